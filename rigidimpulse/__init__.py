@@ -1,0 +1,42 @@
+"""Rigid bodies that collide exactly: mesh scenes in, accurate motion for animation out.
+
+The first hour needs five names: `Scene`, `Body`, `Shape`, `Material` and `simulate`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+# Public names and their homes: imported when used, so that `import rigidimpulse` and `--help` stay quick.
+_HOMES = {
+    "Accuracy": "accuracy",
+    "Body": "body",
+    "Keyframes": "keyframes",
+    "Material": "material",
+    "Recording": "recording",
+    "Scene": "scene",
+    "SceneError": "errors",
+    "Shape": "shape",
+    "compile_scene": "world",
+    "contains": "detect.inside",
+    "load_recording": "recording",
+    "simulate": "simulate",
+}
+
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module 'rigidimpulse' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"rigidimpulse.{home}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

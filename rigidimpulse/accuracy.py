@@ -1,0 +1,67 @@
+"""Accuracy: one named strategy for each slot, and the presets, which are nothing but named values.
+
+Slots
+    impact_time     how the first contact in an interval is found (stage sweep)
+    response        how impulses are computed (stage respond)
+    integrator      how bodies move between impacts (stage integrate)
+    contact_solver  how lasting contacts are solved (stage constrain)
+    step            s; contact forces are constant over it, impacts are found inside it at any time
+    tolerance       gap error at an impact, as a fraction of the size of the smaller body
+    iterations      limit of gap queries for one pair and one interval
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from rigidimpulse.errors import SceneError
+
+
+class Accuracy(BaseModel):
+    """Settings of a run; see the module's head for the slots.
+
+    Example:
+        >>> Accuracy(impact_time="conservative", step=1 / 120).response
+        'sequential'
+
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    impact_time: Literal["bisection", "conservative", "linear", "after"] = "bisection"
+    response: Literal["sequential", "simultaneous", "kinematic"] = "sequential"
+    integrator: Literal["exact"] = "exact"
+    contact_solver: Literal["auto", "newton"] = "auto"
+    step: float = Field(default=1.0 / 60.0, gt=0.0, allow_inf_nan=False)
+    tolerance: float = Field(default=1e-13, gt=0.0, le=1e-2, allow_inf_nan=False)
+    iterations: int = Field(default=2000, ge=1)
+
+    def __init__(self, **settings: object) -> None:
+        try:
+            super().__init__(**settings)
+        except ValidationError as error:
+            lines = [f"accuracy: {'.'.join(map(str, e['loc']))} = {e['input']!r}: {e['msg']}" for e in error.errors()]
+            raise SceneError("\n".join(lines)) from None
+
+
+PRESETS = {
+    "preview": {"impact_time": "conservative", "tolerance": 1e-5},
+    "standard": {},
+    "exact": {"step": 1.0 / 240.0, "tolerance": 1e-15, "iterations": 100000},
+}
+
+
+def resolve_accuracy(accuracy: str | Accuracy) -> Accuracy:
+    """The settings behind a preset's name; settings pass through.
+
+    Raises:
+        SceneError: for an unknown name, listing the known ones.
+
+    """
+    if isinstance(accuracy, Accuracy):
+        return accuracy
+    if accuracy not in PRESETS:
+        raise SceneError(f"accuracy {accuracy!r} is not known; use {', '.join(map(repr, PRESETS))} or ri.Accuracy(...)")
+    return Accuracy(**PRESETS[accuracy])

@@ -1,0 +1,1 @@
+"""Stage constrain: forces of contacts that last."""

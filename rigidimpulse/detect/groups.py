@@ -1,0 +1,174 @@
+"""Groups of touching bodies at one instant, found from some of their bodies by following contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, pressing
+from rigidimpulse.integrate.course import FIXED
+from rigidimpulse.observe.energy import mechanical_energy
+from rigidimpulse.respond.impulse import Contacts
+
+MARGIN = 2.0
+"""Contacts are looked for within this many delta."""
+NO_FORCE = np.zeros(3)
+
+
+@dataclass
+class Group:
+    """Bodies joined by contacts at `time`.
+
+    Attributes:
+        members: movable bodies, in order of index.
+        pairs: places in the window of the contacting pairs.
+        contacts: all contacts within the margin; `place` (m,) their pairs, `keys` who they are.
+        delta: (m,) gap at which lasting contacts are held, m.
+        approach: (m,) u.n, m/s; negative approaches.
+        rest_speed: (m,) a slower rebound is none, m/s.
+        live: (m,) bool, near enough for an impact now.
+        velocity, angular_velocity, position: of the members as they arrived.
+        moved: whether a lift has changed poses.
+        held: whether contact forces act.
+
+    """
+
+    time: float
+    members: np.ndarray
+    pairs: np.ndarray
+    contacts: Contacts
+    place: np.ndarray
+    kinds: np.ndarray
+    keys: list[tuple[int, ...]]
+    delta: np.ndarray
+    approach: np.ndarray
+    rest_speed: np.ndarray
+    live: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    moved: bool = False
+    held: np.ndarray | None = None
+    rests: bool = False
+
+
+def empty_contacts(m: int) -> Contacts:
+    """Arrays for m contacts."""
+    vectors = [np.empty((m, 3)) for _ in range(3)]
+    return Contacts(np.empty(m, np.int64), np.empty(m, np.int64), *vectors, *(np.empty(m) for _ in range(5)))
+
+
+def select(contacts: Contacts, which: np.ndarray) -> Contacts:
+    """The contacts at the given places."""
+    return Contacts(*(np.ascontiguousarray(column[which]) for column in contacts))
+
+
+def collect(context, window, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Manifolds of window pairs at the present poses: copies of the filled buffer rows."""
+    world, state = context.world, context.state
+    while True:
+        count = contacts_of_pairs(
+            world.geometry, world.shape_of_body, state.now, state.rotation, window.a[pairs], window.b[pairs],
+            MARGIN * window.delta[pairs], context.scratch_pairs, context.contact_real, context.contact_int,
+        )
+        if count >= 0:
+            return context.contact_real[:count].copy(), context.contact_int[:count].copy()
+        context.grow_contacts(-count)
+
+
+def touching_groups(context, window, time: float, bodies: np.ndarray) -> list[Group]:
+    """Groups that the given bodies belong to at `time`; all bodies asked about are brought to it."""
+    world, state = context.world, context.state
+    seen = np.zeros(len(window.a), bool)
+    brought = np.zeros(world.num_bodies, bool)
+    reached = np.zeros(world.num_bodies, bool)
+    frontier = np.asarray(bodies, np.int64)
+    reals, integers = [], []
+    while len(frontier):
+        reached[frontier] = True
+        mark = np.zeros(world.num_bodies, bool)
+        mark[frontier] = True
+        pairs = np.flatnonzero((mark[window.a] | mark[window.b]) & ~seen)
+        if not len(pairs):
+            break
+        seen[pairs] = True
+        mark[:] = False
+        mark[window.a[pairs]] = True
+        mark[window.b[pairs]] = True
+        fresh = np.flatnonzero(mark & ~brought)
+        brought[fresh] = True
+        bring_all(
+            state.course, fresh, time, state.now, state.rotation, context.acceleration, context.angular_acceleration
+        )
+        real, integer = collect(context, window, pairs)
+        if not len(real):
+            break
+        reals.append(real)
+        integers.append(integer)
+        touched = np.unique(integer[:, :2])
+        frontier = touched[world.dynamic[touched] & ~reached[touched]]
+    if not reals:
+        return []
+    return _components(context, window, time, np.concatenate(reals), np.concatenate(integers))
+
+
+def _components(context, window, time: float, real: np.ndarray, integer: np.ndarray) -> list[Group]:
+    """Split contacts into groups joined by movable bodies, in order of their first body."""
+    dynamic = context.world.dynamic
+    parent: dict[int, int] = {}
+
+    def root(i: int) -> int:
+        while parent.setdefault(i, i) != i:
+            i = parent[i]
+        return i
+
+    for a, b in integer[:, :2].tolist():
+        if dynamic[a] and dynamic[b]:
+            low, high = sorted((root(a), root(b)))
+            parent[high] = low
+    owner = np.array([root(a if dynamic[a] else b) for a, b in integer[:, :2].tolist()])
+    return [make_group(context, window, time, real, integer, owner == o) for o in np.unique(owner)]
+
+
+def make_group(context, window, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray) -> Group:
+    """The group of the contacts marked in `which`, sorted by pair."""
+    world, state = context.world, context.state
+    rows = np.flatnonzero(which)
+    rows = rows[np.lexsort((integer[rows, 4], integer[rows, 3], integer[rows, 2], integer[rows, 1], integer[rows, 0]))]
+    contacts = empty_contacts(len(rows))
+    fill_contacts(state.now, real, integer, rows, world.material_of_body, world.coefficients, contacts)
+    touched = np.unique(integer[rows, :2])
+    members = touched[world.dynamic[touched]]
+    place = window.find(contacts.body_a, contacts.body_b)
+    group = Group(
+        time=time,
+        members=members,
+        pairs=np.unique(place),
+        contacts=contacts,
+        place=place,
+        kinds=integer[rows, 2],
+        keys=[tuple(row) for row in integer[rows].tolist()],
+        delta=window.delta[place],
+        approach=np.empty(len(rows)),
+        rest_speed=np.empty(len(rows)),
+        live=window.is_live(time, place, contacts.gap),
+        velocity=state.now.velocity[members].copy(),
+        angular_velocity=state.now.angular_velocity[members].copy(),
+    )
+    for i in members:
+        course = state.course
+        if course.mode[i] != FIXED and (np.any(course.torque[i]) or np.any(course.acceleration[i] != world.gravity[i])):
+            state.arrival_energy[int(i)] = mechanical_energy(state.now, world, np.array([i]))
+    classify(context, group)
+    return group
+
+
+def classify(context, group: Group) -> None:
+    """Measure approach speeds and what presses each contact; slow approaches within the margin count as live."""
+    memory = context.state.contact_force
+    force = np.array([memory.get(key, NO_FORCE)[0] for key in group.keys])
+    pressing(
+        context.state.now, group.contacts, context.acceleration, context.angular_acceleration, force, group.delta,
+        group.approach, group.rest_speed,
+    )
+    group.live |= np.abs(group.approach) <= group.rest_speed

@@ -1,0 +1,155 @@
+"""Which bodies touch at one instant: poses brought to it, manifolds of the pairs in question, and what presses each contact.
+
+The acceleration that presses contact i together, without the force the contact itself carried before, is
+
+    a_i = -n.(acceleration of b's point - acceleration of a's point) + f_i (n.K n)
+
+with the present accelerations of the bodies (forces and contacts included) and f_i the normal force it carried. It is what a rebound is
+measured against: one that rises less than delta, v^2 < 2 a delta, is none, and a contact that leaves more slowly than that is held.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from rigidimpulse._jit import jit
+from rigidimpulse.detect.manifold import pair_contacts, reduce_contacts
+from rigidimpulse.integrate.course import FIXED, state_at
+from rigidimpulse.respond.impulse import inverse_effective_mass, relative_velocity
+from rigidimpulse.rotation import quaternion_to_matrix
+
+
+@jit
+def world_inverse_inertia(r, inertia, out):
+    """R diag(1 / I) R^T."""
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = (
+                r[i, 0] * r[j, 0] / inertia[0] + r[i, 1] * r[j, 1] / inertia[1] + r[i, 2] * r[j, 2] / inertia[2]
+            )
+
+
+@jit
+def gyroscopic_acceleration(r, inertia, w, torque, out):
+    """I^-1 (torque - w x (I w)), world frame."""
+    x = np.empty(3)
+    t = np.empty(3)
+    for k in range(3):
+        x[k] = r[0, k] * w[0] + r[1, k] * w[1] + r[2, k] * w[2]
+        t[k] = r[0, k] * torque[0] + r[1, k] * torque[1] + r[2, k] * torque[2]
+    a0 = (t[0] + (inertia[1] - inertia[2]) * x[1] * x[2]) / inertia[0]
+    a1 = (t[1] + (inertia[2] - inertia[0]) * x[2] * x[0]) / inertia[1]
+    a2 = (t[2] + (inertia[0] - inertia[1]) * x[0] * x[1]) / inertia[2]
+    for k in range(3):
+        out[k] = r[k, 0] * a0 + r[k, 1] * a1 + r[k, 2] * a2
+
+
+@jit
+def bring(course, i, time, bodies, rotation, acceleration, angular_acceleration):
+    """Bring body i to `time`: pose, velocities, inverse inertia and its present accelerations."""
+    state_at(course, i, time, bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i])
+    quaternion_to_matrix(bodies.orientation[i], rotation[i])
+    if bodies.inv_mass[i] > 0.0:
+        world_inverse_inertia(rotation[i], course.inertia[i], bodies.inv_inertia[i])
+    for k in range(3):
+        acceleration[i, k] = 0.0
+        angular_acceleration[i, k] = 0.0
+    if bodies.inv_mass[i] > 0.0 and course.mode[i] != FIXED:
+        for k in range(3):
+            acceleration[i, k] = course.acceleration[i, k]
+        gyroscopic_acceleration(
+            rotation[i], course.inertia[i], bodies.angular_velocity[i], course.torque[i], angular_acceleration[i]
+        )
+
+
+@jit
+def bring_all(course, members, time, bodies, rotation, acceleration, angular_acceleration):
+    for i in members:
+        bring(course, i, time, bodies, rotation, acceleration, angular_acceleration)
+
+
+@jit
+def bring_gyroscopic(members, bodies, rotation, inertia, angular_acceleration):
+    """Angular accelerations of torque-free bodies at their present spins."""
+    zero = np.zeros(3)
+    for i in members:
+        gyroscopic_acceleration(rotation[i], inertia[i], bodies.angular_velocity[i], zero, angular_acceleration[i])
+
+
+@jit
+def refresh_pose(members, bodies, rotation, inertia):
+    """Rotation matrix and inverse inertia after a change of orientation."""
+    for i in members:
+        quaternion_to_matrix(bodies.orientation[i], rotation[i])
+        world_inverse_inertia(rotation[i], inertia[i], bodies.inv_inertia[i])
+
+
+@jit
+def contacts_of_pairs(geometry, shape_of_body, bodies, rotation, pairs_a, pairs_b, margin, scratch, real, integer):
+    """Reduced manifolds of the pairs, margin (k,) m; returns the number of contacts, or -(needed) if a buffer is too small."""
+    count = 0
+    for k in range(pairs_a.shape[0]):
+        a, b = pairs_a[k], pairs_b[k]
+        first = count
+        count = pair_contacts(
+            geometry, shape_of_body[a], bodies.position[a], rotation[a],
+            shape_of_body[b], bodies.position[b], rotation[b], margin[k], scratch, real, integer, count,
+        )
+        if count < 0:
+            return count
+        count = reduce_contacts(real, integer, first, count)
+        for c in range(first, count):
+            integer[c, 0] = a
+            integer[c, 1] = b
+    return count
+
+
+@jit
+def fill_contacts(bodies, real, integer, rows, material_of_body, coefficients, contacts):
+    """Contacts (see respond/impulse.py) from the buffer rows; coefficients (k, k, 4): e, mu_s, mu_k, e_t of two materials."""
+    for s in range(rows.shape[0]):
+        c = rows[s]
+        a, b = integer[c, 0], integer[c, 1]
+        contacts.body_a[s] = a
+        contacts.body_b[s] = b
+        for k in range(3):
+            contacts.arm_a[s, k] = real[c, k] - bodies.position[a, k]
+            contacts.arm_b[s, k] = real[c, 3 + k] - bodies.position[b, k]
+            contacts.normal[s, k] = real[c, 6 + k]
+        contacts.gap[s] = real[c, 9]
+        pair = coefficients[material_of_body[a], material_of_body[b]]
+        contacts.restitution[s] = pair[0]
+        contacts.static_friction[s] = pair[1]
+        contacts.dynamic_friction[s] = pair[2]
+        contacts.tangential_restitution[s] = pair[3]
+
+
+@jit
+def _point_acceleration(bodies, acceleration, angular_acceleration, i, r, n):
+    """n.(a + alpha x r + w x (w x r)) of body i."""
+    a, alpha, w = acceleration[i], angular_acceleration[i], bodies.angular_velocity[i]
+    wr = w[0] * r[0] + w[1] * r[1] + w[2] * r[2]
+    ww = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+    x = a[0] + alpha[1] * r[2] - alpha[2] * r[1] + w[0] * wr - ww * r[0]
+    y = a[1] + alpha[2] * r[0] - alpha[0] * r[2] + w[1] * wr - ww * r[1]
+    z = a[2] + alpha[0] * r[1] - alpha[1] * r[0] + w[2] * wr - ww * r[2]
+    return n[0] * x + n[1] * y + n[2] * z
+
+
+@jit
+def pressing(bodies, contacts, acceleration, angular_acceleration, normal_force, delta, approach, rest_speed):
+    """Fill approach (m,) = u.n and rest_speed (m,) = sqrt(2 a delta) [m/s]; normal_force (m,) carried before [N]."""
+    u = np.empty(3)
+    k = np.empty((3, 3))
+    for c in range(contacts.gap.shape[0]):
+        n = contacts.normal[c]
+        approach[c] = relative_velocity(bodies, contacts, c, u)
+        a = _point_acceleration(
+            bodies, acceleration, angular_acceleration, contacts.body_a[c], contacts.arm_a[c], n
+        ) - _point_acceleration(bodies, acceleration, angular_acceleration, contacts.body_b[c], contacts.arm_b[c], n)
+        if normal_force[c] > 0.0:
+            inverse_effective_mass(bodies, contacts, c, k)
+            for i in range(3):
+                for j in range(3):
+                    a += normal_force[c] * n[i] * k[i, j] * n[j]
+        rest_speed[c] = sqrt(2.0 * max(a, 0.0) * delta[c])

@@ -1,0 +1,1 @@
+"""Stage forces: what accelerates bodies, constant over a sub-step."""

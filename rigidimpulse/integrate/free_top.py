@@ -1,0 +1,362 @@
+"""Rotation of a body without torque, exact at any time.
+
+Symbols: principal moments I, body-frame angular velocity w, angular momentum L = |I w|, T2 = w . I w (twice the energy).
+    spherical inertia, or w on a principal axis:   q(t) = exp(w t) q0
+    symmetric (I_b = I_c = I, axis e of I_a):      q(t) = exp(L t / I) q0 exp((1 - I_a / I) w_a t e)
+    asymmetric: a frame (e1, e2, e3) of principal axes with e1 the middle moment and L circling about e3, w3 > 0:
+        w1 = b sn u,  w2 = c cn u,  w3 = a dn u,  u = p t + u0,  m = |I1 - I2| r2 / (|I3 - I1| d2),
+        r2 = |T2 I3 - L^2|,  d2 = |T2 I2 - L^2|,  p^2 = |I3 - I1| d2 / (I1 I2 I3),
+        a^2 = d2 / (I3 |I3 - I2|),  b^2 = r2 / (I1 |I3 - I1|),  c^2 = r2 / (I2 |I3 - I2|),  sign b = sign(I1 - I3)
+
+Attitude of the asymmetric top: let g = (g0, g1, g2, g3) turn (e1, e2, e3) into a fixed frame whose third axis is L. Its
+Cayley-Klein parameters A = g0 + i g3, B = g1 + i g2 obey |A|^2 = (1 + I3 w3 / L) / 2, B = -i (I1 w1 + i I2 w2) A / (L + I3 w3)
+    and   arg(A)' = (T2 + L w3) / (2 (L + I3 w3)),
+so that A is never zero and only its phase is left to find. A is a theta function of half the usual lattice:
+    A ~ exp(i lambda t) theta4(z - i y; Q),   z = pi u / 2K,   y = sign(I3 - I1) pi y0 / 2K,   Q = exp(-2 pi K' / K),
+    where y0 is the zero of L - I3 a dn(i y0): y0 = tau RF(1, G, G + m1 tau^2), G = (L / I3 a)^2, tau^2 = I2 |I3 - I1| / (I3 |I1 - I2|),
+and lambda follows from the rate at z = 0. Near the separatrix (Q > exp(-pi)) Jacobi's imaginary transformation is used: with
+T = 2K'/K,  theta4(z - i y; exp(-pi T)) ~ exp(2 i z y / (pi T)) theta2(y/T + i z/T; exp(-pi / T)). Phases are counted from the
+nearest maximum of dn, so errors grow only as the round-off of the phase itself.
+
+Sources: C. G. J. Jacobi, J. reine angew. Math. 39, 1850; R. van Zon and J. Schofield, J. Comput. Phys. 225:145, 2007 (sections
+2-3); F. Klein and A. Sommerfeld, Theorie des Kreisels, chapter VI; sn, cn, dn after R. Bulirsch, Numer. Math. 7:78, 1965;
+RF after B. C. Carlson, DLMF 19.36.
+"""
+
+import math
+
+from rigidimpulse._jit import jit
+from rigidimpulse.rotation import exponential, from_columns, product, rotated
+
+# Kinds of rotation, and places in the row of constants.
+REST, FIXED_AXIS, SYMMETRIC, ASYMMETRIC = 0.0, 1.0, 2.0, 3.0
+_KIND = 0
+_BASE = 1  # (4,) orientation at the start; asymmetric: from the frame of L to the world
+_RATE = 5  # (3,) world angular velocity (fixed axis), precession L / I (symmetric)
+_SPIN = 8  # (3,) turning in the body (symmetric)
+_START_RATE = 11  # (3,) world angular velocity at the start (symmetric)
+
+_FRAME = 5  # (4,) from (e1, e2, e3) to the principal frame
+_AMPLITUDE = 9  # (3,) b, c, a
+_SHARE = 12  # (3,) I b / L, I c / L, I a / L
+_PHASE_RATE = 15  # lambda
+_PHASE_SLOPE = 16  # 2 y / (pi T), or 0
+_HALF_TURNS = 17  # p / 2K, and u0 / 2K
+_NEAR = 19  # 1 if the series are those of the imaginary transformation
+_NOME_SCALE = 20  # 1 / T
+_THETA = 21  # (8,) coefficients of real and imaginary part
+_MEAN = 29  # final mean of the AGM of (1, k')
+_LEVELS = 30  # number of levels
+_AGM = 31  # (2 * _MAX_LEVELS,) arithmetic and geometric means
+
+_MAX_LEVELS = 14
+FREE_TOP_SIZE = _AGM + 2 * _MAX_LEVELS
+
+_EQUAL = 4e-15
+"""relative difference of two moments below which they are equal: the phase then errs by less than its round-off"""
+_ON_AXIS = 1e-40
+"""part of the spin off a stable principal axis that is taken for none"""
+_ON_UNSTABLE_AXIS = 1e-15
+"""the same for the middle axis: what round-off of the world spin leaves must not make a body flip"""
+_LEAST_M1 = 1e-100
+"""floor of 1 - m: the separatrix itself; the body stays by the unstable axis for 2K > 230 / p"""
+_AGM_DONE = 1e-8
+"""relative gap of the two means after which one more step is exact"""
+_RF_DONE = 0.003
+"""relative spread at which the series of RF, whose error is of order 8, ends"""
+_TINY_ANGLE = 1e-60
+"""z below which sn z = z, and cotangents would overflow"""
+_NOME_SWITCH = 1.0
+"""T = 2K'/K below which the imaginary transformation converges faster"""
+
+
+@jit
+def _carlson_rf(x, y, z):
+    """Carlson's symmetric elliptic integral of the first kind; at most one argument zero."""
+    while True:
+        mean = (x + y + z) / 3.0
+        dx, dy, dz = (mean - x) / mean, (mean - y) / mean, (mean - z) / mean
+        if not max(abs(dx), abs(dy), abs(dz)) >= _RF_DONE:  # so written, it ends for NaN too
+            break
+        sx, sy, sz = math.sqrt(x), math.sqrt(y), math.sqrt(z)
+        shift = sx * sy + sy * sz + sz * sx
+        x, y, z = 0.25 * (x + shift), 0.25 * (y + shift), 0.25 * (z + shift)
+    e2, e3 = dx * dy - dz * dz, dx * dy * dz
+    series = e2 * (-0.1 + e2 / 24.0 - 3.0 * e3 / 44.0) + e3 / 14.0
+    return (1.0 + series - 5.0 * e2 * e2 * e2 / 208.0 + 3.0 * e3 * e3 / 104.0) / math.sqrt(mean)
+
+
+@jit
+def _agm(k):
+    """Arithmetic-geometric mean of 1 and k."""
+    a, g = 1.0, k
+    while abs(a - g) > _AGM_DONE * a:
+        a, g = 0.5 * (a + g), math.sqrt(a * g)
+    return 0.5 * (a + g)
+
+
+@jit
+def _store_agm(k, constants_out):
+    """Mean of 1 and k, with every level kept for `_jacobi`."""
+    a, g = 1.0, k
+    level = 0
+    while True:
+        constants_out[_AGM + 2 * level] = a
+        constants_out[_AGM + 2 * level + 1] = g
+        level += 1
+        if abs(a - g) <= _AGM_DONE * a or level == _MAX_LEVELS:
+            break
+        a, g = 0.5 * (a + g), math.sqrt(a * g)
+    mean = 0.5 * (a + g)
+    constants_out[_MEAN] = mean
+    constants_out[_LEVELS] = level
+    return mean
+
+
+@jit
+def _jacobi(constants, sin_z, cos_z):
+    """sn, cn, dn of u = z / mean, by descending Landen steps on the cotangent of the amplitude."""
+    if abs(sin_z) < _TINY_ANGLE:
+        return sin_z / constants[_MEAN], 1.0, 1.0
+    ratio = cos_z / sin_z
+    cotangent = ratio * constants[_MEAN]
+    dn = 1.0
+    for level in range(int(constants[_LEVELS]) - 1, -1, -1):
+        a = constants[_AGM + 2 * level]
+        g = constants[_AGM + 2 * level + 1]
+        ratio *= cotangent
+        cotangent *= dn
+        dn = (g + ratio) / (a + ratio)
+        ratio = cotangent / a
+    sn = math.copysign(1.0 / math.sqrt(1.0 + cotangent * cotangent), sin_z)
+    return sn, cotangent * sn, dn
+
+
+@jit
+def _theta(constants, z, sin_z, cos_z):
+    """Real and imaginary part of the theta function that carries the phase of A, up to a positive factor."""
+    c = constants
+    if c[_NEAR] == 0.0:
+        cos_2, sin_2 = cos_z * cos_z - sin_z * sin_z, 2.0 * sin_z * cos_z
+        cos_4, sin_4 = cos_2 * cos_2 - sin_2 * sin_2, 2.0 * sin_2 * cos_2
+        cos_6, sin_6 = cos_4 * cos_2 - sin_4 * sin_2, sin_4 * cos_2 + cos_4 * sin_2
+        real = c[_THETA] + c[_THETA + 1] * cos_2 + c[_THETA + 2] * cos_4 + c[_THETA + 3] * cos_6
+        return real, c[_THETA + 5] * sin_2 + c[_THETA + 6] * sin_4 + c[_THETA + 7] * sin_6
+    # Divided by exp(|x|), which is left to the final normalisation: cosh, sinh of (2n + 1) x without overflow.
+    x = z * c[_NOME_SCALE]
+    growth = math.exp(2.0 * abs(x))
+    growing, shrinking = 1.0, 1.0 / growth
+    real, imaginary = 0.0, 0.0
+    for n in range(4):
+        real += c[_THETA + n] * (growing + shrinking)
+        imaginary += c[_THETA + 4 + n] * (growing - shrinking)
+        growing *= growth
+        shrinking /= growth
+    return real, imaginary if x >= 0.0 else -imaginary
+
+
+@jit
+def _asymmetric_frame(c, t):
+    """Quaternion of (e1, e2, e3) relative to the frame of L, and w1, w2, w3, t seconds after the start."""
+    turns = c[_HALF_TURNS] * t + c[_HALF_TURNS + 1]
+    whole = math.floor(turns + 0.5)
+    z = math.pi * (turns - whole)
+    sin_z, cos_z = math.sin(z), math.cos(z)
+    sn, cn, dn = _jacobi(c, sin_z, cos_z)
+    if whole % 2.0 != 0.0:
+        sn, cn = -sn, -cn
+    l1, l2, l3 = c[_SHARE] * sn, c[_SHARE + 1] * cn, c[_SHARE + 2] * dn
+    real, imaginary = _theta(c, z, sin_z, cos_z)
+    phase = c[_PHASE_RATE] * t + c[_PHASE_SLOPE] * z
+    cos_phase, sin_phase = math.cos(phase), math.sin(phase)
+    size = math.sqrt(0.5 * (1.0 + l3) / (real * real + imaginary * imaginary))
+    a_real = size * (cos_phase * real - sin_phase * imaginary)
+    a_imaginary = size * (sin_phase * real + cos_phase * imaginary)
+    b_real = (l2 * a_real + l1 * a_imaginary) / (1.0 + l3)
+    b_imaginary = (l2 * a_imaginary - l1 * a_real) / (1.0 + l3)
+    w1, w2, w3 = c[_AMPLITUDE] * sn, c[_AMPLITUDE + 1] * cn, c[_AMPLITUDE + 2] * dn
+    return a_real, b_real, b_imaginary, a_imaginary, w1, w2, w3
+
+
+@jit
+def _store_phase(c, start_rate, speed, sigma, y, t_ratio):
+    """Coefficients of the theta function and lambda, given arg(A)' at z = 0, z', sigma, |y| and T."""
+    slope, total = 0.0, 0.0
+    if t_ratio >= _NOME_SWITCH:
+        c[_NEAR], c[_NOME_SCALE], c[_PHASE_SLOPE] = 0.0, 0.0, 0.0
+        c[_THETA], c[_THETA + 4] = 1.0, 0.0
+        total = 1.0
+        for n in range(1, 4):
+            high = math.exp(2.0 * n * y - n * n * math.pi * t_ratio)
+            low = math.exp(-2.0 * n * y - n * n * math.pi * t_ratio)
+            sign = 1.0 if n % 2 == 0 else -1.0
+            c[_THETA + n] = sign * (high + low)
+            c[_THETA + 4 + n] = sigma * sign * (high - low)
+            total += c[_THETA + n]
+            slope += 2.0 * n * c[_THETA + 4 + n]
+        slope /= total
+    else:
+        c[_NEAR], c[_NOME_SCALE], c[_PHASE_SLOPE] = 1.0, 1.0 / t_ratio, 2.0 * sigma * y / (math.pi * t_ratio)
+        for n in range(4):
+            nome = math.exp(-n * (n + 1) * math.pi / t_ratio)
+            odd = 2.0 * n + 1.0
+            c[_THETA + n] = nome * math.cos(odd * y / t_ratio)
+            c[_THETA + 4 + n] = -sigma * nome * math.sin(odd * y / t_ratio)
+            total += c[_THETA + n]
+            slope += odd * c[_THETA + 4 + n]
+        slope = c[_PHASE_SLOPE] + slope / (total * t_ratio)
+    c[_PHASE_RATE] = start_rate - speed * slope
+
+
+@jit
+def _store_motion(c, i1, i2, i3, w1, w2, w3):
+    """Constants of the asymmetric motion for moments and spin of order one, w3 > 0."""
+    d13, d12, d23 = abs(i3 - i1), abs(i1 - i2), abs(i3 - i2)
+    r2 = i1 * d13 * w1 * w1 + i2 * d23 * w2 * w2
+    d2 = i3 * d23 * w3 * w3 + i1 * d12 * w1 * w1
+    m = min(d12 * r2 / (d13 * d2), 1.0)
+    m1 = max(d23 * (i3 * d13 * w3 * w3 - i2 * d12 * w2 * w2) / (d13 * d2), _LEAST_M1)
+    sigma = 1.0 if i3 > i1 else -1.0
+    a, b, c2 = math.sqrt(d2 / (i3 * d23)), -sigma * math.sqrt(r2 / (i1 * d13)), math.sqrt(r2 / (i2 * d23))
+    momentum_3, momentum_2 = i3 * a, i2 * c2
+    momentum = math.sqrt(momentum_3 * momentum_3 + momentum_2 * momentum_2)
+    c[_AMPLITUDE], c[_AMPLITUDE + 1], c[_AMPLITUDE + 2] = b, c2, a
+    c[_SHARE], c[_SHARE + 1], c[_SHARE + 2] = i1 * b / momentum, momentum_2 / momentum, momentum_3 / momentum
+
+    mean = _store_agm(math.sqrt(m1), c)
+    speed = mean * math.sqrt(d13 * d2 / (i1 * i2 * i3))  # z'
+    c[_HALF_TURNS] = speed / math.pi
+    sn, cn = w1 / b, w2 / c2
+    size = math.sqrt(sn * sn + cn * cn)
+    sn, cn = sn / size, cn / size
+    half_turns = abs(sn) * mean / math.pi * _carlson_rf(cn * cn, cn * cn + m1 * sn * sn, 1.0)
+    if cn < 0.0:
+        half_turns = 1.0 - half_turns
+    c[_HALF_TURNS + 1] = math.copysign(half_turns, sn)
+
+    steepness = momentum / momentum_3
+    steepness *= steepness  # G
+    tau2 = i2 * d13 / (i3 * d12)
+    y = mean * math.sqrt(tau2) * _carlson_rf(1.0, steepness, steepness + m1 * tau2)
+    start_rate = 0.5 * (i3 * a * a + i2 * c2 * c2 + momentum * a) / (momentum + momentum_3)
+    _store_phase(c, start_rate, speed, sigma, y, 2.0 * mean / _agm(math.sqrt(m)))
+
+
+@jit
+def _prepare_asymmetric(inertia, low, middle, high, wx, wy, wz, c):
+    """Choose (e1, e2, e3), store the motion in it, and turn the base so that it starts at the given orientation."""
+    w = (wx, wy, wz)
+    scale_i, scale_w = 1.0 / inertia[high], 1.0 / max(abs(wx), abs(wy), abs(wz))
+    i_low, i_middle, i_high = scale_i * inertia[low], scale_i * inertia[middle], 1.0
+    w_low, w_middle, w_high = scale_w * w[low], scale_w * w[middle], scale_w * w[high]
+    circles_high = i_high * (i_high - i_middle) * w_high * w_high >= i_low * (i_middle - i_low) * w_low * w_low
+    third = high if circles_high else low
+    sign_3 = 1.0 if w[third] >= 0.0 else -1.0
+    sign_2 = sign_3 if (middle - third) % 3 == 1 else -sign_3
+    if circles_high:
+        _store_motion(c, i_middle, i_low, i_high, w_middle, sign_2 * w_low, sign_3 * w_high)
+    else:
+        _store_motion(c, i_middle, i_high, i_low, w_middle, sign_2 * w_high, sign_3 * w_low)
+    for k in range(3):
+        c[_AMPLITUDE + k] /= scale_w
+    c[_PHASE_RATE] /= scale_w
+    c[_HALF_TURNS] /= scale_w
+
+    second = 3 - middle - third
+    e0, e1, e2, e3 = from_columns(
+        1.0 if middle == 0 else 0.0,
+        1.0 if middle == 1 else 0.0,
+        1.0 if middle == 2 else 0.0,
+        sign_2 if second == 0 else 0.0,
+        sign_2 if second == 1 else 0.0,
+        sign_2 if second == 2 else 0.0,
+        sign_3 if third == 0 else 0.0,
+        sign_3 if third == 1 else 0.0,
+        sign_3 if third == 2 else 0.0,
+    )
+    c[_FRAME], c[_FRAME + 1], c[_FRAME + 2], c[_FRAME + 3] = e0, e1, e2, e3
+    g0, g1, g2, g3, _, _, _ = _asymmetric_frame(c, 0.0)
+    h0, h1, h2, h3 = product(e0, e1, e2, e3, g0, -g1, -g2, -g3)
+    c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = product(
+        c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], h0, h1, h2, h3
+    )
+    c[_KIND] = ASYMMETRIC
+
+
+@jit
+def _prepare_symmetric(inertia, axis, w_axis, w_world, c):
+    """Constants for two equal moments; `axis` is the one of the third."""
+    i_across = 0.5 * (inertia[(axis + 1) % 3] + inertia[(axis + 2) % 3])
+    excess = inertia[axis] / i_across - 1.0
+    along = excess * w_axis
+    x, y, z = 1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0
+    dx, dy, dz = rotated(c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], along * x, along * y, along * z)
+    c[_RATE], c[_RATE + 1], c[_RATE + 2] = w_world[0] + dx, w_world[1] + dy, w_world[2] + dz
+    c[_SPIN], c[_SPIN + 1], c[_SPIN + 2] = -along * x, -along * y, -along * z
+    c[_START_RATE], c[_START_RATE + 1], c[_START_RATE + 2] = w_world[0], w_world[1], w_world[2]
+    c[_KIND] = SYMMETRIC
+
+
+@jit
+def prepare(inertia, q, w_world, constants_out):
+    """Write the constants (FREE_TOP_SIZE,) of the motion from orientation q (4,) and world angular velocity (3,), rad/s.
+
+    `inertia` (3,): principal moments, kg m^2, all > 0; they need not obey the triangle inequality.
+    """
+    c = constants_out
+    scale = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    spin = max(abs(w_world[0]), abs(w_world[1]), abs(w_world[2]))
+    if spin == 0.0:
+        scale = 1.0  # a body at rest keeps the very bits of its orientation
+    for k in range(4):
+        c[_BASE + k] = scale * q[k]
+    for k in range(3):
+        c[_RATE + k] = w_world[k]
+    c[_KIND] = REST if spin == 0.0 else FIXED_AXIS
+    low = 0 if inertia[0] <= min(inertia[1], inertia[2]) else (1 if inertia[1] <= inertia[2] else 2)
+    high = 2 if inertia[2] >= max(inertia[0], inertia[1]) else (1 if inertia[1] >= inertia[0] else 0)
+    middle = 3 - low - high
+    equal = _EQUAL * inertia[high]
+    if spin == 0.0 or inertia[high] - inertia[low] <= equal:
+        return
+    w = rotated(c[_BASE], -c[_BASE + 1], -c[_BASE + 2], -c[_BASE + 3], w_world[0], w_world[1], w_world[2])
+    if inertia[high] - inertia[middle] <= equal:
+        _prepare_symmetric(inertia, low, w[low], w_world, c)
+    elif inertia[middle] - inertia[low] <= _EQUAL * inertia[middle]:
+        _prepare_symmetric(inertia, high, w[high], w_world, c)
+    elif not (
+        max(abs(w[middle]), abs(w[low])) <= _ON_AXIS * spin
+        or max(abs(w[middle]), abs(w[high])) <= _ON_AXIS * spin
+        or max(abs(w[low]), abs(w[high])) <= _ON_UNSTABLE_AXIS * spin
+    ):
+        _prepare_asymmetric(inertia, low, middle, high, w[0], w[1], w[2], c)
+
+
+@jit
+def rotation(constants, t):
+    """Quaternion and world angular velocity t seconds after the start, as seven numbers."""
+    c = constants
+    if c[_KIND] == ASYMMETRIC:
+        g0, g1, g2, g3, w1, w2, w3 = _asymmetric_frame(c, t)
+        h0, h1, h2, h3 = product(c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], g0, g1, g2, g3)
+        wx, wy, wz = rotated(h0, h1, h2, h3, w1, w2, w3)
+        q0, q1, q2, q3 = product(
+            h0, h1, h2, h3, c[_FRAME], -c[_FRAME + 1], -c[_FRAME + 2], -c[_FRAME + 3]
+        )
+        return q0, q1, q2, q3, wx, wy, wz
+    if c[_KIND] == REST:
+        return c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], 0.0, 0.0, 0.0
+    e0, e1, e2, e3 = exponential(t * c[_RATE], t * c[_RATE + 1], t * c[_RATE + 2])
+    q0, q1, q2, q3 = product(e0, e1, e2, e3, c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3])
+    if c[_KIND] == FIXED_AXIS:
+        return q0, q1, q2, q3, c[_RATE], c[_RATE + 1], c[_RATE + 2]
+    wx, wy, wz = rotated(e0, e1, e2, e3, c[_START_RATE], c[_START_RATE + 1], c[_START_RATE + 2])
+    s0, s1, s2, s3 = exponential(t * c[_SPIN], t * c[_SPIN + 1], t * c[_SPIN + 2])
+    q0, q1, q2, q3 = product(q0, q1, q2, q3, s0, s1, s2, s3)
+    return q0, q1, q2, q3, wx, wy, wz
+
+
+@jit
+def evaluate(constants, t, q_out, w_out):
+    """Write quaternion (4,) and world angular velocity (3,) t >= 0 seconds after the start."""
+    q_out[0], q_out[1], q_out[2], q_out[3], w_out[0], w_out[1], w_out[2] = rotation(constants, t)

@@ -1,0 +1,1 @@
+"""Stage observe: what is kept of a run: frames, impacts, the ledger, events."""

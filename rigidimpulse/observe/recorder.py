@@ -1,0 +1,53 @@
+"""The recorder: samples every body's exact path at the frame times, whatever the frame rate, without touching the motion.
+
+A body's path is fixed from one change of course to the next. Before a body's course changes at time t its frames before t are written; a
+frame at the very time of an impact shows the state after it, but frame 0 is the state as given.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse._jit import jit
+from rigidimpulse.integrate.course import state_at
+
+
+@jit
+def _sample(course, i, times, first, last, position, orientation, velocity, angular_velocity):
+    for f in range(first, last):
+        state_at(course, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
+
+
+class Recorder:
+    """Frames of n bodies in the principal frame: position (f, n, 3), orientation (f, n, 4), velocities (f, n, 3)."""
+
+    def __init__(self, times: np.ndarray, num_bodies: int) -> None:
+        """times (f,) s, increasing."""
+        self.times = times
+        self.position = np.empty((len(times), num_bodies, 3))
+        self.orientation = np.empty((len(times), num_bodies, 4))
+        self.velocity = np.empty((len(times), num_bodies, 3))
+        self.angular_velocity = np.empty((len(times), num_bodies, 3))
+        self.written = np.zeros(num_bodies, np.int64)
+
+    def start(self, course) -> None:
+        """Write frame 0, the state as given."""
+        for i in range(len(self.written)):
+            self._write(course, i, 1)
+
+    def flush(self, course, i: int, time: float) -> None:
+        """Write the frames of body i before `time`; its course must still be the one that led there."""
+        self._write(course, i, int(np.searchsorted(self.times, time, side="left")))
+
+    def finish(self, course) -> None:
+        """Write what is left of all bodies."""
+        for i in range(len(self.written)):
+            self._write(course, i, len(self.times))
+
+    def _write(self, course, i: int, last: int) -> None:
+        first = int(self.written[i])
+        if last > first:
+            _sample(
+                course, i, self.times, first, last, self.position, self.orientation, self.velocity, self.angular_velocity
+            )
+            self.written[i] = last

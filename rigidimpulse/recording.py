@@ -1,0 +1,197 @@
+"""What a run leaves: frames, impacts, ledger, status; and the files it can be written to."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigidimpulse.errors import SceneError, unknown_name
+
+if TYPE_CHECKING:
+    from rigidimpulse.observe.events import Event
+    from rigidimpulse.observe.ledger import Ledger
+    from rigidimpulse.plan import Plan
+    from rigidimpulse.scene import Scene
+
+
+@dataclass(frozen=True)
+class Status:
+    """How a run went.
+
+    Attributes:
+        ok: nothing happened that a user should know of.
+        message: what happened and what to change.
+        events: all of it, in order of time.
+
+    """
+
+    ok: bool
+    message: str
+    events: tuple[Event, ...] = ()
+
+    @staticmethod
+    def of(events: Sequence[Event]) -> Status:
+        """Return the status that the events of a run add up to."""
+        if not events:
+            return Status(True, "finished")
+        lines = [f"t = {e.time:.6g} s, {e.kind} ({', '.join(e.bodies)}): {e.message}" for e in events]
+        return Status(False, "\n".join(lines), tuple(events))
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Frames of n bodies at f times.
+
+    Attributes:
+        times: (f,) s. names: body names, in order of index.
+        positions: (f, n, 3) m, body origins. orientations: (f, n, 4) wxyz, body to world.
+        velocities: (f, n, 3) m/s, centres of mass. angular_velocities: (f, n, 3) rad/s, world axes.
+        centers: (f, n, 3) m, centres of mass.
+        impacts: structured array, one row an impulse at a contact point (see observe.events.IMPACT_DTYPE).
+        ledger: energy and momentum per frame. status: how the run went. plan: what was simulated and why.
+        scene: the scene as it was written; None in a recording loaded from a file without one.
+
+    """
+
+    times: np.ndarray
+    names: list[str]
+    positions: np.ndarray
+    orientations: np.ndarray
+    velocities: np.ndarray
+    angular_velocities: np.ndarray
+    centers: np.ndarray
+    impacts: np.ndarray
+    ledger: Ledger | None = None
+    status: Status = Status(True, "loaded")
+    plan: Plan | None = None
+    scene: Scene | None = None
+
+    def index(self, name: str) -> int:
+        """Index of a body.
+
+        Raises:
+            SceneError: for an unknown name, listing the known ones.
+
+        """
+        if name not in self.names:
+            raise unknown_name("body", name, self.names)
+        return self.names.index(name)
+
+    def position(self, name: str) -> np.ndarray:
+        """(f, 3) m, the body's own origin."""
+        return self.positions[:, self.index(name)]
+
+    def orientation(self, name: str) -> np.ndarray:
+        """(f, 4) wxyz, body to world; signs are continuous."""
+        from rigidimpulse.rotation import quaternion_continuity
+
+        return quaternion_continuity(self.orientations[:, self.index(name)])
+
+    def velocity(self, name: str) -> np.ndarray:
+        """(f, 3) m/s, of the centre of mass."""
+        return self.velocities[:, self.index(name)]
+
+    def angular_velocity(self, name: str) -> np.ndarray:
+        """(f, 3) rad/s, world axes."""
+        return self.angular_velocities[:, self.index(name)]
+
+    def center_of_mass(self, name: str) -> np.ndarray:
+        """(f, 3) m."""
+        return self.centers[:, self.index(name)]
+
+    def state_hash(self) -> str:
+        """SHA-256 of all frames and impacts: equal if and only if two runs agree in every bit."""
+        import hashlib
+
+        digest = hashlib.sha256()
+        for array in (self.times, self.positions, self.orientations, self.velocities, self.angular_velocities):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        digest.update(np.ascontiguousarray(self.impacts).tobytes())
+        return digest.hexdigest()
+
+    def export(self, path: str | os.PathLike) -> Path:
+        """Write the recording; the suffix says how: .npz (arrays) or .html (a page that plays it, in one file).
+
+        Raises:
+            SceneError: for another suffix, or .html without a scene.
+
+        """
+        path = Path(path)
+        if path.suffix == ".npz":
+            return self._write(path, self._write_npz)
+        if path.suffix == ".html":
+            self._need_scene("an HTML page")
+            from rigidimpulse.view import write_html
+
+            return self._write(path, lambda target: write_html(self, target))
+        raise SceneError(f"cannot export to {path.name!r}", "use a name that ends in .npz or .html")
+
+    def show(self) -> Any:
+        """Open the recording in the browser (meshcat); returns the viewer, which ends with the program.
+
+        Raises:
+            SceneError: without a scene.
+
+        """
+        self._need_scene("the viewer")
+        from rigidimpulse.view import show
+
+        return show(self)
+
+    def _need_scene(self, what: str) -> None:
+        if self.scene is None:
+            raise SceneError(f"{what} needs the shapes of the scene", "simulate the scene, then export or show that run")
+
+    def _write(self, path: Path, write: Any) -> Path:
+        """Write to a temporary name beside the target, then rename: nobody ever sees half a file."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+        try:
+            write(temporary)
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+        return path
+
+    def _write_npz(self, path: Path) -> None:
+        np.savez_compressed(
+            path,
+            times=self.times,
+            names=np.array(self.names),
+            position=self.positions,
+            orientation=self.orientations,
+            velocity=self.velocities,
+            angular_velocity=self.angular_velocities,
+            center_of_mass=self.centers,
+            impacts=self.impacts,
+        )
+
+
+def load_recording(path: str | os.PathLike) -> Recording:
+    """Read a recording written as .npz.
+
+    Raises:
+        SceneError: the file is missing or no recording.
+
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return Recording(
+                times=data["times"],
+                names=[str(name) for name in data["names"]],
+                positions=data["position"],
+                orientations=data["orientation"],
+                velocities=data["velocity"],
+                angular_velocities=data["angular_velocity"],
+                centers=data["center_of_mass"],
+                impacts=data["impacts"],
+            )
+    except (OSError, KeyError, ValueError) as error:
+        raise SceneError(
+            f"{os.fspath(path)} is no recording: {error}", "give an .npz file written by Recording.export"
+        ) from None

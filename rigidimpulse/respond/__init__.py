@@ -1,0 +1,1 @@
+"""Stage respond: what an impact does to velocities."""

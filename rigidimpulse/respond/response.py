@@ -1,0 +1,100 @@
+"""The stage respond: restitution acts on the velocity that bodies brought in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimpulse.conventions import TOLERANCES
+from rigidimpulse.detect.groups import Group, classify, select
+from rigidimpulse.observe.energy import kinetic_energy
+from rigidimpulse.observe.events import IMPACT_DTYPE
+from rigidimpulse.plan import Bound, Skip
+from rigidimpulse.respond.impulse import Contacts, speed_scale
+from rigidimpulse.respond.kinematic import respond_kinematic
+from rigidimpulse.respond.simultaneous import respond_sequential, respond_simultaneous
+
+KERNELS = {
+    "sequential": respond_sequential,
+    "simultaneous": respond_simultaneous,
+    "kinematic": respond_kinematic,
+}
+REASONS = {
+    "sequential": "impacts pair after pair, fastest first; points of a pair together",
+    "simultaneous": "all impacts of touching bodies at once",
+    "kinematic": "normal velocity reflected, masses and spins ignored",
+}
+# Approach speed that counts as none, relative to the speed below which contacts are held.
+SLOW = 1e-9
+# Calls with a full log before a group is given up.
+MAX_CALLS = 1000
+
+
+@dataclass(frozen=True)
+class ImpactResponse:
+    """Impulses at impacts by one of KERNELS."""
+
+    method: str
+    stage: str = "respond"
+
+    @property
+    def name(self) -> str:
+        """Name of the slot's choice."""
+        return f"{self.method} impulses"
+
+    def bind(self, world) -> Bound | Skip:
+        """In where something can collide."""
+        if not world.can_collide:
+            return Skip("nothing can collide")
+        kernel = KERNELS[self.method]
+
+        def respond(context, group: Group) -> None:
+            respond_to_impacts(context, group, kernel)
+
+        return Bound(respond, REASONS[self.method])
+
+
+def respond_to_impacts(context, group: Group, kernel) -> None:
+    """Apply the impulses of the group's approaching contacts and log them."""
+    live = np.flatnonzero(group.live)
+    if not len(live):
+        return
+    contacts = group.contacts if len(live) == len(group.live) else select(group.contacts, live)
+    rest_speed = group.rest_speed[live]
+    scale = speed_scale(context.state.now, contacts)
+    tolerance = TOLERANCES.approach * scale + SLOW * float(rest_speed.max())
+    if group.approach[live].min() >= -tolerance:
+        return
+    now = context.state.now
+    before = kinetic_energy(now, context.world, group.members)
+    for _ in range(MAX_CALLS):
+        count, impulses, capped = kernel(now, contacts, rest_speed, tolerance, scale, context.column, context.impact_log)
+        _log(context, group.time, contacts, context.impact_log[:count])
+        if capped:
+            names = tuple(context.world.names[i] for i in group.members)
+            context.log.report(
+                group.time, "impacts finished without rebound", names,
+                "too many impacts at one instant; try response='simultaneous'",
+            )
+        if not count or count + len(contacts.gap) < len(context.impact_log):
+            break
+    context.log.book(group.time, "impact", kinetic_energy(now, context.world, group.members) - before)
+    classify(context, group)
+
+
+def _log(context, time: float, contacts: Contacts, rows: np.ndarray) -> None:
+    if not len(rows):
+        return
+    c = rows[:, 0].astype(np.int64)
+    table = np.empty(len(rows), IMPACT_DTYPE)
+    table["time"] = time
+    table["body_a"], table["body_b"] = contacts.body_a[c], contacts.body_b[c]
+    position = context.state.now.position
+    at_a = position[contacts.body_a[c]] + contacts.arm_a[c]
+    at_b = position[contacts.body_b[c]] + contacts.arm_b[c]
+    table["point"] = 0.5 * (at_a + at_b)
+    table["normal"] = contacts.normal[c]
+    table["impulse"], table["tangent_impulse"] = rows[:, 1], rows[:, 2:5]
+    table["approach_speed"], table["separation_speed"] = rows[:, 5], rows[:, 6]
+    context.log.impacts.append(table)

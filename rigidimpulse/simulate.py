@@ -1,0 +1,165 @@
+"""Run a scene: compile it, plan it, step it, and hand back what was recorded."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from rigidimpulse._jit import kernels_are_cached
+from rigidimpulse.accuracy import Accuracy
+from rigidimpulse.constrain.contact_forces import ContactForces
+from rigidimpulse.detect.overlap import report_overlaps
+from rigidimpulse.detect.pairs import BroadPhase
+from rigidimpulse.errors import SceneError
+from rigidimpulse.forces.gravity import FreeRotation, Gravity
+from rigidimpulse.integrate.course import FIXED, FREE, PRESCRIBED, begin
+from rigidimpulse.integrate.flight import ExactFlight
+from rigidimpulse.integrate.prescribed import KeyframePaths
+from rigidimpulse.observe.events import EventLog
+from rigidimpulse.observe.ledger import make_ledger
+from rigidimpulse.observe.recorder import Recorder
+from rigidimpulse.plan import Plan
+from rigidimpulse.recording import Recording, Status
+from rigidimpulse.respond.response import ImpactResponse
+from rigidimpulse.scene import Scene
+from rigidimpulse.state import StepContext
+from rigidimpulse.step import step
+from rigidimpulse.sweep.strategy import ImpactTime
+from rigidimpulse.world import World, compile_scene
+
+logger = logging.getLogger("rigidimpulse")
+
+# Frames whose product with the number of bodies is refused as a slip of the keyboard (about 1e9 poses, 100 GB).
+MOST_POSES = 1_000_000_000
+
+
+def simulate(
+    scene: Scene,
+    duration: float,
+    fps: float = 60.0,
+    *,
+    accuracy: str | Accuracy = "standard",
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """Simulate a scene and record it. Deterministic: the same scene gives the same bits, at any frame rate.
+
+    Args:
+        scene: what to simulate; it is not changed.
+        duration: s, >= 0.
+        fps: frames per second; changes what is recorded, never what happens.
+        accuracy: "preview", "standard", "exact" or an `Accuracy`.
+        progress: called after every step with the simulated time in s.
+
+    Returns:
+        The recording, with round(duration * fps) + 1 frames; the first is the initial state.
+
+    Raises:
+        SceneError: the scene cannot be simulated as it is; names the body, the value and the remedy.
+
+    """
+    times = frame_times(duration, fps)
+    world = compile_scene(scene, accuracy)
+    if len(times) * world.num_bodies > MOST_POSES:
+        raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
+    if not kernels_are_cached():
+        logger.warning("compiling kernels for the first run on this machine: up to half a minute, once")
+    plan = make_plan(world)
+    recorder = Recorder(times, world.num_bodies)
+    log = EventLog()
+    context = StepContext(world, recorder, log)
+    start_courses(context)
+    recorder.start(context.state.course)
+    report_overlaps(context)
+    # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
+    paths = KeyframePaths(world)
+    for end in (float(duration), max(float(duration), float(times[-1]))):
+        if plan.collides:
+            run_steps(context, plan, paths, end, progress)
+        else:
+            paths.start_segments(context, end)
+    recorder.finish(context.state.course)
+    return make_recording(context, plan, times, duration)
+
+
+def frame_times(duration: float, fps: float) -> np.ndarray:
+    """Times of round(duration * fps) + 1 frames [s].
+
+    Raises:
+        SceneError: duration or fps is not a positive finite number.
+
+    """
+    if not (math.isfinite(duration) and duration >= 0.0):
+        raise SceneError(f"duration = {duration!r}", "give a finite time in seconds, >= 0")
+    if not (math.isfinite(fps) and fps > 0.0):
+        raise SceneError(f"fps = {fps!r}", "give a positive number of frames per second")
+    return np.arange(round(duration * fps) + 1) / fps
+
+
+def make_plan(world: World) -> Plan:
+    """Bind every effect there is to the world; the plan keeps those that the scene calls for."""
+    accuracy = world.accuracy
+    effects = [
+        BroadPhase(),
+        ImpactResponse(accuracy.response),
+        FreeRotation(),
+        Gravity(),
+        ContactForces(),
+        ImpactTime(accuracy.impact_time),
+        ExactFlight(),
+    ]
+    return Plan(world, effects)
+
+
+def start_courses(context: StepContext) -> None:
+    """Give every body its first course."""
+    world, course = context.world, context.state.course
+    course.position[:], course.orientation[:] = world.position, world.orientation
+    course.velocity[:], course.angular_velocity[:] = world.velocity, world.angular_velocity
+    course.acceleration[:] = world.gravity
+    course.inertia[:] = world.inertia
+    course.mode[:] = np.where(world.dynamic, FREE, np.where(world.moving, PRESCRIBED, FIXED))
+    for i in range(world.num_bodies):
+        begin(course, i)
+
+
+def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, end: float, progress) -> None:
+    """Step to the end; steps end on the grid of the accuracy's step and at keyframes."""
+    size = context.world.accuracy.step
+    while context.state.time < end:
+        now = context.state.time
+        paths.start_segments(context, now)
+        index = math.floor(now / size + 1e-9) + 1
+        step(context, plan, min(index * size, paths.next_key(now), end))
+        if progress is not None:
+            progress(context.state.time)
+
+
+def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration: float) -> Recording:
+    """Body-frame poses, impacts and ledger from what the recorder holds."""
+    world, recorder = context.world, context.recorder
+    position, orientation = np.empty_like(recorder.position), np.empty_like(recorder.orientation)
+    for i in range(world.num_bodies):
+        position[:, i], orientation[:, i] = world.body_pose(i, recorder.position[:, i], recorder.orientation[:, i])
+    k = np.flatnonzero(world.dynamic)
+    impacts = context.log.impact_table()
+    ledger = make_ledger(
+        times, recorder.position[:, k], recorder.orientation[:, k], recorder.velocity[:, k],
+        recorder.angular_velocity[:, k], world.mass[k], world.inertia[k], world.gravity[k], context.log.energy,
+    )
+    return Recording(
+        times=times,
+        names=list(world.names),
+        positions=position,
+        orientations=orientation,
+        velocities=recorder.velocity,
+        angular_velocities=recorder.angular_velocity,
+        centers=recorder.position,
+        impacts=impacts[impacts["time"] <= duration],
+        ledger=ledger,
+        status=Status.of(context.log.events),
+        plan=plan,
+        scene=world.scene,
+    )

@@ -1,0 +1,83 @@
+"""What varies: courses, the state at the instant being worked on, contact memory; and the scratch arrays of a step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.integrate.course import Course, make_course, pose_at
+from rigidimpulse.observe.events import EventLog
+from rigidimpulse.observe.recorder import Recorder
+from rigidimpulse.respond.impulse import BodyState
+from rigidimpulse.world import World
+
+CONTACT_CAPACITY = 1024
+PAIR_CAPACITY = 4096
+LOG_CAPACITY = 4096
+
+
+class State:
+    """The varying arrays of a run.
+
+    Attributes:
+        time: s, every body's course is known from here on.
+        course: path of every body since its last change of course.
+        now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
+        energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at.
+        contact_force: last force of a held contact, in its frame [N], by (body_a, body_b, kind, feature_a, feature_b).
+    """
+
+    def __init__(self, world: World) -> None:
+        n = world.num_bodies
+        self.time = 0.0
+        self.course: Course = make_course(n)
+        self.now = BodyState(
+            position=world.position.copy(),
+            orientation=world.orientation.copy(),
+            velocity=world.velocity.copy(),
+            angular_velocity=world.angular_velocity.copy(),
+            inv_mass=world.inv_mass,
+            inv_inertia=np.zeros((n, 3, 3)),
+        )
+        self.rotation = np.zeros((n, 3, 3))
+        self.contact_force: dict[tuple[int, ...], np.ndarray] = {}
+        self.energy_at_start = np.zeros(n)
+        self.arrival_energy: dict[int, float] = {}
+
+
+class StepContext:
+    """Everything a step needs: world, state, recorder, log, and buffers that grow when they are too small."""
+
+    def __init__(self, world: World, recorder: Recorder, log: EventLog) -> None:
+        n = world.num_bodies
+        self.world = world
+        self.state = State(world)
+        self.recorder = recorder
+        self.log = log
+        self.contact_real = np.empty((CONTACT_CAPACITY, 10))
+        self.contact_int = np.empty((CONTACT_CAPACITY, 5), np.int64)
+        self.scratch_pairs = np.empty((PAIR_CAPACITY, 2), np.int64)
+        self.impact_log = np.empty((LOG_CAPACITY, 7))
+        self.column = np.zeros(n, np.int64)
+        self.acceleration = np.zeros((n, 3))
+        self.angular_acceleration = np.zeros((n, 3))
+        self.wrench = np.zeros((n, 6))
+        self.box_min = np.empty((n, 3))
+        self.box_max = np.empty((n, 3))
+        self.num_queries = 0
+
+    def grow_contacts(self, needed: int) -> None:
+        """Make room for `needed` contacts and candidate pairs."""
+        capacity = max(needed, 2 * len(self.contact_real))
+        self.contact_real = np.empty((capacity, 10))
+        self.contact_int = np.empty((capacity, 5), np.int64)
+        self.scratch_pairs = np.empty((4 * capacity, 2), np.int64)
+
+    def quarantine(self, i: int, time: float) -> None:
+        """Freeze a body whose state stopped being finite where its course last was, and report it."""
+        now, course = self.state.now, self.state.course
+        pose_at(course, i, time, now.position[i], now.orientation[i])
+        now.velocity[i] = now.angular_velocity[i] = 0.0
+        self.log.report(
+            time, "not finite", (self.world.names[i],),
+            "the body's velocity was no finite number; it is frozen: check its mass, inertia and restitution",
+        )

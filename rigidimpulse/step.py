@@ -1,0 +1,36 @@
+"""One step of the loop, and what happens at an instant: detect, respond, forces, constrain, sweep, integrate, observe.
+
+Every body has a course: its exact path since something last acted on it. A step opens a window of pairs that may meet before its end, then
+goes from contact to contact: at the earliest time at which a pair touches, the group of bodies that touch there is brought to that time
+and gets its impulses and contact forces; those whose course changed are swept again. Bodies elsewhere do not notice.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.detect.window import Window
+
+
+def step(context, plan, end: float) -> None:
+    """Advance all courses to `end` [s]."""
+    window = Window(context, end)
+    plan.run("detect", context, window)
+    react(context, plan, window, context.state.time, window.active_bodies())
+    while True:
+        plan.run("sweep", context, window)
+        time = window.next_time()
+        if time >= end:
+            break
+        react(context, plan, window, time, window.bodies_at(time))
+    context.state.time = end
+
+
+def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> None:
+    """Everything that happens at `time` to the groups that the given bodies touch."""
+    for group in window.touching(time, bodies):
+        plan.run("respond", context, group)
+        plan.run("forces", context, group)
+        plan.run("constrain", context, window, group)
+        plan.run("integrate", context, window, group)
+    window.settle(time)

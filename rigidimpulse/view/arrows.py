@@ -1,0 +1,68 @@
+"""Impact arrows: what the page needs to draw the impulse of every impact.
+
+An arrow starts at the point of contact and shows the impulse on a dynamic body: +j on b, -j on a; an impact of two
+dynamic bodies has both. Impulses of one run differ by orders of magnitude, so the length grows with the square root of
+j: a sixteenth of the largest impulse still has a quarter of the length. Weaker ones than that of `LEAST_LENGTH` are
+drawn alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+ROW = 11
+"""Numbers of an arrow: time, point (3), direction (3), contact normal (3), length."""
+MOST_ROWS = 20_000
+"""Arrows kept, the largest first: a page of a long stacking run would otherwise be mostly arrows."""
+LEAST_LENGTH = 0.15
+"""Shortest arrow, as a share of the longest."""
+FADE = 0.4
+"""How long an arrow is seen, s, unless the whole run is short."""
+FADE_SHARE = 0.15
+"""Longest time an arrow is seen, as a share of the run."""
+
+
+def arrow_rows(impacts: npt.NDArray[Any], dynamic: Sequence[bool], longest: float) -> npt.NDArray[np.float32]:
+    """Return the arrows (k, 11) sorted by time.
+
+    Args:
+        impacts: structured array of a recording.
+        dynamic: for each body whether it can be pushed.
+        longest: length of the arrow of the largest impulse, m.
+
+    """
+    impulse = (
+        np.asarray(impacts["impulse"], dtype=np.float64)[:, None] * impacts["normal"] + impacts["tangent_impulse"]
+    ).reshape(-1, 3)
+    size = np.linalg.norm(impulse, axis=1)
+    seen = np.isfinite(size) & (size > 0.0)
+    largest = float(size[seen].max()) if seen.any() else 1.0
+    pushed = np.asarray(dynamic, dtype=bool)
+    parts = []
+    for sign, body in ((1.0, impacts["body_b"]), (-1.0, impacts["body_a"])):
+        chosen = np.flatnonzero(seen & pushed[body])
+        rows = np.empty((len(chosen), ROW))
+        rows[:, 0] = impacts["time"][chosen]
+        rows[:, 1:4] = impacts["point"][chosen]
+        rows[:, 4:7] = sign * impulse[chosen] / size[chosen, None]
+        rows[:, 7:10] = impacts["normal"][chosen]
+        rows[:, 10] = longest * np.maximum(np.sqrt(size[chosen] / largest), LEAST_LENGTH)
+        parts.append(rows)
+    rows = np.concatenate(parts)
+    if len(rows) > MOST_ROWS:
+        rows = rows[np.argsort(-rows[:, 10], kind="stable")[:MOST_ROWS]]
+    return rows[np.argsort(rows[:, 0], kind="stable")].astype(np.float32)
+
+
+def fade_time(duration: float) -> float:
+    """Return how long an arrow is seen, s, in a run of `duration` s; never 0."""
+    return min(FADE, FADE_SHARE * duration) if duration > 0.0 else FADE
+
+
+def longest_arrow(action_radius: float, body_radius: float) -> float:
+    """Return the length of the longest arrow, m: a few body sizes, but neither lost in the picture nor filling it."""
+    return float(np.clip(3.0 * body_radius, 0.14 * action_radius, 0.42 * action_radius))

@@ -1,0 +1,188 @@
+"""What a page holds: the manifest that names and paints the bodies, and meshcat's messages with everything large.
+
+Manifest (JSON)
+    framing   see `camera.Framing`
+    bodies    name, folder (group) and key in meshcat's tree, half spaces, number of the display geometry (-1: none),
+              surface, pose of the first frame
+    numShapes, fade (s an arrow is seen), summary (a line of text)
+Messages, each with its kind
+    shape     a display geometry at /shapes/k, shared by all bodies of that shape
+    times     frame times as a property of /impacts        rows      arrows as a property of /impacts
+    motion    the animation of all bodies that move
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from rigidimpulse.shape import rotation_matrix
+from rigidimpulse.view.arrows import arrow_rows, fade_time, longest_arrow
+from rigidimpulse.view.camera import Path, frame_action, up_axis
+from rigidimpulse.view.display import SEGMENTS, DisplayMesh, display_mesh, display_planes
+from rigidimpulse.view.materials import surface
+from rigidimpulse.view.protocol import RecordingLike
+from rigidimpulse.view.tracks import animation_message, body_tracks, pack_float32, quaternion_keys
+
+MANY_SHAPES = 50
+"""Number of different shapes from which round ones are drawn with `FEW_SEGMENTS`."""
+FEW_SEGMENTS = 24
+LEVEL = 0.99
+"""Least cosine of the slope of a half space that is drawn as the ground and not as a wall or a ramp."""
+
+
+def page_contents(recording: RecordingLike) -> tuple[dict[str, Any], list[tuple[str, dict[str, Any]]]]:
+    """Return the manifest of a recording's page and its messages, each with its kind.
+
+    Raises:
+        ValueError: the recording has no frames, or a pose is not finite.
+
+    """
+    times = np.asarray(recording.times, dtype=np.float64)
+    if len(times) == 0:
+        raise ValueError("the recording has no frames; simulate at least one")
+    bodies = list(recording.scene.bodies)
+    poses = [_finite_poses(recording, body.name) for body in bodies]
+    numbers, meshes = _shared_meshes(bodies)
+    up = up_axis(recording.scene.gravity)
+    framing = frame_action(_paths(bodies, poses, numbers, meshes), up)
+    entries, tracks = [], {}
+    num_coloured = 0
+    for index, body in enumerate(bodies):
+        position, orientation = poses[index]
+        planes = _plane_entries(body, orientation[0], up)
+        group, key = "ground" if planes and numbers[index] < 0 else "bodies", _path_key(index, body.name)
+        entry = {"name": body.name, "group": group, "key": key, "planes": planes, "shape": numbers[index]}
+        entry["surface"] = surface(num_coloured, body)
+        entry["position"] = position[0].tolist()
+        entry["quaternion"] = quaternion_keys(orientation[:1])[0].tolist()
+        entries.append(entry)
+        tracks[f"{group}/{key}"] = body_tracks(times, position, orientation)
+        num_coloured += body.motion != "static"
+    radius = float(np.linalg.norm(framing.half))
+    dynamic = [body.motion == "dynamic" for body in bodies]
+    rows = arrow_rows(recording.impacts, dynamic, longest_arrow(radius, framing.body_radius))
+    manifest = {
+        "framing": asdict(framing),
+        "bodies": entries,
+        "numShapes": len(meshes),
+        "fade": fade_time(float(times[-1] - times[0])),
+        "summary": _summary(sum(dynamic), len(recording.impacts), float(times[-1] - times[0])),
+    }
+    messages = [("shape", _shape_message(number, mesh)) for number, mesh in enumerate(meshes)]
+    messages.append(("times", _property_message("impacts", "times", times)))
+    messages.append(("rows", _property_message("impacts", "rows", rows)))
+    moving = {path: body_keys for path, body_keys in tracks.items() if body_keys}
+    if moving:
+        messages.append(("motion", animation_message(moving, float(times[-1]))))
+    return manifest, messages
+
+
+def _finite_poses(recording: RecordingLike, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions (f, 3) and orientations (f, 4) of a body; raise ValueError if one is not finite."""
+    position = np.asarray(recording.position(name), dtype=np.float64)
+    orientation = np.asarray(recording.orientation(name), dtype=np.float64)
+    finite = np.isfinite(position).all(axis=1) & np.isfinite(orientation).all(axis=1)
+    if not finite.all():
+        frame = int(np.argmin(finite))
+        raise ValueError(f"body {name!r}: the pose of frame {frame} is not finite; look at the status of the run")
+    return position, orientation
+
+
+def _shared_meshes(bodies: list[Any]) -> tuple[list[int], list[DisplayMesh]]:
+    """Return for each body the number of its display mesh, -1 for none, and the meshes; equal shapes share one."""
+    different: dict[Any, Any] = {}
+    keys = [_shape_key(body.shape) for body in bodies]
+    for key, body in zip(keys, bodies, strict=True):
+        different.setdefault(key, body.shape)
+    segments = SEGMENTS if len(different) < MANY_SHAPES else FEW_SEGMENTS
+    number_of: dict[Any, int] = {}
+    meshes = []
+    for key, shape in different.items():
+        mesh = display_mesh(shape, segments)
+        number_of[key] = -1 if mesh is None else len(meshes)
+        if mesh is not None:
+            meshes.append(mesh)
+    return [number_of[key] for key in keys], meshes
+
+
+def _shape_key(shape: Any) -> Any:
+    """Return what is equal for shapes that look alike: figures of primitives, else the object itself."""
+    if shape.kind in ("sphere", "capsule", "cylinder"):
+        return (shape.kind, shape.radius, shape.height)
+    if shape.kind == "box":
+        return (shape.kind, *np.asarray(shape.size).tolist())
+    return id(shape)
+
+
+def _paths(
+    bodies: list[Any], poses: list[tuple[np.ndarray, np.ndarray]], numbers: list[int], meshes: list[DisplayMesh]
+) -> list[Path]:
+    """Return the paths of all bodies that are not just half spaces."""
+    radii = [float(np.sqrt(np.max(np.sum(mesh.vertices**2, axis=1)))) for mesh in meshes]
+    paths = []
+    for body, (position, orientation), number in zip(bodies, poses, numbers, strict=True):
+        if number >= 0:
+            moves = body.motion != "static" and bool(
+                np.any(position != position[0]) or np.any(orientation != orientation[0])
+            )
+            paths.append(Path(body.name, position, radii[number], moves))
+    return paths
+
+
+def _plane_entries(body: Any, orientation: np.ndarray, up: np.ndarray) -> list[dict[str, Any]]:
+    """Return the half spaces of a body for the manifest: normal, offset, and whether it is level ground."""
+    entries = []
+    for normal, offset in display_planes(body.shape):
+        level = bool(up @ rotation_matrix(orientation) @ normal > LEVEL)
+        entries.append({"normal": normal.tolist(), "offset": offset, "level": level})
+    return entries
+
+
+def _path_key(index: int, name: str) -> str:
+    """Return the body's name in meshcat's tree: unique, and without the slash that parts folders."""
+    return f"{index} {name.replace('/', chr(0x2215))}"
+
+
+def _summary(num_dynamic: int, num_impacts: int, duration: float) -> str:
+    """Return the line below the title."""
+    bodies = f"{num_dynamic} moving {'body' if num_dynamic == 1 else 'bodies'}"
+    impacts = f"{num_impacts:,} {'impact' if num_impacts == 1 else 'impacts'}"
+    return f"{bodies}  \u00b7  {impacts}  \u00b7  {duration:.4g} s"
+
+
+def _shape_message(number: int, mesh: DisplayMesh) -> dict[str, Any]:
+    """Return meshcat's `set_object` message of a display geometry.
+
+    meshcat's own `TriangularMeshGeometry` has no normals, and draws its identifiers from the clock.
+    """
+    from meshcat.geometry import pack_numpy_array
+
+    geometry, material = f"geometry {number}", f"material {number}"
+    attributes = {"position": mesh.vertices, "normal": mesh.normals}
+    return {
+        "type": "set_object",
+        "path": f"/shapes/{number}",
+        "object": {
+            "metadata": {"version": 4.5, "type": "Object"},
+            "geometries": [{
+                "uuid": geometry,
+                "type": "BufferGeometry",
+                "data": {
+                    "attributes": {
+                        name: pack_numpy_array(values.T.astype(np.float32)) for name, values in attributes.items()
+                    },
+                    "index": pack_numpy_array(mesh.faces.T.astype(np.uint32)),
+                },
+            }],
+            "materials": [{"uuid": material, "type": "MeshBasicMaterial"}],
+            "object": {"uuid": f"mesh {number}", "type": "Mesh", "geometry": geometry, "material": material},
+        },
+    }  # fmt: skip
+
+
+def _property_message(path: str, name: str, values: np.ndarray) -> dict[str, Any]:
+    """Return meshcat's `set_property` message that hangs a Float32Array on a node."""
+    return {"type": "set_property", "path": "/" + path, "property": name, "value": pack_float32(values)}

@@ -1,0 +1,74 @@
+"""One HTML file of a recording that anyone can open, offline: meshcat's viewer, the motion and our stage around it.
+
+The page holds meshcat's script, a few of its messages (gzip in base64: display geometry, frame times, arrows, tracks),
+a manifest in JSON that names and paints what they hold, and the files of `page/`. The same recording gives the same
+bytes.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html
+import json
+import os
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from rigidimpulse.view.contents import page_contents
+from rigidimpulse.view.protocol import RecordingLike
+
+SCRIPTS = ("look.js", "arrows.js", "transport.js", "hud.js", "main.js")
+DEFAULT_TITLE = "rigidimpulse"
+
+
+def write_html(recording: RecordingLike, path: str | os.PathLike[str], title: str = DEFAULT_TITLE) -> None:
+    """Write a recording as one HTML file, which needs nothing else, not even a network.
+
+    Args:
+        recording: the motion.
+        path: the file.
+        title: shown in the page's corner and as its name.
+
+    Raises:
+        ValueError: the recording has no frames, or a pose is not finite.
+
+    """
+    Path(path).write_text(render_page(recording, title), encoding="utf-8")
+
+
+def render_page(recording: RecordingLike, title: str = DEFAULT_TITLE) -> str:
+    """Return the HTML page of a recording, as `write_html` writes it."""
+    manifest, messages = page_contents(recording)
+    files = resources.files("rigidimpulse.view") / "page"
+    viewer = _meshcat_files()
+    fields = {
+        "title": html.escape(title),
+        "style": (files / "page.css").read_text(encoding="utf-8"),
+        "license": (viewer / "main.min.js.LICENSE.txt").read_text(encoding="utf-8").replace("--", "- -"),
+        "meshcat": (viewer / "main.min.js").read_text(encoding="utf-8"),
+        "commands": "\n".join(_command(kind, message) for kind, message in messages),
+        "manifest": json.dumps(manifest, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "script": "\n".join((files / name).read_text(encoding="utf-8") for name in SCRIPTS),
+    }
+    page = (files / "page.html").read_text(encoding="utf-8")
+    # Cut the template at its fields first, so that braces in a name or in a script are never taken for a field.
+    pieces = []
+    for piece in page.split("{{"):
+        name, closed, rest = piece.partition("}}")
+        pieces += [fields[name], rest] if closed else [piece]
+    return "".join(pieces)
+
+
+def _meshcat_files() -> Any:
+    """Return the folder of meshcat's viewer."""
+    return resources.files("meshcat") / "viewer" / "dist"
+
+
+def _command(kind: str, message: dict[str, Any]) -> str:
+    """Return one meshcat message as an inert script element."""
+    import umsgpack
+
+    packed = base64.b64encode(gzip.compress(umsgpack.packb(message), compresslevel=6, mtime=0)).decode("ascii")
+    return f'<script class="command" type="text/plain" data-kind="{kind}">{packed}</script>'

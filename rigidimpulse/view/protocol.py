@@ -1,0 +1,49 @@
+"""What the viewer reads: any object with these members can be shown, a `Recording` above all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class SceneLike(Protocol):
+    """The scene that was simulated."""
+
+    gravity: Any
+
+    @property
+    def bodies(self) -> Sequence[Any]:
+        """The bodies (name, shape, motion, material), in the order in which impacts count them."""
+        ...
+
+
+class RecordingLike(Protocol):
+    """A simulated motion: f frames of every body, and the impacts between them."""
+
+    @property
+    def times(self) -> FloatArray:
+        """Frame times (f,), s, rising."""
+        ...
+
+    @property
+    def scene(self) -> Any:
+        """The scene, a `SceneLike`."""
+        ...
+
+    @property
+    def impacts(self) -> npt.NDArray[Any]:
+        """Structured array: time, body_a, body_b, point, normal, impulse, tangent_impulse."""
+        ...
+
+    def position(self, name: str, /) -> FloatArray:
+        """Body origin (f, 3), m, world."""
+        ...
+
+    def orientation(self, name: str, /) -> FloatArray:
+        """Body frame (f, 4), unit quaternions (w, x, y, z), body to world."""
+        ...

@@ -1,0 +1,245 @@
+"""The compiled scene: constant arrays that the stages read. People's body frames end here; inside, everything is principal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimpulse.accuracy import Accuracy, resolve_accuracy
+from rigidimpulse.conventions import TOLERANCES
+from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
+from rigidimpulse.mass import body_mass
+from rigidimpulse.material import combine
+from rigidimpulse.rotation import conjugate, from_matrix, multiply, rotate
+from rigidimpulse.scene import Scene, validate
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """Constant arrays of n bodies; see the head of `state.py` for what varies.
+
+    Attributes:
+        scene: the scene as written.
+        accuracy: settings of the run.
+        names: body names in order of index.
+        dynamic: (n,) bool. moving: (n,) bool, kinematic bodies with a velocity or keyframes.
+        mass, inv_mass: (n,) kg, 1/kg (0 for immovable). inertia: (n, 3) kg m2, principal (1 for immovable).
+        offset: (n, 3) m, centre of mass in the body frame. turn: (n, 4), principal axes in the body frame.
+        position, orientation, velocity, angular_velocity: principal-frame state at time 0.
+        gravity: (n, 3) m/s2.
+        shape_of_body: (n,). size: (n,) m, largest extent, inf for half spaces. bound_radius: (n,) m about the centre of mass.
+        static_min, static_max: (n, 3) m, world boxes of bodies where they start.
+        material_of_body: (n,). coefficients: (k, k, 4), see material.combine.
+        flat: (n,) bool, has faces or rims that must not touch those of another at gap 0.
+        contact_gap: gap at which lasting contacts are held, as a fraction of the smaller body's size.
+
+    """
+
+    scene: Scene
+    accuracy: Accuracy
+    names: list[str]
+    shapes: list[CompiledShape]
+    geometry: Geometry
+    dynamic: np.ndarray
+    moving: np.ndarray
+    mass: np.ndarray
+    inv_mass: np.ndarray
+    inertia: np.ndarray
+    offset: np.ndarray
+    turn: np.ndarray
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    gravity: np.ndarray
+    shape_of_body: np.ndarray
+    size: np.ndarray
+    bound_radius: np.ndarray
+    static_min: np.ndarray
+    static_max: np.ndarray
+    material_of_body: np.ndarray
+    coefficients: np.ndarray
+    flat: np.ndarray
+    half_space: np.ndarray
+    contact_gap: float
+    touch_gap: float
+
+    @property
+    def num_bodies(self) -> int:
+        """Number of bodies."""
+        return len(self.names)
+
+    @property
+    def largest_delta(self) -> float:
+        """Largest gap at which any contact is held, m."""
+        finite = self.size[np.isfinite(self.size)]
+        return self.contact_gap * float(finite.max()) if len(finite) else 0.0
+
+    @property
+    def can_collide(self) -> bool:
+        """Whether any two bodies may ever touch with consequence: a dynamic one and another."""
+        return bool(self.dynamic.any()) and self.num_bodies > 1
+
+    @property
+    def can_press(self) -> bool:
+        """Whether anything but impacts can press bodies together: gravity, a moving support."""
+        return bool(np.any(self.gravity) or np.any(self.moving))
+
+    def may_collide(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Which pairs take part in contact at all: at least one of the bodies is dynamic."""
+        return self.dynamic[a] | self.dynamic[b]
+
+    def least_touch(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Gap at which contact of new pairs is declared, m: 0 where normals are well defined at gap 0."""
+        size = np.minimum(self.size[a], self.size[b])
+        return np.where(self.flat[a] & self.flat[b], self.touch_gap * size, 0.0)
+
+    def body_pose(self, i: int, position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pose of the body's own origin and axes from principal-frame poses (f, 3), (f, 4)."""
+        turned = multiply(orientation, conjugate(self.turn[i]))
+        return position - rotate(turned, self.offset[i]), turned
+
+
+def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
+    """Check a scene and compile it.
+
+    Raises:
+        SceneError: naming the body, the value and the remedy.
+
+    """
+    validate(scene)
+    bodies = list(scene.bodies)
+    masses = [body_mass(body) for body in bodies]
+    dynamic = np.array([body.motion == "dynamic" for body in bodies], bool)
+    moving = np.array([body.motion == "kinematic" and _is_driven(body) for body in bodies], bool)
+    offset = np.array([m.center_of_mass for m in masses], float).reshape(-1, 3)
+    axes = [m.axes for m in masses]
+    turn = np.array([from_matrix(a) for a in axes], float).reshape(-1, 4)
+    shapes, shape_of_body = _compile_shapes(bodies, masses)
+    geometry = build_geometry(shapes)
+    origin = np.array([body.position for body in bodies], float).reshape(-1, 3)
+    orientation = np.array([body.unit_orientation() for body in bodies], float).reshape(-1, 4)
+    principal = multiply(orientation, turn)
+    position = origin + rotate(orientation, offset)
+    size, radius = _extents(geometry, shape_of_body)
+    low, high = _world_boxes(geometry, shape_of_body, position, principal)
+    material_of_body, coefficients = _materials(bodies)
+    mass = np.array([m.mass for m in masses], float)
+    factor = np.array([body.gravity_factor for body in bodies], float)
+    return World(
+        scene=scene,
+        accuracy=resolve_accuracy(accuracy),
+        names=[body.name for body in bodies],
+        shapes=shapes,
+        geometry=geometry,
+        dynamic=dynamic,
+        moving=moving,
+        mass=mass,
+        inv_mass=np.where(dynamic, 1.0 / mass, 0.0),
+        inertia=np.where(dynamic[:, None], np.array([m.moments for m in masses], float).reshape(-1, 3), 1.0),
+        offset=offset,
+        turn=turn,
+        position=position,
+        orientation=principal,
+        velocity=np.array([body.velocity for body in bodies], float).reshape(-1, 3),
+        angular_velocity=np.array([body.angular_velocity for body in bodies], float).reshape(-1, 3),
+        gravity=factor[:, None] * np.asarray(scene.gravity, float) * dynamic[:, None],
+        shape_of_body=shape_of_body,
+        size=size,
+        bound_radius=radius,
+        static_min=low,
+        static_max=high,
+        material_of_body=material_of_body,
+        coefficients=coefficients,
+        flat=_has_faces(geometry, shape_of_body),
+        half_space=np.array([_all_half_spaces(geometry, k) for k in shape_of_body], bool),
+        contact_gap=TOLERANCES.contact_gap,
+        touch_gap=TOLERANCES.touch_gap,
+    )
+
+
+def _is_driven(body) -> bool:
+    return body.keyframes is not None or bool(np.any(body.velocity) or np.any(body.angular_velocity))
+
+
+def _compile_shapes(bodies, masses) -> tuple[list[CompiledShape], np.ndarray]:
+    """Compile each shape once for each frame it is used in."""
+    shapes: list[CompiledShape] = []
+    known: dict[tuple, int] = {}
+    index = np.zeros(len(bodies), np.int64)
+    for i, (body, m) in enumerate(zip(bodies, masses, strict=True)):
+        key = (id(body.shape), m.center_of_mass.tobytes(), m.axes.tobytes())
+        if key not in known:
+            known[key] = len(shapes)
+            shapes.append(compile_shape(body.shape, m.center_of_mass, m.axes))
+        index[i] = known[key]
+    return shapes, index
+
+
+def _primitives(geometry: Geometry, shape: int) -> range:
+    return range(int(geometry.shape_first[shape]), int(geometry.shape_first[shape + 1]))
+
+
+def _all_half_spaces(geometry: Geometry, shape: int) -> bool:
+    return all(geometry.kind[p] == HALF_SPACE for p in _primitives(geometry, shape))
+
+
+def _primitive_points(geometry: Geometry, p: int) -> tuple[np.ndarray, float]:
+    """Points (k, 3) and the radius of the ball about each that enclose a finite primitive."""
+    if geometry.kind[p] == CYLINDER:
+        centre, axis, half = geometry.frame[p, :3], geometry.frame[p, 3:6], geometry.frame[p, 6]
+        return np.array([centre - half * axis, centre + half * axis]), float(geometry.radius[p])
+    return geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]], float(geometry.radius[p])
+
+
+def _extents(geometry: Geometry, shape_of_body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Largest extent and bounding radius about the centre of mass, of every body."""
+    size, radius = [], []
+    for shape in range(len(geometry.shape_first) - 1):
+        low, high, reach = np.full(3, np.inf), np.full(3, -np.inf), 0.0
+        for p in _primitives(geometry, shape):
+            if geometry.kind[p] == HALF_SPACE:
+                low, high, reach = np.full(3, -np.inf), np.full(3, np.inf), np.inf
+                break
+            points, r = _primitive_points(geometry, p)
+            low, high = np.minimum(low, points.min(0) - r), np.maximum(high, points.max(0) + r)
+            reach = max(reach, float(np.linalg.norm(points, axis=1).max()) + r)
+        size.append(float((high - low).max()))
+        radius.append(reach)
+    return np.array(size)[shape_of_body], np.array(radius)[shape_of_body]
+
+
+def _world_boxes(geometry, shape_of_body, position, orientation) -> tuple[np.ndarray, np.ndarray]:
+    low = np.full((len(shape_of_body), 3), np.inf)
+    high = -low
+    for i, shape in enumerate(shape_of_body):
+        for p in _primitives(geometry, int(shape)):
+            if geometry.kind[p] == HALF_SPACE:
+                low[i], high[i] = -np.inf, np.inf
+                break
+            points, r = _primitive_points(geometry, p)
+            placed = rotate(orientation[i], points) + position[i]
+            low[i] = np.minimum(low[i], placed.min(0) - r)
+            high[i] = np.maximum(high[i], placed.max(0) + r)
+    return low, high
+
+
+def _has_faces(geometry: Geometry, shape_of_body: np.ndarray) -> np.ndarray:
+    """Polyhedra and cylinders: pairs of them need a gap for well-defined normals."""
+    flat = [
+        any(
+            geometry.kind[p] == CYLINDER or (geometry.kind[p] == ROUND and geometry.radius[p] == 0.0)
+            for p in _primitives(geometry, shape)
+        )
+        for shape in range(len(geometry.shape_first) - 1)
+    ]
+    return np.array(flat, bool)[shape_of_body]
+
+
+def _materials(bodies) -> tuple[np.ndarray, np.ndarray]:
+    """Index of each body's material and the combined coefficients of all pairs of materials."""
+    unique = list(dict.fromkeys(body.material for body in bodies))
+    index = np.array([unique.index(body.material) for body in bodies], np.int64)
+    coefficients = np.array([[combine(a, b) for b in unique] for a in unique], float)
+    return index, coefficients.reshape(len(unique), len(unique), 4)
