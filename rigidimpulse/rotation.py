@@ -2,7 +2,7 @@
 
 First the compiled helpers for kernels, then the same algebra on numpy arrays, over any leading axes. With q = (c, u):
     q v q* = v + 2 c u x v + 2 u x (u x v),        exp(r) = (cos |r|/2, sin(|r|/2) r/|r|)
-Source: J. Diebel, Representing attitude, Stanford 2006; matrix to quaternion after S. W. Shepperd, J. Guid. Control 1, 1978.
+Sources: J. Diebel, Representing attitude, Stanford 2006; matrix to quaternion: S. Shepperd, J. Guid. Control 1, 1978.
 """
 
 import math
@@ -52,14 +52,6 @@ def exponential(x, y, z):
     else:
         factor = math.sin(0.5 * angle) / angle
     return math.cos(0.5 * angle), factor * x, factor * y, factor * z
-
-
-@jit
-def rotated_by_vector(x, y, z, q0, q1, q2, q3):
-    """The quaternion exp(x, y, z) q, q normalised."""
-    e0, e1, e2, e3 = exponential(x, y, z)
-    scale = 1.0 / math.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
-    return product(e0, e1, e2, e3, scale * q0, scale * q1, scale * q2, scale * q3)
 
 
 @jit

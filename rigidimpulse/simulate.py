@@ -131,6 +131,9 @@ def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, end: float
     while context.state.time < end:
         now = context.state.time
         paths.start_segments(context, now)
+        if not np.any(context.state.course.mode != FIXED):
+            context.state.time = min(paths.next_key(now), end)
+            continue
         index = math.floor(now / size + 1e-9) + 1
         step(context, plan, min(index * size, paths.next_key(now), end))
         if progress is not None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from rigidimpulse.geometry import Geometry
 from rigidimpulse.integrate.course import Course, make_course, pose_at
 from rigidimpulse.observe.events import EventLog
 from rigidimpulse.observe.recorder import Recorder
 from rigidimpulse.respond.impulse import BodyState
+from rigidimpulse.sweep.guard import SweepScratch, make_scratch
 from rigidimpulse.world import World
 
 CONTACT_CAPACITY = 1024
@@ -23,6 +27,7 @@ class State:
         course: path of every body since its last change of course.
         now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
         energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at.
+        rebounds: by pair, time and speed of the last rebound and how many in a row were short.
         contact_force: last force of a held contact, in its frame [N], by (body_a, body_b, kind, feature_a, feature_b).
     """
 
@@ -40,8 +45,18 @@ class State:
         )
         self.rotation = np.zeros((n, 3, 3))
         self.contact_force: dict[tuple[int, ...], np.ndarray] = {}
+        self.rebounds: dict[tuple[int, int], tuple[float, float, int]] = {}
         self.energy_at_start = np.zeros(n)
         self.arrival_energy: dict[int, float] = {}
+
+
+@dataclass(frozen=True)
+class Detector:
+    """What a sweep needs to know of the scene."""
+
+    geometry: Geometry
+    shape_of_body: np.ndarray
+    sweep_scratch: SweepScratch
 
 
 class StepContext:
@@ -53,6 +68,7 @@ class StepContext:
         self.state = State(world)
         self.recorder = recorder
         self.log = log
+        self.detector = Detector(world.geometry, world.shape_of_body, make_scratch(world.geometry))
         self.contact_real = np.empty((CONTACT_CAPACITY, 10))
         self.contact_int = np.empty((CONTACT_CAPACITY, 5), np.int64)
         self.scratch_pairs = np.empty((PAIR_CAPACITY, 2), np.int64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -70,7 +71,12 @@ class World:
         """Number of bodies."""
         return len(self.names)
 
-    @property
+    @cached_property
+    def gravity_strength(self) -> np.ndarray:
+        """(n,) m/s2, magnitude of gravity."""
+        return np.linalg.norm(self.gravity, axis=1)
+
+    @cached_property
     def largest_delta(self) -> float:
         """Largest gap at which any contact is held, m."""
         finite = self.size[np.isfinite(self.size)]

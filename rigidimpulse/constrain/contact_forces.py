@@ -77,8 +77,7 @@ def hold(context, window, group: Group) -> None:
 
 def held_contacts(group: Group) -> np.ndarray:
     """Contacts that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
-    slow = np.abs(group.approach) <= group.rest_speed * (1.0 + SLACK)
-    return slow & (group.rest_speed > 0.0)
+    return np.abs(group.approach) <= group.rest_speed * (1.0 + SLACK) + group.still
 
 
 def _lift(context, window, group: Group) -> None:

@@ -1,8 +1,8 @@
 """Least distance of two ROUND primitives.
 
-The closest points of two sets of triangles that do not cross are a vertex and a point inside a face, or points of two edges
-(their ends included). Each vertex and edge is owned by one triangle, so each pair is met once: about three tests for two
-triangles instead of fifteen. Where boxes overlap, an edge of one that runs through a face of the other makes the distance 0.
+The closest points of two sets of triangles that do not cross are a vertex and a point inside a face, or points of two
+edges (their ends included). Each vertex and edge is owned by one triangle, so each pair is met once: about three tests
+for two triangles instead of fifteen. Where boxes overlap, an edge that runs through a face makes the distance 0.
 Both box trees are walked nearest first; a pair of boxes farther apart than the best distance so far is left out.
 """
 
@@ -28,120 +28,98 @@ from rigidimpulse.detect.features import (
 
 
 @inner
-def _keep_closer(best, p, q, out):
-    """Keep p, q in out[0:6] if the square of their distance is below `best`; return the lesser square."""
+def _closer(best, p, q):
+    """Return the triple (squared distance, p, q) if it is closer than the triple `best`, else `best`."""
     between = subtract(q, p)
     distance_squared = dot(between, between)
-    if distance_squared >= best:
-        return best
-    for i in range(3):
-        out[i] = p[i]
-        out[3 + i] = q[i]
-    return distance_squared
+    return (distance_squared, p, q) if distance_squared < best[0] else best
 
 
 @inner
-def _over_face(p, face, best):
-    """Return (closer, foot): whether `p` lies over a face (a, b, c, normal), nearer than the root of `best`."""
-    a, b, c, normal = face
-    height = dot(subtract(p, a), normal)
-    solid = dot(normal, normal) > 0.0  # not the point or segment of a sphere or a capsule
-    closer = solid and height * height < best and over_triangle(p, a, b, c, normal, 0.0, 0.0, 0.0)
-    return closer, along(p, -height, normal)
+def _foot(p, face, limit):
+    """Return (over, foot): whether `p` lies over the face (a, b, c, normal), with a squared height below `limit`."""
+    height = dot(subtract(p, face[0]), face[3])
+    over = height * height < limit and over_triangle(p, face[0], face[1], face[2], face[3], 0.0, 0.0, 0.0)
+    return over and dot(face[3], face[3]) > 0.0, along(p, -height, face[3])
 
 
 @inner
-def _segment_ends(face, k):
-    """Return the ends of side k of a face."""
-    if k == 0:
-        return face[0], face[1]
-    if k == 1:
-        return face[1], face[2]
-    return face[2], face[0]
+def _triangle_box(a, b, c):
+    """Return the box of a triangle."""
+    low = (min(a[0], b[0], c[0]), min(a[1], b[1], c[1]), min(a[2], b[2], c[2]))
+    return low, (max(a[0], b[0], c[0]), max(a[1], b[1], c[1]), max(a[2], b[2], c[2]))
 
 
 @inner
-def _owned_segments(geometry, triangle):
-    """Return the bits of the sides that a triangle owns; the first one for a sphere, a segment of no length."""
-    if geometry.triangle[triangle, 0] == geometry.triangle[triangle, 1]:
-        return 1
-    return geometry.triangle_owns[triangle] >> 3
+def _boxes_squared(low_a, high_a, low_b, high_b):
+    """Return the squared distance of two boxes of one frame."""
+    x = max(0.0, low_a[0] - high_b[0], low_b[0] - high_a[0])
+    y = max(0.0, low_a[1] - high_b[1], low_b[1] - high_a[1])
+    z = max(0.0, low_a[2] - high_b[2], low_b[2] - high_a[2])
+    return x * x + y * y + z * z
 
 
 @inner
-def _triangle_distance(geometry, triangle_a, triangle_b, face_a, face_b, may_cross, best, out):
-    """Lower the squared distance `best`, with points in `out`, by the features that two triangles own."""
-    owns_a = geometry.triangle_owns[triangle_a]
-    owns_b = geometry.triangle_owns[triangle_b]
+def _triangle_distance(owns_a, owns_b, face_a, face_b, may_cross, best):
+    """Return the closest of `best` and the features that two triangles own (bits as in `geometry`)."""
+    corners_a = (face_a[0], face_a[1], face_a[2], face_a[0])
+    corners_b = (face_b[0], face_b[1], face_b[2], face_b[0])
     for k in range(3):
         if owns_a >> k & 1:
-            p = _segment_ends(face_a, k)[0]
-            closer, foot = _over_face(p, face_b, best)
-            if closer:
-                best = _keep_closer(best, p, foot, out)
+            over, foot = _foot(corners_a[k], face_b, best[0])
+            if over:
+                best = _closer(best, corners_a[k], foot)
         if owns_b >> k & 1:
-            p = _segment_ends(face_b, k)[0]
-            closer, foot = _over_face(p, face_a, best)
-            if closer:
-                best = _keep_closer(best, foot, p, out)
-    segments_a = _owned_segments(geometry, triangle_a)
-    segments_b = _owned_segments(geometry, triangle_b)
+            over, foot = _foot(corners_b[k], face_a, best[0])
+            if over:
+                best = _closer(best, foot, corners_b[k])
     for k in range(3):
-        if not segments_a >> k & 1:
+        if not owns_a >> (3 + k) & 1:
             continue
-        p, p_end = _segment_ends(face_a, k)
-        d = subtract(p_end, p)
-        if may_cross and pierces_triangle(p, p_end, face_b[0], face_b[1], face_b[2], face_b[3]):
-            best = _keep_closer(best, p, p, out)
-        for l in range(3):
-            if segments_b >> l & 1:
-                q, q_end = _segment_ends(face_b, l)
-                e = subtract(q_end, q)
+        p = corners_a[k]
+        d = subtract(corners_a[k + 1], p)
+        if may_cross and pierces_triangle(p, corners_a[k + 1], face_b[0], face_b[1], face_b[2], face_b[3]):
+            best = _closer(best, p, p)
+        for m in range(3):
+            if owns_b >> (3 + m) & 1:
+                q = corners_b[m]
+                e = subtract(corners_b[m + 1], q)
                 s, t = closest_on_segments(p, d, q, e)
-                best = _keep_closer(best, along(p, s, d), along(q, t, e), out)
-    for l in range(3):
-        if may_cross and segments_b >> l & 1:
-            q, q_end = _segment_ends(face_b, l)
-            if pierces_triangle(q, q_end, face_a[0], face_a[1], face_a[2], face_a[3]):
-                best = _keep_closer(best, q, q, out)
+                best = _closer(best, along(p, s, d), along(q, t, e))
+    for m in range(3):
+        if may_cross and owns_b >> (3 + m) & 1:
+            q = corners_b[m]
+            if pierces_triangle(q, corners_b[m + 1], face_a[0], face_a[1], face_a[2], face_a[3]):
+                best = _closer(best, q, q)
     return best
 
 
 @inner
-def _boxes_squared(face_a, face_b):
-    """Return the squared distance of the boxes of two triangles."""
-    total = 0.0
-    for k in range(3):
-        low_a = min(face_a[0][k], face_a[1][k], face_a[2][k])
-        high_a = max(face_a[0][k], face_a[1][k], face_a[2][k])
-        low_b = min(face_b[0][k], face_b[1][k], face_b[2][k])
-        high_b = max(face_b[0][k], face_b[1][k], face_b[2][k])
-        total += max(0.0, low_a - high_b, low_b - high_a) ** 2
-    return total
-
-
-@inner
-def _leaf_distance(geometry, a, b, R, t, best, out):
-    """Lower the squared distance `best` by the triangles of two leaves."""
-    for triangle_b in range(geometry.node_start[b], geometry.node_start[b] + geometry.node_count[b]):
-        face_b = (
-            moved(R, t, row(geometry.vertex, geometry.triangle[triangle_b, 0])),
-            moved(R, t, row(geometry.vertex, geometry.triangle[triangle_b, 1])),
-            moved(R, t, row(geometry.vertex, geometry.triangle[triangle_b, 2])),
-            turned(R, row(geometry.triangle_normal, triangle_b)),
-        )
-        for triangle_a in range(geometry.node_start[a], geometry.node_start[a] + geometry.node_count[a]):
-            face_a = (
-                row(geometry.vertex, geometry.triangle[triangle_a, 0]),
-                row(geometry.vertex, geometry.triangle[triangle_a, 1]),
-                row(geometry.vertex, geometry.triangle[triangle_a, 2]),
-                row(geometry.triangle_normal, triangle_a),
-            )
-            bound = _boxes_squared(face_a, face_b)
-            if bound < best:
-                best = _triangle_distance(
-                    geometry, triangle_a, triangle_b, face_a, face_b, bound == 0.0, best, out
-                )
+def _leaf_distance(geometry, a, b, R, t, best):
+    """Return the closest of `best` and the triangles of two leaves."""
+    vertex, triangle, owns = geometry.vertex, geometry.triangle, geometry.triangle_owns
+    normal = geometry.triangle_normal
+    start_a, count_a = geometry.node_start[a], geometry.node_count[a]
+    start_b, count_b = geometry.node_start[b], geometry.node_count[b]
+    low_node, high_node = row(geometry.node_min, a), row(geometry.node_max, a)
+    for j in range(start_b, start_b + count_b):
+        q0 = moved(R, t, row(vertex, triangle[j, 0]))
+        q1 = moved(R, t, row(vertex, triangle[j, 1]))
+        q2 = moved(R, t, row(vertex, triangle[j, 2]))
+        low_b, high_b = _triangle_box(q0, q1, q2)
+        if _boxes_squared(low_node, high_node, low_b, high_b) >= best[0]:
+            continue
+        face_b = (q0, q1, q2, turned(R, row(normal, j)))
+        # A sphere has no edge; the first side of its triangle, of no length, stands for its point.
+        owns_b = owns[j] | (8 if triangle[j, 0] == triangle[j, 1] else 0)
+        for i in range(start_a, start_a + count_a):
+            p0, p1, p2 = row(vertex, triangle[i, 0]), row(vertex, triangle[i, 1]), row(vertex, triangle[i, 2])
+            low_a, high_a = _triangle_box(p0, p1, p2)
+            bound = _boxes_squared(low_a, high_a, low_b, high_b)
+            if bound < best[0]:
+                face_a = (p0, p1, p2, row(normal, i))
+                owns_a = owns[i] | (8 if triangle[i, 0] == triangle[i, 1] else 0)
+                best = _triangle_distance(owns_a, owns_b, face_a, face_b, bound == 0.0, best)
     return best
 
 
@@ -152,42 +130,47 @@ def round_round_gap(geometry, first, second, R, t, limit, stack, out):
     R, t: pose of the second body in the frame of the first; out[0:6]: a closest point of each surface in that frame;
     `stack`: scratch of at least `STACK_ROWS` rows. Crossing triangles have the distance 0 (gap minus both radii).
     """
-    radius_a = geometry.radius[first]
-    radius_b = geometry.radius[second]
-    core = limit + radius_a + radius_b
+    node_min, node_max, node_child = geometry.node_min, geometry.node_max, geometry.node_child
+    reach = geometry.radius[first] + geometry.radius[second]
+    core = limit + reach
     if core <= 0.0:
         return limit
-    best = core * core
+    nowhere = (0.0, 0.0, 0.0)
+    best = (core * core, nowhere, nowhere)
     bound = np.empty(STACK_ROWS)
-    points = np.empty(6)
     stack[0, 0] = geometry.node_first[first]
     stack[0, 1] = geometry.node_first[second]
-    bound[0] = box_distance_squared(geometry, stack[0, 0], stack[0, 1], R, t)
+    bound[0] = 0.0
     depth = 1
     while depth > 0:
         depth -= 1
-        a = stack[depth, 0]
-        b = stack[depth, 1]
-        if bound[depth] >= best:
+        a, b = stack[depth, 0], stack[depth, 1]
+        if bound[depth] >= best[0]:
             continue
-        if geometry.node_child[a] < 0 and geometry.node_child[b] < 0:
-            best = _leaf_distance(geometry, a, b, R, t, best, points)
+        child_a, child_b = node_child[a], node_child[b]
+        if child_a < 0 and child_b < 0:
+            best = _leaf_distance(geometry, a, b, R, t, best)
             continue
-        split_first = splits_first(geometry, a, b)
+        split_first = child_b < 0 or (
+            child_a >= 0 and splits_first(row(node_min, a), row(node_max, a), row(node_min, b), row(node_max, b))
+        )
         for side in range(2):
-            stack[depth + side, 0] = geometry.node_child[a] + side if split_first else a
-            stack[depth + side, 1] = b if split_first else geometry.node_child[b] + side
-            bound[depth + side] = box_distance_squared(geometry, stack[depth + side, 0], stack[depth + side, 1], R, t)
-        if bound[depth] < bound[depth + 1]:  # the nearer pair on top
-            for column in range(2):
-                stack[depth, column], stack[depth + 1, column] = stack[depth + 1, column], stack[depth, column]
-            bound[depth], bound[depth + 1] = bound[depth + 1], bound[depth]
+            a = child_a + side if split_first else a
+            b = b if split_first else child_b + side
+            squared = box_distance_squared(
+                row(node_min, a), row(node_max, a), row(node_min, b), row(node_max, b), R, t, best[0]
+            )
+            place = depth + side
+            if side == 1 and squared > bound[depth]:  # the nearer pair comes on top
+                stack[place, 0], stack[place, 1], bound[place] = stack[depth, 0], stack[depth, 1], bound[depth]
+                place = depth
+            stack[place, 0], stack[place, 1], bound[place] = a, b, squared
         depth += 2
-    if best >= core * core:
+    if best[0] >= core * core:
         return limit
-    distance = sqrt(best)
+    distance = sqrt(best[0])
     for i in range(3):
-        normal = (points[3 + i] - points[i]) / distance if distance > 0.0 else 0.0
-        out[i] = points[i] + radius_a * normal
-        out[3 + i] = points[3 + i] - radius_b * normal
-    return distance - radius_a - radius_b
+        normal = (best[2][i] - best[1][i]) / distance if distance > 0.0 else 0.0
+        out[i] = best[1][i] + geometry.radius[first] * normal
+        out[3 + i] = best[2][i] - geometry.radius[second] * normal
+    return distance - reach

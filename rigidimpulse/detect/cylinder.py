@@ -1,381 +1,148 @@
-"""Least distance of a solid right circular cylinder to points, segments, triangles and other cylinders.
+"""Contacts and least gaps of cylinders, in the frame of the cylinder's body (see `manifold`).
 
-    cylinder_support(axis, half_height, radius, n) -> s          s(n) = max over the cylinder of n . (p - centre), |n| = 1
+    cylinder_half_space_contacts, cylinder_round_contacts, cylinder_cylinder_contacts    append rows, give the new count
+    cylinder_half_space_gap, cylinder_round_gap, cylinder_cylinder_gap                   least gap below a limit
+
+Features within the margin make contacts; each normal comes from the surfaces that meet, not from the difference of
+two points:
+- rim - plane (half space, face, cap): the lowest point of each rim, so a lying cylinder has the two ends of its
+  lowest line. Where the whole rim is within the margin, RIM_POINTS points fixed on the cylinder stand for it, and the
+  lowest one too.
+- vertex - cap, side or rim, the last two only if the normal lies in the cone of the vertex.
+- edge - side: the common perpendicular of edge and axis; edge - rim: the local least distance of line and circle,
+  normal to both. The normal must lie in the arc of the edge and between the normals of cap and side.
+- two cylinders: side - side as two edges; rim - cap as rim - plane; rim - side and rim - rim at the local least
+  distances.
+Side against a parallel edge or side has its contacts at the ends of the overlap, which are vertices and rims. A
+sphere or capsule is its core grown by a radius; its closest point is a contact in any case. If nothing else is found,
+the closest pair is.
+
+The least distances of `cylinder_features` can be imported from here as well:
+    cylinder_support(axis, half_height, radius, n) -> greatest n . (p - centre)
     cylinder_triangle_distance(centre, axis, half_height, radius, triangle (3, 3), out (9,)) -> distance
-    cylinder_cylinder_distance(centre_a, axis_a, half_height_a, radius_a, centre_b, axis_b, half_height_b, radius_b, out (9,))
-        -> distance                                              centre, axis: (3,) arrays or 3-tuples, axes of unit length
-    out = point on the first cylinder, point on the second shape, unit normal from first to second (all 0 where they overlap).
-    A triangle may be a segment (a, b, b) or a point (a, a, a).
-
-The normal n is worth as much as the distance: n . p over the second shape less n . p over the first is a lower bound of the
-distance, and equals it up to round-off (`least n . p`, that is min_B n . p - n . centre_a - s_a(n), certifies the answer).
-
-In the frame of the cylinder (axis z, half height h, radius r, rho^2 = x^2 + y^2) the distance of a point is
-    d^2 = max(0, rho - r)^2 + max(0, |z| - h)^2,
-a convex function with continuous slope, so its least value on a segment is where the slope vanishes: found piece by piece
-between the crossings of rho = r and z = +-h, in closed form or by Newton's method kept inside a bracket. A triangle's interior
-is closest only where its plane supports the cylinder. Two cylinders are closest at their sides (common perpendicular of the
-axes) or at a point of one of the four rims; the rims are searched by Newton's method, and if the support gap does not confirm
-the result, the discs they bound are searched as convex sets, chord by chord.
-
-Support function: s(n) = r sqrt(1 - (n . axis)^2) + h |n . axis|.
+    cylinder_cylinder_distance(centre_a, axis_a, half_height_a, radius_a, centre_b, axis_b, half_height_b, radius_b,
+        out (9,)) -> distance
 """
 
 from __future__ import annotations
 
-from math import cos, copysign, hypot, inf, pi, sin, sqrt
+from math import copysign, hypot
 
-from rigidimpulse._jit import jit
-from rigidimpulse.detect.features import along, cross, dot, over_triangle, subtract
+from rigidimpulse.detect.closed_form import plane_in_frame
+from rigidimpulse.detect.cylinder_features import (
+    AXIS,
+    ZERO,
+    closest_on_cylinder,
+    closest_sides,
+    cylinder_cylinder_distance,
+    cylinder_support,
+    cylinder_triangle_distance,
+    to_axes,
+)
+from rigidimpulse.detect.cylinder_rims import (
+    CAP,
+    RIM,
+    SIDE,
+    WHOLE_PLANE,
+    append,
+    carried,
+    circle_contacts,
+    rims_on_plane,
+    solid_of,
+    write_points,
+)
+from rigidimpulse.detect.cylinder_round import cylinder_round_contacts, cylinder_round_gap
+from rigidimpulse.detect.features import along, dot, inner, subtract
 
-_EPSILON = 2.0**-52
-_ROUND_OFF = 1e-13  # excess of a distance over its lower bound, relative to the sizes involved, that passes as rounding
-_MAX_NEWTON = 60  # steps of Newton's method, most of which halve a bracket
-_MAX_HALVINGS = 60
-_NUM_SAMPLES = 8  # points of a rim from which the closest one is sought
-_THIN = 1e-14  # area of a triangle over the squares of its sides below which it has no face
-_PARALLEL = 1e-12  # sine of the angle of two axes below which their common perpendicular is left to the rims
-_ZERO = (0.0, 0.0, 0.0)
-
-
-@jit
-def cylinder_support(axis, half_height, radius, n):
-    """Return the greatest n . (p - centre) over the cylinder, for a unit vector n."""
-    across = cross(axis, n)
-    return radius * sqrt(dot(across, across)) + half_height * abs(dot(axis, n))
-
-
-@jit
-def cylinder_triangle_distance(centre, axis, half_height, radius, triangle, out):
-    """Write the closest points and the normal to `out`; return the distance, 0 where they overlap."""
-    u, v, w = basis(axis)
-    a = to_frame(centre, u, v, w, triangle[0])
-    b = to_frame(centre, u, v, w, triangle[1])
-    c = to_frame(centre, u, v, w, triangle[2])
-    return _write(centre, u, v, w, closest_on_triangle(a, b, c, radius, half_height), out)
-
-
-@jit
-def cylinder_cylinder_distance(centre_a, axis_a, half_height_a, radius_a, centre_b, axis_b, half_height_b, radius_b, out):
-    """Write the closest points and the normal to `out`; return the distance, 0 where they overlap."""
-    u, v, w = basis(axis_a)
-    centre = to_frame(centre_a, u, v, w, centre_b)
-    axis = (dot(axis_b, u), dot(axis_b, v), dot(axis_b, w))
-    return _write(
-        centre_a, u, v, w, closest_on_cylinder(centre, axis, radius_b, half_height_b, radius_a, half_height_a), out
-    )
+__all__ = [
+    "cylinder_cylinder_contacts",
+    "cylinder_cylinder_distance",
+    "cylinder_cylinder_gap",
+    "cylinder_half_space_contacts",
+    "cylinder_half_space_gap",
+    "cylinder_round_contacts",
+    "cylinder_round_gap",
+    "cylinder_support",
+    "cylinder_triangle_distance",
+]
 
 
-@jit
-def basis(axis):
-    """Return three orthonormal vectors, the last along the unit vector `axis`; the others depend on nothing else."""
-    x, y, z = axis[0], axis[1], axis[2]
-    if abs(x) <= abs(y) and abs(x) <= abs(z):
-        scale = 1.0 / hypot(y, z)
-        u = (0.0, z * scale, -y * scale)
-    elif abs(y) <= abs(z):
-        scale = 1.0 / hypot(x, z)
-        u = (-z * scale, 0.0, x * scale)
-    else:
-        scale = 1.0 / hypot(x, y)
-        u = (y * scale, -x * scale, 0.0)
-    w = (x, y, z)
-    return u, cross(w, u), w
+@inner
+def _plane(geometry, solid, half_space, R, t):
+    """Return the unit normal of a half space and a point on its surface, in the axes of the cylinder."""
+    normal, offset = plane_in_frame(geometry.frame, half_space, R, t)
+    m = to_axes(solid.u, solid.v, solid.w, normal)
+    return m, along(ZERO, offset - dot(normal, solid.origin), m)
 
 
-@jit
-def to_frame(centre, u, v, w, point):
-    """Return the coordinates of a point in the frame at `centre` with axes u, v, w."""
-    q = (point[0] - centre[0], point[1] - centre[1], point[2] - centre[2])
-    return dot(q, u), dot(q, v), dot(q, w)
+@inner
+def cylinder_half_space_contacts(geometry, cylinder, half_space, R, t, margin, contact_real, contact_int, count):
+    """Append the rim points of a cylinder within `margin` of a half space."""
+    solid = solid_of(geometry.frame, geometry.radius, cylinder, margin)
+    m, a = _plane(geometry, solid, half_space, R, t)
+    rows = (contact_real, contact_int, count)
+    return rims_on_plane(solid, rows, count, m, a, a, a, WHOLE_PLANE, half_space)
 
 
-@jit
-def from_axes(u, v, w, q):
-    """Return q_0 u + q_1 v + q_2 w."""
-    return along(along(along(_ZERO, q[0], u), q[1], v), q[2], w)
+@inner
+def cylinder_half_space_gap(geometry, cylinder, half_space, R, t, limit, out):
+    """Return the least gap, negative if they overlap, or `limit` with `out` untouched if it is not below."""
+    solid = solid_of(geometry.frame, geometry.radius, cylinder, 0.0)
+    m, a = _plane(geometry, solid, half_space, R, t)
+    gap = -dot(m, a) - cylinder_support(AXIS, solid.half, solid.radius, m)
+    if gap < limit:
+        flat = hypot(m[0], m[1])
+        scale = -solid.radius / flat if flat > 0.0 else 0.0
+        p = (scale * m[0], scale * m[1], -copysign(solid.half, m[2]))
+        write_points(solid, p, along(p, -gap, m), out)
+        return gap
+    return limit
 
 
-@jit
-def _write(centre, u, v, w, pair, out):
-    distance, p, q, n = pair
-    p, q, n = from_axes(u, v, w, p), from_axes(u, v, w, q), from_axes(u, v, w, n)
-    for k in range(3):
-        out[k] = centre[k] + p[k]
-        out[3 + k] = centre[k] + q[k]
-        out[6 + k] = n[k]
-    return distance
+@inner
+def cylinder_cylinder_contacts(geometry, first, second, R, t, margin, contact_real, contact_int, count):
+    """Append every touching pair of features of two cylinders."""
+    solid = solid_of(geometry.frame, geometry.radius, first, margin)
+    other = carried(solid_of(geometry.frame, geometry.radius, second, margin), R, t)
+    rows = (contact_real, contact_int, count)
+    for turn in range(2):
+        u, v, w = solid.u, solid.v, solid.w
+        centre = to_axes(u, v, w, subtract(other.origin, solid.origin))
+        axis, x, y = to_axes(u, v, w, other.w), to_axes(u, v, w, other.u), to_axes(u, v, w, other.v)
+        if turn == 0:
+            distance, p, q, n = closest_sides(centre, axis, other.radius, other.half, solid.radius, solid.half)
+            if 0.0 < distance <= margin:
+                count = append(solid, rows, count, p, q, n, distance, SIDE, other.feature + SIDE)
+        for bottom in range(2):
+            sign = 1.0 - 2.0 * bottom
+            outward, across = along(ZERO, sign, axis), along(ZERO, sign, y)
+            middle = along(centre, other.half, outward)
+            cap, rim = other.feature + CAP + bottom, other.feature + RIM + bottom
+            count = rims_on_plane(solid, rows, count, outward, middle, middle, middle, other.radius, cap)
+            for target in range(-1, 2 - 2 * turn):  # the side; in the first turn both rims as well
+                count = circle_contacts(solid, rows, count, middle, x, across, other.radius, target, rim)
+        solid, other = other, solid
+    if count == rows[2]:
+        distance, p, q, n = _closest_pair(solid, other)
+        if 0.0 < distance <= margin:
+            count = append(solid, rows, count, p, q, n, distance, SIDE, other.feature + SIDE)
+    return count
 
 
-# From here on in the frame of the cylinder. Results are (distance, point on the cylinder, other point, normal).
+@inner
+def _closest_pair(solid, other):
+    centre = to_axes(solid.u, solid.v, solid.w, subtract(other.origin, solid.origin))
+    axis = to_axes(solid.u, solid.v, solid.w, other.w)
+    return closest_on_cylinder(centre, axis, other.radius, other.half, solid.radius, solid.half)
 
 
-@jit
-def closest_on_curve(q, tangent, interior, radius, half):
-    """Return the closest pair of the cylinder and the point q of a curve with the given tangent there.
-
-    If q is the closest point in the interior of its curve and the cylinder's rim is closest to it, the normal is perpendicular
-    to both curves; where they cross that is sharper than the difference of the points, whose error grows as 1 / distance.
-    """
-    x, y, z = q
-    rho = hypot(x, y)
-    beside, beyond = rho - radius, abs(z) - half
-    if beside <= 0.0 and beyond <= 0.0:
-        return 0.0, q, q, _ZERO
-    if beyond <= 0.0:
-        n = (x / rho, y / rho, 0.0)
-        return beside, (radius * n[0], radius * n[1], z), q, n
-    end = copysign(1.0, z)
-    if beside <= 0.0:
-        return beyond, (x, y, end * half), q, (0.0, 0.0, end)
-    distance = hypot(beside, beyond)
-    n = (beside / distance * x / rho, beside / distance * y / rho, end * beyond / distance)
-    if interior:
-        across = cross(tangent, (-y / rho, x / rho, 0.0))
-        size = sqrt(dot(across, across))
-        if size * radius > distance * sqrt(dot(tangent, tangent)):
-            size = copysign(size, dot(across, n))
-            n = (across[0] / size, across[1] / size, across[2] / size)
-    return distance, (radius * x / rho, radius * y / rho, end * half), q, n
-
-
-@jit
-def slope_along(q, dq, ddq, radius, half):
-    """Return the first two derivatives of d^2 / 2 at the point q of a curve with derivatives dq, ddq."""
-    slope, curvature = 0.0, 0.0
-    rho = hypot(q[0], q[1])
-    beside, beyond = rho - radius, abs(q[2]) - half
-    if beside > 0.0:
-        x, y = q[0] / rho, q[1] / rho
-        outward, around = x * dq[0] + y * dq[1], x * dq[1] - y * dq[0]
-        slope += beside * outward
-        curvature += outward * outward + beside * (around * around / rho + x * ddq[0] + y * ddq[1])
-    if beyond > 0.0:
-        beyond = copysign(beyond, q[2])
-        slope += beyond * dq[2]
-        curvature += dq[2] * dq[2] + beyond * ddq[2]
-    return slope, curvature
-
-
-@jit
-def closest_on_segment(a, d, radius, half):
-    """Return t in [0, 1] so that a + t d is the closest point of a segment to the cylinder."""
-    low, high = 0.0, 1.0
-    slope_low, _ = slope_along(a, d, _ZERO, radius, half)
-    slope_high, _ = slope_along(along(a, 1.0, d), d, _ZERO, radius, half)
-    if slope_low >= 0.0:
-        return low
-    if slope_high <= 0.0:
-        return high
-    across = d[0] * d[0] + d[1] * d[1]
-    nearest = -(a[0] * d[0] + a[1] * d[1]) / across if across > 0.0 else inf
-    miss = (a[0] * d[1] - a[1] * d[0]) / sqrt(across) if across > 0.0 else inf
-    chord = sqrt((radius - miss) * (radius + miss) / across) if abs(miss) < radius else inf
-    for t in (nearest, nearest - chord, nearest + chord, (half - a[2]) / d[2], (-half - a[2]) / d[2]):
-        if low < t < high:
-            slope, _ = slope_along(along(a, t, d), d, _ZERO, radius, half)
-            if slope == 0.0:
-                return t
-            if slope < 0.0:
-                low, slope_low = t, slope
-            else:
-                high, slope_high = t, slope
-    # In what is left the squared distance is smooth and convex.
-    t = low + (high - low) * slope_low / (slope_low - slope_high)
-    noise = 0.25 * _EPSILON * sqrt((dot(a, a) + dot(d, d)) * dot(d, d))
-    for _ in range(_MAX_NEWTON):
-        slope, curvature = slope_along(along(a, t, d), d, _ZERO, radius, half)
-        if abs(slope) <= noise:
-            break
-        if slope < 0.0:
-            low = t
-        else:
-            high = t
-        following = t - slope / curvature
-        if not low < following < high:
-            following = 0.5 * (low + high)
-        if abs(following - t) <= _EPSILON:
-            break
-        t = following
-    return t
-
-
-@jit
-def closest_on_triangle(a, b, c, radius, half):
-    """Return the closest pair of the cylinder and a triangle, which may be a segment or a point."""
-    best = _closest_on_face(a, b, c, radius, half)
-    if best[0] < inf:
-        return best
-    u = c
-    for v in (a, b, c):
-        d = subtract(v, u)
-        t = closest_on_segment(u, d, radius, half)
-        pair = closest_on_curve(along(u, t, d), d, 0.0 < t < 1.0, radius, half)
-        if pair[0] < best[0]:
-            best = pair
-        u = v
-    return best
-
-
-@jit
-def _closest_on_face(a, b, c, radius, half):
-    """Return the closest pair if the triangle's interior takes part in it; otherwise the distance is inf."""
-    ab, ac = subtract(b, a), subtract(c, a)
-    m = cross(ab, ac)
-    size = sqrt(dot(m, m))
-    nowhere = (inf, _ZERO, _ZERO, _ZERO)
-    if size <= _THIN * (dot(ab, ab) + dot(ac, ac)):
-        return nowhere
-    m = (m[0] / size, m[1] / size, m[2] / size)
-    height = dot(m, a)
-    side = copysign(1.0, height)  # n points from the centre of the cylinder to the plane
-    n, height = along(_ZERO, side, m), abs(height)
-    flat = hypot(n[0], n[1])
-    p = (radius, 0.0, copysign(half, n[2]))
-    if flat > 0.0:
-        p = (radius * n[0] / flat, radius * n[1] / flat, p[2])
-    reach = dot(n, p)
-    if reach >= height:  # the plane cuts the cylinder, also between its centre and p
-        q = along(_ZERO, height / reach, p)
-        return (0.0, q, q, _ZERO) if over_triangle(q, a, b, c, m, 0.0, 0.0, 0.0) else nowhere
-    q = along(p, height - reach, n)
-    return (height - reach, p, q, n) if over_triangle(q, a, b, c, m, 0.0, 0.0, 0.0) else nowhere
-
-
-@jit
-def closest_on_cylinder(centre, axis, radius_b, half_b, radius, half):
-    """Return the closest pair of the cylinder and another one, given by centre, unit axis, radius and half height."""
-    best = _closest_sides(centre, axis, radius_b, half_b, radius, half)
-    noise = _ROUND_OFF * (sqrt(dot(centre, centre)) + radius + half + radius_b + half_b)
-    for thorough in (False, True):
-        for rim in range(4):
-            if best[0] < inf:
-                n = best[3]
-                reach = cylinder_support((0.0, 0.0, 1.0), half, radius, n) + cylinder_support(axis, half_b, radius_b, n)
-                if best[0] <= dot(n, centre) - reach + noise or best[0] == 0.0:
-                    return best
-            pair = _closest_on_rim(rim, thorough, centre, axis, radius_b, half_b, radius, half)
-            if pair[0] < best[0]:
-                best = pair
-    return best
-
-
-@jit
-def _closest_sides(centre, axis, radius_b, half_b, radius, half):
-    """Return the closest pair of the two sides if the axes' common perpendicular meets both; else the distance is inf."""
-    turn = hypot(axis[0], axis[1])
-    if turn > _PARALLEL:
-        c = (-axis[1] / turn, axis[0] / turn, 0.0)
-        s = dot(cross(centre, axis), c) / turn
-        t = (centre[1] * c[0] - centre[0] * c[1]) / turn
-        if abs(s) <= half and abs(t) <= half_b:
-            foot = (0.0, 0.0, s)
-            other = along(centre, t, axis)
-            n = subtract(other, foot)
-            length = sqrt(dot(n, n))
-            if length <= radius + radius_b:
-                common = along(foot, radius / (radius + radius_b), n)
-                return 0.0, common, common, _ZERO
-            n = along(_ZERO, 1.0 / length, n)
-            return length - radius - radius_b, along(foot, radius, n), along(other, -radius_b, n), n
-    return inf, _ZERO, _ZERO, _ZERO
-
-
-@jit
-def _closest_on_rim(rim, thorough, centre, axis, radius_b, half_b, radius, half):
-    """Return the closest pair between one of four rims (0 and 2 of B, 1 and 3 of A, near ones first) and the other solid.
-
-    If `thorough`, between the whole disc within the rim and the other solid.
-    """
-    u, v, w = basis(axis)
-    if rim % 2 == 0:
-        away = copysign(half_b, dot(centre, axis)) * (1.0 if rim else -1.0)
-        return _closest_on_circle(along(centre, away, axis), u, v, radius_b, thorough, radius, half)
-    away = copysign(half, centre[2]) * (-1.0 if rim == 3 else 1.0)
-    middle = to_frame(centre, u, v, w, (0.0, 0.0, away))
-    x, y = (u[0], v[0], w[0]), (u[1], v[1], w[1])
-    distance, q, p, n = _closest_on_circle(middle, x, y, radius, thorough, radius_b, half_b)
-    p, q, n = from_axes(u, v, w, p), from_axes(u, v, w, q), from_axes(u, v, w, n)
-    return distance, along(centre, 1.0, p), along(centre, 1.0, q), along(_ZERO, -1.0, n)
-
-
-@jit
-def _closest_on_circle(centre, u, v, rim_radius, thorough, radius, half):
-    """Return the closest pair of the cylinder and a circle, or the disc it bounds (centre, unit vectors u, v across it)."""
-    if thorough:
-        angle, q, inner = _closest_on_disc(centre, u, v, rim_radius, radius, half)
-        if inner:
-            pair = closest_on_curve(q, u, False, radius, half)
-            n = cross(u, v)
-            return (pair[0], pair[1], pair[2], along(_ZERO, copysign(1.0, dot(n, pair[3])), n)) if pair[0] > 0.0 else pair
-    else:
-        angle, least = 0.0, inf
-        for k in range(_NUM_SAMPLES):
-            q = on_circle(centre, u, v, rim_radius, 2.0 * pi / _NUM_SAMPLES * k)
-            pair = closest_on_curve(q, u, False, radius, half)
-            if pair[0] < least:
-                angle, least = 2.0 * pi / _NUM_SAMPLES * k, pair[0]
-    angle = _refine_on_circle(centre, u, v, rim_radius, angle, radius, half)
-    tangent = on_circle(_ZERO, u, v, 1.0, angle + 0.5 * pi)
-    return closest_on_curve(on_circle(centre, u, v, rim_radius, angle), tangent, True, radius, half)
-
-
-@jit
-def on_circle(centre, u, v, rim_radius, angle):
-    """Return centre + rim_radius (cos(angle) u + sin(angle) v)."""
-    return along(along(centre, rim_radius * cos(angle), u), rim_radius * sin(angle), v)
-
-
-@jit
-def _refine_on_circle(centre, u, v, rim_radius, angle, radius, half):
-    """Return the angle of a least distance near `angle`: Newton's method downhill, in a bracket once there is one."""
-    low, high = -inf, inf
-    for _ in range(_MAX_NEWTON):
-        out = on_circle(_ZERO, u, v, rim_radius, angle)
-        tangent = on_circle(_ZERO, u, v, rim_radius, angle + 0.5 * pi)
-        q = along(centre, 1.0, out)
-        slope, curvature = slope_along(q, tangent, along(_ZERO, -1.0, out), radius, half)
-        if abs(slope) <= 0.25 * _EPSILON * rim_radius * sqrt(dot(q, q)):
-            break
-        if slope < 0.0:
-            low = angle
-        else:
-            high = angle
-        step = pi / _NUM_SAMPLES
-        step = min(step, max(-step, -slope / curvature)) if curvature > 0.0 else -copysign(step, slope)
-        if not low < angle + step < high:
-            step = 0.5 * (low + high) - angle
-        angle += step
-        if abs(step) <= _EPSILON:
-            break
-    return angle
-
-
-@jit
-def _closest_on_disc(centre, u, v, rim_radius, radius, half):
-    """Return (angle, point, inner) of the disc's point closest to the cylinder; `inner` if it is not on the rim.
-
-    Over the chords of the disc the least squared distance is convex; the slope at its closest point tells where to go.
-    """
-    low, high = -0.5 * pi, 0.5 * pi
-    angle, q, inner = 0.0, centre, True
-    for _ in range(_MAX_HALVINGS):
-        middle = 0.5 * (low + high)
-        width = rim_radius * cos(middle)
-        start = along(along(centre, rim_radius * sin(middle), u), -width, v)
-        chord = along(_ZERO, 2.0 * width, v)
-        t = closest_on_segment(start, chord, radius, half)
-        q = along(start, t, chord)
-        inner = 0.0 < t < 1.0
-        slope, _ = slope_along(q, u, _ZERO, radius, half)
-        if not inner:
-            angle = 0.5 * pi - middle if t > 0.5 else middle - 0.5 * pi
-            slope_chord, _ = slope_along(q, v, _ZERO, radius, half)
-            slope = slope * cos(middle) - (1.0 if t > 0.5 else -1.0) * slope_chord * sin(middle)
-        if slope == 0.0:
-            break
-        if slope < 0.0:
-            low = middle
-        else:
-            high = middle
-    return angle, q, inner
+@inner
+def cylinder_cylinder_gap(geometry, first, second, R, t, limit, out):
+    """Return the least gap, 0 if they overlap, or `limit` with `out` untouched if it is not below."""
+    solid = solid_of(geometry.frame, geometry.radius, first, 0.0)
+    other = carried(solid_of(geometry.frame, geometry.radius, second, 0.0), R, t)
+    distance, p, q, _ = _closest_pair(solid, other)
+    if distance < limit:
+        write_points(solid, p, q, out)
+        return distance
+    return limit

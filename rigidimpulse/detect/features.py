@@ -2,25 +2,35 @@
 
 Segments are p + s d with s in [0, 1]. The closest points of two lines p + s d, q + t e follow from c = d x e:
     s = ((q - p) x e) . c / c^2,    t = ((q - p) x d) . c / c^2,
-whose error grows as 1 / sin(angle); the usual determinant d^2 e^2 - (d . e)^2 loses twice as many digits (clamping to the
-segments after Ericson, Real-Time Collision Detection, 2005, section 5.1.9).
+whose error grows as 1 / sin(angle); the usual determinant d^2 e^2 - (d . e)^2 loses twice as many digits (clamping to
+the segments after Ericson, Real-Time Collision Detection, 2005, section 5.1.9).
 
-A direction m across an edge points away from the wedge of its two faces when it lies in the arc between their normals n_0,
-n_1 on the Gauss sphere: m . o_0 >= 0 and m . o_1 >= 0 with o_0 = e x n_0 and o_1 = n_1 x e, the directions that leave each face
-across the edge (e: the unit direction of the edge in the winding of face 0).
+A direction m across an edge points away from the wedge of its two faces when it lies in the arc between their normals
+n_0, n_1 on the Gauss sphere: m . o_0 >= 0 and m . o_1 >= 0 with o_0 = e x n_0 and o_1 = n_1 x e, the directions that
+leave each face across the edge (e: the unit direction of the edge in the winding of face 0).
 """
 
 from __future__ import annotations
 
 from math import sqrt
 
+import numpy as np
 from numba import njit
 
 from rigidimpulse._jit import jit
 from rigidimpulse.geometry import EDGE_BOUNDARY, EDGE_CAPSULE, EDGE_CONVEX
 
-inner = njit(cache=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-"""`jit` for kernels that only other kernels call: compiled several times faster, and a crash when called from Python."""
+inner = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)  # pyright: ignore[reportCallIssue]
+"""`jit` for kernels that only other kernels call, and that are stored in the cache as part of those.
+
+They compile several times faster, but a call from Python ends the process: test them through a `jit` function.
+"""
+
+VERTEX_FACE, FACE_VERTEX, EDGE_EDGE, CORNER, HALF_SPACE_CONTACT = (np.int64(kind) for kind in range(5))
+"""Kinds of contact. Features: vertex and triangle, two edges, 2 * vertex or 2 * edge + 1, vertex and primitive.
+
+(Plain integers would be literals, and kernels would be compiled once for each.)
+"""
 
 PARALLEL = 1e-14
 """Sine of the angle of two segments below which any point of their overlap is as close as any other."""
@@ -54,6 +64,15 @@ def subtract(a, b):
 def row(array, i):
     """Return row `i` of an array (k, 3) as a tuple."""
     return (array[i, 0], array[i, 1], array[i, 2])
+
+
+@inner
+def edge_normals(array, edge):
+    """Return both normals of an edge from an array (E, 2, 3) as tuples."""
+    return (
+        (array[edge, 0, 0], array[edge, 0, 1], array[edge, 0, 2]),
+        (array[edge, 1, 0], array[edge, 1, 1], array[edge, 1, 2]),
+    )
 
 
 @jit
@@ -137,8 +156,8 @@ def pierces_triangle(p, q, a, b, c, normal):
 def in_edge_arc(direction, edge_direction, normal_0, normal_1, kind, tolerance):
     """Tell whether a unit direction across an edge points away from both faces.
 
-    `edge_direction` is the unit direction of the edge in the winding of face 0, `tolerance` the sine of the angle by which
-    the direction may miss the arc. The arc of a boundary is the half circle beyond its one face.
+    `edge_direction` is the unit direction of the edge in the winding of face 0, `tolerance` the sine of the angle by
+    which the direction may miss the arc. The arc of a boundary is the half circle beyond its one face.
     """
     if kind == EDGE_CAPSULE:
         return True
@@ -153,22 +172,16 @@ def in_edge_arc(direction, edge_direction, normal_0, normal_1, kind, tolerance):
     )
 
 
-@jit
-def write_contact(contact_real, contact_int, count, point_a, point_b, normal, gap, kind, feature_a, feature_b):
-    """Append a contact row if there is room; return `count + 1` in any case, so that the room needed is known."""
-    if count < contact_real.shape[0]:
-        set_contact(contact_real, contact_int, count, point_a, point_b, normal, gap, kind, feature_a, feature_b)
-    return count + 1
-
-
-@jit
-def set_contact(contact_real, contact_int, index, point_a, point_b, normal, gap, kind, feature_a, feature_b):
-    """Write a contact into a row of the buffers."""
-    for axis in range(3):
-        contact_real[index, axis] = point_a[axis]
-        contact_real[index, 3 + axis] = point_b[axis]
-        contact_real[index, 6 + axis] = normal[axis]
-    contact_real[index, 9] = gap
-    contact_int[index, 2] = kind
-    contact_int[index, 3] = feature_a
-    contact_int[index, 4] = feature_b
+@inner
+def write_contact(contact_real, contact_int, index, point_a, point_b, normal, gap, kind, feature_a, feature_b):
+    """Write a contact into a row if there is room; return `index + 1` in any case, so that the room needed is known."""
+    if index < contact_real.shape[0]:
+        for axis in range(3):
+            contact_real[index, axis] = point_a[axis]
+            contact_real[index, 3 + axis] = point_b[axis]
+            contact_real[index, 6 + axis] = normal[axis]
+        contact_real[index, 9] = gap
+        contact_int[index, 2] = kind
+        contact_int[index, 3] = feature_a
+        contact_int[index, 4] = feature_b
+    return index + 1

@@ -30,7 +30,8 @@ class Group:
         live: (m,) bool, near enough for an impact now.
         velocity, angular_velocity, position: of the members as they arrived.
         moved: whether a lift has changed poses.
-        held: whether contact forces act.
+        held: (m,) bool, contacts that carry forces. rests: whether all members stand still.
+        still: m/s, approach speed that counts as none.
 
     """
 
@@ -50,6 +51,7 @@ class Group:
     moved: bool = False
     held: np.ndarray | None = None
     rests: bool = False
+    still: float = 0.0
 
 
 def empty_contacts(m: int) -> Contacts:
@@ -164,11 +166,18 @@ def make_group(context, window, time: float, real: np.ndarray, integer: np.ndarr
 
 
 def classify(context, group: Group) -> None:
-    """Measure approach speeds and what presses each contact; slow approaches within the margin count as live."""
-    memory = context.state.contact_force
+    """Measure approach speeds and what presses each contact; slow approaches within the margin count as live.
+
+    Where a group is supported, whatever it carries is pressed by gravity as soon as the support bears, so gravity is the least that counts.
+    """
+    memory, world = context.state.contact_force, context.world
+    contacts = group.contacts
     force = np.array([memory.get(key, NO_FORCE)[0] for key in group.keys])
+    least = 0.0
+    if not np.all(world.dynamic[contacts.body_a] & world.dynamic[contacts.body_b]):
+        least = float(world.gravity_strength[group.members].max())
     pressing(
-        context.state.now, group.contacts, context.acceleration, context.angular_acceleration, force, group.delta,
+        context.state.now, contacts, context.acceleration, context.angular_acceleration, force, least, group.delta,
         group.approach, group.rest_speed,
     )
     group.live |= np.abs(group.approach) <= group.rest_speed

@@ -4,13 +4,15 @@ Convex solid (animation notes: point in convex polyhedron): p is inside where or
 
     orient(a, b, c, p) = (a - p) . ((b - p) x (c - p))    > 0 behind the face, 0 in its plane.
 
-Any solid (point in concave polyhedron): a ray from p along +x leaves the surface as often as it enters it, plus the winding
-number of p, so p is inside where the signed count of crossings is not zero. For one clean surface this is ray parity; it also
-holds where parts of a mesh overlap. A ray through an edge or a vertex is moved, in thought, by (0, e^2, e) with e > 0 infinitely
-small (Edelsbrunner & Mücke 1990, simulation of simplicity): then it meets no edge, and every crossing belongs to one face.
+Any solid (point in concave polyhedron): a ray from p along +x leaves the surface as often as it enters it, plus the
+winding number of p, so p is inside where the signed count of crossings is not zero. For one clean surface this is ray
+parity; it also holds where parts of a mesh overlap. A ray through an edge or a vertex is moved, in thought, by (0,
+e^2, e) with e > 0 infinitely small (Edelsbrunner & Mücke 1990, simulation of simplicity): then it meets no edge, and
+every crossing belongs to one face.
 
-Points on the surface are inside. Signs of the two determinants (orientation in the plane, orientation in space) are exact: plain
-floating point where its error bound allows, otherwise a sum of exact products (Shewchuk 1997, adaptive precision arithmetic).
+Points on the surface are inside. Signs of the two determinants (orientation in the plane, orientation in space) are
+exact: plain floating point where its error bound allows, otherwise a sum of exact products (Shewchuk 1997, adaptive
+precision arithmetic).
 """
 
 from __future__ import annotations
@@ -58,7 +60,9 @@ def points_in_shape(geometry, shape, points, inside):
             if geometry.kind[primitive] != ROUND or geometry.radius[primitive] > 0.0:
                 first, last = geometry.vertex_first[primitive], geometry.vertex_first[primitive + 1] - 1
                 radius = geometry.radius[primitive]
-                inside[k] = _in_curved(geometry.kind[primitive], geometry.frame[primitive], radius, geometry.vertex, first, last, point)
+                inside[k] = _in_curved(
+                    geometry.kind[primitive], geometry.frame[primitive], radius, geometry.vertex, first, last, point
+                )
             elif geometry.closed[primitive]:
                 inside[k] = point_in_mesh(geometry, primitive, point)
             if inside[k]:
@@ -163,7 +167,7 @@ def _crossing(a, b, c, p, terms):
 
 @jit
 def _in_triangle(a, b, c, p, terms):
-    """Say whether a point of the triangle's plane lies in the closed triangle: if so, it does in all three projections."""
+    """Say whether a point of the triangle's plane lies in the closed triangle: it does if in all three projections."""
     for _ in range(3):
         if p[0] < min(a[0], b[0], c[0]) or p[0] > max(a[0], b[0], c[0]):
             return False
@@ -246,7 +250,7 @@ def _product(a, b):
 
 @jit
 def _add_products(terms, count, sign, x, y, z):
-    """Append the exact terms of sign x y z, each factor a sum of two floats, leaving out zeros; return the new count."""
+    """Append the exact terms of sign x y z, each factor a sum of two floats, without zeros; return the new count."""
     for i in range(2):
         for j in range(2):
             product, rest = _product(x[i], y[j])

@@ -87,7 +87,8 @@ def refresh_pose(members, bodies, rotation, inertia):
 @jit
 def contacts_of_pairs(geometry, shape_of_body, bodies, rotation, pairs_a, pairs_b, margin, scratch, real, integer):
     """Reduced manifolds of the pairs, margin (k,) m; returns the number of contacts, or -(needed) if a buffer is too small."""
-    count = 0
+    # Not a literal: that would compile everything below twice.
+    count = np.int64(0)
     for k in range(pairs_a.shape[0]):
         a, b = pairs_a[k], pairs_b[k]
         first = count
@@ -137,8 +138,8 @@ def _point_acceleration(bodies, acceleration, angular_acceleration, i, r, n):
 
 
 @jit
-def pressing(bodies, contacts, acceleration, angular_acceleration, normal_force, delta, approach, rest_speed):
-    """Fill approach (m,) = u.n and rest_speed (m,) = sqrt(2 a delta) [m/s]; normal_force (m,) carried before [N]."""
+def pressing(bodies, contacts, acceleration, angular_acceleration, normal_force, least, delta, approach, rest_speed):
+    """Fill approach (m,) = u.n and rest_speed (m,) = sqrt(2 a delta) [m/s]; a is at least `least`."""
     u = np.empty(3)
     k = np.empty((3, 3))
     for c in range(contacts.gap.shape[0]):
@@ -152,4 +153,4 @@ def pressing(bodies, contacts, acceleration, angular_acceleration, normal_force,
             for i in range(3):
                 for j in range(3):
                     a += normal_force[c] * n[i] * k[i, j] * n[j]
-        rest_speed[c] = sqrt(2.0 * max(a, 0.0) * delta[c])
+        rest_speed[c] = sqrt(2.0 * max(a, least) * delta[c])

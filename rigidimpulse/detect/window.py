@@ -58,6 +58,7 @@ class Window:
         touch: m, gap at which contact is declared now.
         delta: m, gap at which lasting contacts are held.
         tolerance: m, gap error of an impact.
+        witness: (10,) points on a and b, normal and gap where the pair comes to contact.
         tries: how often the pair came to contact at one instant without an impulse.
     """
 
@@ -72,6 +73,7 @@ class Window:
         self.delta = np.zeros(0)
         self.tolerance = np.zeros(0)
         self.tries = np.zeros(0, np.int64)
+        self.witness = np.zeros((0, 10))
         self._moves = (context.state.course.mode != FIXED) | context.world.dynamic
 
     def find_pairs(self) -> None:
@@ -110,6 +112,7 @@ class Window:
         self.delta = np.concatenate([self.delta, world.contact_gap * size])
         self.tolerance = np.concatenate([self.tolerance, world.accuracy.tolerance * size])
         self.tries = np.concatenate([self.tries, np.zeros(len(a), np.int64)])
+        self.witness = np.concatenate([self.witness, np.zeros((len(a), 10))])
         return np.arange(first, len(self.a))
 
     def pairs_of(self, body: int) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Rotation of a body without torque, exact at any time.
 
-Symbols: principal moments I, body-frame angular velocity w, angular momentum L = |I w|, T2 = w . I w (twice the energy).
+Symbols: principal moments I, angular velocity w in the body, angular momentum L = |I w|, T2 = w . I w (twice energy).
     spherical inertia, or w on a principal axis:   q(t) = exp(w t) q0
     symmetric (I_b = I_c = I, axis e of I_a):      q(t) = exp(L t / I) q0 exp((1 - I_a / I) w_a t e)
     asymmetric: a frame (e1, e2, e3) of principal axes with e1 the middle moment and L circling about e3, w3 > 0:
@@ -9,24 +9,25 @@ Symbols: principal moments I, body-frame angular velocity w, angular momentum L 
         a^2 = d2 / (I3 |I3 - I2|),  b^2 = r2 / (I1 |I3 - I1|),  c^2 = r2 / (I2 |I3 - I2|),  sign b = sign(I1 - I3)
 
 Attitude of the asymmetric top: let g = (g0, g1, g2, g3) turn (e1, e2, e3) into a fixed frame whose third axis is L. Its
-Cayley-Klein parameters A = g0 + i g3, B = g1 + i g2 obey |A|^2 = (1 + I3 w3 / L) / 2, B = -i (I1 w1 + i I2 w2) A / (L + I3 w3)
-    and   arg(A)' = (T2 + L w3) / (2 (L + I3 w3)),
+Cayley-Klein parameters A = g0 + i g3, B = g1 + i g2 obey
+    |A|^2 = (1 + I3 w3 / L) / 2,   B = -i (I1 w1 + i I2 w2) A / (L + I3 w3),   arg(A)' = (T2 + L w3) / (2 (L + I3 w3)),
 so that A is never zero and only its phase is left to find. A is a theta function of half the usual lattice:
     A ~ exp(i lambda t) theta4(z - i y; Q),   z = pi u / 2K,   y = sign(I3 - I1) pi y0 / 2K,   Q = exp(-2 pi K' / K),
-    where y0 is the zero of L - I3 a dn(i y0): y0 = tau RF(1, G, G + m1 tau^2), G = (L / I3 a)^2, tau^2 = I2 |I3 - I1| / (I3 |I1 - I2|),
-and lambda follows from the rate at z = 0. Near the separatrix (Q > exp(-pi)) Jacobi's imaginary transformation is used: with
-T = 2K'/K,  theta4(z - i y; exp(-pi T)) ~ exp(2 i z y / (pi T)) theta2(y/T + i z/T; exp(-pi / T)). Phases are counted from the
-nearest maximum of dn, so errors grow only as the round-off of the phase itself.
+where y0 is the zero of L - I3 a dn(i y0),
+    y0 = tau RF(1, G, G + m1 tau^2),   G = (L / I3 a)^2,   tau^2 = I2 |I3 - I1| / (I3 |I1 - I2|),   m1 = 1 - m,
+and lambda follows from the rate at z = 0. Near the separatrix (Q > exp(-pi)) Jacobi's imaginary transformation is used:
+    theta4(z - i y; exp(-pi T)) ~ exp(2 i z y / (pi T)) theta2(y / T + i z / T; exp(-pi / T)),   T = 2K' / K.
+Phases are counted from the nearest maximum of dn, so that errors grow only as the round-off of the phase itself.
 
-Sources: C. G. J. Jacobi, J. reine angew. Math. 39, 1850; R. van Zon and J. Schofield, J. Comput. Phys. 225:145, 2007 (sections
-2-3); F. Klein and A. Sommerfeld, Theorie des Kreisels, chapter VI; sn, cn, dn after R. Bulirsch, Numer. Math. 7:78, 1965;
-RF after B. C. Carlson, DLMF 19.36.
+Sources: C. G. J. Jacobi, J. reine angew. Math. 39, 1850; F. Klein and A. Sommerfeld, Theorie des Kreisels, chapter VI;
+R. van Zon and J. Schofield, J. Comput. Phys. 225:145, 2007 (sections 2-3); sn, cn, dn after R. Bulirsch, Numer. Math.
+7:78, 1965; RF after B. C. Carlson, DLMF 19.36.
 """
 
 import math
 
 from rigidimpulse._jit import jit
-from rigidimpulse.rotation import exponential, from_columns, product, rotated
+from rigidimpulse.rotation import exponential, product, rotated
 
 # Kinds of rotation, and places in the row of constants.
 REST, FIXED_AXIS, SYMMETRIC, ASYMMETRIC = 0.0, 1.0, 2.0, 3.0
@@ -41,16 +42,19 @@ _AMPLITUDE = 9  # (3,) b, c, a
 _SHARE = 12  # (3,) I b / L, I c / L, I a / L
 _PHASE_RATE = 15  # lambda
 _PHASE_SLOPE = 16  # 2 y / (pi T), or 0
-_HALF_TURNS = 17  # p / 2K, and u0 / 2K
+_HALF_TURNS = 17  # p / 2K
+_START_HALF_TURNS = 18  # u0 / 2K
 _NEAR = 19  # 1 if the series are those of the imaginary transformation
 _NOME_SCALE = 20  # 1 / T
-_THETA = 21  # (8,) coefficients of real and imaginary part
+_THETA = 21  # (_TERMS,) coefficients of the real part
+_THETA_IMAGINARY = 25  # (_TERMS,) of the imaginary part
 _MEAN = 29  # final mean of the AGM of (1, k')
 _LEVELS = 30  # number of levels
-_AGM = 31  # (2 * _MAX_LEVELS,) arithmetic and geometric means
-
+_TERMS = 4
 _MAX_LEVELS = 14
-FREE_TOP_SIZE = _AGM + 2 * _MAX_LEVELS
+_ARITHMETIC = 31  # (_MAX_LEVELS,) arithmetic means
+_GEOMETRIC = _ARITHMETIC + _MAX_LEVELS  # (_MAX_LEVELS,) geometric means
+FREE_TOP_SIZE = _GEOMETRIC + _MAX_LEVELS
 
 _EQUAL = 4e-15
 """relative difference of two moments below which they are equal: the phase then errs by less than its round-off"""
@@ -58,6 +62,8 @@ _ON_AXIS = 1e-40
 """part of the spin off a stable principal axis that is taken for none"""
 _ON_UNSTABLE_AXIS = 1e-15
 """the same for the middle axis: what round-off of the world spin leaves must not make a body flip"""
+_SLOW = 1e-150
+"""rad/s, below which a body keeps its axis: squares would underflow"""
 _LEAST_M1 = 1e-100
 """floor of 1 - m: the separatrix itself; the body stays by the unstable axis for 2K > 230 / p"""
 _AGM_DONE = 1e-8
@@ -101,8 +107,8 @@ def _store_agm(k, constants_out):
     a, g = 1.0, k
     level = 0
     while True:
-        constants_out[_AGM + 2 * level] = a
-        constants_out[_AGM + 2 * level + 1] = g
+        constants_out[_ARITHMETIC + level] = a
+        constants_out[_GEOMETRIC + level] = g
         level += 1
         if abs(a - g) <= _AGM_DONE * a or level == _MAX_LEVELS:
             break
@@ -122,8 +128,8 @@ def _jacobi(constants, sin_z, cos_z):
     cotangent = ratio * constants[_MEAN]
     dn = 1.0
     for level in range(int(constants[_LEVELS]) - 1, -1, -1):
-        a = constants[_AGM + 2 * level]
-        g = constants[_AGM + 2 * level + 1]
+        a = constants[_ARITHMETIC + level]
+        g = constants[_GEOMETRIC + level]
         ratio *= cotangent
         cotangent *= dn
         dn = (g + ratio) / (a + ratio)
@@ -136,20 +142,22 @@ def _jacobi(constants, sin_z, cos_z):
 def _theta(constants, z, sin_z, cos_z):
     """Real and imaginary part of the theta function that carries the phase of A, up to a positive factor."""
     c = constants
+    real, imaginary = 0.0, 0.0
     if c[_NEAR] == 0.0:
         cos_2, sin_2 = cos_z * cos_z - sin_z * sin_z, 2.0 * sin_z * cos_z
-        cos_4, sin_4 = cos_2 * cos_2 - sin_2 * sin_2, 2.0 * sin_2 * cos_2
-        cos_6, sin_6 = cos_4 * cos_2 - sin_4 * sin_2, sin_4 * cos_2 + cos_4 * sin_2
-        real = c[_THETA] + c[_THETA + 1] * cos_2 + c[_THETA + 2] * cos_4 + c[_THETA + 3] * cos_6
-        return real, c[_THETA + 5] * sin_2 + c[_THETA + 6] * sin_4 + c[_THETA + 7] * sin_6
+        cos_n, sin_n = 1.0, 0.0
+        for n in range(_TERMS):
+            real += c[_THETA + n] * cos_n
+            imaginary += c[_THETA_IMAGINARY + n] * sin_n
+            cos_n, sin_n = cos_n * cos_2 - sin_n * sin_2, sin_n * cos_2 + cos_n * sin_2
+        return real, imaginary
     # Divided by exp(|x|), which is left to the final normalisation: cosh, sinh of (2n + 1) x without overflow.
     x = z * c[_NOME_SCALE]
     growth = math.exp(2.0 * abs(x))
     growing, shrinking = 1.0, 1.0 / growth
-    real, imaginary = 0.0, 0.0
-    for n in range(4):
+    for n in range(_TERMS):
         real += c[_THETA + n] * (growing + shrinking)
-        imaginary += c[_THETA + 4 + n] * (growing - shrinking)
+        imaginary += c[_THETA_IMAGINARY + n] * (growing - shrinking)
         growing *= growth
         shrinking /= growth
     return real, imaginary if x >= 0.0 else -imaginary
@@ -158,14 +166,15 @@ def _theta(constants, z, sin_z, cos_z):
 @jit
 def _asymmetric_frame(c, t):
     """Quaternion of (e1, e2, e3) relative to the frame of L, and w1, w2, w3, t seconds after the start."""
-    turns = c[_HALF_TURNS] * t + c[_HALF_TURNS + 1]
+    turns = c[_HALF_TURNS] * t + c[_START_HALF_TURNS]
     whole = math.floor(turns + 0.5)
     z = math.pi * (turns - whole)
     sin_z, cos_z = math.sin(z), math.cos(z)
     sn, cn, dn = _jacobi(c, sin_z, cos_z)
     if whole % 2.0 != 0.0:
         sn, cn = -sn, -cn
-    l1, l2, l3 = c[_SHARE] * sn, c[_SHARE + 1] * cn, c[_SHARE + 2] * dn
+    l1, l2, l3 = c[_SHARE], c[_SHARE + 1], c[_SHARE + 2]
+    l1, l2, l3 = l1 * sn, l2 * cn, l3 * dn
     real, imaginary = _theta(c, z, sin_z, cos_z)
     phase = c[_PHASE_RATE] * t + c[_PHASE_SLOPE] * z
     cos_phase, sin_phase = math.cos(phase), math.sin(phase)
@@ -174,44 +183,41 @@ def _asymmetric_frame(c, t):
     a_imaginary = size * (sin_phase * real + cos_phase * imaginary)
     b_real = (l2 * a_real + l1 * a_imaginary) / (1.0 + l3)
     b_imaginary = (l2 * a_imaginary - l1 * a_real) / (1.0 + l3)
-    w1, w2, w3 = c[_AMPLITUDE] * sn, c[_AMPLITUDE + 1] * cn, c[_AMPLITUDE + 2] * dn
-    return a_real, b_real, b_imaginary, a_imaginary, w1, w2, w3
+    b, c2, a = c[_AMPLITUDE], c[_AMPLITUDE + 1], c[_AMPLITUDE + 2]
+    return a_real, b_real, b_imaginary, a_imaginary, b * sn, c2 * cn, a * dn
 
 
 @jit
 def _store_phase(c, start_rate, speed, sigma, y, t_ratio):
     """Coefficients of the theta function and lambda, given arg(A)' at z = 0, z', sigma, |y| and T."""
+    near = t_ratio < _NOME_SWITCH
+    turn = y / t_ratio
     slope, total = 0.0, 0.0
-    if t_ratio >= _NOME_SWITCH:
-        c[_NEAR], c[_NOME_SCALE], c[_PHASE_SLOPE] = 0.0, 0.0, 0.0
-        c[_THETA], c[_THETA + 4] = 1.0, 0.0
-        total = 1.0
-        for n in range(1, 4):
-            high = math.exp(2.0 * n * y - n * n * math.pi * t_ratio)
-            low = math.exp(-2.0 * n * y - n * n * math.pi * t_ratio)
-            sign = 1.0 if n % 2 == 0 else -1.0
-            c[_THETA + n] = sign * (high + low)
-            c[_THETA + 4 + n] = sigma * sign * (high - low)
-            total += c[_THETA + n]
-            slope += 2.0 * n * c[_THETA + 4 + n]
-        slope /= total
-    else:
-        c[_NEAR], c[_NOME_SCALE], c[_PHASE_SLOPE] = 1.0, 1.0 / t_ratio, 2.0 * sigma * y / (math.pi * t_ratio)
-        for n in range(4):
+    for n in range(_TERMS):
+        if near:
             nome = math.exp(-n * (n + 1) * math.pi / t_ratio)
-            odd = 2.0 * n + 1.0
-            c[_THETA + n] = nome * math.cos(odd * y / t_ratio)
-            c[_THETA + 4 + n] = -sigma * nome * math.sin(odd * y / t_ratio)
-            total += c[_THETA + n]
-            slope += odd * c[_THETA + 4 + n]
-        slope = c[_PHASE_SLOPE] + slope / (total * t_ratio)
-    c[_PHASE_RATE] = start_rate - speed * slope
+            frequency = (2 * n + 1) / t_ratio
+            real, imaginary = nome * math.cos((2 * n + 1) * turn), -nome * math.sin((2 * n + 1) * turn)
+        else:
+            high = math.exp(2 * n * y - n * n * math.pi * t_ratio)
+            low = math.exp(-2 * n * y - n * n * math.pi * t_ratio)
+            frequency = 2.0 * n
+            sign = 0.5 if n == 0 else (-1.0 if n % 2 == 1 else 1.0)
+            real, imaginary = sign * (high + low), sign * (high - low)
+        c[_THETA + n] = real
+        c[_THETA_IMAGINARY + n] = sigma * imaginary
+        total += real
+        slope += frequency * sigma * imaginary
+    c[_NEAR] = 1.0 if near else 0.0
+    c[_NOME_SCALE] = 1.0 / t_ratio
+    c[_PHASE_SLOPE] = 2.0 * sigma * turn / math.pi if near else 0.0
+    c[_PHASE_RATE] = start_rate - speed * (c[_PHASE_SLOPE] + slope / total)
 
 
 @jit
-def _store_motion(c, i1, i2, i3, w1, w2, w3):
-    """Constants of the asymmetric motion for moments and spin of order one, w3 > 0."""
-    d13, d12, d23 = abs(i3 - i1), abs(i1 - i2), abs(i3 - i2)
+def _store_motion(c, i1, i2, i3, d13, d12, w1, w2, w3):
+    """Constants of the asymmetric motion, given moments and spin of order one, d13 = |I3 - I1|, d12 = |I1 - I2|."""
+    d23 = d13 + d12
     r2 = i1 * d13 * w1 * w1 + i2 * d23 * w2 * w2
     d2 = i3 * d23 * w3 * w3 + i1 * d12 * w1 * w1
     m = min(d12 * r2 / (d13 * d2), 1.0)
@@ -232,7 +238,7 @@ def _store_motion(c, i1, i2, i3, w1, w2, w3):
     half_turns = abs(sn) * mean / math.pi * _carlson_rf(cn * cn, cn * cn + m1 * sn * sn, 1.0)
     if cn < 0.0:
         half_turns = 1.0 - half_turns
-    c[_HALF_TURNS + 1] = math.copysign(half_turns, sn)
+    c[_START_HALF_TURNS] = math.copysign(half_turns, sn)
 
     steepness = momentum / momentum_3
     steepness *= steepness  # G
@@ -243,115 +249,136 @@ def _store_motion(c, i1, i2, i3, w1, w2, w3):
 
 
 @jit
-def _prepare_asymmetric(inertia, low, middle, high, wx, wy, wz, c):
-    """Choose (e1, e2, e3), store the motion in it, and turn the base so that it starts at the given orientation."""
-    w = (wx, wy, wz)
-    scale_i, scale_w = 1.0 / inertia[high], 1.0 / max(abs(wx), abs(wy), abs(wz))
-    i_low, i_middle, i_high = scale_i * inertia[low], scale_i * inertia[middle], 1.0
-    w_low, w_middle, w_high = scale_w * w[low], scale_w * w[middle], scale_w * w[high]
-    circles_high = i_high * (i_high - i_middle) * w_high * w_high >= i_low * (i_middle - i_low) * w_low * w_low
+def _prepare_asymmetric(inertia, low, middle, high, c):
+    """Choose (e1, e2, e3), store the motion in it, and turn the base so that it starts at the given orientation.
+
+    The angular velocity in the body is read from the place _SPIN.
+    """
+    w_low, w_middle, w_high = c[_SPIN + low], c[_SPIN + middle], c[_SPIN + high]
+    # Powers of two: scaling then rounds nothing.
+    scale_i = math.ldexp(1.0, -math.frexp(inertia[high])[1])
+    scale_w = math.ldexp(1.0, -math.frexp(max(abs(w_low), abs(w_middle), abs(w_high)))[1])
+    w_low, w_middle, w_high = scale_w * w_low, scale_w * w_middle, scale_w * w_high
+    i_low, i_middle, i_high = scale_i * inertia[low], scale_i * inertia[middle], scale_i * inertia[high]
+    # Differences are taken before scaling: of two nearly equal moments they are exact then.
+    d_high, d_low = scale_i * (inertia[high] - inertia[middle]), scale_i * (inertia[middle] - inertia[low])
+    circles_high = i_high * d_high * w_high * w_high >= i_low * d_low * w_low * w_low
     third = high if circles_high else low
-    sign_3 = 1.0 if w[third] >= 0.0 else -1.0
-    sign_2 = sign_3 if (middle - third) % 3 == 1 else -sign_3
+    step = third - middle
+    sign_3 = math.copysign(1.0, c[_SPIN + third])
+    sign_2 = sign_3 if step == 2 or step == -1 else -sign_3
     if circles_high:
-        _store_motion(c, i_middle, i_low, i_high, w_middle, sign_2 * w_low, sign_3 * w_high)
+        _store_motion(c, i_middle, i_low, i_high, d_high, d_low, w_middle, sign_2 * w_low, abs(w_high))
     else:
-        _store_motion(c, i_middle, i_high, i_low, w_middle, sign_2 * w_high, sign_3 * w_low)
+        _store_motion(c, i_middle, i_high, i_low, d_low, d_high, w_middle, sign_2 * w_high, abs(w_low))
     for k in range(3):
         c[_AMPLITUDE + k] /= scale_w
     c[_PHASE_RATE] /= scale_w
     c[_HALF_TURNS] /= scale_w
 
-    second = 3 - middle - third
-    e0, e1, e2, e3 = from_columns(
-        1.0 if middle == 0 else 0.0,
-        1.0 if middle == 1 else 0.0,
-        1.0 if middle == 2 else 0.0,
-        sign_2 if second == 0 else 0.0,
-        sign_2 if second == 1 else 0.0,
-        sign_2 if second == 2 else 0.0,
-        sign_3 if third == 0 else 0.0,
-        sign_3 if third == 1 else 0.0,
-        sign_3 if third == 2 else 0.0,
-    )
+    # (e1, e2, e3) is (x, y, z) turned by 0, 120 or 240 degrees about (1, 1, 1), after 0, 90, 180 or 270 about x.
+    around = 0.25 * middle * (5 - 3 * middle)
+    half_angle = 0.25 * math.pi * ((1.0 - sign_3) if sign_2 == sign_3 else -sign_3)
+    cos_half, sin_half = math.cos(half_angle), math.sin(half_angle)
+    e0, e1, e2, e3 = product(1.0 - abs(around), around, around, around, cos_half, sin_half, 0.0, 0.0)
     c[_FRAME], c[_FRAME + 1], c[_FRAME + 2], c[_FRAME + 3] = e0, e1, e2, e3
     g0, g1, g2, g3, _, _, _ = _asymmetric_frame(c, 0.0)
-    h0, h1, h2, h3 = product(e0, e1, e2, e3, g0, -g1, -g2, -g3)
-    c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = product(
-        c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], h0, h1, h2, h3
-    )
+    e0, e1, e2, e3 = product(e0, e1, e2, e3, g0, -g1, -g2, -g3)
+    q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
+    q0, q1, q2, q3 = product(q0, q1, q2, q3, e0, e1, e2, e3)
+    c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = q0, q1, q2, q3
     c[_KIND] = ASYMMETRIC
 
 
 @jit
-def _prepare_symmetric(inertia, axis, w_axis, w_world, c):
-    """Constants for two equal moments; `axis` is the one of the third."""
-    i_across = 0.5 * (inertia[(axis + 1) % 3] + inertia[(axis + 2) % 3])
-    excess = inertia[axis] / i_across - 1.0
-    along = excess * w_axis
-    x, y, z = 1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0
-    dx, dy, dz = rotated(c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], along * x, along * y, along * z)
-    c[_RATE], c[_RATE + 1], c[_RATE + 2] = w_world[0] + dx, w_world[1] + dy, w_world[2] + dz
-    c[_SPIN], c[_SPIN + 1], c[_SPIN + 2] = -along * x, -along * y, -along * z
-    c[_START_RATE], c[_START_RATE + 1], c[_START_RATE + 2] = w_world[0], w_world[1], w_world[2]
+def _prepare_symmetric(axis, excess, c):
+    """Constants for two equal moments; `axis` is that of the third, which is larger by the fraction `excess`.
+
+    The angular velocity in the body is read from the place _SPIN.
+    """
+    along = c[_SPIN + axis] * excess
+    c[_SPIN], c[_SPIN + 1], c[_SPIN + 2] = 0.0, 0.0, 0.0
+    c[_SPIN + axis] = -along
+    x, y, z = rotated(c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], c[_SPIN], c[_SPIN + 1], c[_SPIN + 2])
+    wx, wy, wz = c[_RATE], c[_RATE + 1], c[_RATE + 2]
+    c[_START_RATE], c[_START_RATE + 1], c[_START_RATE + 2] = wx, wy, wz
+    c[_RATE], c[_RATE + 1], c[_RATE + 2] = wx - x, wy - y, wz - z
     c[_KIND] = SYMMETRIC
 
 
 @jit
-def prepare(inertia, q, w_world, constants_out):
-    """Write the constants (FREE_TOP_SIZE,) of the motion from orientation q (4,) and world angular velocity (3,), rad/s.
+def keep_axis(q, w_world, constants_out):
+    """Write the constants of a turn at constant angular velocity, whatever the inertia."""
+    c = constants_out
+    q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
+    wx, wy, wz = w_world[0], w_world[1], w_world[2]
+    c[_RATE], c[_RATE + 1], c[_RATE + 2] = wx, wy, wz
+    c[_KIND] = REST
+    if wx != 0.0 or wy != 0.0 or wz != 0.0:
+        # Only a body that turns is normalised: one at rest keeps the very bits of its orientation.
+        c[_KIND] = FIXED_AXIS
+        norm = math.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+        q0, q1, q2, q3 = q0 / norm, q1 / norm, q2 / norm, q3 / norm
+    c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = q0, q1, q2, q3
 
-    `inertia` (3,): principal moments, kg m^2, all > 0; they need not obey the triangle inequality.
+
+@jit
+def prepare(inertia, q, w_world, constants_out):
+    """Write the constants (FREE_TOP_SIZE,) of the motion from orientation q (4,) and angular velocity (3,), rad/s.
+
+    `w_world` is in the world. `inertia` (3,): principal moments, kg m^2, all > 0; any ratios.
     """
     c = constants_out
-    scale = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    spin = max(abs(w_world[0]), abs(w_world[1]), abs(w_world[2]))
-    if spin == 0.0:
-        scale = 1.0  # a body at rest keeps the very bits of its orientation
-    for k in range(4):
-        c[_BASE + k] = scale * q[k]
-    for k in range(3):
-        c[_RATE + k] = w_world[k]
-    c[_KIND] = REST if spin == 0.0 else FIXED_AXIS
-    low = 0 if inertia[0] <= min(inertia[1], inertia[2]) else (1 if inertia[1] <= inertia[2] else 2)
-    high = 2 if inertia[2] >= max(inertia[0], inertia[1]) else (1 if inertia[1] >= inertia[0] else 0)
+    keep_axis(q, w_world, c)
+    spin = max(abs(c[_RATE]), abs(c[_RATE + 1]), abs(c[_RATE + 2]))
+    low, high = 0, 0
+    for k in range(1, 3):
+        if inertia[k] < inertia[low]:
+            low = k
+        if inertia[k] >= inertia[high]:
+            high = k
     middle = 3 - low - high
     equal = _EQUAL * inertia[high]
-    if spin == 0.0 or inertia[high] - inertia[low] <= equal:
+    if spin < _SLOW or inertia[high] - inertia[low] <= equal:
         return
-    w = rotated(c[_BASE], -c[_BASE + 1], -c[_BASE + 2], -c[_BASE + 3], w_world[0], w_world[1], w_world[2])
-    if inertia[high] - inertia[middle] <= equal:
-        _prepare_symmetric(inertia, low, w[low], w_world, c)
-    elif inertia[middle] - inertia[low] <= _EQUAL * inertia[middle]:
-        _prepare_symmetric(inertia, high, w[high], w_world, c)
-    elif not (
-        max(abs(w[middle]), abs(w[low])) <= _ON_AXIS * spin
-        or max(abs(w[middle]), abs(w[high])) <= _ON_AXIS * spin
-        or max(abs(w[low]), abs(w[high])) <= _ON_UNSTABLE_AXIS * spin
-    ):
-        _prepare_asymmetric(inertia, low, middle, high, w[0], w[1], w[2], c)
+    c[_SPIN], c[_SPIN + 1], c[_SPIN + 2] = rotated(
+        c[_BASE], -c[_BASE + 1], -c[_BASE + 2], -c[_BASE + 3], c[_RATE], c[_RATE + 1], c[_RATE + 2]
+    )
+    i_low, i_middle, i_high = inertia[low], inertia[middle], inertia[high]
+    if i_high - i_middle <= equal:
+        _prepare_symmetric(low, 2.0 * i_low / (i_middle + i_high) - 1.0, c)
+    elif i_middle - i_low <= _EQUAL * i_middle:
+        _prepare_symmetric(high, 2.0 * i_high / (i_middle + i_low) - 1.0, c)
+    else:
+        off_low, off_middle, off_high = abs(c[_SPIN + low]), abs(c[_SPIN + middle]), abs(c[_SPIN + high])
+        stable = min(max(off_low, off_middle), max(off_middle, off_high)) <= _ON_AXIS * spin
+        if not (stable or max(off_low, off_high) <= _ON_UNSTABLE_AXIS * spin):
+            _prepare_asymmetric(inertia, low, middle, high, c)
 
 
 @jit
 def rotation(constants, t):
     """Quaternion and world angular velocity t seconds after the start, as seven numbers."""
     c = constants
-    if c[_KIND] == ASYMMETRIC:
-        g0, g1, g2, g3, w1, w2, w3 = _asymmetric_frame(c, t)
-        h0, h1, h2, h3 = product(c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], g0, g1, g2, g3)
-        wx, wy, wz = rotated(h0, h1, h2, h3, w1, w2, w3)
-        q0, q1, q2, q3 = product(
-            h0, h1, h2, h3, c[_FRAME], -c[_FRAME + 1], -c[_FRAME + 2], -c[_FRAME + 3]
-        )
-        return q0, q1, q2, q3, wx, wy, wz
+    q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
     if c[_KIND] == REST:
-        return c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], 0.0, 0.0, 0.0
-    e0, e1, e2, e3 = exponential(t * c[_RATE], t * c[_RATE + 1], t * c[_RATE + 2])
-    q0, q1, q2, q3 = product(e0, e1, e2, e3, c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3])
-    if c[_KIND] == FIXED_AXIS:
-        return q0, q1, q2, q3, c[_RATE], c[_RATE + 1], c[_RATE + 2]
-    wx, wy, wz = rotated(e0, e1, e2, e3, c[_START_RATE], c[_START_RATE + 1], c[_START_RATE + 2])
-    s0, s1, s2, s3 = exponential(t * c[_SPIN], t * c[_SPIN + 1], t * c[_SPIN + 2])
+        return q0, q1, q2, q3, 0.0, 0.0, 0.0
+    if c[_KIND] == ASYMMETRIC:
+        g0, g1, g2, g3, wx, wy, wz = _asymmetric_frame(c, t)
+        q0, q1, q2, q3 = product(q0, q1, q2, q3, g0, g1, g2, g3)
+        wx, wy, wz = rotated(q0, q1, q2, q3, wx, wy, wz)
+        s0, s1, s2, s3 = c[_FRAME], c[_FRAME + 1], c[_FRAME + 2], c[_FRAME + 3]
+        s1, s2, s3 = -s1, -s2, -s3
+    else:
+        wx, wy, wz = c[_RATE], c[_RATE + 1], c[_RATE + 2]
+        e0, e1, e2, e3 = exponential(t * wx, t * wy, t * wz)
+        q0, q1, q2, q3 = product(e0, e1, e2, e3, q0, q1, q2, q3)
+        if c[_KIND] == FIXED_AXIS:
+            return q0, q1, q2, q3, wx, wy, wz
+        wx, wy, wz = c[_START_RATE], c[_START_RATE + 1], c[_START_RATE + 2]
+        wx, wy, wz = rotated(e0, e1, e2, e3, wx, wy, wz)
+        x, y, z = c[_SPIN], c[_SPIN + 1], c[_SPIN + 2]
+        s0, s1, s2, s3 = exponential(t * x, t * y, t * z)
     q0, q1, q2, q3 = product(q0, q1, q2, q3, s0, s1, s2, s3)
     return q0, q1, q2, q3, wx, wy, wz
 

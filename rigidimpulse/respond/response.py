@@ -29,6 +29,9 @@ REASONS = {
 SLOW = 1e-9
 # Calls with a full log before a group is given up.
 MAX_CALLS = 1000
+# Impacts in a row, without a gap worth the name between them, after which a pair no longer rebounds.
+RATTLES = 8
+NEVER = (-np.inf, np.inf, 0)
 
 
 @dataclass(frozen=True)
@@ -64,13 +67,16 @@ def respond_to_impacts(context, group: Group, kernel) -> None:
     rest_speed = group.rest_speed[live]
     scale = speed_scale(context.state.now, contacts)
     tolerance = TOLERANCES.approach * scale + SLOW * float(rest_speed.max())
+    group.still = tolerance
     if group.approach[live].min() >= -tolerance:
         return
     now = context.state.now
+    rest_speed = np.where(_rattles(context, group.time, contacts), np.inf, rest_speed)
     before = kinetic_energy(now, context.world, group.members)
     for _ in range(MAX_CALLS):
         count, impulses, capped = kernel(now, contacts, rest_speed, tolerance, scale, context.column, context.impact_log)
         _log(context, group.time, contacts, context.impact_log[:count])
+        _remember_rebounds(context, group, contacts, context.impact_log[:count])
         if capped:
             names = tuple(context.world.names[i] for i in group.members)
             context.log.report(
@@ -81,6 +87,31 @@ def respond_to_impacts(context, group: Group, kernel) -> None:
             break
     context.log.book(group.time, "impact", kinetic_energy(now, context.world, group.members) - before)
     classify(context, group)
+
+
+def _rattles(context, time: float, contacts: Contacts) -> np.ndarray:
+    """Contacts of pairs that came back RATTLES times in a row without ever having been farther apart than nothing to speak of.
+
+    Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
+    a bouncing ball they are replaced by one inelastic impact.
+    """
+    rattles = np.zeros(len(contacts.gap), bool)
+    for c, pair in enumerate(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)):
+        _, _, count = context.state.rebounds.get(pair, NEVER)
+        rattles[c] = count >= RATTLES and contacts.restitution[c] < 1.0
+    return rattles
+
+
+def _remember_rebounds(context, group: Group, contacts: Contacts, rows: np.ndarray) -> None:
+    """Count for each pair how often in a row it came back after less than its held gap."""
+    delta = {pair: d for pair, d in zip(zip(group.contacts.body_a.tolist(), group.contacts.body_b.tolist()), group.delta)}
+    for row in rows:
+        c = int(row[0])
+        pair = (int(contacts.body_a[c]), int(contacts.body_b[c]))
+        last, speed, count = context.state.rebounds.get(pair, NEVER)
+        if group.time > last:
+            count = count + 1 if speed * (group.time - last) < delta[pair] else 0
+        context.state.rebounds[pair] = (group.time, float(row[6]), count)
 
 
 def _log(context, time: float, contacts: Contacts, rows: np.ndarray) -> None:

@@ -58,7 +58,7 @@ def _block_impulses(jacobian, u, bounce, bounce_t, mu, friction, scale, p):
 
 @jit
 def solve_block(bodies, contacts, subset, rebound, rest_speed, scale, column, log, count):
-    """Resolve the contacts of subset together and apply the impulses; `rebound` False makes it inelastic. New log count."""
+    """Resolve the contacts of subset together and apply the impulses; `rebound` 1, or 0 for an inelastic one. New log count."""
     m = subset.shape[0]
     members = number_columns(bodies, contacts, column)
     width = 6 * members.shape[0]
@@ -76,8 +76,8 @@ def solve_block(bodies, contacts, subset, rebound, rest_speed, scale, column, lo
         for k in range(3):
             u[3 * s + k] = v[0] * frames[s, k, 0] + v[1] * frames[s, k, 1] + v[2] * frames[s, k, 2]
         mu[s], friction[s] = contacts.static_friction[c], contacts.dynamic_friction[c]
-        if rebound and approach < 0.0:
-            bounce[s] = _restitution(contacts, c, approach, rest_speed)
+        if approach < 0.0:
+            bounce[s] = rebound * _restitution(contacts, c, approach, rest_speed)
             bounce_t[s] = contacts.tangential_restitution[c] if bounce[s] > 0.0 else 0.0
             largest = max(largest, bounce[s])
     p = np.empty(3 * m)
@@ -124,12 +124,12 @@ def _apply(bodies, contacts, subset, frames, u, p, scale, log, count):
 
 @jit
 def _approaching(bodies, contacts, tolerance, rebounding, rest_speed):
-    """The fastest approaching contact, or -1; only contacts that rebound if asked."""
+    """The fastest approaching contact, or -1; only contacts that rebound if `rebounding` is 1."""
     u = np.empty(3)
     best, fastest = -1, -tolerance
     for c in range(contacts.gap.shape[0]):
         approach = relative_velocity(bodies, contacts, c, u)
-        if approach < fastest and (not rebounding or _restitution(contacts, c, approach, rest_speed) > 0.0):
+        if approach < fastest and (rebounding == 0.0 or _restitution(contacts, c, approach, rest_speed) > 0.0):
             best, fastest = c, approach
     return best
 
@@ -157,12 +157,12 @@ def respond_sequential(bodies, contacts, rest_speed, tolerance, scale, column, l
 
     rest_speed (m,): a rebound slower than this is none [m/s]; tolerance: slower approach is none [m/s]; scale: speed of the group.
     """
-    count = 0
+    count = np.int64(0)
     impulses = 0
     cap = IMPULSES_PER_CONTACT * contacts.gap.shape[0]
     u = np.empty(3)
     while impulses < cap and count + contacts.gap.shape[0] < log.shape[0]:
-        c = _approaching(bodies, contacts, tolerance, True, rest_speed)
+        c = _approaching(bodies, contacts, tolerance, 1.0, rest_speed)
         if c < 0:
             break
         subset = _same_pair(contacts, c)
@@ -170,10 +170,10 @@ def respond_sequential(bodies, contacts, rest_speed, tolerance, scale, column, l
             e = _restitution(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
             count = resolve_contact(bodies, contacts, c, e, log, count)
         else:
-            count = solve_block(bodies, contacts, subset, True, rest_speed, scale, column, log, count)
+            count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, column, log, count)
         impulses += 1
     full = count + contacts.gap.shape[0] >= log.shape[0]
-    if not full and _approaching(bodies, contacts, tolerance, False, rest_speed) >= 0:
+    if not full and _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
         count = _finish(bodies, contacts, rest_speed, scale, column, log, count)
         impulses += 1
     return count, impulses, impulses >= cap
@@ -182,25 +182,26 @@ def respond_sequential(bodies, contacts, rest_speed, tolerance, scale, column, l
 @jit
 def _finish(bodies, contacts, rest_speed, scale, column, log, count):
     if contacts.gap.shape[0] == 1:
-        return resolve_contact(bodies, contacts, 0, 0.0, log, count)
+        return resolve_contact(bodies, contacts, np.int64(0), 0.0, log, count)
     subset = np.arange(contacts.gap.shape[0])
-    return solve_block(bodies, contacts, subset, False, rest_speed, scale, column, log, count)
+    return solve_block(bodies, contacts, subset, 0.0, rest_speed, scale, column, log, count)
 
 
 @jit
 def respond_simultaneous(bodies, contacts, rest_speed, tolerance, scale, column, log):
     """The whole group as one block; same arguments and answer as `respond_sequential`."""
-    c = _approaching(bodies, contacts, tolerance, False, rest_speed)
+    c = _approaching(bodies, contacts, tolerance, 0.0, rest_speed)
     if c < 0:
         return 0, 0, False
     u = np.empty(3)
     if contacts.gap.shape[0] == 1:
-        e = _restitution(contacts, 0, relative_velocity(bodies, contacts, 0, u), rest_speed)
-        return resolve_contact(bodies, contacts, 0, e, log, 0), 1, False
+        c = np.int64(0)
+        e = _restitution(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
+        return resolve_contact(bodies, contacts, c, e, log, c), 1, False
     subset = np.arange(contacts.gap.shape[0])
-    count = solve_block(bodies, contacts, subset, True, rest_speed, scale, column, log, 0)
+    count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, column, log, np.int64(0))
     impulses = 1
-    if _approaching(bodies, contacts, tolerance, False, rest_speed) >= 0:
+    if _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
         count = _finish(bodies, contacts, rest_speed, scale, column, log, count)
         impulses += 1
     return count, impulses, False

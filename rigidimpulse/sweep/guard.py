@@ -4,9 +4,9 @@
 motion that `bound` describes, turning and accelerating bodies included, so stepping by safe spans never passes a contact (conservative
 advancement, Mirtich 1996; Zhang, Lee and Kim 2006, here with exact first and second derivatives and bounded third ones).
 
-Every pair of primitives has its kernel: `guard_half_space`, `guard_round`, `guard_cylinder`. The first primitive's body carries the frame:
-a half space before a ROUND primitive before a cylinder. Bodies that start at or below the threshold but leave it are let go: until they
-come back, the gap is not below the present one.
+Primitives are walked through by `guard_tree`, their convex pieces are bounded by `guard_pieces`. The body of the first primitive carries
+the frame: a half space before a ROUND primitive before a cylinder. Bodies that start at or below the threshold but leave it are let go:
+until they come back, the gap is not below the present one.
 """
 
 from __future__ import annotations
@@ -15,55 +15,57 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
-from rigidimpulse.detect.features import along, relative_pose, row, subtract, turned
-from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
-from rigidimpulse.sweep.bound import (
-    AXES,
-    MOTION_SIZE,
-    ORIENTATION,
-    POSITION,
-    SEEN_SIZE,
-    VELOCITY,
-    length,
-    relative_motion,
-    vector,
+from rigidimpulse.detect.cylinder_features import basis
+from rigidimpulse.detect.features import along, dot, inner, subtract
+from rigidimpulse.geometry import CYLINDER as CYLINDER_KIND
+from rigidimpulse.geometry import HALF_SPACE, ROUND, Geometry
+from rigidimpulse.sweep.bound import AXES, MOTION_SIZE, POSITION, SEEN_SIZE, length, put, relative_motion, scaled, turned, turned_back, vector
+from rigidimpulse.sweep.guard_layout import (
+    CARRIER,
+    CLOSEST,
+    COUNT,
+    CYLINDER,
+    CYLINDER_AXES,
+    CYLINDER_AXIS,
+    CYLINDER_HEIGHT,
+    CYLINDER_RADIUS,
+    CYLINDER_SIZE,
+    DIRECTION,
+    ELEMENT_A,
+    ELEMENT_B,
+    FIRST,
+    GAP,
+    INDEX_SIZE,
+    LIMIT,
+    LIMIT_SIZE,
+    MOTION,
+    NORMAL,
+    ORIGIN,
+    POINT_FIRST,
+    POINT_SECOND,
+    PRIMITIVE_A,
+    PRIMITIVE_B,
+    ROTATION,
+    SECOND,
+    SEEN,
+    TOWARDS,
+    WITNESS,
+    WORK_SIZE,
 )
-from rigidimpulse.sweep.guard_closest import CLOSEST_SIZE
-from rigidimpulse.sweep.guard_cylinder import (
-    cylinder_cylinder_safe_until,
-    half_space_cylinder_safe_until,
-    round_cylinder_safe_until,
-)
-from rigidimpulse.sweep.guard_half_space import half_space_round_safe_until
-from rigidimpulse.sweep.guard_root import point_safe_until
-from rigidimpulse.sweep.guard_round import round_round_safe_until
-from rigidimpulse.sweep.guard_witness import WITNESS_SIZE
-
-STACK_SIZE = 128
-"""Rows of the traversal stack: two trees of up to 2^60 triangles."""
+from rigidimpulse.sweep.guard_pieces import pieces_safe_until
+from rigidimpulse.sweep.guard_root import cylinder_safe_until, point_safe_until
+from rigidimpulse.sweep.guard_tree import NO_NODE, half_space_safe_until, row, trees_safe_until
+from rigidimpulse.sweep.guard_witness import support_point
 
 
 class SweepScratch(NamedTuple):
-    """Constants per shape, and arrays that the kernels of a sweep write into; made by `make_scratch`."""
+    """Constants per shape, and the arrays that the kernels of a sweep write into; made by `make_scratch`."""
 
     reach: np.ndarray  # (s,) m, radius of the shape about its body's centre of mass; inf with a half space
     ball: np.ndarray  # (s,) bool: one sphere about the centre of mass, on which no rotation can be seen
     plane: np.ndarray  # (s,) the half space that is all of the shape, or -1
-    motion: np.ndarray  # (2, MOTION_SIZE) of bodies a and b
-    position: np.ndarray  # (2, 3) m, poses of bodies a and b at which a witness is looked at
-    orientation: np.ndarray  # (2, 4)
-    axes: np.ndarray  # (2, 3, 3)
-    rotation: np.ndarray  # (3, 3) second body's axes in the frame of the first
-    offset: np.ndarray  # (3,) m, second body's centre of mass in the frame of the first
-    seen: np.ndarray  # (2, SEEN_SIZE) second seen from the first; first seen from the second, in the axes of the first
-    corners_first: np.ndarray  # (3, 3) m, frame of the first
-    corners_second: np.ndarray  # (3, 3) m, frame of the first
-    closest: np.ndarray  # (CLOSEST_SIZE,) of the pair last looked at
-    feature: np.ndarray  # (4,) int64, the witness: primitive and element of a, primitive and element of b
-    witness: np.ndarray  # (WITNESS_SIZE,) where the witness is, see `guard_witness`
-    stack: np.ndarray  # (STACK_SIZE, 2) int64
-    stack_time: np.ndarray  # (STACK_SIZE,)
+    work: np.ndarray  # (WORK_SIZE,) and
+    index: np.ndarray  # (INDEX_SIZE,) int64, see `guard_layout`
 
 
 def make_scratch(geometry: Geometry) -> SweepScratch:
@@ -81,70 +83,139 @@ def make_scratch(geometry: Geometry) -> SweepScratch:
             ball[shape] = len(vertices) == 1 and not vertices.any()
             if ball[shape]:
                 reach[shape] = geometry.radius[first]
-    return SweepScratch(
-        reach=reach,
-        ball=ball,
-        plane=plane,
-        motion=np.zeros((2, MOTION_SIZE)),
-        position=np.zeros((2, 3)),
-        orientation=np.zeros((2, 4)),
-        axes=np.zeros((2, 3, 3)),
-        rotation=np.zeros((3, 3)),
-        offset=np.zeros(3),
-        seen=np.zeros((2, SEEN_SIZE)),
-        corners_first=np.zeros((3, 3)),
-        corners_second=np.zeros((3, 3)),
-        closest=np.zeros(CLOSEST_SIZE),
-        feature=np.full(4, -1, np.int64),
-        witness=np.zeros(WITNESS_SIZE),
-        stack=np.zeros((STACK_SIZE, 2), np.int64),
-        stack_time=np.zeros(STACK_SIZE),
-    )
+    return SweepScratch(reach, ball, plane, np.zeros(WORK_SIZE), np.zeros(INDEX_SIZE, np.int64))
 
 
-@jit
-def _look_from(scratch, first, second, horizon):
-    """Write the relative pose and motion of two motion rows, in the frame of the first."""
-    axes_first, axes_second = first[AXES:ORIENTATION].reshape((3, 3)), second[AXES:ORIENTATION].reshape((3, 3))
-    relative_pose(axes_first, first[POSITION:VELOCITY], axes_second, second[POSITION:VELOCITY], scratch.rotation, scratch.offset)
-    relative_motion(first, second, first, horizon, scratch.seen[0])
-    relative_motion(second, first, first, horizon, scratch.seen[1])
+@inner
+def _look_from(work, first, second, horizon):
+    """Write pose and motion of the second motion record as seen from the first, and the reverse."""
+    between = subtract(vector(work, second + POSITION), vector(work, first + POSITION))
+    put(work, ORIGIN + 3, turned_back(work, first + AXES, between))
+    for k in range(3):
+        column = (work[second + AXES + k], work[second + AXES + 3 + k], work[second + AXES + 6 + k])
+        column = turned_back(work, first + AXES, column)
+        work[ROTATION + k], work[ROTATION + 3 + k], work[ROTATION + 6 + k] = column
+    relative_motion(work, first, second, first, horizon, SEEN)
+    relative_motion(work, second, first, first, horizon, SEEN + SEEN_SIZE)
 
 
-@jit
-def _bounds_safe_until(geometry, scratch, first, second, threshold, horizon):
+@inner
+def _place_cylinder(frame, radius, primitive, work, index, side):
+    """Put a cylinder into the place of the first (0) or second (1) piece, in the frame of the first body."""
+    centre, axis = row(frame, primitive), (frame[primitive, 3], frame[primitive, 4], frame[primitive, 5])
+    if side:
+        centre = along(turned(work, ROTATION, centre), 1.0, vector(work, ORIGIN + 3))
+        axis = turned(work, ROTATION, axis)
+        u, v, _ = basis(axis)
+        put(work, CYLINDER_AXES, (u[0], v[0], axis[0]))
+        put(work, CYLINDER_AXES + 3, (u[1], v[1], axis[1]))
+        put(work, CYLINDER_AXES + 6, (u[2], v[2], axis[2]))
+    at = CYLINDER + CYLINDER_SIZE * side
+    put(work, at, centre)
+    put(work, at + CYLINDER_AXIS, axis)
+    work[at + CYLINDER_HEIGHT], work[at + CYLINDER_RADIUS] = frame[primitive, 6], radius[primitive]
+    index[COUNT + side] = 0
+
+
+@inner
+def _bounds_safe_until(bound_centre, bound_radius, first, second, work, threshold, horizon):
     """Safe time of the bounding spheres of two primitives along the line between them; 0 where they overlap."""
-    reach = geometry.bound_radius[first] + geometry.bound_radius[second] + threshold
-    if reach == np.inf:
-        return 0.0
-    arm = turned(scratch.rotation, row(geometry.bound_centre, second))
-    between = subtract(along(arm, 1.0, vector(scratch.offset, 0)), row(geometry.bound_centre, first))
+    reach = bound_radius[first] + bound_radius[second] + threshold
+    arm = turned(work, ROTATION, row(bound_centre, second))
+    between = subtract(along(arm, 1.0, vector(work, ORIGIN + 3)), row(bound_centre, first))
     distance = length(between)
     if distance <= reach:
         return 0.0
-    normal = along((0.0, 0.0, 0.0), 1.0 / distance, between)
-    return point_safe_until(scratch.seen[0], normal, arm, distance - reach, horizon)
+    return point_safe_until(work, SEEN, scaled(between, 1.0 / distance), arm, 0.0, distance - reach, horizon)
 
 
-@jit
-def _primitives_safe_until(geometry, scratch, first, second, threshold, horizon):
-    """Safe time of two primitives; their elements that limit it are left in scratch.feature[1] and [3]."""
-    kind_first, kind_second = geometry.kind[first], geometry.kind[second]
-    if kind_first == HALF_SPACE:
-        if kind_second == ROUND:
-            return half_space_round_safe_until(geometry, scratch, first, second, threshold, horizon)
-        if kind_second == CYLINDER:
-            return half_space_cylinder_safe_until(geometry, scratch, first, second, threshold, horizon)
-        return horizon
-    if kind_second == ROUND:
-        return round_round_safe_until(geometry, scratch, first, second, threshold, horizon)
-    if kind_first == ROUND:
-        return round_cylinder_safe_until(geometry, scratch, first, second, threshold, horizon)
-    return cylinder_cylinder_safe_until(geometry, scratch, first, second, threshold, horizon)
+@inner
+def _half_space_pair(geometry, first, second, work, index, threshold, horizon, cylinders):
+    """Safe time of a half space and another primitive; the record at LIMIT gets direction and closest points."""
+    kind, radius, frame, vertex, triangle = geometry.kind, geometry.radius, geometry.frame, geometry.vertex, geometry.triangle
+    normal = row(frame, first)
+    down = turned_back(work, ROTATION, scaled(normal, -1.0))
+    level = frame[first, 3] + threshold
+    s = horizon
+    if kind[second] == ROUND:
+        nodes = (geometry.node_min, geometry.node_max, geometry.node_child, geometry.node_start, geometry.node_count)
+        root, level = geometry.node_first[second], level + radius[second]
+        s = half_space_safe_until(
+            nodes, triangle, geometry.triangle_owns, vertex, root, normal, level, work, index, horizon
+        )
+    elif cylinders is not None:
+        _place_cylinder(frame, radius, second, work, index, SECOND)
+        point = support_point(kind, radius, frame, vertex, triangle, second, FIRST, down)
+        point = along(turned(work, ROTATION, point), 1.0, vector(work, ORIGIN + 3))
+        at = CYLINDER + CYLINDER_SIZE
+        arm, axis = subtract(vector(work, at), vector(work, ORIGIN + 3)), vector(work, at + CYLINDER_AXIS)
+        s = cylinder_safe_until(
+            work, SEEN, normal, arm, axis, frame[second, 6], radius[second], dot(normal, point) - level, horizon
+        )
+    if s < horizon:
+        index[CARRIER] = 0
+        point = support_point(kind, radius, frame, vertex, triangle, second, index[ELEMENT_B], down)
+        point = along(turned(work, ROTATION, point), 1.0, vector(work, ORIGIN + 3))
+        gap = dot(normal, point) - frame[first, 3]
+        put(work, LIMIT + POINT_FIRST, along(point, -gap, normal))
+        put(work, LIMIT + POINT_SECOND, point)
+        put(work, LIMIT + NORMAL, normal)
+        put(work, LIMIT + DIRECTION, normal)
+        work[LIMIT + GAP] = gap
+    return s
 
 
-@jit
-def safe_time(geometry, shape_a, motion_a, shape_b, motion_b, threshold, horizon, scratch):
+@inner
+def _solid_pair(geometry, first, second, work, index, threshold, horizon, cylinders):
+    """Safe time of two primitives that are no half spaces; the record at LIMIT tells what limits it."""
+    radius, kind = geometry.radius, geometry.kind
+    grown_first, grown_second = radius[first], radius[second]
+    root_first, root_second = geometry.node_first[first], geometry.node_first[second]
+    if cylinders is not None:
+        if kind[second] == CYLINDER_KIND:
+            grown_second, root_second = 0.0, NO_NODE
+            _place_cylinder(geometry.frame, radius, second, work, index, SECOND)
+        if kind[first] == CYLINDER_KIND:
+            _place_cylinder(geometry.frame, radius, first, work, index, FIRST)
+            s, carrier = pieces_safe_until(work, index, threshold, horizon, cylinders)
+            if s < horizon:
+                index[CARRIER] = carrier
+                for k in range(LIMIT_SIZE):
+                    work[LIMIT + k] = work[CLOSEST + k]
+            return s
+    nodes = (geometry.node_min, geometry.node_max, geometry.node_child, geometry.node_start, geometry.node_count)
+    surface = (geometry.vertex, geometry.triangle, geometry.triangle_normal)
+    threshold += grown_first + grown_second
+    s = trees_safe_until(nodes, surface, root_first, root_second, work, index, threshold, horizon, cylinders)
+    if s < horizon:
+        normal = vector(work, LIMIT + NORMAL)
+        work[LIMIT + GAP] -= grown_first + grown_second
+        put(work, LIMIT + POINT_FIRST, along(vector(work, LIMIT + POINT_FIRST), grown_first, normal))
+        put(work, LIMIT + POINT_SECOND, along(vector(work, LIMIT + POINT_SECOND), -grown_second, normal))
+    return s
+
+
+@inner
+def _name_witness(work, index, p, q, swapped, first):
+    """Bring what limits the safe time from first and second to bodies a and b, points to the world; `first`: its motion record."""
+    sign = -1.0 if swapped else 1.0
+    towards = scaled(vector(work, LIMIT + DIRECTION), sign)
+    put(work, TOWARDS, turned_back(work, ROTATION, towards) if index[CARRIER] else towards)
+    axes, centre = first + AXES, vector(work, first + POSITION)
+    point_first = along(turned(work, axes, vector(work, LIMIT + POINT_FIRST)), 1.0, centre)
+    point_second = along(turned(work, axes, vector(work, LIMIT + POINT_SECOND)), 1.0, centre)
+    put(work, WITNESS + POINT_FIRST, point_second if swapped else point_first)
+    put(work, WITNESS + POINT_SECOND, point_first if swapped else point_second)
+    put(work, WITNESS + NORMAL, turned(work, axes, scaled(vector(work, LIMIT + NORMAL), sign)))
+    work[WITNESS + GAP] = work[LIMIT + GAP]
+    index[PRIMITIVE_A], index[PRIMITIVE_B] = p, q
+    if swapped:
+        element = index[ELEMENT_A]
+        index[ELEMENT_A], index[ELEMENT_B], index[CARRIER] = index[ELEMENT_B], element, 1 - index[CARRIER]
+
+
+@inner
+def safe_time(geometry, shape_a, shape_b, work, index, threshold, horizon, cylinders):
     """Find how long two shapes stay farther apart than a threshold.
 
     Two half spaces never limit each other.
@@ -152,34 +223,35 @@ def safe_time(geometry, shape_a, motion_a, shape_b, motion_b, threshold, horizon
     Args:
         geometry: the compiled shapes.
         shape_a: index of a's shape; likewise shape_b.
-        motion_a: motion row of a (`bound.motion_bound`), its bounds valid over the horizon; likewise motion_b.
+        work: scratch with the motions of a and b (`bound.motion_bound`) at MOTION, their bounds valid over the horizon.
+        index: scratch.
         threshold: m.
         horizon: s.
-        scratch: `SweepScratch`. If the result is short of the horizon, scratch.feature names the features that limit it.
+        cylinders: None where no shape is a cylinder, else any int: without them the kernel compiles faster.
 
     Returns:
         s <= horizon such that the gap is above the threshold on [0, s); where it starts at or below the threshold and grows, above
-        its present value.
+        its present value. If s is short of the horizon, TOWARDS, WITNESS and the first five of `index` tell what limits it: features
+        whose present gap need not be the least one.
 
     """
-    viewer = -1
+    view = -1
     for p in range(geometry.shape_first[shape_a], geometry.shape_first[shape_a + 1]):
         for q in range(geometry.shape_first[shape_b], geometry.shape_first[shape_b + 1]):
             swapped = geometry.kind[q] < geometry.kind[p]
-            if viewer != swapped:
-                viewer = int(swapped)
-                if swapped:
-                    _look_from(scratch, motion_b, motion_a, horizon)
-                else:
-                    _look_from(scratch, motion_a, motion_b, horizon)
-            first, second = (q, p) if swapped else (p, q)
-            if _bounds_safe_until(geometry, scratch, first, second, threshold, horizon) >= horizon:
+            motion = MOTION + MOTION_SIZE if swapped else MOTION
+            if view != motion:
+                view = motion
+                _look_from(work, motion, MOTION + MOTION + MOTION_SIZE - motion, horizon)
+            first, second = q if swapped else p, p if swapped else q
+            s = _bounds_safe_until(geometry.bound_centre, geometry.bound_radius, first, second, work, threshold, horizon)
+            if s >= horizon or geometry.kind[second] == HALF_SPACE:
                 continue
-            s = _primitives_safe_until(geometry, scratch, first, second, threshold, horizon)
+            if geometry.kind[first] == HALF_SPACE:
+                s = _half_space_pair(geometry, first, second, work, index, threshold, horizon, cylinders)
+            else:
+                s = _solid_pair(geometry, first, second, work, index, threshold, horizon, cylinders)
             if s < horizon:
                 horizon = s
-                feature = scratch.feature
-                feature[0], feature[2] = p, q
-                if swapped:
-                    feature[1], feature[3] = feature[3], feature[1]
+                _name_witness(work, index, p, q, swapped, motion)
     return horizon

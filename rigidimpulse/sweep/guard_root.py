@@ -1,24 +1,43 @@
-"""The quadratic under every safe time: the gap of a point along a direction that its carrier takes along.
+"""The quadratic under every safe time: the gap of a point or a cylinder along a direction that the other body carries.
 
-With n fixed in the carrier, g the present gap along n and y the path of the point as seen from the carrier (see `bound`),
+With n fixed in the carrier, g the present gap along n and y the path of a point as seen from the carrier (see `bound`),
 
     gap(s) >= g + n.y' s + 1/2 n.y'' s^2 - J s^3 / 6 >= g - c s - 1/2 a s^2   for s <= h,
     c = -n.y',   a = -n.y'' + J h / 3,   J = J_c + J_r |r|
 
 so the gap stays above a threshold until the first root of the right side. A point that is at or below its threshold but leaving stays
 above its present gap until it comes back to it.
+
+A cylinder with unit axis e, half height H and rim radius R reaches from its centre by the support H |n.e| + R |n x e| along -n. With
+q = n.e and N = n x e (q', q'', N', N'' from e' = w x e, e'' = beta x e + w x (w x e), |e'''| <= J_r), over s in [0, h]:
+
+    |q(s)|  <=  chord of |q + q' s|  + |q''| s^2 / 2 + J_r s^3 / 6          the chord of a convex function over [0, h] lies above it
+    |q(s)|  =   sign(q) (q + q' s + q'' s^2 / 2) + J_r s^3 / 6              as long as q keeps its sign
+    |N(s)|  <=  chord of |N + N' s|  + |N''| s^2 / 2 + J_r s^3 / 6          sharp for a cylinder that stands or lies
+    |N(s)|  <=  (|N(s)|^2 + |N|^2) / (2 |N|),   |N(s)|^2 = 1 - q(s)^2       sharp for one that leans and rolls on its rim
+
+(the last is the inequality of the means).
 """
 
 from __future__ import annotations
 
 from math import sqrt
 
-from rigidimpulse._jit import jit
-from rigidimpulse.detect.features import dot
-from rigidimpulse.sweep.bound import SEEN_ARM_JERK, SEEN_JERK, length, seen_acceleration, seen_velocity
+from rigidimpulse.detect.features import along, cross, dot, inner
+from rigidimpulse.sweep.bound import (
+    SEEN_ARM_JERK,
+    SEEN_JERK,
+    SEEN_SPIN,
+    SEEN_SPIN_SIZE,
+    SEEN_TURN,
+    SEEN_TURN_SIZE,
+    length,
+    seen_motion,
+    vector,
+)
 
 
-@jit
+@inner
 def safe_until(gap, closing, bend, horizon):
     """First s in [0, horizon] with gap - closing s - bend s^2 / 2 = 0, else horizon; `gap` is what is left above the threshold.
 
@@ -38,15 +57,53 @@ def safe_until(gap, closing, bend, horizon):
     return min(horizon, (sqrt(square) - closing) / bend)
 
 
-@jit
-def jerk_term(seen, distance, horizon):
-    """J h / 3 of a point at that distance from its body's centre of mass."""
-    return (seen[SEEN_JERK] + seen[SEEN_ARM_JERK] * distance) * horizon / 3.0
+@inner
+def point_safe_until(work, seen, normal, arm, reach, gap, horizon):
+    """Safe time of all points within `reach` of the one at `arm`, along a carried normal that points at the moving body.
+
+    `seen`: place in `work` of the motion of the moving body as seen from the carrier; `gap`: what is left above the threshold, m.
+    """
+    velocity, acceleration = seen_motion(work, seen, arm)
+    jerk = work[seen + SEEN_JERK] + work[seen + SEEN_ARM_JERK] * (length(arm) + reach)
+    closing = work[seen + SEEN_SPIN_SIZE] * reach - dot(normal, velocity)
+    bend = work[seen + SEEN_TURN_SIZE] * reach - dot(normal, acceleration)
+    return safe_until(gap, closing, bend + jerk * horizon / 3.0, horizon)
 
 
-@jit
-def point_safe_until(seen, normal, arm, gap, horizon):
-    """Safe time of the point at `arm` along `normal`, which its carrier takes along and which points at the moving body."""
-    closing = -dot(normal, seen_velocity(seen, arm))
-    bend = jerk_term(seen, length(arm), horizon) - dot(normal, seen_acceleration(seen, arm))
-    return safe_until(gap, closing, bend, horizon)
+@inner
+def _end_growth(q, rate, bend, rest, horizon):
+    """Return (rate, bend) of a quadratic above |q(s)| - |q| on [0, horizon]; `rest`: J_r h / 3."""
+    if abs(q) > horizon * (abs(rate) + 0.5 * horizon * (abs(bend) + rest)):
+        sign = 1.0 if q > 0.0 else -1.0
+        return sign * rate, sign * bend + rest
+    return (abs(q + rate * horizon) - abs(q)) / horizon, abs(bend) + rest
+
+
+@inner
+def cylinder_safe_until(work, seen, normal, arm, axis, half_height, radius, gap, horizon):
+    """Safe time of a cylinder with its centre at `arm`, as `point_safe_until`; `axis` unit, in the axes of `seen`."""
+    if horizon <= 0.0:
+        return 0.0
+    w = vector(work, seen + SEEN_SPIN)
+    axis_rate = cross(w, axis)
+    axis_bend = along(cross(vector(work, seen + SEEN_TURN), axis), 1.0, cross(w, axis_rate))
+    jerk = work[seen + SEEN_ARM_JERK]
+    rest = jerk * horizon / 3.0
+    q, q_rate, q_bend = dot(normal, axis), dot(normal, axis_rate), dot(normal, axis_bend)
+    end_rate, end_bend = _end_growth(q, q_rate, q_bend, rest, horizon)
+    velocity, acceleration = seen_motion(work, seen, arm)
+    closing = half_height * end_rate - dot(normal, velocity)
+    bend = half_height * end_bend - dot(normal, acceleration) + rest * length(arm) + work[seen + SEEN_JERK] * horizon / 3.0
+
+    side = cross(normal, axis)
+    size = length(side)
+    rim_rate = (length(along(side, horizon, cross(normal, axis_rate))) - size) / horizon
+    rim_bend = length(cross(normal, axis_bend)) + rest
+    best = safe_until(gap, closing + radius * rim_rate, bend + radius * rim_bend, horizon)
+    if best >= horizon or size == 0.0:
+        return best
+    fastest_bend = abs(q_bend) + jerk * horizon
+    third = 6.0 * (abs(q_rate) + fastest_bend * horizon) * fastest_bend + 2.0 * jerk  # of q(s)^2
+    rim_rate = -q * q_rate / size
+    rim_bend = (third * horizon / 6.0 - q_rate * q_rate - q * q_bend) / size
+    return max(best, safe_until(gap, closing + radius * rim_rate, bend + radius * rim_bend, horizon))

@@ -1,145 +1,146 @@
-"""The witness of a safe time: the pair of features that limits it, and its gap at any pose.
+"""The witness of a safe time: the features that limit it and the direction along which they do.
 
-A witness is (primitive of a, element of a, primitive of b, element of b): the element is a triangle against a ROUND primitive or a
-cylinder, a vertex against a half space, and not read for half spaces and cylinders. Its gap costs no walk through trees, so the time at
-which it reaches a value is found cheaply; the guard then says whether anything else was earlier.
+The direction is carried by one of the bodies, so the gap along it at any other pose costs two support functions and no search. It is a lower
+bound of the distance of the features, and equals it for a vertex over a face. The time at which it reaches a value is found cheaply; the
+guard then says whether anything was earlier.
 """
 
 from __future__ import annotations
 
-from rigidimpulse._jit import jit
-from rigidimpulse.detect.cylinder import cylinder_cylinder_distance, cylinder_support, cylinder_triangle_distance
-from rigidimpulse.detect.features import along, dot, moved, relative_pose, row, subtract, turned
-from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND
+from math import inf, log2
+
+from rigidimpulse.detect.features import along, cross, dot, inner, subtract
+from rigidimpulse.geometry import CYLINDER, HALF_SPACE
 from rigidimpulse.integrate.course import pose_at
 from rigidimpulse.rotation import quaternion_to_matrix
-from rigidimpulse.sweep.bound import POSITION, SPIN, VELOCITY, length, vector
-from rigidimpulse.sweep.guard_closest import closest_simplices, highest, load_corners, load_turned_corners
+from rigidimpulse.sweep.bound import (
+    MOTION_SIZE,
+    POSITION,
+    SPIN,
+    VELOCITY,
+    length,
+    scaled,
+    turned,
+    turned_back,
+    vector,
+)
+from rigidimpulse.sweep.guard_layout import (
+    CARRIER,
+    ELEMENT_A,
+    ELEMENT_B,
+    FRAME,
+    MOTION,
+    NORMAL,
+    PLACE,
+    PRIMITIVE_A,
+    PRIMITIVE_B,
+    TOWARDS,
+    TURN,
+    WITNESS,
+)
+from rigidimpulse.sweep.guard_tree import row
 
-WITNESS_POINT_A, WITNESS_POINT_B, WITNESS_NORMAL, WITNESS_GAP = 0, 3, 6, 9
-WITNESS_SIZE = 10
-"""Offsets into the row of a witness, world frame: points on a and b, unit normal from a to b (zeros if unknown), gap."""
-
-_NOTHING = (0.0, 0.0, 0.0)
+_EPSILON = 2.0**-52
+_TRUNCATION = 0.2  # kappa_1 of the ITP method times the first bracket; kappa_2 = 2, n_0 = 1
 
 
-@jit
-def _half_space_gap(geometry, scratch, half_space, other, vertex):
-    """Gap of a half space to a vertex or to a cylinder: (gap, normal, first point, second point), frame of the first."""
-    frame, radius = geometry.frame[half_space], geometry.radius[other]
-    normal = vector(frame, 0)
-    if geometry.kind[other] == ROUND:
-        point = along(moved(scratch.rotation, scratch.offset, row(geometry.vertex, vertex)), -radius, normal)
-    else:
-        axis = turned(scratch.rotation, vector(geometry.frame[other], 3))
-        point = moved(scratch.rotation, scratch.offset, vector(geometry.frame[other], 0))
+@inner
+def support_point(kind, radius, frame, vertex, triangle, primitive, element, normal):
+    """Return the point of a primitive that is farthest along a unit normal; of a ROUND one, of its element.
+
+    The first five are arrays of the geometry; the element is a triangle, or -1 - vertex.
+    """
+    if kind[primitive] == HALF_SPACE:
+        return scaled(row(frame, primitive), frame[primitive, 3])
+    if kind[primitive] == CYLINDER:
+        axis = (frame[primitive, 3], frame[primitive, 4], frame[primitive, 5])
         cosine = dot(normal, axis)
-        point = along(point, -geometry.frame[other][6] if cosine > 0.0 else geometry.frame[other][6], axis)
         across = along(normal, -cosine, axis)
         size = length(across)
-        if size > 0.0:
-            point = along(point, -radius / size, across)
-    gap = dot(normal, point) - frame[3]
-    return gap, normal, along(point, -gap, normal), point
+        half_height = frame[primitive, 6]
+        point = along(row(frame, primitive), half_height if cosine > 0.0 else -half_height, axis)
+        return along(point, radius[primitive] / size if size > 0.0 else 0.0, across)
+    best = -inf
+    point = (0.0, 0.0, 0.0)
+    for k in range(3 if element >= 0 else 1):
+        corner = row(vertex, triangle[element, k] if element >= 0 else -1 - element)
+        if dot(normal, corner) > best:
+            best, point = dot(normal, corner), corner
+    return along(point, radius[primitive], normal)
 
 
-@jit
-def _round_gap(geometry, scratch, first, triangle_first, second, triangle_second):
-    """Gap of two grown simplices, as `_half_space_gap`."""
-    num_first = load_corners(geometry, triangle_first, scratch.corners_first)
-    num_second = load_turned_corners(geometry, triangle_second, scratch.rotation, scratch.offset, scratch.corners_second)
-    normal_first = row(geometry.triangle_normal, triangle_first)
-    normal_second = turned(scratch.rotation, row(geometry.triangle_normal, triangle_second))
-    separation, _ = closest_simplices(
-        scratch.corners_first, num_first, normal_first, scratch.corners_second, num_second, normal_second, scratch.closest
-    )
-    normal = vector(scratch.closest, 0)
-    on_first = along(vector(scratch.closest, 3), geometry.radius[first], normal)
-    on_second = along(vector(scratch.closest, 6), -geometry.radius[second], normal)
-    return separation - geometry.radius[first] - geometry.radius[second], normal, on_first, on_second
+@inner
+def _gap_along(geometry, work, index, direction):
+    """Gap of the witness along its direction at the poses at PLACE and FRAME."""
+    kind, radius, frame, vertex, triangle = geometry.kind, geometry.radius, geometry.frame, geometry.vertex, geometry.triangle
+    normal = turned(work, FRAME + 9 * index[CARRIER], direction)
+    own_a, own_b = turned_back(work, FRAME, normal), turned_back(work, FRAME + 9, scaled(normal, -1.0))
+    point_a = support_point(kind, radius, frame, vertex, triangle, index[PRIMITIVE_A], index[ELEMENT_A], own_a)
+    point_b = support_point(kind, radius, frame, vertex, triangle, index[PRIMITIVE_B], index[ELEMENT_B], own_b)
+    return dot(normal, subtract(vector(work, PLACE + 3), vector(work, PLACE))) - dot(own_b, point_b) - dot(own_a, point_a)
 
 
-@jit
-def _cylinder_gap(geometry, scratch, first, triangle, second):
-    """Gap of a grown simplex or a cylinder to a cylinder, as `_half_space_gap`."""
-    frame, radius, closest = geometry.frame[second], geometry.radius[second], scratch.closest
-    centre, axis = moved(scratch.rotation, scratch.offset, vector(frame, 0)), turned(scratch.rotation, vector(frame, 3))
-    if geometry.kind[first] == CYLINDER:
-        other, radius_first = geometry.frame[first], geometry.radius[first]
-        centre_first, axis_first = vector(other, 0), vector(other, 3)
-        if cylinder_cylinder_distance(centre_first, axis_first, other[6], radius_first, centre, axis, frame[6], radius, closest) <= 0.0:
-            return 0.0, _NOTHING, _NOTHING, _NOTHING
-        normal = vector(closest, 6)
-        separation = dot(normal, subtract(centre, centre_first)) - cylinder_support(axis_first, other[6], radius_first, normal)
-        return separation - cylinder_support(axis, frame[6], radius, normal), normal, vector(closest, 0), vector(closest, 3)
-    num_corners = load_corners(geometry, triangle, scratch.corners_first)
-    grown = geometry.radius[first]
-    if cylinder_triangle_distance(centre, axis, frame[6], radius, scratch.corners_first, closest) <= 0.0:
-        return -grown, _NOTHING, _NOTHING, _NOTHING
-    normal = along(_NOTHING, -1.0, vector(closest, 6))
-    separation = dot(normal, centre) - cylinder_support(axis, frame[6], radius, normal)
-    separation -= highest(scratch.corners_first, num_corners, normal) + grown
-    return separation, normal, along(vector(closest, 3), grown, normal), vector(closest, 0)
+@inner
+def _next_trial(low, above, high, below, truncation, least, left):
+    """Time at which the gap is looked at next; above > 0 at low, below < 0 at high, `left` evaluations of the budget."""
+    middle = 0.5 * (low + high)
+    radius = least * 2.0**left - 0.5 * (high - low)
+    secant = (above * high - below * low) / (above - below)
+    inward = 1.0 if middle > secant else -1.0
+    shift = truncation * (high - low) * (high - low)
+    t = secant + inward * shift if shift <= abs(middle - secant) else middle
+    if abs(t - middle) > radius:
+        t = middle - inward * radius
+    return t if low < t < high else middle
 
 
-@jit
-def _write(witness, first, position, axes, normal, on_first, on_second, swapped):
-    """Write points and normal, given in the frame of body `first` (0: a, 1: b), to the witness row."""
-    on_first = moved(axes[first], position[first], on_first)
-    on_second = moved(axes[first], position[first], on_second)
-    normal = turned(axes[first], normal)
-    for k in range(3):
-        witness[WITNESS_POINT_A + k] = on_second[k] if swapped else on_first[k]
-        witness[WITNESS_POINT_B + k] = on_first[k] if swapped else on_second[k]
-        witness[WITNESS_NORMAL + k] = -normal[k] if swapped else normal[k]
+@inner
+def witness_root(geometry, course, work, index, a, b, low, high, touch, tolerance):
+    """Find where the witness of bodies a and b comes down to `touch` between two times.
 
+    Bisection with interpolation (ITP: Oliveira and Takahashi 2020): at most log2((high - low) / rounding) + 1 evaluations after those at
+    the ends, mostly far fewer.
 
-@jit
-def witness_gap(geometry, scratch, feature):
-    """Find the gap of the features at the poses in scratch.position and scratch.axes; writes scratch.witness, returns the gap."""
-    p, q = feature[0], feature[2]
-    swapped = geometry.kind[q] < geometry.kind[p]
-    first, second = (q, p) if swapped else (p, q)
-    element_first, element_second = (feature[3], feature[1]) if swapped else (feature[1], feature[3])
-    viewer = int(swapped)
-    axes, position = scratch.axes, scratch.position
-    relative_pose(axes[viewer], position[viewer], axes[1 - viewer], position[1 - viewer], scratch.rotation, scratch.offset)
-    if geometry.kind[first] == HALF_SPACE:
-        gap, normal, on_first, on_second = _half_space_gap(geometry, scratch, first, second, element_second)
-    elif geometry.kind[second] == CYLINDER:
-        gap, normal, on_first, on_second = _cylinder_gap(geometry, scratch, first, element_first, second)
-    else:
-        gap, normal, on_first, on_second = _round_gap(geometry, scratch, first, element_first, second, element_second)
-    _write(scratch.witness, viewer, position, axes, normal, on_first, on_second, swapped)
-    scratch.witness[WITNESS_GAP] = gap
-    return gap
+    Returns:
+        (t, evaluations): the last time known to be above, where its gap is at most touch + tolerance or t is one rounding from the root;
+        inf if it is not above at low and below at high.
 
-
-@jit
-def pose_pair(course, scratch, shape_a, shape_b, a, b, t):
-    """Write the poses of bodies a and b at time t to scratch; the axes of a ball stay those of the world."""
-    for side in range(2):
-        body, shape = (b, shape_b) if side else (a, shape_a)
-        pose_at(course, body, t, scratch.position[side], scratch.orientation[side])
-        if scratch.ball[shape]:
-            for i in range(3):
-                for j in range(3):
-                    scratch.axes[side, i, j] = 1.0 if i == j else 0.0
+    """
+    least = _EPSILON * max(abs(low), abs(high))
+    budget = 1 + int(max(log2((high - low) / least), 0.0))
+    truncation = _TRUNCATION / (high - low)
+    direction = vector(work, TOWARDS)
+    above, below = -1.0, 1.0
+    for trial in range(budget + 2):
+        t = low if trial == 0 else high
+        if trial > 1:
+            t = _next_trial(low, above, high, below, truncation, least, budget + 1 - trial)
+        for side in range(2):
+            place, turn, frame = PLACE + 3 * side, TURN + 4 * side, FRAME + 9 * side
+            pose_at(course, b if side else a, t, work[place : place + 3], work[turn : turn + 4])
+            quaternion_to_matrix(work[turn : turn + 4], work[frame : frame + 9].reshape((3, 3)))
+        gap = _gap_along(geometry, work, index, direction) - touch
+        if trial == 0:
+            above = gap
+        elif trial == 1 or gap < 0.0:
+            high, below = t, gap
         else:
-            quaternion_to_matrix(scratch.orientation[side], scratch.axes[side])
+            low, above = t, gap
+        if above < 0.0 or (trial == 1 and below >= 0.0):
+            return inf, trial + 1
+        if trial > 0 and (above <= tolerance or high - low <= 2.0 * least):
+            return low, trial + 1
+    return low, budget + 2
 
 
-@jit
-def closing_speed(scratch):
-    """Rate at which the points of scratch.witness approach along its normal, for the motions in scratch.motion (same time)."""
-    normal = vector(scratch.witness, WITNESS_NORMAL)
+@inner
+def closing_speed(work):
+    """Rate at which the points of the witness approach along its normal, for the motions at MOTION."""
+    normal = vector(work, WITNESS + NORMAL)
     result = 0.0
     for side in range(2):
-        motion = scratch.motion[side]
-        point = vector(scratch.witness, WITNESS_POINT_B if side else WITNESS_POINT_A)
-        arm = subtract(point, vector(motion, POSITION))
-        spin = vector(motion, SPIN)
-        turning = (spin[1] * arm[2] - spin[2] * arm[1], spin[2] * arm[0] - spin[0] * arm[2], spin[0] * arm[1] - spin[1] * arm[0])
-        speed = dot(normal, along(vector(motion, VELOCITY), 1.0, turning))
+        motion = MOTION + MOTION_SIZE * side
+        arm = subtract(vector(work, WITNESS + 3 * side), vector(work, motion + POSITION))
+        speed = dot(normal, along(vector(work, motion + VELOCITY), 1.0, cross(vector(work, motion + SPIN), arm)))
         result += -speed if side else speed
     return result

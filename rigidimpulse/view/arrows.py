@@ -42,7 +42,7 @@ def arrow_rows(impacts: npt.NDArray[Any], dynamic: Sequence[bool], longest: floa
     seen = np.isfinite(size) & (size > 0.0)
     largest = float(size[seen].max()) if seen.any() else 1.0
     pushed = np.asarray(dynamic, dtype=bool)
-    parts = []
+    parts, sizes = [], []
     for sign, body in ((1.0, impacts["body_b"]), (-1.0, impacts["body_a"])):
         chosen = np.flatnonzero(seen & pushed[body])
         rows = np.empty((len(chosen), ROW))
@@ -52,9 +52,10 @@ def arrow_rows(impacts: npt.NDArray[Any], dynamic: Sequence[bool], longest: floa
         rows[:, 7:10] = impacts["normal"][chosen]
         rows[:, 10] = longest * np.maximum(np.sqrt(size[chosen] / largest), LEAST_LENGTH)
         parts.append(rows)
+        sizes.append(size[chosen])
     rows = np.concatenate(parts)
     if len(rows) > MOST_ROWS:
-        rows = rows[np.argsort(-rows[:, 10], kind="stable")[:MOST_ROWS]]
+        rows = rows[np.argsort(-np.concatenate(sizes), kind="stable")[:MOST_ROWS]]
     return rows[np.argsort(rows[:, 0], kind="stable")].astype(np.float32)
 
 

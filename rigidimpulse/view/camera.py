@@ -23,8 +23,9 @@ SURROUNDINGS = 0.25
 ELEVATION = np.radians(13.0)
 TURN = np.radians(32.0)
 """Angle between the camera and the plane across the widest horizontal spread: a three-quarter view."""
-_DIRECTIONS = np.array([[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z], float)
-_DIRECTIONS /= np.linalg.norm(_DIRECTIONS, axis=1, keepdims=True)
+_GRID = np.array(np.meshgrid([-1, 0, 1], [-1, 0, 1], [-1, 0, 1]), dtype=np.float64).reshape(3, 27).T
+_GRID = np.delete(_GRID, 13, axis=0)  # without the middle
+OUTLINE_DIRECTIONS = _GRID / np.linalg.norm(_GRID, axis=1, keepdims=True)
 """Directions in which the outline of the action is measured."""
 
 
@@ -95,7 +96,7 @@ def frame_action(paths: Sequence[Path], up: np.ndarray) -> Framing:
     if follow:
         reach = FOLLOW_VIEW * largest
         centre = np.mean([rotation @ path.position[0] for path in movers], axis=0)
-        half, points = np.full(3, reach / np.sqrt(3.0)), centre + reach * _DIRECTIONS
+        half, points = np.full(3, reach / np.sqrt(3.0)), centre + reach * OUTLINE_DIRECTIONS
     return Framing(
         stage=_stage_quaternion(up),
         centre=_floats(centre),
@@ -119,14 +120,14 @@ def _without_runaways(movers: Sequence[Path]) -> list[Path]:
 
 
 def _outline(paths: Sequence[Path], rotation: np.ndarray) -> list[np.ndarray]:
-    """Return the outermost points of the bodies over all frames in each of `_DIRECTIONS`, in the turned frame."""
+    """Return the outermost point of all bodies and frames in each of `OUTLINE_DIRECTIONS`, in the turned frame."""
     if not paths:
         return []
     turned = [path.position @ rotation.T for path in paths]
     points = np.concatenate(turned)
     radii = np.concatenate([np.full(len(part), path.radius) for part, path in zip(turned, paths, strict=True)])
     outer = []
-    for direction in _DIRECTIONS:
+    for direction in OUTLINE_DIRECTIONS:
         k = int(np.argmax(points @ direction + radii))
         outer.append(points[k] + radii[k] * direction)
     return outer
@@ -142,7 +143,7 @@ def _surroundings(statics: Sequence[Path], rotation: np.ndarray, outline: Sequen
     for path in statics:
         centre = rotation @ path.position[0]
         if np.all(centre - path.radius < high + reach) and np.all(centre + path.radius > low - reach):
-            points += [np.clip(centre + path.radius * out, low - reach, high + reach) for out in _DIRECTIONS]
+            points += [np.clip(centre + path.radius * out, low - reach, high + reach) for out in OUTLINE_DIRECTIONS]
     return points
 
 

@@ -19,6 +19,9 @@ HOST = "127.0.0.1"
 LOAD_TIMEOUT = 20.0
 """Longest wait, s, for the browser to fetch the page."""
 
+CLOSE_DELAY = 0.05
+"""Longest time, s, until the server notices that it is to end."""
+
 _viewer: Viewer | None = None
 
 
@@ -59,7 +62,7 @@ class Viewer:
         self._page = b""
         self._server = ThreadingHTTPServer((HOST, port), self._handler())
         self._server.daemon_threads = True
-        self._thread = threading.Thread(target=self._server.serve_forever, name="rigidimpulse-view", daemon=True)
+        self._thread = threading.Thread(target=self._serve, name="rigidimpulse-view", daemon=True)
         self._thread.start()
 
     @property
@@ -97,6 +100,9 @@ class Viewer:
     def __exit__(self, *_: object) -> None:
         """Close."""
         self.close()
+
+    def _serve(self) -> None:
+        self._server.serve_forever(poll_interval=CLOSE_DELAY)
 
     def _handler(self) -> type[BaseHTTPRequestHandler]:
         viewer = self

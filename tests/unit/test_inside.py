@@ -1,8 +1,9 @@
 """Point in solid: exact against independent oracles, also for points in line with vertices and edges.
 
-Oracles: the generalised winding number (sum of solid angles over 4 pi: 1 inside, 0 outside) for random points; membership of unit
-cells for solids put together from a lattice, where every ray runs through vertices and edges; closed forms for curved primitives.
-A ray parity that counts a shared edge twice, or not at all, fails for about half of the lattice points in line with it.
+Oracles: the generalised winding number (sum of solid angles over 4 pi: 1 inside, 0 outside) for random points;
+membership of unit cells for solids put together from a lattice, where every ray runs through vertices and edges;
+closed forms for curved primitives. A ray parity that counts a shared edge twice, or not at all, fails for about half
+of the lattice points in line with it.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ def star(seed=1):
 
 @pytest.mark.parametrize("cells", [[(0, 0, 0)], L_SHAPE, RING, STAIRS], ids=["box", "L", "ring", "stairs"])
 def test_lattice_points_in_line_with_vertices_and_edges(cells):
-    """Every point of a grid of pitch 1/4 looks along edges, vertices, face diagonals; the truth is membership of a closed cell."""
+    """Every point of a grid of pitch 1/4 looks along edges, vertices, diagonals; truth: it lies in a closed cell."""
     vertices, faces = lattice_solid(cells)
     grid = np.stack(np.meshgrid(*[np.arange(-1.0, 4.01, 0.25)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     truth = np.zeros(len(grid), dtype=bool)
@@ -122,9 +123,11 @@ def test_random_points_against_the_winding_number(name):
     assert 20 < inside.sum() < 980
 
 
-@pytest.mark.parametrize("make", [lambda: trimesh.creation.torus(1.0, 0.4, major_sections=16, minor_sections=8), star], ids=["torus", "star"])
+@pytest.mark.parametrize(
+    "make", [lambda: trimesh.creation.torus(1.0, 0.4, major_sections=16, minor_sections=8), star], ids=["torus", "star"]
+)
 def test_rays_through_vertices_and_edges(make):
-    """Points behind and before each vertex, and each edge's midpoint, along the ray: coordinates y, z agree to the last bit."""
+    """Points behind and before each vertex and each edge's middle, along the ray: y and z agree to the last bit."""
     mesh = make()
     vertices = np.round(np.array(mesh.vertices) * 2**20) / 2**20  # so that midpoints are exact
     mesh = trimesh.Trimesh(vertices, mesh.faces, process=False)
@@ -203,9 +206,17 @@ def test_open_meshes_hold_nothing_and_overlapping_parts_do_not_cancel():
     vertices, faces = lattice_solid([(0, 0, 0)])
     centre = [[0.5, 0.5, 0.5], [1.25, 0.5, 0.5]]
     assert not contains(geometry_of(Primitive(ROUND, vertices=vertices, faces=faces[:-1])), 0, centre).any()
-    both = Primitive(ROUND, vertices=np.concatenate([vertices, vertices + [0.25, 0, 0]]), faces=np.concatenate([faces, faces + len(vertices)]))
+    both = Primitive(
+        ROUND,
+        vertices=np.concatenate([vertices, vertices + [0.25, 0, 0]]),
+        faces=np.concatenate([faces, faces + len(vertices)]),
+    )
     assert contains(geometry_of(both), 0, [*centre, [0.1, 0.5, 0.5]])[[0, 2]].all()
-    hollow = Primitive(ROUND, vertices=np.concatenate([4.0 * vertices, vertices + 1.0]), faces=np.concatenate([faces, faces[:, ::-1] + len(vertices)]))
+    hollow = Primitive(
+        ROUND,
+        vertices=np.concatenate([4.0 * vertices, vertices + 1.0]),
+        faces=np.concatenate([faces, faces[:, ::-1] + len(vertices)]),
+    )
     assert np.array_equal(contains(geometry_of(hollow), 0, [[1.5, 1.5, 1.5], [0.5, 0.5, 0.5]]), [False, True])
 
 
@@ -217,4 +228,7 @@ def test_cost_grows_with_the_depth_of_the_tree_only():
     start = time.perf_counter()
     inside = contains(geometry, 0, points)
     assert time.perf_counter() - start < 2_000 * 100e-6  # all triangles of one point take more than 200 us
-    assert np.array_equal(inside[np.abs(np.linalg.norm(points, axis=1) - 1.0) > 1e-2], (np.linalg.norm(points, axis=1) < 1.0)[np.abs(np.linalg.norm(points, axis=1) - 1.0) > 1e-2])
+    assert np.array_equal(
+        inside[np.abs(np.linalg.norm(points, axis=1) - 1.0) > 1e-2],
+        (np.linalg.norm(points, axis=1) < 1.0)[np.abs(np.linalg.norm(points, axis=1) - 1.0) > 1e-2],
+    )

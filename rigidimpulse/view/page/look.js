@@ -52,34 +52,46 @@ function makeSky() {
   return sky;
 }
 
-/* What shiny surfaces mirror: a bright overcast room with a large soft box overhead and a strip at the side. */
-function makeEnvironment(renderer) {
-  const room = new THREE.Scene();
-  const walls = new THREE.SphereGeometry(10, 32, 24);
-  const colours = [];
-  for (let i = 0; i < walls.attributes.position.count; i++) {
-    const height = walls.attributes.position.getY(i) / 10;
-    const colour = linearColour(SKY.horizon).lerp(linearColour(height > 0 ? SKY.zenith : "#8d8a86"), Math.abs(height));
-    colours.push(colour.r, colour.g, colour.b);
+/* What surfaces mirror: a bright room with a large soft box overhead, a strip at the side and one in front. It is a
+   formula, not a picture: a picture would have to be blurred for every roughness first, which takes a machine without
+   a graphics card ten seconds. A panel lies around the direction `at`; roughness blurs its edges and thins its
+   light. */
+const ROOM = `
+  float panel(vec3 ray, vec3 at, vec2 size, float blur) {
+    float ahead = dot(ray, at);
+    vec3 aside = normalize(cross(vec3(0.0, 0.0, 1.0), at));
+    vec2 place = abs(vec2(dot(ray, aside), dot(ray, cross(at, aside)))) / max(ahead, 1e-3);
+    vec2 inside = 1.0 - smoothstep(size - blur, size + blur, place);
+    vec2 thin = size / (size + 0.5 * blur);
+    return ahead > 0.0 ? inside.x * inside.y * thin.x * thin.y : 0.0;
   }
-  walls.setAttribute("color", new THREE.Float32BufferAttribute(colours, 3));
-  room.add(new THREE.Mesh(walls, new THREE.MeshBasicMaterial({vertexColors: true, side: THREE.BackSide})));
-  for (const [width, height, brightness, position] of [
-    [7, 5, 7, [-3, 8, 2]],
-    [2, 7, 4, [8, 3, -3]],
-    [6, 1.5, 3, [2, 2.5, 9]],
-  ]) {
-    const colour = new THREE.Color(1, 1, 1).multiplyScalar(brightness);
-    const panel = new THREE.Mesh(
-      new THREE.PlaneGeometry(width, height), new THREE.MeshBasicMaterial({color: colour, side: THREE.DoubleSide}));
-    panel.position.set(...position);
-    panel.lookAt(0, 0, 0);
-    room.add(panel);
+  vec3 roomRadiance(vec3 ray, float roughness) {
+    float blur = 0.03 + 1.2 * roughness * roughness;
+    float above = smoothstep(-0.05 - blur, 0.05 + 0.5 * blur, ray.y);
+    vec3 light = mix(vec3(0.27, 0.26, 0.25), vec3(0.84, 0.82, 0.78), above);
+    light = mix(light, vec3(0.30, 0.43, 0.62), 0.8 * smoothstep(0.0, 1.0, ray.y));
+    light += 6.0 * panel(ray, normalize(vec3(-0.36, 0.93, 0.2)), vec2(0.42, 0.3), blur);
+    light += 3.5 * panel(ray, normalize(vec3(0.88, 0.33, -0.33)), vec2(0.12, 0.42), blur);
+    light += 2.5 * panel(ray, normalize(vec3(0.2, 0.28, 0.94)), vec2(0.3, 0.09), blur);
+    return light;
   }
-  const generator = new THREE.PMREMGenerator(renderer);
-  const texture = generator.fromScene(room, 0.03).texture;
-  generator.dispose();
-  return texture;
+  vec3 roomIrradiance(vec3 normal) {
+    vec3 light = mix(vec3(0.9, 0.87, 0.83), vec3(2.0, 2.1, 2.25), 0.5 + 0.5 * normal.y);
+    light += 1.3 * max(dot(normal, vec3(-0.36, 0.93, 0.2)), 0.0);
+    return light + 0.5 * max(dot(normal, vec3(0.5, 0.3, 0.8)), 0.0);
+  }`;
+
+/* Lets a physical material see the room, `strength` of it. */
+function seeRoom(shader, strength) {
+  shader.fragmentShader = shader.fragmentShader
+    .replace("#include <common>", `#include <common>\n${ROOM}`)
+    .replace("#include <lights_fragment_maps>", `#include <lights_fragment_maps>
+      vec3 mirrored = inverseTransformDirection(reflect(-geometry.viewDir, geometry.normal), viewMatrix);
+      iblIrradiance += ${strength} * roomIrradiance(inverseTransformDirection(geometry.normal, viewMatrix));
+      radiance += ${strength} * roomRadiance(mirrored, material.roughness);
+      #ifdef USE_CLEARCOAT
+        clearcoatRadiance += ${strength} * roomRadiance(mirrored, material.clearcoatRoughness);
+      #endif`);
 }
 
 /* Key light with shadows, its frustum fitted to a ball of `radius` about `centre` (recorded frame). */
@@ -102,16 +114,17 @@ function makeKeyLight(stage, centre, radius) {
   return light;
 }
 
-/* The face of a half space: a plane (its own xy) with a grid, which dissolves into the sky `reach` away from `centre`. */
+/* The face of a half space: a plane (its own xy) with a grid, which dissolves into the sky `reach` from `centre`. */
 function makeGround(spacing, reach, opacity) {
   const uniforms = {
     centre: {value: new THREE.Vector2()}, spacing: {value: spacing}, reach: {value: reach},
     line: {value: linearColour("#5d6b78")},
   };
   const material = new THREE.MeshStandardMaterial({
-    color: linearColour("#b3b8bd"), roughness: 0.9, metalness: 0, envMapIntensity: 0.55, transparent: true, opacity,
+    color: linearColour("#b3b8bd"), roughness: 0.9, metalness: 0, transparent: true, opacity,
     depthWrite: false});
   material.onBeforeCompile = (shader) => {
+    seeRoom(shader, "0.55");
     Object.assign(shader.uniforms, uniforms);
     shader.vertexShader = shader.vertexShader
       .replace("#include <common>", "#include <common>\nuniform vec2 centre;\nvarying vec2 plane;")
@@ -131,7 +144,8 @@ function makeGround(spacing, reach, opacity) {
         }`)
       .replace("#include <color_fragment>", `#include <color_fragment>
         float away = distance(plane, centre) / reach;
-        float lines = max(0.34 * grid(spacing, 0.007), 0.55 * grid(5.0 * spacing, 0.003)) * (1.0 - smoothstep(0.1, 0.7, away));
+        float lines = max(0.5 * grid(spacing, 0.009), 0.75 * grid(5.0 * spacing, 0.004));
+        lines *= 1.0 - smoothstep(0.1, 0.7, away);
         diffuseColor.rgb = mix(diffuseColor.rgb, line, lines);
         diffuseColor.a *= 1.0 - smoothstep(0.12, 1.0, away);`);
   };
@@ -147,26 +161,26 @@ function makeGround(spacing, reach, opacity) {
 }
 
 /* Round bodies are painted in octants, else one could not see them spin. */
-function paintOctants(material) {
-  material.onBeforeCompile = (shader) => {
-    shader.vertexShader = shader.vertexShader
-      .replace("#include <common>", "#include <common>\nvarying vec3 local;")
-      .replace("#include <begin_vertex>", "#include <begin_vertex>\nlocal = position;");
-    shader.fragmentShader = shader.fragmentShader
-      .replace("#include <common>", "#include <common>\nvarying vec3 local;")
-      .replace("#include <color_fragment>", `#include <color_fragment>
-        vec3 sides = clamp(local / max(fwidth(local), 1e-12), -1.0, 1.0);
-        float octant = 0.5 + 0.5 * sides.x * sides.y * sides.z;
-        diffuseColor.rgb = mix(diffuseColor.rgb, mix(diffuseColor.rgb, vec3(0.9), 0.72), octant);`);
-  };
+function paintOctants(shader) {
+  shader.vertexShader = shader.vertexShader
+    .replace("#include <common>", "#include <common>\nvarying vec3 local;")
+    .replace("#include <begin_vertex>", "#include <begin_vertex>\nlocal = position;");
+  shader.fragmentShader = shader.fragmentShader
+    .replace("#include <common>", "#include <common>\nvarying vec3 local;")
+    .replace("#include <color_fragment>", `#include <color_fragment>
+      vec3 sides = clamp(local / max(fwidth(local), 1e-12), -1.0, 1.0);
+      float octant = 0.5 + 0.5 * sides.x * sides.y * sides.z;
+      diffuseColor.rgb = mix(diffuseColor.rgb, mix(diffuseColor.rgb, vec3(0.9), 0.72), octant);`);
 }
 
 function makeSurface(surface) {
   const material = new THREE.MeshPhysicalMaterial({
     color: linearColour(surface.color), roughness: surface.roughness, metalness: surface.metalness,
-    clearcoat: surface.clearcoat, clearcoatRoughness: 0.25, envMapIntensity: 0.75});
-  if (surface.octants) {
-    paintOctants(material);
-  }
+    clearcoat: surface.clearcoat, clearcoatRoughness: 0.25});
+  material.onBeforeCompile = (shader) => {
+    seeRoom(shader, "0.8");
+    if (surface.octants) { paintOctants(shader); }
+  };
+  material.customProgramCacheKey = () => (surface.octants ? "octants" : "plain");
   return material;
 }

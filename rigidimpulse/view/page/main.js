@@ -54,7 +54,6 @@ class Stage {
     viewer.scene_tree.find(["Background"]).on_update = () => viewer.set_dirty();
     viewer.scene.background = null;
     viewer.set_object(["sky"], makeSky());
-    viewer.scene.environment = makeEnvironment(viewer.renderer);
     this.light = makeKeyLight(this.turn, this.recorded(this.centre), 1.35 * this.radius);
     viewer.set_object(["Lights", "key"], this.light);
   }
@@ -218,7 +217,10 @@ function expose(viewer, stage, transport, impacts) {
 }
 
 main().catch((error) => {
-  element("failure").textContent = `This page could not be shown: ${error.message}. It needs a browser of 2023 or later with WebGL.`;
+  const reason = error.message.replace(/\.$/, "");
+  element("failure").textContent =
+    `This page could not be shown: ${reason}. It needs a browser of 2023 or later, with WebGL.`;
+  document.body.classList.add("bare");
   element("failure").hidden = false;
   throw error;
 });

@@ -1,0 +1,5 @@
+"""`python -m rigidimpulse`: the command line."""
+
+from rigidimpulse.cli import main
+
+main(prog_name="rigidimpulse")

@@ -1,0 +1,306 @@
+"""The command line. Only click is imported here; commands import what they use, so that `--help` answers at once."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+import rigidimpulse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rigidimpulse.gallery.record import Check, GalleryScene
+    from rigidimpulse.recording import Recording
+    from rigidimpulse.scene import Scene
+
+OUTPUT_SUFFIXES = (".html", ".npz")
+DEFAULT_DURATION = 4.0
+"""s, of scenes from files."""
+DEFAULT_FPS = 60.0
+PATIENCE = 0.5
+"""s of work before a progress bar appears."""
+CHECK_FAILED, BAD_SCENE = 1, 2
+"""Exit codes, besides 0 for success."""
+
+
+class Failure(click.ClickException):
+    """A message for the user, without a traceback."""
+
+    exit_code = BAD_SCENE
+
+
+class Commands(click.Group):
+    """Commands whose `SceneError` ends the program with its message."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except ValueError as error:
+            from rigidimpulse.errors import SceneError
+
+            if isinstance(error, SceneError):
+                raise Failure(str(error)) from None
+            raise
+
+
+class Job(NamedTuple):
+    """A scene to run: name, how to make it, how long [s], frames per second, accuracy preset, gallery record."""
+
+    name: str
+    make: Callable[[], Scene]
+    duration: float
+    fps: float
+    accuracy: str
+    entry: GalleryScene | None
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(rigidimpulse.__version__, prog_name="rigidimpulse")
+def main() -> None:
+    """Rigid bodies that collide exactly: mesh scenes in, accurate motion for animation out.
+
+    SCENE is the name of a gallery scene (`rigidimpulse demo` lists them), or a file.py that defines scene().
+    """
+
+
+def run_options(command: Callable) -> Callable:
+    """Add the options of commands that simulate."""
+    for option in (
+        click.option("--view", is_flag=True, help="Open the result in the browser."),
+        click.option("--fps", type=float, help="Frames per second; changes what is recorded, never what happens."),
+        click.option("--duration", type=float, help="Time to simulate, s."),
+        click.option("--accuracy", help="preview, standard or exact."),
+    ):
+        command = option(command)
+    return command
+
+
+@main.command()
+@click.argument("name", required=False)
+@click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html or .npz.")
+@run_options
+def demo(name: str | None, output: tuple[str, ...], view: bool, **settings: Any) -> None:
+    """Run a gallery scene and its checks; without NAME, list the scenes."""
+    from rigidimpulse import gallery
+
+    if name is None:
+        width = max(map(len, gallery.names()))
+        for known in gallery.names():
+            click.echo(f"{known.ljust(width)}  {gallery.load(known).description}")
+        return
+    entry = gallery.load(name)
+    job = _job_of(entry)._replace(**_given(settings))
+    click.echo(f"{entry.name}: {entry.description}")
+    run = _run(job, output)
+    passed = True
+    if job.duration == entry.duration:
+        passed = _print_checks(entry.check(run))
+    else:
+        click.echo(f"checks left out: they are for the scene's own duration, {entry.duration:g} s")
+    _hand_over(run, output, view)
+    if not passed:
+        sys.exit(CHECK_FAILED)
+
+
+@main.command()
+@click.argument("scene")
+@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html or .npz.")
+@run_options
+def simulate(scene: str, output: tuple[str, ...], view: bool, **settings: Any) -> None:
+    """Simulate SCENE and write the recording."""
+    job = _find_job(scene)._replace(**_given(settings))
+    _hand_over(_run(job, output), output, view)
+
+
+@main.command()
+@click.argument("file", type=click.Path())
+@click.option("--scene", help="SCENE that an .npz recording was made of: it has the motion, the scene has the shapes.")
+def view(file: str, scene: str | None) -> None:
+    """Open FILE, an .html or .npz recording, in the browser."""
+    from rigidimpulse.errors import SceneError
+
+    path = Path(file)
+    if not path.is_file():
+        raise SceneError(f"there is no file {file!r}", "check the path")
+    if path.suffix == ".html":
+        click.launch(path.resolve().as_uri())
+    elif path.suffix == ".npz":
+        _show(_recording_with_shapes(path, scene))
+    else:
+        raise SceneError(f"cannot view {path.name!r}", "give a recording, a file that ends in .html or .npz")
+
+
+@main.command()
+@click.argument("scene")
+@click.option("--duration", type=float, help="Also simulate for this time [s], to see each effect's share of the work.")
+@click.option("--accuracy", help="preview, standard or exact.")
+def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
+    """Say which effects SCENE calls for, which not, and why."""
+    from rigidimpulse.simulate import make_plan
+    from rigidimpulse.world import compile_scene
+
+    job = _find_job(scene)._replace(**_given({"accuracy": accuracy, "duration": duration}))
+    if duration is None:
+        plan = make_plan(compile_scene(job.make(), job.accuracy))
+    else:
+        plan = _run(job, ()).plan
+        assert plan is not None
+    click.echo(plan.explain())
+
+
+def _given(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return the options that were given."""
+    return {name: value for name, value in settings.items() if value is not None}
+
+
+def _job_of(entry: GalleryScene) -> Job:
+    return Job(entry.name, entry.scene, entry.duration, entry.fps, entry.accuracy, entry)
+
+
+def _find_job(scene: str) -> Job:
+    """Return the job for a gallery name or a file.
+
+    Raises:
+        SceneError: it is neither, with the ways to name a scene.
+
+    """
+    from rigidimpulse import gallery
+    from rigidimpulse.errors import SceneError
+
+    path = Path(scene)
+    if path.suffix == ".py":
+        return Job(path.stem, _scene_function(path), DEFAULT_DURATION, DEFAULT_FPS, "standard", None)
+    if path.suffix or len(path.parts) > 1:
+        known = "a gallery scene (`rigidimpulse demo` lists them), or a file.py that defines scene()"
+        raise SceneError(f"cannot read a scene from {scene!r}", f"supported: {known}")
+    return _job_of(gallery.load(scene))
+
+
+def _scene_function(path: Path) -> Callable[[], Scene]:
+    """Return the function `scene` of a Python file, so wrapped that its errors name the file and the line."""
+    import runpy
+    import traceback
+
+    from rigidimpulse.errors import RigidImpulseError, SceneError
+    from rigidimpulse.scene import Scene
+
+    where = f"scene file {str(path)!r}"
+    if not path.is_file():
+        raise SceneError("there is no such file", "check the path", where)
+
+    def guarded(function: Callable[[], Any]) -> Any:
+        try:
+            return function()
+        except RigidImpulseError:
+            raise
+        except Exception as error:
+            lines = [entry.lineno for entry in traceback.extract_tb(error.__traceback__) if entry.filename == str(path)]
+            line = getattr(error, "lineno", None) or (lines[-1] if lines else "?")
+            raise SceneError(f"line {line}: {type(error).__name__}: {error}", "correct the file", where) from error
+
+    function = guarded(lambda: runpy.run_path(str(path))).get("scene")
+    if not callable(function):
+        raise SceneError("it defines no function scene()", "write: def scene(): ... return a Scene", where)
+
+    def make() -> Scene:
+        made = guarded(function)
+        if not isinstance(made, Scene):
+            raise SceneError(f"scene() returned a {type(made).__name__}", "return a Scene", where)
+        return made
+
+    return make
+
+
+def _run(job: Job, output: Sequence[str]) -> Recording:
+    """Simulate with a progress bar and print the summary; names of outputs are looked at first."""
+    from rigidimpulse.errors import SceneError
+
+    for target in output:
+        if Path(target).suffix not in OUTPUT_SUFFIXES:
+            raise SceneError(f"cannot write {target!r}", f"use a name that ends in {' or '.join(OUTPUT_SUFFIXES)}")
+    from time import perf_counter
+
+    from tqdm import tqdm
+
+    from rigidimpulse.simulate import simulate as run_scene
+
+    scene = job.make()
+    start = perf_counter()
+    # disable=None: no bar where the output is no terminal.
+    with tqdm(
+        total=job.duration, desc=job.name, unit="s", delay=PATIENCE, disable=None, leave=False,
+        bar_format="{desc} {percentage:3.0f} % |{bar}| {n:.2f} of {total:g} s, {remaining} left",
+    ) as bar:  # fmt: skip
+
+        def progress(time: float) -> None:
+            bar.update(min(time, job.duration) - bar.n)
+
+        run = run_scene(scene, job.duration, job.fps, accuracy=job.accuracy, progress=progress)
+    seconds = perf_counter() - start
+    num_impacts = len(run.impacts)
+    impacts = f"{num_impacts} {'impact' if num_impacts == 1 else 'impacts'}"
+    click.echo(f"{job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s")
+    click.echo(f"status: {run.status.message}")
+    return run
+
+
+def _print_checks(checks: Sequence[Check]) -> bool:
+    """Print a table of checks; return whether all hold."""
+    rows = [
+        ("ok" if check.passed else "FAILED", check.what, _figure(check.value), _figure(check.bound), check.law)
+        for check in checks
+    ]
+    head = ("", "check", "value", "bound", "law")
+    widths = [max(len(row[k]) for row in [head, *rows]) for k in range(4)]
+    for row in [head, *rows]:
+        mark, what, value, bound = (
+            text.rjust(width) if k in (2, 3) else text.ljust(width)
+            for k, (text, width) in enumerate(zip(row, widths, strict=False))
+        )
+        click.echo(f"{mark}  {what}  {value}  {bound}  {row[4]}")
+    return all(check.passed for check in checks)
+
+
+def _figure(value: float) -> str:
+    """Return counts in full, errors with two digits."""
+    return f"{value:.0f}" if value == int(value if abs(value) < 1e15 else 0) else f"{value:.1e}"
+
+
+def _hand_over(run: Recording, output: Sequence[str], view: bool) -> None:
+    """Write the recording where it was asked for, and open it."""
+    for target in output:
+        path = run.export(target)
+        click.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
+    if view:
+        _show(run)
+
+
+def _show(run: Recording) -> None:
+    """Open a recording in the browser; where there is none, serve it until Ctrl-C."""
+    viewer = run.show()
+    if not viewer.fetched.is_set():
+        click.echo("open this address in a browser; Ctrl-C ends")
+        viewer.wait()
+
+
+def _recording_with_shapes(path: Path, scene: str | None) -> Recording:
+    """Return the recording of an .npz file, with the scene that has its shapes."""
+    from dataclasses import replace
+
+    from rigidimpulse.errors import SceneError
+    from rigidimpulse.recording import load_recording
+
+    if scene is None:
+        remedy = "name its scene, --scene SCENE, or export the run as .html"
+        raise SceneError("an .npz recording has the motion but not the shapes", remedy, f"recording {str(path)!r}")
+    run = load_recording(path)
+    made = _find_job(scene).make()
+    if list(made.names) != run.names:
+        bodies = f"its bodies are {', '.join(run.names)}, those of the scene {', '.join(made.names)}"
+        raise SceneError(bodies, "name the scene it was made of", f"recording {str(path)!r}")
+    return replace(run, scene=made)

@@ -1,0 +1,50 @@
+"""Named scenes, each with a check against a law. A scene's module is imported when the scene is asked for."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+from rigidimpulse.errors import unknown_name
+from rigidimpulse.gallery.record import asset_path
+
+if TYPE_CHECKING:
+    from rigidimpulse.gallery.record import GalleryScene
+
+__all__ = ["asset_path", "load", "names"]
+
+_MODULES = {
+    "spot": "spot",
+    "disks_in_a_box": "disks_in_a_box",
+    "pool_break": "pool_break",
+    "cradle_one": "cradle",
+    "cradle_two": "cradle",
+    "superball": "superball",
+    "wing_nut": "wing_nut",
+    "galperin_0": "galperin",
+    "galperin_1": "galperin",
+    "galperin_2": "galperin",
+    "galperin_3": "galperin",
+    "two_spheres": "two_spheres",
+    "off_centre_disk": "off_centre_disk",
+    "rifle": "rifle",
+}
+"""Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of all scenes."""
+    return tuple(_MODULES)
+
+
+def load(name: str) -> GalleryScene:
+    """Return the scene of a name.
+
+    Raises:
+        SceneError: for an unknown name, listing the known ones.
+
+    """
+    if name not in _MODULES:
+        raise unknown_name("gallery scene", name, _MODULES)
+    module = importlib.import_module(f"rigidimpulse.gallery.{_MODULES[name]}")
+    return next(entry for entry in module.SCENES if entry.name == name)

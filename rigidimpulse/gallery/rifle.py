@@ -1,0 +1,136 @@
+"""Recoil of a rifle (B5): the momentum of the ball is that of the rifle, M V = m v.
+
+A steel ball of 5.588 mm leaves two rifles, of 2.5 and 5 kg, with 305 m/s. The powder is an impact that feeds energy
+in: ball and breech come together with a small speed u, total momentum zero, and part with e u, for e far above 1
+(allowed by `any_restitution`). With the reduced masses of the two, e = (v / u)(1 + m / M) gives the ball the speed v.
+The bore is open: the ball flies out along it.
+
+The centre of mass lies on the bore line, as the law has it: no muzzle rise.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rigidimpulse.body import Body
+from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
+from rigidimpulse.material import Material
+from rigidimpulse.recording import Recording
+from rigidimpulse.scene import Scene
+from rigidimpulse.shape import Shape
+
+BALL_RADIUS = 0.5 * 5.588e-3
+BALL_DENSITY = 7860.0
+BALL_MASS = BALL_DENSITY * 4.0 / 3.0 * math.pi * BALL_RADIUS**3
+MUZZLE_SPEED = 305.0
+RIFLES = {"light rifle": 2.5, "heavy rifle": 5.0}
+"""Masses, kg."""
+PRINTED_RECOIL = {"light rifle": 0.0877, "heavy rifle": 0.0438}
+"""m/s, as printed in the source, which rounds the mass of the ball."""
+PRINTED_DIGITS = 1e-4
+DISTANCE = 0.5
+APPROACH_SPEED = 0.5
+"""u, m/s."""
+APPROACH_GAP = 1e-3
+BORE_RADIUS, BARREL_RADIUS, BARREL_LENGTH, BORE_SIDES = 3.0e-3, 9.0e-3, 0.6, 24
+DURATION = 1.0
+BOUND = 1e-12
+
+
+def scene() -> Scene:
+    """Return the two rifles side by side, along x."""
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    shape = _rifle()
+    ball = Shape.sphere(BALL_RADIUS)
+    smooth = Material(static_friction=0.0, dynamic_friction=0.0)
+    for k, (name, mass) in enumerate(RIFLES.items()):
+        restitution = MUZZLE_SPEED / APPROACH_SPEED * (1.0 + BALL_MASS / mass)
+        powder = Material(
+            density=BALL_DENSITY,
+            restitution=restitution,
+            static_friction=0.0,
+            dynamic_friction=0.0,
+            any_restitution=True,
+        )
+        total = BALL_MASS + mass
+        y = k * DISTANCE
+        own = {"mass": mass, "center_of_mass": (0.0, 0.0, 0.0), "material": smooth}
+        scene.add(Body(name, shape, position=(0, y, 0), velocity=(APPROACH_SPEED * BALL_MASS / total, 0, 0), **own))
+        scene.add(
+            Body(
+                f"ball of the {name}",
+                ball,
+                position=(BALL_RADIUS + APPROACH_GAP, y, 0.0),
+                velocity=(-APPROACH_SPEED * mass / total, 0.0, 0.0),
+                material=powder,
+            )
+        )
+    return scene
+
+
+def check(run: Recording) -> list[Check]:
+    """Compare with the balance of momentum."""
+    checks = [equal("impacts", len(run.impacts), len(RIFLES), "one shot each; the ball never touches the bore")]
+    for name, mass in RIFLES.items():
+        rifle, ball = run.velocity(name)[-1], run.velocity(f"ball of the {name}")[-1]
+        recoil = BALL_MASS * MUZZLE_SPEED / mass
+        law = "V = m v / M"
+        checks += [
+            at_most(f"{name}: speed of the ball, relative error", _relative(ball, (MUZZLE_SPEED, 0, 0)), BOUND, law),
+            at_most(f"{name}: recoil, relative error", _relative(rifle, (-recoil, 0, 0)), BOUND, law),
+            at_most(
+                f"{name}: recoil, m/s from {PRINTED_RECOIL[name]}",
+                abs(-rifle[0] - PRINTED_RECOIL[name]),
+                PRINTED_DIGITS,
+                "as printed in the dynamics notes",
+            ),
+        ]
+    spin = np.abs(run.angular_velocities[-1]).max() * BALL_RADIUS / MUZZLE_SPEED
+    checks.append(at_most("spin, R w / v of the balls", spin, BOUND, "shot through the centres of mass"))
+    return checks
+
+
+def _relative(value: np.ndarray, expected: tuple[float, float, float]) -> float:
+    return float(np.linalg.norm(value - expected) / np.linalg.norm(expected))
+
+
+def _rifle() -> Shape:
+    """Return barrel, breech, stock and grip; the bore runs along x, its closed end at the origin."""
+    upright = (1.0, 0.0, 0.0, 0.0)
+    stock = [
+        (x, y, z) for y in (-0.016, 0.016) for x, z in ((-0.06, 0.012), (-0.06, -0.03), (-0.42, -0.13), (-0.42, -0.01))
+    ]
+    grip = [
+        (x, y, z) for y in (-0.013, 0.013) for x, z in ((-0.05, -0.02), (-0.01, -0.02), (-0.04, -0.12), (-0.075, -0.11))
+    ]
+    return Shape.compound([
+        (_barrel(), (0.0, 0.0, 0.0), upright),
+        (Shape.box((0.1, 0.032, 0.04)), (-0.05, 0.0, -0.005), upright),
+        (Shape.box((0.3, 0.034, 0.022)), (0.1, 0.0, -0.022), upright),
+        (Shape.convex_hull(stock), (0.0, 0.0, 0.0), upright),
+        (Shape.convex_hull(grip), (0.0, 0.0, 0.0), upright),
+    ])  # fmt: skip
+
+
+def _barrel() -> Shape:
+    """Return a tube along x from 0 to BARREL_LENGTH: four rings of vertices, joined by quads."""
+    angle = 2.0 * np.pi * np.arange(BORE_SIDES) / BORE_SIDES
+    circle = np.stack([np.zeros(BORE_SIDES), np.cos(angle), np.sin(angle)], axis=1)
+    ends = np.array([[0.0, 0.0, 0.0], [BARREL_LENGTH, 0.0, 0.0]])
+    rings = [BARREL_RADIUS * circle + ends[0], BARREL_RADIUS * circle + ends[1]]
+    rings += [BORE_RADIUS * circle + ends[1], BORE_RADIUS * circle + ends[0]]
+    here = np.arange(BORE_SIDES)
+    after = np.roll(here, -1)
+    faces = []
+    for ring in range(4):
+        low, high = ring * BORE_SIDES, (ring + 1) % 4 * BORE_SIDES
+        faces += [
+            np.stack([low + here, low + after, high + after], 1),
+            np.stack([low + here, high + after, high + here], 1),
+        ]
+    return Shape.mesh(np.concatenate(rings), np.concatenate(faces))
+
+
+SCENES = (GalleryScene("rifle", "Recoil of a rifle of 2.5 and 5 kg (dynamics notes B5)", scene, check, DURATION),)

@@ -1,0 +1,226 @@
+"""Rotation of a body under a torque that is constant in the world.
+
+Body frame, principal moments I, angular velocity w; e = R^T d for two fixed directions d of the world:
+    I1 w1' = (I2 - I3) w2 w3 + |tau| e_1.x (and cyclic),   e' = e x w,   d_1 = tau / |tau|,   d_2 normal to d_1,
+so that the angular momentum in the world is L0 + tau t. These equations are quadratic: the coefficients of the power
+series of w, e_1, e_2 follow one from another by Cauchy products. The series up to ORDER is computed once; it serves for
+any time up to `segment`, where its last terms reach round-off, and is begun anew from there on. Segments depend on the
+start alone, never on the time asked for, so the path is one smooth function of time. The attitude follows from e_1, e_2
+and e_1 x e_2.
+
+If w is zero or parallel to the torque and both lie on a principal axis, that axis is kept: angle = w t + tau t^2 / 2I.
+
+Source: A. Jorba and M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor
+methods, Experimental Mathematics 14:99, 2005 (the segment from the last terms).
+"""
+
+import math
+
+from rigidimpulse._jit import jit
+from rigidimpulse.integrate import free_top
+from rigidimpulse.rotation import exponential, from_columns, product, rotated
+
+ORDER = 18
+"""order of the series: a higher one costs more at the start and less beyond the first segment, which grows with it"""
+FORCED_AXIS, FORCED = 4.0, 5.0  # kinds of rotation, after those of free_top
+
+_KIND = 0
+_BASE = 1  # (4,) orientation at the start
+_RATE = 5  # (3,) world angular velocity at the start (axis)
+_ACCELERATION = 8  # (3,) world angular acceleration (axis)
+
+_INERTIA = 5  # (3,)
+_TORQUE = 8  # |tau|
+_TIME_SCALE = 9  # 1/s, a power of two: the series is in (time * scale), and w is in units of the scale
+SEGMENT = 10  # s
+_SERIES = 11  # (ORDER + 1, _STRIDE) coefficients of w, e_1, e_2
+_STRIDE = 9
+FORCED_TOP_SIZE = _SERIES + _STRIDE * (ORDER + 1)
+
+_PARALLEL = 1e-15
+"""sine of the angle between vectors that are taken for parallel: what round-off of their turn to the body leaves"""
+_NO_TORQUE = 1e-280
+"""rad/s^2, angular acceleration taken for none: squares would underflow"""
+_LAST_TERM = 1e-15
+"""size of the last terms of the series at the end of a segment; the terms left out are an eighth of it or less"""
+
+
+@jit
+def _fill_series(c):
+    """Coefficients 1 to ORDER from coefficients 0, and the length of the segment."""
+    i1, i2, i3 = c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2]
+    k1, k2, k3 = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
+    push = c[_TORQUE] / c[_TIME_SCALE] / c[_TIME_SCALE]
+    g1, g2, g3 = push / i1, push / i2, push / i3
+    segment = math.inf
+    for n in range(ORDER):
+        w1, w2, w3, a1, a2, a3, b1, b2, b3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        # One loop for all nine sums: apart, each would wait for its own additions.
+        for j in range(n + 1):
+            x = _SERIES + _STRIDE * j
+            y = _SERIES + _STRIDE * (n - j)
+            v1, v2, v3 = c[y], c[y + 1], c[y + 2]
+            w1 += c[x + 1] * v3
+            w2 += c[x + 2] * v1
+            w3 += c[x] * v2
+            e1, e2, e3 = c[x + 3], c[x + 4], c[x + 5]
+            a1 += e2 * v3 - e3 * v2
+            a2 += e3 * v1 - e1 * v3
+            a3 += e1 * v2 - e2 * v1
+            e1, e2, e3 = c[x + 6], c[x + 7], c[x + 8]
+            b1 += e2 * v3 - e3 * v2
+            b2 += e3 * v1 - e1 * v3
+            b3 += e1 * v2 - e2 * v1
+        share = 1.0 / (n + 1.0)
+        here = _SERIES + _STRIDE * n
+        e1, e2, e3 = c[here + 3], c[here + 4], c[here + 5]
+        here += _STRIDE
+        c[here] = share * (k1 * w1 + g1 * e1)
+        c[here + 1] = share * (k2 * w2 + g2 * e2)
+        c[here + 2] = share * (k3 * w3 + g3 * e3)
+        c[here + 3], c[here + 4], c[here + 5] = share * a1, share * a2, share * a3
+        c[here + 6], c[here + 7], c[here + 8] = share * b1, share * b2, share * b3
+        # The last terms stay below round-off for x <= (_LAST_TERM / |c_n|)^(1/n); some of them may vanish by symmetry.
+        if n >= ORDER - 4:
+            largest = 0.0
+            for k in range(_STRIDE):
+                largest = max(largest, abs(c[here + k]))
+            if largest > 0.0:
+                segment = min(segment, math.exp(math.log(_LAST_TERM / largest) / (n + 1.0)))
+    c[SEGMENT] = segment / c[_TIME_SCALE]
+
+
+@jit
+def _start_series(c, wx, wy, wz, ex, ey, ez):
+    """Begin a series at body angular velocity w and unit torque direction e; set scale and segment."""
+    i1, i2, i3 = c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2]
+    coupling = max(1.0, abs(i2 - i3) / i1, abs(i3 - i1) / i2, abs(i1 - i2) / i3)
+    rate = coupling * max(abs(wx), abs(wy), abs(wz)) + math.sqrt(c[_TORQUE] / min(i1, i2, i3))
+    scale = math.ldexp(1.0, math.frexp(rate)[1])
+    c[_TIME_SCALE] = scale
+    c[_SERIES], c[_SERIES + 1], c[_SERIES + 2] = wx / scale, wy / scale, wz / scale
+    c[_SERIES + 3], c[_SERIES + 4], c[_SERIES + 5] = ex, ey, ez
+    # d_2 is normal to the torque and to the body axis x or y, whichever is farther from it.
+    nx, ny, nz = (0.0, ez, -ey) if abs(ex) <= abs(ey) else (-ez, 0.0, ex)
+    size = math.sqrt(nx * nx + ny * ny + nz * nz)
+    c[_SERIES + 6], c[_SERIES + 7], c[_SERIES + 8] = nx / size, ny / size, nz / size
+    _fill_series(c)
+
+
+@jit
+def _advance(c, t):
+    """Body angular velocity, e_1, and the turn since the start of the series, t seconds after it: ten numbers."""
+    x = t * c[_TIME_SCALE]
+    w1, w2, w3, a1, a2, a3, b1, b2, b3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for n in range(ORDER, -1, -1):
+        k = _SERIES + _STRIDE * n
+        u1, u2, u3 = c[k], c[k + 1], c[k + 2]
+        w1, w2, w3 = w1 * x + u1, w2 * x + u2, w3 * x + u3
+        u1, u2, u3 = c[k + 3], c[k + 4], c[k + 5]
+        a1, a2, a3 = a1 * x + u1, a2 * x + u2, a3 * x + u3
+        u1, u2, u3 = c[k + 6], c[k + 7], c[k + 8]
+        b1, b2, b3 = b1 * x + u1, b2 * x + u2, b3 * x + u3
+    # Same directions, seen from the body at the start of the series (p, q, r = p x q) and now (a, b, n = a x b).
+    p1, p2, p3 = c[_SERIES + 3], c[_SERIES + 4], c[_SERIES + 5]
+    q1, q2, q3 = c[_SERIES + 6], c[_SERIES + 7], c[_SERIES + 8]
+    r1, r2, r3 = p2 * q3 - p3 * q2, p3 * q1 - p1 * q3, p1 * q2 - p2 * q1
+    n1, n2, n3 = a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1
+    g0, g1, g2, g3 = from_columns(
+        p1 * a1 + q1 * b1 + r1 * n1,
+        p2 * a1 + q2 * b1 + r2 * n1,
+        p3 * a1 + q3 * b1 + r3 * n1,
+        p1 * a2 + q1 * b2 + r1 * n2,
+        p2 * a2 + q2 * b2 + r2 * n2,
+        p3 * a2 + q3 * b2 + r3 * n2,
+        p1 * a3 + q1 * b3 + r1 * n3,
+        p2 * a3 + q2 * b3 + r2 * n3,
+        p3 * a3 + q3 * b3 + r3 * n3,
+    )
+    scale = c[_TIME_SCALE]
+    return scale * w1, scale * w2, scale * w3, a1, a2, a3, g0, g1, g2, g3
+
+
+@jit
+def _parallel(ax, ay, az, bx, by, bz):
+    """Whether two vectors are parallel to round-off; a zero vector is parallel to any."""
+    limit = _PARALLEL * max(abs(ax), abs(ay), abs(az)) * max(abs(bx), abs(by), abs(bz))
+    return max(abs(ay * bz - az * by), abs(az * bx - ax * bz), abs(ax * by - ay * bx)) <= limit
+
+
+@jit
+def prepare(inertia, q, w_world, torque, constants_out):
+    """Write the constants (FORCED_TOP_SIZE,) of the motion from orientation q (4,) and angular velocity (3,), rad/s.
+
+    `w_world` and `torque` (3,), N m, are in the world; `inertia` (3,): principal moments, kg m^2, all > 0. Returns
+    False and writes nothing if the torque is none: then the body is a free top.
+    """
+    c = constants_out
+    i1, i2, i3 = inertia[0], inertia[1], inertia[2]
+    tx, ty, tz = torque[0], torque[1], torque[2]
+    largest = max(abs(tx), abs(ty), abs(tz))
+    if largest <= _NO_TORQUE * min(i1, i2, i3):
+        return False
+    q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
+    norm = 1.0 / math.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+    q0, q1, q2, q3 = norm * q0, norm * q1, norm * q2, norm * q3
+    c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = q0, q1, q2, q3
+    tx, ty, tz = tx / largest, ty / largest, tz / largest
+    size = math.sqrt(tx * tx + ty * ty + tz * tz)
+    ex, ey, ez = rotated(q0, -q1, -q2, -q3, tx / size, ty / size, tz / size)
+    vx, vy, vz = w_world[0], w_world[1], w_world[2]
+    wx, wy, wz = rotated(q0, -q1, -q2, -q3, vx, vy, vz)
+    magnitude = size * largest
+    ax, ay, az = magnitude * ex / i1, magnitude * ey / i2, magnitude * ez / i3
+    if _parallel(ex, ey, ez, ax, ay, az) and _parallel(ex, ey, ez, wx, wy, wz):
+        c[_KIND] = FORCED_AXIS
+        ax, ay, az = rotated(q0, q1, q2, q3, ax, ay, az)
+        c[_RATE], c[_RATE + 1], c[_RATE + 2] = vx, vy, vz
+        c[_ACCELERATION], c[_ACCELERATION + 1], c[_ACCELERATION + 2] = ax, ay, az
+    else:
+        c[_KIND] = FORCED
+        c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2] = i1, i2, i3
+        c[_TORQUE] = magnitude
+        _start_series(c, wx, wy, wz, ex, ey, ez)
+    return True
+
+
+@jit
+def _last_segment(constants, t):
+    """Constants of the segment that holds the time t, and the time since its start."""
+    c = constants.copy()
+    while t > c[SEGMENT]:
+        t -= c[SEGMENT]
+        wx, wy, wz, ex, ey, ez, g0, g1, g2, g3 = _advance(c, c[SEGMENT])
+        q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
+        q0, q1, q2, q3 = product(q0, q1, q2, q3, g0, g1, g2, g3)
+        c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = q0, q1, q2, q3
+        _start_series(c, wx, wy, wz, ex, ey, ez)
+    return c, t
+
+
+@jit
+def rotation(constants, t):
+    """Quaternion and world angular velocity t seconds after the start, as seven numbers; for rows of free_top too."""
+    c = constants
+    if c[_KIND] < FORCED_AXIS:
+        return free_top.rotation(c, t)
+    if c[_KIND] == FORCED:
+        if t > c[SEGMENT]:
+            c, t = _last_segment(c, t)
+        wx, wy, wz, _, _, _, g0, g1, g2, g3 = _advance(c, t)
+        q0, q1, q2, q3 = product(c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], g0, g1, g2, g3)
+        wx, wy, wz = rotated(q0, q1, q2, q3, wx, wy, wz)
+        return q0, q1, q2, q3, wx, wy, wz
+    wx, wy, wz = c[_RATE], c[_RATE + 1], c[_RATE + 2]
+    ax, ay, az = c[_ACCELERATION], c[_ACCELERATION + 1], c[_ACCELERATION + 2]
+    h = 0.5 * t
+    e0, e1, e2, e3 = exponential(t * (wx + h * ax), t * (wy + h * ay), t * (wz + h * az))
+    q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
+    q0, q1, q2, q3 = product(e0, e1, e2, e3, q0, q1, q2, q3)
+    return q0, q1, q2, q3, wx + t * ax, wy + t * ay, wz + t * az
+
+
+@jit
+def evaluate(constants, t, q_out, w_out):
+    """Write quaternion (4,) and world angular velocity (3,) t >= 0 seconds after the start."""
+    q_out[0], q_out[1], q_out[2], q_out[3], w_out[0], w_out[1], w_out[2] = rotation(constants, t)

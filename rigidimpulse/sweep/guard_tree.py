@@ -1,0 +1,199 @@
+"""Safe time of two primitives with many pieces: walks through their box trees, soonest pair of boxes first.
+
+A pair of boxes is bounded along the axes of either box, each carried by its body; only pairs that could lower the safe time found so far
+are opened. A cylinder counts as one box.
+"""
+
+from __future__ import annotations
+
+from rigidimpulse.detect.features import along, dot, inner, subtract
+from rigidimpulse.sweep.bound import SEEN_SIZE, length, put, scaled, turned, turned_back, vector
+from rigidimpulse.sweep.guard_layout import (
+    CARRIER,
+    CLOSEST,
+    CORNER,
+    COUNT,
+    CYLINDER,
+    CYLINDER_AXES,
+    CYLINDER_HEIGHT,
+    CYLINDER_RADIUS,
+    CYLINDER_SIZE,
+    ELEMENT_A,
+    ELEMENT_B,
+    FACE,
+    FIRST,
+    LIMIT,
+    LIMIT_SIZE,
+    ORIGIN,
+    ROTATION,
+    SECOND,
+    SEEN,
+    STACK,
+    STACK_TIME,
+)
+from rigidimpulse.sweep.guard_pieces import pieces_safe_until
+from rigidimpulse.sweep.guard_root import point_safe_until
+
+NO_NODE = -1
+"""In place of a tree node: the cylinder."""
+
+
+@inner
+def row(array, i):
+    """Return row i of an array (k, 3) as a tuple."""
+    return array[i, 0], array[i, 1], array[i, 2]
+
+
+@inner
+def _load_triangle(vertex, triangle, triangle_normal, i, work, index, side):
+    """Put triangle i into the place of the first (0) or second (1) piece, in the frame of the first body."""
+    normal = row(triangle_normal, i)
+    put(work, FACE + 3 * side, turned(work, ROTATION, normal) if side else normal)
+    for k in range(3):
+        point = row(vertex, triangle[i, k])
+        if side:
+            point = along(turned(work, ROTATION, point), 1.0, vector(work, ORIGIN + 3))
+        put(work, CORNER + 9 * side + 3 * k, point)
+    index[COUNT + side] = 3
+    if triangle[i, 1] == triangle[i, 2]:
+        index[COUNT + side] = 1 if triangle[i, 0] == triangle[i, 1] else 2
+
+
+@inner
+def _boxes_safe_until(low, high, centre, half, work, axes, threshold, horizon):
+    """Safe time of a box [low, high] of the first body and a box of the second; 0 where no axis separates them.
+
+    `centre` middle of the second box, `half` its half extents along the columns of the matrix at `axes`; frame of the first body.
+    """
+    middle, half_first = scaled(along(low, 1.0, high), 0.5), scaled(subtract(high, low), 0.5)
+    between = subtract(centre, middle)
+    best = 0.0
+    for trial in range(6):
+        k = trial % 3
+        if trial < 3:
+            axis = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
+        else:
+            axis = (work[axes + k], work[axes + 3 + k], work[axes + 6 + k])
+        other = turned_back(work, axes, axis)
+        extent = abs(axis[0]) * half_first[0] + abs(axis[1]) * half_first[1] + abs(axis[2]) * half_first[2]
+        extent += abs(other[0]) * half[0] + abs(other[1]) * half[1] + abs(other[2]) * half[2]
+        distance = dot(axis, between)
+        gap = abs(distance) - extent - threshold
+        if gap > 0.0:
+            side = trial // 3
+            outward = scaled(axis, 1.0 if (distance > 0.0) == (side == 0) else -1.0)
+            arm = middle if side else subtract(centre, vector(work, ORIGIN + 3))
+            reach = length(half_first if side else half)
+            best = max(best, point_safe_until(work, SEEN + SEEN_SIZE * side, outward, arm, reach, gap, horizon))
+            if best >= horizon:
+                return horizon
+    return best
+
+
+@inner
+def _pair_safe_until(node_min, node_max, first, second, work, threshold, horizon):
+    """Safe time of two boxes of the trees, or of one and the cylinder."""
+    if second == NO_NODE:
+        at = CYLINDER + CYLINDER_SIZE
+        radius = work[at + CYLINDER_RADIUS]
+        centre, half, axes = vector(work, at), (radius, radius, work[at + CYLINDER_HEIGHT]), CYLINDER_AXES
+    else:
+        low, high = row(node_min, second), row(node_max, second)
+        centre = along(turned(work, ROTATION, scaled(along(low, 1.0, high), 0.5)), 1.0, vector(work, ORIGIN + 3))
+        half, axes = scaled(subtract(high, low), 0.5), ROTATION
+    return _boxes_safe_until(row(node_min, first), row(node_max, first), centre, half, work, axes, threshold, horizon)
+
+
+@inner
+def _push(work, index, depth, first, second, time):
+    index[STACK + 2 * depth] = first
+    index[STACK + 2 * depth + 1] = second
+    work[STACK_TIME + depth] = time
+
+
+@inner
+def trees_safe_until(nodes, surface, first, second, work, index, threshold, horizon, cylinders):
+    """Safe time of two primitives, given by the roots of their trees; NO_NODE for a cylinder as the second.
+
+    What limits it: triangles at ELEMENT_A (of the first) and ELEMENT_B, side at CARRIER, record at LIMIT.
+
+    Args:
+        nodes: node_min, node_max, node_child, node_start, node_count of the geometry.
+        surface: vertex, triangle, triangle_normal of the geometry.
+        first, second: roots.
+        work, index, threshold, horizon, cylinders: as for `pieces_safe_until`.
+
+    """
+    node_min, node_max, child, start, count = nodes
+    vertex, triangle, triangle_normal = surface
+    _push(work, index, FIRST, first, second, 0.0)
+    depth = 1
+    while depth > 0 and horizon > 0.0:
+        depth -= 1
+        if work[STACK_TIME + depth] >= horizon:
+            continue
+        a, b = index[STACK + 2 * depth], index[STACK + 2 * depth + 1]
+        leaf_b = b == NO_NODE or child[b] < 0
+        if child[a] < 0 and leaf_b:
+            for j in range(start[b] if b != NO_NODE else 0, start[b] + count[b] if b != NO_NODE else 1):
+                index[COUNT + 1] = 0
+                if b != NO_NODE:
+                    _load_triangle(vertex, triangle, triangle_normal, j, work, index, SECOND)
+                for i in range(start[a], start[a] + count[a]):
+                    _load_triangle(vertex, triangle, triangle_normal, i, work, index, FIRST)
+                    s, carrier = pieces_safe_until(work, index, threshold, horizon, cylinders)
+                    if s < horizon:
+                        horizon = s
+                        index[ELEMENT_A], index[ELEMENT_B], index[CARRIER] = i, j, carrier
+                        for k in range(LIMIT_SIZE):
+                            work[LIMIT + k] = work[CLOSEST + k]
+            continue
+        open_a = leaf_b
+        if child[a] >= 0 and not leaf_b:
+            open_a = length(subtract(row(node_max, a), row(node_min, a))) >= length(subtract(row(node_max, b), row(node_min, b)))
+        before = depth
+        for k in range(2):
+            next_a, next_b = child[a] + k if open_a else a, b if open_a else child[b] + k
+            time = _pair_safe_until(node_min, node_max, next_a, next_b, work, threshold, horizon)
+            if time < horizon:
+                if depth > before and time > work[STACK_TIME + before]:  # the sooner one is taken first
+                    _push(work, index, depth, index[STACK + 2 * before], index[STACK + 2 * before + 1], work[STACK_TIME + before])
+                    _push(work, index, before, next_a, next_b, time)
+                else:
+                    _push(work, index, depth, next_a, next_b, time)
+                depth += 1
+    return horizon
+
+
+@inner
+def half_space_safe_until(nodes, triangle, owns, vertex, root, normal, level, work, index, horizon):
+    """Safe time of a ROUND primitive of the second body above a level along a normal; the vertex that limits it is at ELEMENT_B."""
+    node_min, node_max, child, start, count = nodes
+    back = turned_back(work, ROTATION, normal)
+    level -= dot(normal, vector(work, ORIGIN + 3))
+    index[STACK] = root
+    depth = 1
+    while depth > 0 and horizon > 0.0:
+        depth -= 1
+        node = index[STACK + depth]
+        low, high = row(node_min, node), row(node_max, node)
+        half, middle = scaled(subtract(high, low), 0.5), scaled(along(low, 1.0, high), 0.5)
+        gap = dot(back, middle) - (abs(back[0]) * half[0] + abs(back[1]) * half[1] + abs(back[2]) * half[2]) - level
+        arm = turned(work, ROTATION, middle)
+        if gap > 0.0 and point_safe_until(work, SEEN, normal, arm, length(half), gap, horizon) >= horizon:
+            continue
+        if child[node] >= 0:
+            index[STACK + depth] = child[node]
+            index[STACK + depth + 1] = child[node] + 1
+            depth += 2
+            continue
+        for i in range(start[node], start[node] + count[node]):
+            for k in range(3):
+                if owns[i] >> k & 1:
+                    point = row(vertex, triangle[i, k])
+                    arm = turned(work, ROTATION, point)
+                    s = point_safe_until(work, SEEN, normal, arm, 0.0, dot(back, point) - level, horizon)
+                    if s < horizon:
+                        horizon = s
+                        index[ELEMENT_B] = -1 - triangle[i, k]
+    return horizon
