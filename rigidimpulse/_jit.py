@@ -1,7 +1,8 @@
 """The one way kernels are compiled: cached on disk, IEEE division (no exception at a zero divisor), lazily typed.
 
-Numba's cache knows only the file that a function stands in, not those of the functions it calls; here the sources of all modules that a
-kernel's module imports, directly or not, are part of the key, so that no kernel ever runs with an old version of another one inside it.
+Numba's cache knows only the file that a function stands in, not those of the functions it calls; here the sources of
+all modules that a kernel's module imports, directly or not, are part of the key, so that no kernel ever runs with an
+old version of another one inside it.
 """
 
 from __future__ import annotations
@@ -56,8 +57,8 @@ class _KernelCache(FunctionCache):
 class Kernel:
     """A compiled function: an entry where Python calls it, and a part of other kernels where they do.
 
-    Most kernels are only ever parts. Parts have no wrapper for Python and are not written to the cache (whatever calls them is, with the
-    part inside), which halves the time of a first run.
+    Most kernels are only ever parts. Parts have no wrapper for Python and are not written to the cache (whatever calls
+    them is, with the part inside), which saves much of the time of a first run.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -90,7 +91,7 @@ def jit(function: Callable[..., Any]) -> Any:
 
 def kernels_are_cached() -> bool:
     """Whether kernels of these sources lie in the cache, so that a run starts at once."""
-    from rigidimpulse.sweep import bisection
+    from rigidimpulse.detect import touching
 
-    digest = source_digest(Path(bisection.__file__))
-    return any(key[-1] == digest for key in bisection._sweep.entry._cache._cache_file._load_index())
+    digest = source_digest(Path(touching.__file__))
+    return any(key[-1] == digest for key in touching.contacts_of_pairs.entry._cache._cache_file._load_index())

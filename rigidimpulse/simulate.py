@@ -140,17 +140,24 @@ def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, end: float
             progress(context.state.time)
 
 
+def close_stretches(context: StepContext) -> None:
+    """Book the courses under contact forces that are still under way."""
+    state = context.state
+    for i in np.flatnonzero(state.under_contact).tolist():
+        context.log.stretches.append((state.course.start[i], np.inf, i, state.energy_at_start[i], 0.0))
+
+
 def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration: float) -> Recording:
     """Body-frame poses, impacts and ledger from what the recorder holds."""
     world, recorder = context.world, context.recorder
     position, orientation = np.empty_like(recorder.position), np.empty_like(recorder.orientation)
     for i in range(world.num_bodies):
         position[:, i], orientation[:, i] = world.body_pose(i, recorder.position[:, i], recorder.orientation[:, i])
-    k = np.flatnonzero(world.dynamic)
     impacts = context.log.impact_table()
+    close_stretches(context)
     ledger = make_ledger(
-        times, recorder.position[:, k], recorder.orientation[:, k], recorder.velocity[:, k],
-        recorder.angular_velocity[:, k], world.mass[k], world.inertia[k], world.gravity[k], context.log.energy,
+        times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
+        np.where(world.dynamic, world.mass, 0.0), world.inertia, world.gravity, context.log,
     )
     return Recording(
         times=times,

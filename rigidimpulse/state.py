@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigidimpulse.detect.groups import note_arrival
+from rigidimpulse.detect.touching import bring
 from rigidimpulse.geometry import Geometry
 from rigidimpulse.integrate.course import Course, make_course, pose_at
 from rigidimpulse.observe.events import EventLog
@@ -27,6 +29,7 @@ class State:
         course: path of every body since its last change of course.
         now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
         energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at.
+        under_contact: (n,) bool, bodies whose course carries contact forces.
         rebounds: by pair, time and speed of the last rebound and how many in a row were short.
         contact_force: last force of a held contact, in its frame [N], by (body_a, body_b, kind, feature_a, feature_b).
     """
@@ -45,6 +48,7 @@ class State:
         )
         self.rotation = np.zeros((n, 3, 3))
         self.contact_force: dict[tuple[int, ...], np.ndarray] = {}
+        self.under_contact = np.zeros(n, bool)
         self.rebounds: dict[tuple[int, int], tuple[float, float, int]] = {}
         self.energy_at_start = np.zeros(n)
         self.arrival_energy: dict[int, float] = {}
@@ -80,6 +84,12 @@ class StepContext:
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
         self.num_queries = 0
+
+    def bring(self, i: int, time: float) -> None:
+        """Bring body i to `time` on its course."""
+        state = self.state
+        bring(state.course, i, time, state.now, state.rotation, self.acceleration, self.angular_acceleration)
+        note_arrival(self, [i])
 
     def grow_contacts(self, needed: int) -> None:
         """Make room for `needed` contacts and candidate pairs."""

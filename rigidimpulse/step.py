@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.detect.window import Window
+from rigidimpulse.integrate.flight import take_course
 
 
 def step(context, plan, end: float) -> None:
@@ -17,6 +18,7 @@ def step(context, plan, end: float) -> None:
     window = Window(context, end)
     plan.run("detect", context, window)
     react(context, plan, window, context.state.time, window.active_bodies())
+    release(context, window)
     while True:
         plan.run("sweep", context, window)
         time = window.next_time()
@@ -34,3 +36,13 @@ def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> Non
         plan.run("constrain", context, window, group)
         plan.run("integrate", context, window, group)
     window.settle(time)
+
+
+def release(context, window: Window) -> None:
+    """Let go the bodies that still carry the forces of contacts they have left."""
+    state, time = context.state, context.state.time
+    free = np.zeros(6)
+    pushed = context.world.dynamic & (state.course.start < time) & state.under_contact
+    for i in np.flatnonzero(pushed).tolist():
+        context.bring(i, time)
+        take_course(context, window, i, time, free, rests=False)

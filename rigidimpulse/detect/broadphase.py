@@ -79,6 +79,14 @@ def _sorted_order(box_min, axis):
 
 
 @inner
+def _strip_at(place, num_strips):
+    """Return the strip at a place, the first or the last one beyond the ends (and the first one for a NaN)."""
+    if not place > 0.0:
+        return 0
+    return int(place) if place < num_strips else num_strips - 1
+
+
+@inner
 def _strips(box_min, box_max, axis):
     """Return the number of strips across an axis and, for each body, the first and the last one it reaches."""
     n = box_min.shape[0]
@@ -92,13 +100,13 @@ def _strips(box_min, box_max, axis):
             high = max(high, box_max[i, axis])
             total += box_max[i, axis] - box_min[i, axis]
             count += 1
-    reach = np.zeros((n, 2), np.int64)
-    width = max(STRIP_WIDTH * total / max(count, 1), (high - low) / sqrt(n)) if high > low else inf
-    num_strips = int((high - low) / width) + 1 if high > low else 1
+    apart = high > low
+    width = max(STRIP_WIDTH * total / max(count, 1), (high - low) / sqrt(n)) if apart else 1.0
+    num_strips = int((high - low) / width) + 1 if apart else 1
     reach = np.empty((n, 2), np.int64)
     for i in range(n):
-        reach[i, 0] = int(min(max((box_min[i, axis] - low) / width, 0.0), num_strips - 1.0))
-        reach[i, 1] = int(min(max((box_max[i, axis] - low) / width, 0.0), num_strips - 1.0))
+        reach[i, 0] = _strip_at((box_min[i, axis] - low) / width, num_strips)
+        reach[i, 1] = _strip_at((box_max[i, axis] - low) / width, num_strips)
     return num_strips, reach
 
 

@@ -201,6 +201,9 @@ def circle_contacts(solid, rows, count, centre, u, v, rim_radius, bottom, other)
     centre, u, v, rim_radius: the other rim, with u x v out of its cap; `other`: feature of its rim.
     """
     radius, half, margin = solid.radius, solid.half, solid.margin
+    beside = max(0.0, hypot(centre[0], centre[1]) - radius)
+    if hypot(beside, max(0.0, abs(centre[2]) - half)) > margin + rim_radius:
+        return count
     axial = 0.0 if bottom < 0 else 1.0
     level = 0.0 if bottom < 0 else half - 2.0 * half * bottom
     outward = cross(u, v)

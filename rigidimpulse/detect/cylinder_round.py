@@ -83,6 +83,25 @@ def _box_gap(solid, view, low, high):
 
 
 @inner
+def _corners(geometry, view, triangle):
+    """Return the corners of a triangle in the axes of the cylinder."""
+    a = _seen(view, row(geometry.vertex, geometry.triangle[triangle, 0]))
+    b = _seen(view, row(geometry.vertex, geometry.triangle[triangle, 1]))
+    c = _seen(view, row(geometry.vertex, geometry.triangle[triangle, 2]))
+    return a, b, c
+
+
+@inner
+def _corner_gap(solid, a, b, c):
+    """Return a lower bound of the distance of a triangle to the cylinder; negative if they may meet."""
+    x, y = a[0] + b[0] + c[0], a[1] + b[1] + c[1]
+    size = max(hypot(x, y), 1e-300)
+    x, y = x / size, y / size
+    beside = min(x * a[0] + y * a[1], x * b[0] + y * b[1], x * c[0] + y * c[1]) - solid.radius
+    return max(beside, min(a[2], b[2], c[2]) - solid.half, -max(a[2], b[2], c[2]) - solid.half)
+
+
+@inner
 def cylinder_round_contacts(geometry, cylinder, round_, R, t, margin, stack, contact_real, contact_int, count):
     """Append every touching pair of features of a cylinder and a ROUND primitive; `stack` (n, 2) is scratch."""
     vertex, edge_kind = geometry.vertex, geometry.edge_kind
@@ -106,28 +125,31 @@ def cylinder_round_contacts(geometry, cylinder, round_, R, t, margin, stack, con
         start = geometry.node_start[node]
         for slot in range(3 * start, 3 * (start + geometry.node_count[node])):
             triangle, k = slot // 3, slot % 3
+            if k == 0:
+                a, b, c = _corners(geometry, view, triangle)
+                near = _corner_gap(solid, a, b, c) <= margin + core
+            if not near:
+                continue
             owns = geometry.triangle_owns[triangle] >> k
             corner, edge = geometry.triangle[triangle, k], geometry.triangle_edge[triangle, k]
             if owns & 1 and geometry.vertex_corner[corner]:
                 count = _vertex_contact(geometry, solid, view, rows, count, corner, core)
             if owns >> 3 & 1 and edge_kind[edge] != EDGE_HIDDEN:
-                a = _seen(view, row(vertex, geometry.edge[edge, 0]))
-                d = subtract(_seen(view, row(vertex, geometry.edge[edge, 1])), a)
+                tail = _seen(view, row(vertex, geometry.edge[edge, 0]))
+                d = subtract(_seen(view, row(vertex, geometry.edge[edge, 1])), tail)
                 normal_0, normal_1 = edge_normals(geometry.edge_normal, edge)
                 arc = (to_axes(view.x, view.y, view.z, normal_0), to_axes(view.x, view.y, view.z, normal_1))
-                count = _edge_contacts(solid, rows, count, a, d, arc, edge_kind[edge], core, 3 * edge + 1)
+                count = _edge_contacts(solid, rows, count, tail, d, arc, edge_kind[edge], core, 3 * edge + 1)
             if core == 0.0 and k < (1 if geometry.closed[round_] else 2):  # an open surface has two sides
-                side = 1.0 - 2.0 * k
-                m = along(ZERO, side, to_axes(view.x, view.y, view.z, row(geometry.triangle_normal, triangle)))
-                a = _seen(view, row(vertex, corner))
-                b = _seen(view, row(vertex, geometry.triangle[triangle, 1 - k]))
-                c = _seen(view, row(vertex, geometry.triangle[triangle, 2]))
+                m = to_axes(view.x, view.y, view.z, row(geometry.triangle_normal, triangle))
+                m = along(ZERO, 1.0 - 2.0 * k, m)
                 count = rims_on_plane(solid, rows, count, m, a, b, c, TRIANGLE, 3 * triangle + 2)
+                a, b = b, a
     if core > 0.0 or count == rows[2]:  # the closest point of a smooth body is a contact in any case
-        pair, near = _closest_triangle(geometry, solid, view, round_, margin + core, stack)
+        pair, triangle = _closest_triangle(geometry, solid, view, round_, margin + core, stack)
         distance, p, q, n = pair
-        if near >= 0 and dot(n, n) > 0.0:
-            count = append(solid, rows, count, p, along(q, -core, n), n, distance - core, SIDE, 3 * near + 2)
+        if triangle >= 0 and dot(n, n) > 0.0:
+            count = append(solid, rows, count, p, along(q, -core, n), n, distance - core, SIDE, 3 * triangle + 2)
     return count
 
 
@@ -211,12 +233,11 @@ def _closest_triangle(geometry, solid, view, round_, limit, stack):
             continue
         first = geometry.node_start[node]
         for triangle in range(first, first + geometry.node_count[node]):
-            a = _seen(view, row(geometry.vertex, geometry.triangle[triangle, 0]))
-            b = _seen(view, row(geometry.vertex, geometry.triangle[triangle, 1]))
-            c = _seen(view, row(geometry.vertex, geometry.triangle[triangle, 2]))
-            pair = closest_on_triangle(a, b, c, solid.radius, solid.half)
-            if pair[0] < best[0]:
-                best, near = pair, triangle
+            a, b, c = _corners(geometry, view, triangle)
+            if _corner_gap(solid, a, b, c) < best[0]:
+                pair = closest_on_triangle(a, b, c, solid.radius, solid.half)
+                if pair[0] < best[0]:
+                    best, near = pair, triangle
     return (best, near) if near >= 0 else ((inf, ZERO, ZERO, ZERO), near)
 
 

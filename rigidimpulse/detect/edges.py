@@ -9,10 +9,10 @@ from rigidimpulse.detect.features import (
     CORNER,
     EDGE_EDGE,
     along,
+    arc_miss,
     cross,
     dot,
     edge_normals,
-    in_edge_arc,
     inner,
     moved,
     row,
@@ -31,18 +31,22 @@ SIDEWAYS = 0.5
 
 
 @inner
-def _arcs_hold(edge_normal, edge_kind, R_back, edge_a, edge_b, d, e, normal, tolerance):
-    """Tell whether a normal from a to b lies in the arcs of both edges; d, e: their vectors, all in the frame of a."""
+def _arcs_miss(edge_normal, edge_kind, R_back, R, edge_a, edge_b, d, e, normal):
+    """Return (miss, end) of the edge whose arc a normal from a to b misses by more (see `arc_miss`).
+
+    d, e: vectors of the edges; they, the normal and the end, which points from a to b too, are in the frame of a.
+    """
     length = sqrt(dot(d, d))
     direction = (d[0] / length, d[1] / length, d[2] / length)
     normal_0, normal_1 = edge_normals(edge_normal, edge_a)
-    if not in_edge_arc(normal, direction, normal_0, normal_1, edge_kind[edge_a], tolerance):
-        return False
+    miss_a, end_a = arc_miss(normal, direction, normal_0, normal_1, edge_kind[edge_a])
     length = sqrt(dot(e, e))
     direction = turned(R_back, (e[0] / length, e[1] / length, e[2] / length))
     outward = turned(R_back, (-normal[0], -normal[1], -normal[2]))
     normal_0, normal_1 = edge_normals(edge_normal, edge_b)
-    return in_edge_arc(outward, direction, normal_0, normal_1, edge_kind[edge_b], tolerance)
+    miss_b, end_b = arc_miss(outward, direction, normal_0, normal_1, edge_kind[edge_b])
+    end_b = turned(R, end_b)
+    return (miss_a, end_a) if miss_a > miss_b else (miss_b, (-end_b[0], -end_b[1], -end_b[2]))
 
 
 @inner
@@ -75,16 +79,19 @@ def _crossing_contact(edge_normal, edge_kind, view, rows, count, edge_a, edge_b,
     c_length = sqrt(dot(c, c))
     spread = sqrt(dot(d, d) * dot(e, e)) / c_length  # 1 / sine: how much the normal leans where an edge leans
     size = sqrt(min(dot(d, d), dot(e, e)))
-    tolerance = STRICT + view.leeway + ROUND_OFF * spread + min(TILT, view.margin * spread / size)
+    tolerance = STRICT + ROUND_OFF * spread + min(TILT, view.margin * spread / size)
     sense = 1.0
     # At a distance within round-off its sign tells nothing, and both senses of the normal are tried.
     for _ in range(2 if distance <= PENETRATION * size else 1):
         scale = sense / c_length
         normal = (c[0] * scale, c[1] * scale, c[2] * scale)
-        if _arcs_hold(edge_normal, edge_kind, view.R_back, edge_a, edge_b, d, e, normal, tolerance):
+        miss, end = _arcs_miss(edge_normal, edge_kind, view.R_back, view.R, edge_a, edge_b, d, e, normal)
+        if miss <= tolerance + view.leeway:
+            if 0.0 < miss <= tolerance:
+                normal = end
             surface_a = along(point_a, view.radius_t, normal)
             surface_b = along(point_b, -view.radius_v, normal)
-            gap = sense * distance - view.radius_t - view.radius_v
+            gap = dot(subtract(surface_b, surface_a), normal)
             return append_contact(
                 rows, count, surface_a, surface_b, normal, gap, EDGE_EDGE, edge_a, edge_b, MERGE * size
             )
@@ -117,7 +124,7 @@ def _parallel_contacts(edge, edge_normal, edge_kind, view, rows, count, edge_a, 
         return count
     normal = (between[0] / distance, between[1] / distance, between[2] / distance)
     tolerance = STRICT + view.leeway + ROUND_OFF * (length + abs(p[0]) + abs(p[1]) + abs(p[2])) / distance
-    if not _arcs_hold(edge_normal, edge_kind, view.R_back, edge_a, edge_b, d, e, normal, tolerance):
+    if _arcs_miss(edge_normal, edge_kind, view.R_back, view.R, edge_a, edge_b, d, e, normal)[0] > tolerance:
         return count
     for end in range(2):
         place = high if end == 1 else low

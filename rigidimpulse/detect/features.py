@@ -12,19 +12,15 @@ leave each face across the edge (e: the unit direction of the edge in the windin
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
-from numba import njit
 
 from rigidimpulse._jit import jit
 from rigidimpulse.geometry import EDGE_BOUNDARY, EDGE_CAPSULE, EDGE_CONVEX
 
-inner = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)  # pyright: ignore[reportCallIssue]
-"""`jit` for kernels that only other kernels call, and that are stored in the cache as part of those.
-
-They compile several times faster, but a call from Python ends the process: test them through a `jit` function.
-"""
+inner = jit
+"""Marks a kernel that is only ever a part of other kernels."""
 
 VERTEX_FACE, FACE_VERTEX, EDGE_EDGE, CORNER, HALF_SPACE_CONTACT = (np.int64(kind) for kind in range(5))
 """Kinds of contact. Features: vertex and triangle, two edges, 2 * vertex or 2 * edge + 1, vertex and primitive.
@@ -153,23 +149,29 @@ def pierces_triangle(p, q, a, b, c, normal):
 
 
 @jit
-def in_edge_arc(direction, edge_direction, normal_0, normal_1, kind, tolerance):
-    """Tell whether a unit direction across an edge points away from both faces.
+def arc_miss(direction, edge_direction, normal_0, normal_1, kind):
+    """Return (miss, end): how far a unit direction across an edge misses its arc, and the end of the arc next to it.
 
-    `edge_direction` is the unit direction of the edge in the winding of face 0, `tolerance` the sine of the angle by
-    which the direction may miss the arc. The arc of a boundary is the half circle beyond its one face.
+    `miss` is the sine of the angle, negative inside the arc; `edge_direction` is the unit direction of the edge in the
+    winding of face 0. The arc of a boundary is the half circle beyond its one face; a capsule's is the whole circle.
     """
-    if kind == EDGE_CAPSULE:
-        return True
+    beyond_0 = -dot(direction, cross(edge_direction, normal_0))
+    if kind == EDGE_CONVEX:
+        beyond_1 = -dot(direction, cross(normal_1, edge_direction))
+        behind = -dot(direction, normal_0) - dot(direction, normal_1)
+        return max(beyond_0, beyond_1, behind), normal_0 if beyond_0 > beyond_1 else normal_1
     if kind == EDGE_BOUNDARY:
-        single = normal_0[0] == normal_1[0] and normal_0[1] == normal_1[1] and normal_0[2] == normal_1[2]
-        return not single or dot(direction, cross(edge_direction, normal_0)) >= -tolerance
-    return (
-        kind == EDGE_CONVEX
-        and dot(direction, cross(edge_direction, normal_0)) >= -tolerance
-        and dot(direction, cross(normal_1, edge_direction)) >= -tolerance
-        and dot(direction, normal_0) + dot(direction, normal_1) >= -tolerance
-    )
+        if normal_0[0] != normal_1[0] or normal_0[1] != normal_1[1] or normal_0[2] != normal_1[2]:
+            return -1.0, direction  # more than two faces: any direction may be free
+        back = (-normal_0[0], -normal_0[1], -normal_0[2])
+        return beyond_0, normal_0 if dot(direction, normal_0) > 0.0 else back
+    return -1.0 if kind == EDGE_CAPSULE else inf, direction
+
+
+@inner
+def in_edge_arc(direction, edge_direction, normal_0, normal_1, kind, tolerance):
+    """Tell whether a unit direction across an edge misses its arc by no more than a tolerance (see `arc_miss`)."""
+    return arc_miss(direction, edge_direction, normal_0, normal_1, kind)[0] <= tolerance
 
 
 @inner

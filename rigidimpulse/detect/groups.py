@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, pressing
-from rigidimpulse.integrate.course import FIXED
 from rigidimpulse.observe.energy import mechanical_energy
 from rigidimpulse.respond.impulse import Contacts
 
@@ -129,7 +128,18 @@ def _components(context, window, time: float, real: np.ndarray, integer: np.ndar
             low, high = sorted((root(a), root(b)))
             parent[high] = low
     owner = np.array([root(a if dynamic[a] else b) for a, b in integer[:, :2].tolist()])
-    return [make_group(context, window, time, real, integer, owner == o) for o in np.unique(owner)]
+    groups = [make_group(context, window, time, real, integer, owner == o) for o in np.unique(owner)]
+    for group in groups:
+        note_arrival(context, group.members.tolist())
+    return groups
+
+
+def note_arrival(context, members: list[int]) -> None:
+    """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows."""
+    world, state = context.world, context.state
+    for i in members:
+        if state.under_contact[i]:
+            state.arrival_energy[i] = mechanical_energy(state.now, world, np.array([i]))
 
 
 def make_group(context, window, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray) -> Group:
@@ -157,10 +167,6 @@ def make_group(context, window, time: float, real: np.ndarray, integer: np.ndarr
         velocity=state.now.velocity[members].copy(),
         angular_velocity=state.now.angular_velocity[members].copy(),
     )
-    for i in members:
-        course = state.course
-        if course.mode[i] != FIXED and (np.any(course.torque[i]) or np.any(course.acceleration[i] != world.gravity[i])):
-            state.arrival_energy[int(i)] = mechanical_energy(state.now, world, np.array([i]))
     classify(context, group)
     return group
 

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse._jit import jit
+from rigidimpulse.detect.features import inner
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
 
 _EPSILON = 2.0**-53
@@ -69,7 +70,7 @@ def points_in_shape(geometry, shape, points, inside):
                 break
 
 
-@jit
+@inner
 def _in_curved(kind, frame, radius, vertex, first, last, point):
     """Say whether a point lies in a half space, a cylinder, or within `radius` of the segment between two vertices."""
     x, y, z = point
@@ -134,7 +135,7 @@ def point_in_mesh(geometry, primitive, point):
     return winding != 0
 
 
-@jit
+@inner
 def _corners(vertex, triangle, t):
     i, j, k = triangle[t, 0], triangle[t, 1], triangle[t, 2]
     a = (vertex[i, 0], vertex[i, 1], vertex[i, 2])
@@ -143,7 +144,7 @@ def _corners(vertex, triangle, t):
     return a, b, c
 
 
-@jit
+@inner
 def _crossing(a, b, c, p, terms):
     """Return how often the ray p + s x, s > 0, leaves through a triangle: 1, 0 or -1; or _ON_SURFACE."""
     if p[0] > max(a[0], b[0], c[0]):
@@ -165,7 +166,7 @@ def _crossing(a, b, c, p, terms):
     return outward if side == outward else 0
 
 
-@jit
+@inner
 def _in_triangle(a, b, c, p, terms):
     """Say whether a point of the triangle's plane lies in the closed triangle: it does if in all three projections."""
     for _ in range(3):
@@ -227,7 +228,7 @@ def space_orientation(a, b, c, p, terms):
     return _sign_of_sum(terms, count)
 
 
-@jit
+@inner
 def _difference(a, b):
     """Return (d, e), d + e = a - b exactly."""
     difference = a - b
@@ -235,7 +236,7 @@ def _difference(a, b):
     return difference, (a - (difference + lost)) + (lost - b)
 
 
-@jit
+@inner
 def _product(a, b):
     """Return (p, e), p + e = a b exactly (Dekker), without underflow."""
     product = a * b
@@ -248,7 +249,7 @@ def _product(a, b):
     return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
-@jit
+@inner
 def _add_products(terms, count, sign, x, y, z):
     """Append the exact terms of sign x y z, each factor a sum of two floats, without zeros; return the new count."""
     for i in range(2):
@@ -264,7 +265,7 @@ def _add_products(terms, count, sign, x, y, z):
     return count
 
 
-@jit
+@inner
 def _sign_of_sum(terms, count):
     """Return the exact sign of the sum of `count` floats: Shewchuk's growing expansion, in place."""
     for i in range(count):

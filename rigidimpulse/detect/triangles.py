@@ -13,8 +13,9 @@ however small the gap is; the others carry an error of round-off / d. Each verte
 so a pair of features is met once; flat or concave edges and vertices without a convex edge are left out (see
 `geometry`).
 
-A contact with a normal that is not the locally closest one is kept in two cases, both bounded by the margin: crossing
-edges, and capsules, whose contacts at both ends of a line are wanted though one end is a little farther away.
+Contacts that miss being locally closest by less than the margin are kept in two cases: crossing edges, which are
+corners of faces that lie on each other and get the normal at the end of the arc, and capsules, whose contacts at both
+ends of a line are wanted though one end is a little farther away.
 
 Both box trees are walked at once; pairs of leaves are gathered in chunks, so that no scene needs a larger buffer.
 """

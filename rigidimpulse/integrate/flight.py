@@ -39,8 +39,7 @@ def integrate(context, window, group: Group) -> None:
             or np.any(now.velocity[i] != group.velocity[n])
             or np.any(now.angular_velocity[i] != group.angular_velocity[n])
             or np.any(context.wrench[i])
-            or np.any(course.torque[i])
-            or np.any(course.acceleration[i] != world.gravity[i])
+            or state.under_contact[i]
         )
         if group.rests and course.mode[i] == FIXED:
             continue
@@ -67,7 +66,8 @@ def take_course(context, window, i: int, time: float, wrench: np.ndarray, rests:
     course.torque[i] = 0.0 if rests else wrench[3:]
     course.mode[i] = FIXED if rests else (FORCED if np.any(wrench[3:]) else FREE)
     begin(course, i)
-    if np.any(wrench):
+    state.under_contact[i] = not rests and bool(np.any(wrench))
+    if state.under_contact[i]:
         state.energy_at_start[i] = mechanical_energy(now, world, np.array([i]))
     if window is not None:
         window.change_course(i, time)
@@ -77,7 +77,8 @@ def _book_contact_work(context, i: int, time: float) -> None:
     """Work that contact forces did along the course that ends: what its energy changed by."""
     arrival = context.state.arrival_energy.pop(i, None)
     if arrival is not None:
-        context.log.book(time, "contact", arrival - context.state.energy_at_start[i])
+        begun = context.state.energy_at_start[i]
+        context.log.stretches.append((context.state.course.start[i], time, i, begun, arrival - begun))
 
 
 def set_touch(context, window, group: Group) -> None:

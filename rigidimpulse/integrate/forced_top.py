@@ -41,6 +41,8 @@ _PARALLEL = 1e-15
 """sine of the angle between vectors that are taken for parallel: what round-off of their turn to the body leaves"""
 _NO_TORQUE = 1e-280
 """rad/s^2, angular acceleration taken for none: squares would underflow"""
+_MOST_SEGMENTS = 100_000
+"""segments after which the rotation is given up: some 30,000 rad, a tenth of a second of work"""
 _LAST_TERM = 1e-15
 """size of the last terms of the series at the end of a segment; the terms left out are an eighth of it or less"""
 
@@ -186,21 +188,26 @@ def prepare(inertia, q, w_world, torque, constants_out):
 
 @jit
 def _last_segment(constants, t):
-    """Constants of the segment that holds the time t, and the time since its start."""
+    """Constants of the segment that holds the time t, and the time since its start (NaN: too many segments)."""
     c = constants.copy()
-    while t > c[SEGMENT]:
+    for _ in range(_MOST_SEGMENTS):
+        if not t > c[SEGMENT]:
+            return c, t
         t -= c[SEGMENT]
         wx, wy, wz, ex, ey, ez, g0, g1, g2, g3 = _advance(c, c[SEGMENT])
         q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
         q0, q1, q2, q3 = product(q0, q1, q2, q3, g0, g1, g2, g3)
         c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = q0, q1, q2, q3
         _start_series(c, wx, wy, wz, ex, ey, ez)
-    return c, t
+    return c, math.nan
 
 
 @jit
 def rotation(constants, t):
-    """Quaternion and world angular velocity t seconds after the start, as seven numbers; for rows of free_top too."""
+    """Quaternion and world angular velocity t seconds after the start, as seven numbers; for rows of free_top too.
+
+    NaN if the body turns so fast, for so long, that it would take more than _MOST_SEGMENTS.
+    """
     c = constants
     if c[_KIND] < FORCED_AXIS:
         return free_top.rotation(c, t)

@@ -49,15 +49,16 @@ _NOME_SCALE = 20  # 1 / T
 _THETA = 21  # (_TERMS,) coefficients of the real part
 _THETA_IMAGINARY = 25  # (_TERMS,) of the imaginary part
 _MEAN = 29  # final mean of the AGM of (1, k')
-_LEVELS = 30  # number of levels
+_M1 = 30  # 1 - m
+_LEVELS = 31  # number of levels
 _TERMS = 4
 _MAX_LEVELS = 14
-_ARITHMETIC = 31  # (_MAX_LEVELS,) arithmetic means
+_ARITHMETIC = 32  # (_MAX_LEVELS,) arithmetic means
 _GEOMETRIC = _ARITHMETIC + _MAX_LEVELS  # (_MAX_LEVELS,) geometric means
 FREE_TOP_SIZE = _GEOMETRIC + _MAX_LEVELS
 
 _EQUAL = 4e-15
-"""relative difference of two moments below which they are equal: the phase then errs by less than its round-off"""
+"""relative difference of two moments below which they are equal: rates then err by half of it, a few eps"""
 _ON_AXIS = 1e-40
 """part of the spin off a stable principal axis that is taken for none"""
 _ON_UNSTABLE_AXIS = 1e-15
@@ -135,7 +136,9 @@ def _jacobi(constants, sin_z, cos_z):
         dn = (g + ratio) / (a + ratio)
         ratio = cotangent / a
     sn = math.copysign(1.0 / math.sqrt(1.0 + cotangent * cotangent), sin_z)
-    return sn, cotangent * sn, dn
+    cn = cotangent * sn
+    # From the others once more: so the energy keeps its last digits.
+    return sn, cn, math.sqrt(cn * cn + constants[_M1] * sn * sn)
 
 
 @jit
@@ -178,11 +181,13 @@ def _asymmetric_frame(c, t):
     real, imaginary = _theta(c, z, sin_z, cos_z)
     phase = c[_PHASE_RATE] * t + c[_PHASE_SLOPE] * z
     cos_phase, sin_phase = math.cos(phase), math.sin(phase)
-    size = math.sqrt(0.5 * (1.0 + l3) / (real * real + imaginary * imaginary))
+    # B = (l2 - i l1) A, and |A| from |A|^2 + |B|^2 = 1: a unit quaternion to the last digit.
+    l1, l2 = l1 / (1.0 + l3), l2 / (1.0 + l3)
+    size = 1.0 / math.sqrt((real * real + imaginary * imaginary) * (1.0 + l1 * l1 + l2 * l2))
     a_real = size * (cos_phase * real - sin_phase * imaginary)
     a_imaginary = size * (sin_phase * real + cos_phase * imaginary)
-    b_real = (l2 * a_real + l1 * a_imaginary) / (1.0 + l3)
-    b_imaginary = (l2 * a_imaginary - l1 * a_real) / (1.0 + l3)
+    b_real = l2 * a_real + l1 * a_imaginary
+    b_imaginary = l2 * a_imaginary - l1 * a_real
     b, c2, a = c[_AMPLITUDE], c[_AMPLITUDE + 1], c[_AMPLITUDE + 2]
     return a_real, b_real, b_imaginary, a_imaginary, b * sn, c2 * cn, a * dn
 
@@ -229,6 +234,7 @@ def _store_motion(c, i1, i2, i3, d13, d12, w1, w2, w3):
     c[_AMPLITUDE], c[_AMPLITUDE + 1], c[_AMPLITUDE + 2] = b, c2, a
     c[_SHARE], c[_SHARE + 1], c[_SHARE + 2] = i1 * b / momentum, momentum_2 / momentum, momentum_3 / momentum
 
+    c[_M1] = m1
     mean = _store_agm(math.sqrt(m1), c)
     speed = mean * math.sqrt(d13 * d2 / (i1 * i2 * i3))  # z'
     c[_HALF_TURNS] = speed / math.pi

@@ -34,10 +34,14 @@ class Event:
 
 @dataclass
 class EventLog:
-    """Collects impacts, energy changes by cause, and events while a run goes on."""
+    """Collects impacts, energy changes by cause, and events while a run goes on.
+
+    stretches: courses under contact forces: start, end [s], body, energy at the start [J], work of the forces [J].
+    """
 
     impacts: list[np.ndarray] = field(default_factory=list)
     energy: list[tuple[float, str, float]] = field(default_factory=list)
+    stretches: list[tuple[float, float, int, float, float]] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
 
     def impact_table(self) -> np.ndarray:

@@ -37,21 +37,34 @@ class Ledger:
         return self.kinetic + self.potential
 
 
-def make_ledger(times, position, orientation, velocity, angular_velocity, mass, inertia, gravity, changes) -> Ledger:
+def make_ledger(times, position, orientation, velocity, angular_velocity, mass, inertia, gravity, log) -> Ledger:
     """Ledger of recorded principal-frame states.
 
-    Arrays are (f, k, ...) for the k dynamic bodies: centre of mass, principal orientation, velocity, world spin; mass (k,),
-    principal inertia (k, 3), gravity (k, 3); changes: (time, cause, energy) of contacts.
+    Arrays are (f, n, ...) for all bodies: centre of mass, principal orientation, velocity, world spin; mass (n,) with 0 for
+    bodies that are not dynamic, principal inertia (n, 3), gravity (n, 3); log: energy changes by cause and courses under
+    contact forces.
     """
     spin_body = rotate_inverse(orientation, angular_velocity)
-    angular_body = spin_body * inertia
-    kinetic = 0.5 * (mass * (velocity**2).sum(-1) + (spin_body * angular_body).sum(-1)).sum(-1)
-    potential = -(mass[:, None] * gravity * position).sum((-1, -2))
+    angular_body = spin_body * np.where(mass > 0.0, 1.0, 0.0)[:, None] * inertia
+    kinetic = 0.5 * (mass * (velocity**2).sum(-1) + (spin_body * angular_body).sum(-1))
+    potential = -(mass[:, None] * gravity * position).sum(-1)
     momentum = (mass[:, None] * velocity).sum(1)
     angular = (rotate(orientation, angular_body) + np.cross(position, mass[:, None] * velocity)).sum(1)
     dissipated: dict[str, np.ndarray] = {}
-    for cause in sorted({c for _, c, _ in changes}):
-        stamps = np.array([t for t, c, _ in changes if c == cause])
-        sums = np.concatenate([[0.0], np.cumsum([-e for _, c, e in changes if c == cause])])
+    for cause in sorted({c for _, c, _ in log.energy}):
+        stamps = np.array([t for t, c, _ in log.energy if c == cause])
+        sums = np.concatenate([[0.0], np.cumsum([-e for _, c, e in log.energy if c == cause])])
         dissipated[cause] = sums[np.searchsorted(stamps, times, side="right")]
-    return Ledger(times, kinetic, potential, momentum, angular, dissipated)
+    if log.stretches:
+        dissipated["contact"] = _contact_work(times, kinetic + potential, log.stretches)
+    return Ledger(times, kinetic.sum(1), potential.sum(1), momentum, angular, dissipated)
+
+
+def _contact_work(times: np.ndarray, energy: np.ndarray, stretches) -> np.ndarray:
+    """Energy that contact forces took until each frame (f,); inside a stretch what the body, energy (f, n), lost since."""
+    taken, steps = np.zeros(len(times)), np.zeros(len(times) + 1)
+    for start, end, body, begun, work in stretches:
+        first, last = np.searchsorted(times, start, "right"), np.searchsorted(times, end, "left")
+        taken[first:last] += begun - energy[first:last, body]
+        steps[last] -= work
+    return taken + np.cumsum(steps)[:-1]

@@ -177,6 +177,7 @@ def _solid_pair(geometry, first, second, work, index, threshold, horizon, cylind
             _place_cylinder(geometry.frame, radius, second, work, index, SECOND)
         if kind[first] == CYLINDER_KIND:
             _place_cylinder(geometry.frame, radius, first, work, index, FIRST)
+            put(work, LIMIT + DIRECTION, (0.0, 0.0, 0.0))
             s, carrier = pieces_safe_until(work, index, threshold, horizon, cylinders)
             if s < horizon:
                 index[CARRIER] = carrier

@@ -37,6 +37,7 @@ from rigidimpulse.sweep.bound import (
 )
 from rigidimpulse.sweep.guard_closest import NO_EDGES, closest_simplices, farthest
 from rigidimpulse.sweep.guard_layout import (
+    CARRIER,
     CLOSEST,
     CORNER,
     COUNT,
@@ -49,6 +50,7 @@ from rigidimpulse.sweep.guard_layout import (
     FACE,
     FIRST,
     GAP,
+    LIMIT,
     NORMAL,
     ORIGIN,
     POINT_FIRST,
@@ -163,7 +165,8 @@ def _face_direction(work, index, side):
 def pieces_safe_until(work, index, threshold, horizon, cylinders):
     """Safe time of the two convex pieces at CORNER, FACE or CYLINDER and COUNT; of a simplex and a cylinder the cylinder is the second.
 
-    If the result is short of the horizon, the record at CLOSEST tells what limits it.
+    If the result is short of the horizon, the record at CLOSEST tells what limits it. Of the record at LIMIT the direction is tried first
+    (zeros if there is none).
 
     Args:
         work, index: see `guard_layout`.
@@ -177,29 +180,27 @@ def pieces_safe_until(work, index, threshold, horizon, cylinders):
     """
     best, carrier, separation = 0.0, 0, 0.0
     edges = NO_EDGES
-    normal = direction = (0.0, 0.0, 0.0)
-    for trial in range(4):  # faces of the first and the second, then the closest features carried by the first and the second
-        side = trial % 2
-        if trial < 2:
+    normal = direction = vector(work, LIMIT + DIRECTION)
+    for trial in range(5):  # the limit so far, the faces of first and second, the closest features carried by first and second
+        side = index[CARRIER] if trial == 0 else (trial - 1) % 2
+        if trial == 1 or trial == 2:
             if index[COUNT + side] < 3:
                 continue
             normal = _face_direction(work, index, side)
-        elif trial == 2:
+        elif trial == 3:
             separation, edges = _closest(work, index, cylinders)
             normal = vector(work, CLOSEST + NORMAL)
             if separation <= 0.0:
                 break
         outward = normal if side == 0 else scaled(normal, -1.0)
-        if trial < 2:
+        if trial < 3:
             top = _top(work, index, side, outward, cylinders)
             if -_top(work, index, 1 - side, scaled(outward, -1.0), cylinders) - top <= threshold:
                 continue
-        if trial == 3:
-            normal = vector(work, CLOSEST + NORMAL)
         s = _carried(work, index, side, outward, threshold, horizon, cylinders)
         if s >= horizon:
             return horizon, side
-        if s > best or trial == 2 and best == 0.0:
+        if s > best or trial == 3 and best == 0.0:
             best, carrier, direction = s, side, normal
     if separation <= 0.0:
         best = 0.0

@@ -113,14 +113,14 @@ def first_contacts(
                 continue
             gap = work[WITNESS + GAP]
             if gap < touch[k] and not lowered:
-                floor, lowered = gap - slack, True
+                floor, lowered, target = gap - slack, True, end
                 continue
             closing = closing_speed(work)
             near = gap <= touch[k] + max(tolerance[k], slack)
             if near and closing < 0.0:
                 s *= 0.5  # it leaves: look again half way to its return
             ahead = _later(t, s)
-            if ahead <= t or (near and closing * s >= 0.5 * (gap - floor)):
+            if ahead <= t or (near and closing * rest > slack):
                 status = TOUCHING if t == start[k] and gap <= touch[k] else IMPACT
                 break
             t, trial, floor, lowered = ahead, 2.0 * s, touch[k] - slack, False

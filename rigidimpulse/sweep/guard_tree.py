@@ -18,6 +18,7 @@ from rigidimpulse.sweep.guard_layout import (
     CYLINDER_HEIGHT,
     CYLINDER_RADIUS,
     CYLINDER_SIZE,
+    DIRECTION,
     ELEMENT_A,
     ELEMENT_B,
     FACE,
@@ -60,27 +61,29 @@ def _load_triangle(vertex, triangle, triangle_normal, i, work, index, side):
 
 
 @inner
-def _boxes_safe_until(low, high, centre, half, work, axes, threshold, horizon):
-    """Safe time of a box [low, high] of the first body and a box of the second; 0 where no axis separates them.
+def _boxes_safe_until(low, high, centre, half, work, carrier, axes, threshold, horizon):
+    """Safe time of a box [low, high] of the first body and a box of the second; 0 where no direction separates them.
 
     `centre` middle of the second box, `half` its half extents along the columns of the matrix at `axes`; frame of the first body.
+    Directions: the one that limits the safe time so far (`carrier`: its side), and the axes of both boxes.
     """
     middle, half_first = scaled(along(low, 1.0, high), 0.5), scaled(subtract(high, low), 0.5)
     between = subtract(centre, middle)
     best = 0.0
-    for trial in range(6):
-        k = trial % 3
-        if trial < 3:
-            axis = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
+    for trial in range(7):
+        k = (trial - 1) % 3
+        if trial == 0:
+            axis, side = vector(work, LIMIT + DIRECTION), carrier
+        elif trial < 4:
+            axis, side = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0), 0
         else:
-            axis = (work[axes + k], work[axes + 3 + k], work[axes + 6 + k])
+            axis, side = (work[axes + k], work[axes + 3 + k], work[axes + 6 + k]), 1
         other = turned_back(work, axes, axis)
         extent = abs(axis[0]) * half_first[0] + abs(axis[1]) * half_first[1] + abs(axis[2]) * half_first[2]
         extent += abs(other[0]) * half[0] + abs(other[1]) * half[1] + abs(other[2]) * half[2]
         distance = dot(axis, between)
         gap = abs(distance) - extent - threshold
         if gap > 0.0:
-            side = trial // 3
             outward = scaled(axis, 1.0 if (distance > 0.0) == (side == 0) else -1.0)
             arm = middle if side else subtract(centre, vector(work, ORIGIN + 3))
             reach = length(half_first if side else half)
@@ -91,7 +94,7 @@ def _boxes_safe_until(low, high, centre, half, work, axes, threshold, horizon):
 
 
 @inner
-def _pair_safe_until(node_min, node_max, first, second, work, threshold, horizon):
+def _pair_safe_until(node_min, node_max, first, second, work, carrier, threshold, horizon):
     """Safe time of two boxes of the trees, or of one and the cylinder."""
     if second == NO_NODE:
         at = CYLINDER + CYLINDER_SIZE
@@ -101,7 +104,7 @@ def _pair_safe_until(node_min, node_max, first, second, work, threshold, horizon
         low, high = row(node_min, second), row(node_max, second)
         centre = along(turned(work, ROTATION, scaled(along(low, 1.0, high), 0.5)), 1.0, vector(work, ORIGIN + 3))
         half, axes = scaled(subtract(high, low), 0.5), ROTATION
-    return _boxes_safe_until(row(node_min, first), row(node_max, first), centre, half, work, axes, threshold, horizon)
+    return _boxes_safe_until(row(node_min, first), row(node_max, first), centre, half, work, carrier, axes, threshold, horizon)
 
 
 @inner
@@ -126,6 +129,7 @@ def trees_safe_until(nodes, surface, first, second, work, index, threshold, hori
     """
     node_min, node_max, child, start, count = nodes
     vertex, triangle, triangle_normal = surface
+    put(work, LIMIT + DIRECTION, (0.0, 0.0, 0.0))
     _push(work, index, FIRST, first, second, 0.0)
     depth = 1
     while depth > 0 and horizon > 0.0:
@@ -154,7 +158,7 @@ def trees_safe_until(nodes, surface, first, second, work, index, threshold, hori
         before = depth
         for k in range(2):
             next_a, next_b = child[a] + k if open_a else a, b if open_a else child[b] + k
-            time = _pair_safe_until(node_min, node_max, next_a, next_b, work, threshold, horizon)
+            time = _pair_safe_until(node_min, node_max, next_a, next_b, work, index[CARRIER], threshold, horizon)
             if time < horizon:
                 if depth > before and time > work[STACK_TIME + before]:  # the sooner one is taken first
                     _push(work, index, depth, index[STACK + 2 * before], index[STACK + 2 * before + 1], work[STACK_TIME + before])

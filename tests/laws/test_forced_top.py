@@ -121,6 +121,12 @@ def test_no_torque_is_left_to_the_free_top():
     assert (constants == 7.0).all()
 
 
+def test_endless_turning_is_given_up():
+    """A needle under a torque that turns it by 1e10 rad: NaN after a bounded number of segments, no endless loop."""
+    q, w = Top((1e-12, 1.0, 1.0), TILTED, (0.0, 0.0, 0.1), (1.0, 0.0, 0.0)).at(0.1)
+    assert np.isnan(q).all() and np.isnan(w).all()
+
+
 def test_order_of_the_series():
     """Cut after t^ORDER, the series errs by t^(ORDER + 1); beyond its segment that is well above round-off."""
     inertia, q, w_start, torque = CASES["comparable"]

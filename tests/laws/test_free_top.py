@@ -205,6 +205,12 @@ def test_no_spin_keeps_every_bit():
     assert not w_later.any()
 
 
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_what_is_not_finite_ends_and_stays_so(bad):
+    q, w = Top((1.0, 2.0, 3.0), TILTED, (0.3, bad, 0.1)).at(2.0)
+    assert not np.isfinite(np.concatenate([q, w])).all()
+
+
 ratios = st.floats(-6.0, 0.0).map(lambda exponent: 10.0**exponent)
 components = st.one_of(st.floats(-1.0, 1.0), st.sampled_from([0.0, 1e-9, -1e-5, 1e-200]))
 vectors = st.tuples(components, components, components).filter(lambda v: max(map(abs, v)) > 1e-3).map(np.array)
@@ -224,16 +230,19 @@ def tops(draw):
 @settings(deadline=None, derandomize=True, max_examples=200)
 @given(tops(), st.floats(0.0, 1000.0))
 def test_angular_momentum_and_energy_are_constant(top, turned):
-    """Both to the round-off of the world spin itself, |w| eps, times the largest moment; however long the flight."""
+    """Both to the round-off of the world spin itself, |w| eps, times the largest moment; however long the flight.
+
+    Much of it is the turn from the world to the body in this test: q has unit length to 2 eps, which enters 16 times.
+    """
     spin = np.linalg.norm(top.w)
     states = [top.at(turned * k / spin) for k in (0.0, 0.37, 1.0)]
     w_body = [rotate_inverse(q, w) for q, w in states]
     momenta = np.array([rotate(q, top.inertia * w) for (q, _), w in zip(states, w_body, strict=True)])
     energies = np.array([top.inertia @ w**2 for w in w_body])
     scale = top.inertia.max() * spin
-    assert np.abs(momenta - momenta[0]).max() <= ROUND_OFF * EPS * scale
-    assert np.abs(energies - energies[0]).max() <= ROUND_OFF * EPS * scale * spin
-    assert all(abs(np.linalg.norm(q) - 1.0) < ROUND_OFF * EPS for q, _ in states)
+    assert np.abs(momenta - momenta[0]).max() <= 2.0 * ROUND_OFF * EPS * scale
+    assert np.abs(energies - energies[0]).max() <= 2.0 * ROUND_OFF * EPS * scale * spin
+    assert all(abs(np.linalg.norm(q) - 1.0) < 6.0 * EPS for q, _ in states)
 
 
 @settings(deadline=None, derandomize=True, max_examples=200)

@@ -58,6 +58,14 @@ def test_half_infinite_boxes(n):
     np.testing.assert_array_equal(found(box_min, box_max, movable), brute(box_min, box_max, movable))
 
 
+def test_only_infinite_boxes():
+    box_min, box_max = np.full((FEW + 5, 3), -np.inf), np.full((FEW + 5, 3), np.inf)
+    box_max[3] = -1.0
+    box_min[4] = 1.0
+    movable = np.ones(FEW + 5, dtype=bool)
+    np.testing.assert_array_equal(found(box_min, box_max, movable), brute(box_min, box_max, movable))
+
+
 @pytest.mark.parametrize("n", [FEW, 700])
 def test_order_of_the_bodies_does_not_matter(n):
     box_min, box_max = boxes("mixed", n)

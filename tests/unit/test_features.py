@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigidimpulse.detect.features import closest_on_segments, in_edge_arc, over_triangle, pierces_triangle
+from rigidimpulse.detect.features import arc_miss, closest_on_segments, over_triangle, pierces_triangle
 from rigidimpulse.geometry import EDGE_BOUNDARY, EDGE_CAPSULE, EDGE_CONVEX, EDGE_HIDDEN
 
 coordinate = st.floats(-1.0, 1.0, width=32)
@@ -106,7 +106,8 @@ def test_segment_pierces_the_triangle_it_runs_through(x, y, above, below):
 @fixed
 @given(st.floats(-np.pi, np.pi), st.floats(1e-3, np.pi - 1e-3))
 def test_arc_of_a_convex_edge(angle, bend):
-    # Edge along y, face 0 with normal z on the side x < 0: the arc turns from z towards x by the bend.
+    # Edge along y, face 0 with normal z on the side x < 0: the arc turns from z towards x by the bend. A direction next
+    # to an end misses the arc by the sine of its angle to that end.
     def direction(a):
         return (np.sin(a), 0.0, np.cos(a))
 
@@ -114,9 +115,14 @@ def test_arc_of_a_convex_edge(angle, bend):
         return
     normals = (direction(0.0), direction(bend))
     along = (0.0, 1.0, 0.0)
-    assert in_edge_arc(direction(angle), along, *normals, EDGE_CONVEX, 0.0) == (0.0 < angle < bend)
-    assert not in_edge_arc(direction(angle), along, *normals, EDGE_HIDDEN, 0.0)
-    assert in_edge_arc(direction(angle), along, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), EDGE_CAPSULE, 0.0)
+    miss, end = arc_miss(direction(angle), along, *normals, EDGE_CONVEX)
+    assert (miss < 0.0) == (0.0 < angle < bend)
+    if -0.1 < angle < 0.0:
+        assert miss >= -np.sin(angle) - 4 * EPSILON and end == normals[0]
+    if bend < angle < bend + 0.1:
+        assert miss >= np.sin(angle - bend) - 4 * EPSILON and end == normals[1]
+    assert arc_miss(direction(angle), along, *normals, EDGE_HIDDEN)[0] == np.inf
+    assert arc_miss(direction(angle), along, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), EDGE_CAPSULE)[0] < 0.0
 
 
 @fixed
@@ -126,11 +132,6 @@ def test_arc_of_a_boundary_is_the_half_circle_beyond_it(angle):
         return
     normal = (0.0, 0.0, 1.0)
     direction = (np.sin(angle), 0.0, np.cos(angle))
-    assert in_edge_arc(direction, (0.0, 1.0, 0.0), normal, normal, EDGE_BOUNDARY, 0.0) == (angle > 0.0)
-
-
-def test_tolerance_widens_the_arc_by_its_sine():
-    along, normals = (0.0, 1.0, 0.0), ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
-    outside = (-np.sin(0.01), 0.0, np.cos(0.01))
-    assert not in_edge_arc(outside, along, *normals, EDGE_CONVEX, 0.0099)
-    assert in_edge_arc(outside, along, *normals, EDGE_CONVEX, 0.0101)
+    miss, end = arc_miss(direction, (0.0, 1.0, 0.0), normal, normal, EDGE_BOUNDARY)
+    assert miss == -np.sin(angle)
+    assert end == (0.0, 0.0, np.sign(np.cos(angle)))
