@@ -20,7 +20,7 @@ from numba.core.caching import FunctionCache
 from numba.extending import typeof_impl
 
 _PACKAGE = Path(__file__).parent
-_IMPORT = re.compile(rb"^\s*from rigidimpulse\.?([\w.]*) import ([\w, ]+)", re.MULTILINE)
+_IMPORT = re.compile(rb"^\s*from rigidimpulse\.?([\w.]*) import (?:\(|([\w, ]+))", re.MULTILINE)
 
 
 @cache

@@ -10,6 +10,7 @@ import numpy as np
 
 from rigidimpulse._jit import kernels_are_cached
 from rigidimpulse.accuracy import Accuracy
+from rigidimpulse.compile_ahead import start_in_second_process
 from rigidimpulse.constrain.contact_forces import ContactForces
 from rigidimpulse.detect.overlap import report_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
@@ -65,7 +66,9 @@ def simulate(
     if len(times) * world.num_bodies > MOST_POSES:
         raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
     if not kernels_are_cached():
-        logger.warning("compiling kernels for the first run on this machine: up to half a minute, once")
+        logger.warning("compiling kernels for the first run on this machine, once: this takes up to a minute")
+        if world.can_collide:
+            start_in_second_process(world.cylinders is not None)
     plan = make_plan(world)
     recorder = Recorder(times, world.num_bodies)
     log = EventLog()

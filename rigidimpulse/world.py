@@ -72,6 +72,11 @@ class World:
         return len(self.names)
 
     @cached_property
+    def cylinders(self) -> int | None:
+        """None where no shape is a cylinder: kernels then leave their part out, also when they are compiled."""
+        return 1 if np.any(self.geometry.kind == CYLINDER) else None
+
+    @cached_property
     def gravity_strength(self) -> np.ndarray:
         """(n,) m/s2, magnitude of gravity."""
         return np.linalg.norm(self.gravity, axis=1)

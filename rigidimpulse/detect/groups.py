@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigidimpulse.detect.features import FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, pressing
 from rigidimpulse.observe.energy import mechanical_energy
 from rigidimpulse.respond.impulse import Contacts
@@ -71,6 +72,7 @@ def collect(context, window, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]
         count = contacts_of_pairs(
             world.geometry, world.shape_of_body, state.now, state.rotation, window.a[pairs], window.b[pairs],
             MARGIN * window.delta[pairs], context.scratch_pairs, context.contact_real, context.contact_int,
+            world.cylinders,
         )
         if count >= 0:
             return context.contact_real[:count].copy(), context.contact_int[:count].copy()
@@ -159,7 +161,7 @@ def make_group(context, window, time: float, real: np.ndarray, integer: np.ndarr
         contacts=contacts,
         place=place,
         kinds=integer[rows, 2],
-        keys=[tuple(row) for row in integer[rows].tolist()],
+        keys=[contact_key(*row) for row in integer[rows].tolist()],
         delta=window.delta[place],
         approach=np.empty(len(rows)),
         rest_speed=np.empty(len(rows)),
@@ -169,6 +171,15 @@ def make_group(context, window, time: float, real: np.ndarray, integer: np.ndarr
     )
     classify(context, group)
     return group
+
+
+def contact_key(a: int, b: int, kind: int, feature_a: int, feature_b: int) -> tuple[int, ...]:
+    """Who a contact is from step to step; a vertex that slides over a tiled face stays the same contact."""
+    if kind == VERTEX_FACE:
+        return a, b, kind, feature_a
+    if kind == FACE_VERTEX:
+        return a, b, kind, feature_b
+    return a, b, kind, feature_a, feature_b
 
 
 def classify(context, group: Group) -> None:

@@ -104,12 +104,12 @@ def _rows_to_world(contact_real, contact_int, start, end, R, x, swapped):
 
 @jit
 def pair_contacts(
-    geometry, shape_a, x_a, R_a, shape_b, x_b, R_b, margin, scratch_pairs, contact_real, contact_int, count
+    geometry, shape_a, x_a, R_a, shape_b, x_b, R_b, margin, scratch_pairs, contact_real, contact_int, count, cylinders=1
 ):
     """Append every touching pair of features of two shapes with gap <= margin [m].
 
-    x (3,), R (3, 3): poses of the principal frames; `count`: rows in use; buffers: see the top of this module. Returns
-    the new count, or minus the rows needed if there are fewer: then the rows from `count` on mean nothing.
+    x (3,), R (3, 3): poses of the principal frames; `count`: rows in use; buffers: see the top of this module;
+    `cylinders`: None where no shape is a cylinder, which then is not compiled either. Returns the new count, or minus the rows needed if there are fewer: then the rows from `count` on mean nothing.
 
     Bodies are taken to be apart. Overlap keeps its meaning (gap < 0, the right normal) for half spaces, and for spheres
     and capsules until an axis is touched; meshes allow only what round-off makes.
@@ -140,14 +140,15 @@ def pair_contacts(
                 count = round_half_space_contacts(
                     geometry, i, j, U, s, margin, scratch_pairs, contact_real, contact_int, count
                 )
-            elif kind[i] == CYLINDER and kind[j] == HALF_SPACE:
-                count = cylinder_half_space_contacts(geometry, i, j, U, s, margin, contact_real, contact_int, count)
-            elif kind[i] == CYLINDER and kind[j] == ROUND:
-                count = cylinder_round_contacts(
-                    geometry, i, j, U, s, margin, scratch_pairs, contact_real, contact_int, count
-                )
-            elif kind[i] == CYLINDER:
-                count = cylinder_cylinder_contacts(geometry, i, j, U, s, margin, contact_real, contact_int, count)
+            elif cylinders is not None:
+                if kind[i] == CYLINDER and kind[j] == HALF_SPACE:
+                    count = cylinder_half_space_contacts(geometry, i, j, U, s, margin, contact_real, contact_int, count)
+                elif kind[i] == CYLINDER and kind[j] == ROUND:
+                    count = cylinder_round_contacts(
+                        geometry, i, j, U, s, margin, scratch_pairs, contact_real, contact_int, count
+                    )
+                elif kind[i] == CYLINDER:
+                    count = cylinder_cylinder_contacts(geometry, i, j, U, s, margin, contact_real, contact_int, count)
             end = min(count, contact_real.shape[0])
             R_first, x_first = (R_b, x_b) if swapped else (R_a, x_a)
             _rows_to_world(contact_real, contact_int, start, end, R_first, x_first, swapped)

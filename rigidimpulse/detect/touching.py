@@ -13,7 +13,7 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.manifold import pair_contacts, reduce_contacts
+from rigidimpulse.detect.manifold import MAX_PER_NORMAL, pair_contacts, reduce_contacts
 from rigidimpulse.integrate.course import FIXED, state_at
 from rigidimpulse.respond.impulse import inverse_effective_mass, relative_velocity
 from rigidimpulse.rotation import quaternion_to_matrix
@@ -85,8 +85,13 @@ def refresh_pose(members, bodies, rotation, inertia):
 
 
 @jit
-def contacts_of_pairs(geometry, shape_of_body, bodies, rotation, pairs_a, pairs_b, margin, scratch, real, integer):
-    """Reduced manifolds of the pairs, margin (k,) m; returns the number of contacts, or -(needed) if a buffer is too small."""
+def contacts_of_pairs(
+    geometry, shape_of_body, bodies, rotation, pairs_a, pairs_b, margin, scratch, real, integer, cylinders
+):
+    """Reduced manifolds of the pairs, margin (k,) m; returns the number of contacts, or -(needed) if a buffer is too small.
+
+    cylinders: None where no shape is a cylinder.
+    """
     # Not a literal: that would compile everything below twice.
     count = np.int64(0)
     for k in range(pairs_a.shape[0]):
@@ -94,11 +99,11 @@ def contacts_of_pairs(geometry, shape_of_body, bodies, rotation, pairs_a, pairs_
         first = count
         count = pair_contacts(
             geometry, shape_of_body[a], bodies.position[a], rotation[a],
-            shape_of_body[b], bodies.position[b], rotation[b], margin[k], scratch, real, integer, count,
+            shape_of_body[b], bodies.position[b], rotation[b], margin[k], scratch, real, integer, count, cylinders,
         )
         if count < 0:
             return count
-        count = reduce_contacts(real, integer, first, count)
+        count = reduce_contacts(real, integer, first, count, MAX_PER_NORMAL)
         for c in range(first, count):
             integer[c, 0] = a
             integer[c, 1] = b

@@ -1,8 +1,8 @@
 """The search that both guarded sweeps share: safe steps until the gap is at `touch`.
 
 Each step asks the bounding spheres, then the shapes (`guard`). If the shapes limit the step by features that are at `touch` already and
-would use up the slack for rounding, the pair is in contact. Features at or below `touch` that hover, or leave, or go on to slide, are let
-go: their threshold is their present gap less that slack, so that neither lasting contact nor a rebound is taken for an impact.
+approach, the pair is in contact. Features at `touch` that hover (they approach by less than rounding until the end), slide or leave are let
+go: they may come closer by the slack for rounding, so that neither lasting contact nor a rebound is taken for an impact.
 
 With `look_ahead`, the time at which the limiting features come down to `touch` is found by bisection (`guard_witness`); the steps then
 only have to confirm that nothing is earlier. Without it, they are repeated until they are there (conservative advancement).
@@ -91,13 +91,13 @@ def first_contacts(
         a, b = pairs_a[k], pairs_b[k]
         shape_a, shape_b = shape_of_body[a], shape_of_body[b]
         slack = rounding_slack(course, scratch.reach, a, b, shape_a, shape_b, end)
-        t, target, trial, floor = start[k], end, end - start[k], touch[k] - slack
-        status, queries, lowered = STALLED, 0, False
+        t, target, trial, floor = start[k], end, end - start[k], touch[k]
+        status, queries, is_let_go = STALLED, 0, False
         while queries < MAX_QUERIES:
             rest = target - t
-            horizon = rest if lowered else min(rest, trial)
+            horizon = rest if is_let_go else min(rest, trial)
             queries += 1
-            s, exact = _flight_safe_until(geometry.frame, course, scratch, a, b, shape_a, shape_b, t, floor + slack, horizon)
+            s, exact = _flight_safe_until(geometry.frame, course, scratch, a, b, shape_a, shape_b, t, floor, horizon)
             is_free = s >= horizon or (not exact and s > _WORTHWHILE * horizon)
             if not is_free:
                 span = _bring_motions(course, scratch, a, b, shape_a, shape_b, t, horizon)
@@ -109,21 +109,21 @@ def first_contacts(
                     t, status = inf, SEPARATE
                     break
                 t, target = target if s >= rest else _later(t, s), end if s >= rest else target
-                trial, floor, lowered = max(_GROWTH * s, trial), touch[k] - slack, False
+                trial, floor, is_let_go = max(_GROWTH * s, trial), touch[k], False
                 continue
-            gap = work[WITNESS + GAP]
-            if gap < touch[k] and not lowered:
-                floor, lowered, target = gap - slack, True, end
-                continue
-            closing = closing_speed(work)
+            gap, closing = work[WITNESS + GAP], closing_speed(work)
             near = gap <= touch[k] + max(tolerance[k], slack)
-            if near and closing < 0.0:
-                s *= 0.5  # it leaves: look again half way to its return
-            ahead = _later(t, s)
-            if ahead <= t or (near and closing * rest > slack):
+            if near and closing * (end - t) > slack:
                 status = TOUCHING if t == start[k] and gap <= touch[k] else IMPACT
                 break
-            t, trial, floor, lowered = ahead, 2.0 * s, touch[k] - slack, False
+            if near and not is_let_go:
+                floor, is_let_go, target = min(gap, touch[k]) - slack, True, end
+                continue
+            ahead = _later(t, 0.5 * s if near and closing < 0.0 else s)  # what leaves is looked at again half way to its return
+            if ahead <= t:
+                status = IMPACT
+                break
+            t, trial, floor, is_let_go = ahead, 2.0 * s, touch[k], False
             probe = min(target, t + look_ahead * s)
             if probe > t and not exact:
                 root, used = witness_root(geometry, course, work, index, a, b, t, probe, touch[k], max(tolerance[k], slack))
