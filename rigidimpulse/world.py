@@ -33,6 +33,8 @@ class World:
         static_min, static_max: (n, 3) m, world boxes of bodies where they start.
         material_of_body: (n,). coefficients: (k, k, 4), see material.combine.
         flat: (n,) bool, has faces or rims that must not touch those of another at gap 0.
+        half_space, ball: (n,) bool, the shape is half spaces only; one sphere about the centre of mass.
+        touch_gap: gap at which faces and rims meet, as a fraction of the smaller body's size.
         contact_gap: gap at which lasting contacts are held, as a fraction of the smaller body's size.
 
     """
@@ -63,6 +65,7 @@ class World:
     coefficients: np.ndarray
     flat: np.ndarray
     half_space: np.ndarray
+    ball: np.ndarray
     contact_gap: float
     touch_gap: float
 
@@ -94,8 +97,8 @@ class World:
 
     @property
     def can_press(self) -> bool:
-        """Whether anything but impacts can press bodies together: gravity, a moving support."""
-        return bool(np.any(self.gravity) or np.any(self.moving))
+        """Whether anything but impacts can press bodies together: gravity, a moving support, the spin of what is no ball."""
+        return bool(np.any(self.gravity) or np.any(self.moving) or not np.all(self.ball[self.dynamic]))
 
     def may_collide(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Which pairs take part in contact at all: at least one of the bodies is dynamic."""
@@ -165,6 +168,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
         coefficients=coefficients,
         flat=_has_faces(geometry, shape_of_body),
         half_space=np.array([_all_half_spaces(geometry, k) for k in shape_of_body], bool),
+        ball=np.array([_is_ball(geometry, k) for k in shape_of_body], bool),
         contact_gap=TOLERANCES.contact_gap,
         touch_gap=TOLERANCES.touch_gap,
     )
@@ -194,6 +198,13 @@ def _primitives(geometry: Geometry, shape: int) -> range:
 
 def _all_half_spaces(geometry: Geometry, shape: int) -> bool:
     return all(geometry.kind[p] == HALF_SPACE for p in _primitives(geometry, shape))
+
+
+def _is_ball(geometry: Geometry, shape: int) -> bool:
+    p, last = int(geometry.shape_first[shape]), int(geometry.shape_first[shape + 1])
+    v = int(geometry.vertex_first[p])
+    single = last == p + 1 and geometry.kind[p] == ROUND and geometry.vertex_first[p + 1] == v + 1
+    return bool(single and not np.any(geometry.vertex[v]))
 
 
 def _primitive_points(geometry: Geometry, p: int) -> tuple[np.ndarray, float]:

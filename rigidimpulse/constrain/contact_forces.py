@@ -33,7 +33,7 @@ class ContactForces:
         if not world.can_collide:
             return Skip("nothing can collide")
         if not world.can_press:
-            return Skip("no force and no moving support presses bodies together")
+            return Skip("no force, no moving support and no spin presses bodies together")
         return Bound(hold, "bodies may come to rest on each other")
 
 

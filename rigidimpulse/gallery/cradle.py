@@ -28,6 +28,8 @@ DENSITY = 7860.0
 SPEED = 1.0
 FREE = 0.375
 """m, d: from a ball at the end of the row to the wall."""
+WALL = 0.0625
+"""m, thickness."""
 DURATION = 6.0
 BOUND = 1e-11
 """m and m/s: rounding of some ten impacts on each of eight passages, times a hundred."""
@@ -38,8 +40,9 @@ def scene(num_in: int) -> Scene:
     steel = Material(density=DENSITY, restitution=1.0, static_friction=0.0, dynamic_friction=0.0)
     scene = Scene(gravity=(0.0, 0.0, 0.0))
     left, right = _walls()
-    scene.add(Body("left wall", Shape.half_space((1, 0, 0), left), motion="static", material=steel))
-    scene.add(Body("right wall", Shape.half_space((-1, 0, 0), -right), motion="static", material=steel))
+    wall = Shape.box((WALL, 4.0 * RADIUS, 4.0 * RADIUS))
+    scene.add(Body("left wall", wall, motion="static", position=(left - 0.5 * WALL, 0, 0), material=steel))
+    scene.add(Body("right wall", wall, motion="static", position=(right + 0.5 * WALL, 0, 0), material=steel))
     ball = Shape.sphere(RADIUS)
     for k in range(NUM_BALLS):
         comes_in = k < num_in

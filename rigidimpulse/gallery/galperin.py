@@ -28,6 +28,8 @@ from rigidimpulse.shape import Shape
 RADIUS = 0.125
 GROWTH = 0.0625
 """m by which the heavy ball's radius grows with each power of 100."""
+WALL = 0.25
+"""m, thickness."""
 LIGHT_MASS = 1.0
 LIGHT_GAP = 0.75
 HEAVY_GAP = 1.5
@@ -37,13 +39,16 @@ DURATIONS = (3.0, 3.5, 6.5, 3.5)
 """s, half a second and more after the last impact."""
 ROUNDING = 2e-15
 """Of one impact, relative to the speeds; the errors of n impacts add up to n times as much at most."""
+TIME_ROUNDING = 3e-13
+"""s, of one impact: 1e-13 of the light ball's diameter on either side of it, at the slowest approach, 0.17 m/s."""
 
 
 def scene(power: int) -> Scene:
     """Return the wall and the balls, the heavy one 100^power times as heavy."""
     elastic = Material(restitution=1.0, static_friction=0.0, dynamic_friction=0.0)
     scene = Scene(gravity=(0.0, 0.0, 0.0))
-    scene.add(Body("wall", Shape.half_space((1, 0, 0)), motion="static", material=elastic))
+    wall = Shape.box((WALL, 8.0 * RADIUS, 8.0 * RADIUS))
+    scene.add(Body("wall", wall, motion="static", position=(-0.5 * WALL, 0, 0), material=elastic))
     scene.add(
         Body("light", Shape.sphere(RADIUS), position=(RADIUS + LIGHT_GAP, 0, 0), mass=LIGHT_MASS, material=elastic)
     )
@@ -68,7 +73,7 @@ def check(power: int, run: Recording) -> list[Check]:
     bound = ROUNDING * max(number, 10)
     return [
         equal("impacts", len(run.impacts), COUNTS[power], "digits of pi (Galperin 2003)"),
-        at_most("error of the impact times, s", late, 10.0 * bound, "crossings of the unfolded line"),
+        at_most("error of the impact times, s", late, TIME_ROUNDING * number, "crossings of the unfolded line"),
         at_most(
             "error of the heavy ball's speed, m/s",
             abs(run.velocity("heavy")[-1, 0] - leaving),

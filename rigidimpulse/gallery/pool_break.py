@@ -32,12 +32,16 @@ RACK_GAP = 1e-4
 """m between neighbours in the rack."""
 NUM_ROWS = 5
 BALL_RESTITUTION, CUSHION_RESTITUTION = 0.95, 0.8
+RAIL, RAIL_HEIGHT, BED_GAP = 0.08, 0.06, 1e-3
+"""m: width and height of the cushions, and how far below the balls the cloth is drawn."""
 CUSHIONS = {
-    "cushion -x": ((1, 0, 0), -0.5 * LENGTH),
-    "cushion +x": ((-1, 0, 0), -0.5 * LENGTH),
-    "cushion -y": ((0, 1, 0), -0.5 * WIDTH),
-    "cushion +y": ((0, -1, 0), -0.5 * WIDTH),
+    "cushion -x": ((RAIL, WIDTH, RAIL_HEIGHT), (-0.5 * (LENGTH + RAIL), 0.0, 0.0)),
+    "cushion +x": ((RAIL, WIDTH, RAIL_HEIGHT), (0.5 * (LENGTH + RAIL), 0.0, 0.0)),
+    "cushion -y": ((LENGTH + 2.0 * RAIL, RAIL, RAIL_HEIGHT), (0.0, -0.5 * (WIDTH + RAIL), 0.0)),
+    "cushion +y": ((LENGTH + 2.0 * RAIL, RAIL, RAIL_HEIGHT), (0.0, 0.5 * (WIDTH + RAIL), 0.0)),
 }
+"""Sizes and places, m."""
+NUM_FIXED = len(CUSHIONS) + 1
 DURATION = 5.0
 NUM_TIMED = 40
 """Impacts whose times are compared. Each impact of balls after the break multiplies errors by five or more."""
@@ -52,8 +56,10 @@ def scene() -> Scene:
     rubber = Material(restitution=CUSHION_RESTITUTION, **smooth)
     resin = Material(restitution=BALL_RESTITUTION, **smooth)
     scene = Scene(gravity=(0.0, 0.0, 0.0))
-    for name, (normal, offset) in CUSHIONS.items():
-        scene.add(Body(name, Shape.half_space(normal, offset), motion="static", material=rubber))
+    for name, (size, place) in CUSHIONS.items():
+        scene.add(Body(name, Shape.box(size), motion="static", position=place, material=rubber))
+    bed = Shape.box((LENGTH + 2.0 * RAIL, WIDTH + 2.0 * RAIL, RAIL))
+    scene.add(Body("bed", bed, motion="static", position=(0.0, 0.0, -RADIUS - BED_GAP - 0.5 * RAIL), material=rubber))
     ball = Shape.sphere(RADIUS)
     for k, (x, y) in enumerate(_places()):
         speed = CUE_SPEED if k == 0 else 0.0
@@ -64,7 +70,7 @@ def scene() -> Scene:
 
 def check(run: Recording) -> list[Check]:
     """Compare impacts with their law, the ledger with the impacts, and the beginning with the exact run."""
-    impacts, first = run.impacts, len(CUSHIONS)
+    impacts, first = run.impacts, NUM_FIXED
     at_cushion = np.minimum(impacts["body_a"], impacts["body_b"]) < first
     e = np.where(at_cushion, CUSHION_RESTITUTION, BALL_RESTITUTION)
     rebound = np.abs(impacts["separation_speed"] - e * impacts["approach_speed"]).max() / CUE_SPEED
@@ -111,7 +117,7 @@ def _against_exact(run: Recording) -> list[Check]:
     sides = (0.5 * LENGTH, 0.5 * WIDTH)
     exact = DisksInRectangle.of(places, velocities, RADIUS, sides, BALL_RESTITUTION, CUSHION_RESTITUTION)
     events = exact.advance(float(run.times[-1]))
-    pairs = [{event.a + len(CUSHIONS), _body(event.b)} for event in events]
+    pairs = [{event.a + NUM_FIXED, _body(event.b)} for event in events]
     found = [{int(impact["body_a"]), int(impact["body_b"])} for impact in run.impacts]
     right = sum(pair == other for pair, other in zip(pairs, found, strict=False))
     times = np.array([float(event.time) for event in events[:NUM_TIMED]])
@@ -126,7 +132,7 @@ def _against_exact(run: Recording) -> list[Check]:
 
 def _body(index: int) -> int:
     """Return the body's index in the scene for a disk or wall of an event."""
-    return index + len(CUSHIONS) if index >= 0 else -1 - index
+    return index + NUM_FIXED if index >= 0 else -1 - index
 
 
 def _overlap(positions: np.ndarray) -> float:

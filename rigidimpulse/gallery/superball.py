@@ -25,19 +25,19 @@ from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
 from rigidimpulse.shape import Shape
 
-RADIUS = 0.03
+RADIUS = 0.06
 DENSITY = 950.0
 GRAVITY = 9.81
-START = (-0.7, 0.6)
+START = (-0.75, 0.55)
 THROW = (3.0, -4.0)
 """Position and velocity along x and z, m and m/s."""
 UNDERSIDE = 0.75
 EDGE = -0.5
 """The table's underside is at this height, from this x on, m."""
-TABLE_LENGTH, TABLE_WIDTH, TABLE_THICKNESS, LEG = 1.2, 0.7, 0.04, 0.05
+TABLE_LENGTH, TABLE_WIDTH, TABLE_THICKNESS, LEG = 1.2, 0.8, 0.04, 0.05
 GRIP = 5.0
 """Friction that sticks at every bounce of the run (1.1 is needed)."""
-DURATION = 2.4
+DURATION = 1.75
 BOUND = 1e-11
 """m, s, m/s: rounding of some twenty roots and products, times a thousand."""
 

@@ -1,7 +1,7 @@
 """No backing up: contact is looked for at the end of the step only, and dealt with there, overlap and all.
 
-This is what engines with fixed steps do. What passes through within the step is missed; what has got inside is found as long as it is in
-there at the end. The normal of bodies that overlap is the one they had at the start of the step.
+This is what engines with fixed steps do. What passes through within the step is missed; what has got inside is found
+as long as it is in there at the end. The normal of bodies that overlap is the one they had at the start of the step.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.features import along, inner, subtract
+from rigidimpulse.detect.features import along, subtract
 from rigidimpulse.detect.inside import points_in_shape
 from rigidimpulse.geometry import HALF_SPACE, ROUND
 from rigidimpulse.integrate.course import Course, pose_at
@@ -21,7 +21,7 @@ from rigidimpulse.sweep.impact_time import IMPACT, ImpactTimes, SweepDetector, n
 from rigidimpulse.sweep.linear import measure
 
 
-@inner
+@jit
 def _is_inside(geometry, course, shape_of_body, a, b, t):
     """Tell whether a primitive of one body lies inside the other, for bodies whose surfaces do not cross."""
     position, orientation, axes = np.empty(6), np.empty((2, 4)), np.empty(18)

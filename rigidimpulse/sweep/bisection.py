@@ -1,8 +1,9 @@
 """Backing up time by bisection: the first contact of each pair, found to a tolerance and never passed.
 
-The guard gives a safe step and the features that limit it. Where their gap has come below `touch` a little later, its root is bracketed and
-bisected with interpolation, log2(h / tolerance) evaluations at most and mostly far fewer. The guard then confirms that nothing touches
-before the root; if it names other features, their earlier root is taken, and so on (`guard_search`).
+The guard gives a safe step and the features that limit it. Where their gap has come below `touch` a little later, its
+root is bracketed and bisected with interpolation, log2(h / tolerance) evaluations at most and mostly far fewer. The
+guard then confirms that nothing touches before the root; if it names other features, their earlier root is taken, and
+so on (`guard_search`).
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ def sweep(
         pairs_a: (k,) int64 bodies a; likewise pairs_b.
         start: (k,) s, from when each pair is swept.
         end: s.
-        touch: (k,) m, gap at which contact is declared: 0 or more, above 0 where two surfaces without a radius may meet.
+        touch: (k,) m, gap at which contact is declared: 0 or more, above 0 where two surfaces without a radius may
+            meet.
         tolerance: (k,) m, how far above `touch` the gap may be at the time found; rounding sets a limit to it.
 
     Returns:
@@ -45,7 +47,18 @@ def sweep(
     """
     result = no_impacts(len(pairs_a))
     first_contacts(
-        detector.geometry, course, detector.sweep_scratch, detector.shape_of_body, pairs_a, pairs_b, start, float(end), touch, tolerance,
-        LOOK_AHEAD, 1 if (detector.geometry.kind == CYLINDER).any() else None, result,
+        detector.geometry,
+        course,
+        detector.sweep_scratch,
+        detector.shape_of_body,
+        pairs_a,
+        pairs_b,
+        start,
+        float(end),
+        touch,
+        tolerance,
+        LOOK_AHEAD,
+        1 if (detector.geometry.kind == CYLINDER).any() else None,
+        result,
     )
     return result

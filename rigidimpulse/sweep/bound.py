@@ -1,25 +1,29 @@
 """How two bodies move past each other in the next instants, and how far the motion can stray from that.
 
-Each body flies with constant acceleration and turns freely, under a constant world torque tau, or at a constant rate. One instant
-of a body is a record of floats (the offsets `POSITION` ... `JERK_BOUND` below), written by `motion_bound`:
+Each body flies with constant acceleration and turns freely, under a constant world torque tau, or at a constant rate.
+One instant of a body is a record of floats (the offsets `POSITION` ... `JERK_BOUND` below), written by
+`motion_bound`:
 
     x, v, acc     centre of mass, its velocity and acceleration      w, alpha   spin and its rate of change, world
     W >= |w|      A >= |alpha|      K >= rate of alpha in the body's own axes                   bounds over [t, t + h]
 
 Spin bounds. With I the principal moments, T the kinetic energy of rotation, L = I w and kappa = max |I_i - I_j| / I_k,
 
-    W^2  = max of sum x_i  under  sum I_i x_i <= (sqrt(2 T) + h |tau| / sqrt(I_min))^2,  sum I_i^2 x_i >= (|L| - h |tau|)^2,  x_i >= 0
+    W^2  = max of sum x_i  under  sum I_i x_i <= (sqrt(2 T) + h |tau| / sqrt(I_min))^2,
+                                  sum I_i^2 x_i >= (|L| - h |tau|)^2,  x_i >= 0
     A   <= |tau| / I_min + kappa W^2 / sqrt(3)                K <= W |tau| / I_min + 2 kappa W A / sqrt(3)
 
 (x_i = w_i^2; the constraints say that energy and angular momentum change no faster than the torque lets them).
 
-Relative motion. Let d = x_b - x_a, w = w_b - w_a, and r a point of B from x_b. In the frame of A, at the instant (all exact),
+Relative motion. Let d = x_b - x_a, w = w_b - w_a, and r a point of B from x_b. In the frame of A, at the instant (all
+exact),
 
-    u   = v_b - v_a - w_a x d                                                            y'  = u + w x r
-    c   = acc_b - acc_a - alpha_a x d - 2 w_a x (v_b - v_a) + w_a x (w_a x d)            y'' = c + beta x r + w x (w x r)
-    beta = alpha_b - alpha_a - w_a x w_b                                                |y'''| <= J_c + J_r |r|
+    u   = v_b - v_a - w_a x d                                                     y'  = u + w x r
+    c   = acc_b - acc_a - alpha_a x d - 2 w_a x (v_b - v_a) + w_a x (w_a x d)     y'' = c + beta x r + w x (w x r)
+    beta = alpha_b - alpha_a - w_a x w_b                                          |y'''| <= J_c + J_r |r|
 
-Both y' and y'' vanish for bodies that move as one. Capitals bound the letters over [0, h] (D: d, U: u, C: c, O: w, B: beta):
+Both y' and y'' vanish for bodies that move as one. Capitals bound the letters over [0, h] (D: d, U: u, C: c, O: w, B:
+beta):
 
     J_c = W_a |acc_b - acc_a| + 3 A_a U + 2 W_a C + K_a D + 2 A_a W_a D + W_a^2 U
     J_r = B' + 3 O B + O^3,   B' = K_a + K_b + O (A_a + A_b) + W_a B
@@ -35,7 +39,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.features import along, cross, dot, inner, subtract
+from rigidimpulse.detect.features import along, cross, dot, subtract
 from rigidimpulse.integrate.course import FIXED, FORCED, PRESCRIBED, state_at
 from rigidimpulse.rotation import quaternion_to_matrix
 
@@ -47,8 +51,8 @@ SPIN_BOUND, SPIN_RATE_BOUND, JERK_BOUND, MOTION_SIZE = np.array([28, 29, 30, 31]
 
 SEEN_VELOCITY, SEEN_SPIN, SEEN_ACCELERATION, SEEN_TURN, SEEN_JERK, SEEN_ARM_JERK = np.array([0, 3, 6, 9, 12, 13])
 SEEN_SPIN_SIZE, SEEN_TURN_SIZE, SEEN_SIZE = np.array([14, 15, 16])
-"""Offsets into the record of a relative motion: u, w, c, beta (3 each), J_c, J_r, |w|, and |beta| + w^2, which bounds the part of y''
-that grows with r."""
+"""Offsets into the record of a relative motion: u, w, c, beta (3 each), J_c, J_r, |w|, and |beta| + w^2, which bounds
+the part of y'' that grows with r."""
 
 _TIGHTENINGS = 4
 _WIDEN = 1.0 + 1e-12  # covers the rounding of the bounds themselves
@@ -56,13 +60,13 @@ _ROUND_OFF = TOLERANCES.round_off
 _EQUAL_MOMENTS = TOLERANCES.equal_moments
 
 
-@inner
+@jit
 def vector(work, at):
     """Return three neighbouring entries of an array."""
     return work[at], work[at + 1], work[at + 2]
 
 
-@inner
+@jit
 def put(work, at, v):
     """Write a vector to three neighbouring entries of an array."""
     work[at] = v[0]
@@ -70,19 +74,19 @@ def put(work, at, v):
     work[at + 2] = v[2]
 
 
-@inner
+@jit
 def scaled(a, factor):
     """Return a times a number."""
     return a[0] * factor, a[1] * factor, a[2] * factor
 
 
-@inner
+@jit
 def length(a):
     """Return |a|."""
     return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
-@inner
+@jit
 def turned(work, at, v):
     """Return M v for the matrix stored row by row in nine neighbouring entries."""
     return (
@@ -92,7 +96,7 @@ def turned(work, at, v):
     )
 
 
-@inner
+@jit
 def turned_back(work, at, v):
     """Return M^T v for the matrix stored row by row in nine neighbouring entries."""
     return (
@@ -102,7 +106,7 @@ def turned_back(work, at, v):
     )
 
 
-@inner
+@jit
 def _edge_of_region(first, second, energy, momentum):
     """Sum of the x_i where both constraints are met and only two x_i are not zero; 0 if that is outside."""
     if abs(first - second) <= _EQUAL_MOMENTS * max(first, second):
@@ -112,9 +116,9 @@ def _edge_of_region(first, second, energy, momentum):
     return x_first + x_second if x_first >= 0.0 and x_second >= 0.0 else 0.0
 
 
-@inner
+@jit
 def _fastest_spin(moments, energy, momentum):
-    """Square root of the largest sum x_i with sum I_i x_i <= energy, sum I_i^2 x_i >= momentum, x_i >= 0: at a corner."""
+    """W from the moments, the bound of 2 T and the bound of |L|^2: the largest sum lies at a corner of its region."""
     i, j, k = moments
     least = momentum * (1.0 - _ROUND_OFF)
     best = energy / i if i * energy >= least else 0.0
@@ -124,16 +128,15 @@ def _fastest_spin(moments, energy, momentum):
     return sqrt(max(best, _edge_of_region(k, i, energy, momentum)))
 
 
-@inner
+@jit
 def _write_spin_bounds(moments, torque_world, horizon, row):
     """Write alpha, W, A and K of a body that turns freely or under a torque."""
-    axes = AXES
-    spin, torque = turned_back(row, axes, vector(row, SPIN)), turned_back(row, axes, torque_world)
+    spin, torque = turned_back(row, AXES, vector(row, SPIN)), turned_back(row, AXES, torque_world)
     i, j, k = moments
     momentum = (i * spin[0], j * spin[1], k * spin[2])
     moment_of_force = subtract(torque, cross(spin, momentum))
     rate = (moment_of_force[0] / i, moment_of_force[1] / j, moment_of_force[2] / k)
-    put(row, SPIN_RATE, turned(row, axes, rate))
+    put(row, SPIN_RATE, turned(row, AXES, rate))
 
     least = min(i, j, k)
     kappa = max(abs(i - j) / k, abs(j - k) / i, abs(k - i) / j)
@@ -159,11 +162,14 @@ def motion_bound(course, i, t, horizon, row):
 
     Works for every mode of a course: fixed, prescribed, free, and turning under a constant world torque.
     """
-    state_at(course, i, t, row[POSITION:VELOCITY], row[ORIENTATION:SPIN_BOUND], row[VELOCITY:SPIN], row[SPIN:ACCELERATION])
+    state_at(
+        course, i, t, row[POSITION:VELOCITY], row[ORIENTATION:SPIN_BOUND], row[VELOCITY:SPIN], row[SPIN:ACCELERATION]
+    )
     quaternion_to_matrix(row[ORIENTATION:SPIN_BOUND], row[AXES:ORIENTATION].reshape((3, 3)))
     mode = course.mode[i]
     none = (0.0, 0.0, 0.0)
-    put(row, ACCELERATION, none if mode == FIXED else (course.acceleration[i, 0], course.acceleration[i, 1], course.acceleration[i, 2]))
+    pull = (course.acceleration[i, 0], course.acceleration[i, 1], course.acceleration[i, 2])
+    put(row, ACCELERATION, none if mode == FIXED else pull)
     if mode == FIXED or mode == PRESCRIBED:
         put(row, SPIN_RATE, none)
         row[SPIN_BOUND] = length(vector(row, SPIN))
@@ -175,7 +181,7 @@ def motion_bound(course, i, t, horizon, row):
     _write_spin_bounds(moments, torque, horizon, row)
 
 
-@inner
+@jit
 def stop_turning(row):
     """Take the rotation out of a motion row: for a sphere about its own centre, on which no rotation can be seen."""
     for k in range(SPIN_RATE, ORIENTATION):
@@ -185,7 +191,7 @@ def stop_turning(row):
     row[SPIN_BOUND] = row[SPIN_RATE_BOUND] = row[JERK_BOUND] = 0.0
 
 
-@inner
+@jit
 def _centre_jerk(spin, rate, jerk, distance, speed, velocity, acceleration, pull, horizon):
     """J_c from W, A, K of the carrier, |d|, the largest |v_b - v_a|, |u|, |c| and |acc_b - acc_a|."""
     if spin == 0.0 and rate == 0.0:
@@ -196,13 +202,15 @@ def _centre_jerk(spin, rate, jerk, distance, speed, velocity, acceleration, pull
     result = 0.0
     for _ in range(_TIGHTENINGS):
         far = min(far, distance + horizon * fast)
-        result = spin * pull + 3.0 * rate * fast + 2.0 * spin * bend + (jerk + 2.0 * rate * spin) * far + spin * spin * fast
+        result = (
+            spin * pull + 3.0 * rate * fast + 2.0 * spin * bend + (jerk + 2.0 * rate * spin) * far + spin * spin * fast
+        )
         bend = max(acceleration, min(bend, acceleration + horizon * result))
         fast = max(velocity, min(fast, velocity + horizon * bend))
     return result * _WIDEN
 
 
-@inner
+@jit
 def _arm_jerk(spin_carrier, spin, rate, jerk, spin_now, turn_now, horizon):
     """J_r from W of the carrier, sums of W, A and K of both bodies, and the present |w| and |beta|."""
     turn = rate + spin_carrier * spin
@@ -214,7 +222,7 @@ def _arm_jerk(spin_carrier, spin, rate, jerk, spin_now, turn_now, horizon):
     return (turn_rate + 3.0 * spin * turn + spin * spin * spin) * _WIDEN
 
 
-@inner
+@jit
 def relative_motion(work, carrier, other, axes, horizon, seen):
     """Write how the points of one body move as seen from another, its carrier, into the record at `seen`.
 
@@ -241,22 +249,19 @@ def relative_motion(work, carrier, other, axes, horizon, seen):
     put(work, seen + SEEN_ACCELERATION, turned_back(work, axes + AXES, c))
     put(work, seen + SEEN_TURN, turned_back(work, axes + AXES, beta))
 
-    spin_bound, other_spin = work[carrier + SPIN_BOUND], work[other + SPIN_BOUND]
-    rate_bound, other_rate = work[carrier + SPIN_RATE_BOUND], work[other + SPIN_RATE_BOUND]
-    jerk_bound, other_jerk = work[carrier + JERK_BOUND], work[other + JERK_BOUND]
-    spin_size, turn_size = length(w), length(beta)
+    spin, rate, jerk = work[carrier + SPIN_BOUND], work[carrier + SPIN_RATE_BOUND], work[carrier + JERK_BOUND]
     speed = max(length(dv), length(along(dv, horizon, pull)))
     work[seen + SEEN_JERK] = _centre_jerk(
-        spin_bound, rate_bound, jerk_bound, length(d), speed, length(u), length(c), length(pull), horizon
+        spin, rate, jerk, length(d), speed, length(u), length(c), length(pull), horizon
     )
-    work[seen + SEEN_ARM_JERK] = _arm_jerk(
-        spin_bound, spin_bound + other_spin, rate_bound + other_rate, jerk_bound + other_jerk, spin_size, turn_size, horizon
-    )
-    work[seen + SEEN_SPIN_SIZE] = spin_size
-    work[seen + SEEN_TURN_SIZE] = turn_size + spin_size * spin_size
+    both_spins, both_rates = spin + work[other + SPIN_BOUND], rate + work[other + SPIN_RATE_BOUND]
+    both_jerks, spin_now, turn_now = jerk + work[other + JERK_BOUND], length(w), length(beta)
+    work[seen + SEEN_ARM_JERK] = _arm_jerk(spin, both_spins, both_rates, both_jerks, spin_now, turn_now, horizon)
+    work[seen + SEEN_SPIN_SIZE] = spin_now
+    work[seen + SEEN_TURN_SIZE] = turn_now + spin_now * spin_now
 
 
-@inner
+@jit
 def seen_motion(work, seen, r):
     """Return y' and y'' of the point at arm r."""
     w = vector(work, seen + SEEN_SPIN)

@@ -1,12 +1,13 @@
 """How long two moving shapes stay apart for certain: one safe step, whatever the shapes.
 
-`safe_time` looks at two bodies at one instant and returns a span over which their gap stays above a threshold. It holds for exactly the
-motion that `bound` describes, turning and accelerating bodies included, so stepping by safe spans never passes a contact (conservative
-advancement, Mirtich 1996; Zhang, Lee and Kim 2006, here with exact first and second derivatives and bounded third ones).
+`safe_time` looks at two bodies at one instant and returns a span over which their gap stays above a threshold. It
+holds for exactly the motion that `bound` describes, turning and accelerating bodies included, so stepping by safe
+spans never passes a contact (conservative advancement, Mirtich 1996; Zhang, Lee and Kim 2006, here with exact first
+and second derivatives and bounded third ones).
 
-Primitives are walked through by `guard_tree`, their convex pieces are bounded by `guard_pieces`. The body of the first primitive carries
-the frame: a half space before a ROUND primitive before a cylinder. Bodies that start at or below the threshold but leave it are let go:
-until they come back, the gap is not below the present one.
+Primitives are walked through by `guard_tree`, their convex pieces are bounded by `guard_pieces`. The body of the
+first primitive carries the frame: a half space before a ROUND primitive before a cylinder. Bodies that start at or
+below the threshold but leave it are let go: until they come back, the gap is not below the present one.
 """
 
 from __future__ import annotations
@@ -15,11 +16,24 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse._jit import jit
 from rigidimpulse.detect.cylinder_features import basis
-from rigidimpulse.detect.features import along, dot, inner, subtract
+from rigidimpulse.detect.features import along, dot, subtract
 from rigidimpulse.geometry import CYLINDER as CYLINDER_KIND
 from rigidimpulse.geometry import HALF_SPACE, ROUND, Geometry
-from rigidimpulse.sweep.bound import AXES, MOTION_SIZE, POSITION, SEEN_SIZE, length, put, relative_motion, scaled, turned, turned_back, vector
+from rigidimpulse.sweep.bound import (
+    AXES,
+    MOTION_SIZE,
+    POSITION,
+    SEEN_SIZE,
+    length,
+    put,
+    relative_motion,
+    scaled,
+    turned,
+    turned_back,
+    vector,
+)
 from rigidimpulse.sweep.guard_layout import (
     CARRIER,
     CLOSEST,
@@ -86,7 +100,7 @@ def make_scratch(geometry: Geometry) -> SweepScratch:
     return SweepScratch(reach, ball, plane, np.zeros(WORK_SIZE), np.zeros(INDEX_SIZE, np.int64))
 
 
-@inner
+@jit
 def _look_from(work, first, second, horizon):
     """Write pose and motion of the second motion record as seen from the first, and the reverse."""
     between = subtract(vector(work, second + POSITION), vector(work, first + POSITION))
@@ -99,7 +113,7 @@ def _look_from(work, first, second, horizon):
     relative_motion(work, second, first, first, horizon, SEEN + SEEN_SIZE)
 
 
-@inner
+@jit
 def _place_cylinder(frame, radius, primitive, work, index, side):
     """Put a cylinder into the place of the first (0) or second (1) piece, in the frame of the first body."""
     centre, axis = row(frame, primitive), (frame[primitive, 3], frame[primitive, 4], frame[primitive, 5])
@@ -117,7 +131,7 @@ def _place_cylinder(frame, radius, primitive, work, index, side):
     index[COUNT + side] = 0
 
 
-@inner
+@jit
 def _bounds_safe_until(bound_centre, bound_radius, first, second, work, threshold, horizon):
     """Safe time of the bounding spheres of two primitives along the line between them; 0 where they overlap."""
     reach = bound_radius[first] + bound_radius[second] + threshold
@@ -129,10 +143,16 @@ def _bounds_safe_until(bound_centre, bound_radius, first, second, work, threshol
     return point_safe_until(work, SEEN, scaled(between, 1.0 / distance), arm, 0.0, distance - reach, horizon)
 
 
-@inner
+@jit
 def _half_space_pair(geometry, first, second, work, index, threshold, horizon, cylinders):
     """Safe time of a half space and another primitive; the record at LIMIT gets direction and closest points."""
-    kind, radius, frame, vertex, triangle = geometry.kind, geometry.radius, geometry.frame, geometry.vertex, geometry.triangle
+    kind, radius, frame, vertex, triangle = (
+        geometry.kind,
+        geometry.radius,
+        geometry.frame,
+        geometry.vertex,
+        geometry.triangle,
+    )
     normal = row(frame, first)
     down = turned_back(work, ROTATION, scaled(normal, -1.0))
     level = frame[first, 3] + threshold
@@ -165,7 +185,7 @@ def _half_space_pair(geometry, first, second, work, index, threshold, horizon, c
     return s
 
 
-@inner
+@jit
 def _solid_pair(geometry, first, second, work, index, threshold, horizon, cylinders):
     """Safe time of two primitives that are no half spaces; the record at LIMIT tells what limits it."""
     radius, kind = geometry.radius, geometry.kind
@@ -196,9 +216,9 @@ def _solid_pair(geometry, first, second, work, index, threshold, horizon, cylind
     return s
 
 
-@inner
+@jit
 def _name_witness(work, index, p, q, swapped, first):
-    """Bring what limits the safe time from first and second to bodies a and b, points to the world; `first`: its motion record."""
+    """Bring what limits the safe time from first and second to a and b, points to the world; `first`: its motion."""
     sign = -1.0 if swapped else 1.0
     towards = scaled(vector(work, LIMIT + DIRECTION), sign)
     put(work, TOWARDS, turned_back(work, ROTATION, towards) if index[CARRIER] else towards)
@@ -215,7 +235,7 @@ def _name_witness(work, index, p, q, swapped, first):
         index[ELEMENT_A], index[ELEMENT_B], index[CARRIER] = index[ELEMENT_B], element, 1 - index[CARRIER]
 
 
-@inner
+@jit
 def safe_time(geometry, shape_a, shape_b, work, index, threshold, horizon, cylinders):
     """Find how long two shapes stay farther apart than a threshold.
 
@@ -231,9 +251,9 @@ def safe_time(geometry, shape_a, shape_b, work, index, threshold, horizon, cylin
         cylinders: None where no shape is a cylinder, else any int: without them the kernel compiles faster.
 
     Returns:
-        s <= horizon such that the gap is above the threshold on [0, s); where it starts at or below the threshold and grows, above
-        its present value. If s is short of the horizon, TOWARDS, WITNESS and the first five of `index` tell what limits it: features
-        whose present gap need not be the least one.
+        s <= horizon such that the gap is above the threshold on [0, s); where it starts at or below the threshold and
+        grows, above its present value. If s is short of the horizon, TOWARDS, WITNESS and the first five of `index`
+        tell what limits it: features whose present gap need not be the least one.
 
     """
     view = -1
@@ -245,7 +265,9 @@ def safe_time(geometry, shape_a, shape_b, work, index, threshold, horizon, cylin
                 view = motion
                 _look_from(work, motion, MOTION + MOTION + MOTION_SIZE - motion, horizon)
             first, second = q if swapped else p, p if swapped else q
-            s = _bounds_safe_until(geometry.bound_centre, geometry.bound_radius, first, second, work, threshold, horizon)
+            s = _bounds_safe_until(
+                geometry.bound_centre, geometry.bound_radius, first, second, work, threshold, horizon
+            )
             if s >= horizon or geometry.kind[second] == HALF_SPACE:
                 continue
             if geometry.kind[first] == HALF_SPACE:

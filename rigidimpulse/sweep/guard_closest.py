@@ -1,19 +1,20 @@
 """Separation of two simplices (point, segment or triangle) along the direction of their closest features.
 
-The direction of a vertex over a face is the normal of the face, that of two crossing edges their common normal: both come from the
-surfaces, not from the difference of two close points, and stay exact however small the distance. Any other direction is the
-difference of the closest points with its part along the edges in question taken out.
+The direction of a vertex over a face is the normal of the face, that of two crossing edges their common normal: both
+come from the surfaces, not from the difference of two close points, and stay exact however small the distance. Any
+other direction is the difference of the closest points with its part along the edges in question taken out.
 
-The separation along a unit direction n is min n.b - max n.a over the corners, a lower bound of the distance for every n, equal to the
-distance for the direction of the closest features, and negative for simplices that cross.
+The separation along a unit direction n is min n.b - max n.a over the corners, a lower bound of the distance for every
+n, equal to the distance for the direction of the closest features, and negative for simplices that cross.
 """
 
 from __future__ import annotations
 
 from math import inf, sqrt
 
+from rigidimpulse._jit import jit
 from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.features import along, closest_on_segments, cross, dot, inner, over_triangle, subtract
+from rigidimpulse.detect.features import along, closest_on_segments, cross, dot, over_triangle, subtract
 from rigidimpulse.sweep.bound import length, put, scaled, vector
 from rigidimpulse.sweep.guard_layout import CORNER, COUNT, FACE, NORMAL, POINT_FIRST, POINT_SECOND
 
@@ -24,7 +25,7 @@ _CROSSING = 1e-4  # least sine of the angle of two edges whose common normal is 
 _ROUND_OFF = TOLERANCES.round_off
 
 
-@inner
+@jit
 def farthest(work, corners, count, normal):
     """Return max of normal . corner over `count` neighbouring points."""
     best = -inf
@@ -33,14 +34,14 @@ def farthest(work, corners, count, normal):
     return best
 
 
-@inner
+@jit
 def _without(v, direction, is_inside):
     """Return v less its part along a direction, if `is_inside`."""
     square = dot(direction, direction)
     return along(v, -dot(v, direction) / square, direction) if is_inside and square > 0.0 else v
 
 
-@inner
+@jit
 def _direction_of_edges(edge_first, edge_second, between, s, t):
     """Unit normal from the first edge to the second, and whether both are met inside, crossing."""
     inside_first, inside_second = 0.0 < s < 1.0, 0.0 < t < 1.0
@@ -55,14 +56,15 @@ def _direction_of_edges(edge_first, edge_second, between, s, t):
     return scaled(normal, factor if dot(normal, between) >= 0.0 else -factor), crossing
 
 
-@inner
+@jit
 def closest_simplices(work, index, closest):
     """Find the closest features of the two simplices at CORNER and FACE in `work`, with the counts at COUNT in `index`.
 
     Writes points and normal (zeros if the points coincide) to the record at `closest`.
 
     Returns:
-        Separation along the normal, and 3 k + l for crossing edges k and l (edge k joins corners k and k + 1), else NO_EDGES.
+        Separation along the normal, and 3 k + l for crossing edges k and l (edge k joins corners k and k + 1), else
+        NO_EDGES.
 
     """
     edges = NO_EDGES

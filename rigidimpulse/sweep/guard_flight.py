@@ -1,14 +1,16 @@
 """Safe time of bounding spheres and planes: from the centres of mass alone, exact on their parabolas.
 
-It clears most pairs before their shapes are looked at, and for two balls, or a ball and a plane, it is the answer itself.
+It clears most pairs before their shapes are looked at, and for two balls, or a ball and a plane, it is the answer
+itself.
 """
 
 from __future__ import annotations
 
 from math import inf
 
+from rigidimpulse._jit import jit
 from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.features import along, dot, inner, subtract
+from rigidimpulse.detect.features import along, dot
 from rigidimpulse.integrate.course import FIXED
 from rigidimpulse.rotation import rotated
 from rigidimpulse.sweep.bound import length, scaled
@@ -19,7 +21,7 @@ _MAX_STEPS = 100  # Newton's method on spheres: 5 to 6 steps, a few dozen where 
 _ROUND_OFF = TOLERANCES.round_off
 
 
-@inner
+@jit
 def relative_flight(course, a, b, t):
     """Position, velocity and acceleration of b's centre of mass less those of a."""
     x, v, acceleration = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -36,9 +38,9 @@ def relative_flight(course, a, b, t):
     return x, v, acceleration
 
 
-@inner
+@jit
 def rounding_slack(course, reach, a, b, shape_a, shape_b, end):
-    """How far rounding can move the gap of a pair until `end`, m: relative to the coordinates that its path runs through."""
+    """How far rounding can move the gap of a pair until `end`, m: relative to the coordinates of its path."""
     size = 0.0
     for side in range(2):
         i, shape = b if side else a, shape_b if side else shape_a
@@ -51,12 +53,12 @@ def rounding_slack(course, reach, a, b, shape_a, shape_b, end):
     return _ROUND_OFF * size
 
 
-@inner
+@jit
 def spheres_safe_until(x, v, a, reach, exact, horizon):
-    """Safe time of two spheres, `reach` the distance of their centres at the threshold; `exact`: carried to the very end.
+    """Safe time of two spheres whose centres are `reach` apart at the threshold; `exact`: carried to the very end.
 
-    Newton's method from the safe side: along the fixed line of centres the distance is bounded by a quadratic without error, so no step
-    passes the root, and the steps converge to it quadratically.
+    Newton's method from the safe side: along the fixed line of centres the distance is bounded by a quadratic without
+    error, so no step passes the root, and the steps converge to it quadratically.
     """
     s = 0.0
     for _ in range(_MAX_STEPS):
@@ -74,9 +76,9 @@ def spheres_safe_until(x, v, a, reach, exact, horizon):
     return s
 
 
-@inner
+@jit
 def plane_safe_until(course, i, normal_x, normal_y, normal_z, level, ball, x, v, a, horizon):
-    """Safe time of a plane of body i, which does not turn, and a sphere: `level` the height of its centre at the threshold.
+    """Safe time of a plane of body i, which does not turn, and a sphere with its centre at `level` at the threshold.
 
     x, v, a: the sphere's flight from the plane's body.
     """

@@ -1,7 +1,9 @@
-"""The scratch array of a guard: one array of floats in which every record has its place, and one of integers.
+"""The scratch of a guard: one array of floats in which every record has its place, and one of integers.
 
-Two bodies are looked at from the *first*: its frame is the one of all points, directions and arms (arms start at the centres of mass).
-Records that come in pairs have that of the first body or piece, then that of the second.
+Two bodies are looked at from the *first*: its frame is the one of all points, directions and arms (arms start at the
+centres of mass). Records that come in pairs have that of the first body or piece, then that of the second.
+
+One array instead of many: numba passes an array as seven numbers from kernel to kernel, so each costs compile time.
 """
 
 from __future__ import annotations
@@ -10,12 +12,16 @@ import numpy as np
 
 from rigidimpulse.sweep.bound import MOTION_SIZE, SEEN_SIZE
 
-CYLINDER_CENTRE, CYLINDER_AXIS, CYLINDER_HEIGHT, CYLINDER_RADIUS, CYLINDER_SIZE = np.array([0, 3, 6, 7, 8])
-"""Offsets into the record of a cylinder: centre, unit axis, half height, rim radius."""
+FIRST, SECOND = np.array([0, 1])
+"""Sides."""
+
+CYLINDER_AXIS, CYLINDER_HEIGHT, CYLINDER_RADIUS, CYLINDER_SIZE = np.array([3, 6, 7, 8])
+"""Offsets into the record of a cylinder: it starts with the centre; unit axis, half height, rim radius."""
 
 POINT_FIRST, POINT_SECOND, NORMAL, GAP, DIRECTION, LIMIT_SIZE = np.array([0, 3, 6, 9, 10, 13])
-"""Offsets into the record of what limits a safe time: closest points of two pieces, unit normal from first to second (zeros if unknown),
-gap along it, and the direction that did best, from first to second. The witness has the first four, from a to b in the world."""
+"""Offsets into the record of what limits a safe time: closest points of two pieces, unit normal from first to second
+(zeros if unknown), gap along it, and the direction that did best, from first to second. The witness has the first
+four, from a to b in the world."""
 
 STACK_SIZE = 128
 """Depth of a walk through two trees; they are less deep than that together."""
@@ -24,7 +30,7 @@ _SIZES = {
     "motion": 2 * MOTION_SIZE,  # of bodies a and b (see `bound`)
     "rotation": 9,  # columns: axes of the second body
     "origin": 6,  # centres of mass
-    "seen": 2 * SEEN_SIZE,  # the second body seen from the first, and the first seen from the second, in the axes of the first
+    "seen": 2 * SEEN_SIZE,  # second body seen from the first, first seen from the second; all in the first's axes
     "corner": 18,  # three points each
     "face": 6,  # unit normals
     "cylinder": 2 * CYLINDER_SIZE,
@@ -32,22 +38,19 @@ _SIZES = {
     "closest": LIMIT_SIZE,  # of the pieces looked at last
     "limit": LIMIT_SIZE,  # of the pieces that limit the safe time
     "towards": 3,  # direction from a to b along which they do, in the axes of its carrier; zeros if there is none
-    "witness": GAP + 1,  # in the world
-    "position": 6,  # of bodies a and b at another time
-    "orientation": 8,
-    "axes": 18,
+    "witness": GAP + 1,
+    "place": 6,  # centres of mass of bodies a and b at another time
+    "turn": 8,  # their orientations
+    "frame": 18,  # their axes
     "stack_time": STACK_SIZE,
 }
 _STARTS = np.concatenate([[0], np.cumsum(list(_SIZES.values()))])
-(
-    MOTION, ROTATION, ORIGIN, SEEN, CORNER, FACE, CYLINDER, CYLINDER_AXES, CLOSEST, LIMIT, TOWARDS, WITNESS, PLACE, TURN, FRAME,
-    STACK_TIME, WORK_SIZE,
-) = _STARTS
+MOTION, ROTATION, ORIGIN, SEEN, CORNER, FACE, CYLINDER, CYLINDER_AXES = _STARTS[:8]
+CLOSEST, LIMIT, TOWARDS, WITNESS, PLACE, TURN, FRAME, STACK_TIME, WORK_SIZE = _STARTS[8:]
 """Places in the float array, in the order of `_SIZES`."""
 
-PRIMITIVE_A, ELEMENT_A, PRIMITIVE_B, ELEMENT_B, CARRIER, COUNT, STACK, INDEX_SIZE = np.array([0, 1, 2, 3, 4, 5, 7, 7 + 2 * STACK_SIZE])
-"""Places in the integer array. The witness: primitives of a and b, their elements (a triangle, or -1 - vertex), and which of them carries
-the direction (0: a, 1: b). Then the number of corners of both pieces, 0 for a cylinder, and the stack of pairs of nodes."""
-
-FIRST, SECOND = np.array([0, 1])
-"""Sides."""
+PRIMITIVE_A, ELEMENT_A, PRIMITIVE_B, ELEMENT_B, CARRIER, COUNT, BASE, STACK = np.array([0, 1, 2, 3, 4, 5, 7, 8])
+INDEX_SIZE = STACK + 2 * STACK_SIZE
+"""Places in the integer array. The witness: primitives of a and b, their elements (a triangle, or -1 - vertex), and
+which of them carries the direction (0: a, 1: b). Then the number of corners of both pieces, 0 for a cylinder, and the
+stack of pairs of nodes, with the depth at which the last opened pair lay."""

@@ -1,8 +1,9 @@
-"""Safe time of two convex pieces: simplices (a point, a segment, a triangle) and cylinders, grown by what the threshold holds.
+"""Safe time of two convex pieces: simplices (points, segments, triangles) and cylinders, grown by the threshold.
 
-Several directions n are tried and the best counts: the normal of either face, carried by its body; the direction of the closest features,
-carried by either body; and, for crossing edges, n turning with both of them. For a carried n every corner has its own offset and speed
-(`guard_root`): one offset with the largest speed would stall a body that rolls or slides.
+Several directions n are tried and the best counts: the normal of either face, carried by its body; the direction of
+the closest features, carried by either body; and, for crossing edges, n turning with both of them. For a carried n
+every corner has its own offset and speed (`guard_root`): one offset with the largest speed would stall a body that
+rolls or slides.
 
 n turning with both edges e_a (at rest in A) and e_b, seen from A: n stays across both to first order if n' = m,
 
@@ -11,18 +12,19 @@ n turning with both edges e_a (at rest in A) and e_b, seen from A: n stays acros
 and for D the vector from a corner of A to one of B, f_ij = n.D:   f' = m.D + n.y',   f'' = -nu^2 n.D + 2 m.y' + n.y'',
 |f'''| <= J + 3 nu |y''| + 3 nu^2 |y'| + nu^3 |D|, the lengths bounded over [0, h].
 
-Records lie in the arrays `work` and `index` (`guard_layout`). The argument `cylinders` is None where no shape is a cylinder: then nothing of
-them is compiled.
+Records lie in the arrays `work` and `index` (`guard_layout`). The argument `cylinders` is None where no shape is a
+cylinder: then nothing of them is compiled.
 """
 
 from __future__ import annotations
 
+from rigidimpulse._jit import jit
 from rigidimpulse.detect.cylinder_features import (
     cylinder_cylinder_distance,
     cylinder_support,
     cylinder_triangle_distance,
 )
-from rigidimpulse.detect.features import cross, dot, inner, subtract
+from rigidimpulse.detect.features import cross, dot, subtract
 from rigidimpulse.sweep.bound import (
     SEEN_ARM_JERK,
     SEEN_JERK,
@@ -63,14 +65,14 @@ from rigidimpulse.sweep.guard_root import cylinder_safe_until, point_safe_until,
 _FASTEST_TURN = 2.0  # a direction that turns faster than this many times |w| is not tried
 
 
-@inner
+@jit
 def _cylinder_record(work, side):
     """Return centre, axis, half height and radius of the cylinder of the first (0) or second (1) piece."""
     at = CYLINDER + CYLINDER_SIZE * side
     return vector(work, at), vector(work, at + CYLINDER_AXIS), work[at + CYLINDER_HEIGHT], work[at + CYLINDER_RADIUS]
 
 
-@inner
+@jit
 def _top(work, index, side, normal, cylinders):
     """Return the greatest normal . p over the first (0) or second (1) piece."""
     if cylinders is not None:
@@ -80,7 +82,7 @@ def _top(work, index, side, normal, cylinders):
     return farthest(work, CORNER + 9 * side, index[COUNT + side], normal)
 
 
-@inner
+@jit
 def _carried(work, index, side, normal, threshold, horizon, cylinders):
     """Safe time of the other piece along a normal that the body of one side carries and that points away from it."""
     other = 1 - side
@@ -94,11 +96,12 @@ def _carried(work, index, side, normal, threshold, horizon, cylinders):
             return cylinder_safe_until(work, seen, normal, arm, axis, half_height, radius, gap, horizon)
     for k in range(index[COUNT + other]):
         point = vector(work, CORNER + 9 * other + 3 * k)
-        horizon = point_safe_until(work, seen, normal, subtract(point, origin), 0.0, dot(normal, point) - level, horizon)
+        gap = dot(normal, point) - level
+        horizon = point_safe_until(work, seen, normal, subtract(point, origin), 0.0, gap, horizon)
     return horizon
 
 
-@inner
+@jit
 def _with_edges(work, index, edges, normal, threshold, horizon):
     """Safe time of two simplices along n turning with both crossing edges; 0 if it would have to turn too fast."""
     k, j = edges // 3, edges % 3
@@ -129,7 +132,7 @@ def _with_edges(work, index, edges, normal, threshold, horizon):
     return horizon
 
 
-@inner
+@jit
 def _closest(work, index, cylinders):
     """Write the closest points and the normal of the two pieces at CLOSEST; return (separation, crossing edges)."""
     if cylinders is not None:
@@ -153,7 +156,7 @@ def _closest(work, index, cylinders):
     return closest_simplices(work, index, CLOSEST)
 
 
-@inner
+@jit
 def _face_direction(work, index, side):
     """Return the normal of a face, turned from the first piece to the second."""
     normal = vector(work, FACE + 3 * side)
@@ -161,12 +164,12 @@ def _face_direction(work, index, side):
     return normal if dot(normal, subtract(other, vector(work, CORNER))) > 0.0 else scaled(normal, -1.0)
 
 
-@inner
+@jit
 def pieces_safe_until(work, index, threshold, horizon, cylinders):
-    """Safe time of the two convex pieces at CORNER, FACE or CYLINDER and COUNT; of a simplex and a cylinder the cylinder is the second.
+    """Safe time of the two convex pieces at COUNT and CORNER, FACE or CYLINDER.
 
-    If the result is short of the horizon, the record at CLOSEST tells what limits it. Of the record at LIMIT the direction is tried first
-    (zeros if there is none).
+    Of a simplex and a cylinder the cylinder is the second. If the result is short of the horizon, the record at CLOSEST tells what limits it. Of the record at LIMIT the
+    direction is tried first (zeros if there is none).
 
     Args:
         work, index: see `guard_layout`.
@@ -181,8 +184,11 @@ def pieces_safe_until(work, index, threshold, horizon, cylinders):
     best, carrier, separation = 0.0, 0, 0.0
     edges = NO_EDGES
     normal = direction = vector(work, LIMIT + DIRECTION)
-    for trial in range(5):  # the limit so far, the faces of first and second, the closest features carried by first and second
+    # The limit so far, the faces of first and second, and the closest features carried by first and second.
+    for trial in range(5):
         side = index[CARRIER] if trial == 0 else (trial - 1) % 2
+        if trial == 0 and dot(normal, normal) == 0.0:
+            continue
         if trial == 1 or trial == 2:
             if index[COUNT + side] < 3:
                 continue
@@ -200,7 +206,7 @@ def pieces_safe_until(work, index, threshold, horizon, cylinders):
         s = _carried(work, index, side, outward, threshold, horizon, cylinders)
         if s >= horizon:
             return horizon, side
-        if s > best or trial == 3 and best == 0.0:
+        if s > best or (trial == 3 and best == 0.0):
             best, carrier, direction = s, side, normal
     if separation <= 0.0:
         best = 0.0

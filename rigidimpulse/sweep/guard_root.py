@@ -5,16 +5,17 @@ With n fixed in the carrier, g the present gap along n and y the path of a point
     gap(s) >= g + n.y' s + 1/2 n.y'' s^2 - J s^3 / 6 >= g - c s - 1/2 a s^2   for s <= h,
     c = -n.y',   a = -n.y'' + J h / 3,   J = J_c + J_r |r|
 
-so the gap stays above a threshold until the first root of the right side. A point that is at or below its threshold but leaving stays
-above its present gap until it comes back to it.
+so the gap stays above a threshold until the first root of the right side. A point that is at or below its threshold
+but leaving stays above its present gap until it comes back to it.
 
-A cylinder with unit axis e, half height H and rim radius R reaches from its centre by the support H |n.e| + R |n x e| along -n. With
-q = n.e and N = n x e (q', q'', N', N'' from e' = w x e, e'' = beta x e + w x (w x e), |e'''| <= J_r), over s in [0, h]:
+A cylinder with unit axis e, half height H and rim radius R reaches from its centre by the support H |n.e| + R |n x e|
+along -n. With q = n.e and N = n x e (q', q'', N', N'' from e' = w x e, e'' = beta x e + w x (w x e), |e'''| <= J_r),
+over s in [0, h]:
 
-    |q(s)|  <=  chord of |q + q' s|  + |q''| s^2 / 2 + J_r s^3 / 6          the chord of a convex function over [0, h] lies above it
-    |q(s)|  =   sign(q) (q + q' s + q'' s^2 / 2) + J_r s^3 / 6              as long as q keeps its sign
-    |N(s)|  <=  chord of |N + N' s|  + |N''| s^2 / 2 + J_r s^3 / 6          sharp for a cylinder that stands or lies
-    |N(s)|  <=  (|N(s)|^2 + |N|^2) / (2 |N|),   |N(s)|^2 = 1 - q(s)^2       sharp for one that leans and rolls on its rim
+    |q(s)|  <=  chord of |q + q' s|  + |q''| s^2 / 2 + J_r s^3 / 6      a convex function over [0, h] is below its chord
+    |q(s)|  <=  sign(q) (q + q' s + q'' s^2 / 2) + J_r s^3 / 6          as long as q keeps its sign
+    |N(s)|  <=  chord of |N + N' s|  + |N''| s^2 / 2 + J_r s^3 / 6      sharp for a cylinder that stands or lies
+    |N(s)|  <=  (|N(s)|^2 + |N|^2) / (2 |N|),   |N(s)|^2 = 1 - q(s)^2   sharp for one that leans and rolls on its rim
 
 (the last is the inequality of the means).
 """
@@ -23,7 +24,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from rigidimpulse.detect.features import along, cross, dot, inner
+from rigidimpulse._jit import jit
+from rigidimpulse.detect.features import along, cross, dot
 from rigidimpulse.sweep.bound import (
     SEEN_ARM_JERK,
     SEEN_JERK,
@@ -37,11 +39,12 @@ from rigidimpulse.sweep.bound import (
 )
 
 
-@inner
+@jit
 def safe_until(gap, closing, bend, horizon):
-    """First s in [0, horizon] with gap - closing s - bend s^2 / 2 = 0, else horizon; `gap` is what is left above the threshold.
+    """First s in [0, horizon] with gap - closing s - bend s^2 / 2 = 0, else horizon.
 
-    Without anything left: 0 if closing, else the time of return to the present gap.
+    `gap` is what is left above the threshold. Without anything left: 0 if closing, else the time of return to the
+    present gap.
     """
     if gap <= 0.0:
         if closing > 0.0:
@@ -57,11 +60,12 @@ def safe_until(gap, closing, bend, horizon):
     return min(horizon, (sqrt(square) - closing) / bend)
 
 
-@inner
+@jit
 def point_safe_until(work, seen, normal, arm, reach, gap, horizon):
     """Safe time of all points within `reach` of the one at `arm`, along a carried normal that points at the moving body.
 
-    `seen`: place in `work` of the motion of the moving body as seen from the carrier; `gap`: what is left above the threshold, m.
+    `seen`: place in `work` of the motion of the moving body as seen from the carrier; `gap`: what is left above the
+    threshold, m.
     """
     velocity, acceleration = seen_motion(work, seen, arm)
     jerk = work[seen + SEEN_JERK] + work[seen + SEEN_ARM_JERK] * (length(arm) + reach)
@@ -70,7 +74,7 @@ def point_safe_until(work, seen, normal, arm, reach, gap, horizon):
     return safe_until(gap, closing, bend + jerk * horizon / 3.0, horizon)
 
 
-@inner
+@jit
 def _end_growth(q, rate, bend, rest, horizon):
     """Return (rate, bend) of a quadratic above |q(s)| - |q| on [0, horizon]; `rest`: J_r h / 3."""
     if abs(q) > horizon * (abs(rate) + 0.5 * horizon * (abs(bend) + rest)):
@@ -79,7 +83,7 @@ def _end_growth(q, rate, bend, rest, horizon):
     return (abs(q + rate * horizon) - abs(q)) / horizon, abs(bend) + rest
 
 
-@inner
+@jit
 def cylinder_safe_until(work, seen, normal, arm, axis, half_height, radius, gap, horizon):
     """Safe time of a cylinder with its centre at `arm`, as `point_safe_until`; `axis` unit, in the axes of `seen`."""
     if horizon <= 0.0:
@@ -93,7 +97,9 @@ def cylinder_safe_until(work, seen, normal, arm, axis, half_height, radius, gap,
     end_rate, end_bend = _end_growth(q, q_rate, q_bend, rest, horizon)
     velocity, acceleration = seen_motion(work, seen, arm)
     closing = half_height * end_rate - dot(normal, velocity)
-    bend = half_height * end_bend - dot(normal, acceleration) + rest * length(arm) + work[seen + SEEN_JERK] * horizon / 3.0
+    bend = (
+        half_height * end_bend - dot(normal, acceleration) + rest * length(arm) + work[seen + SEEN_JERK] * horizon / 3.0
+    )
 
     side = cross(normal, axis)
     size = length(side)

@@ -1,11 +1,13 @@
 """The search that both guarded sweeps share: safe steps until the gap is at `touch`.
 
-Each step asks the bounding spheres, then the shapes (`guard`). If the shapes limit the step by features that are at `touch` already and
-approach, the pair is in contact. Features at `touch` that hover (they approach by less than rounding until the end), slide or leave are let
-go: they may come closer by the slack for rounding, so that neither lasting contact nor a rebound is taken for an impact.
+Each step asks the bounding spheres, then the shapes (`guard`). If the shapes limit the step by features that are at
+`touch` already and approach, the pair is in contact. Features at `touch` that hover (they approach by less than
+rounding until the end), slide or leave are let go: they may come closer by the slack for rounding, so that neither
+lasting contact nor a rebound is taken for an impact.
 
-With `look_ahead`, the time at which the limiting features come down to `touch` is found by bisection (`guard_witness`); the steps then
-only have to confirm that nothing is earlier. Without it, they are repeated until they are there (conservative advancement).
+With `ahead`, the time at which the limiting features come down to `touch` is found by bisection
+(`guard_witness`); the steps then only have to confirm that nothing is earlier. Without it, they are repeated until
+they are there (conservative advancement).
 """
 
 from __future__ import annotations
@@ -13,7 +15,6 @@ from __future__ import annotations
 from math import inf
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.features import inner
 from rigidimpulse.integrate.course import FIXED
 from rigidimpulse.sweep.bound import MOTION_SIZE, length, motion_bound, stop_turning
 from rigidimpulse.sweep.guard import safe_time
@@ -32,14 +33,14 @@ _GROWTH = 4.0  # how much longer a step is tried after a free one
 _EPSILON = 2.0**-52
 
 
-@inner
+@jit
 def _later(t, s):
     """Return t + s rounded down: never later than that."""
     result = t + s
     return result - _EPSILON * abs(result) if result - t > s else result
 
 
-@inner
+@jit
 def _flight_safe_until(frame, course, scratch, a, b, shape_a, shape_b, t, threshold, horizon):
     """Return (safe time of the bounding spheres or planes, whether it is exact for the shapes)."""
     x, v, acceleration = relative_flight(course, a, b, t)
@@ -59,7 +60,7 @@ def _flight_safe_until(frame, course, scratch, a, b, shape_a, shape_b, t, thresh
     return spheres_safe_until(x, v, acceleration, reach, exact, horizon), exact
 
 
-@inner
+@jit
 def _bring_motions(course, scratch, a, b, shape_a, shape_b, t, horizon):
     """Write the motions of a pair at time t, over a horizon in which neither turns too far; returns that horizon."""
     for side in range(2):
@@ -78,19 +79,29 @@ def _bring_motions(course, scratch, a, b, shape_a, shape_b, t, horizon):
 
 
 @jit
+def _record(result, k, time, status, queries, work):
+    """Write row k of the answer; the witness only where contact is made."""
+    result.time[k], result.status[k], result.queries[k] = time, status, queries
+    if status == IMPACT or status == TOUCHING:
+        for i in range(result.witness.shape[1]):
+            result.witness[k, i] = work[WITNESS + i]
+
+
+@jit
 def first_contacts(
-    geometry, course, scratch, shape_of_body, pairs_a, pairs_b, start, end, touch, tolerance, look_ahead, cylinders, result
+    geometry, course, scratch, shape_of_body, pairs_a, pairs_b, start, end, touch, tolerance, ahead, cylinders, result
 ):
     """Fill in `result` (`ImpactTimes`); arguments as for `bisection.sweep`.
 
-    look_ahead: how far past a safe step the root is looked for, relative to the step; 0 for safe steps only.
-    cylinders: None where no shape is a cylinder.
+    ahead: how far past a safe step the root is looked for, relative to the step; 0 for safe steps only.
+    cylinders: None where no shape is a cylinder, else any int.
     """
     work, index = scratch.work, scratch.index
     for k in range(pairs_a.shape[0]):
         a, b = pairs_a[k], pairs_b[k]
         shape_a, shape_b = shape_of_body[a], shape_of_body[b]
         slack = rounding_slack(course, scratch.reach, a, b, shape_a, shape_b, end)
+        above = max(tolerance[k], slack)
         t, target, trial, floor = start[k], end, end - start[k], touch[k]
         status, queries, is_let_go = STALLED, 0, False
         while queries < MAX_QUERIES:
@@ -112,23 +123,22 @@ def first_contacts(
                 trial, floor, is_let_go = max(_GROWTH * s, trial), touch[k], False
                 continue
             gap, closing = work[WITNESS + GAP], closing_speed(work)
-            near = gap <= touch[k] + max(tolerance[k], slack)
+            near = gap <= touch[k] + above
             if near and closing * (end - t) > slack:
                 status = TOUCHING if t == start[k] and gap <= touch[k] else IMPACT
                 break
             if near and not is_let_go:
                 floor, is_let_go, target = min(gap, touch[k]) - slack, True, end
                 continue
-            ahead = _later(t, 0.5 * s if near and closing < 0.0 else s)  # what leaves is looked at again half way to its return
-            if ahead <= t:
+            if near and closing < 0.0:
+                s *= 0.5  # it leaves: look again half way to its return
+            now, t = t, _later(t, s)
+            if t <= now:
                 status = IMPACT
                 break
-            t, trial, floor, is_let_go = ahead, 2.0 * s, touch[k], False
-            probe = min(target, t + look_ahead * s)
+            trial, floor, is_let_go = 2.0 * s, touch[k], False
+            probe = min(target, t + ahead * s)
             if probe > t and not exact:
-                root, used = witness_root(geometry, course, work, index, a, b, t, probe, touch[k], max(tolerance[k], slack))
+                root, used = witness_root(geometry, course, work, index, a, b, t, probe, touch[k], above)
                 target, queries = min(target, root), queries + used
-        result.time[k], result.status[k], result.queries[k] = t, status, queries
-        if status == IMPACT or status == TOUCHING:
-            for i in range(result.witness.shape[1]):
-                result.witness[k, i] = work[WITNESS + i]
+        _record(result, k, t, status, queries, work)

@@ -1,14 +1,16 @@
 """Safe time of two primitives with many pieces: walks through their box trees, soonest pair of boxes first.
 
-A pair of boxes is bounded along the axes of either box, each carried by its body; only pairs that could lower the safe time found so far
-are opened. A cylinder counts as one box.
+A pair of boxes is bounded along the axes of either box, each carried by its body; only pairs that could lower the
+safe time found so far are opened. A cylinder counts as one box.
 """
 
 from __future__ import annotations
 
-from rigidimpulse.detect.features import along, dot, inner, subtract
+from rigidimpulse._jit import jit
+from rigidimpulse.detect.features import along, dot, subtract
 from rigidimpulse.sweep.bound import SEEN_SIZE, length, put, scaled, turned, turned_back, vector
 from rigidimpulse.sweep.guard_layout import (
+    BASE,
     CARRIER,
     CLOSEST,
     CORNER,
@@ -39,13 +41,13 @@ NO_NODE = -1
 """In place of a tree node: the cylinder."""
 
 
-@inner
+@jit
 def row(array, i):
     """Return row i of an array (k, 3) as a tuple."""
     return array[i, 0], array[i, 1], array[i, 2]
 
 
-@inner
+@jit
 def _load_triangle(vertex, triangle, triangle_normal, i, work, index, side):
     """Put triangle i into the place of the first (0) or second (1) piece, in the frame of the first body."""
     normal = row(triangle_normal, i)
@@ -60,12 +62,13 @@ def _load_triangle(vertex, triangle, triangle_normal, i, work, index, side):
         index[COUNT + side] = 1 if triangle[i, 0] == triangle[i, 1] else 2
 
 
-@inner
+@jit
 def _boxes_safe_until(low, high, centre, half, work, carrier, axes, threshold, horizon):
     """Safe time of a box [low, high] of the first body and a box of the second; 0 where no direction separates them.
 
-    `centre` middle of the second box, `half` its half extents along the columns of the matrix at `axes`; frame of the first body.
-    Directions: the one that limits the safe time so far (`carrier`: its side), and the axes of both boxes.
+    `centre` middle of the second box, `half` its half extents along the columns of the matrix at `axes`; frame of the
+    first body. Directions: the one that limits the safe time so far (`carrier`: its side), and the axes of both
+    boxes.
     """
     middle, half_first = scaled(along(low, 1.0, high), 0.5), scaled(subtract(high, low), 0.5)
     between = subtract(centre, middle)
@@ -74,6 +77,8 @@ def _boxes_safe_until(low, high, centre, half, work, carrier, axes, threshold, h
         k = (trial - 1) % 3
         if trial == 0:
             axis, side = vector(work, LIMIT + DIRECTION), carrier
+            if dot(axis, axis) == 0.0:
+                continue
         elif trial < 4:
             axis, side = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0), 0
         else:
@@ -93,7 +98,7 @@ def _boxes_safe_until(low, high, centre, half, work, carrier, axes, threshold, h
     return best
 
 
-@inner
+@jit
 def _pair_safe_until(node_min, node_max, first, second, work, carrier, threshold, horizon):
     """Safe time of two boxes of the trees, or of one and the cylinder."""
     if second == NO_NODE:
@@ -104,17 +109,35 @@ def _pair_safe_until(node_min, node_max, first, second, work, carrier, threshold
         low, high = row(node_min, second), row(node_max, second)
         centre = along(turned(work, ROTATION, scaled(along(low, 1.0, high), 0.5)), 1.0, vector(work, ORIGIN + 3))
         half, axes = scaled(subtract(high, low), 0.5), ROTATION
-    return _boxes_safe_until(row(node_min, first), row(node_max, first), centre, half, work, carrier, axes, threshold, horizon)
+    return _boxes_safe_until(
+        row(node_min, first), row(node_max, first), centre, half, work, carrier, axes, threshold, horizon
+    )
 
 
-@inner
+@jit
 def _push(work, index, depth, first, second, time):
-    index[STACK + 2 * depth] = first
-    index[STACK + 2 * depth + 1] = second
-    work[STACK_TIME + depth] = time
+    """Put a pair of nodes on the stack, or under the top pair if that one is sooner; returns the new depth."""
+    place = depth
+    if depth > index[BASE] and work[STACK_TIME + depth - 1] < time:
+        place = depth - 1
+        work[STACK_TIME + depth] = work[STACK_TIME + place]
+        for k in range(2):
+            index[STACK + 2 * depth + k] = index[STACK + 2 * place + k]
+    index[STACK + 2 * place] = first
+    index[STACK + 2 * place + 1] = second
+    work[STACK_TIME + place] = time
+    return depth + 1
 
 
-@inner
+@jit
+def _is_larger(node_min, node_max, a, b):
+    """Tell whether the box of node a is longer across than that of b."""
+    across_a = subtract(row(node_max, a), row(node_min, a))
+    across_b = subtract(row(node_max, b), row(node_min, b))
+    return dot(across_a, across_a) >= dot(across_b, across_b)
+
+
+@jit
 def trees_safe_until(nodes, surface, first, second, work, index, threshold, horizon, cylinders):
     """Safe time of two primitives, given by the roots of their trees; NO_NODE for a cylinder as the second.
 
@@ -130,48 +153,42 @@ def trees_safe_until(nodes, surface, first, second, work, index, threshold, hori
     node_min, node_max, child, start, count = nodes
     vertex, triangle, triangle_normal = surface
     put(work, LIMIT + DIRECTION, (0.0, 0.0, 0.0))
-    _push(work, index, FIRST, first, second, 0.0)
-    depth = 1
+    index[BASE] = 0
+    depth = _push(work, index, FIRST, first, second, 0.0)
     while depth > 0 and horizon > 0.0:
         depth -= 1
+        a, b = index[STACK + 2 * depth], index[STACK + 2 * depth + 1]
         if work[STACK_TIME + depth] >= horizon:
             continue
-        a, b = index[STACK + 2 * depth], index[STACK + 2 * depth + 1]
-        leaf_b = b == NO_NODE or child[b] < 0
-        if child[a] < 0 and leaf_b:
-            for j in range(start[b] if b != NO_NODE else 0, start[b] + count[b] if b != NO_NODE else 1):
-                index[COUNT + 1] = 0
-                if b != NO_NODE:
-                    _load_triangle(vertex, triangle, triangle_normal, j, work, index, SECOND)
-                for i in range(start[a], start[a] + count[a]):
-                    _load_triangle(vertex, triangle, triangle_normal, i, work, index, FIRST)
-                    s, carrier = pieces_safe_until(work, index, threshold, horizon, cylinders)
-                    if s < horizon:
-                        horizon = s
-                        index[ELEMENT_A], index[ELEMENT_B], index[CARRIER] = i, j, carrier
-                        for k in range(LIMIT_SIZE):
-                            work[LIMIT + k] = work[CLOSEST + k]
+        index[BASE] = depth
+        open_a = b == NO_NODE or child[b] < 0
+        if child[a] >= 0 or not open_a:
+            if child[a] >= 0 and not open_a:
+                open_a = _is_larger(node_min, node_max, a, b)
+            for k in range(2):
+                next_a, next_b = child[a] + k if open_a else a, b if open_a else child[b] + k
+                time = _pair_safe_until(node_min, node_max, next_a, next_b, work, index[CARRIER], threshold, horizon)
+                if time < horizon:
+                    depth = _push(work, index, depth, next_a, next_b, time)
             continue
-        open_a = leaf_b
-        if child[a] >= 0 and not leaf_b:
-            open_a = length(subtract(row(node_max, a), row(node_min, a))) >= length(subtract(row(node_max, b), row(node_min, b)))
-        before = depth
-        for k in range(2):
-            next_a, next_b = child[a] + k if open_a else a, b if open_a else child[b] + k
-            time = _pair_safe_until(node_min, node_max, next_a, next_b, work, index[CARRIER], threshold, horizon)
-            if time < horizon:
-                if depth > before and time > work[STACK_TIME + before]:  # the sooner one is taken first
-                    _push(work, index, depth, index[STACK + 2 * before], index[STACK + 2 * before + 1], work[STACK_TIME + before])
-                    _push(work, index, before, next_a, next_b, time)
-                else:
-                    _push(work, index, depth, next_a, next_b, time)
-                depth += 1
+        for j in range(start[b] if b != NO_NODE else 0, start[b] + count[b] if b != NO_NODE else 1):
+            index[COUNT + 1] = 0
+            if b != NO_NODE:
+                _load_triangle(vertex, triangle, triangle_normal, j, work, index, SECOND)
+            for i in range(start[a], start[a] + count[a]):
+                _load_triangle(vertex, triangle, triangle_normal, i, work, index, FIRST)
+                s, carrier = pieces_safe_until(work, index, threshold, horizon, cylinders)
+                if s < horizon:
+                    horizon = s
+                    index[ELEMENT_A], index[ELEMENT_B], index[CARRIER] = i, j, carrier
+                    for k in range(LIMIT_SIZE):
+                        work[LIMIT + k] = work[CLOSEST + k]
     return horizon
 
 
-@inner
+@jit
 def half_space_safe_until(nodes, triangle, owns, vertex, root, normal, level, work, index, horizon):
-    """Safe time of a ROUND primitive of the second body above a level along a normal; the vertex that limits it is at ELEMENT_B."""
+    """Safe time of a ROUND primitive of the second body above a level along a normal; ELEMENT_B tells the vertex."""
     node_min, node_max, child, start, count = nodes
     back = turned_back(work, ROTATION, normal)
     level -= dot(normal, vector(work, ORIGIN + 3))

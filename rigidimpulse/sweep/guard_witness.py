@@ -1,15 +1,16 @@
 """The witness of a safe time: the features that limit it and the direction along which they do.
 
-The direction is carried by one of the bodies, so the gap along it at any other pose costs two support functions and no search. It is a lower
-bound of the distance of the features, and equals it for a vertex over a face. The time at which it reaches a value is found cheaply; the
-guard then says whether anything was earlier.
+The direction is carried by one of the bodies, so the gap along it at any other pose costs two support functions and
+no search. It is a lower bound of the distance of the features, and equals it for a vertex over a face. The time at
+which it reaches a value is found cheaply; the guard then says whether anything was earlier.
 """
 
 from __future__ import annotations
 
 from math import inf, log2
 
-from rigidimpulse.detect.features import along, cross, dot, inner, subtract
+from rigidimpulse._jit import jit
+from rigidimpulse.detect.features import along, cross, dot, subtract
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE
 from rigidimpulse.integrate.course import pose_at
 from rigidimpulse.rotation import quaternion_to_matrix
@@ -44,7 +45,7 @@ _EPSILON = 2.0**-52
 _TRUNCATION = 0.2  # kappa_1 of the ITP method times the first bracket; kappa_2 = 2, n_0 = 1
 
 
-@inner
+@jit
 def support_point(kind, radius, frame, vertex, triangle, primitive, element, normal):
     """Return the point of a primitive that is farthest along a unit normal; of a ROUND one, of its element.
 
@@ -69,18 +70,26 @@ def support_point(kind, radius, frame, vertex, triangle, primitive, element, nor
     return along(point, radius[primitive], normal)
 
 
-@inner
+@jit
 def _gap_along(geometry, work, index, direction):
     """Gap of the witness along its direction at the poses at PLACE and FRAME."""
-    kind, radius, frame, vertex, triangle = geometry.kind, geometry.radius, geometry.frame, geometry.vertex, geometry.triangle
+    kind, radius, frame, vertex, triangle = (
+        geometry.kind,
+        geometry.radius,
+        geometry.frame,
+        geometry.vertex,
+        geometry.triangle,
+    )
     normal = turned(work, FRAME + 9 * index[CARRIER], direction)
     own_a, own_b = turned_back(work, FRAME, normal), turned_back(work, FRAME + 9, scaled(normal, -1.0))
     point_a = support_point(kind, radius, frame, vertex, triangle, index[PRIMITIVE_A], index[ELEMENT_A], own_a)
     point_b = support_point(kind, radius, frame, vertex, triangle, index[PRIMITIVE_B], index[ELEMENT_B], own_b)
-    return dot(normal, subtract(vector(work, PLACE + 3), vector(work, PLACE))) - dot(own_b, point_b) - dot(own_a, point_a)
+    return (
+        dot(normal, subtract(vector(work, PLACE + 3), vector(work, PLACE))) - dot(own_b, point_b) - dot(own_a, point_a)
+    )
 
 
-@inner
+@jit
 def _next_trial(low, above, high, below, truncation, least, left):
     """Time at which the gap is looked at next; above > 0 at low, below < 0 at high, `left` evaluations of the budget."""
     middle = 0.5 * (low + high)
@@ -94,16 +103,16 @@ def _next_trial(low, above, high, below, truncation, least, left):
     return t if low < t < high else middle
 
 
-@inner
+@jit
 def witness_root(geometry, course, work, index, a, b, low, high, touch, tolerance):
     """Find where the witness of bodies a and b comes down to `touch` between two times.
 
-    Bisection with interpolation (ITP: Oliveira and Takahashi 2020): at most log2((high - low) / rounding) + 1 evaluations after those at
-    the ends, mostly far fewer.
+    Bisection with interpolation (ITP: Oliveira and Takahashi 2020): at most log2((high - low) / rounding) + 1
+    evaluations after those at the ends, mostly far fewer.
 
     Returns:
-        (t, evaluations): the last time known to be above, where its gap is at most touch + tolerance or t is one rounding from the root;
-        inf if it is not above at low and below at high.
+        (t, evaluations): the last time known to be above, where its gap is at most touch + tolerance or t is one
+        rounding from the root; inf if it is not above at low and below at high.
 
     """
     least = _EPSILON * max(abs(low), abs(high))
@@ -133,7 +142,7 @@ def witness_root(geometry, course, work, index, a, b, low, high, touch, toleranc
     return low, budget + 2
 
 
-@inner
+@jit
 def closing_speed(work):
     """Rate at which the points of the witness approach along its normal, for the motions at MOTION."""
     normal = vector(work, WITNESS + NORMAL)

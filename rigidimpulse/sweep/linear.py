@@ -1,10 +1,13 @@
 """Backing up time by a linear approximation: the gap is taken to shrink at the speed it has at the start.
 
-    t = start + (gap - touch) / c,     c = -n.(v_b + w_b x r_b - v_a - w_a x r_a)   at the closest points, with normal n from a to b
+    t = start + (gap - touch) / c,     c = -n.(v_b + w_b x r_b - v_a - w_a x r_a)
 
-The error is that of a straight line, 1/2 |gap''| (t - start)^2 / c: second order in the step. Two queries a contact. It may miss contacts:
-those of bodies that do not approach at the start because they are still to be accelerated or turned, and those of other features than
-the closest ones; where it is late the bodies overlap. `bisection` does neither.
+with the points that are closest then, and the normal n from a to b.
+
+The error is that of a straight line, 1/2 |gap''| (t - start)^2 / c: second order in the step. Two queries a contact.
+It may miss contacts: those of bodies that do not approach at the start because they are still to be accelerated or
+turned, and those of other features than the closest ones; where it is late the bodies overlap. `bisection` does
+neither.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ from math import inf
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.features import along, cross, dot, inner, subtract
+from rigidimpulse.detect.features import along, cross, dot, subtract
 from rigidimpulse.detect.manifold import pair_gap
 from rigidimpulse.integrate.course import Course, state_at
 from rigidimpulse.rotation import quaternion_to_matrix
@@ -24,9 +27,9 @@ from rigidimpulse.sweep.guard_tree import row
 from rigidimpulse.sweep.impact_time import IMPACT, TOUCHING, ImpactTimes, SweepDetector, no_impacts
 
 
-@inner
+@jit
 def measure(geometry, course, shape_of_body, a, b, t, witness):
-    """Measure the least gap of two bodies at time t; write points, normal and gap to witness (10,), return the closing speed.
+    """Measure the least gap of two bodies: points, normal and gap to witness (10,); returns the closing speed.
 
     Where surfaces cross or coincide, the normal is the line between the centres of mass, and the points tell nothing.
     """

@@ -38,21 +38,23 @@ def random_shape(rng: np.random.Generator) -> ri.Shape:
     if kind == 1:
         return ri.Shape.from_trimesh(trimesh.creation.torus(0.8, 0.3, major_sections=12, minor_sections=8))
     if kind == 2:
-        corner = trimesh.creation.extrude_polygon(_l_shape(), rng.uniform(0.2, 1.0), engine="earcut")
-        return ri.Shape.from_trimesh(corner)
+        return l_prism(float(rng.uniform(0.2, 1.0)))
     star = trimesh.creation.icosphere(subdivisions=1)
     return ri.Shape.mesh(star.vertices * rng.uniform(0.4, 1.0, (len(star.vertices), 1)), star.faces)
 
 
-def _l_shape():
-    from shapely.geometry import Polygon
-
-    return Polygon([(0, 0), (1.2, 0), (1.2, 0.4), (0.4, 0.4), (0.4, 1.0), (0, 1.0)])
+def l_prism(height: float) -> ri.Shape:
+    outline = np.array([(0, 0), (1.2, 0), (1.2, 0.4), (0.4, 0.4), (0.4, 1.0), (0, 1.0)])
+    vertices = np.vstack([np.column_stack([outline, np.full(6, z)]) for z in (0.0, height)])
+    fan = np.array([(0, k, k + 1) for k in range(1, 5)])
+    sides = [f for k in range(6) for f in ((k, (k + 1) % 6, (k + 1) % 6 + 6), (k, (k + 1) % 6 + 6, k + 6))]
+    return ri.Shape.mesh(vertices, np.vstack([fan[:, ::-1], fan + 6, sides]))
 
 
 def random_body(rng, name, position, velocity, material) -> ri.Body:
     axes = to_matrix(random_quaternion(rng))
-    moments = np.exp(rng.normal(size=3) * 0.25)
+    spread = rng.uniform(0.1, 1.0, 3)  # of the mass along each axis: no moment exceeds the sum of the others
+    moments = spread.sum() - spread
     mass = float(np.exp(rng.normal() * 1.5))
     return ri.Body(
         name,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -117,21 +118,13 @@ def test_view_of_arrays_needs_the_scene(scene_file, tmp_path, monkeypatch):
     arrays = tmp_path / "ball.npz"
     assert call("simulate", scene_file, "-o", arrays, "--duration", 0.1).exit_code == 0
     shown = []
+    viewer = SimpleNamespace(fetched=SimpleNamespace(is_set=lambda: True))
 
-    class Viewer:
-        """Stands in for a page that was fetched."""
+    def show(recording):
+        shown.append(recording)
+        return viewer
 
-        def __init__(self, recording):
-            shown.append(recording)
-
-        class fetched:
-            """An event that has come."""
-
-            @staticmethod
-            def is_set():
-                return True
-
-    monkeypatch.setattr(ri.Recording, "show", Viewer)
+    monkeypatch.setattr(ri.Recording, "show", show)
     assert call("view", arrays, "--scene", scene_file).exit_code == 0
     assert shown[0].scene.names == ("floor", "ball")
     assert "--scene" in call("view", arrays).stderr
