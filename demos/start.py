@@ -1,4 +1,4 @@
-"""The main demo, from a clone and Python alone: throws Spot the cow over a torus and writes the motion as a web page.
+"""The main demo, from a clone and Python alone: throws Spot the cow at a torus and writes the motion as a web page.
 
     python demos/start.py            then open spot.html in a browser
     python demos/start.py NAME       another gallery scene

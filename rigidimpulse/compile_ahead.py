@@ -1,7 +1,7 @@
-"""Compile kernels on a second core while the first run compiles the others.
+"""The first run on a machine: compile kernels on two cores.
 
-Numba compiles one kernel at a time in a process. On the first run on a machine a second process compiles those that the run needs last
-(sweep, respond, constrain) into the cache on disk, while the run itself starts with those it needs first.
+Numba compiles one kernel at a time in a process. So a second process compiles one half of what a run with contacts needs (sweep and
+constrain) into the cache on disk, while the first one compiles the other half, and then waits for it.
 """
 
 from __future__ import annotations
@@ -11,65 +11,79 @@ import sys
 
 import numpy as np
 
-
-def start_in_second_process(with_cylinders: bool) -> subprocess.Popen:
-    """Start compiling in a process of its own; it ends by itself, and nobody has to wait for it."""
-    command = [sys.executable, "-m", "rigidimpulse.compile_ahead", *(["cylinders"] if with_cylinders else [])]
-    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+CYLINDERS = "cylinders"
 
 
-def compile_late_kernels(with_cylinders: bool) -> None:
-    """Call the kernels that a run with contacts needs last, on a box above a floor."""
+def compile_kernels(world) -> None:
+    """Compile what a run of a world with contacts needs. Should the second process fail, its half is compiled when used."""
+    shapes = [CYLINDERS] if world.cylinders is not None else []
+    command = [sys.executable, "-m", "rigidimpulse.compile_ahead", *shapes]
+    quiet = subprocess.DEVNULL
+    with subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet):
+        _detect_and_respond(_box_on_floor(bool(shapes)))
+
+
+def _box_on_floor(with_cylinder: bool):
+    """Context of a scene that has a contact from the start."""
     from rigidimpulse.body import Body
-    from rigidimpulse.detect.groups import empty_contacts
     from rigidimpulse.observe.events import EventLog
     from rigidimpulse.observe.recorder import Recorder
     from rigidimpulse.scene import Scene
     from rigidimpulse.shape import Shape
     from rigidimpulse.simulate import start_courses
     from rigidimpulse.state import StepContext
-    from rigidimpulse.sweep import bisection
     from rigidimpulse.world import compile_scene
 
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static")])
-    scene.add(Body("body", Shape.cylinder(1, 1) if with_cylinders else Shape.box((1, 1, 1)), position=(0, 0, 1)))
-    world = compile_scene(scene)
-    context = StepContext(world, Recorder(np.zeros(1), 2), EventLog())
+    shape = Shape.cylinder(1, 1) if with_cylinder else Shape.box((1, 1, 1))
+    scene.add(Body("body", shape, position=(0, 0, 0.5), velocity=(0, 0, -1)))
+    context = StepContext(compile_scene(scene), Recorder(np.zeros(1), 2), EventLog())
     start_courses(context)
-    pair, zero = (np.array([0]), np.array([1])), np.zeros(1)
-    bisection.sweep(context.detector, context.state.course, *pair, zero, 1.0 / 60.0, zero, zero)
+    return context
+
+
+def _group(context):
+    from rigidimpulse.detect.window import Window
+
+    window = Window(context, 1.0 / 60.0)
+    window.find_pairs()
+    return window, window.touching(0.0, np.array([1]))[0]
+
+
+def _detect_and_respond(context) -> None:
+    from rigidimpulse.respond.response import respond_to_impacts
+    from rigidimpulse.respond.simultaneous import respond_sequential
+
+    context.recorder.start(context.state.course)
+    _, group = _group(context)
+    respond_to_impacts(context, group, respond_sequential)
+
+
+def _sweep_and_constrain(context) -> None:
+    from rigidimpulse.constrain.drift import lift_contacts, needs_lift
+    from rigidimpulse.constrain.resting import hold_contacts, turning_of
+    from rigidimpulse.detect.groups import empty_contacts
+    from rigidimpulse.sweep import bisection
+
+    state, world, now = context.state, context.world, context.state.now
+    one, zero = np.ones(1), np.zeros(1)
+    bisection.sweep(context.detector, state.course, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
     contacts = empty_contacts(1)
     for column in contacts:
         column[...] = 0
     contacts.body_b[:] = 1
     contacts.normal[:] = (0.0, 0.0, 1.0)
-    _compile_response(context, contacts)
-    _compile_constraints(context, contacts)
-
-
-def _compile_response(context, contacts) -> None:
-    from rigidimpulse.respond.impulse import speed_scale
-    from rigidimpulse.respond.simultaneous import respond_sequential
-
-    now = context.state.now
-    respond_sequential(now, contacts, np.zeros(1), 0.0, speed_scale(now, contacts), context.column, context.impact_log)
-
-
-def _compile_constraints(context, contacts) -> None:
-    from rigidimpulse.constrain.drift import lift_contacts, needs_lift
-    from rigidimpulse.constrain.resting import hold_contacts, turning_of
-
-    state, world, now = context.state, context.world, context.state.now
     now.inv_inertia[1] = np.eye(3)
-    kinds, held = np.zeros(1, np.int64), np.ones(1, bool)
-    turning = turning_of(world.geometry, world.shape_of_body, state.rotation, now, contacts, kinds)
+    turning = turning_of(
+        world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64)
+    )
     hold_contacts(
         now, contacts, np.arange(1), turning, context.acceleration, context.angular_acceleration, 1.0, context.column,
         np.zeros((1, 3)), context.wrench,
     )
-    needs_lift(contacts, held, np.ones(1))
-    lift_contacts(now, contacts, held, np.ones(1), context.column)
+    needs_lift(contacts, np.ones(1, bool), one)
+    lift_contacts(now, contacts, np.ones(1, bool), one, context.column)
 
 
 if __name__ == "__main__":
-    compile_late_kernels("cylinders" in sys.argv[1:])
+    _sweep_and_constrain(_box_on_floor(CYLINDERS in sys.argv[1:]))

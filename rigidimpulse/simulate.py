@@ -10,7 +10,7 @@ import numpy as np
 
 from rigidimpulse._jit import kernels_are_cached
 from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.compile_ahead import start_in_second_process
+from rigidimpulse.compile_ahead import compile_kernels
 from rigidimpulse.constrain.contact_forces import ContactForces
 from rigidimpulse.detect.overlap import report_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
@@ -68,7 +68,7 @@ def simulate(
     if not kernels_are_cached():
         logger.warning("compiling kernels for the first run on this machine, once: this takes up to a minute")
         if world.can_collide:
-            start_in_second_process(world.cylinders is not None)
+            compile_kernels(world)
     plan = make_plan(world)
     recorder = Recorder(times, world.num_bodies)
     log = EventLog()

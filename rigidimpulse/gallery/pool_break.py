@@ -12,6 +12,8 @@ run is compared with the exact one, impact by impact.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from rigidimpulse.body import Body
@@ -52,7 +54,7 @@ LAW_BOUND = 1e-12
 
 def scene() -> Scene:
     """Return the table and sixteen balls."""
-    smooth = {"static_friction": 0.0, "dynamic_friction": 0.0, "restitution_combine": "minimum"}
+    smooth: dict[str, Any] = {"static_friction": 0.0, "dynamic_friction": 0.0, "restitution_combine": "minimum"}
     rubber = Material(restitution=CUSHION_RESTITUTION, **smooth)
     resin = Material(restitution=BALL_RESTITUTION, **smooth)
     scene = Scene(gravity=(0.0, 0.0, 0.0))

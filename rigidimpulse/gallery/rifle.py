@@ -12,6 +12,7 @@ and so measures their momentum.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def scene() -> Scene:
     scene = Scene(gravity=(0.0, 0.0, 0.0))
     shape = _rifle()
     ball = Shape.sphere(BALL_RADIUS)
-    smooth = {"static_friction": 0.0, "dynamic_friction": 0.0}
+    smooth: dict[str, Any] = {"static_friction": 0.0, "dynamic_friction": 0.0}
     soft = Material(restitution=0.0, restitution_combine="minimum", **smooth)
     wall, place = Shape.box((0.1, 2.5 * DISTANCE, 0.5)), (BACKSTOP + 0.05, 0.5 * DISTANCE, 0.0)
     scene.add(Body("backstop", wall, motion="static", position=place, material=soft))
@@ -57,7 +58,7 @@ def scene() -> Scene:
         powder = Material(
             density=BALL_DENSITY, restitution=e, restitution_combine="minimum", any_restitution=True, **smooth
         )
-        own = {"mass": mass, "center_of_mass": (0.0, 0.0, 0.0), "material": Material(**smooth)}
+        own: dict[str, Any] = {"mass": mass, "center_of_mass": (0.0, 0.0, 0.0), "material": Material(**smooth)}
         y = k * DISTANCE
         back, forth = (-APPROACH_SPEED * mass / total, 0.0, 0.0), (APPROACH_SPEED * BALL_MASS / total, 0.0, 0.0)
         scene.add(Body(name, shape, position=(0.0, y, 0.0), velocity=forth, **own))

@@ -1,4 +1,4 @@
-"""Spot the cow is thrown over a torus that lies on the floor: concave against concave, 5,856 against 4,096 triangles.
+"""Spot the cow is thrown at a torus that lies on the floor: concave against concave, 5,856 against 4,096 triangles.
 
 There is no closed form for the motion, but laws hold at every impact: no impact makes energy, friction stays in its
 cone, the cow never enters floor or torus, and the energy it has lost is what the ledger says was taken.
@@ -116,4 +116,4 @@ def _depths(run: Recording, vertices: np.ndarray) -> tuple[float, float]:
     return lowest, inside
 
 
-SCENES = (GalleryScene("spot", "Spot the cow is thrown over a torus: concave against concave", scene, check, DURATION),)
+SCENES = (GalleryScene("spot", "Spot the cow is thrown at a torus: concave against concave", scene, check, DURATION),)

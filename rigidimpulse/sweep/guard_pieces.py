@@ -168,8 +168,8 @@ def _face_direction(work, index, side):
 def pieces_safe_until(work, index, threshold, horizon, cylinders):
     """Safe time of the two convex pieces at COUNT and CORNER, FACE or CYLINDER.
 
-    Of a simplex and a cylinder the cylinder is the second. If the result is short of the horizon, the record at CLOSEST tells what limits it. Of the record at LIMIT the
-    direction is tried first (zeros if there is none).
+    Of a simplex and a cylinder the cylinder is the second. If the result is short of the horizon, the record at CLOSEST
+    tells what limits it. Of the record at LIMIT the direction is tried first (zeros if there is none).
 
     Args:
         work, index: see `guard_layout`.

@@ -62,10 +62,9 @@ def safe_until(gap, closing, bend, horizon):
 
 @jit
 def point_safe_until(work, seen, normal, arm, reach, gap, horizon):
-    """Safe time of all points within `reach` of the one at `arm`, along a carried normal that points at the moving body.
+    """Safe time of all points within `reach` of the one at `arm`, along a carried normal that points at them.
 
-    `seen`: place in `work` of the motion of the moving body as seen from the carrier; `gap`: what is left above the
-    threshold, m.
+    `seen`: place in `work` of their motion as seen from the carrier; `gap`: what is left above the threshold, m.
     """
     velocity, acceleration = seen_motion(work, seen, arm)
     jerk = work[seen + SEEN_JERK] + work[seen + SEEN_ARM_JERK] * (length(arm) + reach)

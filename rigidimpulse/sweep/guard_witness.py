@@ -84,14 +84,13 @@ def _gap_along(geometry, work, index, direction):
     own_a, own_b = turned_back(work, FRAME, normal), turned_back(work, FRAME + 9, scaled(normal, -1.0))
     point_a = support_point(kind, radius, frame, vertex, triangle, index[PRIMITIVE_A], index[ELEMENT_A], own_a)
     point_b = support_point(kind, radius, frame, vertex, triangle, index[PRIMITIVE_B], index[ELEMENT_B], own_b)
-    return (
-        dot(normal, subtract(vector(work, PLACE + 3), vector(work, PLACE))) - dot(own_b, point_b) - dot(own_a, point_a)
-    )
+    between = subtract(vector(work, PLACE + 3), vector(work, PLACE))
+    return dot(normal, between) - dot(own_b, point_b) - dot(own_a, point_a)
 
 
 @jit
 def _next_trial(low, above, high, below, truncation, least, left):
-    """Time at which the gap is looked at next; above > 0 at low, below < 0 at high, `left` evaluations of the budget."""
+    """Time at which the gap is looked at next; above > 0 at low, below < 0 at high, `left` evaluations are left."""
     middle = 0.5 * (low + high)
     radius = least * 2.0**left - 0.5 * (high - low)
     secant = (above * high - below * low) / (above - below)
