@@ -25,6 +25,7 @@ CAPTURE_PASSES = 4
 # Residual asked of the solver and slip that counts, relative to the speed gained in the sub-step.
 SOLVE_TOLERANCE = 1e-12
 SLIP = 1e-9
+POOR = 1e-8
 BILATERAL_REGULARISATION = 1e-13
 # Which body carries the normal of a contact kind: vertex-face and face-vertex, half space; others share it.
 CARRIER_B, CARRIER_A, SHARED = 0, 1, 2
@@ -152,17 +153,24 @@ def _solve(jacobian, u, a, h, contacts, subset, scale, p):
         c = subset[s]
         slips = abs(u[3 * s + 1]) + abs(u[3 * s + 2]) > SLIP * scale
         mu[s] = contacts.dynamic_friction[c] if slips else contacts.static_friction[c]
-    residual = solve_cone(jacobian, b, mu, p, SOLVE_TOLERANCE * scale)
-    multiply_transposed(jacobian, p, y)
-    multiply(jacobian, y, after)
-    changed = False
-    for s in range(m):
-        slip = abs(b[3 * s + 1] + after[3 * s + 1]) + abs(b[3 * s + 2] + after[3 * s + 2])
-        if mu[s] != contacts.dynamic_friction[subset[s]] and slip > SLIP * scale:
-            mu[s] = contacts.dynamic_friction[subset[s]]
-            changed = True
-    if changed:
+    residual = 0.0
+    for attempt in range(3):
         residual = solve_cone(jacobian, b, mu, p, SOLVE_TOLERANCE * scale)
+        if residual > POOR * scale and attempt == 0:
+            # A misleading start: once more from nothing.
+            for i in range(3 * m):
+                p[i] = 0.0
+            continue
+        multiply_transposed(jacobian, p, y)
+        multiply(jacobian, y, after)
+        changed = False
+        for s in range(m):
+            slip = abs(b[3 * s + 1] + after[3 * s + 1]) + abs(b[3 * s + 2] + after[3 * s + 2])
+            if mu[s] != contacts.dynamic_friction[subset[s]] and slip > SLIP * scale:
+                mu[s] = contacts.dynamic_friction[subset[s]]
+                changed = True
+        if not changed:
+            break
     return residual
 
 
