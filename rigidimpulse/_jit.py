@@ -20,6 +20,8 @@ from numba.core.caching import FunctionCache
 from numba.extending import typeof_impl
 
 _PACKAGE = Path(__file__).parent
+_njit: Any = numba.njit
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
 _IMPORT = re.compile(rb"^\s*from rigidimpulse\.?([\w.]*) import (?:\(|([\w, ]+))", re.MULTILINE)
 
 
@@ -65,12 +67,12 @@ class Kernel:
         """Nothing is compiled before the first call."""
         update_wrapper(self, function)
         self.py_func = function
-        self.part = numba.njit(error_model="numpy", no_cfunc_wrapper=True, no_cpython_wrapper=True)(function)
+        self.part = _njit(no_cpython_wrapper=True, **_OPTIONS)(function)
 
     @cached_property
     def entry(self) -> Any:
         """The dispatcher that Python calls."""
-        dispatcher = numba.njit(error_model="numpy", no_cfunc_wrapper=True)(self.py_func)
+        dispatcher = _njit(**_OPTIONS)(self.py_func)
         dispatcher._cache = _KernelCache(self.py_func)
         return dispatcher
 

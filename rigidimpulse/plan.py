@@ -1,7 +1,7 @@
 """The plan: which effects a scene calls for, bound to it, in the order of the loop.
 
-An effect is a frozen dataclass of settings with a `stage` and `bind(world) -> function | Skip(reason)`. What is skipped is not in the plan: it
-costs nothing, and `explain` says why.
+An effect is a frozen dataclass of settings with a `stage` and `bind(world) -> function | Skip(reason)`. What is
+skipped is not in the plan: it costs nothing, and `explain` says why.
 """
 
 from __future__ import annotations

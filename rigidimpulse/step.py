@@ -1,8 +1,9 @@
 """One step of the loop, and what happens at an instant: detect, respond, forces, constrain, sweep, integrate, observe.
 
-Every body has a course: its exact path since something last acted on it. A step opens a window of pairs that may meet before its end, then
-goes from contact to contact: at the earliest time at which a pair touches, the group of bodies that touch there is brought to that time
-and gets its impulses and contact forces; those whose course changed are swept again. Bodies elsewhere do not notice.
+Every body has a course: its exact path since something last acted on it. A step opens a window of pairs that may meet
+before its end, then goes from contact to contact: at the earliest time at which a pair touches, the group of bodies
+that touch there is brought to that time and gets its impulses and contact forces; those whose course changed are
+swept again. Bodies elsewhere do not notice.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Drift: contacts that last are kept at their gap by position alone.
 
-Second-order paths leave a load-bearing contact slightly above or below the gap delta it is held at. When it has sunk below SUNK delta, the
-bodies of the group are moved by the least displacement in the metric of mass,  dx = M^-1 J_n^T p,  0 <= p _|_ g + J_n dx - target >= 0, that
-brings it back to delta and lets no other contact sink. Velocities do not change; the potential energy it costs is booked in the ledger.
+Second-order paths leave a load-bearing contact slightly above or below the gap delta it is held at. When it has sunk
+below SUNK delta, the bodies of the group are moved by the least displacement in the metric of mass,  dx = M^-1 J_n^T
+p,  0 <= p _|_ g + J_n dx - target >= 0, that brings it back to delta and lets no other contact sink. Velocities do
+not change; the potential energy it costs is booked in the ledger.
 """
 
 import numpy as np

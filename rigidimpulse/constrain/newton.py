@@ -1,17 +1,20 @@
 """The exact solver of rows for small islands: normal complementarity and the true Coulomb cone.
 
-Problem. With J the Jacobian of m contacts (three rows each: normal n, tangents s, t), M the mass matrix, Jh = J M^(-1/2)
-the mass-scaled Jacobian and b the velocity the contacts would have without impulses, find impulses p and velocities u with
+Problem. With J the Jacobian of m contacts (three rows each: normal n, tangents s, t), M the mass matrix, Jh = J
+M^(-1/2) the mass-scaled Jacobian and b the velocity the contacts would have without impulses, find impulses p and
+velocities u with
 
     u = b + Jh Jh^T p,      0 <= p_n  _|_  u_n >= 0,      |p_t| <= mu p_n,      p_t = -mu p_n u_t / |u_t| where u_t != 0.
 
-Method. Outside a proximal method of multipliers (Rockafellar 1976) with regularisation R = k diag(Jh Jh^T), k driven from 1e-3 to
-1e-9, which makes redundant points harmless; inside a semi-smooth Newton method (Alart & Curnier 1991) on y = Jh^T p:
+Method. Outside a proximal method of multipliers (Rockafellar 1976) with regularisation R = k diag(Jh Jh^T), k driven
+from 1e-3 to 1e-9, which makes redundant points harmless; inside a semi-smooth Newton method (Alart & Curnier 1991) on
+y = Jh^T p:
 
     p(u) = projection of q - u / R on the cone of the current normal impulse,      F(y) = y - Jh^T p(b + Jh y) = 0,
 
-with a halving line search on |F|. Where the line search fails k is raised; as the last resort one step is made with the radius of
-the cone frozen, for which the problem is convex. The answer with the least natural-map residual is returned, with that residual.
+with a halving line search on |F|. Where the line search fails k is raised; as the last resort one step is made with
+the radius of the cone frozen, for which the problem is convex. The answer with the least natural-map residual is
+returned, with that residual.
 """
 
 from math import sqrt

@@ -1,16 +1,18 @@
 """Contacts that last: forces that hold touching bodies apart over a sub-step.
 
-Over a sub-step of length h the contact forces f are constant. Row i of the contact has the velocity u_i + h a_i + W p_i at the end, p = h f,
-with u the velocity now and a the acceleration the row would have without contact forces:
+Over a sub-step of length h the contact forces f are constant. Row i of the contact has the velocity u_i + h a_i + W
+p_i at the end, p = h f, with u the velocity now and a the acceleration the row would have without contact forces:
 
     a_n = n.(a_b + alpha_b x r_b + w_b x (w_b x r_b) - the same of a) - 2 n.(w_c x u) + |u_t|^2 / L
 
-w x (w x r) is taken with the arm to the feature that moves with the body (the centre line of a rounded one); w_c is the spin of the body that
-carries the normal; the last term, for two rounded bodies with centre lines L apart, is the turning of the normal itself. The solver finds p >= 0
-in Coulomb's cone so that no contact approaches at the end. Positions follow x0 + v0 h + a h^2 / 2, so sliding and standing are exact.
+w x (w x r) is taken with the arm to the feature that moves with the body (the centre line of a rounded one); w_c is
+the spin of the body that carries the normal; the last term, for two rounded bodies with centre lines L apart, is the
+turning of the normal itself. The solver finds p >= 0 in Coulomb's cone so that no contact approaches at the end.
+Positions follow x0 + v0 h + a h^2 / 2, so sliding and standing are exact.
 
-A contact that carries load but leaves slowly (it would rise less than the gap it is held at) is captured first: its normal velocity is set to
-zero in the metric of mass, which only dissipates; otherwise the force would do work on it and it would hover for ever.
+A contact that carries load but leaves slowly (it would rise less than the gap it is held at) is captured first: its
+normal velocity is set to zero in the metric of mass, which only dissipates; otherwise the force would do work on it
+and it would hover for ever.
 """
 
 import numpy as np

@@ -1,8 +1,9 @@
 """Rows of contacts: the mass-scaled Jacobian that the solvers see.
 
-Contact c of bodies a, b gives three rows, for d in (n, t1, t2):   J = [ -d, -(r_a x d), d, r_b x d ].   With M = C^-T C^-1 a body's
-mass matrix (linear part C = m^(-1/2), angular part the Cholesky factor of the inverse inertia), Jh = J C, so that the contacts'
-inverse effective mass is W = Jh Jh^T and impulses p change velocities by C Jh^T p. Immovable bodies have no columns.
+Contact c of bodies a, b gives three rows, for d in (n, t1, t2):   J = [ -d, -(r_a x d), d, r_b x d ].   With M = C^-T
+C^-1 a body's mass matrix (linear part C = m^(-1/2), angular part the Cholesky factor of the inverse inertia), Jh = J
+C, so that the contacts' inverse effective mass is W = Jh Jh^T and impulses p change velocities by C Jh^T p. Immovable
+bodies have no columns.
 """
 
 from math import sqrt

@@ -109,7 +109,8 @@ def pair_contacts(
     """Append every touching pair of features of two shapes with gap <= margin [m].
 
     x (3,), R (3, 3): poses of the principal frames; `count`: rows in use; buffers: see the top of this module;
-    `cylinders`: None where no shape is a cylinder, which then is not compiled either. Returns the new count, or minus the rows needed if there are fewer: then the rows from `count` on mean nothing.
+    `cylinders`: None where no shape is a cylinder, which then is not compiled either. Returns the new count, or minus
+    the rows needed if there are fewer: then the rows from `count` on mean nothing.
 
     Bodies are taken to be apart. Overlap keeps its meaning (gap < 0, the right normal) for half spaces, and for spheres
     and capsules until an axis is touched; meshes allow only what round-off makes.

@@ -1,7 +1,8 @@
 """Overlap at the start: found with FCL before the first frame, and reported.
 
-Bodies that merely touch are no overlap. FCL's yes-or-no answer counts touching, so a pair is an overlap only if it stays one when a body is
-moved by DEPTH of its size along each axis: whoever only touches, along whatever normal, is free in one of the six directions.
+Bodies that merely touch are no overlap. FCL's yes-or-no answer counts touching, so a pair is an overlap only if it
+stays one when a body is moved by DEPTH of its size along each axis: whoever only touches, along whatever normal, is
+free in one of the six directions.
 """
 
 from __future__ import annotations

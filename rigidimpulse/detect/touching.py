@@ -1,11 +1,13 @@
-"""Which bodies touch at one instant: poses brought to it, manifolds of the pairs in question, and what presses each contact.
+"""Which bodies touch at one instant: poses brought to it, manifolds of the pairs in question, and what presses each
+contact.
 
 The acceleration that presses contact i together, without the force the contact itself carried before, is
 
     a_i = -n.(acceleration of b's point - acceleration of a's point) + f_i (n.K n)
 
-with the present accelerations of the bodies (forces and contacts included) and f_i the normal force it carried. It is what a rebound is
-measured against: one that rises less than delta, v^2 < 2 a delta, is none, and a contact that leaves more slowly than that is held.
+with the present accelerations of the bodies (forces and contacts included) and f_i the normal force it carried. It is
+what a rebound is measured against: one that rises less than delta, v^2 < 2 a delta, is none, and a contact that
+leaves more slowly than that is held.
 """
 
 from math import sqrt

@@ -1,7 +1,8 @@
 """The pairs of one step: which bodies may meet in it, at which gap a contact is declared, and when each pair comes to it.
 
-Boxes enclose each body's bounding sphere along its path to the end of the step. When a body changes course its box is made anew and pairs
-that it may now reach are added; pairs of which a body changed course are swept again, all others keep their time.
+Boxes enclose each body's bounding sphere along its path to the end of the step. When a body changes course its box is
+made anew and pairs that it may now reach are added; pairs of which a body changed course are swept again, all others
+keep their time.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ class ExactFlight:
 
 def integrate(context, window, group: Group) -> None:
     """Give new courses to members whose velocity, pose or wrench changed, and set the gaps at which pairs meet next."""
-    state, world, now = context.state, context.world, context.state.now
+    state, now = context.state, context.state.now
     course = state.course
     for n, i in enumerate(group.members):
         changed = (

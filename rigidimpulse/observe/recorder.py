@@ -1,7 +1,8 @@
 """The recorder: samples every body's exact path at the frame times, whatever the frame rate, without touching the motion.
 
-A body's path is fixed from one change of course to the next. Before a body's course changes at time t its frames before t are written; a
-frame at the very time of an impact shows the state after it, but frame 0 is the state as given.
+A body's path is fixed from one change of course to the next. Before a body's course changes at time t its frames
+before t are written; a frame at the very time of an impact shows the state after it, but frame 0 is the state as
+given.
 """
 
 from __future__ import annotations

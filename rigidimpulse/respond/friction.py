@@ -1,14 +1,15 @@
 """Coulomb's law at a single impact: stick when the cone allows it, else slide; energy never grows.
 
-K (3, 3) is the inverse effective mass of the contact (A9), u the relative velocity of the contact points before, n the normal.
+K (3, 3) is the inverse effective mass of the contact (A9), u the relative velocity of the contact points before, n
+the normal.
 
     stick   J = -K^-1 (u + e (u.n) n + e_t u_t),                       accepted if |J_t| <= mu_s J.n
     slide   J = j (n - mu_k d),  j = -(1 + e) (u.n) / (n.K (n - mu_k d)),  d the direction of the slip *after* the impact
 
-d is the root of (slip after) x d = 0 with (slip after).d >= 0, so that friction opposes the slip that remains (de Saxce and Feng
-1998). Without coupling of normal and tangential motion (spheres) it is the slip before, and J_t = mu j. Newton's law with friction
-can make energy (Kane and Levinson 1985): then e and e_t are reduced together by the factor at which no energy is made;
-for both zero the impact dissipates.
+d is the root of (slip after) x d = 0 with (slip after).d >= 0, so that friction opposes the slip that remains (de
+Saxce and Feng 1998). Without coupling of normal and tangential motion (spheres) it is the slip before, and J_t = mu
+j. Newton's law with friction can make energy (Kane and Levinson 1985): then e and e_t are reduced together by the
+factor at which no energy is made; for both zero the impact dissipates.
 """
 
 from math import cos, pi, sin, sqrt

@@ -6,8 +6,9 @@ A contact has arms r_a, r_b from the centres of mass to its points and the unit 
     K = (1/m_a + 1/m_b) 1 - [r_a]x I_a^-1 [r_a]x - [r_b]x I_b^-1 [r_b]x     inverse effective mass
     j = -(1 + e) u.n / (n.K n)                                             frictionless impulse, A9 (Hahn 1988; Baraff 1989)
 
-the impulse J acts + on b and - on a at the contact: v_b += J / m_b, w_b += I_b^-1 (r_b x J), and the mirror for a. Immovable bodies have
-zero inverse mass and inertia. All bodies' rows stand in arrays of the whole scene; a kernel touches only those its contacts name.
+the impulse J acts + on b and - on a at the contact: v_b += J / m_b, w_b += I_b^-1 (r_b x J), and the mirror for a.
+Immovable bodies have zero inverse mass and inertia. All bodies' rows stand in arrays of the whole scene; a kernel
+touches only those its contacts name.
 """
 
 from math import sqrt

@@ -2,8 +2,9 @@
 
     v' = v - (1 + k) (v.n) n,        k the restitution
 
-for a body that meets an immovable one, v relative to it. Of two movable bodies each takes half of the change, whatever their masses. Spins
-do not change and there is no friction. It is the cheapest response and conserves neither momentum nor the angle of a bounce with spin.
+for a body that meets an immovable one, v relative to it. Of two movable bodies each takes half of the change,
+whatever their masses. Spins do not change and there is no friction. It is the cheapest response and conserves neither
+momentum nor the angle of a bounce with spin.
 """
 
 import numpy as np

@@ -74,7 +74,7 @@ def respond_to_impacts(context, group: Group, kernel) -> None:
     rest_speed = np.where(_rattles(context, group.time, contacts), np.inf, rest_speed)
     before = kinetic_energy(now, context.world, group.members)
     for _ in range(MAX_CALLS):
-        count, impulses, capped = kernel(now, contacts, rest_speed, tolerance, scale, context.column, context.impact_log)
+        count, _, capped = kernel(now, contacts, rest_speed, tolerance, scale, context.column, context.impact_log)
         _log(context, group.time, contacts, context.impact_log[:count])
         _remember_rebounds(context, group, contacts, context.impact_log[:count])
         if capped:

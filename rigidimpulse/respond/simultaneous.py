@@ -1,14 +1,15 @@
 """Impacts of many contacts at one instant.
 
-`solve_block` treats its contacts all at once: find impulses p with u+ = u + W p, where for approaching contacts the target is
-u_n+ >= -e u_n (Newton's law), complementary to p_n >= 0, with Coulomb's cone (see constrain/newton.py). If that made energy (Newton's
-law with friction can), the fully inelastic answer p0 is taken (1 + e) times: the change of energy along s p0 is
-q s (s / 2 - 1) with q = p0.W p0 >= 0, never positive for s <= 2.
+`solve_block` treats its contacts all at once: find impulses p with u+ = u + W p, where for approaching contacts the
+target is u_n+ >= -e u_n (Newton's law), complementary to p_n >= 0, with Coulomb's cone (see constrain/newton.py). If
+that made energy (Newton's law with friction can), the fully inelastic answer p0 is taken (1 + e) times: the change of
+energy along s p0 is q s (s / 2 - 1) with q = p0.W p0 >= 0, never positive for s <= 2.
 
-`respond_sequential` goes contact pair by contact pair, fastest approach first, one block inside a pair (a box landing on a face is one
-impact with four points); what no longer rebounds is finished by one inelastic block. It passes k balls for k in Newton's cradle.
-`respond_simultaneous` takes the whole group as one block. Both follow the rules of Smith et al. 2012 (momentum kept, one-sided
-impulses, energy bounded); they differ in which of the physically possible answers a chain of bodies gives.
+`respond_sequential` goes contact pair by contact pair, fastest approach first, one block inside a pair (a box landing
+on a face is one impact with four points); what no longer rebounds is finished by one inelastic block. It passes k
+balls for k in Newton's cradle. `respond_simultaneous` takes the whole group as one block. Both follow the rules of
+Smith et al. 2012 (momentum kept, one-sided impulses, energy bounded); they differ in which of the physically possible
+answers a chain of bodies gives.
 """
 
 import numpy as np

@@ -210,6 +210,7 @@ def pieces_safe_until(work, index, threshold, horizon, cylinders):
             best, carrier, direction = s, side, normal
     if separation <= 0.0:
         best = 0.0
+        put(work, CLOSEST + NORMAL, (0.0, 0.0, 0.0))
     elif edges >= 0:
         best = max(best, _with_edges(work, index, edges, normal, threshold, horizon))
     work[CLOSEST + GAP] = separation

@@ -143,8 +143,10 @@ def witness_root(geometry, course, work, index, a, b, low, high, touch, toleranc
 
 @jit
 def closing_speed(work):
-    """Rate at which the points of the witness approach along its normal, for the motions at MOTION."""
+    """Rate at which the points of the witness approach along its normal, for the motions at MOTION; inf without normal."""
     normal = vector(work, WITNESS + NORMAL)
+    if dot(normal, normal) == 0.0:
+        return inf
     result = 0.0
     for side in range(2):
         motion = MOTION + MOTION_SIZE * side

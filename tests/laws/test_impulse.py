@@ -1,15 +1,16 @@
 """A9, the impulse with angular response, on 1,000 random pairs of meshes.
 
-Law. Two bodies meet at point p with unit normal n from a to b. With r = p - x, u = v_b + w_b x r_b - v_a - w_a x r_a and
-K = sum over both of 1/m - [r]x I^-1 [r]x:
+Law. Two bodies meet at point p with unit normal n from a to b. With r = p - x, u = v_b + w_b x r_b - v_a - w_a x r_a
+and K = sum over both of 1/m - [r]x I^-1 [r]x:
 
     j = -(1 + e) u.n / (n.K n),     m_b dv_b = j n = -m_a dv_a,     dL_b = r_b x j n = -(about the other centre) dL_a,
     dT = -(1 - e^2) (u.n)^2 / (2 n.K n).
 
-Everything on the right is computed here from the state just before the impact, which comes from a run of each body alone.
+Everything on the right is computed here from the state just before the impact, which comes from a run of each body
+alone.
 
-Tolerance. All terms are sums of products of O(1) doubles: 1e-12 relative leaves three digits for the condition of K. Leaving out the
-angular part of K is off by 10 to 80 % on these pairs; leaving out the spin in u by 100 %.
+Tolerance. All terms are sums of products of O(1) doubles: 1e-12 relative leaves three digits for the condition of K.
+Leaving out the angular part of K is off by 10 to 80 % on these pairs; leaving out the spin in u by 100 %.
 """
 
 from __future__ import annotations

@@ -1,11 +1,13 @@
 """A cube that lands on a vertex, e = 1, no friction: velocity and spin after the impact against the closed form.
 
-Law. A unit cube has equal moments I = m a^2 / 6, so its spin is constant in flight and its path is known: centre z0 - g t^2 / 2, orientation
-exp(w t) q0. The time of impact is the root of the lowest vertex's height (found here by Brent's method to 1e-16), and with
-r the arm of that vertex:  j = 2 m |u_z| / (1 + m |r x n|^2 / I),  v_z += j / m,  w += r x j n / I.
+Law. A unit cube has equal moments I = m a^2 / 6, so its spin is constant in flight and its path is known: centre z0 -
+g t^2 / 2, orientation exp(w t) q0. The time of impact is the root of the lowest vertex's height (found here by
+Brent's method to 1e-16), and with r the arm of that vertex:  j = 2 m |u_z| / (1 + m |r x n|^2 / I),  v_z += j / m,  w
++= r x j n / I.
 
-Tolerance 1e-10 absolute on v and w of O(1 to 5). The time of impact enters through g dt and w x r dt: an error of 1e-10 of the cube's
-size in the gap would show at 2e-10. Engines with fixed steps are off by 1e-15 to 7e-2 (spin-free); ignoring rotation is off by O(1).
+Tolerance 1e-10 absolute on v and w of O(1 to 5). The time of impact enters through g dt and w x r dt: an error of
+1e-10 of the cube's size in the gap would show at 2e-10. Engines with fixed steps are off by 1e-15 to 7e-2 (spin-
+free); ignoring rotation is off by O(1).
 """
 
 from __future__ import annotations
