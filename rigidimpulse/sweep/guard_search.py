@@ -3,7 +3,7 @@
 Each step asks the bounding spheres, then the shapes (`guard`). If the shapes limit the step by features that are at
 `touch` already and approach, the pair is in contact. Features at `touch` that hover (they approach by less than
 rounding until the end), slide or leave are let go: they may come closer by the slack for rounding, so that neither
-lasting contact nor a rebound is taken for an impact.
+lasting contact nor a rebound is taken for an impact. Surfaces that cross are in contact however they move.
 
 With `ahead`, the time at which the limiting features come down to `touch` is found by bisection
 (`guard_witness`); the steps then only have to confirm that nothing is earlier. Without it, they are repeated until
