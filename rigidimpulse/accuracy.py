@@ -36,7 +36,7 @@ class Accuracy(BaseModel):
     contact_solver: Literal["auto", "newton"] = "auto"
     step: float = Field(default=1.0 / 60.0, gt=0.0, allow_inf_nan=False)
     tolerance: float = Field(default=1e-13, gt=0.0, le=1e-2, allow_inf_nan=False)
-    iterations: int = Field(default=2000, ge=1)
+    iterations: int = Field(default=10_000, ge=1)
 
     def __init__(self, **settings: object) -> None:
         try:

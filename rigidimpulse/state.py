@@ -61,6 +61,7 @@ class Detector:
     geometry: Geometry
     shape_of_body: np.ndarray
     sweep_scratch: SweepScratch
+    max_queries: int
 
 
 class StepContext:
@@ -72,7 +73,7 @@ class StepContext:
         self.state = State(world)
         self.recorder = recorder
         self.log = log
-        self.detector = Detector(world.geometry, world.shape_of_body, make_scratch(world.geometry))
+        self.detector = Detector(world.geometry, world.shape_of_body, make_scratch(world.geometry), world.accuracy.iterations)
         self.contact_real = np.empty((CONTACT_CAPACITY, 10))
         self.contact_int = np.empty((CONTACT_CAPACITY, 5), np.int64)
         self.scratch_pairs = np.empty((PAIR_CAPACITY, 2), np.int64)

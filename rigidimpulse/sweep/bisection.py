@@ -58,6 +58,7 @@ def sweep(
         touch,
         tolerance,
         LOOK_AHEAD,
+        detector.max_queries,
         1 if (detector.geometry.kind == CYLINDER).any() else None,
         result,
     )

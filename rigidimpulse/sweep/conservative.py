@@ -38,6 +38,7 @@ def sweep(
         touch,
         tolerance,
         0.0,
+        detector.max_queries,
         1 if (detector.geometry.kind == CYLINDER).any() else None,
         result,
     )

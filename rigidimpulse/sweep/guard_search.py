@@ -24,9 +24,6 @@ from rigidimpulse.sweep.guard_tree import row
 from rigidimpulse.sweep.guard_witness import closing_speed, witness_root
 from rigidimpulse.sweep.impact_time import IMPACT, SEPARATE, STALLED, TOUCHING
 
-MAX_QUERIES = 10_000
-"""Gap evaluations a pair may use."""
-
 _TURN = 0.5  # rad, angle that a body turns at most in one step: beyond it the third derivatives take over
 _WORTHWHILE = 0.25  # part of the horizon that bounding spheres must clear to save a look at the shapes
 _GROWTH = 4.0  # how much longer a step is tried after a free one
@@ -89,11 +86,12 @@ def _record(result, k, time, status, queries, work):
 
 @jit
 def first_contacts(
-    geometry, course, scratch, shape_of_body, pairs_a, pairs_b, start, end, touch, tolerance, ahead, cylinders, result
+    geometry, course, scratch, shape_of_body, pairs_a, pairs_b, start, end, touch, tolerance, ahead, max_queries, cylinders, result
 ):
     """Fill in `result` (`ImpactTimes`); arguments as for `bisection.sweep`.
 
     ahead: how far past a safe step the root is looked for, relative to the step; 0 for safe steps only.
+    max_queries: gap evaluations a pair may use.
     cylinders: None where no shape is a cylinder, else any int.
     """
     work, index = scratch.work, scratch.index
@@ -104,7 +102,7 @@ def first_contacts(
         above = max(tolerance[k], slack)
         t, target, trial, floor = start[k], end, end - start[k], touch[k]
         status, queries, is_let_go = STALLED, 0, False
-        while queries < MAX_QUERIES:
+        while queries < max_queries:
             rest = target - t
             horizon = rest if is_let_go else min(rest, trial)
             queries += 1

@@ -42,6 +42,7 @@ class SweepDetector(Protocol):
     geometry: Geometry
     shape_of_body: np.ndarray  # (n,) int64
     sweep_scratch: SweepScratch
+    max_queries: int  # gap evaluations that a pair may use in an interval
 
 
 def no_impacts(num_pairs: int) -> ImpactTimes:

@@ -1,8 +1,9 @@
 """A ball under gravity: energy over many elastic bounces, and the fall to rest of an inelastic one.
 
-Laws. With e = 1 the energy m v^2 / 2 + m g z is constant: 1e-12 relative over 20 s (engines with a fixed step are off by 1e-5 to 1e-2). With
-e < 1 bounce k rises e^2 of the one before, and rest comes at sqrt(2 h / g) (1 + e) / (1 - e), infinitely many impacts in finite time. The tail
-whose rise is below the gap delta is one inelastic impact; leaving it out ends the bounces early by at most 2 sqrt(2 delta / g) / (1 - e).
+Laws. With e = 1 the energy m v^2 / 2 + m g z is constant: 1e-12 relative over 20 s (engines with a fixed step are off
+by 1e-5 to 1e-2). With e < 1 bounce k rises e^2 of the one before, and rest comes at sqrt(2 h / g) (1 + e) / (1 - e),
+infinitely many impacts in finite time. The tail whose rise is below the gap delta is one inelastic impact; leaving it
+out ends the bounces early by at most 2 sqrt(2 delta / g) / (1 - e).
 """
 
 from __future__ import annotations

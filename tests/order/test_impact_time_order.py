@@ -27,7 +27,7 @@ GEOMETRY = build_geometry(
     ]
 )
 DETECTOR = SimpleNamespace(
-    geometry=GEOMETRY, shape_of_body=np.array([0, 1], dtype=np.int64), sweep_scratch=make_scratch(GEOMETRY)
+    geometry=GEOMETRY, shape_of_body=np.array([0, 1], dtype=np.int64), sweep_scratch=make_scratch(GEOMETRY), max_queries=10_000
 )
 
 

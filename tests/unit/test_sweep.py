@@ -57,7 +57,7 @@ class Pair:
     def __init__(self, name_a, name_b, geometry=GEOMETRY, scratch=SCRATCH, names=NAMES):
         self.shapes = names.index(name_a), names.index(name_b)
         self.detector = SimpleNamespace(
-            geometry=geometry, shape_of_body=np.array(self.shapes, dtype=np.int64), sweep_scratch=scratch
+            geometry=geometry, shape_of_body=np.array(self.shapes, dtype=np.int64), sweep_scratch=scratch, max_queries=10_000
         )
         self.course = make_course(2)
 
