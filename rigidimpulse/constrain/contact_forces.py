@@ -88,7 +88,7 @@ def _lift(context, window, group: Group) -> None:
     refresh_pose(group.members, now, state.rotation, state.course.inertia)
     context.log.book(group.time, "lift", mechanical_energy(now, context.world, group.members) - before)
     group.moved = True
-    real, integer = collect(context, window, group.pairs)
+    real, integer = collect(context, window, group.pairs, group.time)
     if not len(real):
         group.held = np.zeros(0, bool)
         return

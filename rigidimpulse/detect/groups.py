@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.detect.features import FACE_VERTEX, VERTEX_FACE
+from rigidimpulse.detect.features import CORNER, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, pressing
 from rigidimpulse.observe.energy import mechanical_energy
 from rigidimpulse.respond.impulse import Contacts
@@ -65,8 +65,12 @@ def select(contacts: Contacts, which: np.ndarray) -> Contacts:
     return Contacts(*(np.ascontiguousarray(column[which]) for column in contacts))
 
 
-def collect(context, window, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Manifolds of window pairs at the present poses: copies of the filled buffer rows."""
+def collect(context, window, pairs: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """Manifolds of window pairs at the present poses: copies of the filled buffer rows.
+
+    A pair that just came to contact but has no manifold (it overlaps, since its sweep does not back up time) has the
+    witness of its sweep for a contact.
+    """
     world, state = context.world, context.state
     while True:
         count = contacts_of_pairs(
@@ -75,8 +79,15 @@ def collect(context, window, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]
             world.cylinders,
         )
         if count >= 0:
-            return context.contact_real[:count].copy(), context.contact_int[:count].copy()
+            break
         context.grow_contacts(-count)
+    real, integer = context.contact_real[:count].copy(), context.contact_int[:count].copy()
+    for p in pairs[window.time[pairs] <= time]:
+        a, b = window.a[p], window.b[p]
+        if not np.any((integer[:, 0] == a) & (integer[:, 1] == b)) and np.any(window.witness[p, 6:9]):
+            real = np.vstack([real, window.witness[p]])
+            integer = np.vstack([integer, np.array([a, b, CORNER, -1, -1])])
+    return real, integer
 
 
 def touching_groups(context, window, time: float, bodies: np.ndarray) -> list[Group]:
@@ -103,7 +114,7 @@ def touching_groups(context, window, time: float, bodies: np.ndarray) -> list[Gr
         bring_all(
             state.course, fresh, time, state.now, state.rotation, context.acceleration, context.angular_acceleration
         )
-        real, integer = collect(context, window, pairs)
+        real, integer = collect(context, window, pairs, time)
         if not len(real):
             break
         reals.append(real)

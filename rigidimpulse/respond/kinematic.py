@@ -2,9 +2,9 @@
 
     v' = v - (1 + k) (v.n) n,        k the restitution
 
-for a body that meets an immovable one, v relative to it. Of two movable bodies each takes half of the change,
-whatever their masses. Spins do not change and there is no friction. It is the cheapest response and conserves neither
-momentum nor the angle of a bounce with spin.
+for a body that meets an immovable one, v.n the speed of its contact point relative to it. Of two movable bodies each
+takes half of the change, whatever their masses. Spins do not change and there is no friction. It is the cheapest
+response; it conserves neither momentum nor, where bodies spin, energy.
 """
 
 import numpy as np
@@ -34,11 +34,7 @@ def respond_kinematic(bodies, contacts, rest_speed, tolerance, scale, column, lo
         e = contacts.restitution[best]
         if e * -fastest <= rest_speed[best]:
             e = 0.0
-        # The centre's own approach counts: spins take no part.
-        approach = 0.0
-        for k in range(3):
-            approach += (bodies.velocity[b, k] - bodies.velocity[a, k]) * n[k]
-        change = -(1.0 + e) * approach
+        change = -(1.0 + e) * fastest
         share_a = 0.0 if bodies.inv_mass[a] == 0.0 else (1.0 if bodies.inv_mass[b] == 0.0 else 0.5)
         share_b = 0.0 if bodies.inv_mass[b] == 0.0 else 1.0 - share_a
         for k in range(3):
