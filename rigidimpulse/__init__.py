@@ -23,7 +23,7 @@ _HOMES = {
     "compile_scene": "world",
     "contains": "detect.inside",
     "load_recording": "recording",
-    "simulate": "simulate",
+    "simulate": "simulation",
 }
 
 __all__ = sorted(_HOMES)

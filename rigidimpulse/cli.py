@@ -141,7 +141,7 @@ def view(file: str, scene: str | None) -> None:
 @click.option("--accuracy", help="preview, standard or exact.")
 def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
     """Say which effects SCENE calls for, which not, and why."""
-    from rigidimpulse.simulate import make_plan
+    from rigidimpulse.simulation import make_plan
     from rigidimpulse.world import compile_scene
 
     job = _find_job(scene)._replace(**_given({"accuracy": accuracy, "duration": duration}))
@@ -227,7 +227,7 @@ def _run(job: Job, output: Sequence[str]) -> Recording:
 
     from tqdm import tqdm
 
-    from rigidimpulse.simulate import simulate as run_scene
+    from rigidimpulse.simulation import simulate as run_scene
 
     scene = job.make()
     start = perf_counter()

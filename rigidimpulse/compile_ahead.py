@@ -30,7 +30,7 @@ def _box_on_floor(with_cylinder: bool):
     from rigidimpulse.observe.recorder import Recorder
     from rigidimpulse.scene import Scene
     from rigidimpulse.shape import Shape
-    from rigidimpulse.simulate import start_courses
+    from rigidimpulse.simulation import start_courses
     from rigidimpulse.state import StepContext
     from rigidimpulse.world import compile_scene
 
