@@ -84,7 +84,6 @@ class StepContext:
         self.wrench = np.zeros((n, 6))
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
-        self.num_queries = 0
 
     def bring(self, i: int, time: float) -> None:
         """Bring body i to `time` on its course."""

@@ -54,7 +54,6 @@ def sweep_window(context, window, method) -> None:
     window.time[stale] = found.time
     window.witness[stale] = found.witness
     window.start[stale] = np.nan
-    context.num_queries += int(found.queries.sum())
     for k in np.flatnonzero(found.status == STALLED):
         names = context.world.names
         context.log.report(

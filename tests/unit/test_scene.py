@@ -137,12 +137,17 @@ def test_a_scene_needs_a_body():
 
 
 def test_static_and_kinematic_bodies_may_be_open_or_inside_out():
-    """A terrain has no inside, a room seen from within is an inverted box."""
+    """A terrain has no inside, a room seen from within is an inverted box; neither may be dynamic without its mass."""
     bodies = [
         Body("terrain", Shape.mesh(BOX.vertices, BOX.faces[:4]), motion="static"),
         Body("room", Shape.mesh(BOX.vertices, BOX.faces[:, ::-1]), motion="kinematic"),
     ]
-    validate(Scene(bodies=bodies))
+    scene = Scene(bodies=bodies)
+    validate(scene)
+    assert scene.names == ("terrain", "room")
+    for body in bodies:
+        with pytest.raises(SceneError, match=f"body '{body.name}'"):
+            validate(Scene(bodies=[Body(body.name, body.shape)]))
 
 
 @pytest.mark.parametrize("length", [1e-200, 1e-3, 1.0, 3.0, 1e200])
