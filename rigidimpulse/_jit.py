@@ -17,6 +17,8 @@ from typing import Any
 import numba
 from numba import types
 from numba.core.caching import FunctionCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.extending import typeof_impl
 
 _PACKAGE = Path(__file__).parent
@@ -56,6 +58,37 @@ class _KernelCache(FunctionCache):
         return (*super()._index_key(sig, codegen), source_digest(Path(self._py_func.__code__.co_filename)))
 
 
+class _PartLibrary(JITCodeLibrary):
+    """Code that is only ever linked into other kernels: optimised there, and never turned into machine code by itself."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, _name: str) -> int:
+        """Null: there is nothing that Python could call."""
+        return 0
+
+    @property
+    def codegen(self) -> Any:
+        """Where numba would store the environment of a function that Python calls."""
+        return self
+
+    def set_env(self, _name: str, _environment: Any) -> None:
+        """A part has none."""
+
+
+class _PartCompiler(Compiler):
+    """Numba's compiler, with the library of a part."""
+
+    def __init__(self, typing_context: Any, target_context: Any, _library: Any, *arguments: Any) -> None:
+        library = _PartLibrary(target_context.codegen(), "part")
+        super().__init__(typing_context, target_context, library, *arguments)
+
+
 class Kernel:
     """A compiled function: an entry where Python calls it, and a part of other kernels where they do.
 
@@ -67,7 +100,7 @@ class Kernel:
         """Nothing is compiled before the first call."""
         update_wrapper(self, function)
         self.py_func = function
-        self.part = _njit(no_cpython_wrapper=True, **_OPTIONS)(function)
+        self.part = _njit(no_cpython_wrapper=True, pipeline_class=_PartCompiler, **_OPTIONS)(function)
 
     @cached_property
     def entry(self) -> Any:

@@ -66,7 +66,7 @@ def simulate(
     if len(times) * world.num_bodies > MOST_POSES:
         raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
     if not kernels_are_cached():
-        logger.warning("compiling kernels for the first run on this machine, once: this takes up to a minute")
+        logger.warning("compiling kernels for the first run on this machine, once: this takes about half a minute")
         if world.can_collide:
             compile_kernels(world)
     plan = make_plan(world)

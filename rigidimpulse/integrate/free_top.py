@@ -26,6 +26,8 @@ R. van Zon and J. Schofield, J. Comput. Phys. 225:145, 2007 (sections 2-3); sn, 
 
 import math
 
+import numpy as np
+
 from rigidimpulse._jit import jit
 from rigidimpulse.rotation import exponential, product, rotated
 
@@ -337,7 +339,7 @@ def prepare(inertia, q, w_world, constants_out):
     c = constants_out
     keep_axis(q, w_world, c)
     spin = max(abs(c[_RATE]), abs(c[_RATE + 1]), abs(c[_RATE + 2]))
-    low, high = 0, 0
+    low = high = np.int64(0)  # a plain 0 would compile what is called below a second time
     for k in range(1, 3):
         if inertia[k] < inertia[low]:
             low = k
