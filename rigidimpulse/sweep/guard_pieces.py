@@ -30,7 +30,6 @@ from rigidimpulse.sweep.bound import (
     SEEN_JERK,
     SEEN_SIZE,
     SEEN_SPIN,
-    SEEN_SPIN_SIZE,
     length,
     put,
     scaled,
@@ -62,7 +61,7 @@ from rigidimpulse.sweep.guard_layout import (
 )
 from rigidimpulse.sweep.guard_root import cylinder_safe_until, point_safe_until, safe_until
 
-_FASTEST_TURN = 2.0  # a direction that turns faster than this many times |w| is not tried
+_TURN = 0.5  # rad, angle that a direction turns at most: beyond it the third derivatives take over
 
 
 @jit
@@ -103,17 +102,19 @@ def _carried(work, index, side, normal, threshold, horizon, cylinders):
 
 @jit
 def _with_edges(work, index, edges, normal, threshold, horizon):
-    """Safe time of two simplices along n turning with both crossing edges; 0 if it would have to turn too fast."""
+    """Safe time of two simplices along n turning with both crossing edges."""
     k, j = edges // 3, edges % 3
     num_first, num_second = index[COUNT], index[COUNT + 1]
     edge_first = subtract(vector(work, CORNER + 3 * ((k + 1) % num_first)), vector(work, CORNER + 3 * k))
     edge_second = subtract(vector(work, CORNER + 9 + 3 * ((j + 1) % num_second)), vector(work, CORNER + 9 + 3 * j))
     m = cross(normal, edge_first)
     wanted, available = -dot(normal, cross(vector(work, SEEN + SEEN_SPIN), edge_second)), dot(m, edge_second)
-    if abs(wanted) * length(m) > _FASTEST_TURN * work[SEEN + SEEN_SPIN_SIZE] * abs(available) or available == 0.0:
+    if available == 0.0:
         return 0.0
     m = scaled(m, wanted / available)
     nu = length(m)
+    if nu * horizon > _TURN:
+        horizon = _TURN / nu
     for j in range(num_second):
         point = vector(work, CORNER + 9 + 3 * j)
         arm = subtract(point, vector(work, ORIGIN + 3))
