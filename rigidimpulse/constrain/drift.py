@@ -9,8 +9,8 @@ not change; the potential energy it costs is booked in the ledger.
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.newton import multiply_transposed, solve_cone
-from rigidimpulse.constrain.rows import cholesky_3, contact_rows, number_columns
+from rigidimpulse.constrain.newton import solve_newton
+from rigidimpulse.constrain.rows import BOUNDED, make_rows, multiply_transposed, number_members, scaled_change, write_row
 from rigidimpulse.rotation import quaternion_exp, quaternion_multiply
 
 SUNK = 0.7
@@ -29,33 +29,27 @@ def needs_lift(contacts, held, delta):
 
 
 @jit
-def lift_contacts(bodies, contacts, held, delta, column):
+def lift_contacts(bodies, contacts, held, delta, number):
     """Move the bodies of the group so that held contacts have their gap delta again."""
     m = contacts.gap.shape[0]
-    members = number_columns(bodies, contacts, column)
-    width = 6 * members.shape[0]
-    jacobian = np.empty((3 * m, width))
-    frames = np.empty((m, 3, 3))
-    contact_rows(bodies, contacts, np.arange(m), column, width, jacobian, frames)
-    b, p, friction = np.zeros(3 * m), np.zeros(3 * m), np.zeros(m)
+    members = number_members(bodies, contacts, np.arange(m), number)
+    rows = make_rows(m)
     largest = 0.0
     for c in range(m):
+        n = contacts.normal[c]
+        a, b = contacts.body_a[c], contacts.body_b[c]
+        write_row(bodies, number, a, b, contacts.arm_a[c], contacts.arm_b[c], n[0], n[1], n[2], rows, c)
         target = delta[c] if held[c] else min(contacts.gap[c], KEPT * delta[c])
-        b[3 * c] = contacts.gap[c] - target
+        rows.kind[c], rows.lower[c], rows.bias[c] = BOUNDED, 0.0, contacts.gap[c] - target
         largest = max(largest, delta[c])
-    solve_cone(jacobian, b, friction, p, SOLVE_TOLERANCE * largest)
-    y = np.empty(width)
-    multiply_transposed(jacobian, p, y)
-    factor = np.empty((3, 3))
-    turn, q = np.empty(3), np.empty(4)
-    for i in members:
-        first = column[i]
-        root = np.sqrt(bodies.inv_mass[i])
-        cholesky_3(bodies.inv_inertia[i], factor)
-        for k in range(3):
-            bodies.position[i, k] += root * y[first + k]
-            turn[k] = 0.0
-            for j in range(3):
-                turn[k] += factor[k, j] * y[first + 3 + j]
+    solve_newton(rows, members.shape[0], SOLVE_TOLERANCE * largest)
+    y = np.empty((members.shape[0], 6))
+    multiply_transposed(rows, rows.impulse, y)
+    shift, turn, q = np.empty(3), np.empty(3), np.empty(4)
+    for k in range(members.shape[0]):
+        i = members[k]
+        scaled_change(bodies, i, y[k], shift, turn)
+        for j in range(3):
+            bodies.position[i, j] += shift[j]
         quaternion_exp(turn, q)
         quaternion_multiply(q, bodies.orientation[i].copy(), bodies.orientation[i])

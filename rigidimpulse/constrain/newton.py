@@ -1,20 +1,19 @@
-"""The exact solver of rows for small islands: normal complementarity and the true Coulomb cone.
+"""The exact solver of rows, for islands of any mass ratio: true complementarity, true Coulomb cones.
 
-Problem. With J the Jacobian of m contacts (three rows each: normal n, tangents s, t), M the mass matrix, Jh = J
-M^(-1/2) the mass-scaled Jacobian and b the velocity the contacts would have without impulses, find impulses p and
-velocities u with
-
-    u = b + Jh Jh^T p,      0 <= p_n  _|_  u_n >= 0,      |p_t| <= mu p_n,      p_t = -mu p_n u_t / |u_t| where u_t != 0.
+Problem. Find impulses p and velocities  u = b + Jh Jh^T p  that satisfy the laws of all rows (see `rows`).
 
 Method. Outside a proximal method of multipliers (Rockafellar 1976) with regularisation R = k diag(Jh Jh^T), k driven
-from 1e-3 to 1e-9, which makes redundant points harmless; inside a semi-smooth Newton method (Alart & Curnier 1991) on
+from 1e-3 to 1e-9, which makes redundant rows harmless; inside a semi-smooth Newton method (Alart & Curnier 1991) on
 y = Jh^T p:
 
-    p(u) = projection of q - u / R on the cone of the current normal impulse,      F(y) = y - Jh^T p(b + Jh y) = 0,
+    p(u) = projection of (R q - u) / (R + s) on the bounds, with the radius of discs from the current p_master,
+    F = (y - Jh^T q) - Jh^T (p(b + Jh y) - q) = 0,        F' = I + Jh^T (-dp/du) Jh,
 
-with a halving line search on |F|. Where the line search fails k is raised; as the last resort one step is made with
-the radius of the cone frozen, for which the problem is convex. The answer with the least natural-map residual is
-returned, with that residual.
+with a halving line search on |F|. It is written in the changes of y and p since q: as u goes to 0 the round-off of u / R
+goes with it. F' has a 6 x 6 block wherever two bodies share a row and is solved by sparse block elimination
+(`block_lu`), so that chains and stacks cost in proportion to their length. Where the line search fails k is raised; as
+the last resort one step is made with the radii frozen, for which the problem is convex. The answer with the least
+residual of the natural map is returned, with that residual.
 """
 
 from math import sqrt
@@ -22,6 +21,8 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.block_lu import factor, plan_elimination, solve_factored
+from rigidimpulse.constrain.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMENT, multiply, multiply_transposed
 
 MAX_OUTER = 60
 MAX_INNER = 60
@@ -29,262 +30,242 @@ MAX_HALVINGS = 8
 REGULARISATION_START = 1e-3
 REGULARISATION_LEAST = 1e-9
 TINY = 1e-300
+ROUND_OFF = 4e-16
 
 
 @jit
-def natural_residual(u, p, friction, weight_normal, weight_tangent):
-    """Largest violation of the contact law, as a velocity [m/s]: 0 at a solution."""
+def row_weights(rows, weight):
+    """Diagonal of Jh Jh^T, into weight (r,); both rows of a disc get the larger one."""
+    for i in range(weight.shape[0]):
+        total = TINY
+        for k in range(12):
+            total += rows.jacobian[i, k] ** 2
+        weight[i] = total
+        if rows.kind[i] == DISC_SECOND:
+            weight[i - 1] = weight[i] = max(weight[i - 1], total)
+
+
+@jit
+def natural_residual(rows, u, p, weight):
+    """Largest violation of the rows' laws, as a velocity: 0 at a solution."""
     worst = 0.0
-    for c in range(friction.shape[0]):
-        i = 3 * c
-        worst = max(worst, abs(min(u[i], p[i] * weight_normal[c])))
-        x = p[i + 1] - u[i + 1] / weight_tangent[c]
-        y = p[i + 2] - u[i + 2] / weight_tangent[c]
-        length = sqrt(x * x + y * y)
-        radius = friction[c] * max(p[i], 0.0)
-        if length > radius:
-            x *= radius / length
-            y *= radius / length
-        worst = max(worst, max(abs(p[i + 1] - x), abs(p[i + 2] - y)) * weight_tangent[c])
+    for i in range(p.shape[0]):
+        kind, w = rows.kind[i], weight[i]
+        x = p[i] - (u[i] + rows.softness[i] * p[i]) / w
+        if kind == DISC:
+            z = p[i + 1] - (u[i + 1] + rows.softness[i + 1] * p[i + 1]) / w
+            length, radius = sqrt(x * x + z * z), rows.coefficient[i] * max(p[rows.master[i]], 0.0)
+            if length > radius:
+                x *= radius / length
+                z *= radius / length
+            worst = max(worst, max(abs(p[i] - x), abs(p[i + 1] - z)) * w)
+        elif kind == SEGMENT:
+            radius = rows.coefficient[i] * max(p[rows.master[i]], 0.0)
+            worst = max(worst, abs(p[i] - min(max(x, -radius), radius)) * w)
+        elif kind == BOUNDED or kind == FREE:
+            worst = max(worst, abs(p[i] - min(max(x, rows.lower[i]), rows.upper[i])) * w)
     return worst
 
 
 @jit
-def _impulse_law(u, q, friction, r_normal, r_tangent, frozen, p, slope):
-    """p(u) and slope = -dp/du (3 x 3 a contact); frozen[c] >= 0 fixes the cone's radius."""
-    for c in range(friction.shape[0]):
-        i = 3 * c
-        for a in range(3):
-            for b in range(3):
-                slope[c, a, b] = 0.0
-        normal = q[i] - u[i] / r_normal[c]
-        pressed = normal > 0.0
-        if pressed:
-            slope[c, 0, 0] = 1.0 / r_normal[c]
-        else:
-            normal = 0.0
-        p[i] = normal
-        x = q[i + 1] - u[i + 1] / r_tangent[c]
-        y = q[i + 2] - u[i + 2] / r_tangent[c]
-        length = sqrt(x * x + y * y)
-        coupled = frozen[c] < 0.0
-        radius = friction[c] * normal if coupled else frozen[c]
-        if length <= radius:
-            p[i + 1] = x
-            p[i + 2] = y
-            slope[c, 1, 1] = 1.0 / r_tangent[c]
-            slope[c, 2, 2] = 1.0 / r_tangent[c]
-        elif radius > 0.0:
-            x /= length
-            y /= length
-            p[i + 1] = radius * x
-            p[i + 2] = radius * y
-            k = radius / (length * r_tangent[c])
-            slope[c, 1, 1] = k * (1.0 - x * x)
-            slope[c, 2, 2] = k * (1.0 - y * y)
-            slope[c, 1, 2] = -k * x * y
-            slope[c, 2, 1] = -k * x * y
-            if coupled and pressed:
-                slope[c, 1, 0] = friction[c] * x / r_normal[c]
-                slope[c, 2, 0] = friction[c] * y / r_normal[c]
-        else:
-            p[i + 1] = 0.0
-            p[i + 2] = 0.0
+def _impulse_law(rows, u, q, r, frozen, p, slope):
+    """p(u), and slope (r, 3): -dp_i/du of the row itself, of its partner in a disc, of its master.
+
+    frozen (r,) >= 0 fixes the radius of a disc or segment.
+    """
+    for i in range(p.shape[0]):
+        kind = rows.kind[i]
+        if kind == DISC_SECOND:
+            continue
+        stiffness = 1.0 / (r[i] + rows.softness[i])
+        x = (r[i] * q[i] - u[i]) * stiffness
+        slope[i, 0], slope[i, 1], slope[i, 2] = stiffness, 0.0, 0.0
+        if kind == FREE or kind == BOUNDED:
+            p[i] = min(max(x, rows.lower[i]), rows.upper[i])
+            if p[i] != x:
+                slope[i, 0] = 0.0
+            continue
+        coupled = frozen[i] < 0.0
+        master = rows.master[i]
+        radius = rows.coefficient[i] * max(p[master], 0.0) if coupled else frozen[i]
+        share = rows.coefficient[i] * slope[master, 0] if coupled else 0.0
+        z = 0.0
+        if kind == DISC:
+            z = (r[i] * q[i + 1] - u[i + 1]) * stiffness
+            slope[i + 1, 0], slope[i + 1, 1], slope[i + 1, 2] = stiffness, 0.0, 0.0
+        length = sqrt(x * x + z * z)
+        if length > radius:
+            k = stiffness * radius / length
+            x, z = x / length, z / length
+            slope[i, 0], slope[i, 2] = k * (1.0 - x * x), share * x
+            if kind == DISC:
+                slope[i, 1] = slope[i + 1, 1] = -k * x * z
+                slope[i + 1, 0], slope[i + 1, 2] = k * (1.0 - z * z), share * z
+            x, z = radius * x, radius * z
+        p[i] = x
+        if kind == DISC:
+            p[i + 1] = z
 
 
 @jit
-def multiply(matrix, vector, out):
-    for i in range(matrix.shape[0]):
-        total = 0.0
-        for k in range(matrix.shape[1]):
-            total += matrix[i, k] * vector[k]
-        out[i] = total
+def _add_outer(blocks, slot, left, body_left, right, body_right):
+    """Block (body_left, body_right) += left^T right; (6,) each."""
+    if body_left < 0 or body_right < 0:
+        return
+    block = blocks[slot[body_left, body_right]]
+    for i in range(6):
+        for j in range(6):
+            block[i, j] += left[i] * right[j]
 
 
 @jit
-def multiply_transposed(matrix, vector, out):
-    for k in range(matrix.shape[1]):
-        out[k] = 0.0
-    for i in range(matrix.shape[0]):
-        if vector[i] != 0.0:
-            for k in range(matrix.shape[1]):
-                out[k] += matrix[i, k] * vector[i]
-
-
-@jit
-def solve_linear(a, x):
-    """Solve a x = x in place by Gaussian elimination with partial pivoting; a is overwritten."""
-    n = a.shape[0]
-    for k in range(n):
-        pivot = k
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[pivot, k]):
-                pivot = i
-        if pivot != k:
-            for j in range(n):
-                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-            x[k], x[pivot] = x[pivot], x[k]
-        for i in range(k + 1, n):
-            if a[i, k] != 0.0:
-                factor = a[i, k] / a[k, k]
-                for j in range(k + 1, n):
-                    a[i, j] -= factor * a[k, j]
-                x[i] -= factor * x[k]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            x[k] -= a[k, j] * x[j]
-        x[k] /= a[k, k]
-
-
-@jit
-def _assemble(jacobian, slope, matrix):
+def _assemble(rows, slope, slot, blocks, n):
     """I + Jh^T slope Jh."""
-    m, n = slope.shape[0], jacobian.shape[1]
+    blocks[:] = 0.0
     for i in range(n):
-        for j in range(n):
-            matrix[i, j] = 1.0 if i == j else 0.0
-    for c in range(m):
-        for a in range(3):
-            for b in range(3):
-                s = slope[c, a, b]
-                if s == 0.0:
-                    continue
-                for i in range(n):
-                    left = s * jacobian[3 * c + a, i]
-                    if left != 0.0:
-                        for j in range(n):
-                            matrix[i, j] += left * jacobian[3 * c + b, j]
+        block = blocks[slot[i, i]]
+        for k in range(6):
+            block[k, k] = 1.0
+    right = np.empty(12)
+    for i in range(slope.shape[0]):
+        here, partner, master = slope[i, 0], slope[i, 1], slope[i, 2]
+        if here == 0.0 and partner == 0.0 and master == 0.0:
+            continue
+        line = rows.jacobian[i]
+        other = rows.jacobian[i + 1 if rows.kind[i] == DISC else (i - 1 if rows.kind[i] == DISC_SECOND else i)]
+        above = rows.jacobian[rows.master[i]]
+        for k in range(12):
+            right[k] = here * line[k] + partner * other[k] + master * above[k]
+        a, b = rows.first[i], rows.second[i]
+        _add_outer(blocks, slot, line[:6], a, right[:6], a)
+        _add_outer(blocks, slot, line[:6], a, right[6:], b)
+        _add_outer(blocks, slot, line[6:], b, right[:6], a)
+        _add_outer(blocks, slot, line[6:], b, right[6:], b)
 
 
 @jit
 def _norm(v):
     total = 0.0
     for i in range(v.shape[0]):
-        total += v[i] * v[i]
+        for k in range(6):
+            total += v[i, k] * v[i, k]
     return sqrt(total)
 
 
 @jit
-def _newton(jacobian, b, q, friction, r_normal, r_tangent, frozen, y, u, p, slope, target):
-    """Solve F(y) = 0 from y; returns whether it converged (or cannot be improved further)."""
-    rows, n = jacobian.shape
-    residual = np.empty(n)
-    step = np.empty(n)
-    trial_y = np.empty(n)
-    row = np.empty(rows)
-    matrix = np.empty((n, n))
-    multiply(jacobian, y, u)
-    for i in range(rows):
-        u[i] += b[i]
-    _impulse_law(u, q, friction, r_normal, r_tangent, frozen, p, slope)
-    multiply_transposed(jacobian, p, residual)
-    for i in range(n):
-        residual[i] = y[i] - residual[i]
-    size = _norm(residual)
+def _evaluate(rows, base, change, q, r, frozen, u, p, slope, residual):
+    """u, p and slope at y + change, and the residual F (n, 6); returns |F|."""
+    multiply(rows, change, u)
+    for i in range(u.shape[0]):
+        u[i] += base[i]
+    _impulse_law(rows, u, q, r, frozen, p, slope)
+    multiply_transposed(rows, p - q, residual)
+    for i in range(change.shape[0]):
+        for k in range(6):
+            residual[i, k] = change[i, k] - residual[i, k]
+    return _norm(residual)
+
+
+@jit
+def _speed(rows, y, line):
+    """Largest velocity of a row that y (n, 6) stands for."""
+    multiply(rows, y, line)
+    largest = 0.0
+    for i in range(line.shape[0]):
+        largest = max(largest, abs(line[i]))
+    return largest
+
+
+@jit
+def _newton(rows, elimination, base, q, r, frozen, p, target):
+    """Find p with F = 0; base (r,): u at the impulses q. Returns whether it converged (or cannot be improved further)."""
+    n, count = elimination.order.shape[0], p.shape[0]
+    change, trial = np.zeros((n, 6)), np.empty((n, 6))
+    residual, step = np.empty((n, 6)), np.empty((n, 6))
+    u, line, slope = np.empty(count), np.empty(count), np.empty((count, 3))
+    blocks, pivots = np.empty((elimination.num_blocks, 6, 6)), np.empty((n, 6), np.int64)
+    size = _evaluate(rows, base, change, q, r, frozen, u, p, slope, residual)
     for _ in range(MAX_INNER):
-        multiply(jacobian, residual, row)
-        error = 0.0
-        for i in range(rows):
-            error = max(error, abs(row[i]))
-        if error <= target:
+        if _speed(rows, residual, line) <= target:
             return True
-        _assemble(jacobian, slope, matrix)
-        for i in range(n):
-            step[i] = -residual[i]
-        solve_linear(matrix, step)
-        scale = 1.0
-        improved = False
+        _assemble(rows, slope, elimination.slot, blocks, n)
+        step[:] = residual
+        factor(elimination, blocks, pivots)
+        solve_factored(elimination, blocks, pivots, step)
+        # |F| carries the round-off of u divided by k; its step does not.
+        is_last = _speed(rows, step, line) <= target
+        scale, improved, trial_size = 1.0, False, size
         for _halving in range(MAX_HALVINGS):
             for i in range(n):
-                trial_y[i] = y[i] + scale * step[i]
-            multiply(jacobian, trial_y, u)
-            for i in range(rows):
-                u[i] += b[i]
-            _impulse_law(u, q, friction, r_normal, r_tangent, frozen, p, slope)
-            multiply_transposed(jacobian, p, residual)
-            for i in range(n):
-                residual[i] = trial_y[i] - residual[i]
-            trial_size = _norm(residual)
-            if trial_size < size * (1.0 - 0.1 * scale):
+                for k in range(6):
+                    trial[i, k] = change[i, k] - scale * step[i, k]
+            trial_size = _evaluate(rows, base, trial, q, r, frozen, u, p, slope, residual)
+            if is_last or trial_size < size * (1.0 - 0.1 * scale):
                 improved = True
                 break
             scale *= 0.5
         if not improved:
-            return error <= 1e4 * target or size <= 1e-13 * _norm(y)
-        for i in range(n):
-            y[i] = trial_y[i]
+            return _speed(rows, step, line) <= 1e4 * target
+        change[:] = trial
+        if is_last:
+            return True
         size = trial_size
     return False
 
 
 @jit
-def solve_cone(jacobian, b, friction, p, target):
-    """Solve the contact problem of the module's head in place; returns the natural residual reached [m/s].
+def _velocities(rows, p, y, u):
+    """y = Jh^T p and u = b + Jh y."""
+    multiply_transposed(rows, p, y)
+    multiply(rows, y, u)
+    for i in range(u.shape[0]):
+        u[i] += rows.bias[i]
 
-    jacobian (3m, N) mass-scaled, b (3m,), friction (m,), p (3m,) start and answer, target [m/s] the residual asked for.
+
+@jit
+def rounding_floor(rows, weight, p):
+    """Velocity below which the residual of impulses p is round-off: what large opposite impulses leave where they cancel."""
+    largest = 0.0
+    for i in range(p.shape[0]):
+        largest = max(largest, abs(rows.bias[i]), weight[i] * abs(p[i]))
+    return ROUND_OFF * largest
+
+
+@jit
+def solve_newton(rows, n, target):
+    """Solve the rows of an island of n movable bodies; `rows.impulse` is start and answer.
+
+    target: residual asked for, m/s. Returns the residual of the natural map that was reached.
     """
-    m = friction.shape[0]
-    rows, n = jacobian.shape
-    weight_normal = np.empty(m)
-    weight_tangent = np.empty(m)
-    for c in range(m):
-        for a in range(3):
-            total = 0.0
-            for k in range(n):
-                total += jacobian[3 * c + a, k] ** 2
-            if a == 0:
-                weight_normal[c] = max(total, TINY)
-                weight_tangent[c] = TINY
-            else:
-                weight_tangent[c] = max(weight_tangent[c], total)
-    y = np.empty(n)
-    y_start = np.empty(n)
-    u = np.empty(rows)
-    trial = p.copy()
-    q = p.copy()
-    slope = np.empty((m, 3, 3))
-    frozen = np.full(m, -1.0)
-    multiply_transposed(jacobian, p, y)
-    multiply(jacobian, y, u)
-    for i in range(rows):
-        u[i] += b[i]
-    best = natural_residual(u, p, friction, weight_normal, weight_tangent)
-    k = REGULARISATION_START
-    failures = 0
-    stagnant = 0
-    previous = best
-    convex = False
+    count = rows.bias.shape[0]
+    elimination = plan_elimination(rows.first, rows.second, n)
+    weight = np.empty(count)
+    row_weights(rows, weight)
+    y, u = np.empty((n, 6)), np.empty(count)
+    trial, q, frozen = rows.impulse.copy(), rows.impulse.copy(), np.full(count, -1.0)
+    _velocities(rows, q, y, u)
+    best = natural_residual(rows, u, q, weight)
+    k, failures, stagnant, previous, convex = REGULARISATION_START, 0, 0, best, False
     for _ in range(MAX_OUTER):
-        if best <= target or stagnant > 4:
+        if best <= max(target, rounding_floor(rows, weight, rows.impulse)) or stagnant > 4:
             break
-        for i in range(n):
-            y_start[i] = y[i]
-        for c in range(m):
-            frozen[c] = friction[c] * max(q[3 * c], 0.0) if convex else -1.0
-        solved = _newton(
-            jacobian, b, q, friction, k * weight_normal, k * weight_tangent, frozen, y, u, trial, slope, 0.05 * target
-        )
+        for i in range(count):
+            frozen[i] = rows.coefficient[i] * max(q[rows.master[i]], 0.0) if convex else -1.0
+        solved = _newton(rows, elimination, u, q, k * weight, frozen, trial, 0.05 * target)
         if not solved and not convex:
             failures += 1
-            for i in range(n):
-                y[i] = y_start[i]
             convex = k >= 0.5
             k = min(30.0 * k, 1.0)
             continue
-        multiply_transposed(jacobian, trial, y)
-        multiply(jacobian, y, u)
-        for i in range(rows):
-            u[i] += b[i]
-        reached = natural_residual(u, trial, friction, weight_normal, weight_tangent)
+        q[:] = trial
+        _velocities(rows, q, y, u)
+        reached = natural_residual(rows, u, q, weight)
         if reached < best:
             best = reached
-            for i in range(rows):
-                p[i] = trial[i]
+            rows.impulse[:] = q
         if reached > 0.5 * previous:
             stagnant += 1
         previous = reached
-        for i in range(rows):
-            q[i] = trial[i]
         k = max(k * 0.3, 1e-2) if convex else max(k * (0.1 if failures < 3 else 0.3), REGULARISATION_LEAST)
         convex = False
     return best

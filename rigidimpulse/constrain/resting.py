@@ -18,8 +18,20 @@ and it would hover for ever.
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.newton import multiply, multiply_transposed, solve_cone, solve_linear
-from rigidimpulse.constrain.rows import contact_rows, number_columns, row_velocity
+from rigidimpulse.constrain.newton import solve_newton
+from rigidimpulse.constrain.rows import (
+    FREE,
+    contact_rows,
+    contact_velocity,
+    count_contact_rows,
+    impulse_along,
+    make_rows,
+    multiply,
+    multiply_transposed,
+    number_members,
+    rows_of,
+    write_row,
+)
 from rigidimpulse.geometry import CYLINDER, ROUND
 from rigidimpulse.respond.impulse import apply_impulse
 
@@ -28,7 +40,6 @@ CAPTURE_PASSES = 4
 SOLVE_TOLERANCE = 1e-12
 SLIP = 1e-9
 POOR = 1e-8
-BILATERAL_REGULARISATION = 1e-13
 # Which body carries the normal of a contact kind: vertex-face and face-vertex, half space; others share it.
 CARRIER_B, CARRIER_A, SHARED = 0, 1, 2
 # Cosine of normal and axis below which a cylinder lies on its side.
@@ -106,70 +117,61 @@ def turning_of(geometry, shape_of_body, rotation, bodies, contacts, carrier):
 
 
 @jit
-def _capture(bodies, contacts, subset, jacobian, u, p, scale):
-    """Stop load-bearing contacts that leave slowly; True if any was stopped."""
-    m = subset.shape[0]
-    width = jacobian.shape[1]
-    loaded = np.empty(m, np.int64)
-    count = 0
+def _capture(bodies, contacts, subset, number, n, normal_velocity, pressed, scale):
+    """Stop load-bearing contacts that leave slowly; True if any was stopped. pressed (m,) bool, normal_velocity (m,)."""
+    loaded = np.flatnonzero(pressed)
     leaving = False
-    for s in range(m):
-        if p[3 * s] > 0.0:
-            loaded[count] = s
-            count += 1
-            leaving = leaving or u[3 * s] > SOLVE_TOLERANCE * scale
+    for s in loaded:
+        leaving = leaving or normal_velocity[s] > SOLVE_TOLERANCE * scale
     if not leaving:
         return False
-    w = np.empty((count, count))
-    x = np.empty(count)
-    trace = 0.0
-    for i in range(count):
-        x[i] = -u[3 * loaded[i]]
-        for j in range(count):
-            total = 0.0
-            for k in range(width):
-                total += jacobian[3 * loaded[i], k] * jacobian[3 * loaded[j], k]
-            w[i, j] = total
-        trace += w[i, i]
-    for i in range(count):
-        w[i, i] += BILATERAL_REGULARISATION * trace
-    solve_linear(w, x)
-    for i in range(count):
+    rows = make_rows(loaded.shape[0])
+    for i in range(loaded.shape[0]):
         c = subset[loaded[i]]
-        n = contacts.normal[c]
-        apply_impulse(bodies, contacts, c, x[i] * n[0], x[i] * n[1], x[i] * n[2])
+        d = contacts.normal[c]
+        a, b = contacts.body_a[c], contacts.body_b[c]
+        write_row(bodies, number, a, b, contacts.arm_a[c], contacts.arm_b[c], d[0], d[1], d[2], rows, i)
+        rows.kind[i], rows.bias[i] = FREE, normal_velocity[loaded[i]]
+    solve_newton(rows, n, SOLVE_TOLERANCE * scale)
+    for i in range(loaded.shape[0]):
+        c = subset[loaded[i]]
+        d, x = contacts.normal[c], rows.impulse[i]
+        apply_impulse(bodies, contacts, c, x * d[0], x * d[1], x * d[2])
     return True
 
 
 @jit
-def _solve(jacobian, u, a, h, contacts, subset, scale, p):
-    """Impulses of the sub-step; contacts that slip, or come to slip, with dynamic friction. Returns the residual."""
-    m = subset.shape[0]
-    b = np.empty(3 * m)
-    mu = np.empty(m)
-    y = np.empty(jacobian.shape[1])
-    after = np.empty(3 * m)
-    for i in range(3 * m):
-        b[i] = u[i] + h * a[i]
-    for s in range(m):
-        c = subset[s]
-        slips = abs(u[3 * s + 1]) + abs(u[3 * s + 2]) > SLIP * scale
-        mu[s] = contacts.dynamic_friction[c] if slips else contacts.static_friction[c]
+def _solve(rows, n, first_row, slides, contacts, subset, scale):
+    """Impulses of the sub-step; contacts that slip, or come to slip, with dynamic friction. Returns the residual.
+
+    slides (m,) bool: contacts that slip now.
+    """
+    count = rows.bias.shape[0]
+    y, after = np.empty((n, 6)), np.empty(count)
+    for s in range(first_row.shape[0]):
+        i = first_row[s] + 1
+        if rows_of(rows, first_row[s]) == 3:
+            c = subset[s]
+            mu = contacts.dynamic_friction[c] if slides[s] else contacts.static_friction[c]
+            rows.coefficient[i] = rows.coefficient[i + 1] = mu
     residual = 0.0
     for attempt in range(3):
-        residual = solve_cone(jacobian, b, mu, p, SOLVE_TOLERANCE * scale)
+        residual = solve_newton(rows, n, SOLVE_TOLERANCE * scale)
         if residual > POOR * scale and attempt == 0:
             # A misleading start: once more from nothing.
-            for i in range(3 * m):
-                p[i] = 0.0
+            rows.impulse[:] = 0.0
             continue
-        multiply_transposed(jacobian, p, y)
-        multiply(jacobian, y, after)
+        multiply_transposed(rows, rows.impulse, y)
+        multiply(rows, y, after)
         changed = False
-        for s in range(m):
-            slip = abs(b[3 * s + 1] + after[3 * s + 1]) + abs(b[3 * s + 2] + after[3 * s + 2])
-            if mu[s] != contacts.dynamic_friction[subset[s]] and slip > SLIP * scale:
-                mu[s] = contacts.dynamic_friction[subset[s]]
+        for s in range(first_row.shape[0]):
+            i = first_row[s] + 1
+            if rows_of(rows, first_row[s]) < 3:
+                continue
+            slip = abs(rows.bias[i] + after[i]) + abs(rows.bias[i + 1] + after[i + 1])
+            mu = contacts.dynamic_friction[subset[s]]
+            if rows.coefficient[i] != mu and slip > SLIP * scale:
+                rows.coefficient[i] = rows.coefficient[i + 1] = mu
                 changed = True
         if not changed:
             break
@@ -177,7 +179,7 @@ def _solve(jacobian, u, a, h, contacts, subset, scale, p):
 
 
 @jit
-def hold_contacts(bodies, contacts, subset, turning, acceleration, angular_acceleration, h, column, force, wrench):
+def hold_contacts(bodies, contacts, subset, turning, acceleration, angular_acceleration, h, number, force, wrench):
     """Contact forces of the sub-step for the contacts in subset (m,).
 
     turning (m,) from `turning_acceleration`; acceleration, angular_acceleration (n, 3) of the bodies without contacts;
@@ -186,44 +188,52 @@ def hold_contacts(bodies, contacts, subset, turning, acceleration, angular_accel
     May change velocities (capture). Returns the residual relative to the speed gained in the sub-step.
     """
     m = subset.shape[0]
-    members = number_columns(bodies, contacts, column)
-    width = 6 * members.shape[0]
-    jacobian = np.empty((3 * m, width))
-    frames = np.empty((m, 3, 3))
-    contact_rows(bodies, contacts, subset, column, width, jacobian, frames)
-    u, a, p = np.empty(3 * m), np.empty(3 * m), np.empty(3 * m)
-    row_velocity(contacts, subset, frames, acceleration, angular_acceleration, a)
+    n = number_members(bodies, contacts, subset, number).shape[0]
+    rows = make_rows(count_contact_rows(contacts, subset))
+    first_row, frames = np.empty(m, np.int64), np.empty((m, 3, 3))
+    contact_rows(bodies, contacts, subset, number, rows, first_row, frames)
+    u, a = np.empty((m, 3)), np.empty((m, 3))
+    slides, pressed = np.empty(m, np.bool_), np.empty(m, np.bool_)
     scale = 1e-300
     for s in range(m):
-        a[3 * s] += turning[s]
+        contact_velocity(contacts, subset[s], frames[s], acceleration, angular_acceleration, a[s])
+        a[s, 0] += turning[s]
         for k in range(3):
-            p[3 * s + k] = force[s, k] * h
-            scale = max(scale, abs(a[3 * s + k]) * h)
+            scale = max(scale, abs(a[s, k]) * h)
+        for k in range(rows_of(rows, first_row[s])):
+            rows.impulse[first_row[s] + k] = force[s, k] * h
     residual = 0.0
     for _ in range(CAPTURE_PASSES):
-        row_velocity(contacts, subset, frames, bodies.velocity, bodies.angular_velocity, u)
-        residual = _solve(jacobian, u, a, h, contacts, subset, scale, p)
-        if not _capture(bodies, contacts, subset, jacobian, u, p, scale):
+        for s in range(m):
+            contact_velocity(contacts, subset[s], frames[s], bodies.velocity, bodies.angular_velocity, u[s])
+            for k in range(rows_of(rows, first_row[s])):
+                rows.bias[first_row[s] + k] = u[s, k] + h * a[s, k]
+            slides[s] = abs(u[s, 1]) + abs(u[s, 2]) > SLIP * scale
+        residual = _solve(rows, n, first_row, slides, contacts, subset, scale)
+        for s in range(m):
+            pressed[s] = rows.impulse[first_row[s]] > 0.0
+        if not _capture(bodies, contacts, subset, number, n, u[:, 0], pressed, scale):
             break
-    _write_wrench(contacts, subset, frames, p, h, force, wrench)
+    for s in range(m):
+        force[s] = 0.0
+        for k in range(rows_of(rows, first_row[s])):
+            force[s, k] = rows.impulse[first_row[s] + k] / h
+    _write_wrench(contacts, subset, rows, first_row, frames, h, wrench)
     return residual / scale
 
 
 @jit
-def _write_wrench(contacts, subset, frames, p, h, force, wrench):
+def _write_wrench(contacts, subset, rows, first_row, frames, h, wrench):
     for c in range(contacts.gap.shape[0]):
         for k in range(6):
             wrench[contacts.body_a[c], k] = 0.0
             wrench[contacts.body_b[c], k] = 0.0
+    f = np.empty(3)
     for s in range(subset.shape[0]):
         c = subset[s]
-        f = np.zeros(3)
-        for k in range(3):
-            force[s, k] = p[3 * s + k] / h
-            for i in range(3):
-                f[i] += force[s, k] * frames[s, k, i]
+        impulse_along(rows, first_row[s], frames[s], f)
         for body, r, sign in ((contacts.body_a[c], contacts.arm_a[c], -1.0), (contacts.body_b[c], contacts.arm_b[c], 1.0)):
             for k in range(3):
                 i, j = (k + 1) % 3, (k + 2) % 3
-                wrench[body, k] += sign * f[k]
-                wrench[body, 3 + k] += sign * (r[i] * f[j] - r[j] * f[i])
+                wrench[body, k] += sign * f[k] / h
+                wrench[body, 3 + k] += sign * (r[i] * f[j] - r[j] * f[i]) / h

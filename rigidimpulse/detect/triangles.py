@@ -2,8 +2,9 @@
 
 The features of two cores at distance d <= margin + r_a + r_b that are locally closest make the contacts; the radii are
 then taken off along the normal: gap = d - r_a - r_b.
-- vertex - face: the vertex projects into the face. All corners within the margin count: a flat contact gives its
-  corners.
+- vertex - face: the vertex projects into the face, and no edge that leaves it dives below by more than the margin
+  (else the vertex of a box that stands flush on another one would meet its side). All corners within the margin
+  count: a flat contact gives its corners.
 - edge - edge (see `edges`): the common normal meets both edges and lies in the Gauss arcs of both. Nearly parallel
   edges have both ends of their overlap, with the normal at its middle.
 - vertex - edge, vertex - vertex: the normal n runs between the points; it must lie in the arc of the edge and in the
@@ -78,7 +79,19 @@ def _append_vertex(view, rows, count, core_v, core_t, normal, distance, kind, fe
 
 
 @inner
-def _face_contact(view, rows, count, vertex, p, triangle, corners, normal, height, hidden):
+def _in_vertex_cone(vertex, edge, vertex_edge_first, vertex_edge, corner, direction, slack, tolerance):
+    """Tell whether no edge that leaves a vertex runs along the direction, but for a length `slack` [m] or an angle."""
+    origin = row(vertex, corner)
+    for i in range(vertex_edge_first[corner], vertex_edge_first[corner + 1]):
+        leaving = subtract(row(vertex, edge[vertex_edge[i], 0] + edge[vertex_edge[i], 1] - corner), origin)
+        length = sqrt(dot(leaving, leaving))
+        if dot(direction, leaving) > tolerance * length + min(slack, TILT * length):
+            return False
+    return True
+
+
+@inner
+def _face_contact(geometry, view, rows, count, vertex, p, triangle, corners, normal, height, hidden):
     """Append the contact of a vertex at `p` with a face if it lies over it; `hidden`: which sides are hidden edges."""
     a, b, c = corners
     side = subtract(b, a)
@@ -98,6 +111,11 @@ def _face_contact(view, rows, count, vertex, p, triangle, corners, normal, heigh
         height = -height
     else:
         normal = (-normal[0], -normal[1], -normal[2])
+    if not _in_vertex_cone(
+        geometry.vertex, geometry.edge, geometry.vertex_edge_first, geometry.vertex_edge, vertex,
+        turned(view.R_back, normal), view.core, TILT,
+    ):
+        return count
     kind = FACE_VERTEX if view.flipped else VERTEX_FACE
     merge = MERGE * size + 2.0 * crease
     return _append_vertex(view, rows, count, p, foot, normal, height, kind, vertex, triangle, merge)
@@ -133,20 +151,8 @@ def _face_contacts(geometry, view, pairs, end, rows, count):
                         geometry.edge_kind[geometry.triangle_edge[face, 1]] == EDGE_HIDDEN,
                         geometry.edge_kind[geometry.triangle_edge[face, 2]] == EDGE_HIDDEN,
                     )
-                    count = _face_contact(view, rows, count, corner, p, face, corners, normal, height, hidden)
+                    count = _face_contact(geometry, view, rows, count, corner, p, face, corners, normal, height, hidden)
     return count
-
-
-@inner
-def _in_vertex_cone(vertex, edge, vertex_edge_first, vertex_edge, corner, direction, slack, tolerance):
-    """Tell whether no edge that leaves a vertex runs along the direction, but for a length `slack` [m] or an angle."""
-    origin = row(vertex, corner)
-    for i in range(vertex_edge_first[corner], vertex_edge_first[corner + 1]):
-        leaving = subtract(row(vertex, edge[vertex_edge[i], 0] + edge[vertex_edge[i], 1] - corner), origin)
-        length = sqrt(dot(leaving, leaving))
-        if dot(direction, leaving) > tolerance * length + min(slack, TILT * length):
-            return False
-    return True
 
 
 @inner

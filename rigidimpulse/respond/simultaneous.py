@@ -15,8 +15,18 @@ answers a chain of bodies gives.
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.newton import multiply, multiply_transposed, solve_cone
-from rigidimpulse.constrain.rows import contact_rows, number_columns
+from rigidimpulse.constrain.newton import solve_newton
+from rigidimpulse.constrain.rows import (
+    contact_rows,
+    contact_velocity,
+    count_contact_rows,
+    impulse_along,
+    make_rows,
+    multiply,
+    multiply_transposed,
+    number_members,
+    rows_of,
+)
 from rigidimpulse.respond.impulse import apply_impulse, log_impact, relative_velocity, resolve_contact
 
 # Residual asked of the solver and what counts as approaching, relative to the speed of the group.
@@ -33,90 +43,101 @@ def _restitution(contacts, c, approach, rest_speed):
 
 
 @jit
-def _block_impulses(jacobian, u, bounce, bounce_t, mu, friction, scale, p):
+def _block_impulses(rows, n, first_row, friction, scale):
     """Solve one block; static friction first, contacts that still slip again with dynamic friction."""
-    m = mu.shape[0]
-    b = np.empty(3 * m)
-    y = np.empty(jacobian.shape[1])
-    after = np.empty(3 * m)
-    for s in range(m):
-        b[3 * s] = u[3 * s] + bounce[s] * u[3 * s]
-        b[3 * s + 1] = u[3 * s + 1] * (1.0 + bounce_t[s])
-        b[3 * s + 2] = u[3 * s + 2] * (1.0 + bounce_t[s])
-        p[3 * s] = p[3 * s + 1] = p[3 * s + 2] = 0.0
-    solve_cone(jacobian, b, mu, p, SOLVE_TOLERANCE * scale)
-    multiply_transposed(jacobian, p, y)
-    multiply(jacobian, y, after)
+    count = rows.bias.shape[0]
+    y, after = np.empty((n, 6)), np.empty(count)
+    solve_newton(rows, n, SOLVE_TOLERANCE * scale)
+    multiply_transposed(rows, rows.impulse, y)
+    multiply(rows, y, after)
     changed = False
-    for s in range(m):
-        slip = abs(b[3 * s + 1] + after[3 * s + 1]) + abs(b[3 * s + 2] + after[3 * s + 2])
-        if friction[s] != mu[s] and slip > 1e-9 * scale:
-            mu[s] = friction[s]
+    for s in range(first_row.shape[0]):
+        i = first_row[s] + 1
+        if rows_of(rows, i - 1) < 3 or friction[s] == rows.coefficient[i]:
+            continue
+        slip = abs(rows.bias[i] + after[i]) + abs(rows.bias[i + 1] + after[i + 1])
+        if slip > 1e-9 * scale:
+            rows.coefficient[i] = rows.coefficient[i + 1] = friction[s]
             changed = True
     if changed:
-        solve_cone(jacobian, b, mu, p, SOLVE_TOLERANCE * scale)
+        solve_newton(rows, n, SOLVE_TOLERANCE * scale)
 
 
 @jit
-def solve_block(bodies, contacts, subset, rebound, rest_speed, scale, column, log, count):
+def solve_block(bodies, contacts, subset, rebound, rest_speed, scale, number, log, count):
     """Resolve the contacts of subset together and apply the impulses; `rebound` 1, or 0 for an inelastic one. New log count."""
     m = subset.shape[0]
-    members = number_columns(bodies, contacts, column)
-    width = 6 * members.shape[0]
-    jacobian = np.empty((3 * m, width))
-    frames = np.empty((m, 3, 3))
-    contact_rows(bodies, contacts, subset, column, width, jacobian, frames)
-    u = np.empty(3 * m)
-    v = np.empty(3)
-    bounce, bounce_t = np.zeros(m), np.zeros(m)
-    mu, friction = np.empty(m), np.empty(m)
+    n = number_members(bodies, contacts, subset, number).shape[0]
+    rows = make_rows(count_contact_rows(contacts, subset))
+    first_row, frames = np.empty(m, np.int64), np.empty((m, 3, 3))
+    contact_rows(bodies, contacts, subset, number, rows, first_row, frames)
+    u, v = np.empty((m, 3)), np.empty(3)
+    e, e_t, friction = np.zeros(m), np.zeros(m), np.empty(m)
     largest = 0.0
     for s in range(m):
         c = subset[s]
+        contact_velocity(contacts, c, frames[s], bodies.velocity, bodies.angular_velocity, u[s])
+        friction[s] = contacts.dynamic_friction[c]
         approach = relative_velocity(bodies, contacts, c, v)
-        for k in range(3):
-            u[3 * s + k] = v[0] * frames[s, k, 0] + v[1] * frames[s, k, 1] + v[2] * frames[s, k, 2]
-        mu[s], friction[s] = contacts.static_friction[c], contacts.dynamic_friction[c]
         if approach < 0.0:
-            bounce[s] = rebound * _restitution(contacts, c, approach, rest_speed)
-            bounce_t[s] = contacts.tangential_restitution[c] if bounce[s] > 0.0 else 0.0
-            largest = max(largest, bounce[s])
-    p = np.empty(3 * m)
-    _block_impulses(jacobian, u, bounce, bounce_t, mu, friction, scale, p)
-    if largest > 0.0 and _energy_change(jacobian, u, p) > 0.0:
+            e[s] = rebound * _restitution(contacts, c, approach, rest_speed)
+            e_t[s] = contacts.tangential_restitution[c] if e[s] > 0.0 else 0.0
+            largest = max(largest, e[s])
+    _set_bias(rows, first_row, u, e, e_t)
+    _block_impulses(rows, n, first_row, friction, scale)
+    if largest > 0.0 and _energy_change(rows, n, first_row, u) > 0.0:
         for s in range(m):
-            bounce[s] = bounce_t[s] = 0.0
-            mu[s] = contacts.static_friction[subset[s]]
-        _block_impulses(jacobian, u, bounce, bounce_t, mu, friction, scale, p)
-        for i in range(3 * m):
-            p[i] *= 1.0 + largest
-    return _apply(bodies, contacts, subset, frames, u, p, scale, log, count)
+            e[s] = e_t[s] = 0.0
+        _set_bias(rows, first_row, u, e, e_t)
+        for i in range(rows.bias.shape[0]):
+            rows.impulse[i] = 0.0
+        for s in range(m):
+            i = first_row[s] + 1
+            if rows_of(rows, first_row[s]) == 3:
+                rows.coefficient[i] = rows.coefficient[i + 1] = contacts.static_friction[subset[s]]
+        _block_impulses(rows, n, first_row, friction, scale)
+        for i in range(rows.bias.shape[0]):
+            rows.impulse[i] *= 1.0 + largest
+    return _apply(bodies, contacts, subset, rows, first_row, frames, u, log, count)
 
 
 @jit
-def _energy_change(jacobian, u, p):
+def _set_bias(rows, first_row, u, e, e_t):
+    """b = u + e u_n along the normal, (1 + e_t) u_t along the tangents."""
+    for s in range(first_row.shape[0]):
+        i = first_row[s]
+        rows.bias[i] = u[s, 0] + e[s] * u[s, 0]
+        if rows_of(rows, i) == 3:
+            rows.bias[i + 1], rows.bias[i + 2] = u[s, 1] * (1.0 + e_t[s]), u[s, 2] * (1.0 + e_t[s])
+
+
+@jit
+def _energy_change(rows, n, first_row, u):
     """p.u + |Jh^T p|^2 / 2, less the round-off of its terms [J]."""
-    y = np.empty(jacobian.shape[1])
-    multiply_transposed(jacobian, p, y)
+    y = np.empty((n, 6))
+    multiply_transposed(rows, rows.impulse, y)
     linear = moved = quadratic = 0.0
-    for i in range(p.shape[0]):
-        linear += p[i] * u[i]
-        moved += abs(p[i] * u[i])
-    for i in range(y.shape[0]):
-        quadratic += 0.5 * y[i] * y[i]
+    for s in range(first_row.shape[0]):
+        i = first_row[s]
+        for k in range(rows_of(rows, i)):
+            linear += rows.impulse[i + k] * u[s, k]
+            moved += abs(rows.impulse[i + k] * u[s, k])
+    for i in range(n):
+        for k in range(6):
+            quadratic += 0.5 * y[i, k] * y[i, k]
     return linear + quadratic - 1e-13 * (moved + quadratic)
 
 
 @jit
-def _apply(bodies, contacts, subset, frames, u, p, scale, log, count):
+def _apply(bodies, contacts, subset, rows, first_row, frames, u, log, count):
     impulse = np.empty(3)
     first = count
     for s in range(subset.shape[0]):
-        for a in range(3):
-            impulse[a] = p[3 * s] * frames[s, 0, a] + p[3 * s + 1] * frames[s, 1, a] + p[3 * s + 2] * frames[s, 2, a]
-        if p[3 * s] > 0.0:
+        i = first_row[s]
+        impulse_along(rows, i, frames[s], impulse)
+        if rows.impulse[i] > 0.0:
             apply_impulse(bodies, contacts, subset[s], impulse[0], impulse[1], impulse[2])
-            count = log_impact(bodies, contacts, subset[s], impulse, u[3 * s], log, count)
+            count = log_impact(bodies, contacts, subset[s], impulse, u[s, 0], log, count)
     v = np.empty(3)
     for i in range(first, count):
         log[i, 6] = relative_velocity(bodies, contacts, int(log[i, 0]), v)
@@ -151,7 +172,7 @@ def _same_pair(contacts, c):
 
 
 @jit
-def respond_sequential(bodies, contacts, rest_speed, tolerance, scale, column, log):
+def respond_sequential(bodies, contacts, rest_speed, tolerance, scale, number, log):
     """Pair after pair, fastest approach first. Returns (rows written to log, impulses made, whether the cap was reached).
 
     A full log ends the call early, without the inelastic finish: read it and call again.
@@ -171,25 +192,25 @@ def respond_sequential(bodies, contacts, rest_speed, tolerance, scale, column, l
             e = _restitution(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
             count = resolve_contact(bodies, contacts, c, e, log, count)
         else:
-            count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, column, log, count)
+            count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, number, log, count)
         impulses += 1
     full = count + contacts.gap.shape[0] >= log.shape[0]
     if not full and _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
-        count = _finish(bodies, contacts, rest_speed, scale, column, log, count)
+        count = _finish(bodies, contacts, rest_speed, scale, number, log, count)
         impulses += 1
     return count, impulses, impulses >= cap
 
 
 @jit
-def _finish(bodies, contacts, rest_speed, scale, column, log, count):
+def _finish(bodies, contacts, rest_speed, scale, number, log, count):
     if contacts.gap.shape[0] == 1:
         return resolve_contact(bodies, contacts, np.int64(0), 0.0, log, count)
     subset = np.arange(contacts.gap.shape[0])
-    return solve_block(bodies, contacts, subset, 0.0, rest_speed, scale, column, log, count)
+    return solve_block(bodies, contacts, subset, 0.0, rest_speed, scale, number, log, count)
 
 
 @jit
-def respond_simultaneous(bodies, contacts, rest_speed, tolerance, scale, column, log):
+def respond_simultaneous(bodies, contacts, rest_speed, tolerance, scale, number, log):
     """The whole group as one block; same arguments and answer as `respond_sequential`."""
     c = _approaching(bodies, contacts, tolerance, 0.0, rest_speed)
     if c < 0:
@@ -200,9 +221,9 @@ def respond_simultaneous(bodies, contacts, rest_speed, tolerance, scale, column,
         e = _restitution(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
         return resolve_contact(bodies, contacts, c, e, log, c), 1, False
     subset = np.arange(contacts.gap.shape[0])
-    count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, column, log, np.int64(0))
+    count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, number, log, np.int64(0))
     impulses = 1
     if _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
-        count = _finish(bodies, contacts, rest_speed, scale, column, log, count)
+        count = _finish(bodies, contacts, rest_speed, scale, number, log, count)
         impulses += 1
     return count, impulses, False
