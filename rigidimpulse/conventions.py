@@ -51,6 +51,8 @@ class Tolerances:
     """Gap at which lasting contacts are held (delta), relative to the size of the smaller body."""
     touch_gap: float = 1e-10
     """Gap at which impacts of faces, edges and rims with each other take place, relative to the size of the smaller body."""
+    joint: float = 1e-12
+    """Distance at which joints are closed, relative to the size of what they join; also their angles, in rad."""
     approach: float = 1e-13
     """Approach speed that counts as none, relative to the speed of the bodies."""
     rest: float = 1e-8

@@ -72,7 +72,7 @@ class Plan:
             self.lines.append(line)
             if isinstance(bound, Bound):
                 self._stages[effect.stage].append((bound.function, line))
-        self.collides = bool(self._stages["detect"])
+        self.steps = bool(self._stages["detect"] or self._stages["constrain"])
 
     def run(self, stage: str, *arguments) -> None:
         """Run a stage's effects in order, adding up their time."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,9 +37,10 @@ class Status:
     @staticmethod
     def of(events: Sequence[Event]) -> Status:
         """Return the status that the events of a run add up to."""
-        if not events:
-            return Status(True, "finished")
-        lines = [f"t = {e.time:.6g} s, {e.kind} ({', '.join(e.bodies)}): {e.message}" for e in events]
+        problems = [e for e in events if e.is_problem]
+        if not problems:
+            return Status(True, "finished", tuple(events))
+        lines = [f"t = {e.time:.6g} s, {e.kind} ({', '.join(e.bodies)}): {e.message}" for e in problems]
         return Status(False, "\n".join(lines), tuple(events))
 
 
@@ -55,6 +56,7 @@ class Recording:
         impacts: structured array, one row an impulse at a contact point (see observe.events.IMPACT_DTYPE).
         ledger: energy and momentum per frame. status: how the run went. plan: what was simulated and why.
         scene: the scene as it was written; None in a recording loaded from a file without one.
+        reactions: (f, 3) N by joint, see `reaction`.
 
     """
 
@@ -70,6 +72,7 @@ class Recording:
     status: Status = Status(True, "loaded")
     plan: Plan | None = None
     scene: Scene | None = None
+    reactions: dict[str, np.ndarray] = field(default_factory=dict)
 
     def index(self, name: str) -> int:
         """Index of a body.
@@ -103,6 +106,17 @@ class Recording:
     def center_of_mass(self, name: str) -> np.ndarray:
         """(f, 3) m."""
         return self.centers[:, self.index(name)]
+
+    def reaction(self, name: str) -> np.ndarray:
+        """(f, 3) N, force of a joint on its body b; impulses at impacts are not in it.
+
+        Raises:
+            SceneError: for an unknown name, listing the known ones.
+
+        """
+        if name not in self.reactions:
+            raise unknown_name("joint", name, self.reactions)
+        return self.reactions[name]
 
     def state_hash(self) -> str:
         """SHA-256 of all frames and impacts: equal if and only if two runs agree in every bit."""

@@ -12,6 +12,7 @@ from rigidimpulse._jit import kernels_are_cached
 from rigidimpulse.accuracy import Accuracy
 from rigidimpulse.compile_ahead import compile_kernels
 from rigidimpulse.constrain.contact_forces import ContactForces
+from rigidimpulse.constrain.jointed import reaction_table
 from rigidimpulse.detect.overlap import report_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.errors import SceneError
@@ -79,7 +80,7 @@ def simulate(
     # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
     paths = KeyframePaths(world)
     for end in (float(duration), max(float(duration), float(times[-1]))):
-        if plan.collides:
+        if plan.steps:
             run_steps(context, plan, paths, end, progress)
         else:
             paths.start_segments(context, end)
@@ -175,4 +176,5 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         status=Status.of(context.log.events),
         plan=plan,
         scene=world.scene,
+        reactions=reaction_table(context.joints, times),
     )

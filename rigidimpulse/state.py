@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigidimpulse.constrain.jointed import JointState
 from rigidimpulse.detect.groups import note_arrival
 from rigidimpulse.detect.touching import bring
 from rigidimpulse.geometry import Geometry
@@ -13,6 +14,7 @@ from rigidimpulse.integrate.course import Course, make_course, pose_at
 from rigidimpulse.observe.events import EventLog
 from rigidimpulse.observe.recorder import Recorder
 from rigidimpulse.respond.impulse import BodyState
+from rigidimpulse.rotation import to_matrix
 from rigidimpulse.sweep.guard import SweepScratch, make_scratch
 from rigidimpulse.world import World
 
@@ -84,12 +86,19 @@ class StepContext:
         self.wrench = np.zeros((n, 6))
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
+        self.joints = JointState(world) if world.joints_of_scene else None
 
     def bring(self, i: int, time: float) -> None:
         """Bring body i to `time` on its course."""
         state = self.state
         bring(state.course, i, time, state.now, state.rotation, self.acceleration, self.angular_acceleration)
         note_arrival(self, [i])
+
+    def pose_matrix(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Position (3,) and rotation matrix (3, 3) of body i at `time` on its present course."""
+        x, q = np.empty(3), np.empty(4)
+        pose_at(self.state.course, i, time, x, q)
+        return x, to_matrix(q)
 
     def grow_contacts(self, needed: int) -> None:
         """Make room for `needed` contacts and candidate pairs."""

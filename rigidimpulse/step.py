@@ -31,6 +31,7 @@ def step(context, plan, end: float) -> None:
 
 def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> None:
     """Everything that happens at `time` to the groups that the given bodies touch."""
+    window.wake[bodies] = np.inf
     for group in window.touching(time, bodies):
         plan.run("respond", context, group)
         plan.run("forces", context, group)

@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from rigidimpulse.accuracy import Accuracy, resolve_accuracy
+from rigidimpulse.constrain.joint import Joint, compile_joints
+from rigidimpulse.constrain.joint_rows import Joints
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
 from rigidimpulse.mass import body_mass
@@ -35,6 +37,8 @@ class World:
         flat: (n,) bool, has faces or rims that must not touch those of another at gap 0.
         half_space, ball: (n,) bool, the shape is half spaces only; one sphere about the centre of mass.
         touch_gap: gap at which faces and rims meet, as a fraction of the smaller body's size.
+        apart: (p,) pairs a * n + b, a < b, that do not touch each other since a joint joins them.
+        joints_of_scene: the joints as written.
         contact_gap: gap at which lasting contacts are held, as a fraction of the smaller body's size.
 
     """
@@ -68,6 +72,8 @@ class World:
     ball: np.ndarray
     contact_gap: float
     touch_gap: float
+    apart: np.ndarray
+    joints_of_scene: list[Joint]
 
     @property
     def num_bodies(self) -> int:
@@ -90,6 +96,17 @@ class World:
         finite = self.size[np.isfinite(self.size)]
         return self.contact_gap * float(finite.max()) if len(finite) else 0.0
 
+    @cached_property
+    def joints(self) -> Joints:
+        """The table of joints."""
+        return compile_joints(self.joints_of_scene, self)
+
+    @cached_property
+    def joint_size(self) -> float:
+        """Size of the smallest body that a joint joins, m."""
+        ends = np.concatenate([self.joints.body_a, self.joints.body_b])
+        return float(self.size[ends[ends >= 0]].min(initial=np.inf))
+
     @property
     def can_collide(self) -> bool:
         """Whether any two bodies may ever touch with consequence: a dynamic one and another."""
@@ -102,7 +119,8 @@ class World:
 
     def may_collide(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Which pairs take part in contact at all: at least one of the bodies is dynamic."""
-        return self.dynamic[a] | self.dynamic[b]
+        may = self.dynamic[a] | self.dynamic[b]
+        return may & ~np.isin(a * self.num_bodies + b, self.apart) if len(self.apart) else may
 
     def least_touch(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Gap at which contact of new pairs is declared, m: 0 where normals are well defined at gap 0."""
@@ -125,6 +143,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
     validate(scene)
     bodies = list(scene.bodies)
     masses = [body_mass(body) for body in bodies]
+    joints = [effect for effect in scene.effects if isinstance(effect, Joint)]
     dynamic = np.array([body.motion == "dynamic" for body in bodies], bool)
     moving = np.array([body.motion == "kinematic" and _is_driven(body) for body in bodies], bool)
     offset = np.array([m.center_of_mass for m in masses], float).reshape(-1, 3)
@@ -171,7 +190,19 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
         ball=np.array([_is_ball(geometry, k) for k in shape_of_body], bool),
         contact_gap=TOLERANCES.contact_gap,
         touch_gap=TOLERANCES.touch_gap,
+        apart=_pairs_apart(joints, [body.name for body in bodies]),
+        joints_of_scene=joints,
     )
+
+
+def _pairs_apart(joints: list[Joint], names: list[str]) -> np.ndarray:
+    """Keys of the pairs of bodies that are joined and do not touch each other."""
+    pairs = {
+        tuple(sorted((names.index(joint.a), names.index(joint.b))))
+        for joint in joints
+        if joint.a in names and joint.b in names and not joint.collide
+    }
+    return np.array(sorted(a * len(names) + b for a, b in pairs), np.int64)
 
 
 def _is_driven(body) -> bool:

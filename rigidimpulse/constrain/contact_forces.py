@@ -23,13 +23,15 @@ CARRIER_OF_KIND = np.array([CARRIER_B, CARRIER_A, SHARED, SHARED, SHARED, SHARED
 
 @dataclass(frozen=True)
 class ContactForces:
-    """Lasting contact, solved exactly for each group of touching bodies."""
+    """Lasting contact and joints, solved exactly for each group of touching or joined bodies."""
 
     stage: str = "constrain"
     name: str = "contact forces (newton)"
 
     def bind(self, world) -> Bound | Skip:
         """In where something can press bodies together."""
+        if world.joints_of_scene:
+            return Bound(hold, f"{len(world.joints_of_scene)} joints")
         if not world.can_collide:
             return Skip("nothing can collide")
         if not world.can_press:
@@ -41,12 +43,12 @@ def hold(context, window, group: Group) -> None:
     """Find the lasting contacts of a group and write the wrenches of its members into context.wrench."""
     context.wrench[group.members] = 0.0
     group.held = held_contacts(group)
-    if not group.held.any():
+    if not group.held.any() and not len(group.joints):
         return
     if needs_lift(group.contacts, group.held, group.delta):
         _lift(context, window, group)
     subset = np.flatnonzero(group.held)
-    if not len(subset):
+    if not len(subset) and not len(group.joints):
         return
     state, now = context.state, context.state.now
     contacts = select(group.contacts, subset)
@@ -58,12 +60,17 @@ def hold(context, window, group: Group) -> None:
         context.world.geometry, context.world.shape_of_body, state.rotation, now, contacts, carrier
     )
     keys = [group.keys[c] for c in subset]
-    force = np.array([state.contact_force.get(key, NO_FORCE) for key in keys])
+    force = np.array([state.contact_force.get(key, NO_FORCE) for key in keys]).reshape(-1, 3)
     before = kinetic_energy(now, context.world, group.members)
-    residual = hold_contacts(
-        now, contacts, np.arange(len(subset)), turning, context.acceleration, context.angular_acceleration,
-        window.end - group.time, context.column, force, context.wrench,
-    )
+    h = window.end - group.time
+    if len(group.joints):
+        h = context.joints.sub_step(context, group, h)
+        residual = context.joints.hold(context, group, contacts, np.arange(len(subset)), turning, force, h)
+    else:
+        residual = hold_contacts(
+            now, contacts, np.arange(len(subset)), turning, context.acceleration, context.angular_acceleration, h,
+            context.column, force, context.wrench,
+        )
     context.log.book(group.time, "capture", kinetic_energy(now, context.world, group.members) - before)
     for key, f in zip(keys, force, strict=True):
         state.contact_force[key] = f
@@ -72,7 +79,9 @@ def hold(context, window, group: Group) -> None:
         context.log.report(
             group.time, "contact forces not solved", names, f"residual {residual:.1e}; use a smaller step"
         )
-    group.rests = _rests(context, group, window.end - group.time)
+    group.rests = _rests(context, group, h)
+    if h < window.end - group.time and not group.rests:
+        window.wake[group.members] = group.time + h
 
 
 def held_contacts(group: Group) -> np.ndarray:
@@ -93,7 +102,7 @@ def _lift(context, window, group: Group) -> None:
         group.held = np.zeros(0, bool)
         return
     acceleration, angular = context.acceleration[group.members].copy(), context.angular_acceleration[group.members].copy()
-    again = make_group(context, window, group.time, real, integer, np.ones(len(real), bool))
+    again = make_group(context, window, group.time, real, integer, np.ones(len(real), bool), group.joints)
     for name in ("contacts", "place", "kinds", "keys", "delta", "approach", "rest_speed", "live"):
         setattr(group, name, getattr(again, name))
     context.acceleration[group.members], context.angular_acceleration[group.members] = acceleration, angular
@@ -105,6 +114,8 @@ def _rests(context, group: Group, h: float) -> bool:
     world, now = context.world, context.state.now
     i = group.members
     supports = np.unique(np.concatenate([group.contacts.body_a, group.contacts.body_b]))
+    if len(group.joints):
+        supports = np.union1d(supports, context.joints.bodies_of(group.joints))
     if np.any(world.moving[supports]):
         return False
     limit = TOLERANCES.rest * np.linalg.norm(world.gravity[i], axis=1) * h

@@ -3,7 +3,7 @@
 Problem. Find impulses p and velocities  u = b + Jh Jh^T p  that satisfy the laws of all rows (see `rows`).
 
 Method. Outside a proximal method of multipliers (Rockafellar 1976) with regularisation R = k diag(Jh Jh^T), k driven
-from 1e-3 to 1e-9, which makes redundant rows harmless; inside a semi-smooth Newton method (Alart & Curnier 1991) on
+from 1e-3 to 1e-12, which makes redundant rows harmless; inside a semi-smooth Newton method (Alart & Curnier 1991) on
 y = Jh^T p:
 
     p(u) = projection of (R q - u) / (R + s) on the bounds, with the radius of discs from the current p_master,
@@ -28,7 +28,7 @@ MAX_OUTER = 60
 MAX_INNER = 60
 MAX_HALVINGS = 8
 REGULARISATION_START = 1e-3
-REGULARISATION_LEAST = 1e-9
+REGULARISATION_LEAST = 1e-12
 TINY = 1e-300
 ROUND_OFF = 4e-16
 
@@ -263,7 +263,7 @@ def solve_newton(rows, n, target):
         if reached < best:
             best = reached
             rows.impulse[:] = q
-        if reached > 0.5 * previous:
+        if reached > 0.5 * previous and k <= REGULARISATION_LEAST:
             stagnant += 1
         previous = reached
         k = max(k * 0.3, 1e-2) if convex else max(k * (0.1 if failures < 3 else 0.3), REGULARISATION_LEAST)

@@ -33,13 +33,14 @@ from rigidimpulse.constrain.rows import (
     write_row,
 )
 from rigidimpulse.geometry import CYLINDER, ROUND
-from rigidimpulse.respond.impulse import apply_impulse
+from rigidimpulse.respond.impulse import apply_impulse, relative_velocity
 
 CAPTURE_PASSES = 4
 # Residual asked of the solver and slip that counts, relative to the speed gained in the sub-step.
 SOLVE_TOLERANCE = 1e-12
 SLIP = 1e-9
 POOR = 1e-8
+TINY = 1e-300
 # Which body carries the normal of a contact kind: vertex-face and face-vertex, half space; others share it.
 CARRIER_B, CARRIER_A, SHARED = 0, 1, 2
 # Cosine of normal and axis below which a cylinder lies on its side.
@@ -141,7 +142,7 @@ def _capture(bodies, contacts, subset, number, n, normal_velocity, pressed, scal
 
 
 @jit
-def _solve(rows, n, first_row, slides, contacts, subset, scale):
+def solve_with_slip(rows, n, first_row, slides, contacts, subset, scale):
     """Impulses of the sub-step; contacts that slip, or come to slip, with dynamic friction. Returns the residual.
 
     slides (m,) bool: contacts that slip now.
@@ -179,6 +180,34 @@ def _solve(rows, n, first_row, slides, contacts, subset, scale):
 
 
 @jit
+def start_contact_impulses(rows, first_row, force, h):
+    """Impulses of the contact rows to start from, by the forces (m, 3) of last time."""
+    for s in range(first_row.shape[0]):
+        for k in range(rows_of(rows, first_row[s])):
+            rows.impulse[first_row[s] + k] = force[s, k] * h
+
+
+@jit
+def fill_contact_bias(
+    bodies, contacts, subset, frames, turning, acceleration, angular_acceleration, h, rows, first_row, slides
+):
+    """b = u + h a of the contact rows, and which contacts slip; returns the largest speed h a gained [m/s]."""
+    m = subset.shape[0]
+    u, a, scale = np.empty(3), np.empty((m, 3)), TINY
+    for s in range(m):
+        contact_velocity(contacts, subset[s], frames[s], acceleration, angular_acceleration, a[s])
+        a[s, 0] += turning[s]
+        for k in range(3):
+            scale = max(scale, abs(a[s, k]) * h)
+    for s in range(m):
+        contact_velocity(contacts, subset[s], frames[s], bodies.velocity, bodies.angular_velocity, u)
+        for k in range(rows_of(rows, first_row[s])):
+            rows.bias[first_row[s] + k] = u[k] + h * a[s, k]
+        slides[s] = abs(u[1]) + abs(u[2]) > SLIP * scale
+    return scale
+
+
+@jit
 def hold_contacts(bodies, contacts, subset, turning, acceleration, angular_acceleration, h, number, force, wrench):
     """Contact forces of the sub-step for the contacts in subset (m,).
 
@@ -192,27 +221,18 @@ def hold_contacts(bodies, contacts, subset, turning, acceleration, angular_accel
     rows = make_rows(count_contact_rows(contacts, subset))
     first_row, frames = np.empty(m, np.int64), np.empty((m, 3, 3))
     contact_rows(bodies, contacts, subset, number, rows, first_row, frames)
-    u, a = np.empty((m, 3)), np.empty((m, 3))
-    slides, pressed = np.empty(m, np.bool_), np.empty(m, np.bool_)
-    scale = 1e-300
-    for s in range(m):
-        contact_velocity(contacts, subset[s], frames[s], acceleration, angular_acceleration, a[s])
-        a[s, 0] += turning[s]
-        for k in range(3):
-            scale = max(scale, abs(a[s, k]) * h)
-        for k in range(rows_of(rows, first_row[s])):
-            rows.impulse[first_row[s] + k] = force[s, k] * h
-    residual = 0.0
+    slides, pressed, leaving, u = np.empty(m, np.bool_), np.empty(m, np.bool_), np.empty(m), np.empty(3)
+    start_contact_impulses(rows, first_row, force, h)
+    residual, scale = 0.0, 0.0
     for _ in range(CAPTURE_PASSES):
-        for s in range(m):
-            contact_velocity(contacts, subset[s], frames[s], bodies.velocity, bodies.angular_velocity, u[s])
-            for k in range(rows_of(rows, first_row[s])):
-                rows.bias[first_row[s] + k] = u[s, k] + h * a[s, k]
-            slides[s] = abs(u[s, 1]) + abs(u[s, 2]) > SLIP * scale
-        residual = _solve(rows, n, first_row, slides, contacts, subset, scale)
+        scale = fill_contact_bias(
+            bodies, contacts, subset, frames, turning, acceleration, angular_acceleration, h, rows, first_row, slides
+        )
+        residual = solve_with_slip(rows, n, first_row, slides, contacts, subset, scale)
         for s in range(m):
             pressed[s] = rows.impulse[first_row[s]] > 0.0
-        if not _capture(bodies, contacts, subset, number, n, u[:, 0], pressed, scale):
+            leaving[s] = relative_velocity(bodies, contacts, subset[s], u)
+        if not _capture(bodies, contacts, subset, number, n, leaving, pressed, scale):
             break
     for s in range(m):
         force[s] = 0.0

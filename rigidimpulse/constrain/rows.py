@@ -109,12 +109,12 @@ def write_body(bodies, i, line, x, y, z, tx, ty, tz):
 
 @jit
 def write_row(bodies, number, a, b, ra, rb, x, y, z, rows, i):
-    """Row i for the relative velocity of two points along (x, y, z); ra, rb (3,) their arms on bodies a and b."""
-    if bodies.inv_mass[a] > 0.0:
+    """Row i for the relative velocity of two points along (x, y, z); ra, rb (3,) their arms on bodies a and b (-1: the world)."""
+    if a >= 0 and bodies.inv_mass[a] > 0.0:
         tx, ty, tz = ra[1] * z - ra[2] * y, ra[2] * x - ra[0] * z, ra[0] * y - ra[1] * x
         rows.first[i] = number[a]
         write_body(bodies, a, rows.jacobian[i, :6], -x, -y, -z, -tx, -ty, -tz)
-    if bodies.inv_mass[b] > 0.0:
+    if b >= 0 and bodies.inv_mass[b] > 0.0:
         tx, ty, tz = rb[1] * z - rb[2] * y, rb[2] * x - rb[0] * z, rb[0] * y - rb[1] * x
         rows.second[i] = number[b]
         write_body(bodies, b, rows.jacobian[i, 6:], x, y, z, tx, ty, tz)
@@ -217,6 +217,22 @@ def multiply_transposed(rows, p, out):
                 part = out[rows.second[i]]
                 for k in range(6):
                     part[k] += line[6 + k] * p[i]
+
+
+@jit
+def scaled_wrench(bodies, i, y, wrench):
+    """Add C^-T y, the linear and angular impulse on body i that y = (Jh^T p)_i (6,) stands for, to wrench (6,)."""
+    factor = np.empty((3, 3))
+    root = sqrt(bodies.inv_mass[i])
+    cholesky_3(bodies.inv_inertia[i], factor)
+    z = y[5] / factor[2, 2]
+    x1 = (y[4] - factor[2, 1] * z) / factor[1, 1]
+    x0 = (y[3] - factor[1, 0] * x1 - factor[2, 0] * z) / factor[0, 0]
+    for k in range(3):
+        wrench[k] += y[k] / root
+    wrench[3] += x0
+    wrench[4] += x1
+    wrench[5] += z
 
 
 @jit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -32,6 +32,7 @@ class Group:
         moved: whether a lift has changed poses.
         held: (m,) bool, contacts that carry forces. rests: whether all members stand still.
         still: m/s, approach speed that counts as none.
+        joints: the joints of the members.
 
     """
 
@@ -52,6 +53,7 @@ class Group:
     held: np.ndarray | None = None
     rests: bool = False
     still: float = 0.0
+    joints: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
 def empty_contacts(m: int) -> Contacts:
@@ -97,37 +99,42 @@ def touching_groups(context, window, time: float, bodies: np.ndarray) -> list[Gr
     brought = np.zeros(world.num_bodies, bool)
     reached = np.zeros(world.num_bodies, bool)
     frontier = np.asarray(bodies, np.int64)
-    reals, integers = [], []
+    reals, integers = [np.zeros((0, 10))], [np.zeros((0, 5), np.int64)]
     while len(frontier):
         reached[frontier] = True
         mark = np.zeros(world.num_bodies, bool)
         mark[frontier] = True
         pairs = np.flatnonzero((mark[window.a] | mark[window.b]) & ~seen)
-        if not len(pairs):
+        partners = _joint_partners(context, frontier)
+        if not len(pairs) and not len(partners):
             break
         seen[pairs] = True
         mark[:] = False
         mark[window.a[pairs]] = True
         mark[window.b[pairs]] = True
+        mark[partners] = True
         fresh = np.flatnonzero(mark & ~brought)
         brought[fresh] = True
         bring_all(
             state.course, fresh, time, state.now, state.rotation, context.acceleration, context.angular_acceleration
         )
         real, integer = collect(context, window, pairs, time)
-        if not len(real):
-            break
         reals.append(real)
         integers.append(integer)
-        touched = np.unique(integer[:, :2])
+        touched = np.union1d(integer[:, :2], partners)
         frontier = touched[world.dynamic[touched] & ~reached[touched]]
-    if not reals:
-        return []
-    return _components(context, window, time, np.concatenate(reals), np.concatenate(integers))
+    return _components(context, window, time, reached, np.concatenate(reals), np.concatenate(integers))
 
 
-def _components(context, window, time: float, real: np.ndarray, integer: np.ndarray) -> list[Group]:
-    """Split contacts into groups joined by movable bodies, in order of their first body."""
+def _joint_partners(context, bodies: np.ndarray) -> np.ndarray:
+    """All bodies of the joints at the given ones, themselves included."""
+    if context.joints is None:
+        return np.zeros(0, np.int64)
+    return context.joints.bodies_of(context.joints.at(bodies))
+
+
+def _components(context, window, time: float, reached, real: np.ndarray, integer: np.ndarray) -> list[Group]:
+    """Split contacts and joints into groups joined by movable bodies, in order of their first body."""
     dynamic = context.world.dynamic
     parent: dict[int, int] = {}
 
@@ -136,14 +143,30 @@ def _components(context, window, time: float, real: np.ndarray, integer: np.ndar
             i = parent[i]
         return i
 
-    for a, b in integer[:, :2].tolist():
+    def join(a: int, b: int) -> None:
         if dynamic[a] and dynamic[b]:
             low, high = sorted((root(a), root(b)))
             parent[high] = low
-    owner = np.array([root(a if dynamic[a] else b) for a, b in integer[:, :2].tolist()])
-    groups = [make_group(context, window, time, real, integer, owner == o) for o in np.unique(owner)]
+
+    for a, b in integer[:, :2].tolist():
+        join(a, b)
+    joints = np.zeros(0, np.int64)
+    if context.joints is not None:
+        joints = context.joints.at(np.flatnonzero(reached & dynamic))
+        for j in joints.tolist():
+            ends = context.joints.bodies_of(np.array([j])).tolist()
+            join(ends[0], ends[-1])
+    owner = np.array([root(a if dynamic[a] else b) for a, b in integer[:, :2].tolist()], np.int64)
+    owner_of_joint = [root(i) for i in (context.joints.movable_end(j) for j in joints.tolist())] if len(joints) else []
+    owner_of_joint = np.array(owner_of_joint, np.int64)
+    groups = []
+    for o in np.union1d(owner, owner_of_joint):
+        groups.append(make_group(context, window, time, real, integer, owner == o, joints[owner_of_joint == o]))
     for group in groups:
         note_arrival(context, group.members.tolist())
+        if len(group.joints):
+            context.joints.arrive(context, group)
+            classify(context, group)
     return groups
 
 
@@ -155,14 +178,18 @@ def note_arrival(context, members: list[int]) -> None:
             state.arrival_energy[i] = mechanical_energy(state.now, world, np.array([i]))
 
 
-def make_group(context, window, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray) -> Group:
-    """The group of the contacts marked in `which`, sorted by pair."""
+def make_group(
+    context, window, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray, joints: np.ndarray
+) -> Group:
+    """The group of the contacts marked in `which`, sorted by pair, and of the given joints."""
     world, state = context.world, context.state
     rows = np.flatnonzero(which)
     rows = rows[np.lexsort((integer[rows, 4], integer[rows, 3], integer[rows, 2], integer[rows, 1], integer[rows, 0]))]
     contacts = empty_contacts(len(rows))
     fill_contacts(state.now, real, integer, rows, world.material_of_body, world.coefficients, contacts)
     touched = np.unique(integer[rows, :2])
+    if len(joints):
+        touched = np.union1d(touched, context.joints.bodies_of(joints))
     members = touched[world.dynamic[touched]]
     place = window.find(contacts.body_a, contacts.body_b)
     group = Group(
@@ -179,6 +206,7 @@ def make_group(context, window, time: float, real: np.ndarray, integer: np.ndarr
         live=window.is_live(time, place, contacts.gap),
         velocity=state.now.velocity[members].copy(),
         angular_velocity=state.now.angular_velocity[members].copy(),
+        joints=joints,
     )
     classify(context, group)
     return group

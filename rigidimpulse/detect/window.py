@@ -59,6 +59,7 @@ class Window:
         touch: m, gap at which contact is declared now.
         delta: m, gap at which lasting contacts are held.
         tolerance: m, gap error of an impact.
+        wake: (n,) s, when bodies must be looked at again though nothing meets them.
         witness: (10,) points on a and b, normal and gap where the pair comes to contact.
         tries: how often the pair came to contact at one instant without an impulse.
     """
@@ -75,6 +76,7 @@ class Window:
         self.tolerance = np.zeros(0)
         self.tries = np.zeros(0, np.int64)
         self.witness = np.zeros((0, 10))
+        self.wake = np.full(context.world.num_bodies, np.inf)
         self._moves = (context.state.course.mode != FIXED) | context.world.dynamic
 
     def find_pairs(self) -> None:
@@ -145,9 +147,9 @@ class Window:
         return np.flatnonzero(self.context.state.course.mode != FIXED)
 
     def bodies_at(self, time: float) -> np.ndarray:
-        """Bodies of the pairs that come to contact at `time`."""
+        """Bodies that come to contact or are called at `time`."""
         hit = self.time <= time
-        return np.unique(np.concatenate([self.a[hit], self.b[hit]]))
+        return np.unique(np.concatenate([self.a[hit], self.b[hit], np.flatnonzero(self.wake <= time)]))
 
     def find(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Places of the pairs (a, b)."""
@@ -183,5 +185,5 @@ class Window:
             )
 
     def next_time(self) -> float:
-        """Time of the earliest contact, inf if there is none."""
-        return float(self.time.min()) if len(self.time) else np.inf
+        """Time of the earliest contact or call, inf if there is none."""
+        return float(min(self.time.min(initial=np.inf), self.wake.min()))

@@ -36,8 +36,8 @@ class FreeRotation:
     name: str = "gyroscopic term"
 
     def bind(self, world) -> Bound | Skip:
-        """In where contacts may act on bodies whose moments of inertia differ."""
-        if not world.can_collide:
+        """In where contacts or joints may act on bodies whose moments of inertia differ."""
+        if not world.can_collide and not world.joints_of_scene:
             return Skip("nothing can collide; free rotation is in closed form")
 
         def free(context, group) -> None:
@@ -47,4 +47,4 @@ class FreeRotation:
                 group.members, state.now, state.rotation, state.course.inertia, context.angular_acceleration
             )
 
-        return Bound(free, "spins change the load of contacts")
+        return Bound(free, "spins change the load of contacts and joints")

@@ -30,6 +30,7 @@ class Event:
     kind: str
     bodies: tuple[str, ...]
     message: str
+    is_problem: bool = True
 
 
 @dataclass
@@ -54,6 +55,10 @@ class EventLog:
         """Book a change of mechanical energy [J]; negative is dissipated."""
         if change != 0.0:
             self.energy.append((time, cause, change))
+
+    def note(self, time: float, kind: str, bodies: tuple[str, ...], message: str) -> None:
+        """Keep an event that is no problem: what the scene asked for."""
+        self.events.append(Event(time, kind, bodies, message, is_problem=False))
 
     def report(self, time: float, kind: str, bodies: tuple[str, ...], message: str) -> None:
         """Keep an event; the same kind for the same bodies is kept once."""

@@ -14,7 +14,7 @@ from rigidimpulse.respond.impulse import log_impact, relative_velocity
 
 
 @jit
-def respond_kinematic(bodies, contacts, rest_speed, tolerance, scale, column, log):
+def respond_kinematic(bodies, contacts, rest_speed, tolerance, scale, number, joints, log):
     """Arguments and answer as `simultaneous.respond_sequential`; each contact is dealt with once, fastest approach first."""
     m = contacts.gap.shape[0]
     done = np.zeros(m, np.bool_)

@@ -73,8 +73,11 @@ def respond_to_impacts(context, group: Group, kernel) -> None:
     now = context.state.now
     rest_speed = np.where(_rattles(context, group.time, contacts), np.inf, rest_speed)
     before = kinetic_energy(now, context.world, group.members)
+    joints = context.joints.impact_block(context, group) if len(group.joints) else None
     for _ in range(MAX_CALLS):
-        count, _, capped = kernel(now, contacts, rest_speed, tolerance, scale, context.column, context.impact_log)
+        count, _, capped = kernel(
+            now, contacts, rest_speed, tolerance, scale, context.column, joints, context.impact_log
+        )
         _log(context, group.time, contacts, context.impact_log[:count])
         _remember_rebounds(context, group, contacts, context.impact_log[:count])
         if capped:

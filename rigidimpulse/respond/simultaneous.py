@@ -15,6 +15,7 @@ answers a chain of bodies gives.
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.joint_impact import apply_joint_impulses, copy_rows, number_all
 from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.rows import (
     contact_rows,
@@ -64,11 +65,14 @@ def _block_impulses(rows, n, first_row, friction, scale):
 
 
 @jit
-def solve_block(bodies, contacts, subset, rebound, rest_speed, scale, number, log, count):
+def solve_block(bodies, contacts, subset, rebound, rest_speed, scale, number, joints, log, count):
     """Resolve the contacts of subset together and apply the impulses; `rebound` 1, or 0 for an inelastic one. New log count."""
     m = subset.shape[0]
-    n = number_members(bodies, contacts, subset, number).shape[0]
-    rows = make_rows(count_contact_rows(contacts, subset))
+    members = number_members(bodies, contacts, subset, number) if joints is None else number_all(joints.members, number)
+    n, start = members.shape[0], count_contact_rows(contacts, subset)
+    rows = make_rows(start + (np.int64(0) if joints is None else joints.rows.bias.shape[0]))
+    if joints is not None:
+        copy_rows(joints.rows, rows, start)
     first_row, frames = np.empty(m, np.int64), np.empty((m, 3, 3))
     contact_rows(bodies, contacts, subset, number, rows, first_row, frames)
     u, v = np.empty((m, 3)), np.empty(3)
@@ -89,8 +93,7 @@ def solve_block(bodies, contacts, subset, rebound, rest_speed, scale, number, lo
         for s in range(m):
             e[s] = e_t[s] = 0.0
         _set_bias(rows, first_row, u, e, e_t)
-        for i in range(rows.bias.shape[0]):
-            rows.impulse[i] = 0.0
+        rows.impulse[:] = 0.0
         for s in range(m):
             i = first_row[s] + 1
             if rows_of(rows, first_row[s]) == 3:
@@ -98,7 +101,7 @@ def solve_block(bodies, contacts, subset, rebound, rest_speed, scale, number, lo
         _block_impulses(rows, n, first_row, friction, scale)
         for i in range(rows.bias.shape[0]):
             rows.impulse[i] *= 1.0 + largest
-    return _apply(bodies, contacts, subset, rows, first_row, frames, u, log, count)
+    return _apply(bodies, contacts, members, subset, rows, first_row, frames, u, joints, log, count)
 
 
 @jit
@@ -129,8 +132,10 @@ def _energy_change(rows, n, first_row, u):
 
 
 @jit
-def _apply(bodies, contacts, subset, rows, first_row, frames, u, log, count):
+def _apply(bodies, contacts, members, subset, rows, first_row, frames, u, joints, log, count):
     impulse = np.empty(3)
+    if joints is not None:
+        apply_joint_impulses(bodies, members, rows, joints)
     first = count
     for s in range(subset.shape[0]):
         i = first_row[s]
@@ -172,12 +177,13 @@ def _same_pair(contacts, c):
 
 
 @jit
-def respond_sequential(bodies, contacts, rest_speed, tolerance, scale, number, log):
+def respond_sequential(bodies, contacts, rest_speed, tolerance, scale, number, joints, log):
     """Pair after pair, fastest approach first. Returns (rows written to log, impulses made, whether the cap was reached).
 
     A full log ends the call early, without the inelastic finish: read it and call again.
 
-    rest_speed (m,): a rebound slower than this is none [m/s]; tolerance: slower approach is none [m/s]; scale: speed of the group.
+    rest_speed (m,): a rebound slower than this is none [m/s]; tolerance: slower approach is none [m/s]; scale: speed of the group;
+    joints: None, or the `JointBlock` of the group, whose rows take part in every impulse.
     """
     count = np.int64(0)
     impulses = 0
@@ -188,42 +194,42 @@ def respond_sequential(bodies, contacts, rest_speed, tolerance, scale, number, l
         if c < 0:
             break
         subset = _same_pair(contacts, c)
-        if subset.shape[0] == 1:
+        if subset.shape[0] == 1 and joints is None:
             e = _restitution(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
             count = resolve_contact(bodies, contacts, c, e, log, count)
         else:
-            count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, number, log, count)
+            count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, number, joints, log, count)
         impulses += 1
     full = count + contacts.gap.shape[0] >= log.shape[0]
     if not full and _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
-        count = _finish(bodies, contacts, rest_speed, scale, number, log, count)
+        count = _finish(bodies, contacts, rest_speed, scale, number, joints, log, count)
         impulses += 1
     return count, impulses, impulses >= cap
 
 
 @jit
-def _finish(bodies, contacts, rest_speed, scale, number, log, count):
-    if contacts.gap.shape[0] == 1:
+def _finish(bodies, contacts, rest_speed, scale, number, joints, log, count):
+    if contacts.gap.shape[0] == 1 and joints is None:
         return resolve_contact(bodies, contacts, np.int64(0), 0.0, log, count)
     subset = np.arange(contacts.gap.shape[0])
-    return solve_block(bodies, contacts, subset, 0.0, rest_speed, scale, number, log, count)
+    return solve_block(bodies, contacts, subset, 0.0, rest_speed, scale, number, joints, log, count)
 
 
 @jit
-def respond_simultaneous(bodies, contacts, rest_speed, tolerance, scale, number, log):
+def respond_simultaneous(bodies, contacts, rest_speed, tolerance, scale, number, joints, log):
     """The whole group as one block; same arguments and answer as `respond_sequential`."""
     c = _approaching(bodies, contacts, tolerance, 0.0, rest_speed)
     if c < 0:
         return 0, 0, False
     u = np.empty(3)
-    if contacts.gap.shape[0] == 1:
+    if contacts.gap.shape[0] == 1 and joints is None:
         c = np.int64(0)
         e = _restitution(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
         return resolve_contact(bodies, contacts, c, e, log, c), 1, False
     subset = np.arange(contacts.gap.shape[0])
-    count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, number, log, np.int64(0))
+    count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, number, joints, log, np.int64(0))
     impulses = 1
     if _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
-        count = _finish(bodies, contacts, rest_speed, scale, number, log, count)
+        count = _finish(bodies, contacts, rest_speed, scale, number, joints, log, count)
         impulses += 1
     return count, impulses, False

@@ -1,0 +1,174 @@
+"""Joints in a run: what they remember, what they do when a group arrives, and how they hold it (see `joint_forces`)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rigidimpulse.constrain.joint import Joint
+from rigidimpulse.constrain.joint_forces import close_joints, hold_jointed, make_memory, stop_joints
+from rigidimpulse.constrain.joint_impact import impact_rows
+from rigidimpulse.conventions import TOLERANCES
+from rigidimpulse.detect.touching import refresh_pose
+from rigidimpulse.observe.energy import mechanical_energy
+
+TURN = 0.02
+"""rad, how far the bodies of a joint may turn against each other in a sub-step."""
+MOST_SUB_STEPS = 64
+"""Sub-steps in a step."""
+SHORT = 1e-5
+"""Part of a step below which a sub-step is planned as a longer one: closing divides by its length."""
+
+
+class JointState:
+    """The joints of a run.
+
+    Attributes:
+        table: the rows of all joints. memory: what kernels remember.
+        names: of the joints. whole: (j,) bool, not broken.
+        moment: (j, 3) N s, impulse on b at the instant being worked on. shock: (j, 3) N s, by impacts, so far.
+        began: (j,) s, start of the present sub-step. length: (j,) s, that of the one before.
+        reactions: (time, joint, force (3,) on b) at the ends of sub-steps.
+
+    """
+
+    def __init__(self, world) -> None:
+        """All joints whole and without load."""
+        joints: list[Joint] = world.joints_of_scene
+        self.table = world.joints
+        self.memory = make_memory(world.joints, world.inertia)
+        self.names = [joint.name or f"joint{j}" for j, joint in enumerate(joints)]
+        self.break_force = np.array([joint.break_force for joint in joints])
+        self.whole = np.ones(len(joints), bool)
+        self.moment = np.zeros((len(joints), 3))
+        self.shock = np.zeros((len(joints), 3))
+        self.began = np.zeros(len(joints))
+        self.length = np.zeros(len(joints))
+        self.reactions: list[tuple[float, int, np.ndarray]] = []
+        self._allowed = TOLERANCES.joint * world.joint_size
+        self._dynamic = world.dynamic
+        self._of_body: dict[int, list[int]] = {}
+        for j, pair in enumerate(zip(self.table.body_a.tolist(), self.table.body_b.tolist(), strict=True)):
+            for i in pair:
+                if i >= 0 and world.dynamic[i]:
+                    self._of_body.setdefault(i, []).append(j)
+
+    def at(self, bodies) -> np.ndarray:
+        """Whole joints at any of the given dynamic bodies, in order."""
+        found = {j for i in bodies for j in self._of_body.get(int(i), ()) if self.whole[j]}
+        return np.array(sorted(found), np.int64)
+
+    def movable_end(self, joint: int) -> int:
+        """A dynamic body of a joint."""
+        a, b = int(self.table.body_a[joint]), int(self.table.body_b[joint])
+        return a if a >= 0 and self._dynamic[a] else b
+
+    def bodies_of(self, joints: np.ndarray) -> np.ndarray:
+        """Bodies of the joints, without the world."""
+        both = np.unique(np.concatenate([self.table.body_a[joints], self.table.body_b[joints]]))
+        return both[both >= 0]
+
+    def arrive(self, context, group) -> None:
+        """End the group's sub-steps: take half of the forces back, close what drifted, stop the joints."""
+        state, now, memory = context.state, context.state.now, self.memory
+        members, which = group.members, group.joints
+        elapsed = np.zeros(len(self.whole))
+        elapsed[which] = group.time - self.began[which]
+        self.moment[which] = 0.0
+        before = mechanical_energy(now, context.world, members)
+        for i in members:
+            held = memory.wrench[i] * max(elapsed[j] for j in self.at([i])) if int(i) in self._of_body else np.zeros(6)
+            now.velocity[i] -= now.inv_mass[i] * held[:3]
+            now.angular_velocity[i] -= now.inv_inertia[i] @ held[3:]
+        moved = close_joints(
+            self.table, which, now, state.rotation, members, context.column, memory.angle, self._allowed
+        )
+        if moved:
+            refresh_pose(members, now, state.rotation, state.course.inertia)
+            group.moved = True
+        stop_joints(
+            self.table, which, now, state.rotation, members, context.column, memory, elapsed, self.moment
+        )
+        memory.wrench[members] = 0.0
+        self.length[which] = elapsed[which]
+        context.log.book(group.time, "joints", mechanical_energy(now, context.world, members) - before)
+
+    def impact_block(self, context, group):
+        """The joints' part in the impulses of an impact (`JointBlock`)."""
+        state = context.state
+        return impact_rows(
+            self.table, group.joints, state.now, state.rotation, group.members, context.column, self.memory, self.shock
+        )
+
+    def sub_step(self, context, group, h: float) -> float:
+        """Length of the next sub-step: h, the rest of the step, or a part of it. Very short rests are planned as longer ones."""
+        world, now = context.world, context.state.now
+        fastest = 0.0
+        for a, b in zip(self.table.body_a[group.joints].tolist(), self.table.body_b[group.joints].tolist(), strict=True):
+            spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
+            fastest = max(fastest, float(np.linalg.norm(spins[1] - spins[0])))
+        step = world.accuracy.step
+        pieces = min(max(math.ceil(fastest * step / TURN), 1), MOST_SUB_STEPS)
+        piece = step / pieces
+        return piece if h > piece * (1.0 + SHORT) else max(h, SHORT * step)
+
+    def hold(self, context, group, contacts, subset, turning, force, h: float) -> float:
+        """Forces over a sub-step of length h into context.wrench; returns the residual."""
+        state, memory = context.state, self.memory
+        while True:
+            others = self.bodies_of(group.joints)
+            others = others[~context.world.dynamic[others]]
+            for i in others:
+                memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, group.time + h)
+            moment = self.moment.copy()
+            residual, worst = hold_jointed(
+                state.now, contacts, subset, turning, context.acceleration, context.angular_acceleration, h,
+                group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
+                context.wrench, moment,
+            )
+            broken = self._break(context, group, moment, h)
+            if not broken:
+                break
+        self.moment[:] = moment
+        self._log(group, h)
+        self.began[group.joints] = group.time
+        if worst > 1e3 * self._allowed:
+            names = tuple(context.world.names[i] for i in group.members)
+            context.log.report(group.time, "joints not closed", names, f"off by {worst:.1e}; use a smaller step")
+        return residual
+
+    def _break(self, context, group, moment, h: float) -> bool:
+        """Take out the most overloaded joint, if there is one."""
+        which = group.joints
+        force = np.linalg.norm(2.0 * (moment[which] - self.moment[which]) / h, axis=1) / self.break_force[which]
+        if not len(which) or force.max() <= 1.0:
+            return False
+        j = int(which[np.argmax(force)])
+        self.whole[j] = False
+        group.joints = which[which != j]
+        pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
+        context.log.note(group.time, "joint broke", pair, f"{self.names[j]}: {force.max() * self.break_force[j]:.6g} N")
+        self.reactions.append((group.time, j, np.zeros(3)))
+        return True
+
+    def _log(self, group, h: float) -> None:
+        """Forces on b at this instant: its impulses over half of the sub-steps on both sides."""
+        for j in group.joints.tolist():
+            self.reactions.append((group.time, j, self.moment[j] / (0.5 * (self.length[j] + h))))
+
+
+def reaction_table(joints: JointState | None, times: np.ndarray) -> dict[str, np.ndarray]:
+    """Forces on b by joint name, (f, 3) N at the frame times."""
+    if joints is None:
+        return {}
+    table = {}
+    for j, name in enumerate(joints.names):
+        nodes = [(time, force) for time, k, force in joints.reactions if k == j]
+        if not nodes:
+            table[name] = np.zeros((len(times), 3))
+            continue
+        at, force = np.array([n[0] for n in nodes]), np.array([n[1] for n in nodes])
+        last = np.append(np.flatnonzero(np.diff(at) > 0.0), len(at) - 1)
+        table[name] = np.column_stack([np.interp(times, at[last], force[last, k]) for k in range(3)])
+    return table
