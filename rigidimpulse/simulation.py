@@ -16,6 +16,7 @@ from rigidimpulse.constrain.jointed import reaction_table
 from rigidimpulse.detect.overlap import report_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.errors import SceneError
+from rigidimpulse.detect.window import Window
 from rigidimpulse.forces.gravity import FreeRotation, Gravity
 from rigidimpulse.integrate.course import FIXED, FREE, PRESCRIBED, begin
 from rigidimpulse.integrate.flight import ExactFlight
@@ -28,7 +29,7 @@ from rigidimpulse.recording import Recording, Status
 from rigidimpulse.respond.response import ImpactResponse
 from rigidimpulse.scene import Scene
 from rigidimpulse.state import StepContext
-from rigidimpulse.step import step
+from rigidimpulse.step import react, step
 from rigidimpulse.sweep.strategy import ImpactTime
 from rigidimpulse.world import World, compile_scene
 
@@ -84,6 +85,8 @@ def simulate(
             run_steps(context, plan, paths, end, progress)
         else:
             paths.start_segments(context, end)
+    if context.joints is not None:
+        finish_joints(context, plan, context.state.time)
     recorder.finish(context.state.course)
     return make_recording(context, plan, times, duration)
 
@@ -142,6 +145,13 @@ def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, end: float
         step(context, plan, min(index * size, paths.next_key(now), end))
         if progress is not None:
             progress(context.state.time)
+
+
+def finish_joints(context: StepContext, plan: Plan, end: float) -> None:
+    """Stop the joints at the end of the run, so that the last frame has the velocities of its instant."""
+    window = Window(context, end)
+    plan.run("detect", context, window)
+    react(context, plan, window, end, context.joints.moving_bodies(context))
 
 
 def close_stretches(context: StepContext) -> None:

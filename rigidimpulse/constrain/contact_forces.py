@@ -64,8 +64,7 @@ def hold(context, window, group: Group) -> None:
     before = kinetic_energy(now, context.world, group.members)
     h = window.end - group.time
     if len(group.joints):
-        h = context.joints.sub_step(context, group, h)
-        residual = context.joints.hold(context, group, contacts, np.arange(len(subset)), turning, force, h)
+        h, residual = context.joints.hold(context, group, contacts, np.arange(len(subset)), turning, force, h)
     else:
         residual = hold_contacts(
             now, contacts, np.arange(len(subset)), turning, context.acceleration, context.angular_acceleration, h,
@@ -80,6 +79,8 @@ def hold(context, window, group: Group) -> None:
             group.time, "contact forces not solved", names, f"residual {residual:.1e}; use a smaller step"
         )
     group.rests = _rests(context, group, h)
+    if group.rests and len(group.joints):
+        context.joints.log_rest(group)
     if h < window.end - group.time and not group.rests:
         window.wake[group.members] = group.time + h
 

@@ -222,6 +222,8 @@ def hold_jointed(
     scale = fill_contact_bias(
         bodies, contacts, subset, frames, turning, acceleration, angular_acceleration, h, rows, first_row, slides
     )
+    for i in members:
+        scale = max(scale, h * np.sqrt(np.sum(acceleration[i] ** 2)))
     y, u = np.empty((n, 6)), np.empty(start + count)
     residual = worst = 0.0
     for round_ in range(MAX_ROUNDS):

@@ -11,11 +11,14 @@ from rigidimpulse.constrain.joint_forces import close_joints, hold_jointed, make
 from rigidimpulse.constrain.joint_impact import impact_rows
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.touching import refresh_pose
+from rigidimpulse.integrate.course import FIXED
 from rigidimpulse.observe.energy import mechanical_energy
 
 TURN = 0.02
 """rad, how far the bodies of a joint may turn against each other in a sub-step."""
-MOST_SUB_STEPS = 64
+SWAY = 0.7
+"""rad, how far the fastest oscillation may go in a sub-step that the tension of joints keeps up across them; 2 is unstable."""
+MOST_SUB_STEPS = 256
 """Sub-steps in a step."""
 SHORT = 1e-5
 """Part of a step below which a sub-step is planned as a longer one: closing divides by its length."""
@@ -28,6 +31,7 @@ class JointState:
         table: the rows of all joints. memory: what kernels remember.
         names: of the joints. whole: (j,) bool, not broken.
         moment: (j, 3) N s, impulse on b at the instant being worked on. shock: (j, 3) N s, by impacts, so far.
+        pull: (j, 3) N, last force on b.
         began: (j,) s, start of the present sub-step. length: (j,) s, that of the one before.
         reactions: (time, joint, force (3,) on b) at the ends of sub-steps.
 
@@ -43,6 +47,7 @@ class JointState:
         self.whole = np.ones(len(joints), bool)
         self.moment = np.zeros((len(joints), 3))
         self.shock = np.zeros((len(joints), 3))
+        self.pull = np.zeros((len(joints), 3))
         self.began = np.zeros(len(joints))
         self.length = np.zeros(len(joints))
         self.reactions: list[tuple[float, int, np.ndarray]] = []
@@ -68,6 +73,11 @@ class JointState:
         """Bodies of the joints, without the world."""
         both = np.unique(np.concatenate([self.table.body_a[joints], self.table.body_b[joints]]))
         return both[both >= 0]
+
+    def moving_bodies(self, context) -> np.ndarray:
+        """Dynamic bodies with joints that do not rest."""
+        bodies = np.array(sorted(self._of_body), np.int64)
+        return bodies[context.state.course.mode[bodies] != FIXED]
 
     def arrive(self, context, group) -> None:
         """End the group's sub-steps: take half of the forces back, close what drifted, stop the joints."""
@@ -105,20 +115,33 @@ class JointState:
         """Length of the next sub-step: h, the rest of the step, or a part of it. Very short rests are planned as longer ones."""
         world, now = context.world, context.state.now
         fastest = 0.0
+        rates = self._tension_rates(context, group.joints)
         for a, b in zip(self.table.body_a[group.joints].tolist(), self.table.body_b[group.joints].tolist(), strict=True):
             spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
             fastest = max(fastest, float(np.linalg.norm(spins[1] - spins[0])))
         step = world.accuracy.step
-        pieces = min(max(math.ceil(fastest * step / TURN), 1), MOST_SUB_STEPS)
+        pieces = min(max(math.ceil(fastest * step / TURN), math.ceil(rates * step / SWAY), 1), MOST_SUB_STEPS)
         piece = step / pieces
         return piece if h > piece * (1.0 + SHORT) else max(h, SHORT * step)
 
-    def hold(self, context, group, contacts, subset, turning, force, h: float) -> float:
-        """Forces over a sub-step of length h into context.wrench; returns the residual."""
+    def _tension_rates(self, context, which: np.ndarray) -> float:
+        """Bound of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m r))."""
+        world, table, squares = context.world, self.table, {}
+        force = np.linalg.norm(self.pull[which], axis=1)
+        for bodies, anchors in ((table.body_a[which], table.anchor_a[which]), (table.body_b[which], table.anchor_b[which])):
+            for i, f, r in zip(bodies.tolist(), force.tolist(), np.linalg.norm(anchors, axis=1).tolist(), strict=True):
+                if i >= 0 and world.dynamic[i] and r > 0.0:
+                    square = f * (r / world.inertia[i].min() + world.inv_mass[i] / r)
+                    squares[i] = squares.get(i, 0.0) + square
+        return math.sqrt(max(squares.values(), default=0.0))
+
+    def hold(self, context, group, contacts, subset, turning, force, rest: float) -> tuple[float, float]:
+        """Forces into context.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         state, memory = context.state, self.memory
+        others = self.bodies_of(group.joints)
+        others = others[~context.world.dynamic[others]]
+        h = self.sub_step(context, group, rest)
         while True:
-            others = self.bodies_of(group.joints)
-            others = others[~context.world.dynamic[others]]
             for i in others:
                 memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, group.time + h)
             moment = self.moment.copy()
@@ -127,8 +150,12 @@ class JointState:
                 group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
                 context.wrench, moment,
             )
-            broken = self._break(context, group, moment, h)
-            if not broken:
+            self.pull[group.joints] = 2.0 * (moment[group.joints] - self.moment[group.joints]) / h
+            shorter = self.sub_step(context, group, h)
+            if shorter < 0.5 * h:
+                # Only the forces show how short it has to be.
+                h = shorter
+            elif not self._break(context, group):
                 break
         self.moment[:] = moment
         self._log(group, h)
@@ -136,21 +163,26 @@ class JointState:
         if worst > 1e3 * self._allowed:
             names = tuple(context.world.names[i] for i in group.members)
             context.log.report(group.time, "joints not closed", names, f"off by {worst:.1e}; use a smaller step")
-        return residual
+        return h, residual
 
-    def _break(self, context, group, moment, h: float) -> bool:
+    def _break(self, context, group) -> bool:
         """Take out the most overloaded joint, if there is one."""
         which = group.joints
-        force = np.linalg.norm(2.0 * (moment[which] - self.moment[which]) / h, axis=1) / self.break_force[which]
-        if not len(which) or force.max() <= 1.0:
+        load = np.linalg.norm(self.pull[which], axis=1) / self.break_force[which]
+        if not len(which) or load.max() <= 1.0:
             return False
-        j = int(which[np.argmax(force)])
+        j = int(which[np.argmax(load)])
         self.whole[j] = False
         group.joints = which[which != j]
         pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
-        context.log.note(group.time, "joint broke", pair, f"{self.names[j]}: {force.max() * self.break_force[j]:.6g} N")
+        context.log.note(group.time, "joint broke", pair, f"{self.names[j]}: {np.linalg.norm(self.pull[j]):.6g} N")
         self.reactions.append((group.time, j, np.zeros(3)))
         return True
+
+    def log_rest(self, group) -> None:
+        """Forces on b from here on, while the group rests."""
+        for j in group.joints.tolist():
+            self.reactions.append((group.time, j, self.pull[j].copy()))
 
     def _log(self, group, h: float) -> None:
         """Forces on b at this instant: its impulses over half of the sub-steps on both sides."""

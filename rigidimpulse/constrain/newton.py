@@ -3,8 +3,8 @@
 Problem. Find impulses p and velocities  u = b + Jh Jh^T p  that satisfy the laws of all rows (see `rows`).
 
 Method. Outside a proximal method of multipliers (Rockafellar 1976) with regularisation R = k diag(Jh Jh^T), k driven
-from 1e-3 to 1e-12, which makes redundant rows harmless; inside a semi-smooth Newton method (Alart & Curnier 1991) on
-y = Jh^T p:
+from 1e-3 to 1e-12 (at most 1e-9 for FREE rows), which makes redundant rows harmless; inside a semi-smooth Newton method
+(Alart & Curnier 1991) on y = Jh^T p:
 
     p(u) = projection of (R q - u) / (R + s) on the bounds, with the radius of discs from the current p_master,
     F = (y - Jh^T q) - Jh^T (p(b + Jh y) - q) = 0,        F' = I + Jh^T (-dp/du) Jh,
@@ -29,6 +29,7 @@ MAX_INNER = 60
 MAX_HALVINGS = 8
 REGULARISATION_START = 1e-3
 REGULARISATION_LEAST = 1e-12
+REGULARISATION_FREE = 1e-9
 TINY = 1e-300
 ROUND_OFF = 4e-16
 
@@ -241,20 +242,22 @@ def solve_newton(rows, n, target):
     elimination = plan_elimination(rows.first, rows.second, n)
     weight = np.empty(count)
     row_weights(rows, weight)
-    y, u = np.empty((n, 6)), np.empty(count)
+    y, u, r = np.empty((n, 6)), np.empty(count), np.empty(count)
     trial, q, frozen = rows.impulse.copy(), rows.impulse.copy(), np.full(count, -1.0)
     _velocities(rows, q, y, u)
     best = natural_residual(rows, u, q, weight)
-    k, failures, stagnant, previous, convex = REGULARISATION_START, 0, 0, best, False
+    k, free_k, failures, stagnant, previous, convex = REGULARISATION_START, REGULARISATION_FREE, 0, 0, best, False
     for _ in range(MAX_OUTER):
         if best <= max(target, rounding_floor(rows, weight, rows.impulse)) or stagnant > 4:
             break
         for i in range(count):
             frozen[i] = rows.coefficient[i] * max(q[rows.master[i]], 0.0) if convex else -1.0
-        solved = _newton(rows, elimination, u, q, k * weight, frozen, trial, 0.05 * target)
+            r[i] = weight[i] * (min(k, free_k) if rows.kind[i] == FREE else k)
+        solved = _newton(rows, elimination, u, q, r, frozen, trial, 0.05 * target)
         if not solved and not convex:
             failures += 1
             convex = k >= 0.5
+            free_k *= 30.0
             k = min(30.0 * k, 1.0)
             continue
         q[:] = trial

@@ -1,0 +1,172 @@
+"""Joints against closed forms.
+
+Laws. A pendulum of length l with moment I about its centre swings as an ellipse function of time with w0^2 = m g l / (I
++ m l^2); the joint method is of second order, so its error falls fourfold where the step halves. A soft joint is the
+damped oscillator it stands for at any step size: 1e-10 of its amplitude (a semi-implicit spring at these steps is off
+by several percent, or explodes where k h^2 / m > 4). A hanging chain's reaction is the weight below.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.special import ellipj, ellipk
+
+import rigidimpulse as ri
+
+G, LENGTH, MASS, INERTIA, START = 9.81, 1.0, 2.0, 0.1, np.pi / 4
+
+
+def pendulum() -> ri.Scene:
+    scene = ri.Scene(gravity=(0, 0, -G))
+    at = (LENGTH * np.sin(START), 0, -LENGTH * np.cos(START))
+    scene.add(ri.Body("bob", ri.Shape.sphere(0.1), position=at, mass=MASS, inertia=(INERTIA,) * 3))
+    scene.add(ri.HingeJoint(None, "bob", (0, 0, 0), (0, 1, 0), name="pivot"))
+    return scene
+
+
+def swing(times: np.ndarray) -> np.ndarray:
+    """Angle of the pendulum let go at START [rad]."""
+    rate, k = np.sqrt(MASS * G * LENGTH / (INERTIA + MASS * LENGTH**2)), np.sin(START / 2)
+    sn = ellipj(ellipk(k * k) - rate * times, k * k)[0]
+    return 2 * np.arcsin(k * sn)
+
+
+def angle_error(step: float) -> float:
+    run = ri.simulate(pendulum(), 2.0, accuracy=ri.Accuracy(step=step))
+    x = run.position("bob")
+    np.testing.assert_allclose(np.linalg.norm(x, axis=1), LENGTH, rtol=1e-10)
+    return float(np.abs(np.arctan2(x[:, 0], -x[:, 2]) - swing(run.times)).max())
+
+
+def test_pendulum_swings_and_its_error_is_of_second_order() -> None:
+    coarse, fine = angle_error(1 / 240), angle_error(1 / 480)
+    assert coarse < 1e-4
+    assert 3.3 < coarse / fine < 4.7
+
+
+def test_reaction_of_a_pendulum() -> None:
+    run = ri.simulate(pendulum(), 2.0, accuracy=ri.Accuracy(step=1 / 480))
+    theta, rate2 = swing(run.times), 2 * MASS * G * LENGTH / (INERTIA + MASS * LENGTH**2) * (
+        np.cos(swing(run.times)) - np.cos(START)
+    )
+    along = MASS * (G * np.cos(theta) + rate2 * LENGTH)
+    outward = np.column_stack([-np.sin(theta), 0 * theta, np.cos(theta)])
+    found = np.sum(run.reaction("pivot") * outward, axis=1)
+    np.testing.assert_allclose(found[:-1], along[:-1], atol=2e-5 * MASS * G)
+    assert found[-1] == pytest.approx(along[-1], abs=2e-3 * MASS * G)  # half a sub-step only: first order
+
+
+@pytest.mark.parametrize(("stiffness", "damping"), [(50.0, 0.0), (50.0, 1.0), (50.0, 20.0), (50.0, 80.0), (1e7, 10.0)])
+def test_soft_slider_is_a_damped_oscillator_at_any_step(stiffness: float, damping: float) -> None:
+    scene = ri.Scene(gravity=(0, 0, -G))
+    scene.add(ri.Body("load", ri.Shape.box((0.1, 0.1, 0.1)), mass=MASS, velocity=(0, 0, 1.0)))
+    motor = ri.Motor(stiffness=stiffness, damping=damping)
+    scene.add(ri.SliderJoint(None, "load", (0, 0, 0), (0, 0, 1), motor=motor))
+    run = ri.simulate(scene, 1.0)
+    flow = np.array([[0, 1, 0], [-stiffness / MASS, -damping / MASS, -G], [0, 0, 0]])
+    exact = np.array([expm(flow * t) @ (0.0, 1.0, 1.0) for t in run.times])
+    np.testing.assert_allclose(run.position("load")[:, 2], exact[:, 0], atol=1e-10 * np.ptp(exact[:, 0]))
+    np.testing.assert_allclose(run.velocity("load")[:, 2], exact[:, 1], atol=1e-8 * np.abs(exact[:, 1]).max())
+
+
+def test_hanging_chain_of_a_hundred_links_bears_a_thousandfold_ball() -> None:
+    scene = ri.Scene(gravity=(0, 0, -G))
+    above = None
+    for i in range(100):
+        scene.add(ri.Body(f"link{i}", ri.Shape.capsule(0.02, 0.06), position=(0, 0, -0.1 * (i + 0.5)), mass=0.1))
+        scene.add(ri.BallJoint(above, f"link{i}", (0, 0, -0.1 * i), name=f"joint{i}"))
+        above = f"link{i}"
+    scene.add(ri.Body("ball", ri.Shape.sphere(0.3), position=(0, 0, -10.3), mass=100.0))
+    scene.add(ri.BallJoint(above, "ball", (0, 0, -10.0), name="last"))
+    run = ri.simulate(scene, 1.0)
+    assert run.status.ok, run.status.message
+    np.testing.assert_allclose(run.position("ball"), [[0, 0, -10.3]] * len(run.times), atol=1e-10)
+    np.testing.assert_allclose(run.reaction("joint0")[-1], (0, 0, 110 * G), rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(run.reaction("last")[-1], (0, 0, 100 * G), rtol=1e-9, atol=1e-6)
+
+
+def test_swinging_chain_keeps_its_length_and_energy() -> None:
+    scene, above = ri.Scene(gravity=(0, 0, -G)), None
+    way = np.array([np.sin(0.5), 0, -np.cos(0.5)])
+    turned = (np.cos(0.25), 0, -np.sin(0.25), 0)
+    for i in range(5):
+        scene.add(ri.Body(f"link{i}", ri.Shape.capsule(0.02, 0.06), position=way * 0.1 * (i + 0.5), orientation=turned, mass=0.1))
+        scene.add(ri.BallJoint(above, f"link{i}", way * 0.1 * i))
+        above = f"link{i}"
+    scene.add(ri.Body("ball", ri.Shape.sphere(0.1), position=way * 0.6, mass=100.0))
+    scene.add(ri.BallJoint(above, "ball", way * 0.5))
+    run = ri.simulate(scene, 0.5)
+    assert run.status.ok, run.status.message
+    assert np.abs(np.linalg.norm(run.position("ball"), axis=1) / 0.6 - 1).max() < 1e-3
+    swing_energy = 100 * G * 0.6 * (1 - np.cos(0.5))
+    assert np.ptp(run.ledger.total) < 1e-4 * swing_energy
+
+
+def test_limits_of_a_hinge_hold() -> None:
+    scene = ri.Scene(gravity=(0, 0, 0))
+    scene.add(ri.Body("bar", ri.Shape.box((0.1, 0.1, 1)), position=(0, 0, -0.5), mass=1.0, velocity=(-1.5, 0, 0), angular_velocity=(0, 3, 0)))
+    scene.add(ri.HingeJoint(None, "bar", (0, 0, 0), (0, 1, 0), lower=-0.3, upper=0.5))
+    run = ri.simulate(scene, 1.0)
+    q = run.orientation("bar")
+    angle = 2 * np.arctan2(q[:, 2], q[:, 0])
+    assert angle.max() == pytest.approx(0.5, abs=1e-9)
+    assert angle.min() >= -1e-12
+    assert run.status.ok, run.status.message
+
+
+def test_motor_reaches_its_speed_and_never_exceeds_its_torque() -> None:
+    def bar(motor: ri.Motor) -> ri.Recording:
+        scene = ri.Scene(gravity=(0, 0, 0))
+        scene.add(ri.Body("bar", ri.Shape.box((0.1, 0.1, 1)), mass=1.0))
+        scene.add(ri.HingeJoint(None, "bar", (0, 0, 0), (0, 1, 0), motor=motor))
+        return ri.simulate(scene, 1.0)
+
+    inertia = (0.01 + 1.0) / 12
+    weak = bar(ri.Motor(velocity=100.0, damping=1e6, max_force=0.5))
+    np.testing.assert_allclose(weak.angular_velocity("bar")[:, 1], 0.5 / inertia * weak.times, rtol=1e-9, atol=1e-9)
+    strong = bar(ri.Motor(velocity=2.0, damping=3.0))
+    expected = 2.0 * (1 - np.exp(-3.0 / inertia * strong.times))
+    np.testing.assert_allclose(strong.angular_velocity("bar")[:, 1], expected, atol=1e-9)
+
+
+def test_joint_breaks_at_its_force_and_not_below() -> None:
+    for break_force, falls in ((9.0, True), (10.0, False)):
+        scene = ri.Scene(gravity=(0, 0, -G))
+        scene.add(ri.Body("load", ri.Shape.sphere(0.1), mass=1.0))
+        scene.add(ri.FixedJoint(None, "load", name="hook", break_force=break_force))
+        run = ri.simulate(scene, 1.0)
+        assert run.status.ok
+        assert (run.position("load")[-1, 2] < -4.9) == falls
+        assert ("joint broke" in [event.kind for event in run.status.events]) == falls
+
+
+def test_rope_is_slack_until_it_is_taut() -> None:
+    scene = ri.Scene(gravity=(0, 0, -G))
+    scene.add(ri.Body("load", ri.Shape.sphere(0.1), position=(0, 0, -0.5), mass=1.0))
+    scene.add(ri.DistanceJoint(None, "load", (0, 0, 0), (0, 0, -0.5), upper=1.5, name="rope"))
+    run = ri.simulate(scene, 2.0)
+    free = run.times < np.sqrt(2 * 1.0 / G) - 0.02
+    np.testing.assert_allclose(run.position("load")[free, 2], -0.5 - 0.5 * G * run.times[free] ** 2, atol=1e-12)
+    assert run.position("load")[:, 2].min() > -1.5 - 1e-9
+    np.testing.assert_allclose(run.reaction("rope")[-1], (0, 0, G), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("joint", "problem"),
+    [
+        (ri.BallJoint(None, "nobody", (0, 0, 0)), "nobody"),
+        (ri.HingeJoint(None, "load", (0, 0, 0), (0, 0, 0)), "axis"),
+        (ri.BallJoint("load", "load", (0, 0, 0)), "itself"),
+        (ri.HingeJoint(None, "load", (0, 0, 0), (0, 0, 1), lower=1.0, upper=0.0), "lower"),
+        (ri.DistanceJoint(None, "load", (0, 0, 0), (0, 0, 0)), "length"),
+        (ri.BallJoint(None, "load", (0, 0, float("nan"))), "anchor"),
+    ],
+)
+def test_bad_joints_are_refused_by_name(joint: object, problem: str) -> None:
+    scene = ri.Scene()
+    scene.add(ri.Body("load", ri.Shape.sphere(0.1)))
+    scene.add(joint)
+    with pytest.raises(ri.SceneError, match=problem):
+        ri.simulate(scene, 0.1)
