@@ -54,6 +54,15 @@ def equal(what: str, value: float, expected: float, law: str) -> Check:
     return Check(what, float(value), float(expected), bool(value == expected), law, "equal to")
 
 
+def figure(value: float | None) -> str:
+    """Return a value for a table: counts in full, quantities with three digits, errors with two; a dash for what is not finite."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    if abs(value) < 1e15 and value == int(value):
+        return f"{value:,.0f}"
+    return f"{value:.3g}" if 0.01 <= abs(value) < 1000.0 else f"{value:.1e}"
+
+
 @dataclass(frozen=True)
 class GalleryScene:
     """A named scene with its checks.

@@ -40,7 +40,7 @@ class CaseResult:
         name: of the gallery scene. description: its line. family: title of its family.
         outcome: "passed", "failed" (a check), "hung" (over the limit) or "crashed".
         checks: of each: what, value, bound, relation, passed, law. A value that is not finite is None.
-        seconds: s of the simulation, or until it was ended. duration: s of motion.
+        seconds: s of the simulation and its checks, or until it was ended. duration: s of motion.
         impacts: how many. message: status of the run, or last words of the process.
         state_hash: SHA-256 of all frames and impacts; empty if there was no run.
         elsewhere: what common engines reach, as measured.
@@ -130,7 +130,14 @@ def run_apart(name: str, limit: float) -> CaseResult:
     outcome = HUNG if code is None else CRASHED
     message = f"not done after {limit:g} s" if code is None else f"exit code {code}: {last}"
     return CaseResult(
-        name, entry.description, family_of(name), outcome, seconds=seconds, duration=entry.duration, message=message, elsewhere=entry.elsewhere
+        name,
+        entry.description,
+        family_of(name),
+        outcome,
+        seconds=seconds,
+        duration=entry.duration,
+        message=message,
+        elsewhere=entry.elsewhere,
     )
 
 
@@ -151,8 +158,8 @@ def run_case(name: str) -> CaseResult:
     entry = gallery.load(name)
     start = perf_counter()
     run = simulate(entry.scene(), entry.duration, entry.fps, accuracy=entry.accuracy)
-    seconds = perf_counter() - start
     checks = [as_plain(check) for check in entry.check(run)]
+    seconds = perf_counter() - start
     if entry.cheaper is not None:
         checks.append(as_plain(cheaper_fails(entry)))
     outcome = PASSED if all(check["passed"] for check in checks) else FAILED

@@ -24,6 +24,7 @@ energy out of nothing: E never grows, so no point is ever faster than v0 plus wh
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -69,13 +70,13 @@ def check_bounces(run: Recording) -> list[Check]:
         allowed = 2.0 * math.sqrt(2.0 * DELTA * 2.0 * RADIUS / GRAVITY) / (1.0 - e)
         resting = np.flatnonzero(np.linalg.norm(run.velocities[:, ball], axis=1) > 0.0)[-1] + 1
         checks += [
-            at_most(f"e = {e}: error of ten impact times, s", late, 1e-11, "t_k = sqrt(2h/g)(1 + 2(e + ... + e^(k-1)))"),
+            at_most(f"e = {e}: error of ten impact times, s", float(late), 1e-11, "t_k = sqrt(2h/g)(1 + 2(e + ... + e^(k-1)))"),
             at_most(
-                f"e = {e}: last impact from the time of rest, s", abs(times[-1] - rest) if len(times) else math.inf, allowed,
+                f"e = {e}: last impact from the time of rest, s", abs(float(times[-1]) - rest) if len(times) else math.inf, allowed,
                 "sqrt(2h/g)(1 + e)/(1 - e), but for bounces below delta",
             ),
             at_most(
-                f"e = {e}: first frame at rest, s after it", (run.times[resting] if resting < len(run.times) else math.inf) - rest,
+                f"e = {e}: first frame at rest, s after it", (float(run.times[resting]) if resting < len(run.times) else math.inf) - rest,
                 allowed + 2.0 / 60.0, "it then lies still; one frame and one step",
             ),
         ]  # fmt: skip
@@ -108,8 +109,8 @@ def check_rocking(run: Recording) -> list[Check]:
     # A half rock: frames of one sign of the lean. Its middle frame is well away from both impacts.
     changes = np.flatnonzero(np.diff(np.sign(lean)) != 0.0)
     edges = np.concatenate([[0], changes + 1, [len(lean)]])
-    plateaus = [energy[(a + b) // 2] for a, b in zip(edges[:-1], edges[1:], strict=True) if b - a > 4][:4]
-    ratios = [math.sqrt(b / a) for a, b in zip(plateaus[:-1], plateaus[1:], strict=True) if b > 0.0]
+    plateaus = [energy[(a + b) // 2] for a, b in pairwise(edges) if b - a > 4][:4]
+    ratios = [math.sqrt(b / a) for a, b in pairwise(plateaus) if b > 0.0]
     worst = max((abs(r / factor - 1.0) for r in ratios), default=math.inf)
     foot = np.abs(run.position("block")[:, 1]).max()
     return [

@@ -80,7 +80,12 @@ def cloud(seed: int) -> Scene:
     """Return bodies of all kinds that fly at each other, without gravity."""
     random = np.random.default_rng(seed)
     scene = Scene(gravity=(0.0, 0.0, 0.0))
-    shapes = (Shape.sphere(0.1), Shape.box((0.3, 0.15, 0.1)), Shape.capsule(0.06, 0.2), Shape.convex_hull(0.15 * random.normal(size=(12, 3))))
+    shapes = (
+        Shape.sphere(0.1),
+        Shape.box((0.3, 0.15, 0.1)),
+        Shape.capsule(0.06, 0.2),
+        Shape.convex_hull(0.15 * random.normal(size=(12, 3))),
+    )
     cells = np.stack(np.meshgrid(*[np.arange(4)] * 3, indexing="ij"), axis=3).reshape(-1, 3)[:CLOUD] - 1.5
     for k in range(CLOUD):
         place = 0.8 * cells[k] + 0.05 * random.normal(size=3)
@@ -139,7 +144,9 @@ def check_dominoes(run: Recording) -> list[Check]:
         finite(run),
         equal("dominoes that fell", fallen, NUM_DOMINOES, "each has energy enough for the next"),
         equal("out of their order", int(np.sum(np.diff(times) <= 0.0)), 0, "each pushes the next"),
-        at_most("time from one to the next, second half: spread over mean", uneven, 0.25, "a steady wave; frames of 1/480 s read it to 0.1"),
+        at_most(
+            "time from one to the next, second half: spread over mean", uneven, 0.25, "a steady wave; frames of 1/480 s read it to 0.1"
+        ),
         above_floor(run),
         apart(run),
         energy_never_grows(run, DOMINO[2]),

@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from rigidimpulse.body import Body
-from rigidimpulse.gallery.hard.parts import GRAVITY, above_floor, dull, energy_never_grows, farthest, finite, floor_scene, undisturbed
+from rigidimpulse.gallery.hard.parts import GRAVITY, dull, energy_never_grows, farthest, finite, floor_scene, undisturbed
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
 from rigidimpulse.material import Material
 from rigidimpulse.recording import Recording

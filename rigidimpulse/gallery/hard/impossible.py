@@ -35,7 +35,9 @@ def squeezed(shape: str) -> Scene:
     wall = Shape.box((0.2, 2.0, 2.0))
     for side in (-1.0, 1.0):
         place = (side * (0.1 + CLOSING), 0.0, 1.1)
-        scene.add(Body(f"wall {side:+.0f}", wall, motion="kinematic", position=place, velocity=(-side * CLOSING, 0.0, 0.0), material=material))
+        scene.add(
+            Body(f"wall {side:+.0f}", wall, motion="kinematic", position=place, velocity=(-side * CLOSING, 0.0, 0.0), material=material)
+        )
     made = Shape.sphere(0.5 * SIZE) if shape == "ball" else Shape.box(SIZE)
     scene.add(Body("body", made, position=(0.05, 0.0, 0.5 * SIZE), material=material))
     return scene
@@ -94,7 +96,9 @@ def coincident() -> Scene:
 
 SCENES = (
     *(
-        GalleryScene(f"squeezed_{shape}", f"Two walls close on a {shape} until there is no room", partial(squeezed, shape), check_squeezed, 1.2)
+        GalleryScene(
+            f"squeezed_{shape}", f"Two walls close on a {shape} until there is no room", partial(squeezed, shape), check_squeezed, 1.2
+        )
         for shape in ("ball", "box")
     ),
     GalleryScene("deep_overlap", "Two boxes that overlap by half", partial(overlapping, 0.5, "box"), check_overlap, 2.0),

@@ -19,9 +19,18 @@ import numpy as np
 
 from rigidimpulse.body import Body
 from rigidimpulse.errors import SceneError
-from rigidimpulse.gallery.hard.parts import GRAVITY, above_floor, dull, energy_never_grows, finite, floor_scene, last_speed, turned, undisturbed
+from rigidimpulse.gallery.hard.parts import (
+    GRAVITY,
+    above_floor,
+    dull,
+    energy_never_grows,
+    finite,
+    floor_scene,
+    last_speed,
+    turned,
+    undisturbed,
+)
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.material import Material
 from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
 from rigidimpulse.shape import Shape
@@ -38,7 +47,16 @@ def cube(dirty: bool) -> Scene:
     material = dull(0.5, 0.4)
     scene = floor_scene(material)
     shape = Shape.mesh(*(_dirty_cube() if dirty else _cube()))
-    scene.add(Body("cube", shape, position=(0.0, 0.0, 0.9), orientation=turned((1.0, 2.0, 0.5), 0.7), angular_velocity=(1.0, 2.0, 3.0), material=material))
+    scene.add(
+        Body(
+            "cube",
+            shape,
+            position=(0.0, 0.0, 0.9),
+            orientation=turned((1.0, 2.0, 0.5), 0.7),
+            angular_velocity=(1.0, 2.0, 3.0),
+            material=material,
+        )
+    )
     return scene
 
 
@@ -150,7 +168,17 @@ def slender(size: tuple[float, float, float]) -> Scene:
     scene = floor_scene(material)
     turn = turned((1.0, 0.4, 0.2), 0.6)
     spin = (1.0, 2.0, -1.5)
-    scene.add(Body("body", Shape.box(size), position=(0.0, 0.0, 1.0), orientation=turn, velocity=(0.5, 0.0, 0.0), angular_velocity=spin, material=material))
+    scene.add(
+        Body(
+            "body",
+            Shape.box(size),
+            position=(0.0, 0.0, 1.0),
+            orientation=turn,
+            velocity=(0.5, 0.0, 0.0),
+            angular_velocity=spin,
+            material=material,
+        )
+    )
     return scene
 
 
@@ -176,7 +204,9 @@ def check_sheet(run: Recording) -> list[Check]:
 
 
 SCENES = (
-    GalleryScene("dirty_mesh", "A cube of repeated vertices and faces and triangles without area", partial(cube, True), check_cube, DURATION),
+    GalleryScene(
+        "dirty_mesh", "A cube of repeated vertices and faces and triangles without area", partial(cube, True), check_cube, DURATION
+    ),
     GalleryScene("flipped_floor", "A floor of triangles wound at random", flipped, check_sheet, 3.0),
     GalleryScene("inside_out", "Inside-out and open meshes are refused by name", inside_out, check_inside_out, 0.5),
     GalleryScene("many_triangles", "A ball of 81,920 triangles and a ring of 100,352", many, partial(check_moving, 1.3), 3.0),

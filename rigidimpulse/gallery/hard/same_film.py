@@ -34,10 +34,13 @@ TURN = np.array([0.36, 0.48, 0.64, 0.48])
 """A quaternion of length 1, about no axis of the scene."""
 BOUND = 1e-6
 DURATION, SHORT = 1.2, 0.8
-NONE = np.array([1.0, 0.0, 0.0, 0.0])
+HERE, NONE = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+"""No shift, no turn."""
 
 
-def scene(scale: float = 1.0, shift: np.ndarray = np.zeros(3), turn: np.ndarray = NONE, renamed: bool = False, reordered: bool = False) -> Scene:
+def scene(
+    scale: float = 1.0, shift: np.ndarray = HERE, turn: np.ndarray = NONE, renamed: bool = False, reordered: bool = False
+) -> Scene:
     """Return a floor, a box, a ball, a hull and a capsule that fall, bounce and meet; changed as asked for."""
     material = dull(0.4, 0.5)
     q = turn / np.linalg.norm(turn)
@@ -79,8 +82,8 @@ def film(run: Recording, name: str, scale: float, shift: np.ndarray, turn: np.nd
 def check(change: dict[str, Any], rename: Callable[[str], str], run: Recording) -> list[Check]:
     """Compare with the film of the scene as it is."""
     original = simulate(scene(), float(run.times[-1]), 60.0)
-    unchanged = (1.0, np.zeros(3), NONE)
-    undo = (change.get("scale", 1.0), change.get("shift", np.zeros(3)), change.get("turn", NONE))
+    unchanged = (1.0, HERE, NONE)
+    undo = (change.get("scale", 1.0), change.get("shift", HERE), change.get("turn", NONE))
     moved = turned = 0.0
     for name in ("box", "ball", "hull", "capsule"):
         here, there = film(original, name, *unchanged), film(run, rename(name), *undo)

@@ -52,7 +52,14 @@ def disk() -> Scene:
     e, n = np.array([math.cos(a), 0.0, -math.sin(a)]), np.array([math.sin(a), 0.0, math.cos(a)])
     spin = -_disk_rate() * math.sin(a) / r * (r * e - 0.5 * d * n)
     scene.add(
-        Body("disk", Shape.cylinder(r, d), position=(0.0, 0.0, height), orientation=turn, angular_velocity=spin, material=dull(0.5, density=7800.0))
+        Body(
+            "disk",
+            Shape.cylinder(r, d),
+            position=(0.0, 0.0, height),
+            orientation=turn,
+            angular_velocity=spin,
+            material=dull(0.5, density=7800.0),
+        )
     )
     return scene
 
@@ -140,7 +147,9 @@ def check_top(run: Recording) -> list[Check]:
     up = rotate(run.orientation("top"), np.array([0.0, 0.0, 1.0]))[:, 2]
     return [
         finite(run),
-        at_most("Jellett's L . (c - x), relative change", np.abs(jellett / jellett[0] - 1.0).max(), 1e-5, "constant under any contact force"),
+        at_most(
+            "Jellett's L . (c - x), relative change", np.abs(jellett / jellett[0] - 1.0).max(), 1e-5, "constant under any contact force"
+        ),
         at_most("cosine of the axis at its lowest", up.min(), -0.9, "1 - s/R < A/C < 1 + s/R and fast: it turns over"),
         above_floor(run),
         energy_never_grows(run, 2.0 * TOP),
@@ -162,8 +171,9 @@ def rattleback() -> Scene:
     scene = floor_scene()
     height = -float(np.asarray(ball.vertices)[:, 2].min()) * c
     scene.add(
-        Body("back", shape, position=(0.0, 0.0, height), orientation=turned((1.0, 0.0, 0.0), 0.01), angular_velocity=(0.05, 0.05, BACK_SPIN),
-             mass=mass, inertia=skew @ np.diag(moments) @ skew.T, center_of_mass=(0.0, 0.0, -0.3 * c), material=dull(0.9))
+        Body("back", shape, position=(0.0, 0.0, height), orientation=turned((1.0, 0.0, 0.0), 0.01),
+             angular_velocity=(0.05, 0.05, BACK_SPIN), mass=mass, inertia=skew @ np.diag(moments) @ skew.T,
+             center_of_mass=(0.0, 0.0, -0.3 * c), material=dull(0.9))
     )  # fmt: skip
     return scene
 

@@ -42,7 +42,7 @@ def thrown(restitution: float) -> Scene:
 
 def check_thrown(run: Recording) -> list[Check]:
     """Check what holds however the stack falls."""
-    moved = np.linalg.norm(run.position("box 3")[-1] - run.position("box 3")[0])
+    moved = float(np.linalg.norm(run.position("box 3")[-1] - run.position("box 3")[0]))
     return [
         finite(run),
         at_least("the struck box has moved, m", moved, 1e-3, "momentum was given"),

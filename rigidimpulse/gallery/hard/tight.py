@@ -133,7 +133,15 @@ def hole() -> Scene:
     scene = floor_scene(smooth)
     reach = 0.5 * HOLE + 0.1
     for name, x, y in (("-x", -reach, 0.0), ("+x", reach, 0.0), ("-y", 0.0, -reach), ("+y", 0.0, reach)):
-        scene.add(Body(f"wall {name}", Shape.box((0.2, HOLE, 3.0) if x else (HOLE, 0.2, 3.0)), motion="static", position=(x, y, 1.5), material=smooth))
+        scene.add(
+            Body(
+                f"wall {name}",
+                Shape.box((0.2, HOLE, 3.0) if x else (HOLE, 0.2, 3.0)),
+                motion="static",
+                position=(x, y, 1.5),
+                material=smooth,
+            )
+        )
     scene.add(Body("cube", Shape.box(HOLE), position=(0.0, 0.0, DROP + 0.5 * HOLE), material=smooth))
     return scene
 
