@@ -38,9 +38,7 @@ HERE, NONE = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 """No shift, no turn."""
 
 
-def scene(
-    scale: float = 1.0, shift: np.ndarray = HERE, turn: np.ndarray = NONE, renamed: bool = False, reordered: bool = False
-) -> Scene:
+def scene(scale: float = 1.0, shift: np.ndarray = HERE, turn: np.ndarray = NONE, renamed: bool = False, reordered: bool = False) -> Scene:
     """Return a floor, a box, a ball, a hull and a capsule that fall, bounce and meet; changed as asked for."""
     material = dull(0.4, 0.5)
     q = turn / np.linalg.norm(turn)
