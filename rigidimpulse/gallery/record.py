@@ -59,7 +59,7 @@ def figure(value: float | None) -> str:
     if value is None or not math.isfinite(value):
         return "-"
     if abs(value) < 1e15 and value == int(value):
-        return f"{value:,.0f}"
+        return f"{int(value):,}"
     return f"{value:.3g}" if 0.01 <= abs(value) < 1000.0 else f"{value:.1e}"
 
 

@@ -66,10 +66,10 @@ class CaseResult:
 
     @property
     def main_check(self) -> dict[str, Any] | None:
-        """The check that says most in one line: the first that failed, else the one nearest to its bound, promises last."""
+        """The check that says most in one line: the first that failed, else the first error with a bound, else the first."""
         failed = [check for check in self.checks if not check["passed"]]
-        figures = [check for check in self.checks if check["relation"] == "at most" and check["bound"]]
-        return next(iter(failed + figures + self.checks), None)
+        errors = [check for check in self.checks if check["relation"] == "at most" and check["bound"]]
+        return next(iter(failed + errors + self.checks), None)
 
 
 def run_suite(

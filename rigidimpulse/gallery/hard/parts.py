@@ -83,7 +83,8 @@ def weight(run: Recording) -> float:
 
 def undisturbed(run: Recording) -> Check:
     """Return the check that nothing happened that a user should know of."""
-    return equal("events that a user should know of", len(run.status.events), 0, "default settings are enough")
+    said = "" if run.status.ok else f"; the run says: {run.status.message.splitlines()[0]}"
+    return equal("events that a user should know of", len(run.status.events), 0, f"default settings are enough{said}")
 
 
 def lowest(shape: Shape, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
