@@ -24,7 +24,8 @@ from rigidimpulse.study.hard_cases import CRASHED, HUNG, PASSED, CaseResult, run
 
 HOLD = (
     "house_of_cards", "heavy_dropped_1e3", "incline", "table", "bounces_to_rest", "bullet_and_paper", "bullet_and_bullet",
-    "fast_spin", "slide_over_triangles", "slide_over_tiles", "roll_over_triangles", "roll_over_tiles", "spikes", "wedge_in_crack",
+    "fast_spin", "slide_over_triangles", "slide_over_tiles", "roll_over_triangles", "roll_over_tiles",
+    "bounce_over_triangles", "bounce_over_tiles", "spikes", "wedge_in_crack",
     "cube_in_hole", "deep_overlap", "ball_in_ball", "renamed", "dirty_mesh", "flipped_floor", "inside_out", "needle", "plate",
 )  # fmt: skip
 """Cases that pass and take no more than a few seconds; `rigidimpulse hardcases` runs all."""

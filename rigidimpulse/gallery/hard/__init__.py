@@ -14,7 +14,17 @@ FAMILIES: dict[str, tuple[str, tuple[str, ...]]] = {
     "bounce": ("Bounces and rocking", ("bounces_to_rest", "rocking_block", "painleve_rod")),
     "spinning": ("Spinning and rolling", ("euler_disk", "coin", "tippe_top", "rattleback")),
     "fast": ("Fast bodies", ("bullet_and_paper", "bullet_and_bullet", "fast_bar", "fast_spin")),
-    "ghost": ("Internal edges", ("slide_over_triangles", "slide_over_tiles", "roll_over_triangles", "roll_over_tiles")),
+    "ghost": (
+        "Internal edges",
+        (
+            "slide_over_triangles",
+            "slide_over_tiles",
+            "roll_over_triangles",
+            "roll_over_tiles",
+            "bounce_over_triangles",
+            "bounce_over_tiles",
+        ),
+    ),
     "tight": ("Spikes, cracks and holes", ("spikes", "wedge_in_crack", "tetrahedra_in_pit", "cube_in_hole")),
     "impossible": ("Impossible starts and ends", ("squeezed_ball", "squeezed_box", "deep_overlap", "coincident", "ball_in_ball")),
     "same_film": ("The same film", ("scale_1e-3", "scale_1e3", "shifted", "rotated", "renamed", "reordered")),
