@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rigidimpulse.gallery.record import Check, GalleryScene
     from rigidimpulse.recording import Recording
     from rigidimpulse.scene import Scene
+    from rigidimpulse.study.hard_cases import CaseResult
 
 OUTPUT_SUFFIXES = (".html", ".npz")
 DEFAULT_DURATION = 4.0
@@ -89,9 +90,11 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, **settings: Any)
     from rigidimpulse import gallery
 
     if name is None:
-        width = max(map(len, gallery.names()))
-        for known in gallery.names():
-            click.echo(f"{known.ljust(width)}  {gallery.load(known).description}")
+        width = max(map(len, gallery.names() + gallery.hard_names()))
+        for title, known in (("Gallery", gallery.names()), ("Hard cases", gallery.hard_names())):
+            click.echo(f"{title}:")
+            for entry_name in known:
+                click.echo(f"  {entry_name.ljust(width)}  {gallery.load(entry_name).description}")
         return
     entry = gallery.load(name)
     job = _job_of(entry)._replace(**_given(settings))
@@ -104,6 +107,36 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, **settings: Any)
         click.echo(f"checks left out: they are for the scene's own duration, {entry.duration:g} s")
     _hand_over(run, output, view)
     if not passed:
+        sys.exit(CHECK_FAILED)
+
+
+@main.command()
+@click.argument("names", nargs=-1)
+@click.option("-o", "--output", default="hard_cases", show_default=True, help="Folder for hard_cases.json and hard_cases.html.")
+@click.option("--limit", type=float, default=120.0, show_default=True, help="Time for a case, s; one that takes longer has failed.")
+def hardcases(names: tuple[str, ...], output: str, limit: float) -> None:
+    """Run the hard-case suite, or the cases NAMES, at default settings; the exit code is 1 if any fails."""
+    from tqdm import tqdm
+
+    from rigidimpulse import gallery
+    from rigidimpulse.study.hard_cases import run_suite, write_results
+
+    chosen = names or gallery.hard_names()
+    with tqdm(total=len(chosen), unit="case", disable=None, leave=False) as bar:
+        bar.set_description(chosen[0])
+
+        def report(result: CaseResult) -> None:
+            bar.update()
+            if bar.n < len(chosen):
+                bar.set_description(chosen[int(bar.n)])
+
+        results = run_suite(chosen, limit, report)
+    _print_results(results)
+    passed = sum(result.passed for result in results)
+    click.echo(f"{passed} of {len(results)} passed, {sum(result.seconds for result in results):.0f} s")
+    for path in write_results(results, Path(output), limit):
+        click.echo(f"wrote {path}")
+    if passed < len(results):
         sys.exit(CHECK_FAILED)
 
 
@@ -251,24 +284,33 @@ def _run(job: Job, output: Sequence[str]) -> Recording:
 
 def _print_checks(checks: Sequence[Check]) -> bool:
     """Print a table of checks; return whether all hold."""
-    rows = [
-        ("ok" if check.passed else "FAILED", check.what, _figure(check.value), _figure(check.bound), check.law)
-        for check in checks
-    ]
-    head = ("", "check", "value", "bound", "law")
-    widths = [max(len(row[k]) for row in [head, *rows]) for k in range(4)]
-    for row in [head, *rows]:
-        mark, what, value, bound = (
-            text.rjust(width) if k in (2, 3) else text.ljust(width)
-            for k, (text, width) in enumerate(zip(row, widths, strict=False))
-        )
-        click.echo(f"{mark}  {what}  {value}  {bound}  {row[4]}")
+    from rigidimpulse.gallery.record import figure
+
+    rows = [("ok" if check.passed else "FAILED", check.what, figure(check.value), figure(check.bound), check.law) for check in checks]
+    _print_table([("", "check", "value", "bound", "law"), *rows], right=(2, 3))
     return all(check.passed for check in checks)
 
 
-def _figure(value: float) -> str:
-    """Return counts in full, errors with two digits."""
-    return f"{value:.0f}" if value == int(value if abs(value) < 1e15 else 0) else f"{value:.1e}"
+def _print_results(results: Sequence[CaseResult]) -> None:
+    """Print a table of hard cases, a line each: the check that says most."""
+    from rigidimpulse.gallery.record import figure
+
+    rows = [("", "case", "value", "bound", "time", "measure")]
+    for result in results:
+        check = result.main_check
+        value, bound = (figure(check["value"]), figure(check["bound"])) if check else ("-", "-")
+        measure = check["what"] if check else result.message.splitlines()[-1]
+        mark = "ok" if result.passed else result.outcome.upper()
+        rows.append((mark, result.name, value, bound, f"{result.seconds:.1f} s", measure))
+    _print_table(rows, right=(2, 3, 4))
+
+
+def _print_table(rows: Sequence[tuple[str, ...]], right: tuple[int, ...]) -> None:
+    """Print rows with aligned columns; those of the given indices to the right, the last one ragged."""
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]) - 1)]
+    for row in rows:
+        cells = [cell.rjust(width) if k in right else cell.ljust(width) for k, (cell, width) in enumerate(zip(row, widths))]
+        click.echo("  ".join([*cells, row[-1]]))
 
 
 def _hand_over(run: Recording, output: Sequence[str], view: bool) -> None:

@@ -1,4 +1,7 @@
-"""Named scenes, each with a check against a law. A scene's module is imported when the scene is asked for."""
+"""Named scenes, each with a check against a law. A scene's module is imported when the scene is asked for.
+
+`names` are scenes to look at and learn from; `hard_names` those of the hard-case suite (`gallery.hard`).
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,13 @@ import importlib
 from typing import TYPE_CHECKING
 
 from rigidimpulse.errors import unknown_name
+from rigidimpulse.gallery.hard import FAMILIES
 from rigidimpulse.gallery.record import asset_path
 
 if TYPE_CHECKING:
     from rigidimpulse.gallery.record import GalleryScene
 
-__all__ = ["asset_path", "load", "names"]
+__all__ = ["asset_path", "hard_names", "load", "names"]
 
 _MODULES = {
     "spot": "spot",
@@ -32,19 +36,30 @@ _MODULES = {
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 
 
+_HARD_MODULES = {name: family for family, (_, cases) in FAMILIES.items() for name in cases}
+
+
 def names() -> tuple[str, ...]:
-    """Return the names of all scenes."""
+    """Return the names of all scenes but the hard cases."""
     return tuple(_MODULES)
 
 
+def hard_names() -> tuple[str, ...]:
+    """Return the names of the scenes of the hard-case suite."""
+    return tuple(_HARD_MODULES)
+
+
 def load(name: str) -> GalleryScene:
-    """Return the scene of a name.
+    """Return the scene of a name, hard cases included.
 
     Raises:
         SceneError: for an unknown name, listing the known ones.
 
     """
-    if name not in _MODULES:
-        raise unknown_name("gallery scene", name, _MODULES)
-    module = importlib.import_module(f"rigidimpulse.gallery.{_MODULES[name]}")
+    if name in _MODULES:
+        module = importlib.import_module(f"rigidimpulse.gallery.{_MODULES[name]}")
+    elif name in _HARD_MODULES:
+        module = importlib.import_module(f"rigidimpulse.gallery.hard.{_HARD_MODULES[name]}")
+    else:
+        raise unknown_name("gallery scene", name, names() + hard_names())
     return next(entry for entry in module.SCENES if entry.name == name)

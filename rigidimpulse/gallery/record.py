@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from rigidimpulse.errors import SceneError
 
 if TYPE_CHECKING:
+    from rigidimpulse.accuracy import Accuracy
     from rigidimpulse.recording import Recording
     from rigidimpulse.scene import Scene
 
@@ -23,10 +24,10 @@ class Check:
 
     Attributes:
         what: the quantity, with its unit.
-        value: what the run gave: an error to be kept below `bound`, or a count to be equal to it.
-        bound: see `value`.
+        value: what the run gave. bound: what it is compared with, in the way of `relation`.
         passed: whether it holds.
         law: the law it follows from.
+        relation: "at most", "at least" or "equal to".
 
     """
 
@@ -35,6 +36,7 @@ class Check:
     bound: float
     passed: bool
     law: str
+    relation: str = "at most"
 
 
 def at_most(what: str, value: float, bound: float, law: str) -> Check:
@@ -42,9 +44,23 @@ def at_most(what: str, value: float, bound: float, law: str) -> Check:
     return Check(what, float(value), float(bound), bool(math.isfinite(value) and value <= bound), law)
 
 
+def at_least(what: str, value: float, bound: float, law: str) -> Check:
+    """Return the check that a quantity, which must be a number, is at least `bound`."""
+    return Check(what, float(value), float(bound), bool(math.isfinite(value) and value >= bound), law, "at least")
+
+
 def equal(what: str, value: float, expected: float, law: str) -> Check:
     """Return the check that a count is the expected one."""
-    return Check(what, float(value), float(expected), bool(value == expected), law)
+    return Check(what, float(value), float(expected), bool(value == expected), law, "equal to")
+
+
+def figure(value: float | None) -> str:
+    """Return a value for a table: counts in full, quantities with three digits, errors with two; a dash for what is not finite."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    if abs(value) < 1e15 and value == int(value):
+        return f"{int(value):,}"
+    return f"{value:.3g}" if 0.01 <= abs(value) < 1000.0 else f"{value:.1e}"
 
 
 @dataclass(frozen=True)
@@ -57,6 +73,9 @@ class GalleryScene:
         scene: makes the scene.
         check: compares a recording of `duration`, at any frame rate, with the laws of the scene.
         duration: s. fps: frames per second. accuracy: preset.
+        cheaper: settings that are not enough for this scene: with them at least one check fails, or the run does.
+            Shows both sides of an option; None where no option is the point.
+        elsewhere: what common engines reach in this scene, as measured; empty if nobody measured it.
 
     """
 
@@ -67,6 +86,8 @@ class GalleryScene:
     duration: float
     fps: float = 60.0
     accuracy: str = "standard"
+    cheaper: Accuracy | None = None
+    elsewhere: str = ""
 
 
 def asset_path(name: str) -> Path:

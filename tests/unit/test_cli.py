@@ -52,7 +52,7 @@ def test_help_imports_nothing_heavy():
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert out.splitlines()[-1] == "[]"
-    for command in ("demo", "simulate", "view", "explain"):
+    for command in ("demo", "hardcases", "simulate", "view", "explain"):
         assert command in out
 
 
@@ -66,7 +66,8 @@ def test_runs_as_a_module():
 def test_demo_without_a_name_lists_all_scenes():
     result = call("demo")
     assert result.exit_code == 0
-    assert [line.split()[0] for line in result.stdout.splitlines()] == list(gallery.names())
+    listed = [line.split()[0] for line in result.stdout.splitlines() if line.startswith("  ")]
+    assert listed == [*gallery.names(), *gallery.hard_names()]
 
 
 def test_demo_runs_checks_and_writes_what_is_asked_for(tmp_path):

@@ -1,0 +1,1 @@
+"""Studies: runs of many scenes, and what they show."""
