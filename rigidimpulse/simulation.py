@@ -15,8 +15,8 @@ from rigidimpulse.constrain.contact_forces import ContactForces
 from rigidimpulse.constrain.jointed import reaction_table
 from rigidimpulse.detect.overlap import report_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
-from rigidimpulse.errors import SceneError
 from rigidimpulse.detect.window import Window
+from rigidimpulse.errors import SceneError
 from rigidimpulse.forces.gravity import FreeRotation, Gravity
 from rigidimpulse.integrate.course import FIXED, FREE, PRESCRIBED, begin
 from rigidimpulse.integrate.flight import ExactFlight

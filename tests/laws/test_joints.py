@@ -106,7 +106,8 @@ def test_swinging_chain_keeps_its_length_and_energy() -> None:
 
 def test_limits_of_a_hinge_hold() -> None:
     scene = ri.Scene(gravity=(0, 0, 0))
-    scene.add(ri.Body("bar", ri.Shape.box((0.1, 0.1, 1)), position=(0, 0, -0.5), mass=1.0, velocity=(-1.5, 0, 0), angular_velocity=(0, 3, 0)))
+    moving = {"velocity": (-1.5, 0, 0), "angular_velocity": (0, 3, 0)}
+    scene.add(ri.Body("bar", ri.Shape.box((0.1, 0.1, 1)), position=(0, 0, -0.5), mass=1.0, **moving))
     scene.add(ri.HingeJoint(None, "bar", (0, 0, 0), (0, 1, 0), lower=-0.3, upper=0.5))
     run = ri.simulate(scene, 1.0)
     q = run.orientation("bar")
