@@ -32,6 +32,7 @@ _MODULES = {
     "two_spheres": "two_spheres",
     "off_centre_disk": "off_centre_disk",
     "rifle": "rifle",
+    "toss": "tosses",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 

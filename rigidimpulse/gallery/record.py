@@ -90,15 +90,19 @@ class GalleryScene:
     elsewhere: str = ""
 
 
-def asset_path(name: str) -> Path:
-    """Return the path of a mesh that comes with the library, in an installed package as well as in a clone.
+def asset_path(name: str, folder: str = "meshes") -> Path:
+    """Return the path of a file that comes with the library, in an installed package as well as in a clone.
+
+    Args:
+        name: of the file.
+        folder: of the assets, "meshes" or "tosses".
 
     Raises:
         SceneError: there is none of this name.
 
     """
-    places = [PACKAGE / "assets" / "meshes" / name, PACKAGE.parent / "assets" / "meshes" / name]
+    places = [PACKAGE / "assets" / folder / name, PACKAGE.parent / "assets" / folder / name]
     for place in places:
         if place.is_file():
             return place
-    raise SceneError(f"mesh {name!r} is not in {' or '.join(str(place.parent) for place in places)}", "install again")
+    raise SceneError(f"file {name!r} is not in {' or '.join(str(place.parent) for place in places)}", "install again")
