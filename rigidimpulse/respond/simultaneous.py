@@ -1,126 +1,20 @@
 """Impacts of many contacts at one instant.
 
-`solve_block` treats its contacts all at once: find impulses p with u+ = u + W p, where for approaching contacts the
-target is u_n+ >= -e u_n (Newton's law), complementary to p_n >= 0, with Coulomb's cone (see constrain/newton.py). If
-that made energy (Newton's law with friction can), the fully inelastic answer p0 is taken (1 + e) times: the change of
-energy along s p0 is q s (s / 2 - 1) with q = p0.W p0 >= 0, never positive for s <= 2.
-
-`respond_sequential` goes contact pair by contact pair, fastest approach first, one block inside a pair (a box landing
-on a face is one impact with four points); what no longer rebounds is finished by one inelastic block. It passes k
-balls for k in Newton's cradle. `respond_simultaneous` takes the whole group as one block. Both follow the rules of
-Smith et al. 2012 (momentum kept, one-sided impulses, energy bounded); they differ in which of the physically possible
-answers a chain of bodies gives.
+`respond_sequential` goes contact pair by contact pair, fastest approach first: one contact point as in impulse.py,
+several as one block (a box landing on a face is one impact with four points; block.py); what no longer rebounds is
+finished by one inelastic block. It passes k balls for k in Newton's cradle. `respond_simultaneous` takes the whole
+group as one block. Both follow the rules of Smith et al. 2012 (momentum kept, one-sided impulses, energy bounded);
+they differ in which of the physically possible answers a chain of bodies gives.
 """
 
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.newton import multiply, multiply_transposed, solve_cone
-from rigidimpulse.constrain.rows import contact_rows, number_columns
-from rigidimpulse.respond.impulse import apply_impulse, log_impact, relative_velocity, resolve_contact
+from rigidimpulse.respond.block import rebound_of, solve_block
+from rigidimpulse.respond.impulse import relative_velocity, resolve_contact
 
-# Residual asked of the solver and what counts as approaching, relative to the speed of the group.
-SOLVE_TOLERANCE = 1e-14
 # Impulses per contact before a group is finished without rebound.
 IMPULSES_PER_CONTACT = 200
-
-
-@jit
-def _restitution(contacts, c, approach, rest_speed):
-    """e, or 0 where the rebound would rise less than the gap the contact is held at (LOOP rule: no speed threshold)."""
-    e = contacts.restitution[c]
-    return e if e * abs(approach) > rest_speed[c] else 0.0
-
-
-@jit
-def _block_impulses(jacobian, u, bounce, bounce_t, mu, friction, scale, p):
-    """Solve one block; static friction first, contacts that still slip again with dynamic friction."""
-    m = mu.shape[0]
-    b = np.empty(3 * m)
-    y = np.empty(jacobian.shape[1])
-    after = np.empty(3 * m)
-    for s in range(m):
-        b[3 * s] = u[3 * s] + bounce[s] * u[3 * s]
-        b[3 * s + 1] = u[3 * s + 1] * (1.0 + bounce_t[s])
-        b[3 * s + 2] = u[3 * s + 2] * (1.0 + bounce_t[s])
-        p[3 * s] = p[3 * s + 1] = p[3 * s + 2] = 0.0
-    solve_cone(jacobian, b, mu, p, SOLVE_TOLERANCE * scale)
-    multiply_transposed(jacobian, p, y)
-    multiply(jacobian, y, after)
-    changed = False
-    for s in range(m):
-        slip = abs(b[3 * s + 1] + after[3 * s + 1]) + abs(b[3 * s + 2] + after[3 * s + 2])
-        if friction[s] != mu[s] and slip > 1e-9 * scale:
-            mu[s] = friction[s]
-            changed = True
-    if changed:
-        solve_cone(jacobian, b, mu, p, SOLVE_TOLERANCE * scale)
-
-
-@jit
-def solve_block(bodies, contacts, subset, rebound, rest_speed, scale, column, log, count):
-    """Resolve the contacts of subset together and apply the impulses; `rebound` 1, or 0 for an inelastic one. New log count."""
-    m = subset.shape[0]
-    members = number_columns(bodies, contacts, column)
-    width = 6 * members.shape[0]
-    jacobian = np.empty((3 * m, width))
-    frames = np.empty((m, 3, 3))
-    contact_rows(bodies, contacts, subset, column, width, jacobian, frames)
-    u = np.empty(3 * m)
-    v = np.empty(3)
-    bounce, bounce_t = np.zeros(m), np.zeros(m)
-    mu, friction = np.empty(m), np.empty(m)
-    largest = 0.0
-    for s in range(m):
-        c = subset[s]
-        approach = relative_velocity(bodies, contacts, c, v)
-        for k in range(3):
-            u[3 * s + k] = v[0] * frames[s, k, 0] + v[1] * frames[s, k, 1] + v[2] * frames[s, k, 2]
-        mu[s], friction[s] = contacts.static_friction[c], contacts.dynamic_friction[c]
-        if approach < 0.0:
-            bounce[s] = rebound * _restitution(contacts, c, approach, rest_speed)
-            bounce_t[s] = contacts.tangential_restitution[c] if bounce[s] > 0.0 else 0.0
-            largest = max(largest, bounce[s])
-    p = np.empty(3 * m)
-    _block_impulses(jacobian, u, bounce, bounce_t, mu, friction, scale, p)
-    if largest > 0.0 and _energy_change(jacobian, u, p) > 0.0:
-        for s in range(m):
-            bounce[s] = bounce_t[s] = 0.0
-            mu[s] = contacts.static_friction[subset[s]]
-        _block_impulses(jacobian, u, bounce, bounce_t, mu, friction, scale, p)
-        for i in range(3 * m):
-            p[i] *= 1.0 + largest
-    return _apply(bodies, contacts, subset, frames, u, p, scale, log, count)
-
-
-@jit
-def _energy_change(jacobian, u, p):
-    """p.u + |Jh^T p|^2 / 2, less the round-off of its terms [J]."""
-    y = np.empty(jacobian.shape[1])
-    multiply_transposed(jacobian, p, y)
-    linear = moved = quadratic = 0.0
-    for i in range(p.shape[0]):
-        linear += p[i] * u[i]
-        moved += abs(p[i] * u[i])
-    for i in range(y.shape[0]):
-        quadratic += 0.5 * y[i] * y[i]
-    return linear + quadratic - 1e-13 * (moved + quadratic)
-
-
-@jit
-def _apply(bodies, contacts, subset, frames, u, p, scale, log, count):
-    impulse = np.empty(3)
-    first = count
-    for s in range(subset.shape[0]):
-        for a in range(3):
-            impulse[a] = p[3 * s] * frames[s, 0, a] + p[3 * s + 1] * frames[s, 1, a] + p[3 * s + 2] * frames[s, 2, a]
-        if p[3 * s] > 0.0:
-            apply_impulse(bodies, contacts, subset[s], impulse[0], impulse[1], impulse[2])
-            count = log_impact(bodies, contacts, subset[s], impulse, u[3 * s], log, count)
-    v = np.empty(3)
-    for i in range(first, count):
-        log[i, 6] = relative_velocity(bodies, contacts, int(log[i, 0]), v)
-    return count
 
 
 @jit
@@ -130,7 +24,7 @@ def _approaching(bodies, contacts, tolerance, rebounding, rest_speed):
     best, fastest = -1, -tolerance
     for c in range(contacts.gap.shape[0]):
         approach = relative_velocity(bodies, contacts, c, u)
-        if approach < fastest and (rebounding == 0.0 or _restitution(contacts, c, approach, rest_speed) > 0.0):
+        if approach < fastest and (rebounding == 0.0 or rebound_of(contacts, c, approach, rest_speed) > 0.0):
             best, fastest = c, approach
     return best
 
@@ -151,12 +45,13 @@ def _same_pair(contacts, c):
 
 
 @jit
-def respond_sequential(bodies, contacts, rest_speed, tolerance, scale, column, log):
+def respond_sequential(bodies, contacts, law, rest_speed, tolerance, scale, column, log):
     """Pair after pair, fastest approach first. Returns (rows written to log, impulses made, whether the cap was reached).
 
     A full log ends the call early, without the inelastic finish: read it and call again.
 
-    rest_speed (m,): a rebound slower than this is none [m/s]; tolerance: slower approach is none [m/s]; scale: speed of the group.
+    law: one of `restitution.LAWS`; rest_speed (m,): a rebound slower than this is none [m/s]; tolerance: slower approach is none
+    [m/s]; scale: speed of the group.
     """
     count = np.int64(0)
     impulses = 0
@@ -168,28 +63,28 @@ def respond_sequential(bodies, contacts, rest_speed, tolerance, scale, column, l
             break
         subset = _same_pair(contacts, c)
         if subset.shape[0] == 1:
-            e = _restitution(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
-            count = resolve_contact(bodies, contacts, c, e, log, count)
+            e = rebound_of(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
+            count = resolve_contact(bodies, contacts, c, e, law, log, count)
         else:
-            count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, column, log, count)
+            count = solve_block(bodies, contacts, subset, 1.0, law, rest_speed, scale, column, log, count)
         impulses += 1
     full = count + contacts.gap.shape[0] >= log.shape[0]
     if not full and _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
-        count = _finish(bodies, contacts, rest_speed, scale, column, log, count)
+        count = _finish(bodies, contacts, law, rest_speed, scale, column, log, count)
         impulses += 1
     return count, impulses, impulses >= cap
 
 
 @jit
-def _finish(bodies, contacts, rest_speed, scale, column, log, count):
+def _finish(bodies, contacts, law, rest_speed, scale, column, log, count):
     if contacts.gap.shape[0] == 1:
-        return resolve_contact(bodies, contacts, np.int64(0), 0.0, log, count)
+        return resolve_contact(bodies, contacts, np.int64(0), 0.0, law, log, count)
     subset = np.arange(contacts.gap.shape[0])
-    return solve_block(bodies, contacts, subset, 0.0, rest_speed, scale, column, log, count)
+    return solve_block(bodies, contacts, subset, 0.0, law, rest_speed, scale, column, log, count)
 
 
 @jit
-def respond_simultaneous(bodies, contacts, rest_speed, tolerance, scale, column, log):
+def respond_simultaneous(bodies, contacts, law, rest_speed, tolerance, scale, column, log):
     """The whole group as one block; same arguments and answer as `respond_sequential`."""
     c = _approaching(bodies, contacts, tolerance, 0.0, rest_speed)
     if c < 0:
@@ -197,12 +92,12 @@ def respond_simultaneous(bodies, contacts, rest_speed, tolerance, scale, column,
     u = np.empty(3)
     if contacts.gap.shape[0] == 1:
         c = np.int64(0)
-        e = _restitution(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
-        return resolve_contact(bodies, contacts, c, e, log, c), 1, False
+        e = rebound_of(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
+        return resolve_contact(bodies, contacts, c, e, law, log, c), 1, False
     subset = np.arange(contacts.gap.shape[0])
-    count = solve_block(bodies, contacts, subset, 1.0, rest_speed, scale, column, log, np.int64(0))
+    count = solve_block(bodies, contacts, subset, 1.0, law, rest_speed, scale, column, log, np.int64(0))
     impulses = 1
     if _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
-        count = _finish(bodies, contacts, rest_speed, scale, column, log, count)
+        count = _finish(bodies, contacts, law, rest_speed, scale, column, log, count)
         impulses += 1
     return count, impulses, False
