@@ -121,32 +121,34 @@ def _measure(law, e, weight, p, before, after):
 def _two_phases(law, jacobian, u, target, e, static, dynamic, scale, p):
     """Poisson's or the energetic law, into p."""
     _solve(jacobian, u, static, dynamic, scale, p)
-    if e.max() <= 0.0:
-        return
     n = u.shape[0]
     compressed, after, r = np.empty(n), np.empty(n), np.empty(n)
     _velocity_after(jacobian, u, p, compressed)
     asked = abs(_measure(law, e, 1.0, p, u, compressed))
+    if asked == 0.0:
+        return
     compression = p.copy()
-    # The size lies between low, which is allowed, and high, which is not.
+    # Secants of the share made of what is asked; the size lies between low, which is allowed, and high, which is not.
     size, low, high = 1.0, 0.0, np.inf
+    last_size = last_share = 0.0
     for _ in range(SIZES):
         _solve(jacobian, compressed - size * target, static, dynamic, scale, r)
         _velocity_after(jacobian, compressed, r, after)
-        made = _measure(law, e, 0.0, r, compressed, after)
+        made = max(_measure(law, e, 0.0, r, compressed, after), 0.0)
+        share = made / asked if law == POISSON else sqrt(made / asked)
         total = compression + r
         lossy = e.max() > 1.0 or _energy_change(jacobian, u, total) <= 0.0
-        if lossy and made <= asked * (1.0 + SIZE_ACCURACY):
+        if lossy and share <= 1.0 + SIZE_ACCURACY:
             low = size
             for i in range(n):
                 p[i] = total[i]
-            if made >= asked * (1.0 - SIZE_ACCURACY):
+            if share >= 1.0 - SIZE_ACCURACY:
                 break
         else:
             high = size
-        ratio = asked / made if made > 0.0 else 4.0
-        guess = size * (ratio if law == POISSON else sqrt(ratio))
         upper = min(high, 3.0 * size)
+        guess = size + (1.0 - share) * (size - last_size) / (share - last_share) if share != last_share else upper
+        last_size, last_share = size, share
         size = guess if lossy and low < guess < upper else 0.5 * (low + upper)
 
 
