@@ -93,10 +93,18 @@ def _energy_change(jacobian, u, p):
 
 
 @jit
-def _newton(jacobian, u, target, e, static, dynamic, scale, p):
-    """Newton's law, into p."""
-    _solve(jacobian, u - target, static, dynamic, scale, p)
-    largest = e.max()
+def _add(x, factor, y, total):
+    """total = x + factor y."""
+    for i in range(x.shape[0]):
+        total[i] = x[i] + factor * y[i]
+
+
+@jit
+def _newton(jacobian, u, target, largest, static, dynamic, scale, p):
+    """Newton's law, into p; largest is the largest e."""
+    b = np.empty(u.shape[0])
+    _add(u, -1.0, target, b)
+    _solve(jacobian, b, static, dynamic, scale, p)
     if largest > 0.0 and _energy_change(jacobian, u, p) > 0.0:
         _solve(jacobian, u, static, dynamic, scale, p)
         for i in range(p.shape[0]):
@@ -118,11 +126,12 @@ def _measure(law, e, weight, p, before, after):
 
 
 @jit
-def _two_phases(law, jacobian, u, target, e, static, dynamic, scale, p):
+def _two_phases(law, jacobian, u, target, e, largest, static, dynamic, scale, p):
     """Poisson's or the energetic law, into p."""
     _solve(jacobian, u, static, dynamic, scale, p)
     n = u.shape[0]
-    compressed, after, r = np.empty(n), np.empty(n), np.empty(n)
+    compressed, after, b = np.empty(n), np.empty(n), np.empty(n)
+    r, total = np.empty(n), np.empty(n)
     _velocity_after(jacobian, u, p, compressed)
     asked = abs(_measure(law, e, 1.0, p, u, compressed))
     if asked == 0.0:
@@ -132,12 +141,13 @@ def _two_phases(law, jacobian, u, target, e, static, dynamic, scale, p):
     size, low, high = 1.0, 0.0, np.inf
     last_size = last_share = 0.0
     for _ in range(SIZES):
-        _solve(jacobian, compressed - size * target, static, dynamic, scale, r)
+        _add(compressed, -size, target, b)
+        _solve(jacobian, b, static, dynamic, scale, r)
         _velocity_after(jacobian, compressed, r, after)
         made = max(_measure(law, e, 0.0, r, compressed, after), 0.0)
         share = made / asked if law == POISSON else sqrt(made / asked)
-        total = compression + r
-        lossy = e.max() > 1.0 or _energy_change(jacobian, u, total) <= 0.0
+        _add(compression, 1.0, r, total)
+        lossy = largest > 1.0 or _energy_change(jacobian, u, total) <= 0.0
         if lossy and share <= 1.0 + SIZE_ACCURACY:
             low = size
             for i in range(n):
@@ -164,6 +174,7 @@ def solve_block(bodies, contacts, subset, rebound, law, rest_speed, scale, colum
     u, target, p = np.empty(3 * m), np.zeros(3 * m), np.empty(3 * m)
     v = np.empty(3)
     e, static, dynamic = np.zeros(m), np.empty(m), np.empty(m)
+    largest = rough = 0.0
     for s in range(m):
         c = subset[s]
         approach = relative_velocity(bodies, contacts, c, v)
@@ -175,10 +186,11 @@ def solve_block(bodies, contacts, subset, rebound, law, rest_speed, scale, colum
             e_t = contacts.tangential_restitution[c] if e[s] > 0.0 else 0.0
             target[3 * s] = -e[s] * u[3 * s]
             target[3 * s + 1], target[3 * s + 2] = -e_t * u[3 * s + 1], -e_t * u[3 * s + 2]
-    if law == NEWTON or (law == AUTO and static.max() <= 0.0):
-        _newton(jacobian, u, target, e, static, dynamic, scale, p)
+        largest, rough = max(largest, e[s]), max(rough, static[s])
+    if law == NEWTON or (law == AUTO and rough <= 0.0):
+        _newton(jacobian, u, target, largest, static, dynamic, scale, p)
     else:
-        _two_phases(law, jacobian, u, target, e, static, dynamic, scale, p)
+        _two_phases(law, jacobian, u, target, e, largest, static, dynamic, scale, p)
     return _apply(bodies, contacts, subset, frames, u, p, scale, log, count)
 
 

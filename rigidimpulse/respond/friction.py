@@ -222,9 +222,12 @@ def contact_impulse(k, n, u, e, e_t, mu_s, mu_k, law, t1, t2, impulse):
         return
     q = np.empty(PLACES)
     if not (e_t > 0.0 and _grip(mass, e, e_t, mu_s, start, q)):
-        end = _process(law, e, mu_s, mu_s, mass, start, q)
-        if end == SLIDES and mu_k != mu_s:
-            end = _process(law, e, mu_k, mu_s, mass, start, q)
+        mu, end = mu_s, SLIDES
+        for _ in range(2):
+            end = _process(law, e, mu, mu_s, mass, start, q)
+            if end != SLIDES or mu == mu_k:
+                break
+            mu = mu_k
         if end == UNFINISHED or (e <= 1.0 and _makes_energy(mass, start, q)):
             # K is so slender that round-off decides: the frictionless impulse is safe.
             return

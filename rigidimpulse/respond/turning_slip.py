@@ -102,11 +102,11 @@ def _expand(k, mu, scale, slip, q, c):
 
 
 @jit
-def _at(c, row, x):
+def _at(row, x):
     """The series of a row at x."""
-    value = c[row, ORDER]
+    value = row[ORDER]
     for i in range(ORDER - 1, -1, -1):
-        value = value * x + c[row, i]
+        value = value * x + row[i]
     return value
 
 
@@ -114,15 +114,15 @@ def _at(c, row, x):
 def _excess(law, e, k, start, c, since, x, q):
     """Not negative once the law ends the impact; x in the step, `since` in it restitution lasts."""
     if law == POISSON:
-        return q[PR] + _at(c, ROW_P, x) - _at(c, ROW_P, since) - e * q[PC]
+        return q[PR] + _at(c[ROW_P], x) - _at(c[ROW_P], since) - e * q[PC]
     if law == NEWTON:
-        short = _at(c, ROW_UN, x) + e * start[0]
+        short = _at(c[ROW_UN], x) + e * start[0]
         if e > 1.0:
             return short
-        jn, j1, j2 = q[JN] + _at(c, ROW_P, x), q[J1] + _at(c, ROW_J1, x), q[J2] + _at(c, ROW_J2, x)
+        jn, j1, j2 = q[JN] + _at(c[ROW_P], x), q[J1] + _at(c[ROW_J1], x), q[J2] + _at(c[ROW_J2], x)
         # Two units, but only the sign counts.
         return max(short, energy_change(k, start, jn, j1, j2))
-    return q[WR] + _at(c, ROW_W, x) - _at(c, ROW_W, since) - e * e * q[WC]
+    return q[WR] + _at(c[ROW_W], x) - _at(c[ROW_W], since) - e * e * q[WC]
 
 
 @jit
@@ -130,7 +130,7 @@ def _normal_root(c, low, high, sign):
     """Where sign u_n becomes positive in the step."""
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        if sign * _at(c, ROW_UN, middle) > 0.0:
+        if sign * _at(c[ROW_UN], middle) > 0.0:
             high = middle
         else:
             low = middle
@@ -146,7 +146,7 @@ def _take_step(law, e, k, start, step, c, q):
         until = step
         compressed = q[COMPRESSED] > 0.0
         sign = 1.0 if compressed else -1.0
-        changes = sign * _at(c, ROW_UN, step) > 0.0
+        changes = sign * _at(c[ROW_UN], step) > 0.0
         if changes:
             until = _normal_root(c, since, step, sign)
         if not compressed and (e <= 0.0 or _excess(law, e, k, start, c, since, until, q) >= 0.0):
@@ -158,7 +158,7 @@ def _take_step(law, e, k, start, step, c, q):
                     until = middle
                 else:
                     low = middle
-        passed, work = _at(c, ROW_P, until) - _at(c, ROW_P, since), _at(c, ROW_W, until) - _at(c, ROW_W, since)
+        passed, work = _at(c[ROW_P], until) - _at(c[ROW_P], since), _at(c[ROW_W], until) - _at(c[ROW_W], since)
         if compressed:
             q[PC] += passed
             q[WC] -= work
@@ -169,8 +169,8 @@ def _take_step(law, e, k, start, step, c, q):
         if over or not changes:
             break
         q[COMPRESSED] = 1.0 - q[COMPRESSED]
-    q[UN], q[S1], q[S2] = _at(c, ROW_UN, since), _at(c, ROW_S1, since), _at(c, ROW_S2, since)
-    q[JN] += _at(c, ROW_P, since)
-    q[J1] += _at(c, ROW_J1, since)
-    q[J2] += _at(c, ROW_J2, since)
+    q[UN], q[S1], q[S2] = _at(c[ROW_UN], since), _at(c[ROW_S1], since), _at(c[ROW_S2], since)
+    q[JN] += _at(c[ROW_P], since)
+    q[J1] += _at(c[ROW_J1], since)
+    q[J2] += _at(c[ROW_J2], since)
     return over
