@@ -3,6 +3,9 @@
 Slots
     impact_time     how the first contact in an interval is found (stage sweep)
     response        how impulses are computed (stage respond)
+    restitution     law that ends an impact: "newton" (speeds), "poisson" (impulses), "energetic" (works; Stronge), or "auto":
+                    energetic where a contact has friction, Newton's where it has none. They differ only with friction, and
+                    there where the contact couples normal and tangential motion (see respond/restitution.py)
     integrator      how bodies move between impacts (stage integrate)
     contact_solver  how lasting contacts are solved (stage constrain)
     step            s; contact forces are constant over it, impacts are found inside it at any time
@@ -32,6 +35,7 @@ class Accuracy(BaseModel):
 
     impact_time: Literal["bisection", "conservative", "linear", "after"] = "bisection"
     response: Literal["sequential", "simultaneous", "kinematic"] = "sequential"
+    restitution: Literal["auto", "newton", "poisson", "energetic"] = "auto"
     integrator: Literal["exact"] = "exact"
     contact_solver: Literal["auto", "newton"] = "auto"
     step: float = Field(default=1.0 / 60.0, gt=0.0, allow_inf_nan=False)

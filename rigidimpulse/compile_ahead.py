@@ -63,13 +63,14 @@ def _group(context):
 
 def _detect_and_respond(context) -> None:
     from rigidimpulse.respond.response import respond_to_impacts
+    from rigidimpulse.respond.restitution import AUTO
     from rigidimpulse.respond.simultaneous import respond_sequential
     from rigidimpulse.simulation import start_courses
 
     start_courses(context)
     context.recorder.start(context.state.course)
     _, group = _group(context)
-    respond_to_impacts(context, group, respond_sequential)
+    respond_to_impacts(context, group, respond_sequential, AUTO)
 
 
 def _sweep_and_constrain(context) -> None:

@@ -28,9 +28,11 @@ class Material:
 
     Attributes:
         density: kg/m^3; used where the body does not give its mass.
-        restitution: e in [0, 1], ratio of separation speed to approach speed along the normal.
-        static_friction: mu_s >= 0, bound of tangential over normal force without sliding. If only one of the two
-            frictions is stated the other is the same.
+        restitution: e in [0, 1]. Without friction, and for spheres, the ratio of separation speed to approach speed along
+            the normal; with friction e^2 is the share of the normal work of compression that restitution gives back
+            (Stronge), or what `Accuracy.restitution` says.
+        static_friction: mu_s >= 0, bound of tangential over normal force without sliding; decides whether an impact
+            sticks. If only one of the two frictions is stated the other is the same.
         dynamic_friction: mu_k in [0, mu_s], tangential over normal force while sliding.
         tangential_restitution: in [0, 1], share of the slip at an impact that is reversed, as far as friction is able
             (1: Garwin's superball; 0: slip at most stops).

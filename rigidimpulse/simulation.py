@@ -110,7 +110,7 @@ def make_plan(world: World) -> Plan:
     accuracy = world.accuracy
     effects = [
         BroadPhase(),
-        ImpactResponse(accuracy.response),
+        ImpactResponse(accuracy.response, accuracy.restitution),
         FreeRotation(),
         Gravity(),
         ContactForces(),

@@ -20,7 +20,7 @@ from rigidimpulse.shape import Shape
 SCALE = 0.5
 """Metres per unit of the model, which is 1.7 units tall."""
 FRICTION = (0.6, 0.5)
-RESTITUTION = 0.59
+RESTITUTION = 0.6
 DENSITY = 700.0
 RING_RADIUS, TUBE_RADIUS, RING_SECTIONS, TUBE_SECTIONS = 0.7, 0.16, 64, 32
 START, VELOCITY, SPIN = (-2.49, -0.01, 1.2), (2.75, 0.0, 0.65), (-1.1, 9.0, 1.2)

@@ -108,8 +108,8 @@ def apply_impulse(bodies, contacts, c, x, y, z):
 
 
 @jit
-def resolve_contact(bodies, contacts, c, restitution, log, count):
-    """One impact at contact c with the given restitution; appends a row to log and returns the new count."""
+def resolve_contact(bodies, contacts, c, restitution, law, log, count):
+    """One impact at contact c with the given restitution by a law of it; appends a row to log and returns the new count."""
     k = np.empty((3, 3))
     u = np.empty(3)
     t1, t2, impulse = np.empty(3), np.empty(3), np.empty(3)
@@ -117,7 +117,7 @@ def resolve_contact(bodies, contacts, c, restitution, log, count):
     inverse_effective_mass(bodies, contacts, c, k)
     e_t = contacts.tangential_restitution[c] if restitution > 0.0 else 0.0
     mu_s, mu_k = contacts.static_friction[c], contacts.dynamic_friction[c]
-    contact_impulse(k, contacts.normal[c], u, restitution, e_t, mu_s, mu_k, t1, t2, impulse)
+    contact_impulse(k, contacts.normal[c], u, restitution, e_t, mu_s, mu_k, law, t1, t2, impulse)
     apply_impulse(bodies, contacts, c, impulse[0], impulse[1], impulse[2])
     return log_impact(bodies, contacts, c, impulse, approach, log, count)
 

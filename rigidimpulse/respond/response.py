@@ -13,6 +13,7 @@ from rigidimpulse.observe.events import IMPACT_DTYPE
 from rigidimpulse.plan import Bound, Skip
 from rigidimpulse.respond.impulse import Contacts, speed_scale
 from rigidimpulse.respond.kinematic import respond_kinematic
+from rigidimpulse.respond.restitution import LAWS
 from rigidimpulse.respond.simultaneous import respond_sequential, respond_simultaneous
 
 KERNELS = {
@@ -36,9 +37,10 @@ NEVER = (-np.inf, np.inf, 0)
 
 @dataclass(frozen=True)
 class ImpactResponse:
-    """Impulses at impacts by one of KERNELS."""
+    """Impulses at impacts by one of KERNELS and a law of restitution, one of LAWS."""
 
     method: str
+    restitution: str
     stage: str = "respond"
 
     @property
@@ -50,15 +52,15 @@ class ImpactResponse:
         """In where something can collide."""
         if not world.can_collide:
             return Skip("nothing can collide")
-        kernel = KERNELS[self.method]
+        kernel, law = KERNELS[self.method], LAWS[self.restitution]
 
         def respond(context, group: Group) -> None:
-            respond_to_impacts(context, group, kernel)
+            respond_to_impacts(context, group, kernel, law)
 
         return Bound(respond, REASONS[self.method])
 
 
-def respond_to_impacts(context, group: Group, kernel) -> None:
+def respond_to_impacts(context, group: Group, kernel, law: int) -> None:
     """Apply the impulses of the group's approaching contacts and log them."""
     live = np.flatnonzero(group.live)
     if not len(live):
@@ -76,7 +78,7 @@ def respond_to_impacts(context, group: Group, kernel) -> None:
     joints = context.joints.impact_block(context, group) if len(group.joints) else None
     for _ in range(MAX_CALLS):
         count, _, capped = kernel(
-            now, contacts, rest_speed, tolerance, scale, context.column, joints, context.impact_log
+            now, contacts, law, rest_speed, tolerance, scale, context.column, joints, context.impact_log
         )
         _log(context, group.time, contacts, context.impact_log[:count])
         _remember_rebounds(context, group, contacts, context.impact_log[:count])
