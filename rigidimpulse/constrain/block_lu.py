@@ -27,7 +27,7 @@ class Elimination(NamedTuple):
     start: np.ndarray  # (n + 1,) of the neighbours of the k-th body eliminated, in
     later: np.ndarray  # (e,) bodies still to come
     slot: np.ndarray  # (n, n) place of block (i, j), -1 if it is zero
-    num_blocks: int
+    num_blocks: np.int64
 
 
 @jit

@@ -62,9 +62,16 @@ def make_memory(joints, inertia: np.ndarray) -> JointMemory:
     trial = make_course(n)
     trial.inertia[:] = inertia
     hard = (joints.stiffness == np.inf) & (joints.lower == -np.inf) & (joints.upper == np.inf)
-    vectors = (np.zeros(k) for _ in range(2))
     return JointMemory(
-        np.zeros(k), np.zeros(k), hard, *vectors, np.zeros((n, 6)), trial, np.zeros((n, 3)), np.zeros((n, 3, 3))
+        angle=np.zeros(k),
+        force=np.zeros(k),
+        active=hard,
+        start_value=np.zeros(k),
+        start_rate=np.zeros(k),
+        wrench=np.zeros((n, 6)),
+        trial=trial,
+        end_position=np.zeros((n, 3)),
+        end_rotation=np.zeros((n, 3, 3)),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from rigidimpulse.detect.features import CORNER, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, pressing
 from rigidimpulse.observe.energy import mechanical_energy
 from rigidimpulse.respond.impulse import Contacts
+
+if TYPE_CHECKING:
+    from rigidimpulse.constrain.jointed import JointState
 
 MARGIN = 2.0
 """Contacts are looked for within this many delta."""
@@ -150,22 +154,23 @@ def _components(context, window, time: float, reached, real: np.ndarray, integer
 
     for a, b in integer[:, :2].tolist():
         join(a, b)
-    joints = np.zeros(0, np.int64)
-    if context.joints is not None:
-        joints = context.joints.at(np.flatnonzero(reached & dynamic))
+    jointed: JointState | None = context.joints
+    joints, at = np.zeros(0, np.int64), []
+    if jointed is not None:
+        joints = jointed.at(np.flatnonzero(reached & dynamic))
         for j in joints.tolist():
-            ends = context.joints.bodies_of(np.array([j])).tolist()
+            ends = jointed.bodies_of(np.array([j])).tolist()
             join(ends[0], ends[-1])
+            at.append(jointed.movable_end(j))
     owner = np.array([root(a if dynamic[a] else b) for a, b in integer[:, :2].tolist()], np.int64)
-    owner_of_joint = [root(i) for i in (context.joints.movable_end(j) for j in joints.tolist())] if len(joints) else []
-    owner_of_joint = np.array(owner_of_joint, np.int64)
+    owner_of_joint = np.array([root(i) for i in at], np.int64)
     groups = []
     for o in np.union1d(owner, owner_of_joint):
         groups.append(make_group(context, window, time, real, integer, owner == o, joints[owner_of_joint == o]))
     for group in groups:
         note_arrival(context, group.members.tolist())
-        if len(group.joints):
-            context.joints.arrive(context, group)
+        if jointed is not None and len(group.joints):
+            jointed.arrive(context, group)
             classify(context, group)
     return groups
 

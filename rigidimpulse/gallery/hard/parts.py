@@ -111,7 +111,7 @@ def above_floor(run: Recording, bound: float = 1e-9) -> Check:
 
 
 def apart(run: Recording, num_frames: int = 20) -> Check:
-    """Return the check that no two bodies are inside each other, at some frames spread over the run, asked of FCL."""
+    """Return the check that no two bodies are inside each other, at some frames after the given one, asked of FCL."""
     from rigidimpulse.detect.narrowphase import Narrowphase
     from rigidimpulse.rotation import multiply
     from rigidimpulse.world import compile_scene
@@ -123,7 +123,7 @@ def apart(run: Recording, num_frames: int = 20) -> Check:
     a, b = np.triu_indices(world.num_bodies, 1)
     moving = world.dynamic[a] | world.dynamic[b]
     a, b = a[moving], b[moving]
-    for f in np.unique(np.linspace(0, len(run.times) - 1, num_frames).round().astype(int)).tolist():
+    for f in np.unique(np.linspace(1, len(run.times) - 1, num_frames).round().astype(int)).tolist():
         centers = run.centers[f]
         if not np.all(np.isfinite(centers)):
             continue
