@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.constrain.jointed import JointState
-from rigidimpulse.detect.groups import note_arrival
+from rigidimpulse.detect.groups import NO_FORCE, note_arrival
 from rigidimpulse.detect.touching import bring
 from rigidimpulse.geometry import Geometry
 from rigidimpulse.integrate.course import Course, make_course, pose_at
@@ -33,7 +33,7 @@ class State:
         energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at.
         under_contact: (n,) bool, bodies whose course carries contact forces.
         rebounds: by pair, time and speed of the last rebound and how many in a row were short.
-        contact_force: last force of a held contact, in its frame [N], by (body_a, body_b, kind, feature_a, feature_b).
+        contact_force: last force of a held contact, in its frame [N], and when it began, by its key (`groups.contact_key`).
     """
 
     def __init__(self, world: World) -> None:
@@ -49,11 +49,17 @@ class State:
             inv_inertia=np.zeros((n, 3, 3)),
         )
         self.rotation = np.zeros((n, 3, 3))
-        self.contact_force: dict[tuple[int, ...], np.ndarray] = {}
+        self.contact_force: dict[tuple[int, ...], tuple[np.ndarray, float]] = {}
         self.under_contact = np.zeros(n, bool)
         self.rebounds: dict[tuple[int, int], tuple[float, float, int]] = {}
         self.energy_at_start = np.zeros(n)
         self.arrival_energy: dict[int, float] = {}
+
+
+    def force_of(self, key: tuple[int, ...]) -> np.ndarray:
+        """Force (3,) N that a contact carries until now, in its frame; zeros if its bodies have parted since."""
+        force, time = self.contact_force.get(key, (NO_FORCE, -np.inf))
+        return force if time >= max(self.course.start[key[0]], self.course.start[key[1]]) else NO_FORCE
 
 
 @dataclass(frozen=True)

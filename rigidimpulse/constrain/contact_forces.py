@@ -9,7 +9,7 @@ import numpy as np
 from rigidimpulse.constrain.drift import lift_contacts, needs_lift
 from rigidimpulse.constrain.resting import CARRIER_A, CARRIER_B, SHARED, hold_contacts, turning_of
 from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.groups import NO_FORCE, Group, collect, make_group, select
+from rigidimpulse.detect.groups import Group, collect, make_group, select
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.plan import Bound, Skip
@@ -60,7 +60,7 @@ def hold(context, window, group: Group) -> None:
         context.world.geometry, context.world.shape_of_body, state.rotation, now, contacts, carrier
     )
     keys = [group.keys[c] for c in subset]
-    force = np.array([state.contact_force.get(key, NO_FORCE) for key in keys]).reshape(-1, 3)
+    force = np.array([state.force_of(key) for key in keys]).reshape(-1, 3)
     before = kinetic_energy(now, context.world, group.members)
     h = window.end - group.time
     if len(group.joints):
@@ -72,7 +72,7 @@ def hold(context, window, group: Group) -> None:
         )
     context.log.book(group.time, "capture", kinetic_energy(now, context.world, group.members) - before)
     for key, f in zip(keys, force, strict=True):
-        state.contact_force[key] = f
+        state.contact_force[key] = (f, group.time)
     if residual > UNSOLVED:
         names = tuple(context.world.names[i] for i in group.members)
         context.log.report(

@@ -231,9 +231,9 @@ def classify(context, group: Group) -> None:
 
     Where a group is supported, whatever it carries is pressed by gravity as soon as the support bears, so gravity is the least that counts.
     """
-    memory, world = context.state.contact_force, context.world
+    state, world = context.state, context.world
     contacts = group.contacts
-    force = np.array([memory.get(key, NO_FORCE)[0] for key in group.keys])
+    force = np.array([state.force_of(key)[0] for key in group.keys])
     least = 0.0
     if not np.all(world.dynamic[contacts.body_a] & world.dynamic[contacts.body_b]):
         least = float(world.gravity_strength[group.members].max())

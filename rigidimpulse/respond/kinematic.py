@@ -14,8 +14,8 @@ from rigidimpulse.respond.impulse import log_impact, relative_velocity
 
 
 @jit
-def respond_kinematic(bodies, contacts, law, rest_speed, tolerance, scale, number, joints, log):
-    """Each contact once, fastest approach first; arguments (the law does not matter) and answer as `respond_sequential`."""
+def respond_kinematic(bodies, contacts, law, together, rest_speed, tolerance, scale, number, joints, log):
+    """Each contact once, fastest approach first; arguments (neither law nor together matter) and answer as `respond_sequential`."""
     m = contacts.gap.shape[0]
     done = np.zeros(m, np.bool_)
     u, impulse = np.empty(3), np.empty(3)

@@ -76,9 +76,10 @@ def respond_to_impacts(context, group: Group, kernel, law: int) -> None:
     rest_speed = np.where(_rattles(context, group.time, contacts), np.inf, rest_speed)
     before = kinetic_energy(now, context.world, group.members)
     joints = context.joints.impact_block(context, group) if len(group.joints) else None
+    together = _bear_each_other(context, group)
     for _ in range(MAX_CALLS):
         count, _, capped = kernel(
-            now, contacts, law, rest_speed, tolerance, scale, context.column, joints, context.impact_log
+            now, contacts, law, together, rest_speed, tolerance, scale, context.column, joints, context.impact_log
         )
         _log(context, group.time, contacts, context.impact_log[:count])
         _remember_rebounds(context, group, contacts, context.impact_log[:count])
@@ -92,6 +93,13 @@ def respond_to_impacts(context, group: Group, kernel, law: int) -> None:
             break
     context.log.book(group.time, "impact", kinetic_energy(now, context.world, group.members) - before)
     classify(context, group)
+
+
+def _bear_each_other(context, group: Group) -> bool:
+    """Whether a contact between two movable bodies of the group carried load before."""
+    state, dynamic = context.state, context.world.dynamic
+    between = dynamic[group.contacts.body_a] & dynamic[group.contacts.body_b]
+    return any(state.force_of(group.keys[c])[0] > 0.0 for c in np.flatnonzero(between).tolist())
 
 
 def _rattles(context, time: float, contacts: Contacts) -> np.ndarray:

@@ -2,7 +2,10 @@
 
 `respond_sequential` goes contact pair by contact pair, fastest approach first: one contact point as in impulse.py,
 several as one block (a box landing on a face is one impact with four points; block.py); what no longer rebounds is
-finished by one inelastic block. It passes k balls for k in Newton's cradle. `respond_simultaneous` takes the whole
+finished by one inelastic block. It passes k balls for k in Newton's cradle. Where bodies already bear each other (a ball
+that falls on a stack) all contacts are one block, with rebound where they approach: pair after pair, hundreds of
+impulses would run to and fro in the stack and eat all energy (compliant references: a ball at 5 m/s on five boxes, e =
+0.5, leaves with 1.8 to 2.7 m/s; one block 2.5, pairs 0.8). `respond_simultaneous` takes the whole
 group as one block. Both follow the rules of Smith et al. 2012 (momentum kept, one-sided impulses, energy bounded);
 they differ in which of the physically possible answers a chain of bodies gives.
 """
@@ -45,12 +48,12 @@ def _same_pair(contacts, c):
 
 
 @jit
-def respond_sequential(bodies, contacts, law, rest_speed, tolerance, scale, number, joints, log):
+def respond_sequential(bodies, contacts, law, together, rest_speed, tolerance, scale, number, joints, log):
     """Pair after pair, fastest approach first. Returns (rows written to log, impulses made, whether the cap was reached).
 
     A full log ends the call early, without the inelastic finish: read it and call again.
 
-    law: one of `restitution.LAWS`; rest_speed (m,): a rebound slower than this is none [m/s]; tolerance: slower approach is none
+    law: one of `restitution.LAWS`; together: whether bodies press on each other, so that all contacts are one block; rest_speed (m,): a rebound slower than this is none [m/s]; tolerance: slower approach is none
     [m/s]; scale: speed of the group; joints: None, or the `JointBlock` of the group, whose rows take part in every impulse.
     """
     count = np.int64(0)
@@ -61,7 +64,7 @@ def respond_sequential(bodies, contacts, law, rest_speed, tolerance, scale, numb
         c = _approaching(bodies, contacts, tolerance, 1.0, rest_speed)
         if c < 0:
             break
-        subset = _same_pair(contacts, c)
+        subset = np.arange(contacts.gap.shape[0]) if together else _same_pair(contacts, c)
         if subset.shape[0] == 1 and joints is None:
             e = rebound_of(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
             count = resolve_contact(bodies, contacts, c, e, law, log, count)
@@ -84,7 +87,7 @@ def _finish(bodies, contacts, law, rest_speed, scale, number, joints, log, count
 
 
 @jit
-def respond_simultaneous(bodies, contacts, law, rest_speed, tolerance, scale, number, joints, log):
+def respond_simultaneous(bodies, contacts, law, _together, rest_speed, tolerance, scale, number, joints, log):
     """The whole group as one block; same arguments and answer as `respond_sequential`."""
     c = _approaching(bodies, contacts, tolerance, 0.0, rest_speed)
     if c < 0:
