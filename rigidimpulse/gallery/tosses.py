@@ -12,7 +12,7 @@ Its initial state is the flight that fits the frames 0 ... n - 1 best. The inert
 
     x(t) = x0 + v0 t + g t^2 / 2,     q(t) = exp(w0 t) q0,
 
-and x0, v0 (a linear problem) and q0, w0 (Gauss-Newton) minimise the sums of |x_i - x(t_i)|^2 and |log(q_i q(t_i)^-1)|^2.
+and x0, v0 (a linear problem) and q0, w0 (a nonlinear one) minimise the sums of |x_i - x(t_i)|^2 and |log(q_i q(t_i)^-1)|^2.
 The errors of a roll-out x(t), q(t) against the recorded frames from the start on are
 
     mean |x - x_i| / 0.1048,     mean angle(q, q_i),
