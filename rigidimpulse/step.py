@@ -25,7 +25,9 @@ def step(context, plan, end: float) -> None:
         time = window.next_time()
         if time >= end:
             break
-        react(context, plan, window, time, window.bodies_at(time))
+        bodies = window.bodies_at(time)
+        window.count_contacts(time)
+        react(context, plan, window, time, bodies)
     context.state.time = end
 
 

@@ -21,6 +21,10 @@ ROUND_OFF = 1e-6
 STUCK_STEP = 1e-3
 """Part of delta by which the gap of contact is lowered after a contact without consequence."""
 MAX_TRIES = 30
+INSTANT = 1e-6
+"""Part of a step within which a pair that comes to contact again does so at the same instant."""
+MAX_REPEATS = 100
+"""Contacts of a pair at one instant after which there is no motion that its neighbours allow: bodies are squeezed."""
 
 
 @jit
@@ -59,6 +63,7 @@ class Window:
         touch: m, gap at which contact is declared now.
         delta: m, gap at which lasting contacts are held.
         tolerance: m, gap error of an impact.
+        since, repeats: s, instant of contact, and how often the pair came to contact at it.
         wake: (n,) s, when bodies must be looked at again though nothing meets them.
         witness: (10,) points on a and b, normal and gap where the pair comes to contact.
         tries: how often the pair came to contact at one instant without an impulse.
@@ -76,6 +81,8 @@ class Window:
         self.tolerance = np.zeros(0)
         self.tries = np.zeros(0, np.int64)
         self.witness = np.zeros((0, 10))
+        self.since = np.zeros(0)
+        self.repeats = np.zeros(0, np.int64)
         self.wake = np.full(context.world.num_bodies, np.inf)
         self._moves = (context.state.course.mode != FIXED) | context.world.dynamic
 
@@ -115,6 +122,8 @@ class Window:
         self.delta = np.concatenate([self.delta, world.contact_gap * size])
         self.tolerance = np.concatenate([self.tolerance, world.accuracy.tolerance * size])
         self.tries = np.concatenate([self.tries, np.zeros(len(a), np.int64)])
+        self.since = np.concatenate([self.since, np.full(len(a), -np.inf)])
+        self.repeats = np.concatenate([self.repeats, np.zeros(len(a), np.int64)])
         self.witness = np.concatenate([self.witness, np.zeros((len(a), 10))])
         return np.arange(first, len(self.a))
 
@@ -131,8 +140,7 @@ class Window:
         context.box_min[body] -= MARGIN * context.world.largest_delta
         context.box_max[body] += MARGIN * context.world.largest_delta
         known = self.pairs_of(body)
-        self.start[known] = time
-        self.time[known] = np.inf
+        self.sweep_again(known, time)
         self.touch[known] = context.world.least_touch(self.a[known], self.b[known])
         self.tries[known] = 0
         partners = np.empty(context.world.num_bodies, np.int64)
@@ -166,6 +174,25 @@ class Window:
         zone = np.where(self.time[place] <= time, np.maximum(zone, least[place] * (1.0 + NEAR)), zone)
         return gap <= zone + ROUND_OFF * self.delta[place]
 
+    def sweep_again(self, places: np.ndarray, time: float) -> None:
+        """Let pairs be swept from `time` on, but for those that are given up."""
+        self.time[places] = np.inf
+        self.start[places[self.repeats[places] <= MAX_REPEATS]] = time
+
+    def count_contacts(self, time: float) -> None:
+        """Count contacts at one instant; a pair with too many is left alone until the end of the step, and reported."""
+        hit = np.flatnonzero(self.time <= time)
+        again = time - self.since[hit] <= INSTANT * self.context.world.accuracy.step
+        self.repeats[hit] = np.where(again, self.repeats[hit] + 1, 0)
+        self.since[hit[~again]] = time
+        names = self.context.world.names
+        for p in hit[self.repeats[hit] > MAX_REPEATS]:
+            self.start[p], self.time[p] = np.nan, np.inf
+            self.context.log.report(
+                time, "squeezed", (names[self.a[p]], names[self.b[p]]),
+                "no motion keeps the body apart from all that presses on it; make room, or let the pressing bodies move freely",
+            )
+
     def settle(self, time: float) -> None:
         """Pairs that came to contact without consequence are swept again from here with a smaller gap."""
         stuck = np.flatnonzero(self.time <= time)
@@ -175,7 +202,7 @@ class Window:
         step = self.tries[stuck] * STUCK_STEP * self.delta[stuck]
         least = self.context.world.least_touch(self.a[stuck], self.b[stuck])
         self.touch[stuck] = np.where(least > 0.0, 0.5 * self.touch[stuck], -step)
-        self.start[stuck], self.time[stuck] = time, np.inf
+        self.sweep_again(stuck, time)
         for p in stuck[self.tries[stuck] > MAX_TRIES]:
             self.start[p] = np.nan
             names = self.context.world.names

@@ -97,5 +97,4 @@ def set_touch(context, window, group: Group) -> None:
             touch = least[p] * (1.0 - LEAVING) if touch > 0.0 else min(least[p], 0.0)
         if touch != window.touch[p]:
             window.touch[p] = touch
-            window.start[p] = group.time
-            window.time[p] = np.inf
+            window.sweep_again(np.array([p]), group.time)

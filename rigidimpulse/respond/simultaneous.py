@@ -5,7 +5,8 @@ several as one block (a box landing on a face is one impact with four points; bl
 finished by one inelastic block. It passes k balls for k in Newton's cradle. Where bodies already bear each other (a ball
 that falls on a stack) all contacts are one block, with rebound where they approach: pair after pair, hundreds of
 impulses would run to and fro in the stack and eat all energy (compliant references: a ball at 5 m/s on five boxes, e =
-0.5, leaves with 1.8 to 2.7 m/s; one block 2.5, pairs 0.8). `respond_simultaneous` takes the whole group as one block. Both follow the rules of Smith et al. 2012 (momentum kept, one-sided impulses, energy bounded);
+0.5, leaves with 1.8 to 2.7 m/s; one block 2.5, pairs 0.8). `respond_simultaneous` takes the whole group as one block.
+Both follow the rules of Smith et al. 2012 (momentum kept, one-sided impulses, energy bounded);
 they differ in which of the physically possible answers a chain of bodies gives.
 """
 
