@@ -31,7 +31,7 @@ class State:
         course: path of every body since its last change of course.
         now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
         energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at.
-        under_contact: (n,) bool, bodies whose course carries contact forces.
+        under_contact: (n,) bool, bodies whose course carries contact forces. on_rest_of_world: (n,) bool, only of what does not move.
         rebounds: by pair, time and speed of the last rebound and how many in a row were short.
         contact_force: last force of a held contact, in its frame [N], and when it began, by its key (`groups.contact_key`).
     """
@@ -53,6 +53,7 @@ class State:
         self.under_contact = np.zeros(n, bool)
         self.rebounds: dict[tuple[int, int], tuple[float, float, int]] = {}
         self.energy_at_start = np.zeros(n)
+        self.on_rest_of_world = np.zeros(n, bool)
         self.arrival_energy: dict[int, float] = {}
 
 
@@ -98,7 +99,7 @@ class StepContext:
         """Bring body i to `time` on its course."""
         state = self.state
         bring(state.course, i, time, state.now, state.rotation, self.acceleration, self.angular_acceleration)
-        note_arrival(self, [i])
+        note_arrival(self, [i], time)
 
     def pose_matrix(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Position (3,) and rotation matrix (3, 3) of body i at `time` on its present course."""

@@ -71,6 +71,9 @@ def hold(context, window, group: Group) -> None:
             context.column, force, context.wrench,
         )
     context.log.book(group.time, "capture", kinetic_energy(now, context.world, group.members) - before)
+    ends = np.concatenate([contacts.body_a, contacts.body_b])
+    alone = len(group.members) == 1 and not len(group.joints) and not np.any(context.world.moving[ends])
+    state.on_rest_of_world[group.members] = alone
     for key, f in zip(keys, force, strict=True):
         state.contact_force[key] = (f, group.time)
     if residual > UNSOLVED:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigidimpulse.detect.features import CORNER, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, pressing
-from rigidimpulse.observe.energy import mechanical_energy
+from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.respond.impulse import Contacts
 
 if TYPE_CHECKING:
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 MARGIN = 2.0
 """Contacts are looked for within this many delta."""
 NO_FORCE = np.zeros(3)
+GAIN = 1e-11
+"""Part of its kinetic energy that a body on immovable things may gain by rounding."""
 
 
 @dataclass
@@ -168,19 +170,36 @@ def _components(context, window, time: float, reached, real: np.ndarray, integer
     for o in np.union1d(owner, owner_of_joint):
         groups.append(make_group(context, window, time, real, integer, owner == o, joints[owner_of_joint == o]))
     for group in groups:
-        note_arrival(context, group.members.tolist())
+        if note_arrival(context, group.members.tolist(), time):
+            classify(context, group)
         if jointed is not None and len(group.joints):
             jointed.arrive(context, group)
             classify(context, group)
     return groups
 
 
-def note_arrival(context, members: list[int]) -> None:
-    """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows."""
+def note_arrival(context, members: list[int], time: float) -> bool:
+    """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows.
+
+    A body that only rested on, slid or rolled over things that do not move cannot have gained energy: what it has gained, since
+    the forces are constant over a sub-step while the contact moves, is taken off its velocities. Returns whether any was.
+    """
     world, state = context.world, context.state
+    guarded = False
     for i in members:
-        if state.under_contact[i]:
-            state.arrival_energy[i] = mechanical_energy(state.now, world, np.array([i]))
+        if not state.under_contact[i]:
+            continue
+        one = np.array([i])
+        state.arrival_energy[i] = mechanical_energy(state.now, world, one)
+        gained = state.arrival_energy[i] - state.energy_at_start[i]
+        kinetic = kinetic_energy(state.now, world, one)
+        if state.on_rest_of_world[i] and gained > GAIN * kinetic > 0.0:
+            share = float(np.sqrt(max(1.0 - gained / kinetic, 0.0)))
+            state.now.velocity[i] *= share
+            state.now.angular_velocity[i] *= share
+            context.log.book(time, "guard", kinetic_energy(state.now, world, one) - kinetic)
+            guarded = True
+    return guarded
 
 
 def make_group(
