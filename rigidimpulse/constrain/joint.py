@@ -122,16 +122,23 @@ class Joint:
 
 
 @dataclass(frozen=True, eq=False)
-class BallJoint(Joint):
-    """Two bodies share the point `anchor`; `upper` bounds the angle between the axes (at the start both `axis`)."""
+class _AnchoredJoint(Joint):
+    """A joint with one point and one axis."""
 
     anchor: ArrayLike
-    axis: ArrayLike = (0.0, 0.0, 1.0)
+    axis: ArrayLike
 
     def points(self, _world):
         """See `Joint`."""
         anchor = vector(self.anchor, "anchor", "m")
         return anchor, anchor, vector(self.axis, "axis", "")
+
+
+@dataclass(frozen=True, eq=False)
+class BallJoint(_AnchoredJoint):
+    """Two bodies share the point `anchor`; `upper` bounds the angle between the axes (at the start both `axis`)."""
+
+    axis: ArrayLike = (0.0, 0.0, 1.0)
 
     def rows(self, _distance: float) -> list[Row]:
         """See `Joint`."""
@@ -141,17 +148,10 @@ class BallJoint(Joint):
 
 
 @dataclass(frozen=True, eq=False)
-class HingeJoint(Joint):
+class HingeJoint(_AnchoredJoint):
     """The bodies turn against each other about `axis` through `anchor`."""
 
-    anchor: ArrayLike
-    axis: ArrayLike
     motor: Motor | None = None
-
-    def points(self, _world):
-        """See `Joint`."""
-        anchor = vector(self.anchor, "anchor", "m")
-        return anchor, anchor, vector(self.axis, "axis", "")
 
     def rows(self, _distance: float) -> list[Row]:
         """See `Joint`."""
@@ -160,17 +160,10 @@ class HingeJoint(Joint):
 
 
 @dataclass(frozen=True, eq=False)
-class SliderJoint(Joint):
+class SliderJoint(_AnchoredJoint):
     """The bodies shift against each other along `axis`; they do not turn."""
 
-    anchor: ArrayLike
-    axis: ArrayLike
     motor: Motor | None = None
-
-    def points(self, _world):
-        """See `Joint`."""
-        anchor = vector(self.anchor, "anchor", "m")
-        return anchor, anchor, vector(self.axis, "axis", "")
 
     def rows(self, _distance: float) -> list[Row]:
         """See `Joint`."""
