@@ -1,7 +1,7 @@
 """The first run on a machine: compile kernels on two cores.
 
-Numba compiles one kernel at a time in a process. So a second process compiles one half of what a run with contacts needs (sweep and
-constrain) into the cache on disk, while the first one compiles the other half, and then waits for it.
+Numba compiles one kernel at a time in a process. So a second process compiles one half of what a run with contacts needs (motion,
+sweep, contact forces) into the cache on disk, while the first one compiles the other half, and then waits for it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def compile_kernels(world) -> None:
     command = [sys.executable, "-m", "rigidimpulse.compile_ahead", *shapes]
     quiet = subprocess.DEVNULL
     with subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet), _without_garbage_collection():
-        _detect_and_respond(_box_on_floor(bool(shapes)))
+        _respond_and_detect(_box_on_floor(bool(shapes)))
 
 
 @contextmanager
@@ -53,42 +53,58 @@ def _box_on_floor(with_cylinder: bool):
     return StepContext(compile_scene(scene), Recorder(np.zeros(1), 2), EventLog())
 
 
-def _group(context):
-    from rigidimpulse.detect.window import Window
-
-    window = Window(context, 1.0 / 60.0)
-    window.find_pairs()
-    return window, window.touching(0.0, np.array([1]))[0]
-
-
-def _detect_and_respond(context) -> None:
-    from rigidimpulse.respond.response import respond_to_impacts
-    from rigidimpulse.respond.restitution import AUTO
-    from rigidimpulse.respond.simultaneous import respond_sequential
-    from rigidimpulse.simulation import start_courses
-
-    start_courses(context)
-    context.recorder.start(context.state.course)
-    _, group = _group(context)
-    respond_to_impacts(context, group, respond_sequential, AUTO)
-
-
-def _sweep_and_constrain(context) -> None:
-    from rigidimpulse.constrain.drift import lift_contacts, needs_lift
-    from rigidimpulse.constrain.resting import hold_contacts, turning_of
+def _contact():
+    """One contact of the two bodies."""
     from rigidimpulse.detect.groups import empty_contacts
-    from rigidimpulse.detect.window import Window
-    from rigidimpulse.sweep import bisection
 
-    state, world, now = context.state, context.world, context.state.now
-    one, zero = np.ones(1), np.zeros(1)
-    bisection.sweep(context.detector, state.course, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
     contacts = empty_contacts(1)
     for column in contacts:
         column[...] = 0
     contacts.body_b[:] = 1
     contacts.normal[:] = (0.0, 0.0, 1.0)
-    now.inv_inertia[1] = np.eye(3)
+    return contacts
+
+
+def _respond_and_detect(context) -> None:
+    """Impulses first: by then the other process has what moves bodies in the cache, which detection needs too."""
+    from rigidimpulse.constrain.drift import lift_contacts, needs_lift
+    from rigidimpulse.detect.window import Window
+    from rigidimpulse.respond.response import respond_to_impacts
+    from rigidimpulse.respond.restitution import LAWS
+    from rigidimpulse.respond.simultaneous import respond_sequential
+    from rigidimpulse.simulation import start_courses
+
+    state, one = context.state, np.ones(1)
+    state.now.inv_inertia[1] = np.eye(3)
+    respond_sequential(
+        state.now, _contact(), LAWS["auto"], False, one, 1.0, 1.0, context.column, None, context.impact_log
+    )
+    needs_lift(_contact(), np.ones(1, bool), one)
+    lift_contacts(state.now, _contact(), np.ones(1, bool), one, context.column)
+    start_courses(context)
+    window = Window(context, 1.0 / 60.0)
+    window.find_pairs()
+    group = window.touching(0.0, np.array([1]))[0]
+    respond_to_impacts(context, group, respond_sequential, LAWS["auto"])
+
+
+def _move_sweep_and_constrain(context) -> None:
+    from rigidimpulse.constrain.resting import hold_contacts, turning_of
+    from rigidimpulse.detect.touching import bring_all
+    from rigidimpulse.detect.window import Window
+    from rigidimpulse.simulation import start_courses
+    from rigidimpulse.sweep import bisection
+
+    state, world, now = context.state, context.world, context.state.now
+    zero = np.zeros(1)
+    start_courses(context)
+    context.recorder.start(state.course)
+    Window(context, 1.0 / 60.0).find_pairs()
+    bring_all(state.course, np.array([1]), 0.0, now, state.rotation, context.acceleration, context.angular_acceleration)
+    context.bring(1, 0.0)
+    Window(context, 1.0 / 60.0).change_course(1, 0.0)
+    bisection.sweep(context.detector, state.course, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
+    contacts = _contact()
     turning = turning_of(
         world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64)
     )
@@ -96,12 +112,8 @@ def _sweep_and_constrain(context) -> None:
         now, contacts, np.arange(1), turning, context.acceleration, context.angular_acceleration, 1.0, context.column,
         np.zeros((1, 3)), context.wrench,
     )
-    needs_lift(contacts, np.ones(1, bool), one)
-    lift_contacts(now, contacts, np.ones(1, bool), one, context.column)
-    context.bring(1, 0.0)
-    Window(context, 1.0 / 60.0).change_course(1, 0.0)
 
 
 if __name__ == "__main__":
     with _without_garbage_collection():
-        _sweep_and_constrain(_box_on_floor(CYLINDERS in sys.argv[1:]))
+        _move_sweep_and_constrain(_box_on_floor(CYLINDERS in sys.argv[1:]))
