@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.constrain.arrival import PairForce
+from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.constrain.foresight import Foresight
 from rigidimpulse.constrain.jointed import JointState
-from rigidimpulse.detect.groups import NO_FORCE, note_arrival
+from rigidimpulse.detect.groups import NO_FORCE
 from rigidimpulse.detect.touching import bring
 from rigidimpulse.geometry import Geometry
 from rigidimpulse.integrate.course import Course, make_course, pose_at
@@ -33,9 +34,11 @@ class State:
         course: path of every body since its last change of course.
         now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
         energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at.
-        under_contact: (n,) bool, bodies whose course carries contact forces. on_rest_of_world: (n,) bool, only of what does not move.
+        under_contact: (n,) bool, bodies whose course carries contact forces.
+        closed: (n,) first body of its group if nothing that moves by itself takes part, else -1. grounded: (n,) bool, if what stands does.
         rebounds: by pair, time and speed of the last rebound and how many in a row were short.
         contact_force: last force of a held contact, in its frame [N], and when it began, by its key (`groups.contact_key`).
+        sub_step: (n,) s, length of the last one of a group of contacts that turn, at its first body.
         correction: (n, 6) change of velocity and spin that a body got at the end of its sub-step.
         pair_force: what acts in the present sub-step between bodies whose contacts turn (`arrival`).
     """
@@ -54,12 +57,14 @@ class State:
         )
         self.rotation = np.zeros((n, 3, 3))
         self.contact_force: dict[tuple[int, ...], tuple[np.ndarray, float]] = {}
+        self.sub_step = np.full(n, np.inf)
         self.correction = np.zeros((n, 6))
         self.pair_force: dict[tuple[int, int], PairForce] = {}
         self.under_contact = np.zeros(n, bool)
         self.rebounds: dict[tuple[int, int], tuple[float, float, int]] = {}
         self.energy_at_start = np.zeros(n)
-        self.on_rest_of_world = np.zeros(n, bool)
+        self.closed = np.full(n, -1)
+        self.grounded = np.zeros(n, bool)
         self.arrival_energy: dict[int, float] = {}
 
 

@@ -28,8 +28,8 @@ MOST_SUB_STEPS = 256
 """Sub-steps in a step."""
 TURN_OF_BODY = 0.1
 """rad, how far bodies may turn in a sub-step where that matters to gaps."""
-NEGLIGIBLE = 1e-3
-"""Part of what is allowed by which gaps may be off without notice."""
+GROWTH = 1.5
+"""How many times longer than the one before a sub-step may be."""
 SHORTEST = 1e-5
 """Part of a step that is not split."""
 STEADY = 1e-9
@@ -80,8 +80,8 @@ def hold(context, window, group: Group) -> None:
         h, residual = _hold_turning(context, group, subset, contacts, keys, motion, force, rest)
     context.log.book(group.time, "capture", kinetic_energy(now, context.world, group.members) - before)
     ends = np.concatenate([contacts.body_a, contacts.body_b])
-    alone = len(group.members) == 1 and not len(group.joints) and not np.any(context.world.moving[ends])
-    state.on_rest_of_world[group.members] = alone
+    state.closed[group.members] = -1 if len(group.joints) or np.any(context.world.moving[ends]) else group.members[0]
+    state.grounded[group.members] = not np.all(context.world.dynamic[ends])
     for key, f in zip(keys, force, strict=True):
         state.contact_force[key] = (f, group.time)
     if residual > UNSOLVED:
@@ -113,15 +113,22 @@ def _hold_turning(
         held = hold_over(sub_step(motion.fastest, step, rest), np.zeros(len(subset)))
         return held.length, held.residual
     excess = contacts.gap - delta
-    held = hold_over(sub_step(motion.fastest, step, rest), excess)
+    first = group.members[0]
+    h = sub_step(motion.fastest, step, rest)
+    plan = GROWTH * state.sub_step[first] if state.under_contact[first] else np.inf
+    h = min(h, plan)
+    held = hold_over(h, excess)
     error = context.foresight.gap_errors(context, group, contacts, subset, motion, context.wrench, held.length)
     error[force[:, 0] == 0.0] = 0.0
     worst = float(np.max(np.abs(error) / (ALLOWED * delta)))
-    if worst > NEGLIGIBLE:
+    if worst > 1.0:
         spin = float(np.linalg.norm(state.now.angular_velocity[group.members], axis=1).max())
         share = min(worst ** (-1.0 / 3.0), TURN_OF_BODY / (spin * held.length)) if spin > 0.0 else worst ** (-1.0 / 3.0)
         share = min(max(share, step / (MOST_SUB_STEPS * held.length)), 1.0)
+        state.sub_step[first] = share * held.length
         held = hold_over(share * held.length, excess + share**3 * error)
+    elif h >= plan or not state.under_contact[first]:
+        state.sub_step[first] = max(h, step / MOST_SUB_STEPS)
     remember_forces(state, group.time, keys, contacts, force, held.force, held.slides)
     return held.length, held.residual
 
