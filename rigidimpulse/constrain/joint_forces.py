@@ -17,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.joint_limits import is_reached, joint_weights, limit_side, spring_of
 from rigidimpulse.constrain.joint_rows import is_linear, joint_rows, joint_values, relative_point_velocity
-from rigidimpulse.constrain.newton import row_weights, solve_newton
+from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.resting import fill_contact_bias, solve_with_slip, start_contact_impulses
 from rigidimpulse.constrain.rows import (
     BOUNDED,
@@ -50,6 +51,10 @@ class JointMemory(NamedTuple):
     active: np.ndarray  # (k,) bool, rows at work: not at a bound of theirs
     start_value: np.ndarray  # (k,) coordinate less target at the start of the sub-step
     start_rate: np.ndarray  # (k,)
+    end_value: np.ndarray  # (k,) the same at its end
+    slack: np.ndarray  # (k,) bool, limits that are not reached
+    weight: np.ndarray  # (k,) W of soft rows, see `joint_limits`
+    steepness: np.ndarray  # (k,) length of the direction: 1, but for a twist near where it is not defined
     wrench: np.ndarray  # (n, 6) half of the joints' part of the wrench, taken back at the end
     trial: Course
     end_position: np.ndarray  # (n, 3) at the end of the sub-step; right for what is no member of a group
@@ -68,6 +73,10 @@ def make_memory(joints, inertia: np.ndarray) -> JointMemory:
         active=hard,
         start_value=np.zeros(k),
         start_rate=np.zeros(k),
+        end_value=np.zeros(k),
+        slack=np.zeros(k, bool),
+        weight=np.zeros(k),
+        steepness=np.ones(k),
         wrench=np.zeros((n, 6)),
         trial=trial,
         end_position=np.zeros((n, 3)),
@@ -85,11 +94,11 @@ def count_joint_rows(joints, which):
 
 
 @jit
-def stop_joints(joints, which, bodies, rotation, members, number, memory, elapsed, moment):
+def stop_joints(joints, which, bodies, rotation, members, number, memory, elapsed, allowed, moment):
     """End of a sub-step: the impulses nu.
 
-    memory: `JointMemory`; elapsed (j,): length of the sub-step that ends, s. moment (j, 3): the impulse on b of each
-    joint is added, N s.
+    memory: `JointMemory`; elapsed (j,): length of the sub-step that ends, s; allowed: closing error, m or rad. moment (j, 3):
+    the impulse on b of each joint is added, N s.
     """
     count = count_joint_rows(joints, which)
     n = members.shape[0]
@@ -99,19 +108,21 @@ def stop_joints(joints, which, bodies, rotation, members, number, memory, elapse
     joint_rows(joints, which, bodies, rotation, number, memory.angle, rows, np.int64(0), value, direction)
     relative_point_velocity(joints, which, bodies, rotation, direction, u)
     weight = np.empty(count)
-    row_weights(rows, weight)
+    joint_weights(joints, which, rows, np.int64(0), weight)
     scale, i = TINY, 0
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
             rows.bias[i] = u[i]
-            if not memory.active[k] or (joints.stiffness[k] < np.inf and elapsed[j] <= 0.0):
+            hard = joints.stiffness[k] == np.inf
+            at_work = memory.active[k] or (hard and is_reached(joints, k, value[i], allowed))
+            if not at_work or (not hard and elapsed[j] <= 0.0):
                 rows.kind[i] = BOUNDED
                 rows.lower[i] = rows.upper[i] = 0.0
-            elif joints.stiffness[k] < np.inf:
+            elif not hard:
                 rows.kind[i] = FREE
+                stiffness, damping = spring_of(joints, k, weight[i])
                 rows.bias[i] -= end_rate(
-                    joints.stiffness[k], joints.damping[k], weight[i], memory.start_value[k], memory.start_rate[k],
-                    value[i], elapsed[j],
+                    stiffness, damping, weight[i], memory.start_value[k], memory.start_rate[k], value[i], elapsed[j]
                 )
             elif rows.kind[i] == BOUNDED:
                 rows.lower[i] = -np.inf if joints.lower[k] < 0.0 else 0.0
@@ -158,7 +169,7 @@ def close_joints(joints, which, bodies, rotation, members, number, angle, allowe
         number[members[k]] = k
     moved = False
     y, shift, turn, q = np.empty((n, 6)), np.empty(3), np.empty(3), np.empty(4)
-    for _ in range(4):
+    for _ in range(MAX_ROUNDS):
         rows, value, direction = make_rows(count), np.empty(count), np.empty((count, 3))
         joint_rows(joints, which, bodies, rotation, number, angle, rows, np.int64(0), value, direction)
         worst, i = 0.0, 0
@@ -225,7 +236,7 @@ def hold_jointed(
     value, direction, beta = np.empty(count), np.empty((count, 3)), np.zeros(count)
     joint_rows(joints, which, bodies, rotation, number, memory.angle, rows, start, value, direction)
     start_contact_impulses(rows, first_row, force, h)
-    _start_joint_rows(joints, which, bodies, rotation, memory, value, direction, h, rows, start, beta)
+    _start_joint_rows(joints, which, bodies, rotation, memory, value, direction, h, allowed, rows, start, beta)
     scale = fill_contact_bias(
         bodies, contacts, subset, frames, turning, acceleration, angular_acceleration, h, rows, first_row, slides
     )
@@ -238,7 +249,7 @@ def hold_jointed(
         multiply(rows, y, u)
         _write_wrenches(bodies, members, y, h, wrench)
         _end_values(joints, which, bodies, acceleration, members, wrench, h, memory, value)
-        worst = _violation(joints, which, value, rows.impulse[start:])
+        worst = _violation(joints, which, memory, value, rows.impulse[start:])
         if round_ > 1 and worst <= allowed:
             break
         for i in range(count):
@@ -257,21 +268,27 @@ def hold_jointed(
 
 
 @jit
-def _start_joint_rows(joints, which, bodies, rotation, memory, value, direction, h, rows, start, beta):
-    """Bounds, softness and first impulses of the joints' rows; their coordinates and rates are remembered."""
-    u, weight = np.empty(value.shape[0]), np.empty(rows.bias.shape[0])
+def _start_joint_rows(joints, which, bodies, rotation, memory, value, direction, h, allowed, rows, start, beta):
+    """Bounds, softness and first impulses of the joints' rows; their coordinates and rates are remembered.
+
+    Limits that are not reached carry nothing.
+    """
+    u, weight = np.empty(value.shape[0]), np.empty(value.shape[0])
     relative_point_velocity(joints, which, bodies, rotation, direction, u)
-    row_weights(rows, weight)
+    joint_weights(joints, which, rows, start, weight)
     i = 0
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
             r = start + i
             rows.lower[r], rows.upper[r], rows.impulse[r] = joints.lower[k] * h, joints.upper[k] * h, memory.force[k] * h
-            memory.start_value[k], memory.start_rate[k] = value[i], u[i]
-            if joints.stiffness[k] < np.inf:
-                rows.softness[r], beta[i] = soft_row(
-                    joints.stiffness[k], joints.damping[k], joints.rate[k], weight[r], value[i], u[i], h
-                )
+            memory.start_value[k], memory.start_rate[k], memory.weight[k] = value[i], u[i], weight[i]
+            memory.steepness[k] = np.sqrt(np.sum(direction[i] ** 2))
+            memory.slack[k] = limit_side(joints, k) != 0.0 and not is_reached(joints, k, value[i], allowed)
+            if memory.slack[k]:
+                rows.lower[r] = rows.upper[r] = rows.impulse[r] = 0.0
+            elif joints.stiffness[k] < np.inf:
+                stiffness, damping = spring_of(joints, k, weight[i])
+                rows.softness[r], beta[i] = soft_row(stiffness, damping, joints.rate[k], weight[i], value[i], u[i], h)
             i += 1
 
 
@@ -302,13 +319,16 @@ def _write_wrenches(bodies, members, y, h, wrench):
 
 
 @jit
-def _violation(joints, which, value, impulse):
-    """Largest distance of a row from its law: coordinates that must be at their target, or are on the wrong side of it."""
+def _violation(joints, which, memory, value, impulse):
+    """Largest distance of a row from its law: coordinates that must be at their target, or are on the wrong side of it.
+
+    The values are remembered; limits that were slack at the start are the business of `next_switch`.
+    """
     worst, i = 0.0, 0
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
-            x = value[i]
-            if joints.stiffness[k] < np.inf:
+            x = memory.end_value[k] = value[i]
+            if joints.stiffness[k] < np.inf or memory.slack[k]:
                 x = 0.0
             if joints.lower[k] < 0.0 < joints.upper[k] or impulse[i] != 0.0:
                 worst = max(worst, abs(x))
