@@ -98,7 +98,7 @@ def falls_on_a_spring(times: np.ndarray, height: float, k: float, c: float) -> n
         if touching:
             path = lambda t, z=z, v=v: expm(flow * t) @ (z, v, 1.0)  # noqa: E731
             push = lambda t, path=path: k * path(t)[0] + c * path(t)[1]  # noqa: E731
-            tries = np.linspace(1e-9, 5.0, 5000)
+            tries = np.linspace(1e-9, 5.0, 5000).tolist()
             pushes = np.array([push(t) for t in tries])
             lost = np.flatnonzero(pushes > 0)
             length = root(push, tries[lost[0] - 1], tries[lost[0]]) if len(lost) else np.inf
