@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.constrain.drift import lift_contacts, needs_lift
+from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.resting import CARRIER_A, CARRIER_B, SHARED, hold_contacts, turning_of
 from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.groups import Group, collect, make_group, select
+from rigidimpulse.detect.groups import Group, collect, make_group
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.plan import Bound, Skip
+from rigidimpulse.respond.impulse import select
 
 # Residual of the solver that is reported, relative to the speed gained in the step.
 UNSOLVED = 1e-6
@@ -64,10 +66,10 @@ def hold(context, window, group: Group) -> None:
     before = kinetic_energy(now, context.world, group.members)
     h = window.end - group.time
     if len(group.joints):
-        h, residual = context.joints.hold(context, group, contacts, np.arange(len(subset)), turning, force, h)
+        h, residual = context.joints.hold(context, group, contacts, turning, force, h)
     else:
         residual = hold_contacts(
-            now, contacts, np.arange(len(subset)), turning, context.acceleration, context.angular_acceleration, h,
+            solve_newton, now, contacts, group.members, turning, context.acceleration, context.angular_acceleration, h,
             context.column, force, context.wrench,
         )
     context.log.book(group.time, "capture", kinetic_energy(now, context.world, group.members) - before)
@@ -97,7 +99,7 @@ def _lift(context, window, group: Group) -> None:
     """Bring sunken contacts back to their gap and look at the group's contacts again."""
     state, now = context.state, context.state.now
     before = mechanical_energy(now, context.world, group.members)
-    lift_contacts(now, group.contacts, group.held, group.delta, context.column)
+    lift_contacts(now, group.contacts, group.held, group.delta, group.members, context.column)
     refresh_pose(group.members, now, state.rotation, state.course.inertia)
     context.log.book(group.time, "lift", mechanical_energy(now, context.world, group.members) - before)
     group.moved = True

@@ -10,6 +10,7 @@ from rigidimpulse.constrain.joint import Joint
 from rigidimpulse.constrain.joint_forces import close_joints, hold_jointed, make_memory, stop_joints
 from rigidimpulse.constrain.joint_impact import impact_rows
 from rigidimpulse.constrain.joint_limits import next_switch
+from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.integrate.course import FIXED
@@ -141,7 +142,7 @@ class JointState:
                     squares[i] = squares.get(i, 0.0) + square
         return math.sqrt(max(squares.values(), default=0.0))
 
-    def hold(self, context, group, contacts, subset, turning, force, rest: float) -> tuple[float, float]:
+    def hold(self, context, group, contacts, turning, force, rest: float) -> tuple[float, float]:
         """Forces into context.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         state, memory = context.state, self.memory
         others = self.bodies_of(group.joints)
@@ -152,7 +153,7 @@ class JointState:
                 memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, group.time + h)
             moment = self.moment.copy()
             residual, worst = hold_jointed(
-                state.now, contacts, subset, turning, context.acceleration, context.angular_acceleration, h,
+                solve_newton, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
                 group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
                 context.wrench, moment,
             )

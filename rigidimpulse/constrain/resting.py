@@ -18,28 +18,23 @@ and it would hover for ever.
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.rows import (
     FREE,
+    Rows,
+    change_velocities,
     contact_rows,
     contact_velocity,
-    count_contact_rows,
     impulse_along,
-    make_rows,
-    multiply,
-    multiply_transposed,
-    number_members,
     rows_of,
-    write_row,
+    solve_with_slip,
+    take_rows,
 )
 from rigidimpulse.geometry import CYLINDER, ROUND
-from rigidimpulse.respond.impulse import apply_impulse, relative_velocity
 
 CAPTURE_PASSES = 4
 # Residual asked of the solver and slip that counts, relative to the speed gained in the sub-step.
 SOLVE_TOLERANCE = 1e-12
 SLIP = 1e-9
-POOR = 1e-8
 TINY = 1e-300
 # Which body carries the normal of a contact kind: vertex-face and face-vertex, half space; others share it.
 CARRIER_B, CARRIER_A, SHARED = 0, 1, 2
@@ -118,140 +113,78 @@ def turning_of(geometry, shape_of_body, rotation, bodies, contacts, carrier):
 
 
 @jit
-def _capture(bodies, contacts, subset, number, n, normal_velocity, pressed, scale):
-    """Stop load-bearing contacts that leave slowly; True if any was stopped. pressed (m,) bool, normal_velocity (m,)."""
-    loaded = np.flatnonzero(pressed)
-    leaving = False
-    for s in loaded:
-        leaving = leaving or normal_velocity[s] > SOLVE_TOLERANCE * scale
-    if not leaving:
-        return False
-    rows = make_rows(loaded.shape[0])
-    for i in range(loaded.shape[0]):
-        c = subset[loaded[i]]
-        d = contacts.normal[c]
-        a, b = contacts.body_a[c], contacts.body_b[c]
-        write_row(bodies, number, a, b, contacts.arm_a[c], contacts.arm_b[c], d[0], d[1], d[2], rows, i)
-        rows.kind[i], rows.bias[i] = FREE, normal_velocity[loaded[i]]
-    solve_newton(rows, n, SOLVE_TOLERANCE * scale)
-    for i in range(loaded.shape[0]):
-        c = subset[loaded[i]]
-        d, x = contacts.normal[c], rows.impulse[i]
-        apply_impulse(bodies, contacts, c, x * d[0], x * d[1], x * d[2])
-    return True
-
-
-@jit
-def solve_with_slip(rows, n, first_row, slides, contacts, subset, scale):
-    """Impulses of the sub-step; contacts that slip, or come to slip, with dynamic friction. Returns the residual.
-
-    slides (m,) bool: contacts that slip now.
-    """
-    count = rows.bias.shape[0]
-    y, after = np.empty((n, 6)), np.empty(count)
-    for s in range(first_row.shape[0]):
-        i = first_row[s] + 1
-        if rows_of(rows, first_row[s]) == 3:
-            c = subset[s]
-            mu = contacts.dynamic_friction[c] if slides[s] else contacts.static_friction[c]
-            rows.coefficient[i] = rows.coefficient[i + 1] = mu
-    residual = 0.0
-    for attempt in range(3):
-        residual = solve_newton(rows, n, SOLVE_TOLERANCE * scale)
-        if residual > POOR * scale and attempt == 0:
-            # A misleading start: once more from nothing.
-            rows.impulse[:] = 0.0
-            continue
-        multiply_transposed(rows, rows.impulse, y)
-        multiply(rows, y, after)
-        changed = False
-        for s in range(first_row.shape[0]):
-            i = first_row[s] + 1
-            if rows_of(rows, first_row[s]) < 3:
-                continue
-            slip = abs(rows.bias[i] + after[i]) + abs(rows.bias[i + 1] + after[i + 1])
-            mu = contacts.dynamic_friction[subset[s]]
-            if rows.coefficient[i] != mu and slip > SLIP * scale:
-                rows.coefficient[i] = rows.coefficient[i + 1] = mu
-                changed = True
-        if not changed:
-            break
-    return residual
-
-
-@jit
 def start_contact_impulses(rows, first_row, force, h):
     """Impulses of the contact rows to start from, by the forces (m, 3) of last time."""
-    for s in range(first_row.shape[0]):
-        for k in range(rows_of(rows, first_row[s])):
-            rows.impulse[first_row[s] + k] = force[s, k] * h
+    for c in range(first_row.shape[0]):
+        for k in range(rows_of(rows, first_row[c])):
+            rows.impulse[first_row[c] + k] = force[c, k] * h
 
 
 @jit
-def fill_contact_bias(
-    bodies, contacts, subset, frames, turning, acceleration, angular_acceleration, h, rows, first_row, slides
-):
-    """b = u + h a of the contact rows, and which contacts slip; returns the largest speed h a gained [m/s]."""
-    m = subset.shape[0]
+def fill_contact_bias(bodies, contacts, frames, turning, acceleration, angular_acceleration, h, rows, first_row):
+    """b = u + h a of the contact rows; returns the largest speed h a gained [m/s], u.n (m,) and which contacts slip (m,)."""
+    m = first_row.shape[0]
     u, a, scale = np.empty(3), np.empty((m, 3)), TINY
-    for s in range(m):
-        contact_velocity(contacts, subset[s], frames[s], acceleration, angular_acceleration, a[s])
-        a[s, 0] += turning[s]
+    leaving, slides = np.empty(m), np.empty(m, np.bool_)
+    for c in range(m):
+        contact_velocity(contacts, c, frames[c], acceleration, angular_acceleration, a[c])
+        a[c, 0] += turning[c]
         for k in range(3):
-            scale = max(scale, abs(a[s, k]) * h)
-    for s in range(m):
-        contact_velocity(contacts, subset[s], frames[s], bodies.velocity, bodies.angular_velocity, u)
-        for k in range(rows_of(rows, first_row[s])):
-            rows.bias[first_row[s] + k] = u[k] + h * a[s, k]
-        slides[s] = abs(u[1]) + abs(u[2]) > SLIP * scale
-    return scale
+            scale = max(scale, abs(a[c, k]) * h)
+    for c in range(m):
+        contact_velocity(contacts, c, frames[c], bodies.velocity, bodies.angular_velocity, u)
+        for k in range(rows_of(rows, first_row[c])):
+            rows.bias[first_row[c] + k] = u[k] + h * a[c, k]
+        leaving[c] = u[0]
+        slides[c] = abs(u[1]) + abs(u[2]) > SLIP * scale
+    return scale, leaving, slides
 
 
-@jit
-def hold_contacts(bodies, contacts, subset, turning, acceleration, angular_acceleration, h, number, force, wrench):
-    """Contact forces of the sub-step for the contacts in subset (m,).
+def hold_contacts(
+    solve, bodies, contacts, members, turning, acceleration, angular_acceleration, h: float, number, force, wrench
+) -> float:
+    """Contact forces of the sub-step for m contacts.
 
-    turning (m,) from `turning_acceleration`; acceleration, angular_acceleration (n, 3) of the bodies without contacts;
-    force (m, 3) in (n, t1, t2) [N], start and answer; wrench (n, 6) force and torque on the bodies, only rows of involved
-    bodies are written.
-    May change velocities (capture). Returns the residual relative to the speed gained in the sub-step.
+    solve: a solver of rows; members: movable bodies of the group; turning (m,) from `turning_acceleration`; acceleration,
+    angular_acceleration (n, 3) of the bodies without contacts; force (m, 3) in (n, t1, t2) [N], start and answer; wrench (n, 6):
+    force and torque on the members are added. May change velocities (capture). Returns the residual relative to the speed
+    gained in the sub-step.
     """
-    m = subset.shape[0]
-    n = number_members(bodies, contacts, subset, number).shape[0]
-    rows = make_rows(count_contact_rows(contacts, subset))
-    first_row, frames = np.empty(m, np.int64), np.empty((m, 3, 3))
-    contact_rows(bodies, contacts, subset, number, rows, first_row, frames)
-    slides, pressed, leaving, u = np.empty(m, np.bool_), np.empty(m, np.bool_), np.empty(m), np.empty(3)
+    rows, first_row, frames = contact_rows(bodies, contacts, members, number, 0)
     start_contact_impulses(rows, first_row, force, h)
-    residual, scale = 0.0, 0.0
+    n, residual, scale = len(members), 0.0, 1.0
     for _ in range(CAPTURE_PASSES):
-        scale = fill_contact_bias(
-            bodies, contacts, subset, frames, turning, acceleration, angular_acceleration, h, rows, first_row, slides
+        scale, leaving, slides = fill_contact_bias(
+            bodies, contacts, frames, turning, acceleration, angular_acceleration, h, rows, first_row
         )
-        residual = solve_with_slip(rows, n, first_row, slides, contacts, subset, scale)
-        for s in range(m):
-            pressed[s] = rows.impulse[first_row[s]] > 0.0
-            leaving[s] = relative_velocity(bodies, contacts, subset[s], u)
-        if not _capture(bodies, contacts, subset, number, n, leaving, pressed, scale):
+        target = SOLVE_TOLERANCE * scale
+        residual = solve_with_slip(solve, rows, n, first_row, contacts, slides, target, SLIP * scale)
+        loaded = np.flatnonzero(rows.impulse[first_row] > 0.0)
+        if not np.any(leaving[loaded] > target):
             break
-    for s in range(m):
-        force[s] = 0.0
-        for k in range(rows_of(rows, first_row[s])):
-            force[s, k] = rows.impulse[first_row[s] + k] / h
-    _write_wrench(contacts, subset, rows, first_row, frames, h, wrench)
+        capture(solve, bodies, members, rows, first_row[loaded], leaving[loaded], target)
+    add_contact_wrench(contacts, rows, first_row, frames, h, force, wrench)
     return residual / scale
 
 
+def capture(solve, bodies, members, rows: Rows, normals: np.ndarray, leaving: np.ndarray, target: float) -> None:
+    """Stop load-bearing contacts that leave slowly; normals: their rows, leaving: their u.n [m/s]."""
+    stops = take_rows(rows, normals)
+    stops.kind[:], stops.bias[:], stops.impulse[:] = FREE, leaving, 0.0
+    stops.lower[:] = -np.inf
+    solve(stops, len(members), target)
+    change_velocities(bodies, members, stops)
+
+
 @jit
-def _write_wrench(contacts, subset, rows, first_row, frames, h, wrench):
-    for c in range(contacts.gap.shape[0]):
-        for k in range(6):
-            wrench[contacts.body_a[c], k] = 0.0
-            wrench[contacts.body_b[c], k] = 0.0
+def add_contact_wrench(contacts, rows, first_row, frames, h, force, wrench):
+    """The rows' impulses over h as forces (m, 3), and their sum on both bodies of each contact, added to wrench."""
     f = np.empty(3)
-    for s in range(subset.shape[0]):
-        c = subset[s]
-        impulse_along(rows, first_row[s], frames[s], f)
+    for c in range(first_row.shape[0]):
+        force[c] = 0.0
+        for k in range(rows_of(rows, first_row[c])):
+            force[c, k] = rows.impulse[first_row[c] + k] / h
+        impulse_along(rows, first_row[c], frames[c], f)
         for body, r, sign in ((contacts.body_a[c], contacts.arm_a[c], -1.0), (contacts.body_b[c], contacts.arm_b[c], 1.0)):
             for k in range(3):
                 i, j = (k + 1) % 3, (k + 2) % 3

@@ -68,11 +68,6 @@ def empty_contacts(m: int) -> Contacts:
     return Contacts(np.empty(m, np.int64), np.empty(m, np.int64), *vectors, *(np.empty(m) for _ in range(5)))
 
 
-def select(contacts: Contacts, which: np.ndarray) -> Contacts:
-    """The contacts at the given places."""
-    return Contacts(*(np.ascontiguousarray(column[which]) for column in contacts))
-
-
 def collect(context, window, pairs: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
     """Manifolds of window pairs at the present poses: copies of the filled buffer rows.
 
