@@ -9,6 +9,7 @@ import numpy as np
 from rigidimpulse.constrain.drift import lift_contacts, needs_lift
 from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.resting import CARRIER_A, CARRIER_B, SHARED, hold_contacts, turning_of
+from rigidimpulse.constrain.rolling import hold_until_stop, rolling_of
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.groups import Group, collect, make_group
 from rigidimpulse.detect.touching import refresh_pose
@@ -64,14 +65,7 @@ def hold(context, window, group: Group) -> None:
     keys = [group.keys[c] for c in subset]
     force = np.array([state.force_of(key) for key in keys]).reshape(-1, 3)
     before = kinetic_energy(now, context.world, group.members)
-    h = window.end - group.time
-    if len(group.joints):
-        h, residual = context.joints.hold(context, group, contacts, turning, force, h)
-    else:
-        residual = hold_contacts(
-            solve_newton, now, contacts, group.members, turning, context.acceleration, context.angular_acceleration, h,
-            context.column, force, context.wrench,
-        )
+    h, residual = _solve(context, group, contacts, turning, force, window.end - group.time)
     context.log.book(group.time, "capture", kinetic_energy(now, context.world, group.members) - before)
     ends = np.concatenate([contacts.body_a, contacts.body_b])
     alone = len(group.members) == 1 and not len(group.joints) and not np.any(context.world.moving[ends])
@@ -88,6 +82,24 @@ def hold(context, window, group: Group) -> None:
         context.joints.log_rest(group)
     if h < window.end - group.time and not group.rests:
         window.wake[group.members] = group.time + h
+
+
+def _solve(context, group: Group, contacts, turning: np.ndarray, force: np.ndarray, rest: float) -> tuple[float, float]:
+    """Forces over the next sub-step, at most `rest` long; returns its length and the residual."""
+    now, acceleration, angular = context.state.now, context.acceleration, context.angular_acceleration
+    rolling = rolling_of(context.world, now, contacts)
+
+    def hold_for(time: float) -> float:
+        return hold_contacts(
+            solve_newton, now, contacts, group.members, turning, acceleration, angular, time, context.column, force,
+            context.wrench, rolling,
+        )
+
+    if len(group.joints):
+        return context.joints.hold(context, group, contacts, turning, force, rest, rolling)
+    if rolling is not None:
+        return hold_until_stop(hold_for, contacts, rolling, now, group.members, acceleration, angular, rest, context.wrench)
+    return rest, hold_for(rest)
 
 
 def held_contacts(group: Group) -> np.ndarray:

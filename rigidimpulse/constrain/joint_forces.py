@@ -21,6 +21,7 @@ from rigidimpulse.constrain.joint_limits import is_reached, joint_weights, limit
 from rigidimpulse.constrain.joint_rows import is_linear, joint_rows, joint_values, relative_point_velocity
 from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.resting import SLIP, fill_contact_bias, start_contact_impulses
+from rigidimpulse.constrain.rolling import Rolling, count_rolling_rows, fill_rolling_rows
 from rigidimpulse.constrain.rows import (
     BOUNDED,
     FREE,
@@ -210,16 +211,20 @@ def _end_values(joints, which, bodies, acceleration, members, wrench, h, memory,
 
 def hold_jointed(
     solve, bodies, contacts, turning, acceleration, angular_acceleration, h: float, members, number, force, joints, which,
-    rotation, memory: JointMemory, allowed: float, wrench, moment,
+    rotation, memory: JointMemory, allowed: float, wrench, moment, rolling: Rolling | None,
 ) -> tuple[float, float]:
     """Forces of joints and lasting contacts over a sub-step of length h.
 
     As `resting.hold_contacts`, with joints listed in `which`; allowed: closing error, m or rad; moment (j, 3): half of the
     joints' impulses on b is added. Returns (residual relative to the speed gained, worst closing error).
     """
-    n, count = len(members), count_joint_rows(joints, which)
-    rows, first_row, frames = contact_rows(bodies, contacts, members, number, count)
+    n, count, extra = len(members), count_joint_rows(joints, which), count_rolling_rows(rolling)
+    rows, first_row, frames = contact_rows(bodies, contacts, members, number, extra + count)
     start = len(rows.bias) - count
+    if rolling is not None:
+        fill_rolling_rows(
+            bodies, contacts, rolling, number, acceleration, angular_acceleration, frames, first_row, h, rows, start - extra
+        )
     start_contact_impulses(rows, first_row, force, h)
     direction, beta = _start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed, rows, start)
     scale, _, slides = fill_contact_bias(

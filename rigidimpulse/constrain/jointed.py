@@ -142,7 +142,7 @@ class JointState:
                     squares[i] = squares.get(i, 0.0) + square
         return math.sqrt(max(squares.values(), default=0.0))
 
-    def hold(self, context, group, contacts, turning, force, rest: float) -> tuple[float, float]:
+    def hold(self, context, group, contacts, turning, force, rest: float, rolling) -> tuple[float, float]:
         """Forces into context.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         state, memory = context.state, self.memory
         others = self.bodies_of(group.joints)
@@ -155,7 +155,7 @@ class JointState:
             residual, worst = hold_jointed(
                 solve_newton, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
                 group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
-                context.wrench, moment,
+                context.wrench, moment, rolling,
             )
             self.pull[group.joints] = 2.0 * (moment[group.joints] - self.moment[group.joints]) / h
             shorter = self.sub_step(context, group, h)

@@ -18,6 +18,7 @@ and it would hover for ever.
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.rolling import Rolling, add_rolling_wrench, count_rolling_rows, fill_rolling_rows
 from rigidimpulse.constrain.rows import (
     FREE,
     Rows,
@@ -141,22 +142,29 @@ def fill_contact_bias(bodies, contacts, frames, turning, acceleration, angular_a
 
 
 def hold_contacts(
-    solve, bodies, contacts, members, turning, acceleration, angular_acceleration, h: float, number, force, wrench
+    solve, bodies, contacts, members, turning, acceleration, angular_acceleration, h: float, number, force, wrench,
+    rolling: Rolling | None = None,
 ) -> float:
     """Contact forces of the sub-step for m contacts.
 
     solve: a solver of rows; members: movable bodies of the group; turning (m,) from `turning_acceleration`; acceleration,
     angular_acceleration (n, 3) of the bodies without contacts; force (m, 3) in (n, t1, t2) [N], start and answer; wrench (n, 6):
-    force and torque on the members are added. May change velocities (capture). Returns the residual relative to the speed
-    gained in the sub-step.
+    force and torque on the members are added; rolling: their rolling friction, if any. May change velocities (capture).
+    Returns the residual relative to the speed gained in the sub-step.
     """
-    rows, first_row, frames = contact_rows(bodies, contacts, members, number, 0)
+    extra = count_rolling_rows(rolling)
+    rows, first_row, frames = contact_rows(bodies, contacts, members, number, extra)
+    start = len(rows.bias) - extra
     start_contact_impulses(rows, first_row, force, h)
     n, residual, scale = len(members), 0.0, 1.0
     for _ in range(CAPTURE_PASSES):
         scale, leaving, slides = fill_contact_bias(
             bodies, contacts, frames, turning, acceleration, angular_acceleration, h, rows, first_row
         )
+        if rolling is not None:
+            fill_rolling_rows(
+                bodies, contacts, rolling, number, acceleration, angular_acceleration, frames, first_row, h, rows, start
+            )
         target = SOLVE_TOLERANCE * scale
         residual = solve_with_slip(solve, rows, n, first_row, contacts, slides, target, SLIP * scale)
         loaded = np.flatnonzero(rows.impulse[first_row] > 0.0)
@@ -164,6 +172,8 @@ def hold_contacts(
             break
         capture(solve, bodies, members, rows, first_row[loaded], leaving[loaded], target)
     add_contact_wrench(contacts, rows, first_row, frames, h, force, wrench)
+    if rolling is not None:
+        add_rolling_wrench(contacts, rolling, rows, frames, h, start, wrench)
     return residual / scale
 
 
