@@ -187,4 +187,5 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         plan=plan,
         scene=world.scene,
         reactions=reaction_table(context.joints, times),
+        contacts=context.contact_log.table(),
     )

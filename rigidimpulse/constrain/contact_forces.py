@@ -45,6 +45,7 @@ class ContactForces:
 def hold(context, window, group: Group) -> None:
     """Find the lasting contacts of a group and write the wrenches of its members into context.wrench."""
     context.wrench[group.members] = 0.0
+    context.contact_log.close(group.members.tolist(), group.time)
     group.held = held_contacts(group)
     if not group.held.any() and not len(group.joints):
         return
@@ -70,6 +71,7 @@ def hold(context, window, group: Group) -> None:
     ends = np.concatenate([contacts.body_a, contacts.body_b])
     alone = len(group.members) == 1 and not len(group.joints) and not np.any(context.world.moving[ends])
     state.on_rest_of_world[group.members] = alone
+    context.contact_log.replace(group.members.tolist(), group.time, contacts, now.position, force)
     for key, f in zip(keys, force, strict=True):
         state.contact_force[key] = (f, group.time)
     if residual > UNSOLVED:

@@ -56,6 +56,7 @@ def take_course(context, window, i: int, time: float, wrench: np.ndarray, rests:
         context.quarantine(i, time)
         rests = True
     context.recorder.flush(course, i, time)
+    context.contact_log.close([i], time)
     _book_contact_work(context, i, time)
     if rests:
         now.velocity[i] = now.angular_velocity[i] = 0.0
