@@ -67,12 +67,13 @@ def _contact():
 
 def _respond_and_detect(context) -> None:
     """Impulses first: by then the other process has what moves bodies in the cache, which detection needs too."""
+    from rigidimpulse.constrain.contact_motion import contact_motion
     from rigidimpulse.constrain.drift import needs_lift
-    from rigidimpulse.constrain.resting import hold_contacts, turning_of
-    from rigidimpulse.constrain.rows import change_velocities, changes_of, contact_rows, response_to
+    from rigidimpulse.constrain.resting import hold_contacts
+    from rigidimpulse.constrain.rows import change_velocities, changes_of, contact_rows, response_to, row_velocities
     from rigidimpulse.detect.window import Window
     from rigidimpulse.observe.contact_log import fill_contacts_and_forces
-    from rigidimpulse.respond.block import ask_rebounds, log_block
+    from rigidimpulse.respond.block import log_block
     from rigidimpulse.respond.response import respond_to_impacts
     from rigidimpulse.respond.restitution import LAWS
     from rigidimpulse.respond.simultaneous import respond_sequential
@@ -83,17 +84,19 @@ def _respond_and_detect(context) -> None:
     now.inv_inertia[1] = np.eye(3)
     respond_sequential(now, contacts, LAWS["auto"], False, one, 1.0, 1.0, context.column, None, context.impact_log)
     rows, first_row, frames = contact_rows(now, contacts, members, context.column, 0)
-    ask_rebounds(now, contacts, first_row, frames, 1.0, one, np.zeros(1), np.zeros(1))
+    row_velocities(now, contacts, first_row, frames, rows.bias)
     response_to(rows, 1, rows.impulse)
     log_block(now, contacts, rows, first_row, frames, np.zeros(1), context.impact_log, 0)
     change_velocities(now, members, rows)
     changes_of(now, members, rows)
     needs_lift(contacts, np.ones(1, bool), one)
     fill_contacts_and_forces(contacts, now.position, np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)))
-    turning = turning_of(world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64))
+    motion = contact_motion(
+        world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64)
+    )
     hold_contacts(
-        _leave_unsolved, now, contacts, members, turning, context.acceleration, context.angular_acceleration, 1.0,
-        context.column, np.zeros((1, 3)), context.wrench,
+        _leave_unsolved, now, contacts, members, motion.turning, np.zeros(1), context.acceleration, context.angular_acceleration,
+        1.0, 1.0, context.column, np.zeros((1, 3)), context.wrench,
     )
     start_courses(context)
     window = Window(context, 1.0 / 60.0)

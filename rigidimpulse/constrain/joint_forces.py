@@ -223,13 +223,15 @@ def hold_jointed(
     start = len(rows.bias) - count
     if rolling is not None:
         fill_rolling_rows(
-            bodies, contacts, rolling, number, acceleration, angular_acceleration, frames, first_row, h, rows, start - extra
+            bodies, contacts, rolling, number, angular_acceleration, frames, first_row, h, rows, start - extra
         )
     start_contact_impulses(rows, first_row, force, h)
     direction, beta = _start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed, rows, start)
-    scale, _, slides = fill_contact_bias(
-        bodies, contacts, frames, turning, acceleration, angular_acceleration, h, rows, first_row
+    level = np.zeros(len(first_row))
+    scale, u = fill_contact_bias(
+        bodies, contacts, frames, turning, level, acceleration, angular_acceleration, h, rows, first_row
     )
+    slides = np.abs(u[:, 1]) + np.abs(u[:, 2]) > SLIP * scale
     scale = max(scale, h * float(np.sqrt(np.max(np.sum(acceleration[members] ** 2, axis=1)))))
     residual = worst = 0.0
     for round_ in range(MAX_ROUNDS):

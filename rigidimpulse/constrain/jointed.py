@@ -93,6 +93,7 @@ class JointState:
         elapsed[which] = group.time - self.began[which]
         self.moment[which] = 0.0
         before = mechanical_energy(now, context.world, members)
+        arrived = np.hstack([now.velocity[members], now.angular_velocity[members]])
         for i in members:
             held = memory.wrench[i] * max(elapsed[j] for j in self.at([i])) if int(i) in self._of_body else np.zeros(6)
             now.velocity[i] -= now.inv_mass[i] * held[:3]
@@ -106,6 +107,7 @@ class JointState:
         stop_joints(
             self.table, which, now, state.rotation, members, context.column, memory, elapsed, self._allowed, self.moment
         )
+        state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
         memory.wrench[members] = 0.0
         self.length[which] = elapsed[which]
         context.log.book(group.time, "joints", mechanical_energy(now, context.world, members) - before)

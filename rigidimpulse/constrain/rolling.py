@@ -10,8 +10,7 @@ DISC and SEGMENT whose master is the contact's normal. With L the longest lever 
 that their velocity L w is that of a point and b / L is the coefficient. Contacts without friction have none, impacts
 have none: for a finite moment an impact is too short.
 
-A sub-step ends where the first slip, roll or spin of the group ends, as long as it is uniformly slowed: the decrease of
-its speed is that of a solution over a small part of the sub-step (LOOP: stop split).
+Where a roll or a spin stops the sub-step ends, as it does for a slip (`resting`).
 """
 
 from __future__ import annotations
@@ -22,13 +21,6 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.rows import DISC, DISC_SECOND, SEGMENT, write_body
-
-TRIAL = 1e-3
-"""Part of a sub-step over which the decrease of a slip is measured; a stop within it is the sub-step's own."""
-MOVES = 1e-9
-"""Slip that counts, relative to the speed gained in the sub-step."""
-STOPPED = 1e-6
-"""Slip at the end that counts as none, relative to that at the start."""
 
 
 class Rolling(NamedTuple):
@@ -58,7 +50,7 @@ def count_rolling_rows(rolling: Rolling | None) -> int:
 
 
 @jit
-def fill_rolling_rows(bodies, contacts, rolling, number, acceleration, angular_acceleration, frames, first_row, h, rows, start):
+def fill_rolling_rows(bodies, contacts, rolling, number, angular_acceleration, frames, first_row, h, rows, start):
     """Rows from `start` on, with the velocities L t.w that they would have after h without moments."""
     i = start
     for c in range(first_row.shape[0]):
@@ -101,46 +93,17 @@ def add_rolling_wrench(contacts, rolling, rows, frames, h, start, wrench):
             i += 1
 
 
-def slips(contacts, rolling: Rolling, velocity: np.ndarray, angular_velocity: np.ndarray) -> np.ndarray:
-    """Speeds (m, 3) at which contacts slide, roll and spin against their friction [m/s]; velocities (n, 3) of all bodies."""
-    a, b, n = contacts.body_a, contacts.body_b, contacts.normal
-    u = velocity[b] + np.cross(angular_velocity[b], contacts.arm_b) - velocity[a] - np.cross(angular_velocity[a], contacts.arm_a)
-    w = rolling.lever[:, None] * (angular_velocity[b] - angular_velocity[a])
-    spin = np.sum(n * w, axis=1)
-    speeds = np.column_stack([
-        np.linalg.norm(u - np.sum(n * u, axis=1)[:, None] * n, axis=1),
-        np.linalg.norm(w - spin[:, None] * n, axis=1),
-        np.abs(spin),
-    ])
-    return np.where(np.column_stack([contacts.static_friction, rolling.rolling, rolling.spinning]) > 0.0, speeds, 0.0)
-
-
-def hold_until_stop(hold, contacts, rolling: Rolling, bodies, members, acceleration, angular_acceleration, h: float, wrench):
-    """Contact forces over h or until the first slip, roll or spin stops.
-
-    hold: solves for the forces over a length of time, adds them to wrench (n, 6) and returns the residual. Returns (length of
-    the sub-step, residual).
-    """
-
-    def after(time: float) -> np.ndarray:
-        velocity, angular_velocity = bodies.velocity.copy(), bodies.angular_velocity.copy()
-        force, torque = wrench[members, :3], wrench[members, 3:]
-        velocity[members] += time * (acceleration[members] + bodies.inv_mass[members, None] * force)
-        turned = np.einsum("ijk,ik->ij", bodies.inv_inertia[members], torque)
-        angular_velocity[members] += time * (angular_acceleration[members] + turned)
-        return slips(contacts, rolling, velocity, angular_velocity)
-
-    residual = hold(h)
-    now, end = slips(contacts, rolling, bodies.velocity, bodies.angular_velocity), after(h)
-    stops = (now > MOVES * np.abs(end - now).max(initial=0.0)) & (end <= STOPPED * now)
-    if not stops.any():
-        return h, residual
-    wrench[members] = 0.0
-    hold(TRIAL * h)
-    lost = now - after(TRIAL * h)
-    times = np.full(now.shape, np.inf)
-    np.divide(TRIAL * h * now, lost, out=times, where=stops & (lost > 0.0))
-    stop = float(times.min())
-    length = stop if TRIAL * h < stop < h else h
-    wrench[members] = 0.0
-    return length, hold(length)
+def rolling_slip(
+    bodies, contacts, rolling: Rolling, frames: np.ndarray, start: int, slow: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What rolls and spins faster than `slow` [m/s]: first and second row (s,), the same for a spin, and L w along them (s, 2)."""
+    w = rolling.lever[:, None] * (bodies.angular_velocity[contacts.body_b] - bodies.angular_velocity[contacts.body_a])
+    spin, roll = rolling.spinning > 0.0, rolling.rolling > 0.0
+    along = np.einsum("ckj,cj->ck", frames, w)
+    size = 1 * spin + 2 * roll
+    first = start + np.cumsum(size) - size
+    rows = np.concatenate([first[spin], (first + spin)[roll]])
+    seconds = np.concatenate([first[spin], (first + spin)[roll] + 1])
+    slip = np.concatenate([np.column_stack([along[spin, 0], np.zeros(spin.sum())]), along[roll, 1:]])
+    moves = np.abs(slip).sum(axis=1) > slow
+    return rows[moves], seconds[moves], slip[moves]

@@ -155,6 +155,16 @@ def contact_velocity(contacts, c, frame, velocity, angular_velocity, out):
 
 
 @jit
+def row_velocities(bodies, contacts, first_row, frames, u):
+    """Velocities u (r,) of the contacts' rows."""
+    v = np.empty(3)
+    for c in range(first_row.shape[0]):
+        contact_velocity(contacts, c, frames[c], bodies.velocity, bodies.angular_velocity, v)
+        for k in range(3 if contacts.static_friction[c] > 0.0 else 1):
+            u[first_row[c] + k] = v[k]
+
+
+@jit
 def rows_of(rows, i):
     """Rows of the contact whose normal is row i: 3, or 1 without friction."""
     return 3 if i + 1 < rows.kind.shape[0] and rows.kind[i + 1] == DISC and rows.master[i + 1] == i else 1

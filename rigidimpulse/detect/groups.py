@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigidimpulse.constrain.arrival import arrive
 from rigidimpulse.detect.features import CORNER, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, pressing
 from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 MARGIN = 2.0
 """Contacts are looked for within this many delta."""
 NO_FORCE = np.zeros(3)
+SLACK = 1e-9
+"""Contacts that leave or approach slower than the held ones by this part are held."""
 GAIN = 1e-11
 """Part of its kinetic energy that a body on immovable things may gain by rounding."""
 
@@ -60,6 +63,10 @@ class Group:
     rests: bool = False
     still: float = 0.0
     joints: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def slow(self) -> np.ndarray:
+        """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
+        return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + self.still
 
 
 def empty_contacts(m: int) -> Contacts:
@@ -165,6 +172,8 @@ def _components(context, window, time: float, reached, real: np.ndarray, integer
     for o in np.union1d(owner, owner_of_joint):
         groups.append(make_group(context, window, time, real, integer, owner == o, joints[owner_of_joint == o]))
     for group in groups:
+        if arrive(context, group):
+            classify(context, group)
         if note_arrival(context, group.members.tolist(), time):
             classify(context, group)
         if jointed is not None and len(group.joints):

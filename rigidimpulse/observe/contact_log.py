@@ -37,12 +37,13 @@ class ContactLog:
     def __init__(self, times: np.ndarray) -> None:
         """times (f,) s, of the frames."""
         self.times = times
-        self._last: dict[int, Stretch] = {}
         self._open: dict[int, Stretch] = {}
         self._done: list[np.ndarray] = []
 
     def close(self, bodies: list[int], time: float) -> None:
-        """The contacts of the bodies end at `time`, but for those that begin there."""
+        """The contacts of the bodies end at `time`, but for those that begin there, and for the last frame, which is the end."""
+        if 0.0 < self.times[-1] <= time:
+            return
         for stretch in {id(s): s for s in map(self._open.get, bodies) if s is not None and s.start < time}.values():
             self._end(stretch, np.array(bodies), time)
         for i in bodies:
@@ -51,6 +52,8 @@ class ContactLog:
 
     def replace(self, bodies: list[int], time: float, contacts, position: np.ndarray, force: np.ndarray) -> None:
         """The contacts of the bodies are these from `time` on; position (n, 3) of all bodies, force (m, 3) in (n, t1, t2)."""
+        if 0.0 < self.times[-1] <= time:
+            return
         for stretch in {id(s): s for s in map(self._open.get, bodies) if s is not None}.values():
             self._end(stretch, np.array(bodies), time)
         rows = np.empty(len(force), CONTACT_DTYPE)

@@ -36,12 +36,12 @@ from rigidimpulse.constrain.rows import (
     Rows,
     change_velocities,
     contact_rows,
-    contact_velocity,
     impulse_along,
     response_to,
+    row_velocities,
     solve_with_slip,
 )
-from rigidimpulse.respond.impulse import Contacts, log_impact, relative_velocity, select
+from rigidimpulse.respond.impulse import Contacts, log_impact, select
 from rigidimpulse.respond.restitution import AUTO, NEWTON, POISSON
 
 # Residual asked of the solver, relative to the speed of the group.
@@ -93,27 +93,6 @@ def rebound_of(contacts, c, approach, rest_speed):
     """e, or 0 where the rebound would rise less than the gap the contact is held at (LOOP rule: no speed threshold)."""
     e = contacts.restitution[c]
     return e if e * abs(approach) > rest_speed[c] else 0.0
-
-
-@jit
-def ask_rebounds(bodies, contacts, first_row, frames, rebound, rest_speed, u, target):
-    """Velocities u (r,) of the contact rows, what the rebound asks of them, and e (m,); `rebound` 1, or 0 for an inelastic impact."""
-    m = first_row.shape[0]
-    e, v = np.zeros(m), np.empty(3)
-    for c in range(m):
-        i = first_row[c]
-        contact_velocity(contacts, c, frames[c], bodies.velocity, bodies.angular_velocity, v)
-        last = 3 if contacts.static_friction[c] > 0.0 else 1
-        for k in range(last):
-            u[i + k] = v[k]
-        approach = relative_velocity(bodies, contacts, c, v)
-        if approach < 0.0:
-            e[c] = rebound * rebound_of(contacts, c, approach, rest_speed)
-            e_t = contacts.tangential_restitution[c] if e[c] > 0.0 else 0.0
-            target[i] = -e[c] * u[i]
-            for k in range(1, last):
-                target[i + k] = -e_t * u[i + k]
-    return e
 
 
 def _newton(block: Block) -> np.ndarray:
@@ -184,10 +163,18 @@ def solve_block(
     rows, first_row, frames = contact_rows(bodies, contacts, members, number, extra)
     if joints is not None:
         copy_rows(joints.rows, rows, len(rows.bias) - extra)
-    u, target = np.zeros(len(rows.bias)), np.zeros(len(rows.bias))
-    e = ask_rebounds(bodies, contacts, first_row, frames, rebound, rest_speed, u, target)
+    u = np.zeros(len(rows.bias))
+    row_velocities(bodies, contacts, first_row, frames, u)
+    approach = u[first_row]
+    e = np.where((approach < 0.0) & (contacts.restitution * -approach > rest_speed), rebound * contacts.restitution, 0.0)
+    target = np.zeros(len(rows.bias))
+    target[first_row] = -e * approach
+    rough = contacts.static_friction > 0.0
+    e_t = np.where(e > 0.0, contacts.tangential_restitution, 0.0)[rough]
+    for k in (1, 2):
+        target[first_row[rough] + k] = -e_t * u[first_row[rough] + k]
     block = Block(rows, len(members), first_row, contacts, u, target, e, scale)
-    smooth = not np.any(contacts.static_friction > 0.0)
+    smooth = not rough.any()
     rows.impulse[:] = _newton(block) if law == NEWTON or (law == AUTO and smooth) else _two_phases(law, block)
     change_velocities(bodies, members, rows)
     if joints is not None:
