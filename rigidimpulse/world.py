@@ -161,7 +161,6 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
     low, high = _world_boxes(geometry, shape_of_body, position, principal)
     material_of_body, coefficients, rolling = _materials(bodies)
     mass = np.array([m.mass for m in masses], float)
-    factor = np.array([body.gravity_factor for body in bodies], float)
     return World(
         scene=scene,
         accuracy=resolve_accuracy(accuracy),
@@ -179,7 +178,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
         orientation=principal,
         velocity=np.array([body.velocity for body in bodies], float).reshape(-1, 3),
         angular_velocity=np.array([body.angular_velocity for body in bodies], float).reshape(-1, 3),
-        gravity=factor[:, None] * np.asarray(scene.gravity, float) * dynamic[:, None],
+        gravity=np.outer([body.gravity_factor for body in bodies], scene.gravity) * dynamic[:, None],
         shape_of_body=shape_of_body,
         size=size,
         bound_radius=radius,

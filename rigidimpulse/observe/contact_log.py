@@ -25,9 +25,10 @@ def fill_contacts_and_forces(contacts, position, force, point, total):
 
 @dataclass(eq=False)
 class Stretch:
-    """Contacts that one solution gave forces to at `start`; rows (m,) `CONTACT_DTYPE`, end inf while they last."""
+    """Contacts that one solution gave forces to at `start`; rows (m,) `CONTACT_DTYPE`, end inf while they last; movable bodies."""
 
     start: float
+    bodies: frozenset[int]
     rows: np.ndarray
 
 
@@ -45,7 +46,7 @@ class ContactLog:
         if 0.0 < self.times[-1] <= time:
             return
         for stretch in {id(s): s for s in map(self._open.get, bodies) if s is not None and s.start < time}.values():
-            self._end(stretch, np.array(bodies), time)
+            self._end(stretch, bodies, time)
         for i in bodies:
             if i in self._open and self._open[i].start < time:
                 del self._open[i]
@@ -55,14 +56,14 @@ class ContactLog:
         if 0.0 < self.times[-1] <= time:
             return
         for stretch in {id(s): s for s in map(self._open.get, bodies) if s is not None}.values():
-            self._end(stretch, np.array(bodies), time)
+            self._end(stretch, bodies, time)
         rows = np.empty(len(force), CONTACT_DTYPE)
         rows["start"], rows["end"] = time, np.inf
         rows["body_a"], rows["body_b"], rows["normal"] = contacts.body_a, contacts.body_b, contacts.normal
         point, total = np.empty((len(force), 3)), np.empty((len(force), 3))
         fill_contacts_and_forces(contacts, position, force, point, total)
         rows["point"], rows["force"] = point, total
-        self._open.update(dict.fromkeys(bodies, Stretch(time, rows[force[:, 0] > 0.0])))
+        self._open.update(dict.fromkeys(bodies, Stretch(time, frozenset(bodies), rows[force[:, 0] > 0.0])))
 
     def table(self) -> np.ndarray:
         """All contacts that a frame sees, in order of their start."""
@@ -74,9 +75,11 @@ class ContactLog:
         rows = np.concatenate(self._done)
         return rows[np.argsort(rows["start"], kind="stable")]
 
-    def _end(self, stretch: Stretch, bodies: np.ndarray, time: float) -> None:
+    def _end(self, stretch: Stretch, bodies: list[int], time: float) -> None:
         rows = stretch.rows
-        ends = np.isinf(rows["end"]) & (np.isin(rows["body_a"], bodies) | np.isin(rows["body_b"], bodies))
+        ends = np.isinf(rows["end"])
+        if not stretch.bodies.issubset(bodies):
+            ends &= np.isin(rows["body_a"], bodies) | np.isin(rows["body_b"], bodies)
         rows["end"][ends] = time
         self._keep(rows[ends])
 
