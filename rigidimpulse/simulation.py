@@ -13,7 +13,7 @@ from rigidimpulse.accuracy import Accuracy
 from rigidimpulse.compile_ahead import compile_kernels
 from rigidimpulse.constrain.contact_forces import ContactForces
 from rigidimpulse.constrain.jointed import reaction_table
-from rigidimpulse.detect.overlap import report_overlaps
+from rigidimpulse.detect.overlap import resolve_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.detect.window import Window
 from rigidimpulse.errors import SceneError
@@ -77,7 +77,7 @@ def simulate(
     context = StepContext(world, recorder, log)
     start_courses(context)
     recorder.start(context.state.course)
-    report_overlaps(context)
+    resolve_overlaps(context)
     # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
     paths = KeyframePaths(world)
     for end in (float(duration), max(float(duration), float(times[-1]))):
@@ -191,4 +191,5 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         plan=plan,
         scene=world.scene,
         reactions=reaction_table(context.joints, times),
+        contacts=context.contact_log.table(),
     )

@@ -14,6 +14,7 @@ from rigidimpulse.detect.groups import NO_FORCE
 from rigidimpulse.detect.touching import bring
 from rigidimpulse.geometry import Geometry
 from rigidimpulse.integrate.course import Course, make_course, pose_at
+from rigidimpulse.observe.contact_log import ContactLog
 from rigidimpulse.observe.events import EventLog
 from rigidimpulse.observe.recorder import Recorder
 from rigidimpulse.respond.impulse import BodyState
@@ -85,7 +86,7 @@ class Detector:
 
 
 class StepContext:
-    """Everything a step needs: world, state, recorder, log, and buffers that grow when they are too small."""
+    """Everything a step needs: world, state, recorder, logs, and buffers that grow when they are too small."""
 
     def __init__(self, world: World, recorder: Recorder, log: EventLog) -> None:
         n = world.num_bodies
@@ -93,6 +94,7 @@ class StepContext:
         self.state = State(world)
         self.recorder = recorder
         self.log = log
+        self.contact_log = ContactLog(recorder.times)
         self.detector = Detector(world.geometry, world.shape_of_body, make_scratch(world.geometry), world.accuracy.iterations)
         self.contact_real = np.empty((CONTACT_CAPACITY, 10))
         self.contact_int = np.empty((CONTACT_CAPACITY, 5), np.int64)

@@ -13,6 +13,7 @@ from rigidimpulse.constrain.drift import lift_contacts, needs_lift
 from rigidimpulse.constrain.foresight import ALLOWED
 from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.resting import Held, hold_contacts
+from rigidimpulse.constrain.rolling import rolling_of
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.groups import Group, collect, make_group
 from rigidimpulse.detect.touching import refresh_pose
@@ -57,6 +58,7 @@ class ContactForces:
 def hold(context, window, group: Group) -> None:
     """Find the lasting contacts of a group and write the wrenches of its members into context.wrench."""
     context.wrench[group.members] = 0.0
+    context.contact_log.close(group.members.tolist(), group.time)
     group.held = group.slow()
     if not group.held.any() and not len(group.joints):
         return
@@ -75,13 +77,15 @@ def hold(context, window, group: Group) -> None:
     before = kinetic_energy(now, context.world, group.members)
     rest = window.end - group.time
     if len(group.joints):
-        h, residual = context.joints.hold(context, group, contacts, motion.turning, force, rest)
+        rolling = rolling_of(context.world, now, contacts)
+        h, residual = context.joints.hold(context, group, contacts, motion.turning, force, rest, rolling)
     else:
         h, residual = _hold_turning(context, group, subset, contacts, keys, motion, force, rest)
     context.log.book(group.time, "capture", kinetic_energy(now, context.world, group.members) - before)
     ends = np.concatenate([contacts.body_a, contacts.body_b])
     state.closed[group.members] = -1 if len(group.joints) or np.any(context.world.moving[ends]) else group.members[0]
     state.grounded[group.members] = not np.all(context.world.dynamic[ends])
+    context.contact_log.replace(group.members.tolist(), group.time, contacts, now.position, force)
     for key, f in zip(keys, force, strict=True):
         state.contact_force[key] = (f, group.time)
     if residual > UNSOLVED:
@@ -101,12 +105,13 @@ def _hold_turning(
 ) -> tuple[float, float]:
     """Contact forces over a sub-step of at most `rest`; returns its length and the residual."""
     state, step, delta = context.state, context.world.accuracy.step, group.delta[subset]
+    rolling = rolling_of(context.world, state.now, contacts)
 
     def hold_over(h: float, excess: np.ndarray) -> Held:
         context.wrench[group.members] = 0.0
         return hold_contacts(
             solve_newton, state.now, contacts, group.members, motion.turning, excess, context.acceleration,
-            context.angular_acceleration, h, SHORTEST * step, context.column, force, context.wrench,
+            context.angular_acceleration, h, SHORTEST * step, context.column, force, context.wrench, rolling,
         )
 
     if motion.fastest * step <= STEADY:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.joint_limits import is_reached
 from rigidimpulse.constrain.joint_rows import is_linear, joint_rows
 from rigidimpulse.constrain.rows import BOUNDED, Rows, make_rows
 
@@ -20,8 +21,11 @@ class JointBlock(NamedTuple):
 
 
 @jit
-def impact_rows(joints, which, bodies, rotation, members, number, memory, moment):
-    """The `JointBlock` of the joints listed in `which`: hard rows hold, limits that are reached stop, soft rows are too slow."""
+def impact_rows(joints, which, bodies, rotation, members, number, memory, allowed, moment):
+    """The `JointBlock` of the joints listed in `which`: hard rows hold, limits that are reached stop, soft rows are too slow.
+
+    allowed: closing error, m or rad.
+    """
     for k in range(members.shape[0]):
         number[members[k]] = k
     count = np.int64(0)
@@ -37,7 +41,7 @@ def impact_rows(joints, which, bodies, rotation, members, number, memory, moment
                 direction[i] = 0.0
             if rows.kind[i] == BOUNDED or joints.stiffness[k] < np.inf:
                 rows.kind[i] = BOUNDED
-                holds = memory.active[k] and joints.stiffness[k] == np.inf
+                holds = joints.stiffness[k] == np.inf and (memory.active[k] or is_reached(joints, k, value[i], allowed))
                 rows.lower[i] = -np.inf if holds and joints.lower[k] < 0.0 else 0.0
                 rows.upper[i] = np.inf if holds and joints.upper[k] > 0.0 else 0.0
             i += 1

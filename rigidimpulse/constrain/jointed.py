@@ -9,6 +9,7 @@ import numpy as np
 from rigidimpulse.constrain.joint import Joint
 from rigidimpulse.constrain.joint_forces import close_joints, hold_jointed, make_memory, stop_joints
 from rigidimpulse.constrain.joint_impact import impact_rows
+from rigidimpulse.constrain.joint_limits import next_switch
 from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.touching import refresh_pose
@@ -23,6 +24,10 @@ MOST_SUB_STEPS = 256
 """Sub-steps in a step."""
 SHORT = 1e-5
 """Part of a step below which a sub-step is planned as a longer one: closing divides by its length."""
+MOST_CUTS = 20
+"""Times a sub-step is cut to end where a limit is reached or lets go."""
+STEEP = 1e3
+"""Torque of a twist over that about a fixed axis, above which it counts as undefined: half a turn of swing but for 2e-3 rad."""
 
 
 class JointState:
@@ -100,7 +105,7 @@ class JointState:
             refresh_pose(members, now, state.rotation, state.course.inertia)
             group.moved = True
         stop_joints(
-            self.table, which, now, state.rotation, members, context.column, memory, elapsed, self.moment
+            self.table, which, now, state.rotation, members, context.column, memory, elapsed, self._allowed, self.moment
         )
         state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
         memory.wrench[members] = 0.0
@@ -111,7 +116,8 @@ class JointState:
         """The joints' part in the impulses of an impact (`JointBlock`)."""
         state = context.state
         return impact_rows(
-            self.table, group.joints, state.now, state.rotation, group.members, context.column, self.memory, self.shock
+            self.table, group.joints, state.now, state.rotation, group.members, context.column, self.memory, self._allowed,
+            self.shock,
         )
 
     def sub_step(self, context, group, h: float) -> float:
@@ -138,12 +144,12 @@ class JointState:
                     squares[i] = squares.get(i, 0.0) + square
         return math.sqrt(max(squares.values(), default=0.0))
 
-    def hold(self, context, group, contacts, turning, force, rest: float) -> tuple[float, float]:
+    def hold(self, context, group, contacts, turning, force, rest: float, rolling) -> tuple[float, float]:
         """Forces into context.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         state, memory = context.state, self.memory
         others = self.bodies_of(group.joints)
         others = others[~context.world.dynamic[others]]
-        h = self.sub_step(context, group, rest)
+        h, cuts = self.sub_step(context, group, rest), 0
         while True:
             for i in others:
                 memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, group.time + h)
@@ -151,22 +157,38 @@ class JointState:
             residual, worst = hold_jointed(
                 solve_newton, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
                 group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
-                context.wrench, moment,
+                context.wrench, moment, rolling,
             )
             self.pull[group.joints] = 2.0 * (moment[group.joints] - self.moment[group.joints]) / h
             shorter = self.sub_step(context, group, h)
             if shorter < 0.5 * h:
                 # Only the forces show how short it has to be.
                 h = shorter
-            elif not self._break(context, group):
+                continue
+            if self._break(context, group):
+                continue
+            switch = next_switch(self.table, group.joints, memory, h, self._allowed)
+            if cuts == MOST_CUTS or switch >= h * (1.0 - SHORT):
                 break
+            h, cuts = max(switch, SHORT * context.world.accuracy.step), cuts + 1
         self.moment[:] = moment
         self._log(group, h)
         self.began[group.joints] = group.time
-        if worst > 1e3 * self._allowed:
-            names = tuple(context.world.names[i] for i in group.members)
-            context.log.report(group.time, "joints not closed", names, f"off by {worst:.1e}; use a smaller step")
+        self._report(context, group, worst)
         return h, residual
+
+    def _report(self, context, group, worst: float) -> None:
+        """Report joints that are off by `worst` m or rad, and those near the singularity of a twist."""
+        names = tuple(context.world.names[i] for i in group.members)
+        if worst > 1e3 * self._allowed:
+            context.log.report(group.time, "joints not closed", names, f"off by {worst:.1e}; use a smaller step")
+        for j in group.joints.tolist():
+            if self.memory.steepness[self.table.first[j] : self.table.first[j + 1]].max(initial=0.0) > STEEP:
+                pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
+                context.log.report(
+                    group.time, "singular joint", pair,
+                    f"{self.names[j]}: its axis has swung by half a turn, where the twist about it is not defined; limit the swing",
+                )
 
     def _break(self, context, group) -> bool:
         """Take out the most overloaded joint, if there is one."""

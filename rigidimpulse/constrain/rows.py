@@ -167,7 +167,7 @@ def row_velocities(bodies, contacts, first_row, frames, u):
 @jit
 def rows_of(rows, i):
     """Rows of the contact whose normal is row i: 3, or 1 without friction."""
-    return 3 if i + 1 < rows.kind.shape[0] and rows.kind[i + 1] == DISC else 1
+    return 3 if i + 1 < rows.kind.shape[0] and rows.kind[i + 1] == DISC and rows.master[i + 1] == i else 1
 
 
 @jit

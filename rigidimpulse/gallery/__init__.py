@@ -33,6 +33,8 @@ _MODULES = {
     "off_centre_disk": "off_centre_disk",
     "rifle": "rifle",
     "toss": "tosses",
+    "rolling": "rolling",
+    "arm": "arm",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 

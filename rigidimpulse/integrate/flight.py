@@ -57,6 +57,7 @@ def take_course(context, window, i: int, time: float, wrench: np.ndarray, rests:
         rests = True
     context.recorder.flush(course, i, time, state.correction[i])
     state.correction[i] = 0.0
+    context.contact_log.close([i], time)
     _book_contact_work(context, i, time)
     if rests:
         now.velocity[i] = now.angular_velocity[i] = 0.0
