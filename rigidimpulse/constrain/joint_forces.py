@@ -95,20 +95,19 @@ def count_joint_rows(joints, which):
     return count
 
 
-def stop_joints(joints, which, bodies, rotation, members, number, memory: JointMemory, elapsed, allowed: float, moment) -> None:
+def stop_joints(joints, which, bodies, rotation, members, number, memory: JointMemory, elapsed, moment) -> None:
     """End of a sub-step: the impulses nu.
 
-    elapsed (j,): length of the sub-step that ends, s; allowed: closing error, m or rad; moment (j, 3): the impulse on b of
-    each joint is added, N s.
+    elapsed (j,): length of the sub-step that ends, s; moment (j, 3): the impulse on b of each joint is added, N s.
     """
-    rows, direction, scale = _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed, allowed)
+    rows, direction, scale = _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed)
     solve_newton(rows, len(members), SOLVE_TOLERANCE * scale)
     change_velocities(bodies, members, rows)
     _add_moments(joints, which, rows, 0, direction, moment)
 
 
 @jit
-def _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed, allowed):
+def _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed):
     """Rows of the impulses nu, their directions (s, 3) and the largest speed to stop."""
     count = count_joint_rows(joints, which)
     for k in range(members.shape[0]):
@@ -123,8 +122,7 @@ def _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed
         for k in range(joints.first[j], joints.first[j + 1]):
             rows.bias[i] = u[i]
             hard = joints.stiffness[k] == np.inf
-            at_work = memory.active[k] or (hard and is_reached(joints, k, value[i], allowed))
-            if not at_work or (not hard and elapsed[j] <= 0.0):
+            if not memory.active[k] or (not hard and elapsed[j] <= 0.0):
                 rows.kind[i] = BOUNDED
                 rows.lower[i] = rows.upper[i] = 0.0
             elif not hard:

@@ -5,9 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.joint_limits import is_reached
-from rigidimpulse.constrain.joint_rows import is_linear, joint_rows
-from rigidimpulse.constrain.rows import BOUNDED, Rows, make_rows
+from rigidimpulse.constrain.joint_limits import is_reached, limit_side
+from rigidimpulse.constrain.joint_rows import is_linear, joint_rows, relative_point_velocity
+from rigidimpulse.constrain.newton import solve_newton
+from rigidimpulse.constrain.rows import BOUNDED, Rows, change_velocities, make_rows
+
+# Residual asked of the solver, relative to the fastest rate.
+SOLVE_TOLERANCE = 1e-12
 
 
 class JointBlock(NamedTuple):
@@ -46,6 +50,32 @@ def impact_rows(joints, which, bodies, rotation, members, number, memory, allowe
                 rows.upper[i] = np.inf if holds and joints.upper[k] > 0.0 else 0.0
             i += 1
     return JointBlock(members, rows, joint, direction, moment)
+
+
+@jit
+def _fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows):
+    """Rates of all rows, to their bias; returns the fastest approach to a hard limit that is reached, m/s or rad/s."""
+    count = rows.bias.shape[0]
+    again, value, direction = make_rows(count), np.empty(count), np.empty((count, 3))
+    joint_rows(joints, which, bodies, rotation, number, memory.angle, again, np.int64(0), value, direction)
+    relative_point_velocity(joints, which, bodies, rotation, direction, rows.bias)
+    fastest, i = 0.0, 0
+    for j in which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            if joints.stiffness[k] == np.inf and is_reached(joints, k, value[i], allowed):
+                fastest = max(fastest, -limit_side(joints, k) * rows.bias[i])
+            i += 1
+    return fastest
+
+
+def stop_at_limits(joints, which, bodies, rotation, members, number, memory, allowed: float, moment) -> None:
+    """Impacts without rebound on the hard limits that are reached; arguments as of `impact_rows`."""
+    block = impact_rows(joints, which, bodies, rotation, members, number, memory, allowed, moment)
+    rows = block.rows
+    if _fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows) > 0.0:
+        solve_newton(rows, len(members), SOLVE_TOLERANCE * float(np.abs(rows.bias).max()))
+        change_velocities(bodies, members, rows)
+        add_moments(block, rows.impulse)
 
 
 def copy_rows(source: Rows, rows: Rows, start: int) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from rigidimpulse.constrain.joint import Joint
 from rigidimpulse.constrain.joint_forces import close_joints, hold_jointed, make_memory, stop_joints
-from rigidimpulse.constrain.joint_impact import impact_rows
+from rigidimpulse.constrain.joint_impact import impact_rows, stop_at_limits
 from rigidimpulse.constrain.joint_limits import next_switch
 from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.conventions import TOLERANCES
@@ -58,6 +58,8 @@ class JointState:
         self.length = np.zeros(len(joints))
         self.reactions: list[tuple[float, int, np.ndarray]] = []
         self._allowed = TOLERANCES.joint * world.joint_size
+        self._joint_of_row = np.repeat(np.arange(len(joints)), np.diff(self.table.first))
+        self._limited = bool(np.any((self.table.lower == 0.0) != (self.table.upper == 0.0)))
         self._dynamic = world.dynamic
         self._of_body: dict[int, list[int]] = {}
         for j, pair in enumerate(zip(self.table.body_a.tolist(), self.table.body_b.tolist(), strict=True)):
@@ -105,9 +107,14 @@ class JointState:
             refresh_pose(members, now, state.rotation, state.course.inertia)
             group.moved = True
         stop_joints(
-            self.table, which, now, state.rotation, members, context.column, memory, elapsed, self._allowed, self.moment
+            self.table, which, now, state.rotation, members, context.column, memory, elapsed, self.moment
         )
         state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
+        if self._limited:
+            # An impact at this instant: what came before goes on unchanged.
+            stop_at_limits(
+                self.table, which, now, state.rotation, members, context.column, memory, self._allowed, self.shock
+            )
         memory.wrench[members] = 0.0
         self.length[which] = elapsed[which]
         context.log.book(group.time, "joints", mechanical_energy(now, context.world, members) - before)
@@ -124,7 +131,7 @@ class JointState:
         """Length of the next sub-step: h, the rest of the step, or a part of it. Very short rests are planned as longer ones."""
         world, now = context.world, context.state.now
         fastest = 0.0
-        rates = self._tension_rates(context, group.joints)
+        rates = max(self._tension_rates(context, group.joints), self._spring_rate(group.joints))
         for a, b in zip(self.table.body_a[group.joints].tolist(), self.table.body_b[group.joints].tolist(), strict=True):
             spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
             fastest = max(fastest, float(np.linalg.norm(spins[1] - spins[0])))
@@ -132,6 +139,16 @@ class JointState:
         pieces = min(max(math.ceil(fastest * step / TURN), math.ceil(rates * step / SWAY), 1), MOST_SUB_STEPS)
         piece = step / pieces
         return piece if h > piece * (1.0 + SHORT) else max(h, SHORT * step)
+
+    def _spring_rate(self, which: np.ndarray) -> float:
+        """Fastest oscillation [rad/s] of soft rows that other joints pull at: alone they are exact at any length."""
+        if len(which) < 2:
+            return 0.0
+        table, memory = self.table, self.memory
+        works = np.isfinite(table.stiffness) & ~memory.slack & np.isin(self._joint_of_row, which)
+        stiffness = table.stiffness[works]
+        square = np.where(table.per_mass[works], stiffness, stiffness * memory.weight[works])
+        return math.sqrt(square.max(initial=0.0))
 
     def _tension_rates(self, context, which: np.ndarray) -> float:
         """Bound of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m r))."""
