@@ -92,7 +92,7 @@ def _respond_and_detect(context) -> None:
     needs_lift(contacts, np.ones(1, bool), one)
     fill_contacts_and_forces(contacts, now.position, np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)))
     motion = contact_motion(
-        world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64)
+        world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
     )
     hold_contacts(
         _leave_unsolved, now, contacts, members, motion.turning, np.zeros(1), context.acceleration, context.angular_acceleration,

@@ -19,7 +19,6 @@ def step(context, plan, end: float) -> None:
     window = Window(context, end)
     plan.run("detect", context, window)
     react(context, plan, window, context.state.time, window.active_bodies())
-    release(context, window)
     while True:
         plan.run("sweep", context, window)
         time = window.next_time()
@@ -39,14 +38,15 @@ def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> Non
         plan.run("forces", context, group)
         plan.run("constrain", context, window, group)
         plan.run("integrate", context, window, group)
+    release(context, window, time, bodies)
     window.settle(time)
 
 
-def release(context, window: Window) -> None:
-    """Let go the bodies that still carry the forces of contacts they have left."""
-    state, time = context.state, context.state.time
+def release(context, window: Window, time: float, bodies: np.ndarray) -> None:
+    """Let go those bodies that still carry the forces of contacts they have left."""
+    state = context.state
     free = np.zeros(6)
-    pushed = context.world.dynamic & (state.course.start < time) & state.under_contact
-    for i in np.flatnonzero(pushed).tolist():
+    pushed = context.world.dynamic[bodies] & (state.course.start[bodies] < time) & state.under_contact[bodies]
+    for i in bodies[pushed].tolist():
         context.bring(i, time)
         take_course(context, window, i, time, free, rests=False)

@@ -33,6 +33,8 @@ GROWTH = 1.5
 """How many times longer than the one before a sub-step may be."""
 SHORTEST = 1e-5
 """Part of a step that is not split."""
+SHORTEST_STOP = 1e-3
+"""Part of a step within which it does not matter when a contact stops."""
 STEADY = 1e-9
 """rad in a step; what turns less does not."""
 
@@ -70,7 +72,8 @@ def hold(context, window, group: Group) -> None:
     state, now = context.state, context.state.now
     contacts = select(group.contacts, subset)
     motion = contact_motion(
-        context.world.geometry, context.world.shape_of_body, state.rotation, now, contacts, group.kinds[subset]
+        context.world.geometry, context.world.shape_of_body, state.rotation, now, contacts, group.kinds[subset],
+        group.features[subset],
     )
     keys = [group.keys[c] for c in subset]
     force = np.array([state.force_of(key) for key in keys]).reshape(-1, 3)
@@ -111,7 +114,7 @@ def _hold_turning(
         context.wrench[group.members] = 0.0
         return hold_contacts(
             solve_newton, state.now, contacts, group.members, motion.turning, excess, context.acceleration,
-            context.angular_acceleration, h, SHORTEST * step, context.column, force, context.wrench, rolling,
+            context.angular_acceleration, h, SHORTEST_STOP * step, context.column, force, context.wrench, rolling,
         )
 
     if motion.fastest * step <= STEADY:
@@ -158,7 +161,7 @@ def _lift(context, window, group: Group) -> None:
         return
     acceleration, angular = context.acceleration[group.members].copy(), context.angular_acceleration[group.members].copy()
     again = make_group(context, window, group.time, real, integer, np.ones(len(real), bool), group.joints)
-    for name in ("contacts", "place", "kinds", "keys", "delta", "approach", "rest_speed", "live"):
+    for name in ("contacts", "place", "kinds", "features", "keys", "delta", "approach", "rest_speed", "live"):
         setattr(group, name, getattr(again, name))
     context.acceleration[group.members], context.angular_acceleration[group.members] = acceleration, angular
     group.held = group.slow()

@@ -134,13 +134,16 @@ def hold_contacts(
         rolled = rolling_slip(bodies, contacts, rolling, frames, start, SLIP * scale)
         disc, second, slip = (np.concatenate(both) for both in zip((disc, second, slip), rolled, strict=True))
     if len(disc) and residual <= POOR and np.any(np.abs(_end_slip(rows, n, disc, second)).sum(axis=1) <= SLIP * scale):
-        brief = BRIEF * h
+        brief, whole = BRIEF * h, rows.impulse.copy()
         rows.impulse[:] *= BRIEF
         attempt(brief)
         stop = _first_stop(slip, _end_slip(rows, n, disc, second), brief)
-        h = stop if shortest < stop < h else h
-        rows.impulse[:] *= h / brief
-        residual, *_ = attempt(h)
+        if shortest < stop < h:
+            rows.impulse[:] *= stop / brief
+            stopped, *_ = attempt(stop)
+            if stopped <= max(residual, POOR):
+                residual, h, whole = stopped, stop, rows.impulse
+        rows.impulse[:] = whole
     world_force = add_contact_wrench(contacts, rows, first_row, frames, h, force, wrench)
     if rolling is not None:
         add_rolling_wrench(contacts, rolling, rows, frames, h, start, wrench)

@@ -30,7 +30,8 @@ class Group:
     Attributes:
         members: movable bodies, in order of index.
         pairs: places in the window of the contacting pairs.
-        contacts: all contacts within the margin; `place` (m,) their pairs, `keys` who they are.
+        contacts: all contacts within the margin; `place` (m,) their pairs, `kinds` (m,) and `features` (m, 2) what touches, `keys`
+            who they are.
         delta: (m,) gap at which lasting contacts are held, m.
         approach: (m,) u.n, m/s; negative approaches.
         rest_speed: (m,) a slower rebound is none, m/s.
@@ -49,6 +50,7 @@ class Group:
     contacts: Contacts
     place: np.ndarray
     kinds: np.ndarray
+    features: np.ndarray
     keys: list[tuple[int, ...]]
     delta: np.ndarray
     approach: np.ndarray
@@ -201,6 +203,7 @@ def make_group(
         contacts=contacts,
         place=place,
         kinds=integer[rows, 2],
+        features=integer[rows, 3:5],
         keys=[contact_key(*row) for row in integer[rows].tolist()],
         delta=window.delta[place],
         approach=np.empty(len(rows)),
