@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigidimpulse.constrain.heap import Heaps, why_no_heaps
 from rigidimpulse.constrain.jointed import JointState
 from rigidimpulse.detect.groups import NO_FORCE, note_arrival
 from rigidimpulse.detect.touching import bring
@@ -94,6 +95,7 @@ class StepContext:
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
         self.joints = JointState(world) if world.joints_of_scene else None
+        self.heaps = None if why_no_heaps(world) else Heaps(world)
 
     def bring(self, i: int, time: float) -> None:
         """Bring body i to `time` on its course."""

@@ -41,6 +41,8 @@ class ContactForces:
 
 def hold(context, window, group: Group) -> None:
     """Find the lasting contacts of a group and write the wrenches of its members into context.wrench."""
+    if group.heap is not None:
+        return
     context.wrench[group.members] = 0.0
     group.held = held_contacts(group)
     if not group.held.any() and not len(group.joints):
