@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.heap_overlap import FLUSH, deepest_normal, gap_along, overlap_contacts, support
 from rigidimpulse.constrain.heap_rows import (
     CORE_A,
     CORE_B,
@@ -37,7 +38,7 @@ from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
 
 SHRINK = 1.5 * TOLERANCES.skin
 """Part of their lengths by which convex bodies are shrunk for the contact kernels."""
-SLIDE, TURN = 0.05, 0.03
+SLIDE, TURN = 0.02, 0.03
 """Part of the inner radius, and rad, after which touching pairs are looked at again."""
 AHEAD, FARTHEST = 0.1, 1.0
 """Contacts are looked for at least and at most that many inner radii away."""
@@ -81,6 +82,16 @@ def _convex_depth(geometry: Geometry, p: int) -> float:
         if d <= 0.0 or float((vertices @ n).max()) > d + 1e-9 * size:
             return 0.0
     return float(depth.min() + geometry.radius[p])
+
+
+def convex_polyhedra(geometry: Geometry) -> np.ndarray:
+    """Which shapes (s,) bool are one convex polyhedron around their centre of mass, with sharp edges."""
+    out = np.zeros(len(geometry.shape_first) - 1, bool)
+    for s in range(len(out)):
+        p = int(geometry.shape_first[s])
+        single = geometry.shape_first[s + 1] == p + 1 and geometry.kind[p] == ROUND and geometry.radius[p] == 0.0
+        out[s] = single and _convex_depth(geometry, p) > 0.0
+    return out
 
 
 def shrunk_geometry(geometry: Geometry, dynamic_shapes: np.ndarray) -> tuple[Geometry, np.ndarray]:
@@ -199,16 +210,44 @@ def _contradicts(bodies, pairs, p, rows, new, new_end):
 
 
 @jit
+def _sunk(geometry, shape, bodies, convex, factor, a, b, real, first, last, flush, deep, deep_ids):
+    """Contacts into deep (cap, 10), deep_ids (cap, 3) of convex bodies that the kernels found no sound contact for; their number."""
+    if not (convex[a] and convex[b]) or factor[a] * factor[b] == 1.0:
+        return 0
+    p, q = geometry.shape_first[shape[a]], geometry.shape_first[shape[b]]
+    bearing = np.empty(3)
+    for s in range(first, last):
+        # Along a sound contact's normal the shrunk bodies are apart.
+        gap = gap_along(geometry, bodies, a, b, p, q, real[s, 6:9])
+        if gap + _shrunk_by(geometry, bodies, factor, a, b, p, q, real[s, 6:9]) > 0.0:
+            return 0
+    depth, of_b = deepest_normal(geometry, bodies, a, b, p, q, bearing)
+    if depth > 0.0:
+        return 0
+    return overlap_contacts(geometry, bodies, a, b, p, q, bearing, depth, of_b, flush, deep, deep_ids)
+
+
+@jit
+def _shrunk_by(geometry, bodies, factor, a, b, p, q, n):
+    """How much wider the gap along n is between the shrunk bodies, m."""
+    x, y = bodies.position[a], bodies.position[b]
+    reach_a = support(geometry, p, x, bodies.rotation[a], n, 1.0) - (n[0] * x[0] + n[1] * x[1] + n[2] * x[2])
+    reach_b = support(geometry, q, y, bodies.rotation[b], n, -1.0) + (n[0] * y[0] + n[1] * y[1] + n[2] * y[2])
+    return (1.0 - factor[a]) * reach_a + (1.0 - factor[b]) * reach_b
+
+
+@jit
 def store_contacts(
-    geometry, shape, material, coefficients, bodies, pairs, places, margin, inner, skin, factor, ahead, real, integer, count, body, rows,
+    geometry, shape, material, coefficients, convex, bodies, pairs, places, margin, inner, skin, factor, real, integer, count, body, rows,
     ids, used,
 ):  # fmt: skip
     """Put the contacts found for the pairs at `places` into rows from `used` on, with the impulses of those they replace.
 
     real, integer: `count` contacts in the order of the places, `integer[:, :2]` as in the scene, `body` (l,) their indices there;
-    shape, material, inner, skin, factor by body number. Returns the rows used.
+    shape, material, convex (polyhedra), inner, skin, factor by body number. Returns the rows used.
     """
     c = np.int64(0)
+    deep, deep_ids, one = np.empty((8, 10)), np.empty((8, 3), np.int64), np.ones(factor.shape[0])
     for k in range(places.shape[0]):
         p = places[k]
         a, b = pairs.first[p], pairs.second[p]
@@ -217,15 +256,21 @@ def store_contacts(
             c += 1
         last = reduce_contacts(real, integer, first, c, POINTS)
         new = used
-        for s in range(first, last):
-            _write(geometry, shape, coefficients[material[a], material[b]], bodies, factor, skin, a, b, real[s], rows[used])
-            for i in range(3):
-                ids[used, i] = integer[s, 2 + i]
-            if rows[used, SEPARATION] <= margin[k]:
-                used += 1
         size = min(inner[a], inner[b])
-        speed, _ = pair_speeds(bodies, pairs, p)
-        if _contradicts(bodies, pairs, p, rows, new, used):
+        nearest = margin[k]
+        sunk = _sunk(geometry, shape, bodies, convex, factor, a, b, real, first, last, FLUSH * size, deep, deep_ids)
+        for s in range(sunk if sunk > 0 else last - first):
+            if sunk > 0:
+                _write(geometry, shape, coefficients[material[a], material[b]], bodies, one, skin, a, b, deep[s], rows[used])
+                ids[used] = deep_ids[s]
+            else:
+                at = first + s
+                _write(geometry, shape, coefficients[material[a], material[b]], bodies, factor, skin, a, b, real[at], rows[used])
+                ids[used] = integer[at, 2:]
+            if rows[used, SEPARATION] <= margin[k]:
+                nearest = min(nearest, rows[used, SEPARATION] + rows[used, SKIN])
+                used += 1
+        if sunk == 0 and _contradicts(bodies, pairs, p, rows, new, used):
             used = new
             for o in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
                 rows[o, MASS_N] = 0.0
@@ -234,6 +279,6 @@ def store_contacts(
             pairs.start[p], pairs.count[p] = new, used - new
         allowed = margin[k] - min(skin[a], skin[b])
         pairs.expires[p] = bodies.travel[a] + bodies.travel[b] + allowed
-        pairs.slide[p] = min(allowed, max(SLIDE * size, 0.5 * speed * ahead))
+        pairs.slide[p] = min(allowed, max(SLIDE * size, nearest))
         pairs.turn[p] = TURN
     return used

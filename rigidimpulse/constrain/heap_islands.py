@@ -71,7 +71,7 @@ def support_levels(bodies, pairs, rows, tall):
             a, b = pairs.first[p], pairs.second[p]
             low, high = (a, b) if level[a] < level[b] else (b, a)
             reached = min(level[low] + 1, tall + 1)
-            if reached < level[high]:
+            if level[low] <= tall + 1 and reached < level[high]:
                 level[high] = reached
                 changed = True
     return level

@@ -36,6 +36,7 @@ class HeapBodies(NamedTuple):
     gravity: np.ndarray  # (l, 3) m/s2
     reach: np.ndarray  # (l,) m, radius about the centre of mass; 0 for balls about it and for half spaces
     travel: np.ndarray  # (l,) m, how far any of its points may have come since the start of the run
+    pace: np.ndarray  # (l,) m, how far its points may come in the next sub-step, from what they came in the last
     path: np.ndarray  # (l,) m, how far its centre may still come until it may meet bodies that are not in its pairs
     loose: np.ndarray  # (l,) bool, no contact pushed it in this sub-step
 

@@ -298,7 +298,8 @@ def _move(bodies, h):
         speed = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
         spin = sqrt(v[3] * v[3] + v[4] * v[4] + v[5] * v[5])
         bodies.path[i] -= h * speed
-        bodies.travel[i] += h * (speed + bodies.reach[i] * spin)
+        bodies.pace[i] = h * (speed + bodies.reach[i] * spin)
+        bodies.travel[i] += bodies.pace[i]
         if spin > 0.0:
             _turn_freely(bodies, i, h)
 
@@ -327,9 +328,10 @@ def stale_pairs(bodies, pairs, places):
     count = 0
     for p in range(pairs.first.shape[0]):
         if pairs.count[p] > 0:
-            stale = pairs.slide[p] < 0.0 or pairs.turn[p] < 0.0
+            stale = pairs.slide[p] <= 0.0 or pairs.turn[p] < 0.0
         else:
-            stale = bodies.travel[pairs.first[p]] + bodies.travel[pairs.second[p]] > pairs.expires[p]
+            a, b = pairs.first[p], pairs.second[p]
+            stale = bodies.travel[a] + bodies.travel[b] + bodies.pace[a] + bodies.pace[b] > pairs.expires[p]
         if stale:
             places[count] = p
             count += 1
@@ -343,6 +345,8 @@ def _age(bodies, pairs, h):
         if pairs.count[p] > 0:
             speed, spin = pair_speeds(bodies, pairs, p)
             pairs.slide[p] -= h * speed
+            if pairs.slide[p] < h * speed:
+                pairs.slide[p] = 0.0
             pairs.turn[p] -= h * spin
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.constrain.heap_contacts import AHEAD, inner_radii, margins, shrunk_geometry, store_contacts
+from rigidimpulse.constrain.heap_contacts import AHEAD, convex_polyhedra, inner_radii, margins, shrunk_geometry, store_contacts
 from rigidimpulse.constrain.heap_rows import HeapBodies, HeapPairs, set_poses
 from rigidimpulse.constrain.heap_solver import FREQUENCY, advance, note_approach, outgrown, rebound, softness, stale_pairs
 from rigidimpulse.constrain.heap_table import HeapTable
@@ -55,6 +55,7 @@ class HeapStepper:
         self.skin = TOLERANCES.skin * self.inner
         self.geometry, factor = shrunk_geometry(world.geometry, dynamic_shapes)
         self.factor = factor[world.shape_of_body]
+        self.convex = convex_polyhedra(world.geometry)[world.shape_of_body]
         lost = self.factor < 1.0
         self._taken_off = np.zeros(n)
         self._taken_off[lost] = (1.0 - self.factor[lost]) * world.bound_radius[lost]
@@ -121,7 +122,7 @@ class HeapStepper:
             position=now.position[body].copy(), orientation=now.orientation[body].copy(), rotation=np.zeros((len(body), 3, 3)),
             velocity=np.hstack([now.velocity[body], now.angular_velocity[body]]), mass=mass, inertia=world.inertia[body].copy(),
             gravity=np.where(movable[:, None], context.acceleration[body], 0.0), reach=self.reach[body], travel=self.travel[body],
-            path=np.full(len(body), np.inf), loose=np.zeros(len(body), bool),
+            pace=np.zeros(len(body)), path=np.full(len(body), np.inf), loose=np.zeros(len(body), bool),
         )  # fmt: skip
         set_poses(self.bodies)
         self._number = np.full(self._n, -1, np.int64)
@@ -195,8 +196,8 @@ class HeapStepper:
         table.make_room(found)
         pairs.start[:] = table.start[self.place]
         table.used = store_contacts(
-            world.geometry, world.shape_of_body[body], world.material_of_body[body], world.coefficients, bodies, pairs, places, margin,
-            inner, skin, self.factor[body], self.ahead, context.contact_real, context.contact_int, found, body, table.rows, table.ids,
+            world.geometry, world.shape_of_body[body], world.material_of_body[body], world.coefficients, self.convex[body], bodies, pairs,
+            places, margin, inner, skin, self.factor[body], context.contact_real, context.contact_int, found, body, table.rows, table.ids,
             table.used,
         )  # fmt: skip
 
