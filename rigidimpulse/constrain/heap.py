@@ -9,6 +9,7 @@ radius) stands still, to the bit, until something touches it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,8 @@ from rigidimpulse.plan import Bound, Skip
 from rigidimpulse.rotation import product
 
 CALM, REST = 0.02, 3.0
+MOST_PIECES = 4
+"""Parts of a step at most, between which a heap's courses begin anew."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the heap that comes near it."""
 
@@ -120,8 +123,10 @@ class Heaps:
         self.calm = np.zeros(world.num_bodies)
         self._auto = world.accuracy.contact_solver == "auto"
         self._jointed = np.zeros(world.num_bodies, bool)
+        self._ends: dict[int, float] = {}
         self._began: dict[int, tuple[float, np.ndarray, float]] = {}
         self._outcome: Outcome | None = None
+        self._outcome_end = 0.0
         self._most = self._steps = 0
         self._refused: dict[str, int] = {}
         if world.joints_of_scene:
@@ -213,7 +218,7 @@ class Heaps:
         begins &= ~np.isin(root, old)
         if not self._auto or not begins.any():
             return chosen
-        self._set_up(context, window, np.flatnonzero(begins), window.end - window.begin)
+        self._set_up(context, np.flatnonzero(begins), window.begin, window.end - window.begin)
         stepper = self.stepper
         level = support_levels(stepper.bodies, stepper.pairs, stepper.table.rows, TALL)
         tall = np.unique(root[stepper.body[level == TALL + 1]])
@@ -267,16 +272,14 @@ class Heaps:
         state, first = context.state, not window.heaps_begun
         window.heaps_begun = True
         hit = [group for group in groups if np.any(self.label[group.members] >= 0)]
-        if first:
-            members = np.flatnonzero(window.inside)
-            if len(members) and not hit:
-                hit = [_bare_group(time, members, context)]
-                groups = groups + hit
+        due = [label for label, end in self._ends.items() if end <= time]
+        members = np.flatnonzero(window.inside & (np.isin(self.label, due) | first))
+        if len(members) and not hit:
+            hit = [_bare_group(time, members, context)]
+            groups = groups + hit
         for group in hit:
             labels = self.label[group.members]
-            members = np.flatnonzero(np.isin(self.label, labels[labels >= 0]))
-            if first:
-                members = np.union1d(members, np.flatnonzero(window.inside))
+            members = np.union1d(members, np.flatnonzero(np.isin(self.label, labels[labels >= 0])))
             away = np.setdiff1d(members, group.members)
             stepped = members[state.course.mode[members] == STEPPED]
             self._end_courses(context, stepped[state.course.start[stepped] < time], time)
@@ -303,22 +306,39 @@ class Heaps:
             note_arrival(context, [i], group.time)
             book_contact_work(context, i, group.time)
             context.state.under_contact[i] = False
-        self._set_up(context, window, members, window.end - group.time)
+        end = self._end_of(context, window, group.time, members)
+        self._set_up(context, members, group.time, end - group.time)
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
+            self._ends[label] = end
             self._began[label] = group.time, mine, mechanical_energy(context.state.now, world, mine)
-        self._outcome = self.stepper.step(context, group.time, window.end)
+        self._outcome = self.stepper.step(context, group.time, end)
+        self._outcome_end = end
+        if end < window.end:
+            window.wake[members] = end
         self._steps += 1
         self._most = max(self._most, len(members))
 
-    def _set_up(self, context, window, members: np.ndarray, ahead: float) -> None:
+    def _end_of(self, context, window, time: float, members: np.ndarray) -> float:
+        """When the courses of members end: before the step does where straight ways would stray from those of turning bodies.
+
+        A point at r from the centre strays by r (w h)^2 / 8 in h s; half of the skin is allowed, within MOST_PIECES a step.
+        """
+        stepper, step = self.stepper, context.world.accuracy.step
+        spin = np.linalg.norm(context.state.now.angular_velocity[members], axis=1)
+        stray = float((spin * np.sqrt(stepper.reach[members] / (4.0 * stepper.skin[members]))).max())
+        pieces = min(max(math.ceil(stray * step), 1), MOST_PIECES)
+        left = max(math.ceil((window.end - time) * pieces / step - 1e-6), 1)
+        return window.end if left == 1 else time + (window.end - time) / left
+
+    def _set_up(self, context, members: np.ndarray, time: float, ahead: float) -> None:
         """Put members, in their order, and the immovable bodies near them before the solver."""
         world, order = context.world, self.stepper.rank
         members = members[np.argsort(order[members], kind="stable")]
         fixed = np.flatnonzero(~world.dynamic)
         moving = fixed[world.moving[fixed]]
         bring_all(
-            context.state.course, moving, window.end - ahead, context.state.now, context.state.rotation, context.acceleration,
+            context.state.course, moving, time, context.state.now, context.state.rotation, context.acceleration,
             context.angular_acceleration,
         )  # fmt: skip
         self.stepper.set_up(context, members, fixed, ahead)
@@ -327,7 +347,7 @@ class Heaps:
         """Give the members of a group's heap the courses that the solver found."""
         out, state, time = self._outcome, context.state, group.time
         assert out is not None
-        length = window.end - time
+        length = self._outcome_end - time
         context.recorder.flush_all(state.course, out.members, time)
         _depart(state.course, out.members, time, length, state.now, out.position, out.orientation, out.velocity)
         self._note_calm(context, out, length)

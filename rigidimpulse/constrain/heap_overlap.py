@@ -54,6 +54,8 @@ def _try_faces(geometry, bodies, a, b, p, q, carrier, sign, best, normal):
         if best == -inf or s > best + 1e-12 * abs(best):
             best = s
             normal[:] = n
+        if best > 0.0:
+            break
     return best
 
 
@@ -94,8 +96,10 @@ def _try_edges(geometry, bodies, a, b, p, q, best, normal):
 
 @jit
 def deepest_normal(geometry, bodies, a, b, p, q, normal):
-    """The normal of largest s, into normal (3,); returns s and whether the face, if it is one, is b's."""
+    """The normal of largest s, or any with s > 0, into normal (3,); returns s and whether the face, if it is one, is b's."""
     best = _try_faces(geometry, bodies, a, b, p, q, a, 1.0, -inf, normal)
+    if best > 0.0:
+        return best, False
     of_a = best
     best = _try_faces(geometry, bodies, a, b, p, q, b, -1.0, best, normal)
     of_b = best > of_a

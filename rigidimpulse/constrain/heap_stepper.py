@@ -19,7 +19,7 @@ from rigidimpulse.observe.energy import mechanical_energy
 COLUMN = 20.0
 """Bodies whose weight may press the skin in by PRESSED."""
 PRESSED = 0.25
-LEAST_SUB_STEPS, MOST_SUB_STEPS = 8, 256
+LEAST_SUB_STEPS, MOST_SUB_STEPS = 16, 256
 """Sub-steps in a whole step."""
 
 
