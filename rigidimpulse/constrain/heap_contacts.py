@@ -11,6 +11,8 @@ within the skin, touching ones after a slide of SLIDE of the smaller body's inne
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
 from rigidimpulse._jit import jit
@@ -38,9 +40,9 @@ from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
 
 SHRINK = 1.5 * TOLERANCES.skin
 """Part of their lengths by which convex bodies are shrunk for the contact kernels."""
-SLIDE, TURN = 0.02, 0.03
+SLIDE, TURN = 0.04, 0.03
 """Part of the inner radius, and rad, after which touching pairs are looked at again."""
-AHEAD, FARTHEST = 0.1, 1.0
+AHEAD, FARTHEST = 0.2, 1.0
 """Contacts are looked for at least and at most that many inner radii away."""
 POINTS = np.int64(4)
 """Contacts kept of one normal, beside the deepest."""
@@ -238,13 +240,13 @@ def _shrunk_by(geometry, bodies, factor, a, b, p, q, n):
 
 @jit
 def store_contacts(
-    geometry, shape, material, coefficients, convex, bodies, pairs, places, margin, inner, skin, factor, real, integer, count, body, rows,
+    geometry, shape, material, coefficients, convex, bodies, pairs, places, margin, radius, inner, skin, factor, real, integer, count, body, rows,
     ids, used,
 ):  # fmt: skip
     """Put the contacts found for the pairs at `places` into rows from `used` on, with the impulses of those they replace.
 
     real, integer: `count` contacts in the order of the places, `integer[:, :2]` as in the scene, `body` (l,) their indices there;
-    shape, material, convex (polyhedra), inner, skin, factor by body number. Returns the rows used.
+    shape, material, convex (polyhedra), radius (about the centre of mass), inner, skin, factor by body number. Returns the rows used.
     """
     c = np.int64(0)
     deep, deep_ids, one = np.empty((8, 10)), np.empty((8, 3), np.int64), np.ones(factor.shape[0])
@@ -278,7 +280,11 @@ def store_contacts(
             _hand_over(rows, ids, pairs.start[p], pairs.start[p] + pairs.count[p], new, used, NEAR * size)
             pairs.start[p], pairs.count[p] = new, used - new
         allowed = margin[k] - min(skin[a], skin[b])
-        pairs.expires[p] = bodies.travel[a] + bodies.travel[b] + allowed
-        pairs.slide[p] = min(allowed, max(SLIDE * size, nearest))
+        if pairs.count[p] == 0:
+            between = bodies.position[b] - bodies.position[a]
+            apart = sqrt(between[0] ** 2 + between[1] ** 2 + between[2] ** 2) - radius[a] - radius[b] - min(skin[a], skin[b])
+            pairs.slide[p] = max(allowed, apart)
+        else:
+            pairs.slide[p] = min(allowed, max(SLIDE * size, nearest))
         pairs.turn[p] = TURN
     return used

@@ -35,8 +35,6 @@ class HeapBodies(NamedTuple):
     inertia: np.ndarray  # (l, 3) principal
     gravity: np.ndarray  # (l, 3) m/s2
     reach: np.ndarray  # (l,) m, radius about the centre of mass; 0 for balls about it and for half spaces
-    travel: np.ndarray  # (l,) m, how far any of its points may have come since the start of the run
-    pace: np.ndarray  # (l,) m, how far its points may come in the next sub-step, from what they came in the last
     path: np.ndarray  # (l,) m, how far its centre may still come until it may meet bodies that are not in its pairs
     loose: np.ndarray  # (l,) bool, no contact pushed it in this sub-step
 
@@ -50,9 +48,8 @@ class HeapPairs(NamedTuple):
     round: np.ndarray  # (k,) bool, one of the two is a ball: its turning changes no contact
     start: np.ndarray  # (k,) first row
     count: np.ndarray  # (k,) rows
-    expires: np.ndarray  # (k,) m, sum of both bodies' travel at which a pair without rows is looked at again; -inf: now
-    slide: np.ndarray  # (k,) m, how far a pair with rows may move until it is looked at again
-    turn: np.ndarray  # (k,) rad, the same for rotation
+    slide: np.ndarray  # (k,) m, how far the points of the pair may move past each other until it is looked at again
+    turn: np.ndarray  # (k,) rad, the same for the rotation of a pair with rows
 
 
 @jit

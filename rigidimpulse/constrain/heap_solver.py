@@ -298,8 +298,6 @@ def _move(bodies, h):
         speed = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
         spin = sqrt(v[3] * v[3] + v[4] * v[4] + v[5] * v[5])
         bodies.path[i] -= h * speed
-        bodies.pace[i] = h * (speed + bodies.reach[i] * spin)
-        bodies.travel[i] += bodies.pace[i]
         if spin > 0.0:
             _turn_freely(bodies, i, h)
 
@@ -323,16 +321,11 @@ def outgrown(bodies, h):
 
 
 @jit
-def stale_pairs(bodies, pairs, places):
+def stale_pairs(pairs, places):
     """Write the places of the pairs whose contacts must be looked at before the next sub-step; returns their number."""
     count = 0
     for p in range(pairs.first.shape[0]):
-        if pairs.count[p] > 0:
-            stale = pairs.slide[p] <= 0.0 or pairs.turn[p] < 0.0
-        else:
-            a, b = pairs.first[p], pairs.second[p]
-            stale = bodies.travel[a] + bodies.travel[b] + bodies.pace[a] + bodies.pace[b] > pairs.expires[p]
-        if stale:
+        if pairs.slide[p] <= 0.0 or (pairs.count[p] > 0 and pairs.turn[p] < 0.0):
             places[count] = p
             count += 1
     return count
@@ -340,14 +333,13 @@ def stale_pairs(bodies, pairs, places):
 
 @jit
 def _age(bodies, pairs, h):
-    """Take the motion of the coming sub-step from what the pairs with rows have left."""
+    """Take the motion of the coming sub-step from what the pairs have left; those that have not enough for another get nothing."""
     for p in range(pairs.first.shape[0]):
-        if pairs.count[p] > 0:
-            speed, spin = pair_speeds(bodies, pairs, p)
-            pairs.slide[p] -= h * speed
-            if pairs.slide[p] < h * speed:
-                pairs.slide[p] = 0.0
-            pairs.turn[p] -= h * spin
+        speed, spin = pair_speeds(bodies, pairs, p)
+        pairs.slide[p] -= h * speed
+        if pairs.slide[p] < h * speed:
+            pairs.slide[p] = 0.0
+        pairs.turn[p] -= h * spin
 
 
 @jit
@@ -365,7 +357,7 @@ def advance(bodies, pairs, rows, most, h, soft, places):
         _place(bodies, pairs, rows)
         work += _solve(bodies, pairs, rows, h, soft, relaxing)
         done += 1
-        if done < most and (outgrown(bodies, h) or stale_pairs(bodies, pairs, places) > 0):
+        if done < most and (outgrown(bodies, h) or stale_pairs(pairs, places) > 0):
             break
     return done, work
 

@@ -60,7 +60,6 @@ class HeapStepper:
         self._taken_off = np.zeros(n)
         self._taken_off[lost] = (1.0 - self.factor[lost]) * world.bound_radius[lost]
         self.reach = np.where(world.ball | ~np.isfinite(world.bound_radius), 0.0, world.bound_radius)
-        self.travel = np.zeros(n)
         self.table = HeapTable()
         self._n = n
 
@@ -121,8 +120,8 @@ class HeapStepper:
         self.bodies = HeapBodies(
             position=now.position[body].copy(), orientation=now.orientation[body].copy(), rotation=np.zeros((len(body), 3, 3)),
             velocity=np.hstack([now.velocity[body], now.angular_velocity[body]]), mass=mass, inertia=world.inertia[body].copy(),
-            gravity=np.where(movable[:, None], context.acceleration[body], 0.0), reach=self.reach[body], travel=self.travel[body],
-            pace=np.zeros(len(body)), path=np.full(len(body), np.inf), loose=np.zeros(len(body), bool),
+            gravity=np.where(movable[:, None], context.acceleration[body], 0.0), reach=self.reach[body],
+            path=np.full(len(body), np.inf), loose=np.zeros(len(body), bool),
         )  # fmt: skip
         set_poses(self.bodies)
         self._number = np.full(self._n, -1, np.int64)
@@ -155,7 +154,7 @@ class HeapStepper:
         ball, endless = (self.bodies.reach == 0.0) & free, (self.bodies.reach == 0.0) & ~free
         self.pairs = HeapPairs(
             first, second, ball[first] | endless[second], ball[first] | ball[second], table.start[self.place], table.count[self.place],
-            table.expires[self.place], table.slide[self.place], table.turn[self.place],
+            table.slide[self.place], table.turn[self.place],
         )  # fmt: skip
         self._places = np.empty(len(first), np.int64)
 
@@ -163,13 +162,13 @@ class HeapStepper:
         """Put what the kernels changed of pairs into the table."""
         pairs = getattr(self, "pairs", None)
         if pairs is not None:
-            for name in ("start", "count", "expires", "slide", "turn"):
+            for name in ("start", "count", "slide", "turn"):
                 getattr(self.table, name)[self.place] = getattr(pairs, name)
 
     def _look(self, context) -> None:
         """Look again at the contacts of pairs that may have others by now."""
         bodies, pairs, table, world = self.bodies, self.pairs, self.table, self.world
-        count = stale_pairs(bodies, pairs, self._places)
+        count = stale_pairs(pairs, self._places)
         if not count:
             return
         places = self._places[:count].copy()
@@ -197,7 +196,7 @@ class HeapStepper:
         pairs.start[:] = table.start[self.place]
         table.used = store_contacts(
             world.geometry, world.shape_of_body[body], world.material_of_body[body], world.coefficients, self.convex[body], bodies, pairs,
-            places, margin, inner, skin, self.factor[body], context.contact_real, context.contact_int, found, body, table.rows, table.ids,
+            places, margin, world.bound_radius[body], inner, skin, self.factor[body], context.contact_real, context.contact_int, found, body, table.rows, table.ids,
             table.used,
         )  # fmt: skip
 
@@ -221,7 +220,6 @@ class HeapStepper:
         strength = float(np.linalg.norm(bodies.gravity, axis=1).max())
         work += rebound(bodies, self.pairs, self.table.rows, strength)
         self._write_back()
-        self.travel[self.body] = bodies.travel
         at = self._number[self.members]
         outcome = Outcome(self.members, bodies.position[at], bodies.orientation[at], bodies.velocity[at])
         self._limit_energy(context, outcome, work)

@@ -14,7 +14,7 @@ class HeapTable:
 
     Attributes:
         key: (k,) ascending: number of the first body times the number of bodies plus that of the second.
-        start, count: (k,) rows of each pair. expires, slide, turn: (k,), see `HeapPairs`.
+        start, count: (k,) rows of each pair. slide, turn: (k,), see `HeapPairs`.
         rows: (P, ROW_SIZE) and ids: (P, 3) kind and features of each. used: rows in use.
 
     """
@@ -23,7 +23,7 @@ class HeapTable:
         """Nothing."""
         self.key = np.zeros(0, np.int64)
         self.start, self.count = np.zeros(0, np.int64), np.zeros(0, np.int64)
-        self.expires, self.slide, self.turn = np.zeros(0), np.zeros(0), np.zeros(0)
+        self.slide, self.turn = np.zeros(0), np.zeros(0)
         self.rows, self.ids = np.zeros((FIRST_ROWS, ROW_SIZE)), np.zeros((FIRST_ROWS, 3), np.int64)
         self.used = 0
 
@@ -35,7 +35,7 @@ class HeapTable:
             known = self.key[at] == every
         else:
             at, known = np.zeros(len(every), np.int64), np.zeros(len(every), bool)
-        for name, new in (("start", 0), ("count", 0), ("expires", -np.inf), ("slide", 0.0), ("turn", 0.0)):
+        for name, new in (("start", 0), ("count", 0), ("slide", 0.0), ("turn", 0.0)):
             old = getattr(self, name)
             fresh = np.full(len(every), new, old.dtype)
             fresh[known] = old[at[known]]
