@@ -25,7 +25,7 @@ from rigidimpulse.observe.energy import mechanical_energy
 from rigidimpulse.plan import Bound, Skip
 from rigidimpulse.rotation import product
 
-CALM, REST = 0.02, 3.0
+CALM, REST = 0.003, 3.0
 MOST_PIECES = 4
 """Parts of a step at most, between which a heap's courses begin anew."""
 TOUCHES = 5.0

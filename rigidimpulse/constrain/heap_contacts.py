@@ -18,6 +18,7 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.heap_overlap import FLUSH, deepest_normal, gap_along, overlap_contacts, support
 from rigidimpulse.constrain.heap_rows import (
+    APPROACH,
     CORE_A,
     CORE_B,
     DYNAMIC_FRICTION,
@@ -160,6 +161,18 @@ def _write(geometry, shape, coefficients, bodies, factor, skin, a, b, real, row)
 
 
 @jit
+def _approach(bodies, a, b, row):
+    """u.n of a new row, m/s."""
+    va, vb = bodies.velocity[a], bodies.velocity[b]
+    xa, ya, za = turned_row(bodies.rotation[a], row, CORE_A)
+    xb, yb, zb = turned_row(bodies.rotation[b], row, CORE_B)
+    x = (vb[0] + vb[4] * zb - vb[5] * yb) - (va[0] + va[4] * za - va[5] * ya)
+    y = (vb[1] + vb[5] * xb - vb[3] * zb) - (va[1] + va[5] * xa - va[3] * za)
+    z = (vb[2] + vb[3] * yb - vb[4] * xb) - (va[2] + va[3] * ya - va[4] * xa)
+    return x * row[0] + y * row[1] + z * row[2]
+
+
+@jit
 def _hand_over(rows, ids, old, old_end, new, new_end, near):
     """Give new rows the impulses of the old ones of the same features, else of one nearby with much the same normal."""
     taken = np.zeros(old_end - old, np.bool_)
@@ -168,7 +181,7 @@ def _hand_over(rows, ids, old, old_end, new, new_end, near):
             if rows[c, IMPULSE] > 0.0:
                 continue
             for o in range(old, old_end):
-                if taken[o - old] or rows[o, IMPULSE] == 0.0:
+                if taken[o - old]:
                     continue
                 cosine = rows[c, 0] * rows[o, 0] + rows[c, 1] * rows[o, 1] + rows[c, 2] * rows[o, 2]
                 same = ids[c, 0] == ids[o, 0] and ids[c, 1] == ids[o, 1] and ids[c, 2] == ids[o, 2]
@@ -179,6 +192,7 @@ def _hand_over(rows, ids, old, old_end, new, new_end, near):
                 if not same or cosine < 0.9:
                     continue
                 taken[o - old] = True
+                rows[c, APPROACH] = rows[o, APPROACH]
                 rows[c, IMPULSE] = rows[o, IMPULSE]
                 along = 0.0
                 for k in range(3):
@@ -269,6 +283,7 @@ def store_contacts(
                 at = first + s
                 _write(geometry, shape, coefficients[material[a], material[b]], bodies, factor, skin, a, b, real[at], rows[used])
                 ids[used] = integer[at, 2:]
+            rows[used, APPROACH] = _approach(bodies, a, b, rows[used])
             if rows[used, SEPARATION] <= margin[k]:
                 nearest = min(nearest, rows[used, SEPARATION] + rows[used, SKIN])
                 used += 1

@@ -20,8 +20,8 @@ NORMAL, ARM_A, ARM_B, CORE_A, CORE_B, ROUND_A, ROUND_B = 0, 3, 6, 9, 12, 15, 16
 of their bodies, and the radii of the rounded surfaces around them, m."""
 MASS_N, MASS_T, IMPULSE, FRICTION, STATIC_FRICTION, DYNAMIC_FRICTION, RESTITUTION = 17, 18, 19, 20, 23, 24, 25
 """Offsets in a row: effective masses, kg; normal impulse, N s; friction impulse (3), N s; coefficients."""
-APPROACH, LARGEST, SEPARATION, SKIN, ROW_SIZE = 26, 27, 28, 29, 30
-"""Offsets in a row: u.n at the start of the step, m/s; largest normal impulse in it; gap less the skin, m; skin, m."""
+APPROACH, SEPARATION, SKIN, ROW_SIZE = 26, 27, 28, 29
+"""Offsets in a row: u.n when it was first seen in the step, m/s, 0 after a rebound; gap less the skin, m; skin, m."""
 
 
 class HeapBodies(NamedTuple):

@@ -16,7 +16,7 @@ from the sub-step before (a warm start):
 w = 2 pi F / h is the frequency of the spring, z its damping ratio, a_1 = 2 z + h w, a_2 = h w a_1, a_3 = 1 / (1 + a_2); twice
 w against what cannot be moved. Rows are visited in the order of the pairs (Gauss-Seidel). Separations and arms are
 those of points fixed in the bodies, anew in every sub-step; radii are taken along the normal, so that balls roll.
-After the last sub-step contacts that came in at u_n < -sqrt(2 g skin) / e and were pushed leave at -e u_n. The
+At the end of a sub-step contacts that were seen at u_n < -sqrt(2 g skin) / e and are closed by now leave at -e u_n. The
 torque-free part of rotation keeps the angular momentum: w <- I(q')^-1 I(q) w, with q' from the spin at mid-way.
 
 Method: Macklin et al., Small steps in physics simulation, 2019; the relaxing pass and restitution after E. Catto, Solver2D
@@ -37,7 +37,6 @@ from rigidimpulse.constrain.heap_rows import (
     DYNAMIC_FRICTION,
     FRICTION,
     IMPULSE,
-    LARGEST,
     MASS_N,
     MASS_T,
     RESTITUTION,
@@ -120,6 +119,7 @@ def _place(bodies, pairs, rows):
             continue
         a, b = pairs.first[p], pairs.second[p]
         ra, rb = bodies.rotation[a], bodies.rotation[b]
+        both = bodies.mass[a, 0] > 0.0 and bodies.mass[b, 0] > 0.0
         dx = bodies.position[b, 0] - bodies.position[a, 0]
         dy = bodies.position[b, 1] - bodies.position[a, 1]
         dz = bodies.position[b, 2] - bodies.position[a, 2]
@@ -133,8 +133,11 @@ def _place(bodies, pairs, rows):
                 _turn_normal(row, x, y, z)
             nx, ny, nz = row[0], row[1], row[2]
             row[SEPARATION] = (x * nx + y * ny + z * nz) - (round_a + round_b) - row[SKIN]
-            row[ARM_A], row[ARM_A + 1], row[ARM_A + 2] = ax + round_a * nx, ay + round_a * ny, az + round_a * nz
-            row[ARM_B], row[ARM_B + 1], row[ARM_B + 2] = bx - round_b * nx, by - round_b * ny, bz - round_b * nz
+            # Half of the gap to each of two movable bodies, so that no torque is left over; else to the surface, so that balls roll.
+            half = 0.5 * (row[SEPARATION] + row[SKIN]) if both else 0.0
+            to_a, to_b = round_a + half, round_b + half
+            row[ARM_A], row[ARM_A + 1], row[ARM_A + 2] = ax + to_a * nx, ay + to_a * ny, az + to_a * nz
+            row[ARM_B], row[ARM_B + 1], row[ARM_B + 2] = bx - to_b * nx, by - to_b * ny, bz - to_b * nz
 
 
 @jit
@@ -205,9 +208,9 @@ def _warm_start(bodies, pairs, rows):
 
 
 @jit
-def _friction(row, ux, uy, uz, un):
-    """The change of the friction impulse of a row with slip velocity u; the row is updated."""
-    limit, m = row[IMPULSE], row[MASS_T]
+def _friction(row, ux, uy, uz, un, limit):
+    """The change of the friction impulse of a row with slip velocity u and the normal impulse `limit`; the row is updated."""
+    m = row[MASS_T]
     x = row[FRICTION] - m * (ux - un * row[0])
     y = row[FRICTION + 1] - m * (uy - un * row[1])
     z = row[FRICTION + 2] - m * (uz - un * row[2])
@@ -218,6 +221,15 @@ def _friction(row, ux, uy, uz, un):
     dx, dy, dz = x - row[FRICTION], y - row[FRICTION + 1], z - row[FRICTION + 2]
     row[FRICTION], row[FRICTION + 1], row[FRICTION + 2] = x, y, z
     return dx, dy, dz
+
+
+@jit
+def _rub(bodies, a, b, row, limit):
+    """Friction of a row for the normal impulse `limit`; returns the supports' work."""
+    ux, uy, uz = _slip_velocity(bodies.velocity[a], bodies.velocity[b], row)
+    un = ux * row[0] + uy * row[1] + uz * row[2]
+    x, y, z = _friction(row, ux, uy, uz, un, limit)
+    return _apply(bodies, a, b, row, x, y, z)
 
 
 @jit
@@ -237,7 +249,7 @@ def _solve(bodies, pairs, rows, h, soft, first_soft):
                 row[FRICTION] = row[FRICTION + 1] = row[FRICTION + 2] = 0.0
                 continue
             if row[STATIC_FRICTION] > 0.0:
-                x, y, z = _friction(row, ux, uy, uz, un)
+                x, y, z = _friction(row, ux, uy, uz, un, old)
                 work += _apply(bodies, a, b, row, x, y, z)
                 ux, uy, uz = _slip_velocity(va, vb, row)
                 un = ux * row[0] + uy * row[1] + uz * row[2]
@@ -248,10 +260,12 @@ def _solve(bodies, pairs, rows, h, soft, first_soft):
                 new = max((1.0 - soft[held, 2]) * old - row[MASS_N] * soft[held, 1] * (un + bias), 0.0)
             row[IMPULSE] = new
             if new > 0.0:
-                row[LARGEST] = max(row[LARGEST], new)
                 bodies.loose[a] = bodies.loose[b] = False
             change = new - old
             work += _apply(bodies, a, b, row, change * row[0], change * row[1], change * row[2])
+            if old == 0.0 and new > 0.0 and row[STATIC_FRICTION] > 0.0:
+                # It closed just now: its friction belongs to this sub-step.
+                work += _rub(bodies, a, b, row, new)
     return work
 
 
@@ -343,7 +357,28 @@ def _age(bodies, pairs, h):
 
 
 @jit
-def advance(bodies, pairs, rows, most, h, soft, places):
+def _rebound(bodies, pairs, rows, gravity):
+    """Give contacts that came in fast and are closed their rebound; gravity: its strength [m/s2]. Returns the supports' work [J]."""
+    work = 0.0
+    for p in range(pairs.first.shape[0]):
+        a, b = pairs.first[p], pairs.second[p]
+        for c in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
+            row = rows[c]
+            target = -row[RESTITUTION] * row[APPROACH]
+            if row[IMPULSE] == 0.0 or target <= sqrt(2.0 * gravity * row[SKIN]):
+                continue
+            ux, uy, uz = _slip_velocity(bodies.velocity[a], bodies.velocity[b], row)
+            change = max(row[MASS_N] * (target - (ux * row[0] + uy * row[1] + uz * row[2])), 0.0)
+            work += _apply(bodies, a, b, row, change * row[0], change * row[1], change * row[2])
+            row[APPROACH] = row[IMPULSE] = row[FRICTION] = row[FRICTION + 1] = row[FRICTION + 2] = 0.0
+            if row[STATIC_FRICTION] > 0.0:
+                work += _rub(bodies, a, b, row, change)
+                row[FRICTION] = row[FRICTION + 1] = row[FRICTION + 2] = 0.0
+    return work
+
+
+@jit
+def advance(bodies, pairs, rows, most, h, soft, gravity, places):
     """Sub-steps of length h, at most `most`, until pairs must be looked at again. Returns their number and the supports' work [J]."""
     done, work = 0, 0.0
     biased, relaxing = np.int64(0), np.int64(2)
@@ -356,6 +391,7 @@ def advance(bodies, pairs, rows, most, h, soft, places):
         _move(bodies, h)
         _place(bodies, pairs, rows)
         work += _solve(bodies, pairs, rows, h, soft, relaxing)
+        work += _rebound(bodies, pairs, rows, gravity)
         done += 1
         if done < most and (outgrown(bodies, h) or stale_pairs(pairs, places) > 0):
             break
@@ -370,25 +406,6 @@ def note_approach(bodies, pairs, rows):
         va, vb = bodies.velocity[pairs.first[p]], bodies.velocity[pairs.second[p]]
         for c in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
             row = rows[c]
-            row[MASS_N] = row[LARGEST] = 0.0
+            row[MASS_N] = 0.0
             ux, uy, uz = _slip_velocity(va, vb, row)
             row[APPROACH] = ux * row[0] + uy * row[1] + uz * row[2]
-
-
-@jit
-def rebound(bodies, pairs, rows, gravity):
-    """Give contacts that came in fast their rebound; gravity: its strength [m/s2]. Returns the supports' work [J]."""
-    work = 0.0
-    for p in range(pairs.first.shape[0]):
-        a, b = pairs.first[p], pairs.second[p]
-        for c in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
-            row = rows[c]
-            target = -row[RESTITUTION] * row[APPROACH]
-            if row[LARGEST] == 0.0 or target <= sqrt(2.0 * gravity * row[SKIN]):
-                continue
-            ux, uy, uz = _slip_velocity(bodies.velocity[a], bodies.velocity[b], row)
-            new = max(row[IMPULSE] - row[MASS_N] * (ux * row[0] + uy * row[1] + uz * row[2] - target), 0.0)
-            change = new - row[IMPULSE]
-            row[IMPULSE] = new
-            work += _apply(bodies, a, b, row, change * row[0], change * row[1], change * row[2])
-    return work

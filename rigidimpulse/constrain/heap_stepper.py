@@ -9,7 +9,7 @@ import numpy as np
 
 from rigidimpulse.constrain.heap_contacts import AHEAD, convex_polyhedra, inner_radii, margins, shrunk_geometry, store_contacts
 from rigidimpulse.constrain.heap_rows import HeapBodies, HeapPairs, set_poses
-from rigidimpulse.constrain.heap_solver import FREQUENCY, advance, note_approach, outgrown, rebound, softness, stale_pairs
+from rigidimpulse.constrain.heap_solver import FREQUENCY, advance, note_approach, outgrown, softness, stale_pairs
 from rigidimpulse.constrain.heap_table import HeapTable
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.broadphase import overlapping_pairs
@@ -208,17 +208,16 @@ class HeapStepper:
         h = length / count
         soft = softness(h)
         note_approach(bodies, self.pairs, self.table.rows)
+        strength = float(np.linalg.norm(bodies.gravity, axis=1).max())
         done, work = 0, 0.0
         while True:
-            some, supplied = advance(bodies, self.pairs, self.table.rows, count - done, h, soft, self._places)
+            some, supplied = advance(bodies, self.pairs, self.table.rows, count - done, h, soft, strength, self._places)
             done, work = done + some, work + supplied
             if done == count:
                 break
             if outgrown(bodies, h):
                 self._find_pairs(context)
             self._look(context)
-        strength = float(np.linalg.norm(bodies.gravity, axis=1).max())
-        work += rebound(bodies, self.pairs, self.table.rows, strength)
         self._write_back()
         at = self._number[self.members]
         outcome = Outcome(self.members, bodies.position[at], bodies.orientation[at], bodies.velocity[at])
