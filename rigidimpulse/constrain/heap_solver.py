@@ -119,7 +119,9 @@ def _place(bodies, pairs, rows):
             continue
         a, b = pairs.first[p], pairs.second[p]
         ra, rb = bodies.rotation[a], bodies.rotation[b]
-        both = bodies.mass[a, 0] > 0.0 and bodies.mass[b, 0] > 0.0
+        # Impulses act at one point, so that no torque is left over: mid-way, or on the surface of what can move, so that it rolls.
+        share = 0.5 if bodies.mass[b, 0] > 0.0 else 1.0
+        share = share if bodies.mass[a, 0] > 0.0 else 0.0
         dx = bodies.position[b, 0] - bodies.position[a, 0]
         dy = bodies.position[b, 1] - bodies.position[a, 1]
         dz = bodies.position[b, 2] - bodies.position[a, 2]
@@ -133,11 +135,11 @@ def _place(bodies, pairs, rows):
                 _turn_normal(row, x, y, z)
             nx, ny, nz = row[0], row[1], row[2]
             row[SEPARATION] = (x * nx + y * ny + z * nz) - (round_a + round_b) - row[SKIN]
-            # Half of the gap to each of two movable bodies, so that no torque is left over; else to the surface, so that balls roll.
-            half = 0.5 * (row[SEPARATION] + row[SKIN]) if both else 0.0
-            to_a, to_b = round_a + half, round_b + half
-            row[ARM_A], row[ARM_A + 1], row[ARM_A + 2] = ax + to_a * nx, ay + to_a * ny, az + to_a * nz
-            row[ARM_B], row[ARM_B + 1], row[ARM_B + 2] = bx - to_b * nx, by - to_b * ny, bz - to_b * nz
+            px, py, pz = ax + round_a * nx, ay + round_a * ny, az + round_a * nz
+            qx, qy, qz = dx + (bx - round_b * nx), dy + (by - round_b * ny), dz + (bz - round_b * nz)
+            ax, ay, az = share * px + (1.0 - share) * qx, share * py + (1.0 - share) * qy, share * pz + (1.0 - share) * qz
+            row[ARM_A], row[ARM_A + 1], row[ARM_A + 2] = ax, ay, az
+            row[ARM_B], row[ARM_B + 1], row[ARM_B + 2] = ax - dx, ay - dy, az - dz
 
 
 @jit
