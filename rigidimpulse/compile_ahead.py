@@ -1,7 +1,7 @@
 """The first run on a machine: compile kernels on two cores.
 
 Numba compiles one kernel at a time in a process. So a second process compiles one half of what a run with contacts needs (motion,
-sweep, contact forces) into the cache on disk, while the first one compiles the other half, and then waits for it.
+sweep, the solver of rows) into the cache on disk, while the first one compiles the other half, and then waits for it.
 """
 
 from __future__ import annotations
@@ -67,35 +67,56 @@ def _contact():
 
 def _respond_and_detect(context) -> None:
     """Impulses first: by then the other process has what moves bodies in the cache, which detection needs too."""
-    from rigidimpulse.constrain.drift import lift_contacts, needs_lift
+    from rigidimpulse.constrain.contact_motion import contact_motion
+    from rigidimpulse.constrain.drift import needs_lift
+    from rigidimpulse.constrain.resting import hold_contacts
+    from rigidimpulse.constrain.rows import change_velocities, changes_of, contact_rows, response_to, row_velocities
     from rigidimpulse.detect.window import Window
+    from rigidimpulse.respond.block import log_block
     from rigidimpulse.respond.response import respond_to_impacts
     from rigidimpulse.respond.restitution import LAWS
     from rigidimpulse.respond.simultaneous import respond_sequential
     from rigidimpulse.simulation import start_courses
 
-    state, one = context.state, np.ones(1)
-    state.now.inv_inertia[1] = np.eye(3)
-    respond_sequential(
-        state.now, _contact(), LAWS["auto"], False, one, 1.0, 1.0, context.column, None, context.impact_log
+    state, world, now, one, contacts = context.state, context.world, context.state.now, np.ones(1), _contact()
+    members = np.array([1])
+    now.inv_inertia[1] = np.eye(3)
+    respond_sequential(now, contacts, LAWS["auto"], False, one, 1.0, 1.0, context.column, None, context.impact_log)
+    rows, first_row, frames = contact_rows(now, contacts, members, context.column, 0)
+    row_velocities(now, contacts, first_row, frames, rows.bias)
+    response_to(rows, 1, rows.impulse)
+    log_block(now, contacts, rows, first_row, frames, np.zeros(1), context.impact_log, 0)
+    change_velocities(now, members, rows)
+    changes_of(now, members, rows)
+    needs_lift(contacts, np.ones(1, bool), one)
+    motion = contact_motion(
+        world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64)
     )
-    needs_lift(_contact(), np.ones(1, bool), one)
-    lift_contacts(state.now, _contact(), np.ones(1, bool), one, context.column)
+    hold_contacts(
+        _leave_unsolved, now, contacts, members, motion.turning, np.zeros(1), context.acceleration, context.angular_acceleration,
+        1.0, 1.0, context.column, np.zeros((1, 3)), context.wrench,
+    )
     start_courses(context)
     window = Window(context, 1.0 / 60.0)
     window.find_pairs()
-    group = window.touching(0.0, np.array([1]))[0]
+    group = window.touching(0.0, members)[0]
     respond_to_impacts(context, group, respond_sequential, LAWS["auto"])
 
 
-def _move_sweep_and_constrain(context) -> None:
-    from rigidimpulse.constrain.resting import hold_contacts, turning_of
+def _leave_unsolved(_rows, _n: int, _target: float) -> float:
+    """In the place of a solver of rows, which the other process compiles."""
+    return 0.0
+
+
+def _move_sweep_and_solve(context) -> None:
+    from rigidimpulse.constrain.newton import solve_newton
+    from rigidimpulse.constrain.rows import make_rows
     from rigidimpulse.detect.touching import bring_all
     from rigidimpulse.detect.window import Window
     from rigidimpulse.simulation import start_courses
     from rigidimpulse.sweep import bisection
 
-    state, world, now = context.state, context.world, context.state.now
+    state, now = context.state, context.state.now
     zero = np.zeros(1)
     start_courses(context)
     context.recorder.start(state.course)
@@ -103,17 +124,10 @@ def _move_sweep_and_constrain(context) -> None:
     bring_all(state.course, np.array([1]), 0.0, now, state.rotation, context.acceleration, context.angular_acceleration)
     context.bring(1, 0.0)
     Window(context, 1.0 / 60.0).change_course(1, 0.0)
+    solve_newton(make_rows.py_func(0), 1, 1.0)
     bisection.sweep(context.detector, state.course, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
-    contacts = _contact()
-    turning = turning_of(
-        world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64)
-    )
-    hold_contacts(
-        now, contacts, np.arange(1), turning, context.acceleration, context.angular_acceleration, 1.0, context.column,
-        np.zeros((1, 3)), context.wrench,
-    )
 
 
 if __name__ == "__main__":
     with _without_garbage_collection():
-        _move_sweep_and_constrain(_box_on_floor(CYLINDERS in sys.argv[1:]))
+        _move_sweep_and_solve(_box_on_floor(CYLINDERS in sys.argv[1:]))

@@ -13,7 +13,7 @@ from rigidimpulse.accuracy import Accuracy
 from rigidimpulse.compile_ahead import compile_kernels
 from rigidimpulse.constrain.contact_forces import ContactForces
 from rigidimpulse.constrain.heap import HeapForces
-from rigidimpulse.constrain.jointed import JointState, reaction_table
+from rigidimpulse.constrain.jointed import reaction_table
 from rigidimpulse.detect.overlap import report_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.detect.window import Window
@@ -86,8 +86,7 @@ def simulate(
             run_steps(context, plan, paths, end, progress)
         else:
             paths.start_segments(context, end)
-    if context.joints is not None:
-        finish_joints(context, context.joints, plan, context.state.time)
+    finish_sub_steps(context, plan, context.state.time)
     if context.heaps is not None:
         context.heaps.close(context, context.state.time)
         plan.tell(HeapForces.name, context.heaps.summary())
@@ -152,11 +151,16 @@ def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, end: float
             progress(context.state.time)
 
 
-def finish_joints(context: StepContext, joints: JointState, plan: Plan, end: float) -> None:
-    """Stop the joints at the end of the run, so that the last frame has the velocities of its instant."""
-    window = Window(context, end)
-    plan.run("detect", context, window)
-    react(context, plan, window, end, joints.moving_bodies(context))
+def finish_sub_steps(context: StepContext, plan: Plan, end: float) -> None:
+    """End the sub-steps of joints and contacts at the end of the run, so that the last frame has the velocities of its instant."""
+    state = context.state
+    bodies = {i for pair in state.pair_force for i in pair if context.world.dynamic[i]}
+    if context.joints is not None:
+        bodies.update(context.joints.moving_bodies(context).tolist())
+    if bodies:
+        window = Window(context, end)
+        plan.run("detect", context, window)
+        react(context, plan, window, end, np.array(sorted(bodies)))
 
 
 def close_stretches(context: StepContext) -> None:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigidimpulse.constrain.arrival import PairForce
+from rigidimpulse.constrain.foresight import Foresight
 from rigidimpulse.constrain.heap import Heaps, why_no_heaps
 from rigidimpulse.constrain.jointed import JointState
 from rigidimpulse.detect.groups import NO_FORCE, note_arrival
@@ -35,6 +37,8 @@ class State:
         under_contact: (n,) bool, bodies whose course carries contact forces. on_rest_of_world: (n,) bool, only of what does not move.
         rebounds: by pair, time and speed of the last rebound and how many in a row were short.
         contact_force: last force of a held contact, in its frame [N], and when it began, by its key (`groups.contact_key`).
+        correction: (n, 6) change of velocity and spin that a body got at the end of its sub-step.
+        pair_force: what acts in the present sub-step between bodies whose contacts turn (`arrival`).
     """
 
     def __init__(self, world: World) -> None:
@@ -51,6 +55,8 @@ class State:
         )
         self.rotation = np.zeros((n, 3, 3))
         self.contact_force: dict[tuple[int, ...], tuple[np.ndarray, float]] = {}
+        self.correction = np.zeros((n, 6))
+        self.pair_force: dict[tuple[int, int], PairForce] = {}
         self.under_contact = np.zeros(n, bool)
         self.rebounds: dict[tuple[int, int], tuple[float, float, int]] = {}
         self.energy_at_start = np.zeros(n)
@@ -94,6 +100,7 @@ class StepContext:
         self.wrench = np.zeros((n, 6))
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
+        self.foresight = Foresight(world)
         self.joints = JointState(world) if world.joints_of_scene else None
         self.heaps = None if why_no_heaps(world) else Heaps(world)
 

@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from rigidimpulse.constrain.arrival import remember_forces
+from rigidimpulse.constrain.contact_motion import Motion, contact_motion
 from rigidimpulse.constrain.drift import lift_contacts, needs_lift
-from rigidimpulse.constrain.resting import CARRIER_A, CARRIER_B, SHARED, hold_contacts, turning_of
+from rigidimpulse.constrain.foresight import ALLOWED
+from rigidimpulse.constrain.newton import solve_newton
+from rigidimpulse.constrain.resting import Held, hold_contacts
 from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.groups import Group, collect, make_group, select
+from rigidimpulse.detect.groups import Group, collect, make_group
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.plan import Bound, Skip
+from rigidimpulse.respond.impulse import select
 
 # Residual of the solver that is reported, relative to the speed gained in the step.
 UNSOLVED = 1e-6
-# Contacts that leave or approach slower than the held ones by this much are held.
-SLACK = 1e-9
-CARRIER_OF_KIND = np.array([CARRIER_B, CARRIER_A, SHARED, SHARED, SHARED, SHARED])
+TURN = 0.01
+"""rad, how far arms and normals of contacts may turn in a sub-step."""
+MOST_SUB_STEPS = 256
+"""Sub-steps in a step."""
+TURN_OF_BODY = 0.1
+"""rad, how far bodies may turn in a sub-step where that matters to gaps."""
+NEGLIGIBLE = 1e-3
+"""Part of what is allowed by which gaps may be off without notice."""
+SHORTEST = 1e-5
+"""Part of a step that is not split."""
+STEADY = 1e-9
+"""rad in a step; what turns less does not."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +59,7 @@ def hold(context, window, group: Group) -> None:
     if group.heap is not None:
         return
     context.wrench[group.members] = 0.0
-    group.held = held_contacts(group)
+    group.held = group.slow()
     if not group.held.any() and not len(group.joints):
         return
     if needs_lift(group.contacts, group.held, group.delta):
@@ -54,24 +69,17 @@ def hold(context, window, group: Group) -> None:
         return
     state, now = context.state, context.state.now
     contacts = select(group.contacts, subset)
-    kinds = np.minimum(group.kinds[subset], len(CARRIER_OF_KIND) - 1)
-    carrier = CARRIER_OF_KIND[kinds]
-    carrier[context.world.half_space[contacts.body_a]] = CARRIER_A
-    carrier[context.world.half_space[contacts.body_b]] = CARRIER_B
-    turning = turning_of(
-        context.world.geometry, context.world.shape_of_body, state.rotation, now, contacts, carrier
+    motion = contact_motion(
+        context.world.geometry, context.world.shape_of_body, state.rotation, now, contacts, group.kinds[subset]
     )
     keys = [group.keys[c] for c in subset]
     force = np.array([state.force_of(key) for key in keys]).reshape(-1, 3)
     before = kinetic_energy(now, context.world, group.members)
-    h = window.end - group.time
+    rest = window.end - group.time
     if len(group.joints):
-        h, residual = context.joints.hold(context, group, contacts, np.arange(len(subset)), turning, force, h)
+        h, residual = context.joints.hold(context, group, contacts, motion.turning, force, rest)
     else:
-        residual = hold_contacts(
-            now, contacts, np.arange(len(subset)), turning, context.acceleration, context.angular_acceleration, h,
-            context.column, force, context.wrench,
-        )
+        h, residual = _hold_turning(context, group, subset, contacts, keys, motion, force, rest)
     context.log.book(group.time, "capture", kinetic_energy(now, context.world, group.members) - before)
     ends = np.concatenate([contacts.body_a, contacts.body_b])
     alone = len(group.members) == 1 and not len(group.joints) and not np.any(context.world.moving[ends])
@@ -86,20 +94,51 @@ def hold(context, window, group: Group) -> None:
     group.rests = _rests(context, group, h)
     if group.rests and len(group.joints):
         context.joints.log_rest(group)
-    if h < window.end - group.time and not group.rests:
+    if h < rest and not group.rests:
         window.wake[group.members] = group.time + h
 
 
-def held_contacts(group: Group) -> np.ndarray:
-    """Contacts that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
-    return np.abs(group.approach) <= group.rest_speed * (1.0 + SLACK) + group.still
+def _hold_turning(
+    context, group: Group, subset, contacts, keys, motion: Motion, force, rest: float
+) -> tuple[float, float]:
+    """Contact forces over a sub-step of at most `rest`; returns its length and the residual."""
+    state, step, delta = context.state, context.world.accuracy.step, group.delta[subset]
+
+    def hold_over(h: float, excess: np.ndarray) -> Held:
+        context.wrench[group.members] = 0.0
+        return hold_contacts(
+            solve_newton, state.now, contacts, group.members, motion.turning, excess, context.acceleration,
+            context.angular_acceleration, h, SHORTEST * step, context.column, force, context.wrench,
+        )
+
+    if motion.fastest * step <= STEADY:
+        held = hold_over(sub_step(motion.fastest, step, rest), np.zeros(len(subset)))
+        return held.length, held.residual
+    excess = contacts.gap - delta
+    held = hold_over(sub_step(motion.fastest, step, rest), excess)
+    error = context.foresight.gap_errors(context, group, contacts, subset, motion, context.wrench, held.length)
+    error[force[:, 0] == 0.0] = 0.0
+    worst = float(np.max(np.abs(error) / (ALLOWED * delta)))
+    if worst > NEGLIGIBLE:
+        spin = float(np.linalg.norm(state.now.angular_velocity[group.members], axis=1).max())
+        share = min(worst ** (-1.0 / 3.0), TURN_OF_BODY / (spin * held.length)) if spin > 0.0 else worst ** (-1.0 / 3.0)
+        share = min(max(share, step / (MOST_SUB_STEPS * held.length)), 1.0)
+        held = hold_over(share * held.length, excess + share**3 * error)
+    remember_forces(state, group.time, keys, contacts, force, held.force, held.slides)
+    return held.length, held.residual
+
+
+def sub_step(rate: float, step: float, rest: float) -> float:
+    """Length of the next sub-step [s], where arms turn at `rate` [rad/s] and the rest of the step is left."""
+    piece = step / min(max(math.ceil(rate * step / TURN), 1), MOST_SUB_STEPS)
+    return piece if rest > piece * (1.0 + SHORTEST) else max(rest, SHORTEST * step)
 
 
 def _lift(context, window, group: Group) -> None:
     """Bring sunken contacts back to their gap and look at the group's contacts again."""
     state, now = context.state, context.state.now
     before = mechanical_energy(now, context.world, group.members)
-    lift_contacts(now, group.contacts, group.held, group.delta, context.column)
+    lift_contacts(now, group.contacts, group.held, group.delta, group.members, context.column)
     refresh_pose(group.members, now, state.rotation, state.course.inertia)
     context.log.book(group.time, "lift", mechanical_energy(now, context.world, group.members) - before)
     group.moved = True
@@ -112,7 +151,7 @@ def _lift(context, window, group: Group) -> None:
     for name in ("contacts", "place", "kinds", "keys", "delta", "approach", "rest_speed", "live"):
         setattr(group, name, getattr(again, name))
     context.acceleration[group.members], context.angular_acceleration[group.members] = acceleration, angular
-    group.held = held_contacts(group)
+    group.held = group.slow()
 
 
 def _rests(context, group: Group, h: float) -> bool:

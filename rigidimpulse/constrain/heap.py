@@ -26,6 +26,8 @@ from rigidimpulse.plan import Bound, Skip
 from rigidimpulse.rotation import product
 
 CALM, REST = 0.003, 3.0
+LEAVING = 0.1
+"""Part of its speed at which a fast body must leave a heap that it has hit to be no part of it."""
 MOST_PIECES = 4
 """Parts of a step at most, between which a heap's courses begin anew."""
 TOUCHES = 5.0
@@ -295,7 +297,8 @@ class Heaps:
     def step(self, context, window, group: Group) -> None:
         """Step the heap of a group from its time to the end of the window, with what touches it and is slow."""
         world = context.world
-        near = group.members[self._slow(context, group.members) & ~self._jointed[group.members]]
+        stays = self._slow(context, group.members) | ~self._leaves(context, group)
+        near = group.members[stays & ~self._jointed[group.members]]
         members = np.union1d(group.heap, near)
         label = int(self.label[group.heap].max())
         self.label[np.setdiff1d(members, group.heap)] = label
@@ -331,6 +334,14 @@ class Heaps:
         left = max(math.ceil((window.end - time) * pieces / step - 1e-6), 1)
         return window.end if left == 1 else time + (window.end - time) / left
 
+    def _leaves(self, context, group: Group) -> np.ndarray:
+        """Which members (k,) bool leave all that they touch at a speed worth the name."""
+        slowest = np.full(context.world.num_bodies, np.inf)
+        np.minimum.at(slowest, group.contacts.body_a, group.approach)
+        np.minimum.at(slowest, group.contacts.body_b, group.approach)
+        speed = np.linalg.norm(context.state.now.velocity[group.members], axis=1)
+        return slowest[group.members] > LEAVING * speed
+
     def _set_up(self, context, members: np.ndarray, time: float, ahead: float) -> None:
         """Put members, in their order, and the immovable bodies near them before the solver."""
         world, order = context.world, self.stepper.rank
@@ -350,6 +361,7 @@ class Heaps:
         length = self._outcome_end - time
         context.recorder.flush_all(state.course, out.members, time)
         _depart(state.course, out.members, time, length, state.now, out.position, out.orientation, out.velocity)
+        state.correction[out.members] = 0.0
         self._note_calm(context, out, length)
         window.change_courses(out.members, time)
 

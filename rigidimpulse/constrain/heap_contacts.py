@@ -34,7 +34,8 @@ from rigidimpulse.constrain.heap_rows import (
     pair_speeds,
     turned_row,
 )
-from rigidimpulse.constrain.resting import _rounding as rounding_of
+from rigidimpulse.constrain.contact_motion import _radius as rounding
+from rigidimpulse.constrain.contact_motion import _single as single
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.manifold import reduce_contacts
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
@@ -142,7 +143,8 @@ def _write(geometry, shape, coefficients, bodies, factor, skin, a, b, real, row)
     """A new row of the contact `real` (10,) of bodies a and b, without impulse, and its separation."""
     n = real[6:9]
     ra, rb = bodies.rotation[a], bodies.rotation[b]
-    round_a, round_b = rounding_of(geometry, shape[a], ra, n), rounding_of(geometry, shape[b], rb, n)
+    round_a = rounding(geometry, single(geometry, shape[a]), ra, n)
+    round_b = rounding(geometry, single(geometry, shape[b]), rb, n)
     arm_a, arm_b = np.empty(3), np.empty(3)
     row[:] = 0.0
     separation = 0.0

@@ -19,24 +19,26 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.joint_rows import is_linear, joint_rows, joint_values, relative_point_velocity
 from rigidimpulse.constrain.newton import row_weights, solve_newton
-from rigidimpulse.constrain.resting import fill_contact_bias, solve_with_slip, start_contact_impulses
+from rigidimpulse.constrain.resting import SLIP, fill_contact_bias, start_contact_impulses
 from rigidimpulse.constrain.rows import (
     BOUNDED,
     FREE,
+    change_velocities,
     contact_rows,
-    count_contact_rows,
     make_rows,
+    move_bodies,
     multiply,
     multiply_transposed,
     rows_of,
-    scaled_change,
     scaled_wrench,
+    solve_with_slip,
 )
 from rigidimpulse.constrain.softness import end_rate, soft_row
 from rigidimpulse.integrate.course import FORCED, Course, begin, make_course, pose_at
-from rigidimpulse.rotation import quaternion_exp, quaternion_multiply, quaternion_to_matrix
+from rigidimpulse.rotation import quaternion_to_matrix, to_matrix
 
 MAX_ROUNDS = 20
+CLOSING_PASSES = 4
 # Residual asked of the solver, and of closing, relative to the speed gained in the sub-step.
 SOLVE_TOLERANCE = 1e-12
 TINY = 1e-300
@@ -84,16 +86,22 @@ def count_joint_rows(joints, which):
     return count
 
 
-@jit
-def stop_joints(joints, which, bodies, rotation, members, number, memory, elapsed, moment):
+def stop_joints(joints, which, bodies, rotation, members, number, memory: JointMemory, elapsed, moment) -> None:
     """End of a sub-step: the impulses nu.
 
-    memory: `JointMemory`; elapsed (j,): length of the sub-step that ends, s. moment (j, 3): the impulse on b of each
-    joint is added, N s.
+    elapsed (j,): length of the sub-step that ends, s. moment (j, 3): the impulse on b of each joint is added, N s.
     """
+    rows, direction, scale = _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed)
+    solve_newton(rows, len(members), SOLVE_TOLERANCE * scale)
+    change_velocities(bodies, members, rows)
+    _add_moments(joints, which, rows, 0, direction, moment)
+
+
+@jit
+def _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed):
+    """Rows of the impulses nu, their directions (s, 3) and the largest speed to stop."""
     count = count_joint_rows(joints, which)
-    n = members.shape[0]
-    for k in range(n):
+    for k in range(members.shape[0]):
         number[members[k]] = k
     rows, value, direction, u = make_rows(count), np.empty(count), np.empty((count, 3)), np.empty(count)
     joint_rows(joints, which, bodies, rotation, number, memory.angle, rows, np.int64(0), value, direction)
@@ -118,20 +126,7 @@ def stop_joints(joints, which, bodies, rotation, members, number, memory, elapse
                 rows.upper[i] = np.inf if joints.upper[k] > 0.0 else 0.0
             scale = max(scale, abs(rows.bias[i]))
             i += 1
-    solve_newton(rows, n, SOLVE_TOLERANCE * scale)
-    y = np.empty((n, 6))
-    multiply_transposed(rows, rows.impulse, y)
-    _change_velocities(bodies, members, y)
-    _add_moments(joints, which, rows, np.int64(0), direction, moment)
-
-
-@jit
-def _change_velocities(bodies, members, y):
-    linear, angular = np.empty(3), np.empty(3)
-    for k in range(members.shape[0]):
-        scaled_change(bodies, members[k], y[k], linear, angular)
-        bodies.velocity[members[k]] += linear
-        bodies.angular_velocity[members[k]] += angular
+    return rows, direction, scale
 
 
 @jit
@@ -146,46 +141,44 @@ def _add_moments(joints, which, rows, start, direction, moment):
             i += 1
 
 
-@jit
-def close_joints(joints, which, bodies, rotation, members, number, angle, allowed):
+def close_joints(joints, which, bodies, rotation, members, number, angle, allowed: float) -> bool:
     """Bring the joints' coordinates back to their targets by the least displacement in the metric of mass.
 
     Done only where one is off by more than `allowed` [m or rad]; returns whether bodies were moved.
     """
-    count = count_joint_rows(joints, which)
-    n = members.shape[0]
-    for k in range(n):
-        number[members[k]] = k
     moved = False
-    y, shift, turn, q = np.empty((n, 6)), np.empty(3), np.empty(3), np.empty(4)
-    for _ in range(4):
-        rows, value, direction = make_rows(count), np.empty(count), np.empty((count, 3))
-        joint_rows(joints, which, bodies, rotation, number, angle, rows, np.int64(0), value, direction)
-        worst, i = 0.0, 0
-        for j in which:
-            for k in range(joints.first[j], joints.first[j + 1]):
-                rows.bias[i], rows.lower[i], rows.upper[i] = value[i], joints.lower[k], joints.upper[k]
-                if joints.stiffness[k] < np.inf:
-                    rows.kind[i] = BOUNDED
-                    rows.lower[i] = rows.upper[i] = 0.0
-                elif joints.lower[k] < 0.0 and (joints.upper[k] > 0.0 or value[i] > 0.0):
-                    worst = max(worst, abs(value[i]))
-                elif joints.upper[k] > 0.0 and value[i] < 0.0:
-                    worst = max(worst, abs(value[i]))
-                i += 1
+    for _ in range(CLOSING_PASSES):
+        rows, worst = _closing_rows(joints, which, bodies, rotation, members, number, angle)
         if worst <= allowed:
             break
         moved = True
-        solve_newton(rows, n, 1e-3 * allowed)
-        multiply_transposed(rows, rows.impulse, y)
-        for k in range(n):
-            i = members[k]
-            scaled_change(bodies, i, y[k], shift, turn)
-            bodies.position[i] += shift
-            quaternion_exp(turn, q)
-            quaternion_multiply(q, bodies.orientation[i].copy(), bodies.orientation[i])
-            quaternion_to_matrix(bodies.orientation[i], rotation[i])
+        solve_newton(rows, len(members), 1e-3 * allowed)
+        move_bodies(bodies, members, rows)
+        rotation[members] = to_matrix(bodies.orientation[members])
     return moved
+
+
+@jit
+def _closing_rows(joints, which, bodies, rotation, members, number, angle):
+    """Rows of the displacement that closes the joints, and the worst error of a coordinate."""
+    count = count_joint_rows(joints, which)
+    for k in range(members.shape[0]):
+        number[members[k]] = k
+    rows, value, direction = make_rows(count), np.empty(count), np.empty((count, 3))
+    joint_rows(joints, which, bodies, rotation, number, angle, rows, np.int64(0), value, direction)
+    worst, i = 0.0, 0
+    for j in which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            rows.bias[i], rows.lower[i], rows.upper[i] = value[i], joints.lower[k], joints.upper[k]
+            if joints.stiffness[k] < np.inf:
+                rows.kind[i] = BOUNDED
+                rows.lower[i] = rows.upper[i] = 0.0
+            elif joints.lower[k] < 0.0 and (joints.upper[k] > 0.0 or value[i] > 0.0):
+                worst = max(worst, abs(value[i]))
+            elif joints.upper[k] > 0.0 and value[i] < 0.0:
+                worst = max(worst, abs(value[i]))
+            i += 1
+    return rows, worst
 
 
 @jit
@@ -204,62 +197,83 @@ def _end_values(joints, which, bodies, acceleration, members, wrench, h, memory,
     joint_values(joints, which, memory.end_position, memory.end_rotation, memory.angle, value)
 
 
-@jit
 def hold_jointed(
-    bodies, contacts, subset, turning, acceleration, angular_acceleration, h, members, number, force, joints, which,
-    rotation, memory, allowed, wrench, moment,
-):
+    solve, bodies, contacts, turning, acceleration, angular_acceleration, h: float, members, number, force, joints, which,
+    rotation, memory: JointMemory, allowed: float, wrench, moment,
+) -> tuple[float, float]:
     """Forces of joints and lasting contacts over a sub-step of length h.
 
-    As `resting.hold_contacts`, with joints listed in `which`; memory: `JointMemory`; allowed: closing error, m or rad;
-    moment (j, 3): half of the joints' impulses on b is added. Returns (residual relative to the speed gained, worst
-    closing error).
+    As `resting.hold_contacts`, with joints listed in `which`; allowed: closing error, m or rad; moment (j, 3): half of the
+    joints' impulses on b is added. Returns (residual relative to the speed gained, worst closing error).
     """
-    n, m = members.shape[0], subset.shape[0]
-    for k in range(n):
-        number[members[k]] = k
-    count, start = count_joint_rows(joints, which), count_contact_rows(contacts, subset)
-    rows = make_rows(start + count)
-    first_row, frames, slides = np.empty(m, np.int64), np.empty((m, 3, 3)), np.zeros(m, np.bool_)
-    contact_rows(bodies, contacts, subset, number, rows, first_row, frames)
-    value, direction, beta = np.empty(count), np.empty((count, 3)), np.zeros(count)
-    joint_rows(joints, which, bodies, rotation, number, memory.angle, rows, start, value, direction)
+    n, count = len(members), count_joint_rows(joints, which)
+    rows, first_row, frames = contact_rows(bodies, contacts, members, number, count)
+    start = len(rows.bias) - count
     start_contact_impulses(rows, first_row, force, h)
-    _start_joint_rows(joints, which, bodies, rotation, memory, value, direction, h, rows, start, beta)
-    scale = fill_contact_bias(
-        bodies, contacts, subset, frames, turning, acceleration, angular_acceleration, h, rows, first_row, slides
+    direction, beta = _start_joint_rows(joints, which, bodies, rotation, number, memory, h, rows, start)
+    level = np.zeros(len(first_row))
+    scale, u = fill_contact_bias(
+        bodies, contacts, frames, turning, level, acceleration, angular_acceleration, h, rows, first_row
     )
-    for i in members:
-        scale = max(scale, h * np.sqrt(np.sum(acceleration[i] ** 2)))
-    y, u = np.empty((n, 6)), np.empty(start + count)
+    slides = np.abs(u[:, 1]) + np.abs(u[:, 2]) > SLIP * scale
+    scale = max(scale, h * float(np.sqrt(np.max(np.sum(acceleration[members] ** 2, axis=1)))))
     residual = worst = 0.0
     for round_ in range(MAX_ROUNDS):
-        multiply_transposed(rows, rows.impulse, y)
-        multiply(rows, y, u)
-        _write_wrenches(bodies, members, y, h, wrench)
-        _end_values(joints, which, bodies, acceleration, members, wrench, h, memory, value)
-        worst = _violation(joints, which, value, rows.impulse[start:])
+        worst, largest = _close_at_end(
+            joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench
+        )
         if round_ > 1 and worst <= allowed:
             break
-        for i in range(count):
-            rows.bias[start + i] = 2.0 / h * value[i] - u[start + i] - beta[i]
-            scale = max(scale, abs(rows.bias[start + i]))
-        residual = solve_with_slip(rows, n, first_row, slides, contacts, subset, scale)
-    for s in range(m):
-        force[s] = 0.0
-        for k in range(rows_of(rows, first_row[s])):
-            force[s, k] = rows.impulse[first_row[s] + k] / h
-    _remember(joints, which, rows, start, h, memory)
-    multiply_transposed(rows, rows.impulse, y)
-    _write_wrenches(bodies, members, y, h, memory.wrench)
-    _add_moments(joints, which, rows, start, direction, moment)
+        scale = max(scale, largest)
+        residual = solve_with_slip(
+            solve, rows, n, first_row, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale
+        )
+    _finish(joints, which, bodies, members, rows, first_row, start, h, memory, direction, force, moment)
     return residual / scale, worst
 
 
 @jit
-def _start_joint_rows(joints, which, bodies, rotation, memory, value, direction, h, rows, start, beta):
-    """Bounds, softness and first impulses of the joints' rows; their coordinates and rates are remembered."""
-    u, weight = np.empty(value.shape[0]), np.empty(rows.bias.shape[0])
+def _close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench):
+    """Bias of the joints' rows for the next round; wrench: that of the present impulses.
+
+    Returns the violation at the end under that wrench, and the largest bias.
+    """
+    n, count = members.shape[0], beta.shape[0]
+    y, u, value, largest = np.empty((n, 6)), np.empty(rows.bias.shape[0]), np.empty(count), 0.0
+    multiply_transposed(rows, rows.impulse, y)
+    multiply(rows, y, u)
+    _write_wrenches(bodies, members, y, h, wrench)
+    _end_values(joints, which, bodies, acceleration, members, wrench, h, memory, value)
+    for i in range(count):
+        rows.bias[start + i] = 2.0 / h * value[i] - u[start + i] - beta[i]
+        largest = max(largest, abs(rows.bias[start + i]))
+    return _violation(joints, which, value, rows.impulse[start:]), largest
+
+
+@jit
+def _finish(joints, which, bodies, members, rows, first_row, start, h, memory, direction, force, moment):
+    """Forces of the contacts (m, 3); what is remembered of the joints; half of the joints' impulses to their moments."""
+    for s in range(first_row.shape[0]):
+        force[s] = 0.0
+        for k in range(rows_of(rows, first_row[s])):
+            force[s, k] = rows.impulse[first_row[s] + k] / h
+    _remember(joints, which, rows, start, h, memory)
+    y = np.empty((members.shape[0], 6))
+    multiply_transposed(rows, rows.impulse, y)
+    _write_wrenches(bodies, members, y, h, memory.wrench)
+    _add_moments(joints, which, rows, start, direction, moment)
+
+
+@jit
+def _start_joint_rows(joints, which, bodies, rotation, number, memory, h, rows, start):
+    """Joints' rows from `start` on, with bounds, softness and first impulses; their coordinates and rates are remembered.
+
+    Returns their directions (s, 3) and the terms beta (s,) of soft ones.
+    """
+    count = rows.bias.shape[0] - start
+    value, direction, u, beta = np.empty(count), np.empty((count, 3)), np.empty(count), np.zeros(count)
+    weight = np.empty(rows.bias.shape[0])
+    joint_rows(joints, which, bodies, rotation, number, memory.angle, rows, start, value, direction)
     relative_point_velocity(joints, which, bodies, rotation, direction, u)
     row_weights(rows, weight)
     i = 0
@@ -273,6 +287,7 @@ def _start_joint_rows(joints, which, bodies, rotation, memory, value, direction,
                     joints.stiffness[k], joints.damping[k], joints.rate[k], weight[r], value[i], u[i], h
                 )
             i += 1
+    return direction, beta
 
 
 @jit

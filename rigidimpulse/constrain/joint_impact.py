@@ -6,7 +6,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.joint_rows import is_linear, joint_rows
-from rigidimpulse.constrain.rows import BOUNDED, Rows, make_rows, multiply_transposed, scaled_change
+from rigidimpulse.constrain.rows import BOUNDED, Rows, make_rows
 
 
 class JointBlock(NamedTuple):
@@ -20,17 +20,10 @@ class JointBlock(NamedTuple):
 
 
 @jit
-def number_all(members, number):
-    """Number the members from 0 on; returns them."""
-    for k in range(members.shape[0]):
-        number[members[k]] = k
-    return members
-
-
-@jit
 def impact_rows(joints, which, bodies, rotation, members, number, memory, moment):
     """The `JointBlock` of the joints listed in `which`: hard rows hold, limits that are reached stop, soft rows are too slow."""
-    number_all(members, number)
+    for k in range(members.shape[0]):
+        number[members[k]] = k
     count = np.int64(0)
     for j in which:
         count += joints.first[j + 1] - joints.first[j]
@@ -51,27 +44,13 @@ def impact_rows(joints, which, bodies, rotation, members, number, memory, moment
     return JointBlock(members, rows, joint, direction, moment)
 
 
-@jit
-def copy_rows(source, rows, start):
+def copy_rows(source: Rows, rows: Rows, start: int) -> None:
     """Copy rows without masters to the places from `start` on."""
-    for i in range(source.bias.shape[0]):
-        r = start + i
-        rows.first[r], rows.second[r], rows.kind[r] = source.first[i], source.second[i], source.kind[i]
-        rows.jacobian[r] = source.jacobian[i]
-        rows.lower[r], rows.upper[r] = source.lower[i], source.upper[i]
+    for name in ("first", "second", "kind", "jacobian", "lower", "upper"):
+        getattr(rows, name)[start:] = getattr(source, name)
 
 
-@jit
-def apply_joint_impulses(bodies, members, rows, joints):
-    """Apply the impulses of the joints' rows, which are the last ones of `rows`."""
-    start = rows.bias.shape[0] - joints.rows.bias.shape[0]
-    p = rows.impulse.copy()
-    p[:start] = 0.0
-    y, linear, angular = np.empty((members.shape[0], 6)), np.empty(3), np.empty(3)
-    multiply_transposed(rows, p, y)
-    for k in range(members.shape[0]):
-        scaled_change(bodies, members[k], y[k], linear, angular)
-        bodies.velocity[members[k]] += linear
-        bodies.angular_velocity[members[k]] += angular
-    for i in range(joints.joint.shape[0]):
-        joints.moment[joints.joint[i]] += p[start + i] * joints.direction[i]
+def add_moments(joints: JointBlock, impulse: np.ndarray) -> None:
+    """Add the joints' part of the impulses (r,) of a block to their moments; their rows are the last ones."""
+    last = impulse[len(impulse) - len(joints.joint) :]
+    np.add.at(joints.moment, joints.joint, last[:, None] * joints.direction)

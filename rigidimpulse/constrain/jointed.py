@@ -9,6 +9,7 @@ import numpy as np
 from rigidimpulse.constrain.joint import Joint
 from rigidimpulse.constrain.joint_forces import close_joints, hold_jointed, make_memory, stop_joints
 from rigidimpulse.constrain.joint_impact import impact_rows
+from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.integrate.course import FIXED
@@ -87,6 +88,7 @@ class JointState:
         elapsed[which] = group.time - self.began[which]
         self.moment[which] = 0.0
         before = mechanical_energy(now, context.world, members)
+        arrived = np.hstack([now.velocity[members], now.angular_velocity[members]])
         for i in members:
             held = memory.wrench[i] * max(elapsed[j] for j in self.at([i])) if int(i) in self._of_body else np.zeros(6)
             now.velocity[i] -= now.inv_mass[i] * held[:3]
@@ -100,6 +102,7 @@ class JointState:
         stop_joints(
             self.table, which, now, state.rotation, members, context.column, memory, elapsed, self.moment
         )
+        state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
         memory.wrench[members] = 0.0
         self.length[which] = elapsed[which]
         context.log.book(group.time, "joints", mechanical_energy(now, context.world, members) - before)
@@ -135,7 +138,7 @@ class JointState:
                     squares[i] = squares.get(i, 0.0) + square
         return math.sqrt(max(squares.values(), default=0.0))
 
-    def hold(self, context, group, contacts, subset, turning, force, rest: float) -> tuple[float, float]:
+    def hold(self, context, group, contacts, turning, force, rest: float) -> tuple[float, float]:
         """Forces into context.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         state, memory = context.state, self.memory
         others = self.bodies_of(group.joints)
@@ -146,7 +149,7 @@ class JointState:
                 memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, group.time + h)
             moment = self.moment.copy()
             residual, worst = hold_jointed(
-                state.now, contacts, subset, turning, context.acceleration, context.angular_acceleration, h,
+                solve_newton, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
                 group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
                 context.wrench, moment,
             )

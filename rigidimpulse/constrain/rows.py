@@ -22,9 +22,14 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.respond.friction import tangents
+from rigidimpulse.rotation import multiply as quaternion_product
+from rigidimpulse.rotation import quaternion_from_rotation_vector
 
 FREE, BOUNDED, DISC, DISC_SECOND, SEGMENT = np.arange(5)
 """Kinds of rows."""
+SLIP_PASSES = 3
+POOR = 1e4
+"""A residual that many times what was asked for is poor."""
 
 
 class Rows(NamedTuple):
@@ -59,29 +64,6 @@ def make_rows(r):
         np.zeros(r),
         np.zeros(r),
     )
-
-
-@jit
-def number_members(bodies, contacts, subset, number):
-    """Movable bodies of the contacts listed in subset, in order of index; number (n_world,) of each is set to its place."""
-    members = np.empty(2 * subset.shape[0], np.int64)
-    count = 0
-    for s in range(subset.shape[0]):
-        for i in (contacts.body_a[subset[s]], contacts.body_b[subset[s]]):
-            if bodies.inv_mass[i] == 0.0:
-                continue
-            place = count
-            while place > 0 and members[place - 1] > i:
-                place -= 1
-            if place > 0 and members[place - 1] == i:
-                continue
-            for k in range(count, place, -1):
-                members[k] = members[k - 1]
-            members[place] = i
-            count += 1
-    for k in range(count):
-        number[members[k]] = k
-    return members[:count]
 
 
 @jit
@@ -121,22 +103,29 @@ def write_row(bodies, number, a, b, ra, rb, x, y, z, rows, i):
 
 
 @jit
-def contact_rows(bodies, contacts, subset, number, rows, first_row, frames):
-    """Fill rows, from the first one on, with three rows n, t1, t2 for each contact listed in subset (m,).
+def contact_rows(bodies, contacts, members, number, extra):
+    """Rows n, t1, t2 of m contacts, and room for `extra` (int) rows after them.
 
-    Contacts without friction have the normal row only. first_row (m,) and frames (m, 3, 3) are written; returns the
-    number of rows. Friction coefficients are the static ones.
+    Contacts without friction have the normal row only; friction coefficients are the static ones. members: movable bodies, in
+    order; number (n_world,) gets the place of each. Returns rows, first_row (m,) and frames (m, 3, 3).
     """
+    for k in range(members.shape[0]):
+        number[members[k]] = k
+    m = contacts.gap.shape[0]
+    first_row, frames = np.empty(m, np.int64), np.empty((m, 3, 3))
     r = np.int64(0)
-    for s in range(subset.shape[0]):
-        c = subset[s]
+    for c in range(m):
+        first_row[c] = r
+        r += 3 if contacts.static_friction[c] > 0.0 else 1
+    rows = make_rows(r + extra)
+    for c in range(m):
         for k in range(3):
-            frames[s, 0, k] = contacts.normal[c, k]
-        tangents(contacts.normal[c], frames[s, 1], frames[s, 2])
-        first_row[s] = r
+            frames[c, 0, k] = contacts.normal[c, k]
+        tangents(contacts.normal[c], frames[c, 1], frames[c, 2])
+        r = first_row[c]
         last = 3 if contacts.static_friction[c] > 0.0 else 1
         for k in range(last):
-            d = frames[s, k]
+            d = frames[c, k]
             a, b = contacts.body_a[c], contacts.body_b[c]
             write_row(bodies, number, a, b, contacts.arm_a[c], contacts.arm_b[c], d[0], d[1], d[2], rows, r + k)
         rows.kind[r], rows.lower[r] = BOUNDED, 0.0
@@ -144,17 +133,12 @@ def contact_rows(bodies, contacts, subset, number, rows, first_row, frames):
             rows.kind[r + 1], rows.kind[r + 2] = DISC, DISC_SECOND
             rows.master[r + 1] = rows.master[r + 2] = r
             rows.coefficient[r + 1] = rows.coefficient[r + 2] = contacts.static_friction[c]
-        r += last
-    return r
+    return rows, first_row, frames
 
 
-@jit
-def count_contact_rows(contacts, subset):
-    """Rows that `contact_rows` will fill."""
-    r = np.int64(0)
-    for s in range(subset.shape[0]):
-        r += 3 if contacts.static_friction[subset[s]] > 0.0 else 1
-    return r
+def take_rows(rows: Rows, which: np.ndarray) -> Rows:
+    """Copies of rows without masters."""
+    return Rows(*(column[which] for column in rows))
 
 
 @jit
@@ -168,6 +152,16 @@ def contact_velocity(contacts, c, frame, velocity, angular_velocity, out):
     z = (vb[2] + wb[0] * rb[1] - wb[1] * rb[0]) - (va[2] + wa[0] * ra[1] - wa[1] * ra[0])
     for k in range(3):
         out[k] = x * frame[k, 0] + y * frame[k, 1] + z * frame[k, 2]
+
+
+@jit
+def row_velocities(bodies, contacts, first_row, frames, u):
+    """Velocities u (r,) of the contacts' rows."""
+    v = np.empty(3)
+    for c in range(first_row.shape[0]):
+        contact_velocity(contacts, c, frames[c], bodies.velocity, bodies.angular_velocity, v)
+        for k in range(3 if contacts.static_friction[c] > 0.0 else 1):
+            u[first_row[c] + k] = v[k]
 
 
 @jit
@@ -245,3 +239,81 @@ def scaled_change(bodies, i, y, linear, angular):
         linear[j], angular[j] = root * y[j], 0.0
         for t in range(3):
             angular[j] += factor[j, t] * y[3 + t]
+
+
+@jit
+def changes_of(bodies, members, rows):
+    """Changes (n, 6) of the members' velocities, linear and angular, by the rows' impulses."""
+    n = members.shape[0]
+    y, change = np.empty((n, 6)), np.empty((n, 6))
+    multiply_transposed(rows, rows.impulse, y)
+    for k in range(n):
+        scaled_change(bodies, members[k], y[k], change[k, :3], change[k, 3:])
+    return change
+
+
+@jit
+def change_velocities(bodies, members, rows):
+    """Apply the rows' impulses."""
+    change = changes_of(bodies, members, rows)
+    for k in range(members.shape[0]):
+        for j in range(3):
+            bodies.velocity[members[k], j] += change[k, j]
+            bodies.angular_velocity[members[k], j] += change[k, 3 + j]
+
+
+def move_bodies(bodies, members: np.ndarray, rows: Rows) -> None:
+    """Move bodies by what the rows' impulses make of a displacement (the metric of mass)."""
+    change = changes_of(bodies, members, rows)
+    bodies.position[members] += change[:, :3]
+    turned = quaternion_from_rotation_vector(change[:, 3:])
+    bodies.orientation[members] = quaternion_product(turned, bodies.orientation[members])
+
+
+@jit
+def response_to(rows, n, p):
+    """W p (r,): the change of the rows' velocities by impulses p (r,)."""
+    y, out = np.empty((n, 6)), np.empty(p.shape[0])
+    multiply_transposed(rows, p, y)
+    multiply(rows, y, out)
+    return out
+
+
+@jit
+def let_slip(rows, n, first_row, dynamic_friction, slow):
+    """Give contacts that slip faster than `slow` [m/s] their dynamic friction (m,); returns whether any had another one."""
+    y, after = np.empty((n, 6)), np.empty(rows.bias.shape[0])
+    multiply_transposed(rows, rows.impulse, y)
+    multiply(rows, y, after)
+    changed = False
+    for c in range(first_row.shape[0]):
+        i = first_row[c] + 1
+        if rows_of(rows, first_row[c]) < 3 or rows.coefficient[i] == dynamic_friction[c]:
+            continue
+        if abs(rows.bias[i] + after[i]) + abs(rows.bias[i + 1] + after[i + 1]) > slow:
+            rows.coefficient[i] = rows.coefficient[i + 1] = dynamic_friction[c]
+            changed = True
+    return changed
+
+
+def solve_with_slip(solve, rows: Rows, n: int, first_row: np.ndarray, contacts, slides, target: float, slow: float) -> float:
+    """Solve rows that begin with those of contacts; contacts that slip, or come to slip, have dynamic friction.
+
+    solve: a solver of rows, as `newton.solve_newton`; slides (m,) bool: contacts that slip from the start; target: residual
+    asked for, m/s; slow: slip that is none, m/s. Returns the residual, m/s.
+    """
+    rough = contacts.static_friction > 0.0
+    disc = first_row[rough] + 1
+    rows.coefficient[disc] = np.where(slides, contacts.dynamic_friction, contacts.static_friction)[rough]
+    rows.coefficient[disc + 1] = rows.coefficient[disc]
+    warm = bool(np.any(rows.impulse))
+    residual = 0.0
+    for _ in range(SLIP_PASSES):
+        residual = solve(rows, n, target)
+        if residual > POOR * target and warm:
+            # A misleading start: once more from nothing.
+            rows.impulse[:] = 0.0
+            warm = False
+        elif not let_slip(rows, n, first_row, contacts.dynamic_friction, slow):
+            break
+    return residual

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigidimpulse.constrain.arrival import arrive
 from rigidimpulse.detect.features import CORNER, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, pressing
 from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 MARGIN = 2.0
 """Contacts are looked for within this many delta."""
 NO_FORCE = np.zeros(3)
+SLACK = 1e-9
+"""Contacts that leave or approach slower than the held ones by this part are held."""
 GAIN = 1e-11
 """Part of its kinetic energy that a body on immovable things may gain by rounding."""
 
@@ -63,16 +66,15 @@ class Group:
     joints: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     heap: np.ndarray | None = None
 
+    def slow(self) -> np.ndarray:
+        """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
+        return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + self.still
+
 
 def empty_contacts(m: int) -> Contacts:
     """Arrays for m contacts."""
     vectors = [np.empty((m, 3)) for _ in range(3)]
     return Contacts(np.empty(m, np.int64), np.empty(m, np.int64), *vectors, *(np.empty(m) for _ in range(5)))
-
-
-def select(contacts: Contacts, which: np.ndarray) -> Contacts:
-    """The contacts at the given places."""
-    return Contacts(*(np.ascontiguousarray(column[which]) for column in contacts))
 
 
 def collect(context, window, pairs: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -172,6 +174,8 @@ def _components(context, window, time: float, reached, real: np.ndarray, integer
     for o in np.union1d(owner, owner_of_joint):
         groups.append(make_group(context, window, time, real, integer, owner == o, joints[owner_of_joint == o]))
     for group in groups:
+        if arrive(context, group):
+            classify(context, group)
         if note_arrival(context, group.members.tolist(), time):
             classify(context, group)
         if jointed is not None and len(group.joints):

@@ -59,7 +59,8 @@ def take_course(context, window, i: int, time: float, wrench: np.ndarray, rests:
     if not (np.all(np.isfinite(now.velocity[i])) and np.all(np.isfinite(now.angular_velocity[i]))):
         context.quarantine(i, time)
         rests = True
-    context.recorder.flush(course, i, time)
+    context.recorder.flush(course, i, time, state.correction[i])
+    state.correction[i] = 0.0
     book_contact_work(context, i, time)
     if rests:
         now.velocity[i] = now.angular_velocity[i] = 0.0

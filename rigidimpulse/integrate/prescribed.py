@@ -47,7 +47,7 @@ class KeyframePaths:
         while self._next < len(self.segments) and self.segments[self._next][0] <= time:
             start, i, x, q, v, w = self.segments[self._next]
             self._next += 1
-            context.recorder.flush(course, i, start)
+            context.recorder.flush(course, i, start, np.zeros(6))
             course.start[i], course.mode[i] = start, PRESCRIBED
             course.position[i], course.orientation[i] = x, q
             course.velocity[i], course.angular_velocity[i] = v, w

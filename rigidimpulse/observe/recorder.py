@@ -36,9 +36,18 @@ class Recorder:
         for i in range(len(self.written)):
             self._write(course, i, 1)
 
-    def flush(self, course, i: int, time: float) -> None:
-        """Write the frames of body i before `time`; its course must still be the one that led there."""
-        self._write(course, i, int(np.searchsorted(self.times, time, side="left")))
+    def flush(self, course, i: int, time: float, correction: np.ndarray) -> None:
+        """Write the frames of body i before `time`; its course must still be the one that led there.
+
+        correction (6,): change of velocity [m/s] and spin [rad/s] that it got at the end of its course, for what the
+        course was off by: that grew with the square of the time.
+        """
+        first, last = int(self.written[i]), int(np.searchsorted(self.times, time, side="left"))
+        self._write(course, i, last)
+        if last > first and np.any(correction):
+            share = ((self.times[first:last] - course.start[i]) / (time - course.start[i])) ** 2
+            self.velocity[first:last, i] += share[:, None] * correction[:3]
+            self.angular_velocity[first:last, i] += share[:, None] * correction[3:]
 
     def flush_all(self, course, bodies: np.ndarray, time: float) -> None:
         """Write the frames of all these bodies before `time`, as `flush` does."""

@@ -22,25 +22,26 @@ The sums are over contacts that approached. Both are one equation in s, and r(s)
 if the law's s makes energy there is a lesser one that does not.
 """
 
+from __future__ import annotations
+
+from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.joint_impact import apply_joint_impulses, copy_rows, number_all
+from rigidimpulse.constrain.joint_impact import JointBlock, add_moments, copy_rows
 from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.rows import (
+    Rows,
+    change_velocities,
     contact_rows,
-    contact_velocity,
-    count_contact_rows,
     impulse_along,
-    make_rows,
-    multiply,
-    multiply_transposed,
-    number_members,
-    rows_of,
+    response_to,
+    row_velocities,
+    solve_with_slip,
 )
-from rigidimpulse.respond.impulse import apply_impulse, log_impact, relative_velocity
+from rigidimpulse.respond.impulse import Contacts, log_impact, select
 from rigidimpulse.respond.restitution import AUTO, NEWTON, POISSON
 
 # Residual asked of the solver, relative to the speed of the group.
@@ -53,6 +54,40 @@ SIZES = 12
 SIZE_ACCURACY = 1e-10
 
 
+@dataclass
+class Block:
+    """The problem of one block: its rows (r), those of m contacts first."""
+
+    rows: Rows
+    n: int
+    first_row: np.ndarray  # (m,)
+    contacts: Contacts
+    u: np.ndarray  # (r,) velocities before, m/s
+    target: np.ndarray  # (r,) velocities after that the rebound asks for
+    e: np.ndarray  # (m,) restitution of the contacts that approached, else 0
+    scale: float  # speed of the group, m/s
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """Impulses (r,) of the cone problem for b (r,) [m/s]; static friction first, contacts that still slip again with dynamic."""
+        rows, m = self.rows, len(self.first_row)
+        rows.bias[:] = b
+        rows.impulse[:] = 0.0
+        sticks = np.zeros(m, bool)
+        solve_with_slip(
+            solve_newton, rows, self.n, self.first_row, self.contacts, sticks, SOLVE_TOLERANCE * self.scale, SLIPLESS * self.scale
+        )
+        return rows.impulse.copy()
+
+    def velocity_after(self, u: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """u + W p."""
+        return u + response_to(self.rows, self.n, p)
+
+    def energy_change(self, p: np.ndarray) -> float:
+        """p.u + p.W p / 2, less the round-off of its terms [J]."""
+        quadratic = 0.5 * float(p @ response_to(self.rows, self.n, p))
+        return float(p @ self.u) + quadratic - ENERGY_ROUND_OFF * (float(np.abs(p * self.u).sum()) + quadratic)
+
+
 @jit
 def rebound_of(contacts, c, approach, rest_speed):
     """e, or 0 where the rebound would rise less than the gap the contact is held at (LOOP rule: no speed threshold)."""
@@ -60,115 +95,45 @@ def rebound_of(contacts, c, approach, rest_speed):
     return e if e * abs(approach) > rest_speed[c] else 0.0
 
 
-@jit
-def _velocity_after(rows, n, u, p, after):
-    """after = u + W p."""
-    y = np.empty((n, 6))
-    multiply_transposed(rows, p, y)
-    multiply(rows, y, after)
-    for i in range(u.shape[0]):
-        after[i] += u[i]
+def _newton(block: Block) -> np.ndarray:
+    """Impulses (r,) by Newton's law."""
+    largest = float(block.e.max())
+    p = block.solve(block.u - block.target)
+    if largest > 0.0 and block.energy_change(p) > 0.0:
+        p = (1.0 + largest) * block.solve(block.u)
+    return p
 
 
-@jit
-def _solve(rows, n, first_row, b, static, dynamic, scale, p):
-    """The cone problem for b (r,) [m/s], into p; static friction first, contacts that still slip again with dynamic friction."""
-    after = np.empty(b.shape[0])
-    rows.bias[:] = b
-    rows.impulse[:] = 0.0
-    for s in range(first_row.shape[0]):
-        if rows_of(rows, first_row[s]) == 3:
-            rows.coefficient[first_row[s] + 1] = rows.coefficient[first_row[s] + 2] = static[s]
-    for _ in range(2):
-        solve_newton(rows, n, SOLVE_TOLERANCE * scale)
-        _velocity_after(rows, n, b, rows.impulse, after)
-        changed = False
-        for s in range(first_row.shape[0]):
-            i = first_row[s] + 1
-            if rows_of(rows, first_row[s]) < 3 or rows.coefficient[i] == dynamic[s]:
-                continue
-            if abs(after[i]) + abs(after[i + 1]) > SLIPLESS * scale:
-                rows.coefficient[i] = rows.coefficient[i + 1] = dynamic[s]
-                changed = True
-        if not changed:
-            break
-    p[:] = rows.impulse
+def _measure(law: int, block: Block, share: np.ndarray, p: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
+    """Normal impulse (Poisson) [N s] or work (energetic) [J] of a phase, over contacts that rebound, times share or share^2 (m,)."""
+    rebounds = block.e > 0.0
+    i, share = block.first_row[rebounds], share[rebounds]
+    if law == POISSON:
+        return float(np.sum(share * p[i]))
+    return float(np.sum(0.5 * share**2 * p[i] * (before[i] + after[i])))
 
 
-@jit
-def _energy_change(rows, n, u, p):
-    """p.u + |Jh^T p|^2 / 2, less the round-off of its terms [J]."""
-    y = np.empty((n, 6))
-    multiply_transposed(rows, p, y)
-    linear = moved = quadratic = 0.0
-    for i in range(p.shape[0]):
-        linear += p[i] * u[i]
-        moved += abs(p[i] * u[i])
-    for i in range(n):
-        for k in range(6):
-            quadratic += 0.5 * y[i, k] * y[i, k]
-    return linear + quadratic - ENERGY_ROUND_OFF * (moved + quadratic)
-
-
-@jit
-def _add(x, factor, y, total):
-    """total = x + factor y."""
-    for i in range(x.shape[0]):
-        total[i] = x[i] + factor * y[i]
-
-
-@jit
-def _newton(rows, n, first_row, u, target, largest, static, dynamic, scale, p):
-    """Newton's law, into p; largest is the largest e."""
-    b = np.empty(u.shape[0])
-    _add(u, -1.0, target, b)
-    _solve(rows, n, first_row, b, static, dynamic, scale, p)
-    if largest > 0.0 and _energy_change(rows, n, u, p) > 0.0:
-        _solve(rows, n, first_row, u, static, dynamic, scale, p)
-        for i in range(p.shape[0]):
-            p[i] *= 1.0 + largest
-
-
-@jit
-def _measure(law, first_row, e, weight, p, before, after):
-    """Normal impulse (Poisson) [N s] or work (energetic) [J] of a phase, over contacts with e > 0; times e or e^2 if weight is 1."""
-    total = 0.0
-    for s in range(e.shape[0]):
-        if e[s] > 0.0:
-            factor, i = 1.0 + weight * (e[s] - 1.0), first_row[s]
-            if law == POISSON:
-                total += factor * p[i]
-            else:
-                total += 0.5 * factor * factor * p[i] * (before[i] + after[i])
-    return total
-
-
-@jit
-def _two_phases(law, rows, n, first_row, u, target, e, largest, static, dynamic, scale, p):
-    """Poisson's or the energetic law, into p."""
-    _solve(rows, n, first_row, u, static, dynamic, scale, p)
-    count = u.shape[0]
-    compressed, after, b = np.empty(count), np.empty(count), np.empty(count)
-    r, total = np.empty(count), np.empty(count)
-    _velocity_after(rows, n, u, p, compressed)
-    asked = abs(_measure(law, first_row, e, 1.0, p, u, compressed))
+def _two_phases(law: int, block: Block) -> np.ndarray:
+    """Impulses (r,) by Poisson's or the energetic law."""
+    u, e = block.u, block.e
+    compression = block.solve(u)
+    compressed = block.velocity_after(u, compression)
+    asked = abs(_measure(law, block, e, compression, u, compressed))
     if asked == 0.0:
-        return
-    compression = p.copy()
+        return compression
+    p, whole = compression, np.ones(len(e))
     # Secants of the share made of what is asked; the size lies between low, which is allowed, and high, which is not.
     size, low, high = 1.0, 0.0, np.inf
     last_size = last_share = 0.0
     for _ in range(SIZES):
-        _add(compressed, -size, target, b)
-        _solve(rows, n, first_row, b, static, dynamic, scale, r)
-        _velocity_after(rows, n, compressed, r, after)
-        made = max(_measure(law, first_row, e, 0.0, r, compressed, after), 0.0)
+        r = block.solve(compressed - size * block.target)
+        after = block.velocity_after(compressed, r)
+        made = max(_measure(law, block, whole, r, compressed, after), 0.0)
         share = made / asked if law == POISSON else sqrt(made / asked)
-        _add(compression, 1.0, r, total)
-        lossy = largest > 1.0 or _energy_change(rows, n, u, total) <= 0.0
+        total = compression + r
+        lossy = float(e.max()) > 1.0 or block.energy_change(total) <= 0.0
         if lossy and share <= 1.0 + SIZE_ACCURACY:
-            low = size
-            p[:] = total
+            low, p = size, total
             if share >= 1.0 - SIZE_ACCURACY:
                 break
         else:
@@ -177,61 +142,55 @@ def _two_phases(law, rows, n, first_row, u, target, e, largest, static, dynamic,
         guess = size + (1.0 - share) * (size - last_size) / (share - last_share) if share != last_share else upper
         last_size, last_share = size, share
         size = guess if lossy and low < guess < upper else 0.5 * (low + upper)
+    return p
 
 
-@jit
-def solve_block(bodies, contacts, subset, rebound, law, rest_speed, scale, number, joints, log, count):
+def solve_block(
+    bodies, contacts: Contacts, subset: np.ndarray, rebound: float, law: int, rest_speed: np.ndarray, scale: float,
+    number: np.ndarray, joints: JointBlock | None, log: np.ndarray, count: int,
+) -> int:
     """Resolve the contacts of subset together and apply the impulses; `rebound` 1, or 0 for an inelastic one. New log count.
 
     joints: None, or the `JointBlock` of the group.
     """
-    m = subset.shape[0]
-    members = number_members(bodies, contacts, subset, number) if joints is None else number_all(joints.members, number)
-    n, start = members.shape[0], count_contact_rows(contacts, subset)
-    rows = make_rows(start + (np.int64(0) if joints is None else joints.rows.bias.shape[0]))
-    if joints is not None:
-        copy_rows(joints.rows, rows, start)
-    first_row, frames = np.empty(m, np.int64), np.empty((m, 3, 3))
-    contact_rows(bodies, contacts, subset, number, rows, first_row, frames)
-    r = rows.bias.shape[0]
-    u, target, p, v = np.zeros(r), np.zeros(r), np.empty(r), np.empty(3)
-    e, static, dynamic = np.zeros(m), np.empty(m), np.empty(m)
-    largest = rough = 0.0
-    for s in range(m):
-        c, i = subset[s], first_row[s]
-        contact_velocity(contacts, c, frames[s], bodies.velocity, bodies.angular_velocity, v)
-        for k in range(rows_of(rows, i)):
-            u[i + k] = v[k]
-        approach = relative_velocity(bodies, contacts, c, v)
-        static[s], dynamic[s] = contacts.static_friction[c], contacts.dynamic_friction[c]
-        if approach < 0.0:
-            e[s] = rebound * rebound_of(contacts, c, approach, rest_speed)
-            e_t = contacts.tangential_restitution[c] if e[s] > 0.0 else 0.0
-            target[i] = -e[s] * u[i]
-            for k in range(1, rows_of(rows, i)):
-                target[i + k] = -e_t * u[i + k]
-        largest, rough = max(largest, e[s]), max(rough, static[s])
-    if law == NEWTON or (law == AUTO and rough <= 0.0):
-        _newton(rows, n, first_row, u, target, largest, static, dynamic, scale, p)
+    if len(subset) < len(contacts.gap):
+        contacts, rest_speed = select(contacts, subset), rest_speed[subset]
+    if joints is None:
+        touched = np.unique(np.concatenate([contacts.body_a, contacts.body_b]))
+        members, extra = touched[bodies.inv_mass[touched] > 0.0], 0
     else:
-        _two_phases(law, rows, n, first_row, u, target, e, largest, static, dynamic, scale, p)
-    rows.impulse[:] = p
-    return _apply(bodies, contacts, members, subset, rows, first_row, frames, u, joints, log, count)
+        members, extra = joints.members, len(joints.rows.bias)
+    rows, first_row, frames = contact_rows(bodies, contacts, members, number, extra)
+    if joints is not None:
+        copy_rows(joints.rows, rows, len(rows.bias) - extra)
+    u = np.zeros(len(rows.bias))
+    row_velocities(bodies, contacts, first_row, frames, u)
+    approach = u[first_row]
+    e = np.where((approach < 0.0) & (contacts.restitution * -approach > rest_speed), rebound * contacts.restitution, 0.0)
+    target = np.zeros(len(rows.bias))
+    target[first_row] = -e * approach
+    rough = contacts.static_friction > 0.0
+    e_t = np.where(e > 0.0, contacts.tangential_restitution, 0.0)[rough]
+    for k in (1, 2):
+        target[first_row[rough] + k] = -e_t * u[first_row[rough] + k]
+    block = Block(rows, len(members), first_row, contacts, u, target, e, scale)
+    smooth = not rough.any()
+    rows.impulse[:] = _newton(block) if law == NEWTON or (law == AUTO and smooth) else _two_phases(law, block)
+    change_velocities(bodies, members, rows)
+    if joints is not None:
+        add_moments(joints, rows.impulse)
+    last = log_block(bodies, contacts, rows, first_row, frames, u, log, count)
+    log[count:last, 0] = subset[log[count:last, 0].astype(np.int64)]
+    return last
 
 
 @jit
-def _apply(bodies, contacts, members, subset, rows, first_row, frames, u, joints, log, count):
+def log_block(bodies, contacts, rows, first_row, frames, u, log, count):
+    """Log the impacts of a block, whose velocities before were u (r,); returns the new count."""
     impulse = np.empty(3)
-    if joints is not None:
-        apply_joint_impulses(bodies, members, rows, joints)
-    first = count
-    for s in range(subset.shape[0]):
-        i = first_row[s]
-        impulse_along(rows, i, frames[s], impulse)
+    for c in range(first_row.shape[0]):
+        i = first_row[c]
         if rows.impulse[i] > 0.0:
-            apply_impulse(bodies, contacts, subset[s], impulse[0], impulse[1], impulse[2])
-            count = log_impact(bodies, contacts, subset[s], impulse, u[i], log, count)
-    v = np.empty(3)
-    for i in range(first, count):
-        log[i, 6] = relative_velocity(bodies, contacts, int(log[i, 0]), v)
+            impulse_along(rows, i, frames[c], impulse)
+            count = log_impact(bodies, contacts, c, impulse, u[i], log, count)
     return count

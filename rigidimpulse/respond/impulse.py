@@ -46,6 +46,11 @@ class Contacts(NamedTuple):
     dynamic_friction: np.ndarray  # (m,)
 
 
+def select(contacts: Contacts, which: np.ndarray) -> Contacts:
+    """The contacts at the given places."""
+    return Contacts(*(np.ascontiguousarray(column[which]) for column in contacts))
+
+
 @jit
 def relative_velocity(bodies, contacts, c, u):
     """u (3,) of contact c; returns u.n."""

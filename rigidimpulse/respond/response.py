@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.groups import Group, classify, select
+from rigidimpulse.detect.groups import Group, classify
 from rigidimpulse.observe.energy import kinetic_energy
 from rigidimpulse.observe.events import IMPACT_DTYPE
 from rigidimpulse.plan import Bound, Skip
-from rigidimpulse.respond.impulse import Contacts, speed_scale
+from rigidimpulse.respond.impulse import Contacts, select, speed_scale
 from rigidimpulse.respond.kinematic import respond_kinematic
 from rigidimpulse.respond.restitution import LAWS
 from rigidimpulse.respond.simultaneous import respond_sequential, respond_simultaneous

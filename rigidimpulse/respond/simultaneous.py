@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.respond.block import rebound_of, solve_block
-from rigidimpulse.respond.impulse import relative_velocity, resolve_contact
+from rigidimpulse.respond.impulse import Contacts, relative_velocity, resolve_contact
 
 # Impulses per contact before a group is finished without rebound.
 IMPULSES_PER_CONTACT = 200
@@ -33,22 +33,29 @@ def _approaching(bodies, contacts, tolerance, rebounding, rest_speed):
 
 
 @jit
-def _same_pair(contacts, c):
-    count = 0
-    for d in range(contacts.gap.shape[0]):
-        if contacts.body_a[d] == contacts.body_a[c] and contacts.body_b[d] == contacts.body_b[c]:
-            count += 1
-    subset = np.empty(count, np.int64)
-    count = 0
-    for d in range(contacts.gap.shape[0]):
-        if contacts.body_a[d] == contacts.body_a[c] and contacts.body_b[d] == contacts.body_b[c]:
-            subset[count] = d
-            count += 1
-    return subset
+def resolve_singles(bodies, contacts, law, rebound, rest_speed, tolerance, cap, log, count):
+    """Impacts of pairs with one contact, fastest first, until the fastest is of another pair; `rebound` 1, or 0 for inelastic ones.
+
+    Returns (new count of log, impulses made, the fastest contact left or -1).
+    """
+    u = np.empty(3)
+    made, best = 0, -1
+    while made < cap and count + contacts.gap.shape[0] < log.shape[0]:
+        best = _approaching(bodies, contacts, tolerance, rebound, rest_speed)
+        if best < 0:
+            break
+        for d in range(contacts.gap.shape[0]):
+            if d != best and contacts.body_a[d] == contacts.body_a[best] and contacts.body_b[d] == contacts.body_b[best]:
+                return count, made, best
+        e = rebound * rebound_of(contacts, best, relative_velocity(bodies, contacts, best, u), rest_speed)
+        count = resolve_contact(bodies, contacts, best, e, law, log, count)
+        made += 1
+    return count, made, -1
 
 
-@jit
-def respond_sequential(bodies, contacts, law, together, rest_speed, tolerance, scale, number, joints, log):
+def respond_sequential(
+    bodies, contacts: Contacts, law: int, together: bool, rest_speed, tolerance: float, scale: float, number, joints, log
+) -> tuple[int, int, bool]:
     """Pair after pair, fastest approach first. Returns (rows written to log, impulses made, whether the cap was reached).
 
     A full log ends the call early, without the inelastic finish: read it and call again.
@@ -57,51 +64,52 @@ def respond_sequential(bodies, contacts, law, together, rest_speed, tolerance, s
     (m,): a rebound slower than this is none [m/s]; tolerance: slower approach is none [m/s]; scale: speed of the group; joints:
     None, or the `JointBlock` of the group, whose rows take part in every impulse.
     """
-    count = np.int64(0)
-    impulses = 0
-    cap = IMPULSES_PER_CONTACT * contacts.gap.shape[0]
-    u = np.empty(3)
-    while impulses < cap and count + contacts.gap.shape[0] < log.shape[0]:
-        c = _approaching(bodies, contacts, tolerance, 1.0, rest_speed)
+    m = len(contacts.gap)
+    everything = np.arange(m)
+    count = impulses = 0
+    cap = IMPULSES_PER_CONTACT * m
+    blocks_only = joints is not None or (together and m > 1)
+    while impulses < cap and count + m < len(log):
+        if blocks_only:
+            c = _approaching(bodies, contacts, tolerance, 1.0, rest_speed)
+        else:
+            count, made, c = resolve_singles(bodies, contacts, law, 1.0, rest_speed, tolerance, cap - impulses, log, count)
+            impulses += made
         if c < 0:
             break
-        subset = np.arange(contacts.gap.shape[0]) if together else _same_pair(contacts, c)
-        if subset.shape[0] == 1 and joints is None:
-            e = rebound_of(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
-            count = resolve_contact(bodies, contacts, c, e, law, log, count)
-        else:
-            count = solve_block(bodies, contacts, subset, 1.0, law, rest_speed, scale, number, joints, log, count)
+        same_pair = (contacts.body_a == contacts.body_a[c]) & (contacts.body_b == contacts.body_b[c])
+        subset = everything if together else np.flatnonzero(same_pair)
+        count = solve_block(bodies, contacts, subset, 1.0, law, rest_speed, scale, number, joints, log, count)
         impulses += 1
-    full = count + contacts.gap.shape[0] >= log.shape[0]
-    if not full and _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
-        count = _finish(bodies, contacts, law, rest_speed, scale, number, joints, log, count)
+    if count + m < len(log) and _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
+        count = _finish(bodies, contacts, law, rest_speed, tolerance, scale, number, joints, log, count)
         impulses += 1
     return count, impulses, impulses >= cap
 
 
-@jit
-def _finish(bodies, contacts, law, rest_speed, scale, number, joints, log, count):
-    if contacts.gap.shape[0] == 1 and joints is None:
-        return resolve_contact(bodies, contacts, np.int64(0), 0.0, law, log, count)
-    subset = np.arange(contacts.gap.shape[0])
+def _finish(
+    bodies, contacts: Contacts, law: int, rest_speed, tolerance: float, scale: float, number, joints, log, count: int
+) -> int:
+    """One inelastic impulse of all contacts."""
+    if len(contacts.gap) == 1 and joints is None:
+        return resolve_singles(bodies, contacts, law, 0.0, rest_speed, tolerance, 1, log, count)[0]
+    subset = np.arange(len(contacts.gap))
     return solve_block(bodies, contacts, subset, 0.0, law, rest_speed, scale, number, joints, log, count)
 
 
-@jit
-def respond_simultaneous(bodies, contacts, law, _together, rest_speed, tolerance, scale, number, joints, log):
+def respond_simultaneous(
+    bodies, contacts: Contacts, law: int, _together: bool, rest_speed, tolerance: float, scale: float, number, joints, log
+) -> tuple[int, int, bool]:
     """The whole group as one block; same arguments and answer as `respond_sequential`."""
-    c = _approaching(bodies, contacts, tolerance, 0.0, rest_speed)
-    if c < 0:
+    if _approaching(bodies, contacts, tolerance, 0.0, rest_speed) < 0:
         return 0, 0, False
-    u = np.empty(3)
-    if contacts.gap.shape[0] == 1 and joints is None:
-        c = np.int64(0)
-        e = rebound_of(contacts, c, relative_velocity(bodies, contacts, c, u), rest_speed)
-        return resolve_contact(bodies, contacts, c, e, law, log, c), 1, False
-    subset = np.arange(contacts.gap.shape[0])
-    count = solve_block(bodies, contacts, subset, 1.0, law, rest_speed, scale, number, joints, log, np.int64(0))
+    if len(contacts.gap) == 1 and joints is None:
+        # The only contact, by the law of a single one; inelastic where it is too slow to rebound.
+        return respond_sequential(bodies, contacts, law, False, rest_speed, tolerance, scale, number, joints, log)
+    subset = np.arange(len(contacts.gap))
+    count = solve_block(bodies, contacts, subset, 1.0, law, rest_speed, scale, number, joints, log, 0)
     impulses = 1
     if _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
-        count = _finish(bodies, contacts, law, rest_speed, scale, number, joints, log, count)
+        count = _finish(bodies, contacts, law, rest_speed, tolerance, scale, number, joints, log, count)
         impulses += 1
     return count, impulses, False

@@ -12,8 +12,8 @@ from edge to edge on a floor that neither gives nor lets slip. At each impact an
 
     w+ / w- = 1 - (3/2) sin^2 a
 
-Between impacts energy is kept, so plateaus of the ledger give the ratio. The contact gap shifts lever arms by 1e-6 of the
-size: bound 1e-5 relative.
+Between impacts energy is kept, so plateaus of the ledger give the ratio. The motion between
+impacts is right to second order in the angle of a sub-step, 0.01 rad at most: the bound is its square, 1e-4.
 
 Painleve rod: a rod that slides on its tip at the angle b from the floor, friction mu. The normal force has a factor
 1 + 3 cos b (cos b - mu sin b); where that is negative, mu > (1 + 3 cos^2 b) / (3 sin b cos b), no finite force holds
@@ -116,7 +116,7 @@ def check_rocking(run: Recording) -> list[Check]:
     return [
         finite(run),
         at_least("half rocks compared", len(ratios), 3, "it rocks on"),
-        at_most("w+ / w-, relative error", worst, 1e-5, "Housner 1963: 1 - (3/2) sin^2 a"),
+        at_most("w+ / w-, relative error", worst, 1e-4, "Housner 1963: 1 - (3/2) sin^2 a"),
         at_most("out of its plane, m", foot, 1e-9, "mirror symmetry"),
         energy_never_grows(run, BLOCK[2]),
         undisturbed(run),
