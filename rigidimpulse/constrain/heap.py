@@ -3,8 +3,8 @@
 At the start of a step islands are chosen (`heap_islands`); their bodies get courses (mode STEPPED) that end in the poses
 which the solver found for the end of the step. Pairs inside a heap are not swept; pairs of a member and any other body are,
 and at their contact the impulse is found exactly and the heap is stepped anew from there, the other body with it if it is slow
-enough. Contacts are held at a gap, the skin. A heap whose members all stay below CALM sqrt(g r) for REST sqrt(r / g) s (r: inner
-radius) stands still, to the bit, until something touches it.
+enough. Contacts are held at a gap, the skin. A heap whose members all stay within PLAY skins of one place and below
+CALM sqrt(g r) for REST sqrt(r / g) s (r: inner radius) stands still, to the bit, until something touches it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from rigidimpulse.observe.energy import mechanical_energy
 from rigidimpulse.plan import Bound, Skip
 from rigidimpulse.rotation import product
 
-CALM, REST = 0.003, 3.0
+CALM, PLAY, REST = 0.05, 0.5, 3.0
 LEAVING = 0.1
 """Part of its speed at which a fast body must leave a heap that it has hit to be no part of it."""
 MOST_PIECES = 4
@@ -113,7 +113,7 @@ class Heaps:
 
     Attributes:
         label: (n,) the heap that a body belongs to, -1 for none; heaps at rest keep theirs.
-        calm: (n,) s, for how long a member has been slow.
+        calm: (n,) s, for how long a member has hardly moved.
         stepper: the solver and its contacts.
 
     """
@@ -123,6 +123,7 @@ class Heaps:
         self.stepper = HeapStepper(world)
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.calm = np.zeros(world.num_bodies)
+        self._stood = np.full((world.num_bodies, 7), np.inf)
         self._auto = world.accuracy.contact_solver == "auto"
         self._jointed = np.zeros(world.num_bodies, bool)
         self._ends: dict[int, float] = {}
@@ -366,14 +367,17 @@ class Heaps:
         window.change_courses(out.members, time)
 
     def _note_calm(self, context, out: Outcome, length: float) -> None:
-        """How long each member has been slow."""
-        course, members, stepper = context.state.course, out.members, self.stepper
-        strength = np.linalg.norm(context.acceleration[members], axis=1)
-        limit = CALM * np.sqrt(strength * stepper.inner[members])
-        speed = np.maximum(np.linalg.norm(out.velocity[:, :3], axis=1), np.linalg.norm(course.velocity[members], axis=1))
-        spin = np.maximum(np.linalg.norm(out.velocity[:, 3:], axis=1), np.linalg.norm(course.angular_velocity[members], axis=1))
-        slow = (speed <= limit) & (stepper.inner[members] * spin <= limit)
-        self.calm[members] = np.where(slow, self.calm[members] + length, 0.0)
+        """For how long each member has hardly moved from where it was."""
+        members, stepper = out.members, self.stepper
+        strength, inner = np.linalg.norm(context.acceleration[members], axis=1), stepper.inner[members]
+        play = PLAY * stepper.skin[members]
+        moved = np.linalg.norm(out.position - self._stood[members, :3], axis=1)
+        turned = 2.0 * np.linalg.norm(out.orientation - self._stood[members, 3:], axis=1)
+        speed = np.linalg.norm(out.velocity[:, :3], axis=1) + inner * np.linalg.norm(out.velocity[:, 3:], axis=1)
+        calm = (moved <= play) & (inner * turned <= play) & (speed <= CALM * np.sqrt(strength * inner))
+        self.calm[members] = np.where(calm, self.calm[members] + length, 0.0)
+        left = members[~calm]
+        self._stood[left] = np.hstack([out.position, out.orientation])[~calm]
 
 
 def _bare_group(time: float, members: np.ndarray, context) -> Group:
