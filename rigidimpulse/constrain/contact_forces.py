@@ -11,7 +11,6 @@ from rigidimpulse.constrain.arrival import remember_forces
 from rigidimpulse.constrain.contact_motion import Motion, contact_motion
 from rigidimpulse.constrain.drift import lift_contacts, needs_lift
 from rigidimpulse.constrain.foresight import ALLOWED
-from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.resting import Held, hold_contacts
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.groups import Group, collect, make_group
@@ -107,7 +106,7 @@ def _hold_turning(
     def hold_over(h: float, excess: np.ndarray) -> Held:
         context.wrench[group.members] = 0.0
         return hold_contacts(
-            solve_newton, state.now, contacts, group.members, motion.turning, excess, context.acceleration,
+            context.solve_rows, state.now, contacts, group.members, motion.turning, excess, context.acceleration,
             context.angular_acceleration, h, SHORTEST * step, context.column, force, context.wrench,
         )
 
