@@ -8,7 +8,8 @@ Slots
                     there where the contact couples normal and tangential motion (see respond/restitution.py)
     integrator      how bodies move between impacts (stage integrate)
     contact_solver  how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for heaps of many bodies: see
-                    docs/heaps.md), "qp" (the exact laws by a convex solver library: a reference), or "auto": per island of bodies that may touch in a step, newton unless it is a large heap
+                    docs/heaps.md), "qp" (the exact laws by a convex solver library: a reference), or "auto": per island of bodies
+                    that may touch in a step, newton unless it is a large heap
     step            s; contact forces are constant over it, impacts are found inside it at any time
     tolerance       gap error at an impact, as a fraction of the size of the smaller body
     iterations      limit of gap queries for one pair and one interval

@@ -300,6 +300,7 @@ class Heaps:
         world = context.world
         stays = self._slow(context, group.members) | ~self._leaves(context, group)
         near = group.members[stays & ~self._jointed[group.members]]
+        assert group.heap is not None
         members = np.union1d(group.heap, near)
         label = int(self.label[group.heap].max())
         self.label[np.setdiff1d(members, group.heap)] = label

@@ -16,6 +16,8 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.contact_motion import _radius as rounding
+from rigidimpulse.constrain.contact_motion import _single as single
 from rigidimpulse.constrain.heap_overlap import FLUSH, deepest_normal, gap_along, overlap_contacts, support
 from rigidimpulse.constrain.heap_rows import (
     APPROACH,
@@ -34,8 +36,6 @@ from rigidimpulse.constrain.heap_rows import (
     pair_speeds,
     turned_row,
 )
-from rigidimpulse.constrain.contact_motion import _radius as rounding
-from rigidimpulse.constrain.contact_motion import _single as single
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.manifold import reduce_contacts
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
@@ -256,8 +256,8 @@ def _shrunk_by(geometry, bodies, factor, a, b, p, q, n):
 
 @jit
 def store_contacts(
-    geometry, shape, material, coefficients, convex, bodies, pairs, places, margin, radius, inner, skin, factor, real, integer, count, body, rows,
-    ids, used,
+    geometry, shape, material, coefficients, convex, bodies, pairs, places, margin, radius, inner, skin, factor, real, integer, count, body,
+    rows, ids, used,
 ):  # fmt: skip
     """Put the contacts found for the pairs at `places` into rows from `used` on, with the impulses of those they replace.
 

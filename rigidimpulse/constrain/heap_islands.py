@@ -77,7 +77,9 @@ def support_levels(bodies, pairs, rows, tall):
     return level
 
 
-def refusals(world, root: np.ndarray, heap_before: np.ndarray, jointed: np.ndarray, a: np.ndarray, b: np.ndarray, auto: bool) -> dict[int, str]:
+def refusals(
+    world, root: np.ndarray, heap_before: np.ndarray, jointed: np.ndarray, a: np.ndarray, b: np.ndarray, auto: bool
+) -> dict[int, str]:
     """Why islands are no heaps, by their root; what holds of contacts (`low`) is not looked at here.
 
     Args:

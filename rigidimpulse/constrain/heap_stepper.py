@@ -196,8 +196,8 @@ class HeapStepper:
         pairs.start[:] = table.start[self.place]
         table.used = store_contacts(
             world.geometry, world.shape_of_body[body], world.material_of_body[body], world.coefficients, self.convex[body], bodies, pairs,
-            places, margin, world.bound_radius[body], inner, skin, self.factor[body], context.contact_real, context.contact_int, found, body, table.rows, table.ids,
-            table.used,
+            places, margin, world.bound_radius[body], inner, skin, self.factor[body], context.contact_real, context.contact_int,
+            found, body, table.rows, table.ids, table.used,
         )  # fmt: skip
 
     def step(self, context, time: float, end: float) -> Outcome:

@@ -12,6 +12,8 @@ problem is solved by the interior-point method of Clarabel (Goulart and Chen 202
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy import sparse
 
@@ -22,8 +24,8 @@ from rigidimpulse.errors import SceneError
 MOST_ROUNDS = 100
 """Fixed-point steps."""
 MOST_STAGNANT = 4
-"""Steps in a row that gain nothing: what is left is the precision of the convex solver, about 1e-8 of the speeds."""
-PRECISION = 1e-10
+"""Steps in a row that gain nothing: what is left is the precision of the convex solver, about 1e-6 of the speeds."""
+PRECISION = 1e-11
 """Asked of the convex solver, for a problem scaled to 1."""
 REGULAR = 1e-9
 """Added to the scaled W, which redundant contacts make singular."""
@@ -89,8 +91,9 @@ def _matrix(rows: Rows, n: int) -> sparse.csr_matrix:
 
 def _convex_step(rows: Rows, effective: sparse.csc_matrix, bias: np.ndarray, discs: np.ndarray) -> np.ndarray:
     """Impulses (r,) of the convex problem for a given bias (r,), scaled to 1 in impulse and speed."""
-    import clarabel
+    import clarabel as library
 
+    clarabel: Any = library
     mass, speed = float(effective.diagonal().max()), max(float(np.abs(bias).max()), np.finfo(float).tiny)
     unit = speed / mass
     lines: list[tuple[list[int], list[float]]] = []
@@ -115,6 +118,7 @@ def _convex_step(rows: Rows, effective: sparse.csc_matrix, bias: np.ndarray, dis
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = PRECISION
     problem = clarabel.DefaultSolver(
-        sparse.triu(effective / mass + REGULAR * sparse.identity(len(bias)), format="csc"), bias / speed, constraints, np.array(limits), cones, settings
+        sparse.triu(effective / mass + REGULAR * sparse.identity(len(bias)), format="csc"), bias / speed, constraints,
+        np.array(limits), cones, settings,
     )
     return unit * np.array(problem.solve().x)

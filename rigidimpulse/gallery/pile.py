@@ -64,7 +64,7 @@ def check(run: Recording) -> list[Check]:
         at_most("centre beyond a wall, m", inside, 0.0, "walls hold"),
         above_floor(run, SKIN),
         equal("boxes inside each other at the end", overlaps(run), 0, "contacts are held at a gap, the skin"),
-        at_most("largest rise of energy, J", rise, SKIN * weight(run) * TALL, "E falls, but for what skins give back (skin x weight x levels)"),
+        at_most("largest rise of energy, J", rise, SKIN * weight(run) * TALL, "E falls, but for what skins give back: a skin a level"),
         at_most("speed at the end, m/s", float(np.abs(run.velocities[-1]).max()), 0.0, "friction and dull impacts stop them"),
     ]
 

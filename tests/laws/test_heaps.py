@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -57,7 +58,7 @@ def test_stopping_distance_is_of_first_order():
     exact = 9.0 / (2.0 * 0.5 * GRAVITY)
     errors = [travelled(ri.simulate(block_on_plane(0.0, 3.0), 1.0, accuracy=step_accuracy(1.0 / f))) / exact - 1.0 for f in (60, 120, 240)]
     assert abs(errors[0]) < 3e-3
-    for coarse, fine in zip(errors, errors[1:], strict=False):
+    for coarse, fine in itertools.pairwise(errors):
         assert 0.4 < fine / coarse < 0.6
 
 
@@ -101,8 +102,8 @@ def test_momentum_is_kept_and_energy_only_lost():
     assert run.ledger is not None
     ledger = run.ledger
     assert "largest 8 bodies" in run.plan.explain()
-    np.testing.assert_allclose(ledger.momentum, np.broadcast_to(ledger.momentum[0], ledger.momentum.shape), atol=1e-9)
-    np.testing.assert_allclose(ledger.angular_momentum, np.broadcast_to(ledger.angular_momentum[0], ledger.angular_momentum.shape), atol=1e-9)
+    assert np.abs(ledger.momentum - ledger.momentum[0]).max() < 1e-9
+    assert np.abs(ledger.angular_momentum - ledger.angular_momentum[0]).max() < 1e-9
     assert np.diff(ledger.kinetic).max() < 1e-10
     assert ledger.kinetic[-1] < 0.5 * ledger.kinetic[0]
     lost = sum(taken[-1] for taken in ledger.dissipated.values())
@@ -124,7 +125,8 @@ def mixed(reordered: bool, prefix: str) -> ri.Scene:
     material = ri.Material(density=500.0, restitution=0.2, static_friction=0.5, dynamic_friction=0.4)
     hull = 0.15 * random.normal(size=(12, 3))
     shapes = (
-        ri.Shape.box((0.3, 0.2, 0.25)), ri.Shape.sphere(0.12), ri.Shape.capsule(0.08, 0.2), ri.Shape.convex_hull(hull), ri.Shape.cylinder(0.1, 0.2),
+        ri.Shape.box((0.3, 0.2, 0.25)), ri.Shape.sphere(0.12), ri.Shape.capsule(0.08, 0.2), ri.Shape.convex_hull(hull),
+        ri.Shape.cylinder(0.1, 0.2),
     )  # fmt: skip
     bodies = [ri.Body(f"{prefix}floor", ri.Shape.half_space(), motion="static", material=material)]
     for k in range(10):

@@ -41,8 +41,8 @@ def test_same_velocities_as_newton(slides):
     for seed in range(5):
         rows, other = random_rows(seed, 2, slides), random_rows(seed, 2, slides)
         assert solve_newton(rows, 2, 1e-12) < 1e-10
-        assert solve_qp(other, 2, 1e-10) < 1e-7
-        np.testing.assert_allclose(other.impulse, rows.impulse, atol=1e-6)
+        assert solve_qp(other, 2, 1e-10) < 1e-5
+        np.testing.assert_allclose(other.impulse, rows.impulse, atol=1e-5)
 
 
 def test_block_slides_as_with_newton():
@@ -55,7 +55,7 @@ def test_block_slides_as_with_newton():
     scene.add(ri.Body("block", ri.Shape.box((0.6, 0.5, 0.2)), position=0.1 * np.array(up), orientation=q, material=rough))
     runs = [ri.simulate(scene, 0.5, accuracy=ri.Accuracy(contact_solver=name)) for name in ("newton", "qp")]
     assert runs[1].status.ok
-    np.testing.assert_allclose(runs[1].position("block"), runs[0].position("block"), atol=1e-6)
+    np.testing.assert_allclose(runs[1].position("block"), runs[0].position("block"), atol=1e-5)
     expected = 0.5 * 9.81 * (math.sin(angle) - 0.4 * math.cos(angle)) * 0.25
     assert np.linalg.norm(runs[1].position("block")[-1] - runs[1].position("block")[0]) == pytest.approx(expected, rel=1e-4)
 
