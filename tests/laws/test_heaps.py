@@ -96,14 +96,14 @@ def cloud() -> ri.Scene:
 
 
 def test_momentum_is_kept_and_energy_only_lost():
-    # Impulses are equal and opposite at one point, so both momenta hold to round-off (about 1e-12 of 100 kg m/s); the lever arms of
-    # the two bodies taken to their own surfaces would show at once, as 0.5 kg m2/s.
+    # Impulses are equal and opposite at one point, so both momenta hold to round-off (3e-11 of 240 N s), but for the guard of energy, which
+    # takes what the rule for rotation gains (1e-11 of it a step) off all speeds: 1e-8. Lever arms to each body's own surface would give 0.5.
     run = ri.simulate(cloud(), 1.5, accuracy=HEAPS)
     assert run.ledger is not None
     ledger = run.ledger
     assert "largest 8 bodies" in run.plan.explain()
-    assert np.abs(ledger.momentum - ledger.momentum[0]).max() < 1e-9
-    assert np.abs(ledger.angular_momentum - ledger.angular_momentum[0]).max() < 1e-9
+    assert np.abs(ledger.momentum - ledger.momentum[0]).max() < 1e-7
+    assert np.abs(ledger.angular_momentum - ledger.angular_momentum[0]).max() < 1e-7
     assert np.diff(ledger.kinetic).max() < 1e-10
     assert ledger.kinetic[-1] < 0.5 * ledger.kinetic[0]
     lost = sum(taken[-1] for taken in ledger.dissipated.values())
