@@ -96,8 +96,8 @@ def cloud() -> ri.Scene:
 
 
 def test_momentum_is_kept_and_energy_only_lost():
-    # Impulses are equal and opposite at one point, so both momenta hold to round-off (3e-11 of 240 N s), but for the guard of energy, which
-    # takes what the rule for rotation gains (1e-11 of it a step) off all speeds: 1e-8. Lever arms to each body's own surface would give 0.5.
+    # Impulses are equal and opposite at one point, so momenta hold to round-off (3e-11 of 240 N s), but for the guard of energy, which
+    # takes what the rule for rotation gains (1e-11 of it a step) off all speeds: 1e-8. Arms to each own surface would give 0.5.
     run = ri.simulate(cloud(), 1.5, accuracy=HEAPS)
     assert run.ledger is not None
     ledger = run.ledger
