@@ -73,7 +73,7 @@ def two_boxes(skin: float) -> ri.Scene:
 
 def test_converges_to_newton_with_shorter_sub_steps():
     # Each regime starts at its own gap, so that only time steps differ: the exact solver stops both boxes in 0.5 m, the other one
-    # comes nearer by a half with every halving (1.3, 0.64, 0.32 mm); a wrong friction between the two would keep it away.
+    # comes nearer by a half with every halving (1.8, 0.90, 0.45 mm); a wrong friction between the two would keep it away.
     exact = ri.simulate(two_boxes(2e-6), 1.0, accuracy=ri.Accuracy(contact_solver="newton"))
     errors = []
     for f in (60, 120, 240):
