@@ -12,6 +12,7 @@ from rigidimpulse._jit import kernels_are_cached
 from rigidimpulse.accuracy import Accuracy
 from rigidimpulse.compile_ahead import compile_kernels
 from rigidimpulse.constrain.contact_forces import ContactForces
+from rigidimpulse.constrain.heap import HeapForces
 from rigidimpulse.constrain.jointed import reaction_table
 from rigidimpulse.detect.overlap import resolve_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
@@ -86,6 +87,9 @@ def simulate(
         else:
             paths.start_segments(context, end)
     finish_sub_steps(context, plan, context.state.time)
+    if context.heaps is not None:
+        context.heaps.close(context, context.state.time)
+        plan.tell(HeapForces.name, context.heaps.summary())
     recorder.finish(context.state.course)
     return make_recording(context, plan, times, duration)
 
@@ -113,6 +117,7 @@ def make_plan(world: World) -> Plan:
         FreeRotation(),
         Gravity(),
         ContactForces(),
+        HeapForces(accuracy.contact_solver),
         ImpactTime(accuracy.impact_time),
         ExactFlight(),
     ]

@@ -9,7 +9,9 @@ import numpy as np
 from rigidimpulse.constrain.arrival import PairForce
 from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.constrain.foresight import Foresight
+from rigidimpulse.constrain.heap import Heaps, why_no_heaps
 from rigidimpulse.constrain.jointed import JointState
+from rigidimpulse.constrain.qp import row_solver
 from rigidimpulse.detect.groups import NO_FORCE
 from rigidimpulse.detect.touching import bring
 from rigidimpulse.geometry import Geometry
@@ -106,8 +108,10 @@ class StepContext:
         self.wrench = np.zeros((n, 6))
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
+        self.solve_rows = row_solver(world.accuracy.contact_solver)
         self.foresight = Foresight(world)
         self.joints = JointState(world) if world.joints_of_scene else None
+        self.heaps = None if why_no_heaps(world) else Heaps(world)
 
     def bring(self, i: int, time: float) -> None:
         """Bring body i to `time` on its course."""

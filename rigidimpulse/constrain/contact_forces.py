@@ -11,7 +11,6 @@ from rigidimpulse.constrain.arrival import remember_forces
 from rigidimpulse.constrain.contact_motion import Motion, contact_motion
 from rigidimpulse.constrain.drift import lift_contacts, needs_lift
 from rigidimpulse.constrain.foresight import ALLOWED
-from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.resting import Held, hold_contacts
 from rigidimpulse.constrain.rolling import rolling_of
 from rigidimpulse.conventions import TOLERANCES
@@ -59,8 +58,10 @@ class ContactForces:
 
 def hold(context, window, group: Group) -> None:
     """Find the lasting contacts of a group and write the wrenches of its members into context.wrench."""
-    context.wrench[group.members] = 0.0
     context.contact_log.close(group.members.tolist(), group.time)
+    if group.heap is not None:
+        return
+    context.wrench[group.members] = 0.0
     group.held = group.slow()
     if not group.held.any() and not len(group.joints):
         return
@@ -113,7 +114,7 @@ def _hold_turning(
     def hold_over(h: float, excess: np.ndarray) -> Held:
         context.wrench[group.members] = 0.0
         return hold_contacts(
-            solve_newton, state.now, contacts, group.members, motion.turning, excess, context.acceleration,
+            context.solve_rows, state.now, contacts, group.members, motion.turning, excess, context.acceleration,
             context.angular_acceleration, h, SHORTEST_STOP * step, context.column, force, context.wrench, rolling,
         )
 

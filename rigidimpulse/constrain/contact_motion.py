@@ -71,14 +71,14 @@ def _owner(first, index):
 
 
 @jit
-def _single(geometry, shape):
+def only_primitive(geometry, shape):
     """The only primitive of a shape, or -1."""
     p = geometry.shape_first[shape]
     return p if geometry.shape_first[shape + 1] == p + 1 else -1
 
 
 @jit
-def _side_radius(geometry, p, rotation, normal):
+def side_radius(geometry, p, rotation, normal):
     """Radius of a cylinder (the only primitive of its shape) that is touched at its side, or of a ball; else 0."""
     if p < 0 or geometry.kind[p] == HALF_SPACE:
         return 0.0
@@ -217,13 +217,13 @@ def _between_cores(bodies, a, b, core_a, core_b, va, vb, ea, eb, n, distance, ra
 def _place_velocity(geometry, shape_of_body, rotation, bodies, contacts, c, kind, feature_a, feature_b, place, normal_rate):
     """p' and n' of contact c, into place and normal_rate."""
     a, b, n = contacts.body_a[c], contacts.body_b[c], contacts.normal[c]
-    pa, pb = _single(geometry, shape_of_body[a]), _single(geometry, shape_of_body[b])
+    pa, pb = only_primitive(geometry, shape_of_body[a]), only_primitive(geometry, shape_of_body[b])
     ea, eb, va, vb, outward_rate = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     flat_a = pa >= 0 and geometry.kind[pa] == HALF_SPACE
     flat_b = pb >= 0 and geometry.kind[pb] == HALF_SPACE
     if kind > HALF_SPACE_CONTACT or feature_a < 0:
         # A cylinder, or a pair that was stopped by its sweep alone.
-        ra, rb = _side_radius(geometry, pa, rotation[a], n), _side_radius(geometry, pb, rotation[b], n)
+        ra, rb = side_radius(geometry, pa, rotation[a], n), side_radius(geometry, pb, rotation[b], n)
         core_a = FACE if flat_a or (ra == 0.0 and rb > 0.0) else POINT
         core_b = FACE if flat_b or (rb == 0.0 and ra > 0.0) else POINT
     else:

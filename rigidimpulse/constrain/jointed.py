@@ -10,7 +10,6 @@ from rigidimpulse.constrain.joint import Joint
 from rigidimpulse.constrain.joint_forces import close_joints, hold_jointed, make_memory, stop_joints
 from rigidimpulse.constrain.joint_impact import impact_rows, stop_at_limits
 from rigidimpulse.constrain.joint_limits import next_switch
-from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.integrate.course import FIXED
@@ -172,7 +171,7 @@ class JointState:
                 memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, group.time + h)
             moment = self.moment.copy()
             residual, worst = hold_jointed(
-                solve_newton, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
+                context.solve_rows, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
                 group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
                 context.wrench, moment, rolling,
             )

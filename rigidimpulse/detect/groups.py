@@ -41,6 +41,7 @@ class Group:
         held: (m,) bool, contacts that carry forces. rests: whether all members stand still.
         still: m/s, approach speed that counts as none.
         joints: the joints of the members.
+        heap: members that are stepped as a heap (see `constrain/heap`), None where there is none.
 
     """
 
@@ -63,6 +64,7 @@ class Group:
     rests: bool = False
     still: float = 0.0
     joints: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    heap: np.ndarray | None = None
 
     def slow(self) -> np.ndarray:
         """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""

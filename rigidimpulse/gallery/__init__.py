@@ -35,6 +35,7 @@ _MODULES = {
     "toss": "tosses",
     "rolling": "rolling",
     "arm": "arm",
+    "pile": "pile",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 
