@@ -56,7 +56,7 @@ class Tolerances:
     approach: float = 1e-13
     """Approach speed that counts as none, relative to the speed of the bodies."""
     rest: float = 1e-8
-    """Speed below which a body that is held is at rest, relative to the speed that gravity gives it in a step."""
+    """Speed below which a body that is held is at rest, relative to the speed that gravity and constant forces give it in a step."""
 
 
 TOLERANCES = Tolerances()
