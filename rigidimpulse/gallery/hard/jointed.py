@@ -32,6 +32,7 @@ a hundred bodies each: a second of motion takes about two minutes, so the case h
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -79,9 +80,7 @@ def arms() -> Scene:
 
 def check_arms(run: Recording) -> list[Check]:
     """Compare the sag, the lift and the stall with their closed forms."""
-    from scipy.optimize import brentq
-
-    sag = float(brentq(lambda a: STIFFNESS * a - LOAD * math.cos(a), 0.0, 1.0))
+    sag = _root(lambda a: STIFFNESS * a - LOAD * math.cos(a), 0.0, 1.0)
     held = _angle(run, "holds")
     reaction = run.reaction("hinge holds")[-1] - [0.0, 0.0, ARM_MASS * GRAVITY]
     torque = STIFFNESS * held[-1]
@@ -92,7 +91,7 @@ def check_arms(run: Recording) -> list[Check]:
     def energy(b: float) -> float:
         return 0.5 * INERTIA * SPEED**2 + WEAK * (b - stall) - LOAD * (math.cos(stall) - math.cos(b))
 
-    low, high = float(brentq(energy, 0.0, stall)), float(brentq(energy, stall, 0.5 * math.pi))
+    low, high = _root(energy, 0.0, stall), _root(energy, stall, 0.5 * math.pi)
     stalled = _angle(run, "stalls") + 0.5 * math.pi
     late = run.times > 2.0 * stall / SPEED
     return [
@@ -108,6 +107,13 @@ def check_arms(run: Recording) -> list[Check]:
         at_most("ends of the arms off their hinges, m", _off_hinges(run), 1e-9, "hinges are rigid"),
         undisturbed(run),
     ]
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Return the root of a function between two places of opposite sign."""
+    from scipy.optimize import root_scalar
+
+    return float(root_scalar(function, bracket=(low, high)).root)
 
 
 def _off_hinges(run: Recording) -> float:
