@@ -15,6 +15,7 @@ _HOMES = {
     "Accuracy": "accuracy",
     "BallJoint": "constrain.joint",
     "Body": "body",
+    "ConstantForce": "forces.constant",
     "DistanceJoint": "constrain.joint",
     "Drive": "constrain.six_axis",
     "FixedJoint": "constrain.joint",

@@ -58,7 +58,7 @@ class Tolerances:
     skin: float = 8e-3
     """Gap at which contacts of heaps are held, relative to the distance from the centre of mass to the nearest face."""
     rest: float = 1e-8
-    """Speed below which a body that is held is at rest, relative to the speed that gravity gives it in a step."""
+    """Speed below which a body that is held is at rest, relative to the speed that gravity and constant forces give it in a step."""
 
 
 TOLERANCES = Tolerances()

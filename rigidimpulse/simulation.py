@@ -18,6 +18,7 @@ from rigidimpulse.detect.overlap import resolve_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.detect.window import Window
 from rigidimpulse.errors import SceneError
+from rigidimpulse.forces.constant import ConstantForces
 from rigidimpulse.forces.gravity import FreeRotation, Gravity
 from rigidimpulse.integrate.course import FIXED, FREE, PRESCRIBED, begin
 from rigidimpulse.integrate.flight import ExactFlight
@@ -116,6 +117,7 @@ def make_plan(world: World) -> Plan:
         ImpactResponse(accuracy.response, accuracy.restitution),
         FreeRotation(),
         Gravity(),
+        ConstantForces(),
         ContactForces(),
         HeapForces(accuracy.contact_solver),
         ImpactTime(accuracy.impact_time),
@@ -129,7 +131,7 @@ def start_courses(context: StepContext) -> None:
     world, course = context.world, context.state.course
     course.position[:], course.orientation[:] = world.position, world.orientation
     course.velocity[:], course.angular_velocity[:] = world.velocity, world.angular_velocity
-    course.acceleration[:] = world.gravity
+    course.acceleration[:] = world.steady_acceleration
     course.inertia[:] = world.inertia
     course.mode[:] = np.where(world.dynamic, FREE, np.where(world.moving, PRESCRIBED, FIXED))
     for i in range(world.num_bodies):
@@ -180,7 +182,7 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
     close_stretches(context)
     ledger = make_ledger(
         times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
-        np.where(world.dynamic, world.mass, 0.0), world.inertia, world.gravity, context.log,
+        np.where(world.dynamic, world.mass, 0.0), world.inertia, world.steady_acceleration, context.log,
     )
     return Recording(
         times=times,

@@ -11,6 +11,7 @@ from rigidimpulse.accuracy import Accuracy, resolve_accuracy
 from rigidimpulse.constrain.joint import Joint, compile_joints
 from rigidimpulse.constrain.joint_rows import Joints
 from rigidimpulse.conventions import TOLERANCES
+from rigidimpulse.forces.constant import ConstantForce, push_of_forces
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
 from rigidimpulse.mass import body_mass
 from rigidimpulse.material import combine, combine_rolling
@@ -30,7 +31,7 @@ class World:
         mass, inv_mass: (n,) kg, 1/kg (0 for immovable). inertia: (n, 3) kg m2, principal (1 for immovable).
         offset: (n, 3) m, centre of mass in the body frame. turn: (n, 4), principal axes in the body frame.
         position, orientation, velocity, angular_velocity: principal-frame state at time 0.
-        gravity: (n, 3) m/s2.
+        gravity, push: (n, 3) m/s2, of gravity and of constant forces. steady_acceleration: (n, 3) m/s2, their sum.
         shape_of_body: (n,). size: (n,) m, largest extent, inf for half spaces. bound_radius: (n,) m about the centre of mass.
         static_min, static_max: (n, 3) m, world boxes of bodies where they start.
         material_of_body: (n,). coefficients: (k, k, 4), see material.combine.
@@ -61,6 +62,8 @@ class World:
     velocity: np.ndarray
     angular_velocity: np.ndarray
     gravity: np.ndarray
+    push: np.ndarray
+    steady_acceleration: np.ndarray
     shape_of_body: np.ndarray
     size: np.ndarray
     bound_radius: np.ndarray
@@ -88,9 +91,9 @@ class World:
         return 1 if np.any(self.geometry.kind == CYLINDER) else None
 
     @cached_property
-    def gravity_strength(self) -> np.ndarray:
-        """(n,) m/s2, magnitude of gravity."""
-        return np.linalg.norm(self.gravity, axis=1)
+    def steady_strength(self) -> np.ndarray:
+        """(n,) m/s2, magnitude of the steady acceleration."""
+        return np.linalg.norm(self.steady_acceleration, axis=1)
 
     @cached_property
     def largest_delta(self) -> float:
@@ -116,8 +119,8 @@ class World:
 
     @property
     def can_press(self) -> bool:
-        """Whether anything but impacts can press bodies together: gravity, a moving support, the spin of what is no ball."""
-        return bool(np.any(self.gravity) or np.any(self.moving) or not np.all(self.ball[self.dynamic]))
+        """Whether anything but impacts can press bodies together: steady forces, a moving support, the spin of what is no ball."""
+        return bool(np.any(self.steady_acceleration) or np.any(self.moving) or not np.all(self.ball[self.dynamic]))
 
     def may_collide(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Which pairs take part in contact at all: at least one of the bodies is dynamic."""
@@ -161,6 +164,11 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
     low, high = _world_boxes(geometry, shape_of_body, position, principal)
     material_of_body, coefficients, rolling = _materials(bodies)
     mass = np.array([m.mass for m in masses], float)
+    inv_mass = np.where(dynamic, 1.0 / mass, 0.0)
+    factor = np.array([body.gravity_factor for body in bodies], float)
+    gravity = factor[:, None] * np.asarray(scene.gravity, float) * dynamic[:, None]
+    forces = [effect for effect in scene.effects if isinstance(effect, ConstantForce)]
+    push = push_of_forces(forces, [body.name for body in bodies], inv_mass)
     return World(
         scene=scene,
         accuracy=resolve_accuracy(accuracy),
@@ -170,7 +178,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
         dynamic=dynamic,
         moving=moving,
         mass=mass,
-        inv_mass=np.where(dynamic, 1.0 / mass, 0.0),
+        inv_mass=inv_mass,
         inertia=np.where(dynamic[:, None], np.array([m.moments for m in masses], float).reshape(-1, 3), 1.0),
         offset=offset,
         turn=turn,
@@ -178,7 +186,9 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
         orientation=principal,
         velocity=np.array([body.velocity for body in bodies], float).reshape(-1, 3),
         angular_velocity=np.array([body.angular_velocity for body in bodies], float).reshape(-1, 3),
-        gravity=np.outer([body.gravity_factor for body in bodies], np.asarray(scene.gravity, float)) * dynamic[:, None],
+        gravity=gravity,
+        push=push,
+        steady_acceleration=gravity + push,
         shape_of_body=shape_of_body,
         size=size,
         bound_radius=radius,

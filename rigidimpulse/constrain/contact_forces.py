@@ -177,7 +177,7 @@ def _rests(context, group: Group, h: float) -> bool:
         supports = np.union1d(supports, context.joints.bodies_of(group.joints))
     if np.any(world.moving[supports]):
         return False
-    limit = TOLERANCES.rest * np.linalg.norm(world.gravity[i], axis=1) * h
+    limit = TOLERANCES.rest * world.steady_strength[i] * h
     force, torque = context.wrench[i, :3], context.wrench[i, 3:]
     spin = context.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], torque)
     gained = h * (context.acceleration[i] + world.inv_mass[i, None] * force)

@@ -155,7 +155,7 @@ class Heaps:
         bring_all(
             course, everybody, time, context.state.now, context.state.rotation, context.acceleration, context.angular_acceleration
         )
-        context.acceleration[world.dynamic] = world.gravity[world.dynamic]
+        context.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
         member &= self._slow(context, everybody)
         a, b = self._near(context, member, ahead)
         while True:
@@ -256,7 +256,7 @@ class Heaps:
         state, world = context.state, context.world
         context.recorder.flush_all(state.course, members, time)
         _arrive(state.course, members, time)
-        state.course.acceleration[members] = world.gravity[members]
+        state.course.acceleration[members] = world.steady_acceleration[members]
         bring_all(state.course, members, time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
         for label in np.unique(self.label[members]).tolist():
             self._book(context, label, time)
@@ -387,6 +387,6 @@ def _bare_group(time: float, members: np.ndarray, context) -> Group:
     now, none = context.state.now, np.zeros(0, np.int64)
     return Group(
         time=time, members=members, pairs=none, contacts=empty_contacts(0), place=none, kinds=none,
-        features=np.zeros((0, 2), np.int64), keys=[], delta=np.zeros(0), approach=np.zeros(0), rest_speed=np.zeros(0), live=np.zeros(0, bool), velocity=now.velocity[members].copy(),
-        angular_velocity=now.angular_velocity[members].copy(),
+        features=np.zeros((0, 2), np.int64), keys=[], delta=np.zeros(0), approach=np.zeros(0), rest_speed=np.zeros(0),
+        live=np.zeros(0, bool), velocity=now.velocity[members].copy(), angular_velocity=now.angular_velocity[members].copy(),
     )  # fmt: skip

@@ -231,14 +231,15 @@ def contact_key(a: int, b: int, kind: int, feature_a: int, feature_b: int) -> tu
 def classify(context, group: Group) -> None:
     """Measure approach speeds and what presses each contact; slow approaches within the margin count as live.
 
-    Where a group is supported, whatever it carries is pressed by gravity as soon as the support bears, so gravity is the least that counts.
+    Where a group is supported, whatever it carries is pressed by its steady acceleration (gravity, constant forces) as soon as the support
+    bears, so that is the least that counts.
     """
     state, world = context.state, context.world
     contacts = group.contacts
     force = np.array([state.force_of(key)[0] for key in group.keys])
     least = 0.0
     if not np.all(world.dynamic[contacts.body_a] & world.dynamic[contacts.body_b]):
-        least = float(world.gravity_strength[group.members].max())
+        least = float(world.steady_strength[group.members].max())
     pressing(
         context.state.now, contacts, context.acceleration, context.angular_acceleration, force, least, group.delta,
         group.approach, group.rest_speed,

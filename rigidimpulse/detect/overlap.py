@@ -78,7 +78,7 @@ def resolve_overlaps(context) -> None:
         keys = np.array([a * world.num_bodies + b for a, b in stuck])
         context.world = replace(world, apart=np.union1d(world.apart, keys))
     moved = search.position - world.position
-    gained = -float(np.sum(np.where(world.dynamic, world.mass, 0.0)[:, None] * world.gravity * moved))
+    gained = -float(np.sum(np.where(world.dynamic, world.mass, 0.0)[:, None] * world.steady_acceleration * moved))
     # Frame 0 is the state as given: the books change right after it.
     context.log.book(float(np.nextafter(0.0, 1.0)), "overlap", gained)
 

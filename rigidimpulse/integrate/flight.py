@@ -68,7 +68,7 @@ def take_course(context, window, i: int, time: float, wrench: np.ndarray, rests:
     course.start[i] = time
     course.position[i], course.orientation[i] = now.position[i], now.orientation[i]
     course.velocity[i], course.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]
-    course.acceleration[i] = 0.0 if rests else world.gravity[i] + world.inv_mass[i] * wrench[:3]
+    course.acceleration[i] = 0.0 if rests else world.steady_acceleration[i] + world.inv_mass[i] * wrench[:3]
     course.torque[i] = 0.0 if rests else wrench[3:]
     course.mode[i] = FIXED if rests else (FORCED if np.any(wrench[3:]) else FREE)
     begin(course, i)

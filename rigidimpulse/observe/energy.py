@@ -30,6 +30,6 @@ def kinetic_energy(bodies, world, members: np.ndarray) -> float:
 
 
 def mechanical_energy(bodies, world, members: np.ndarray) -> float:
-    """Kinetic energy and potential energy of gravity [J]."""
-    potential = -(world.mass[members, None] * world.gravity[members] * bodies.position[members]).sum()
+    """Kinetic energy and potential energy of gravity and constant forces [J]."""
+    potential = -(world.mass[members, None] * world.steady_acceleration[members] * bodies.position[members]).sum()
     return kinetic_energy(bodies, world, members) + float(potential)

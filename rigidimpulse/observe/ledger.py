@@ -16,7 +16,7 @@ class Ledger:
     Attributes:
         times: (f,) s.
         kinetic: (f,) J.
-        potential: (f,) J, of gravity, zero at the world's origin.
+        potential: (f,) J, of gravity and constant forces, zero at the world's origin.
         momentum: (f, 3) kg m/s.
         angular_momentum: (f, 3) kg m2/s about the world's origin.
         dissipated: by cause ("impact", "contact", "capture", "lift", "heap"), (f,) J taken from the bodies until each frame; a
@@ -37,17 +37,17 @@ class Ledger:
         return self.kinetic + self.potential
 
 
-def make_ledger(times, position, orientation, velocity, angular_velocity, mass, inertia, gravity, log) -> Ledger:
+def make_ledger(times, position, orientation, velocity, angular_velocity, mass, inertia, steady_acceleration, log) -> Ledger:
     """Ledger of recorded principal-frame states.
 
     Arrays are (f, n, ...) for all bodies: centre of mass, principal orientation, velocity, world spin; mass (n,) with 0 for
-    bodies that are not dynamic, principal inertia (n, 3), gravity (n, 3); log: energy changes by cause and courses under
-    contact forces.
+    bodies that are not dynamic, principal inertia (n, 3), acceleration by gravity and constant forces (n, 3); log: energy
+    changes by cause and courses under contact forces.
     """
     spin_body = rotate_inverse(orientation, angular_velocity)
     angular_body = spin_body * np.where(mass > 0.0, 1.0, 0.0)[:, None] * inertia
     kinetic = 0.5 * (mass * (velocity**2).sum(-1) + (spin_body * angular_body).sum(-1))
-    potential = -(mass[:, None] * gravity * position).sum(-1)
+    potential = -(mass[:, None] * steady_acceleration * position).sum(-1)
     momentum = (mass[:, None] * velocity).sum(1)
     angular = (rotate(orientation, angular_body) + np.cross(position, mass[:, None] * velocity)).sum(1)
     dissipated: dict[str, np.ndarray] = {}

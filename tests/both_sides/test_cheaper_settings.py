@@ -1,0 +1,108 @@
+"""Where an option is the point of a scene: the setting that is enough, and the cheaper one that is not.
+
+Each scene of the gallery here comes with checks against its law. With the setting that is enough all hold, with the cheaper one
+those named here fail, by more than ten times the bound: the option does what it is there for.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+
+import rigidimpulse as ri
+from rigidimpulse import gallery
+
+G = 9.81
+
+
+@pytest.mark.parametrize(
+    ("name", "enough", "cheaper", "quantity"),
+    [
+        # Looking after each step finds a ball as deep as it gets in a step; a straight line through two gaps is off by g h^2 / 8.
+        ("bounces_to_rest", {}, {"impact_time": "linear"}, "e = 0.5: error of ten impact times"),
+        ("galperin_1", {}, {"impact_time": "after"}, "error of the impact times"),
+        ("disks_in_a_box", {"impact_time": "conservative"}, {"impact_time": "linear"}, "error of final positions"),
+        ("disks_in_a_box", {}, {"impact_time": "after"}, "error of final positions"),
+        # All impacts of a row at once push every ball; a reflected speed knows no spin.
+        ("cradle_one", {}, {"response": "simultaneous"}, "error of positions"),
+        ("superball", {}, {"response": "kinematic"}, "error of the change of v"),
+    ],
+)
+def test_the_cheaper_setting_fails(name: str, enough: dict, cheaper: dict, quantity: str) -> None:
+    entry = gallery.load(name)
+
+    def checks(settings: dict) -> list:
+        return entry.check(ri.simulate(entry.scene(), entry.duration, entry.fps, accuracy=ri.Accuracy(**settings)))
+
+    assert all(check.passed for check in checks(enough))
+    failed = [check for check in checks(cheaper) if quantity in check.what]
+    assert len(failed) == 1 and failed[0].value > 10.0 * failed[0].bound
+
+
+def triangle_of_balls(response: str) -> ri.Recording:
+    """A ball flies at the gap between two touching ones, e = 1, and meets both at the same instant."""
+    scene = ri.Scene(gravity=(0, 0, 0))
+    smooth = ri.Material(restitution=1.0, static_friction=0.0)
+    ball = ri.Shape.sphere(0.5)
+    scene.add(ri.Body("cue", ball, position=(-2, 0, 0), velocity=(1, 0, 0), mass=1.0, material=smooth))
+    for name, y in (("left", 0.5), ("right", -0.5)):
+        scene.add(ri.Body(name, ball, position=(0, y, 0), mass=1.0, material=smooth))
+    return ri.simulate(scene, 3.0, accuracy=ri.Accuracy(response=response))
+
+
+def test_only_impacts_all_at_once_keep_mirror_symmetry() -> None:
+    """By symmetry both impulses are equal: j = (6/5) m v cos 30, so v' = -v / 5 and u = (3/5) (v, +-v / sqrt 3).
+
+    One after the other, the first ball takes cos^2 30 of the speed, and what is left meets the second one.
+    """
+    together = triangle_of_balls("simultaneous")
+    np.testing.assert_allclose(together.velocity("cue")[-1], (-0.2, 0, 0), atol=1e-12)
+    for name, side in (("left", 1), ("right", -1)):
+        np.testing.assert_allclose(together.velocity(name)[-1], (0.6, side * 0.6 / math.sqrt(3), 0), atol=1e-12)
+    in_turn = triangle_of_balls("sequential")
+    assert abs(in_turn.velocity("cue")[-1, 1]) > 0.2
+    assert in_turn.ledger.kinetic[-1] == pytest.approx(0.5, rel=1e-12)
+
+
+def test_kinematic_response_does_not_keep_momentum() -> None:
+    """A ball of 1 kg and 1 m/s strikes one of 3 kg at rest, e = 0.5: v = (1 - 3 e) / 4, u = (1 + e) / 4."""
+
+    def speeds(response: str) -> tuple[float, float]:
+        scene, dull = ri.Scene(gravity=(0, 0, 0)), ri.Material(restitution=0.5)
+        scene.add(ri.Body("light", ri.Shape.sphere(0.5), position=(-2, 0, 0), velocity=(1, 0, 0), mass=1.0, material=dull))
+        scene.add(ri.Body("heavy", ri.Shape.sphere(0.5), mass=3.0, material=dull))
+        run = ri.simulate(scene, 2.0, accuracy=ri.Accuracy(response=response))
+        return float(run.velocity("light")[-1, 0]), float(run.velocity("heavy")[-1, 0])
+
+    v, u = speeds("sequential")
+    assert (v, u) == pytest.approx(((1 - 1.5) / 4, 1.5 / 4), abs=1e-14)
+    v, u = speeds("kinematic")
+    assert v + 3.0 * u > 1.5
+
+
+def swing_error(step: float) -> float:
+    """Error of the angle [rad] over 2 s of a pendulum let go at 45 degrees: sin(a / 2) = sin(a0 / 2) sn(K - w t)."""
+    mass, inertia, start = 2.0, 0.1, math.pi / 4
+    scene = ri.Scene(gravity=(0, 0, -G))
+    bob = {"position": (math.sin(start), 0, -math.cos(start)), "mass": mass, "inertia": (inertia,) * 3}
+    scene.add(ri.Body("bob", ri.Shape.sphere(0.1), **bob))
+    scene.add(ri.HingeJoint(None, "bob", (0, 0, 0), (0, 1, 0)))
+    run = ri.simulate(scene, 2.0, accuracy=ri.Accuracy(step=step))
+    rate, k = math.sqrt(mass * G / (inertia + mass)), math.sin(start / 2)
+    angle = 2.0 * np.arcsin(k * ellipj(ellipk(k * k) - rate * run.times, k * k)[0])
+    x = run.position("bob")
+    return float(np.abs(np.arctan2(x[:, 0], -x[:, 2]) - angle).max())
+
+
+def test_a_long_step_is_felt_where_joints_turn() -> None:
+    """Joints are of second order: in a time t the phase is off by some (w h)^2 w t / 24 = 7e-4 rad at 1/60 s with w = 3 1/s, thirty-six
+    times as much at 1/10 s, where sub-steps that end after a part of a radian take most of it back. Contact of faces does not turn: a
+    block on a slope does not feel the step."""
+    assert swing_error(1 / 60) < 7e-4
+    assert swing_error(1 / 10) > 1e-3
+    slope = gallery.load("incline")
+    checks = slope.check(ri.simulate(slope.scene(), slope.duration, slope.fps, accuracy=ri.Accuracy(step=0.5)))
+    assert all(check.passed for check in checks)
