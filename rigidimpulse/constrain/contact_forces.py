@@ -20,8 +20,9 @@ from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.plan import Bound, Skip
 from rigidimpulse.respond.impulse import select
 
-# Residual of the solver that is reported, relative to the speed gained in the step.
+# Residual of the solver that is reported, relative to the speed gained in the step, and energy that such forces may make, relative.
 UNSOLVED = 1e-6
+PLAY = 1e-3
 TURN = 0.01
 """rad, how far arms and normals of contacts may turn in a sub-step."""
 MOST_SUB_STEPS = 256
@@ -86,6 +87,12 @@ def hold(context, window, group: Group) -> None:
     else:
         h, residual = _hold_turning(context, group, subset, contacts, keys, motion, force, rest)
     context.log.book(group.time, "capture", kinetic_energy(now, context.world, group.members) - before)
+    failed = residual > UNSOLVED or (len(group.joints) > 0 and not context.joints.are_closed)
+    if failed and _makes_energy(context, group, h):
+        context.wrench[group.members] = 0.0
+        force[:] = 0.0
+        if len(group.joints):
+            context.joints.let_go(group)
     ends = np.concatenate([contacts.body_a, contacts.body_b])
     state.closed[group.members] = -1 if len(group.joints) or np.any(context.world.moving[ends]) else group.members[0]
     state.grounded[group.members] = not np.all(context.world.dynamic[ends])
@@ -102,6 +109,21 @@ def hold(context, window, group: Group) -> None:
         context.joints.log_rest(group)
     if h < rest and not group.rests:
         window.wake[group.members] = group.time + h
+
+
+def _makes_energy(context, group: Group, h: float) -> bool:
+    """Whether forces that are no solution give the members more kinetic energy than they have, or would have without them."""
+    now, i = context.state.now, group.members
+    inertia = np.linalg.inv(now.inv_inertia[i])
+    energies = []
+    for share in (0.0, 1.0):
+        wrench = share * context.wrench[i]
+        v = now.velocity[i] + h * (context.acceleration[i] + now.inv_mass[i, None] * wrench[:, :3])
+        spin = context.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], wrench[:, 3:])
+        w = now.angular_velocity[i] + h * spin
+        energies.append(0.5 * float((context.world.mass[i] * (v**2).sum(1)).sum() + np.einsum("ij,ijk,ik->", w, inertia, w)))
+    most = max(energies[0], kinetic_energy(now, context.world, i))
+    return not energies[1] <= (1.0 + PLAY) * most
 
 
 def _hold_turning(

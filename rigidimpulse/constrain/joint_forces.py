@@ -156,12 +156,19 @@ def close_joints(joints, which, bodies, rotation, members, number, angle, allowe
 
     Done only where one is off by more than `allowed` [m or rad]; returns whether bodies were moved.
     """
-    moved = False
+    moved, last = False, np.inf
+    before = bodies.position[members].copy(), bodies.orientation[members].copy()
     for _ in range(MAX_ROUNDS):
         rows, worst = _closing_rows(joints, which, bodies, rotation, members, number, angle)
+        if not worst < last:
+            # No pose closes them; the one before was the best.
+            bodies.position[members], bodies.orientation[members] = before
+            rotation[members] = to_matrix(bodies.orientation[members])
+            break
         if worst <= allowed:
             break
-        moved = True
+        moved, last = True, worst
+        before = bodies.position[members].copy(), bodies.orientation[members].copy()
         solve_newton(rows, len(members), 1e-3 * allowed)
         move_bodies(bodies, members, rows)
         rotation[members] = to_matrix(bodies.orientation[members])
@@ -243,7 +250,7 @@ def hold_jointed(
             solve, rows, n, first_row, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale
         )
     _finish(joints, which, bodies, members, rows, first_row, start, h, memory, direction, force, moment)
-    return residual / scale, worst
+    return residual / scale if np.isfinite(scale) else np.inf, worst if np.isfinite(worst) else np.inf
 
 
 @jit

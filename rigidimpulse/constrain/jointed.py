@@ -19,6 +19,8 @@ TURN = 0.02
 """rad, how far the bodies of a joint may turn against each other in a sub-step."""
 SWAY = 0.7
 """rad, how far the fastest oscillation may go in a sub-step that the tension of joints keeps up across them; 2 is unstable."""
+NOT_CLOSED = 1e3
+"""How many times farther than allowed joints may be off before that is reported."""
 MOST_SUB_STEPS = 256
 """Sub-steps in a step."""
 SHORT = 1e-5
@@ -37,6 +39,7 @@ class JointState:
         names: of the joints. whole: (j,) bool, not broken.
         moment: (j, 3) N s, impulse on b at the instant being worked on. shock: (j, 3) N s, by impacts, so far.
         pull: (j, 3) N, last force on b.
+        are_closed: whether the forces found last close the joints.
         began: (j,) s, start of the present sub-step. length: (j,) s, that of the one before.
         reactions: (time, joint, force (3,) on b) at the ends of sub-steps.
 
@@ -53,6 +56,7 @@ class JointState:
         self.moment = np.zeros((len(joints), 3))
         self.shock = np.zeros((len(joints), 3))
         self.pull = np.zeros((len(joints), 3))
+        self.are_closed = True
         self.began = np.zeros(len(joints))
         self.length = np.zeros(len(joints))
         self.reactions: list[tuple[float, int, np.ndarray]] = []
@@ -191,12 +195,20 @@ class JointState:
         self._log(group, h)
         self.began[group.joints] = group.time
         self._report(context, group, worst)
+        self.are_closed = worst <= NOT_CLOSED * self._allowed
         return h, residual
+
+    def let_go(self, group) -> None:
+        """Forget the forces of the group's joints, which are not to be used."""
+        self.memory.wrench[group.members] = 0.0
+        self.pull[group.joints] = 0.0
+        for j in group.joints.tolist():
+            self.memory.force[self.table.first[j] : self.table.first[j + 1]] = 0.0
 
     def _report(self, context, group, worst: float) -> None:
         """Report joints that are off by `worst` m or rad, and those near the singularity of a twist."""
         names = tuple(context.world.names[i] for i in group.members)
-        if worst > 1e3 * self._allowed:
+        if worst > NOT_CLOSED * self._allowed:
             context.log.report(group.time, "joints not closed", names, f"off by {worst:.1e}; use a smaller step")
         for j in group.joints.tolist():
             if self.memory.steepness[self.table.first[j] : self.table.first[j + 1]].max(initial=0.0) > STEEP:

@@ -300,7 +300,7 @@ def solve_with_slip(solve, rows: Rows, n: int, first_row: np.ndarray, contacts, 
     """Solve rows that begin with those of contacts; contacts that slip, or come to slip, have dynamic friction.
 
     solve: a solver of rows, as `newton.solve_newton`; slides (m,) bool: contacts that slip from the start; target: residual
-    asked for, m/s; slow: slip that is none, m/s. Returns the residual, m/s.
+    asked for, m/s; slow: slip that is none, m/s. Returns the residual, m/s: inf where there is no finite answer, and then no impulse.
     """
     rough = contacts.static_friction > 0.0
     disc = first_row[rough] + 1
@@ -316,4 +316,7 @@ def solve_with_slip(solve, rows: Rows, n: int, first_row: np.ndarray, contacts, 
             warm = False
         elif not let_slip(rows, n, first_row, contacts.dynamic_friction, slow):
             break
+    if not np.all(np.isfinite(rows.impulse)):
+        rows.impulse[:] = 0.0
+        return np.inf
     return residual
