@@ -36,7 +36,8 @@ class State:
         time: s, every body's course is known from here on.
         course: path of every body since its last change of course.
         now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
-        energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at.
+        energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at, at
+            arrival_time [s].
         under_contact: (n,) bool, bodies whose course carries contact forces.
         closed: (n,) first body of its group if nothing that moves by itself takes part, else -1. grounded: (n,) bool, if what stands does.
         rebounds: by pair, time and speed of the last rebound and how many in a row were short.
@@ -66,6 +67,7 @@ class State:
         self.under_contact = np.zeros(n, bool)
         self.rebounds: dict[tuple[int, int], tuple[float, float, int]] = {}
         self.energy_at_start = np.zeros(n)
+        self.arrival_time = np.full(n, -np.inf)
         self.closed = np.full(n, -1)
         self.grounded = np.zeros(n, bool)
         self.arrival_energy: dict[int, float] = {}

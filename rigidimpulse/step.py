@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigidimpulse.detect.groups import Group
 from rigidimpulse.detect.window import Window
 from rigidimpulse.integrate.flight import take_course
 
@@ -33,20 +34,24 @@ def step(context, plan, end: float) -> None:
 def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> None:
     """Everything that happens at `time` to the groups that the given bodies touch."""
     window.wake[bodies] = np.inf
-    for group in window.touching(time, bodies):
+    groups = window.touching(time, bodies)
+    release(context, window, time, bodies, groups)
+    for group in groups:
         plan.run("respond", context, group)
         plan.run("forces", context, group)
         plan.run("constrain", context, window, group)
         plan.run("integrate", context, window, group)
-    release(context, window, time, bodies)
     window.settle(time)
 
 
-def release(context, window: Window, time: float, bodies: np.ndarray) -> None:
+def release(context, window: Window, time: float, bodies: np.ndarray, groups: list[Group]) -> None:
     """Let go those bodies that still carry the forces of contacts they have left."""
     state = context.state
     free = np.zeros(6)
-    pushed = context.world.dynamic[bodies] & (state.course.start[bodies] < time) & state.under_contact[bodies]
-    for i in bodies[pushed].tolist():
+    held = np.concatenate([group.members for group in groups]) if groups else bodies[:0]
+    left = np.setdiff1d(bodies, held)
+    left = left[state.under_contact[left] & (state.course.start[left] < time) & ~window.inside[left]]
+    for i in left.tolist():
         context.bring(i, time)
+    for i in left.tolist():
         take_course(context, window, i, time, free, rests=False)

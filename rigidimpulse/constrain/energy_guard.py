@@ -22,25 +22,23 @@ GAIN = 1e-11
 def note_arrival(context, members: list[int], time: float) -> bool:
     """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows.
 
-    What groups of them gained is taken off their velocities. Returns whether any was.
+    What groups of them gained is taken off their velocities as soon as all have arrived. Returns whether any was.
     """
     world, state = context.world, context.state
     guarded = False
-    closed: dict[int, list[int]] = {}
-    for i in members:
-        if state.under_contact[i]:
-            state.arrival_energy[i] = mechanical_energy(state.now, world, np.array([i]))
-            if state.closed[i] >= 0:
-                closed.setdefault(int(state.closed[i]), []).append(i)
-    for first, group in closed.items():
-        if len(group) < np.count_nonzero((state.closed == first) & state.under_contact) or np.ptp(state.course.start[group]) > 0.0:
+    touched = [i for i in members if state.under_contact[i]]
+    for i in touched:
+        state.arrival_energy[i] = mechanical_energy(state.now, world, np.array([i]))
+        state.arrival_time[i] = time
+    for first in sorted({int(state.closed[i]) for i in touched} - {-1}):
+        group = np.flatnonzero((state.closed == first) & state.under_contact)
+        if np.any(state.arrival_time[group] != time) or np.ptp(state.course.start[group]) > 0.0:
             continue
-        which = np.array(group)
-        gained = sum(state.arrival_energy[i] - state.energy_at_start[i] for i in group)
-        before = kinetic_energy(state.now, world, which)
+        gained = sum(state.arrival_energy[i] - state.energy_at_start[i] for i in group.tolist())
+        before = kinetic_energy(state.now, world, group)
         if gained > GAIN * before:
-            take_off(state.now, world, which, gained, bool(state.grounded[first]))
-            context.log.book(time, "guard", kinetic_energy(state.now, world, which) - before)
+            take_off(state.now, world, group, gained, bool(state.grounded[first]))
+            context.log.book(time, "guard", kinetic_energy(state.now, world, group) - before)
             guarded = True
     return guarded
 
