@@ -162,7 +162,11 @@ def _vertex_contact(geometry, solid, view, rows, count, vertex, core):
     if solid.radius < rho <= solid.radius + border and abs(q[2]) > solid.half:  # in line with the rim: over the cap
         q = (q[0] * solid.radius / rho, q[1] * solid.radius / rho, q[2])
     distance, p, _, n = closest_on_curve(q, ZERO, solid.radius, solid.half)
-    if distance > solid.margin + core or distance == 0.0:
+    if distance == 0.0 and core == 0.0 and solid.half - abs(q[2]) <= border:
+        # In the very plane of the cap, or in it by rounding.
+        n, distance = (0.0, 0.0, 1.0 if q[2] > 0.0 else -1.0), abs(q[2]) - solid.half
+        p = (q[0], q[1], n[2] * solid.half)
+    elif distance > solid.margin + core or distance == 0.0:
         return count
     flat = core == 0.0 and abs(n[2]) == 1.0
     for k in range(geometry.vertex_edge_first[vertex], geometry.vertex_edge_first[vertex + 1]):
