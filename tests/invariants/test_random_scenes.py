@@ -21,8 +21,8 @@ import rigidimpulse as ri
 CONVEX = tuple(shape for shape in SHAPES if shape != "corner")
 FREE = Choice(supports=("none",), most_bodies=5, joints=False)
 """Nothing supports the bodies, which meet in the air: all shapes, the concave one too."""
-BALLS = Choice(layouts=("cloud", "pile", "stack"), shapes=("sphere",), joints=False)
-"""Balls on all supports, resting or moving, in heaps and stacks."""
+BALLS = Choice(layouts=("cloud",), shapes=("sphere",), joints=False)
+"""Balls that meet in the air and fall on supports of all kinds, resting or moving."""
 PAIRS = Choice(supports=("floor",), layouts=("cloud",), shapes=CONVEX, most_bodies=2, joints=False)
 """Two convex bodies that meet in the air, fall on a floor and bounce, slide or come to rest there."""
 
