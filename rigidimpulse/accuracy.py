@@ -7,7 +7,9 @@ Slots
                     energetic where a contact has friction, Newton's where it has none. They differ only with friction, and
                     there where the contact couples normal and tangential motion (see respond/restitution.py)
     integrator      how bodies move between impacts (stage integrate)
-    contact_solver  how lasting contacts are solved (stage constrain)
+    contact_solver  how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for heaps of many bodies: see
+                    docs/heaps.md), "qp" (the exact laws by a convex solver library: a reference), or "auto": per island of bodies
+                    that may touch in a step, newton unless it is a large heap
     step            s; contact forces are constant over it, impacts are found inside it at any time
     tolerance       gap error at an impact, as a fraction of the size of the smaller body
     iterations      limit of gap queries for one pair and one interval
@@ -37,7 +39,7 @@ class Accuracy(BaseModel):
     response: Literal["sequential", "simultaneous", "kinematic"] = "sequential"
     restitution: Literal["auto", "newton", "poisson", "energetic"] = "auto"
     integrator: Literal["exact"] = "exact"
-    contact_solver: Literal["auto", "newton"] = "auto"
+    contact_solver: Literal["auto", "newton", "substepped", "qp"] = "auto"
     step: float = Field(default=1.0 / 60.0, gt=0.0, allow_inf_nan=False)
     tolerance: float = Field(default=1e-13, gt=0.0, le=1e-2, allow_inf_nan=False)
     iterations: int = Field(default=10_000, ge=1)

@@ -72,6 +72,7 @@ def _respond_and_detect(context) -> None:
     from rigidimpulse.constrain.resting import hold_contacts
     from rigidimpulse.constrain.rows import change_velocities, changes_of, contact_rows, response_to, row_velocities
     from rigidimpulse.detect.window import Window
+    from rigidimpulse.observe.contact_log import fill_contacts_and_forces
     from rigidimpulse.respond.block import log_block
     from rigidimpulse.respond.response import respond_to_impacts
     from rigidimpulse.respond.restitution import LAWS
@@ -89,8 +90,9 @@ def _respond_and_detect(context) -> None:
     change_velocities(now, members, rows)
     changes_of(now, members, rows)
     needs_lift(contacts, np.ones(1, bool), one)
+    fill_contacts_and_forces(contacts, now.position, np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)))
     motion = contact_motion(
-        world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64)
+        world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
     )
     hold_contacts(
         _leave_unsolved, now, contacts, members, motion.turning, np.zeros(1), context.acceleration, context.angular_acceleration,

@@ -55,6 +55,8 @@ class Tolerances:
     """Distance at which joints are closed, relative to the size of what they join; also their angles, in rad."""
     approach: float = 1e-13
     """Approach speed that counts as none, relative to the speed of the bodies."""
+    skin: float = 8e-3
+    """Gap at which contacts of heaps are held, relative to the distance from the centre of mass to the nearest face."""
     rest: float = 1e-8
     """Speed below which a body that is held is at rest, relative to the speed that gravity and constant forces give it in a step."""
 

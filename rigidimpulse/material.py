@@ -36,13 +36,16 @@ class Material:
         dynamic_friction: mu_k in [0, mu_s], tangential over normal force while sliding.
         tangential_restitution: in [0, 1], share of the slip at an impact that is reversed, as far as friction is able
             (1: Garwin's superball; 0: slip at most stops).
+        rolling_friction: b >= 0, m: a contact that presses with N resists rolling by a moment of up to b N. A ball of radius
+            r holds on inclines below tan = b / r.
+        spinning_friction: s >= 0, m: it resists spinning about the normal by a moment of up to s N.
         restitution_combine: one of "average", "minimum", "maximum", "multiply"; also for tangential_restitution.
-        friction_combine: the same, for both frictions.
+        friction_combine: the same, for all frictions.
         any_restitution: accept a restitution outside [0, 1] on purpose: above 1 an impact feeds energy in, below 0
             bodies pass into each other.
 
-    None means not stated: the other body's value counts, or the defaults (restitutions 0, friction 0.5) if neither
-    body states one. Values are checked when the scene is compiled.
+    None means not stated: the other body's value counts, or the defaults (restitutions 0, friction 0.5, rolling and
+    spinning friction 0) if neither body states one. Values are checked when the scene is compiled.
 
     """
 
@@ -54,6 +57,8 @@ class Material:
     restitution_combine: str = "average"
     friction_combine: str = "average"
     any_restitution: bool = False
+    rolling_friction: float | None = None
+    spinning_friction: float | None = None
 
     def frictions(self) -> tuple[float | None, float | None]:
         """Return static and dynamic friction, each standing in for the other where only one is stated."""
@@ -76,6 +81,10 @@ class Material:
             value = _number(name, getattr(self, name))
             if value is not None and value < 0.0:
                 raise SceneError(f"{name} is {value}", "give a value >= 0", "material")
+        for name in ("rolling_friction", "spinning_friction"):
+            value = _number(name, getattr(self, name), "m")
+            if value is not None and value < 0.0:
+                raise SceneError(f"{name} is {value} m", "give a length >= 0", "material")
         static, dynamic = self.frictions()
         if static is not None and dynamic is not None and dynamic > static:
             raise SceneError(
@@ -100,6 +109,15 @@ def combine(material_a: Material, material_b: Material) -> tuple[float, float, f
         _combined(grip, static_a, static_b, DEFAULT_FRICTION),
         _combined(grip, dynamic_a, dynamic_b, DEFAULT_FRICTION),
         _combined(bounce, material_a.tangential_restitution, material_b.tangential_restitution, DEFAULT_RESTITUTION),
+    )
+
+
+def combine_rolling(material_a: Material, material_b: Material) -> tuple[float, float]:
+    """Return rolling and spinning friction of a pair [m]; its order does not matter."""
+    grip = _mode(material_a.friction_combine, material_b.friction_combine)
+    return (
+        _combined(grip, material_a.rolling_friction, material_b.rolling_friction, 0.0),
+        _combined(grip, material_a.spinning_friction, material_b.spinning_friction, 0.0),
     )
 
 

@@ -82,6 +82,12 @@ class Plan:
             line.seconds += perf_counter() - start
             line.calls += 1
 
+    def tell(self, name: str, reason: str) -> None:
+        """Say of an effect what it did in the run, in the place of why it is in."""
+        for line in self.lines:
+            if line.name == name:
+                line.reason = reason
+
     def explain(self) -> str:
         """Return a table: stage, effect, in or out, share of the time so far, why."""
         total = sum(line.seconds for line in self.lines)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidimpulse.errors import SceneError, unknown_name
+from rigidimpulse.observe.contacts import CONTACT_DTYPE, forces_on
 
 if TYPE_CHECKING:
     from rigidimpulse.observe.events import Event
@@ -57,6 +58,8 @@ class Recording:
         ledger: energy and momentum per frame. status: how the run went. plan: what was simulated and why.
         scene: the scene as it was written; None in a recording loaded from a file without one.
         reactions: (f, 3) N by joint, see `reaction`.
+        contacts: structured array, one row a stretch of time over which a lasting contact carries the same force (see
+            observe.contacts.CONTACT_DTYPE); stretches that no frame sees are left out. `contacts_at`, `contact_force` by frame.
 
     """
 
@@ -73,6 +76,7 @@ class Recording:
     plan: Plan | None = None
     scene: Scene | None = None
     reactions: dict[str, np.ndarray] = field(default_factory=dict)
+    contacts: np.ndarray = field(default_factory=lambda: np.zeros(0, CONTACT_DTYPE))
 
     def index(self, name: str) -> int:
         """Index of a body.
@@ -117,6 +121,24 @@ class Recording:
         if name not in self.reactions:
             raise unknown_name("joint", name, self.reactions)
         return self.reactions[name]
+
+    def contacts_at(self, frame: int) -> np.ndarray:
+        """Rows of `contacts` that carry load at a frame (an index of `times`, negative ones from the end).
+
+        A row has body_a, body_b (indices), the point (3,) m where the sub-step began, the normal (3,) from a to b, and the force
+        (3,) N on b; that on a is the opposite. Impulses at impacts are not in it, moments of rolling friction neither.
+        """
+        time = self.times[frame]
+        return self.contacts[(self.contacts["start"] <= time) & (time < self.contacts["end"])]
+
+    def contact_force(self, name: str) -> np.ndarray:
+        """(f, 3) N, sum of the forces of lasting contacts on a body, resting ones included; impulses at impacts are not in it.
+
+        Raises:
+            SceneError: for an unknown name, listing the known ones.
+
+        """
+        return forces_on(self.contacts, self.index(name), self.times)
 
     def state_hash(self) -> str:
         """SHA-256 of all frames and impacts: equal if and only if two runs agree in every bit."""
@@ -183,6 +205,7 @@ class Recording:
             angular_velocity=self.angular_velocities,
             center_of_mass=self.centers,
             impacts=self.impacts,
+            contacts=self.contacts,
         )
 
 
@@ -204,6 +227,7 @@ def load_recording(path: str | os.PathLike) -> Recording:
                 angular_velocities=data["angular_velocity"],
                 centers=data["center_of_mass"],
                 impacts=data["impacts"],
+                contacts=data["contacts"],
             )
     except (OSError, KeyError, ValueError) as error:
         raise SceneError(

@@ -12,8 +12,9 @@ from rigidimpulse._jit import kernels_are_cached
 from rigidimpulse.accuracy import Accuracy
 from rigidimpulse.compile_ahead import compile_kernels
 from rigidimpulse.constrain.contact_forces import ContactForces
+from rigidimpulse.constrain.heap import HeapForces
 from rigidimpulse.constrain.jointed import reaction_table
-from rigidimpulse.detect.overlap import report_overlaps
+from rigidimpulse.detect.overlap import resolve_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.detect.window import Window
 from rigidimpulse.errors import SceneError
@@ -78,7 +79,7 @@ def simulate(
     context = StepContext(world, recorder, log)
     start_courses(context)
     recorder.start(context.state.course)
-    report_overlaps(context)
+    resolve_overlaps(context)
     # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
     paths = KeyframePaths(world)
     for end in (float(duration), max(float(duration), float(times[-1]))):
@@ -87,6 +88,9 @@ def simulate(
         else:
             paths.start_segments(context, end)
     finish_sub_steps(context, plan, context.state.time)
+    if context.heaps is not None:
+        context.heaps.close(context, context.state.time)
+        plan.tell(HeapForces.name, context.heaps.summary())
     recorder.finish(context.state.course)
     return make_recording(context, plan, times, duration)
 
@@ -115,6 +119,7 @@ def make_plan(world: World) -> Plan:
         Gravity(),
         ConstantForces(),
         ContactForces(),
+        HeapForces(accuracy.contact_solver),
         ImpactTime(accuracy.impact_time),
         ExactFlight(),
     ]
@@ -193,4 +198,5 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         plan=plan,
         scene=world.scene,
         reactions=reaction_table(context.joints, times),
+        contacts=context.contact_log.table(),
     )

@@ -7,12 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.constrain.arrival import PairForce
+from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.constrain.foresight import Foresight
+from rigidimpulse.constrain.heap import Heaps, why_no_heaps
 from rigidimpulse.constrain.jointed import JointState
-from rigidimpulse.detect.groups import NO_FORCE, note_arrival
+from rigidimpulse.constrain.qp import row_solver
+from rigidimpulse.detect.groups import NO_FORCE
 from rigidimpulse.detect.touching import bring
 from rigidimpulse.geometry import Geometry
 from rigidimpulse.integrate.course import Course, make_course, pose_at
+from rigidimpulse.observe.contact_log import ContactLog
 from rigidimpulse.observe.events import EventLog
 from rigidimpulse.observe.recorder import Recorder
 from rigidimpulse.respond.impulse import BodyState
@@ -32,10 +36,13 @@ class State:
         time: s, every body's course is known from here on.
         course: path of every body since its last change of course.
         now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
-        energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at.
-        under_contact: (n,) bool, bodies whose course carries contact forces. on_rest_of_world: (n,) bool, only of what does not move.
+        energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at, at
+            arrival_time [s].
+        under_contact: (n,) bool, bodies whose course carries contact forces.
+        closed: (n,) first body of its group if nothing that moves by itself takes part, else -1. grounded: (n,) bool, if what stands does.
         rebounds: by pair, time and speed of the last rebound and how many in a row were short.
         contact_force: last force of a held contact, in its frame [N], and when it began, by its key (`groups.contact_key`).
+        sub_step: (n,) s, length of the last one of a group of contacts that turn, at its first body.
         correction: (n, 6) change of velocity and spin that a body got at the end of its sub-step.
         pair_force: what acts in the present sub-step between bodies whose contacts turn (`arrival`).
     """
@@ -54,12 +61,15 @@ class State:
         )
         self.rotation = np.zeros((n, 3, 3))
         self.contact_force: dict[tuple[int, ...], tuple[np.ndarray, float]] = {}
+        self.sub_step = np.full(n, np.inf)
         self.correction = np.zeros((n, 6))
         self.pair_force: dict[tuple[int, int], PairForce] = {}
         self.under_contact = np.zeros(n, bool)
         self.rebounds: dict[tuple[int, int], tuple[float, float, int]] = {}
         self.energy_at_start = np.zeros(n)
-        self.on_rest_of_world = np.zeros(n, bool)
+        self.arrival_time = np.full(n, -np.inf)
+        self.closed = np.full(n, -1)
+        self.grounded = np.zeros(n, bool)
         self.arrival_energy: dict[int, float] = {}
 
 
@@ -80,7 +90,7 @@ class Detector:
 
 
 class StepContext:
-    """Everything a step needs: world, state, recorder, log, and buffers that grow when they are too small."""
+    """Everything a step needs: world, state, recorder, logs, and buffers that grow when they are too small."""
 
     def __init__(self, world: World, recorder: Recorder, log: EventLog) -> None:
         n = world.num_bodies
@@ -88,6 +98,7 @@ class StepContext:
         self.state = State(world)
         self.recorder = recorder
         self.log = log
+        self.contact_log = ContactLog(recorder.times)
         self.detector = Detector(world.geometry, world.shape_of_body, make_scratch(world.geometry), world.accuracy.iterations)
         self.contact_real = np.empty((CONTACT_CAPACITY, 10))
         self.contact_int = np.empty((CONTACT_CAPACITY, 5), np.int64)
@@ -99,8 +110,10 @@ class StepContext:
         self.wrench = np.zeros((n, 6))
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
+        self.solve_rows = row_solver(world.accuracy.contact_solver)
         self.foresight = Foresight(world)
         self.joints = JointState(world) if world.joints_of_scene else None
+        self.heaps = None if why_no_heaps(world) else Heaps(world)
 
     def bring(self, i: int, time: float) -> None:
         """Bring body i to `time` on its course."""

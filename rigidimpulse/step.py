@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigidimpulse.detect.groups import Group
 from rigidimpulse.detect.window import Window
 from rigidimpulse.integrate.flight import take_course
 
@@ -19,7 +20,6 @@ def step(context, plan, end: float) -> None:
     window = Window(context, end)
     plan.run("detect", context, window)
     react(context, plan, window, context.state.time, window.active_bodies())
-    release(context, window)
     while True:
         plan.run("sweep", context, window)
         time = window.next_time()
@@ -34,7 +34,9 @@ def step(context, plan, end: float) -> None:
 def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> None:
     """Everything that happens at `time` to the groups that the given bodies touch."""
     window.wake[bodies] = np.inf
-    for group in window.touching(time, bodies):
+    groups = window.touching(time, bodies)
+    release(context, window, time, bodies, groups)
+    for group in groups:
         plan.run("respond", context, group)
         plan.run("forces", context, group)
         plan.run("constrain", context, window, group)
@@ -42,11 +44,14 @@ def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> Non
     window.settle(time)
 
 
-def release(context, window: Window) -> None:
-    """Let go the bodies that still carry the forces of contacts they have left."""
-    state, time = context.state, context.state.time
+def release(context, window: Window, time: float, bodies: np.ndarray, groups: list[Group]) -> None:
+    """Let go those bodies that still carry the forces of contacts they have left."""
+    state = context.state
     free = np.zeros(6)
-    pushed = context.world.dynamic & (state.course.start < time) & state.under_contact
-    for i in np.flatnonzero(pushed).tolist():
+    held = np.concatenate([group.members for group in groups]) if groups else bodies[:0]
+    left = np.setdiff1d(bodies, held)
+    left = left[state.under_contact[left] & (state.course.start[left] < time) & ~window.inside[left]]
+    for i in left.tolist():
         context.bring(i, time)
+    for i in left.tolist():
         take_course(context, window, i, time, free, rests=False)

@@ -14,7 +14,7 @@ from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.forces.constant import ConstantForce, push_of_forces
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
 from rigidimpulse.mass import body_mass
-from rigidimpulse.material import combine
+from rigidimpulse.material import combine, combine_rolling
 from rigidimpulse.rotation import conjugate, from_matrix, multiply, rotate
 from rigidimpulse.scene import Scene, validate
 
@@ -35,6 +35,7 @@ class World:
         shape_of_body: (n,). size: (n,) m, largest extent, inf for half spaces. bound_radius: (n,) m about the centre of mass.
         static_min, static_max: (n, 3) m, world boxes of bodies where they start.
         material_of_body: (n,). coefficients: (k, k, 4), see material.combine.
+        rolling: (k, k, 2) m, rolling and spinning friction, see material.combine_rolling; None where there is none.
         flat: (n,) bool, has faces or rims that must not touch those of another at gap 0.
         half_space, ball: (n,) bool, the shape is half spaces only; one sphere about the centre of mass.
         touch_gap: gap at which faces and rims meet, as a fraction of the smaller body's size.
@@ -70,6 +71,7 @@ class World:
     static_max: np.ndarray
     material_of_body: np.ndarray
     coefficients: np.ndarray
+    rolling: np.ndarray | None
     flat: np.ndarray
     half_space: np.ndarray
     ball: np.ndarray
@@ -160,7 +162,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
     position = origin + rotate(orientation, offset)
     size, radius = _extents(geometry, shape_of_body)
     low, high = _world_boxes(geometry, shape_of_body, position, principal)
-    material_of_body, coefficients = _materials(bodies)
+    material_of_body, coefficients, rolling = _materials(bodies)
     mass = np.array([m.mass for m in masses], float)
     inv_mass = np.where(dynamic, 1.0 / mass, 0.0)
     factor = np.array([body.gravity_factor for body in bodies], float)
@@ -194,6 +196,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
         static_max=high,
         material_of_body=material_of_body,
         coefficients=coefficients,
+        rolling=rolling,
         flat=_has_faces(geometry, shape_of_body),
         half_space=np.array([_all_half_spaces(geometry, k) for k in shape_of_body], bool),
         ball=np.array([_is_ball(geometry, k) for k in shape_of_body], bool),
@@ -299,9 +302,11 @@ def _has_faces(geometry: Geometry, shape_of_body: np.ndarray) -> np.ndarray:
     return np.array(flat, bool)[shape_of_body]
 
 
-def _materials(bodies) -> tuple[np.ndarray, np.ndarray]:
-    """Index of each body's material and the combined coefficients of all pairs of materials."""
+def _materials(bodies) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Index of each body's material, the combined coefficients of all pairs of materials, and their rolling friction."""
     unique = list(dict.fromkeys(body.material for body in bodies))
     index = np.array([unique.index(body.material) for body in bodies], np.int64)
     coefficients = np.array([[combine(a, b) for b in unique] for a in unique], float)
-    return index, coefficients.reshape(len(unique), len(unique), 4)
+    rolling = np.array([[combine_rolling(a, b) for b in unique] for a in unique], float)
+    k = len(unique)
+    return index, coefficients.reshape(k, k, 4), rolling.reshape(k, k, 2) if rolling.any() else None

@@ -11,8 +11,8 @@ from rigidimpulse.constrain.arrival import remember_forces
 from rigidimpulse.constrain.contact_motion import Motion, contact_motion
 from rigidimpulse.constrain.drift import lift_contacts, needs_lift
 from rigidimpulse.constrain.foresight import ALLOWED
-from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.resting import Held, hold_contacts
+from rigidimpulse.constrain.rolling import rolling_of
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.groups import Group, collect, make_group
 from rigidimpulse.detect.touching import refresh_pose
@@ -20,18 +20,21 @@ from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.plan import Bound, Skip
 from rigidimpulse.respond.impulse import select
 
-# Residual of the solver that is reported, relative to the speed gained in the step.
+# Residual of the solver that is reported, relative to the speed gained in the step, and energy that such forces may make, relative.
 UNSOLVED = 1e-6
+PLAY = 1e-3
 TURN = 0.01
 """rad, how far arms and normals of contacts may turn in a sub-step."""
 MOST_SUB_STEPS = 256
 """Sub-steps in a step."""
 TURN_OF_BODY = 0.1
 """rad, how far bodies may turn in a sub-step where that matters to gaps."""
-NEGLIGIBLE = 1e-3
-"""Part of what is allowed by which gaps may be off without notice."""
+GROWTH = 1.5
+"""How many times longer than the one before a sub-step may be."""
 SHORTEST = 1e-5
 """Part of a step that is not split."""
+SHORTEST_STOP = 1e-3
+"""Part of a step within which it does not matter when a contact stops."""
 STEADY = 1e-9
 """rad in a step; what turns less does not."""
 
@@ -56,6 +59,9 @@ class ContactForces:
 
 def hold(context, window, group: Group) -> None:
     """Find the lasting contacts of a group and write the wrenches of its members into context.wrench."""
+    context.contact_log.close(group.members.tolist(), group.time)
+    if group.heap is not None:
+        return
     context.wrench[group.members] = 0.0
     group.held = group.slow()
     if not group.held.any() and not len(group.joints):
@@ -68,20 +74,29 @@ def hold(context, window, group: Group) -> None:
     state, now = context.state, context.state.now
     contacts = select(group.contacts, subset)
     motion = contact_motion(
-        context.world.geometry, context.world.shape_of_body, state.rotation, now, contacts, group.kinds[subset]
+        context.world.geometry, context.world.shape_of_body, state.rotation, now, contacts, group.kinds[subset],
+        group.features[subset],
     )
     keys = [group.keys[c] for c in subset]
     force = np.array([state.force_of(key) for key in keys]).reshape(-1, 3)
     before = kinetic_energy(now, context.world, group.members)
     rest = window.end - group.time
     if len(group.joints):
-        h, residual = context.joints.hold(context, group, contacts, motion.turning, force, rest)
+        rolling = rolling_of(context.world, now, contacts)
+        h, residual = context.joints.hold(context, group, contacts, motion.turning, force, rest, rolling)
     else:
         h, residual = _hold_turning(context, group, subset, contacts, keys, motion, force, rest)
     context.log.book(group.time, "capture", kinetic_energy(now, context.world, group.members) - before)
+    failed = residual > UNSOLVED or (len(group.joints) > 0 and not context.joints.are_closed)
+    if failed and _makes_energy(context, group, h):
+        context.wrench[group.members] = 0.0
+        force[:] = 0.0
+        if len(group.joints):
+            context.joints.let_go(group)
     ends = np.concatenate([contacts.body_a, contacts.body_b])
-    alone = len(group.members) == 1 and not len(group.joints) and not np.any(context.world.moving[ends])
-    state.on_rest_of_world[group.members] = alone
+    state.closed[group.members] = -1 if len(group.joints) or np.any(context.world.moving[ends]) else group.members[0]
+    state.grounded[group.members] = not np.all(context.world.dynamic[ends])
+    context.contact_log.replace(group.members.tolist(), group.time, contacts, now.position, force)
     for key, f in zip(keys, force, strict=True):
         state.contact_force[key] = (f, group.time)
     if residual > UNSOLVED:
@@ -96,32 +111,55 @@ def hold(context, window, group: Group) -> None:
         window.wake[group.members] = group.time + h
 
 
+def _makes_energy(context, group: Group, h: float) -> bool:
+    """Whether forces that are no solution give the members more kinetic energy than they have, or would have without them."""
+    now, i = context.state.now, group.members
+    inertia = np.linalg.inv(now.inv_inertia[i])
+    energies = []
+    for share in (0.0, 1.0):
+        wrench = share * context.wrench[i]
+        v = now.velocity[i] + h * (context.acceleration[i] + now.inv_mass[i, None] * wrench[:, :3])
+        spin = context.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], wrench[:, 3:])
+        w = now.angular_velocity[i] + h * spin
+        energies.append(0.5 * float((context.world.mass[i] * (v**2).sum(1)).sum() + np.einsum("ij,ijk,ik->", w, inertia, w)))
+    most = max(energies[0], kinetic_energy(now, context.world, i))
+    return not energies[1] <= (1.0 + PLAY) * most
+
+
 def _hold_turning(
     context, group: Group, subset, contacts, keys, motion: Motion, force, rest: float
 ) -> tuple[float, float]:
     """Contact forces over a sub-step of at most `rest`; returns its length and the residual."""
     state, step, delta = context.state, context.world.accuracy.step, group.delta[subset]
+    rolling = rolling_of(context.world, state.now, contacts)
 
     def hold_over(h: float, excess: np.ndarray) -> Held:
         context.wrench[group.members] = 0.0
         return hold_contacts(
-            solve_newton, state.now, contacts, group.members, motion.turning, excess, context.acceleration,
-            context.angular_acceleration, h, SHORTEST * step, context.column, force, context.wrench,
+            context.solve_rows, state.now, contacts, group.members, motion.turning, excess, context.acceleration,
+            context.angular_acceleration, h, SHORTEST_STOP * step, context.column, force, context.wrench, rolling,
         )
 
     if motion.fastest * step <= STEADY:
         held = hold_over(sub_step(motion.fastest, step, rest), np.zeros(len(subset)))
         return held.length, held.residual
     excess = contacts.gap - delta
-    held = hold_over(sub_step(motion.fastest, step, rest), excess)
+    first = group.members[0]
+    h = sub_step(motion.fastest, step, rest)
+    plan = GROWTH * state.sub_step[first] if state.under_contact[first] else np.inf
+    h = min(h, plan)
+    held = hold_over(h, excess)
     error = context.foresight.gap_errors(context, group, contacts, subset, motion, context.wrench, held.length)
     error[force[:, 0] == 0.0] = 0.0
     worst = float(np.max(np.abs(error) / (ALLOWED * delta)))
-    if worst > NEGLIGIBLE:
+    if worst > 1.0:
         spin = float(np.linalg.norm(state.now.angular_velocity[group.members], axis=1).max())
         share = min(worst ** (-1.0 / 3.0), TURN_OF_BODY / (spin * held.length)) if spin > 0.0 else worst ** (-1.0 / 3.0)
         share = min(max(share, step / (MOST_SUB_STEPS * held.length)), 1.0)
+        state.sub_step[first] = share * held.length
         held = hold_over(share * held.length, excess + share**3 * error)
+    elif h >= plan or not state.under_contact[first]:
+        state.sub_step[first] = max(h, step / MOST_SUB_STEPS)
     remember_forces(state, group.time, keys, contacts, force, held.force, held.slides)
     return held.length, held.residual
 
@@ -146,7 +184,7 @@ def _lift(context, window, group: Group) -> None:
         return
     acceleration, angular = context.acceleration[group.members].copy(), context.angular_acceleration[group.members].copy()
     again = make_group(context, window, group.time, real, integer, np.ones(len(real), bool), group.joints)
-    for name in ("contacts", "place", "kinds", "keys", "delta", "approach", "rest_speed", "live"):
+    for name in ("contacts", "place", "kinds", "features", "keys", "delta", "approach", "rest_speed", "live"):
         setattr(group, name, getattr(again, name))
     context.acceleration[group.members], context.angular_acceleration[group.members] = acceleration, angular
     group.held = group.slow()

@@ -11,8 +11,9 @@ contact moves with velocity p' in the world, and r_a' = p' - v_a, r_b' = p' - v_
     vertex of b on a face of a      n' = w_a x n,  r_b' = w_b x r_b
     ball (radius R) of b            the same for its centre:  r_b' = w_b x (r_b + R n) - R n'
     balls of both                   n' = the velocity of the centres across n over R_a + R_b
+    ball on an edge (direction e)   the same across e;  n'.e = -n.(w x e), as n stays across the edge
+    edges that cross                n'.e_a = -n.(w_a x e_a),  n'.e_b = -n.(w_b x e_b); the place runs along both
     cylinder b (radius R, axis k)   on a face of a: r_b = c - R e, e = (n - z k) / s, z = n.k, s^2 = 1 - z^2;  r_b' = w_b x c - R e'
-    edges                           half of both
 
 and mirrored. The rates |r'| / |r| and |n'| say how long a force along these arms stays right.
 """
@@ -23,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.features import FACE_VERTEX, VERTEX_FACE
+from rigidimpulse.detect.features import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND
 
 # The point of a round cylinder that is nearest to a face is the one found, or one found a moment ago: it is that near to it,
@@ -32,6 +33,9 @@ NEAR = 0.3
 LEAST_LEAN = 1e-3
 # Cosine of normal and axis below which a cylinder that is not touched at a rim is touched at its side.
 ON_ITS_SIDE = 0.7
+# Sine of the angle of two edges below which they count as parallel: the place of contact would run along them too fast to follow.
+PARALLEL = 0.05
+POINT, LINE, FACE = np.arange(3)
 
 
 @jit
@@ -54,8 +58,28 @@ def _rotated(rotation, x, out):
 
 
 @jit
-def _radius(geometry, p, rotation, normal):
-    """Radius of the rounded surface of a body with the single primitive p (-1: several); 0 for flat ones."""
+def _owner(first, index):
+    """Place of the range of `first` that an index lies in."""
+    low, high = 0, first.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if first[middle] <= index:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@jit
+def only_primitive(geometry, shape):
+    """The only primitive of a shape, or -1."""
+    p = geometry.shape_first[shape]
+    return p if geometry.shape_first[shape + 1] == p + 1 else -1
+
+
+@jit
+def side_radius(geometry, p, rotation, normal):
+    """Radius of a cylinder (the only primitive of its shape) that is touched at its side, or of a ball; else 0."""
     if p < 0 or geometry.kind[p] == HALF_SPACE:
         return 0.0
     if geometry.kind[p] == CYLINDER:
@@ -66,10 +90,26 @@ def _radius(geometry, p, rotation, normal):
 
 
 @jit
-def _single(geometry, shape):
-    """The only primitive of a shape, or -1."""
-    p = geometry.shape_first[shape]
-    return p if geometry.shape_first[shape + 1] == p + 1 else -1
+def _core(geometry, kind, feature, is_a, rotation, direction):
+    """What a rounded body is at a contact: its radius, and POINT, LINE (unit direction (3,) in the world) or FACE."""
+    point = kind == HALF_SPACE_CONTACT or (kind == VERTEX_FACE and is_a) or (kind == FACE_VERTEX and not is_a)
+    line = kind == EDGE_EDGE
+    if kind == CORNER:
+        point, line = feature % 2 == 0, feature % 2 == 1
+        feature = feature // 2
+    if point:
+        return geometry.radius[_owner(geometry.vertex_first, feature)], POINT
+    if not line:
+        return geometry.radius[_owner(geometry.triangle_first, feature)], FACE
+    tail, head, d = geometry.vertex[geometry.edge[feature, 0]], geometry.vertex[geometry.edge[feature, 1]], np.empty(3)
+    length = 0.0
+    for k in range(3):
+        d[k] = head[k] - tail[k]
+        length += d[k] * d[k]
+    _rotated(rotation, d, direction)
+    for k in range(3):
+        direction[k] /= sqrt(length)
+    return geometry.radius[_owner(geometry.edge_first, feature)], LINE
 
 
 @jit
@@ -116,47 +156,99 @@ def _centre_velocity(bodies, i, arm, n, radius, out):
 
 
 @jit
-def _place_velocity(geometry, shape_of_body, rotation, bodies, contacts, c, kind, place, normal_rate):
+def _on_face(geometry, p, rotation, bodies, i, arm, core_velocity, radius, outward, outward_rate, place):
+    """p' of the place where body i (of the single primitive p, or -1) touches a face that carries the normal.
+
+    outward (3,): from the face to the body, outward_rate (3,) its rate; core_velocity (3,): of the centre of the rounding.
+    """
+    if p >= 0 and geometry.kind[p] == CYLINDER:
+        if _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, bodies.angular_velocity[i], place):
+            for k in range(3):
+                place[k] += bodies.velocity[i, k]
+            return
+    for k in range(3):
+        place[k] = core_velocity[k] - radius * outward_rate[k]
+
+
+@jit
+def _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
+    """Two crossing lines: n' turns with both, and their crossing runs along both. False if they are parallel."""
+    x = np.empty(3)
+    cosine = _dot(ea, eb)
+    determinant = 1.0 - cosine * cosine
+    if determinant < PARALLEL * PARALLEL:
+        return False
+    _cross(wa, ea, x)
+    ca = -_dot(n, x)
+    _cross(wb, eb, x)
+    cb = -_dot(n, x)
+    alpha, beta = (ca - cosine * cb) / determinant, (cb - cosine * ca) / determinant
+    across = _dot(vb, n) - _dot(va, n)
+    for k in range(3):
+        normal_rate[k] = alpha * ea[k] + beta * eb[k]
+        # The part of the relative velocity of the lines' points that they have to run for.
+        x[k] = vb[k] - va[k] - across * n[k] - distance * normal_rate[k]
+    run = (_dot(x, ea) - cosine * _dot(x, eb)) / determinant
+    for k in range(3):
+        place[k] = va[k] + run * ea[k] + ra * normal_rate[k]
+    return True
+
+
+@jit
+def _between_cores(bodies, a, b, core_a, core_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate):
+    """Points and lines with a rounding."""
+    wa, wb, x = bodies.angular_velocity[a], bodies.angular_velocity[b], np.empty(3)
+    if core_a == LINE and core_b == LINE and _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
+        return
+    across = _dot(vb, n) - _dot(va, n)
+    for k in range(3):
+        normal_rate[k] = (vb[k] - va[k] - across * n[k]) / distance
+    if core_a == LINE or core_b == LINE:
+        e = ea if core_a == LINE else eb
+        _cross(wa if core_a == LINE else wb, e, x)
+        change = -_dot(n, x) - _dot(normal_rate, e)
+        for k in range(3):
+            normal_rate[k] += change * e[k]
+    for k in range(3):
+        place[k] = va[k] + ra * normal_rate[k] if core_a == POINT else vb[k] - rb * normal_rate[k]
+
+
+@jit
+def _place_velocity(geometry, shape_of_body, rotation, bodies, contacts, c, kind, feature_a, feature_b, place, normal_rate):
     """p' and n' of contact c, into place and normal_rate."""
     a, b, n = contacts.body_a[c], contacts.body_b[c], contacts.normal[c]
-    pa, pb = _single(geometry, shape_of_body[a]), _single(geometry, shape_of_body[b])
-    ra, rb = _radius(geometry, pa, rotation[a], n), _radius(geometry, pb, rotation[b], n)
+    pa, pb = only_primitive(geometry, shape_of_body[a]), only_primitive(geometry, shape_of_body[b])
+    ea, eb, va, vb, outward_rate = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     flat_a = pa >= 0 and geometry.kind[pa] == HALF_SPACE
     flat_b = pb >= 0 and geometry.kind[pb] == HALF_SPACE
-    va, vb = np.empty(3), np.empty(3)
+    if kind > HALF_SPACE_CONTACT or feature_a < 0:
+        # A cylinder, or a pair that was stopped by its sweep alone.
+        ra, rb = side_radius(geometry, pa, rotation[a], n), side_radius(geometry, pb, rotation[b], n)
+        core_a = FACE if flat_a or (ra == 0.0 and rb > 0.0) else POINT
+        core_b = FACE if flat_b or (rb == 0.0 and ra > 0.0) else POINT
+    else:
+        ra, core_a = (0.0, FACE) if flat_a else _core(geometry, kind, feature_a, True, rotation[a], ea)
+        rb, core_b = (0.0, FACE) if flat_b else _core(geometry, kind, feature_b, False, rotation[b], eb)
     _centre_velocity(bodies, a, contacts.arm_a[c], n, -ra, va)
     _centre_velocity(bodies, b, contacts.arm_b[c], n, rb, vb)
-    if ra > 0.0 and rb > 0.0 and not flat_a and not flat_b:
-        across = (vb[0] - va[0]) * n[0] + (vb[1] - va[1]) * n[1] + (vb[2] - va[2]) * n[2]
-        for k in range(3):
-            normal_rate[k] = (vb[k] - va[k] - across * n[k]) / (ra + rb)
-            place[k] = vb[k] - rb * normal_rate[k]
-        return
-    on_a = flat_a or (rb > 0.0 and ra == 0.0) or (kind == FACE_VERTEX and ra == 0.0)
-    on_b = flat_b or (ra > 0.0 and rb == 0.0) or (kind == VERTEX_FACE and rb == 0.0)
-    turn = np.empty(3)
-    if on_a:
+    distance = ra + rb + contacts.gap[c]
+    if core_a == FACE:
         _cross(bodies.angular_velocity[a], n, normal_rate)
-        if pb >= 0 and geometry.kind[pb] == CYLINDER:
-            if _rim_velocity(geometry, pb, rotation[b], contacts.arm_b[c], n, normal_rate, bodies.angular_velocity[b], place):
-                for k in range(3):
-                    place[k] += bodies.velocity[b, k]
-                return
-        for k in range(3):
-            place[k] = vb[k] - rb * normal_rate[k]
-    elif on_b:
+        _on_face(geometry, pb, rotation[b], bodies, b, contacts.arm_b[c], vb, rb, n, normal_rate, place)
+    elif core_b == FACE:
         _cross(bodies.angular_velocity[b], n, normal_rate)
-        if pa >= 0 and geometry.kind[pa] == CYLINDER:
-            if _rim_velocity(geometry, pa, rotation[a], contacts.arm_a[c], -n, -normal_rate, bodies.angular_velocity[a], place):
-                for k in range(3):
-                    place[k] += bodies.velocity[a, k]
-                return
         for k in range(3):
-            place[k] = va[k] + ra * normal_rate[k]
-    else:
-        _cross(0.5 * (bodies.angular_velocity[a] + bodies.angular_velocity[b]), n, turn)
+            outward_rate[k] = -normal_rate[k]
+        _on_face(geometry, pa, rotation[a], bodies, a, contacts.arm_a[c], va, ra, -n, outward_rate, place)
+    elif ra + rb > 0.0:
+        _between_cores(bodies, a, b, core_a, core_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate)
+    elif not (
+        core_a == LINE and core_b == LINE
+        and _between_lines(va, vb, bodies.angular_velocity[a], bodies.angular_velocity[b], ea, eb, n, distance, ra, place, normal_rate)
+    ):
+        # Sharp corners: half of both.
+        _cross(0.5 * (bodies.angular_velocity[a] + bodies.angular_velocity[b]), n, normal_rate)
         for k in range(3):
-            normal_rate[k] = turn[k]
             place[k] = 0.5 * (va[k] + vb[k])
 
 
@@ -173,15 +265,18 @@ class Motion(NamedTuple):
 
 
 @jit
-def contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds):
-    """The `Motion` of m contacts; kinds (m,) as `detect.features` has them."""
+def contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, features):
+    """The `Motion` of m contacts; kinds (m,) and features (m, 2) as `detect.features` has them."""
     m = contacts.gap.shape[0]
     turning, fastest = np.zeros((m, 3)), 0.0
     rate_a, rate_b, normal_rate = np.empty((m, 3)), np.empty((m, 3)), np.empty((m, 3))
     place, u, x = np.empty(3), np.empty(3), np.empty(3)
     for c in range(m):
         n = contacts.normal[c]
-        _place_velocity(geometry, shape_of_body, rotation, bodies, contacts, c, kinds[c], place, normal_rate[c])
+        _place_velocity(
+            geometry, shape_of_body, rotation, bodies, contacts, c, kinds[c], features[c, 0], features[c, 1], place,
+            normal_rate[c],
+        )
         u[:] = 0.0
         for side in range(2):
             i = contacts.body_b[c] if side else contacts.body_a[c]

@@ -54,7 +54,8 @@ class Foresight:
             arm_a=contacts.arm_a + h * motion.arm_rate_a, arm_b=contacts.arm_b + h * motion.arm_rate_b, normal=normal
         )
         turning = contact_motion(
-            world.geometry, world.shape_of_body, self.rotation, self.bodies, ahead, group.kinds[subset]
+            world.geometry, world.shape_of_body, self.rotation, self.bodies, ahead, group.kinds[subset],
+            group.features[subset],
         ).turning
         a, b = contacts.body_a, contacts.body_b
         point_a = self.acceleration[a] + np.cross(self.angular_acceleration[a], ahead.arm_a)

@@ -7,7 +7,7 @@ joint does is a list of `Row`s: coordinates (see `joint_rows`) with a target, bo
 from __future__ import annotations
 
 import math
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -33,6 +33,7 @@ class Row:
     stiffness: float = HARD
     damping: float = 0.0
     rate: float = 0.0
+    per_mass: bool = False
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ class Motor:
         target: rad or m that the stiffness strives for.
         stiffness: N m/rad or N/m. damping: N m s/rad or N s/m.
         max_force: N m or N.
+        mode: "force", or "acceleration": stiffness [1/s2] and damping [1/s] give the acceleration of x, whatever mass
+            and inertia the two bodies oppose to it through this joint.
 
     """
 
@@ -56,13 +59,36 @@ class Motor:
     stiffness: float = 0.0
     damping: float = 0.0
     max_force: float = math.inf
+    mode: str = "force"
 
     def rows(self, coordinate: int) -> list[Row]:
         """Return the row of the drive."""
         if not (self.stiffness > 0.0 or self.damping > 0.0):
             raise SceneError("the motor has neither stiffness nor damping", "give one of them, > 0", "motor")
-        bound = abs(self.max_force)
-        return [Row(coordinate, self.target, -bound, bound, self.stiffness, self.damping, self.velocity)]
+        if self.mode not in ("force", "acceleration"):
+            raise SceneError(f"mode is {self.mode!r}", "give 'force' or 'acceleration'", "motor")
+        bound, per_mass = abs(self.max_force), self.mode == "acceleration"
+        return [Row(coordinate, self.target, -bound, bound, self.stiffness, self.damping, self.velocity, per_mass)]
+
+
+def bounds(coordinate: int, lower: float | None, upper: float | None, stiffness: float = HARD, damping: float = 0.0) -> list[Row]:
+    """Rows that keep a coordinate between lower and upper, hard or with the stiffness and damping of a soft row.
+
+    Raises:
+        SceneError: lower is above upper, or one of them is no number.
+
+    """
+    for name, value in (("lower", lower), ("upper", upper)):
+        if value is not None and math.isnan(value):
+            raise SceneError(f"{name} = {value}", "give a number, or leave it out")
+    if lower is not None and upper is not None and lower > upper:
+        raise SceneError(f"lower = {lower} is above upper = {upper}", "exchange them")
+    rows = []
+    if lower is not None and lower > -math.inf:
+        rows.append(Row(coordinate, float(lower), 0.0, math.inf, stiffness, damping))
+    if upper is not None and upper < math.inf:
+        rows.append(Row(coordinate, float(upper), -math.inf, 0.0, stiffness, damping))
+    return rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,20 +126,14 @@ class Joint:
         """Anchor on a, anchor on b and first axis, (3,) each, in the world at the start."""
         raise NotImplementedError
 
+    def frames(self, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Axes of the joint's frame on a and on b (3, 3), in columns, in the world at the start."""
+        frame = _frame(axis)
+        return frame, frame
+
     def rows(self, _distance: float) -> list[Row]:
         """Rows of the joint, hard; `_distance` m is that of its anchors at the start."""
         raise NotImplementedError
-
-    def limits(self, coordinate: int) -> list[Row]:
-        """Rows that keep a coordinate between the bounds."""
-        if self.lower is not None and self.upper is not None and self.lower > self.upper:
-            raise SceneError(f"lower = {self.lower} is above upper = {self.upper}", "exchange them", self.label)
-        rows = []
-        if self.lower is not None:
-            rows.append(Row(coordinate, float(self.lower), lower=0.0))
-        if self.upper is not None:
-            rows.append(Row(coordinate, float(self.upper), upper=0.0))
-        return rows
 
     @property
     def label(self) -> str:
@@ -143,8 +163,13 @@ class BallJoint(_AnchoredJoint):
     def rows(self, _distance: float) -> list[Row]:
         """See `Joint`."""
         if self.lower is not None:
-            raise SceneError(f"lower = {self.lower}", "a ball joint has only an upper bound", self.label)
-        return [Row(ALONG), Row(ALONG + 1), Row(ALONG + 2), *self.limits(SWING)]
+            raise SceneError(f"lower = {self.lower}", "a ball joint has only an upper bound")
+        return [Row(ALONG), Row(ALONG + 1), Row(ALONG + 2), *bounds(SWING, self.lower, self.upper)]
+
+
+def across(axis: int) -> list[int]:
+    """Coordinates whose rows leave free the turn about one axis only."""
+    return [ACROSS + 3 * axis + (axis + 1) % 3, ACROSS + 3 * axis + (axis + 2) % 3]
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,8 +180,8 @@ class HingeJoint(_AnchoredJoint):
 
     def rows(self, _distance: float) -> list[Row]:
         """See `Joint`."""
-        held = [Row(ALONG), Row(ALONG + 1), Row(ALONG + 2), Row(ACROSS + 1), Row(ACROSS + 2)]
-        return held + self.limits(TWIST) + (self.motor.rows(TWIST) if self.motor else [])
+        held = [Row(ALONG), Row(ALONG + 1), Row(ALONG + 2), *(Row(code) for code in across(0))]
+        return held + bounds(TWIST, self.lower, self.upper) + (self.motor.rows(TWIST) if self.motor else [])
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +193,7 @@ class SliderJoint(_AnchoredJoint):
     def rows(self, _distance: float) -> list[Row]:
         """See `Joint`."""
         held = [Row(ALONG + 1), Row(ALONG + 2), Row(ABOUT), Row(ABOUT + 1), Row(ABOUT + 2)]
-        return held + self.limits(ALONG) + (self.motor.rows(ALONG) if self.motor else [])
+        return held + bounds(ALONG, self.lower, self.upper) + (self.motor.rows(ALONG) if self.motor else [])
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,18 +229,18 @@ class DistanceJoint(Joint):
 
     def rows(self, distance: float) -> list[Row]:
         """See `Joint`."""
-        limits = self.limits(DISTANCE)
+        limits = bounds(DISTANCE, self.lower, self.upper)
         length = distance if self.length is None else float(self.length)
         if not (math.isfinite(length) and length > 0.0):
-            raise SceneError(f"length is {length} m", "give a length > 0, or two different anchors", self.label)
+            raise SceneError(f"length is {length} m", "give a length > 0, or two different anchors")
         return limits if limits and self.length is None else [Row(DISTANCE, length), *limits]
 
 
-def _frame(axis: np.ndarray, label: str) -> np.ndarray:
+def _frame(axis: np.ndarray) -> np.ndarray:
     """Right-handed axes (3, 3) in columns, the first one along `axis`."""
     size = float(np.linalg.norm(axis))
     if size == 0.0:
-        raise SceneError("the axis is (0, 0, 0)", "give a direction", label)
+        raise SceneError("the axis is (0, 0, 0)", "give a direction")
     first = axis / size
     second = np.cross(first, np.eye(3)[int(np.argmin(np.abs(first)))])
     second /= np.linalg.norm(second)
@@ -226,15 +251,12 @@ def _soften(joint: Joint, rows: list[Row]) -> list[Row]:
     """The rows with the joint's stiffness and damping; drives keep their own."""
     if joint.stiffness is None:
         if joint.damping != 0.0:
-            raise SceneError(f"damping = {joint.damping} without stiffness", "give a stiffness too", joint.label)
+            raise SceneError(f"damping = {joint.damping} without stiffness", "give a stiffness too")
         return rows
     stiffness = float(joint.stiffness)
     if not (math.isfinite(stiffness) and stiffness >= 0.0 and math.isfinite(joint.damping) and joint.damping >= 0.0):
-        raise SceneError(f"stiffness {joint.stiffness}, damping {joint.damping}", "give finite values >= 0", joint.label)
-    return [
-        Row(r.coordinate, r.target, r.lower, r.upper, stiffness, float(joint.damping)) if r.stiffness == HARD else r
-        for r in rows
-    ]
+        raise SceneError(f"stiffness {joint.stiffness}, damping {joint.damping}", "give finite values >= 0")
+    return [replace(r, stiffness=stiffness, damping=float(joint.damping)) if r.stiffness == HARD else r for r in rows]
 
 
 def compile_joints(joints: list[Joint], world) -> Joints:
@@ -254,20 +276,22 @@ def compile_joints(joints: list[Joint], world) -> Joints:
             raise SceneError("neither body is dynamic", "join at least one that moves", joint.label)
         try:
             anchor_a, anchor_b, axis = joint.points(world)
+            frames = joint.frames(axis)
+            rows = _soften(joint, joint.rows(float(np.linalg.norm(anchor_b - anchor_a))))
         except SceneError as error:
             raise error.within(joint.label) from None
-        frame = _frame(axis, joint.label)
-        for side, anchor, (i, turn, origin) in zip("ab", (anchor_a, anchor_b), sides, strict=True):
+        ends = zip("ab", (anchor_a, anchor_b), frames, sides, strict=True)
+        for side, anchor, frame, (i, turn, origin) in ends:
             columns[f"body_{side}"].append(i)
             columns[f"anchor_{side}"].append(turn.T @ (anchor - origin))
             columns[f"frame_{side}"].append(turn.T @ frame)
-        rows = _soften(joint, joint.rows(float(np.linalg.norm(anchor_b - anchor_a))))
         for row in rows:
-            for field in ("coordinate", "target", "lower", "upper", "stiffness", "damping", "rate"):
+            for field in ("coordinate", "target", "lower", "upper", "stiffness", "damping", "rate", "per_mass"):
                 columns[field].append(getattr(row, field))
         columns["first"].append(columns["first"][-1] + len(rows))
     integers = ("body_a", "body_b", "first", "coordinate")
-    arrays = (np.array(columns[f], np.int64 if f in integers else float) for f in Joints._fields)
+    types = dict.fromkeys(integers, np.int64) | {"per_mass": np.bool_}
+    arrays = (np.array(columns[f], types.get(f, float)) for f in Joints._fields)
     return Joints(*(np.ascontiguousarray(array) for array in arrays))
 
 

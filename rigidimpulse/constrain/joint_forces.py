@@ -17,9 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.joint_limits import is_reached, joint_weights, limit_side, spring_of
 from rigidimpulse.constrain.joint_rows import is_linear, joint_rows, joint_values, relative_point_velocity
-from rigidimpulse.constrain.newton import row_weights, solve_newton
+from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.resting import SLIP, fill_contact_bias, start_contact_impulses
+from rigidimpulse.constrain.rolling import Rolling, count_rolling_rows, fill_rolling_rows
 from rigidimpulse.constrain.rows import (
     BOUNDED,
     FREE,
@@ -38,7 +40,6 @@ from rigidimpulse.integrate.course import FORCED, Course, begin, make_course, po
 from rigidimpulse.rotation import quaternion_to_matrix, to_matrix
 
 MAX_ROUNDS = 20
-CLOSING_PASSES = 4
 # Residual asked of the solver, and of closing, relative to the speed gained in the sub-step.
 SOLVE_TOLERANCE = 1e-12
 TINY = 1e-300
@@ -52,6 +53,10 @@ class JointMemory(NamedTuple):
     active: np.ndarray  # (k,) bool, rows at work: not at a bound of theirs
     start_value: np.ndarray  # (k,) coordinate less target at the start of the sub-step
     start_rate: np.ndarray  # (k,)
+    end_value: np.ndarray  # (k,) the same at its end
+    slack: np.ndarray  # (k,) bool, limits that are not reached
+    weight: np.ndarray  # (k,) W of soft rows, see `joint_limits`
+    steepness: np.ndarray  # (k,) length of the direction: 1, but for a twist near where it is not defined
     wrench: np.ndarray  # (n, 6) half of the joints' part of the wrench, taken back at the end
     trial: Course
     end_position: np.ndarray  # (n, 3) at the end of the sub-step; right for what is no member of a group
@@ -70,6 +75,10 @@ def make_memory(joints, inertia: np.ndarray) -> JointMemory:
         active=hard,
         start_value=np.zeros(k),
         start_rate=np.zeros(k),
+        end_value=np.zeros(k),
+        slack=np.zeros(k, bool),
+        weight=np.zeros(k),
+        steepness=np.ones(k),
         wrench=np.zeros((n, 6)),
         trial=trial,
         end_position=np.zeros((n, 3)),
@@ -89,7 +98,7 @@ def count_joint_rows(joints, which):
 def stop_joints(joints, which, bodies, rotation, members, number, memory: JointMemory, elapsed, moment) -> None:
     """End of a sub-step: the impulses nu.
 
-    elapsed (j,): length of the sub-step that ends, s. moment (j, 3): the impulse on b of each joint is added, N s.
+    elapsed (j,): length of the sub-step that ends, s; moment (j, 3): the impulse on b of each joint is added, N s.
     """
     rows, direction, scale = _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed)
     solve_newton(rows, len(members), SOLVE_TOLERANCE * scale)
@@ -107,19 +116,20 @@ def _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed
     joint_rows(joints, which, bodies, rotation, number, memory.angle, rows, np.int64(0), value, direction)
     relative_point_velocity(joints, which, bodies, rotation, direction, u)
     weight = np.empty(count)
-    row_weights(rows, weight)
+    joint_weights(joints, which, rows, np.int64(0), weight)
     scale, i = TINY, 0
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
             rows.bias[i] = u[i]
-            if not memory.active[k] or (joints.stiffness[k] < np.inf and elapsed[j] <= 0.0):
+            hard = joints.stiffness[k] == np.inf
+            if not memory.active[k] or (not hard and elapsed[j] <= 0.0):
                 rows.kind[i] = BOUNDED
                 rows.lower[i] = rows.upper[i] = 0.0
-            elif joints.stiffness[k] < np.inf:
+            elif not hard:
                 rows.kind[i] = FREE
+                stiffness, damping = spring_of(joints, k, weight[i])
                 rows.bias[i] -= end_rate(
-                    joints.stiffness[k], joints.damping[k], weight[i], memory.start_value[k], memory.start_rate[k],
-                    value[i], elapsed[j],
+                    stiffness, damping, weight[i], memory.start_value[k], memory.start_rate[k], value[i], elapsed[j]
                 )
             elif rows.kind[i] == BOUNDED:
                 rows.lower[i] = -np.inf if joints.lower[k] < 0.0 else 0.0
@@ -146,12 +156,19 @@ def close_joints(joints, which, bodies, rotation, members, number, angle, allowe
 
     Done only where one is off by more than `allowed` [m or rad]; returns whether bodies were moved.
     """
-    moved = False
-    for _ in range(CLOSING_PASSES):
+    moved, last = False, np.inf
+    before = bodies.position[members].copy(), bodies.orientation[members].copy()
+    for _ in range(MAX_ROUNDS):
         rows, worst = _closing_rows(joints, which, bodies, rotation, members, number, angle)
+        if not worst < last:
+            # No pose closes them; the one before was the best.
+            bodies.position[members], bodies.orientation[members] = before
+            rotation[members] = to_matrix(bodies.orientation[members])
+            break
         if worst <= allowed:
             break
-        moved = True
+        moved, last = True, worst
+        before = bodies.position[members].copy(), bodies.orientation[members].copy()
         solve_newton(rows, len(members), 1e-3 * allowed)
         move_bodies(bodies, members, rows)
         rotation[members] = to_matrix(bodies.orientation[members])
@@ -199,18 +216,22 @@ def _end_values(joints, which, bodies, acceleration, members, wrench, h, memory,
 
 def hold_jointed(
     solve, bodies, contacts, turning, acceleration, angular_acceleration, h: float, members, number, force, joints, which,
-    rotation, memory: JointMemory, allowed: float, wrench, moment,
+    rotation, memory: JointMemory, allowed: float, wrench, moment, rolling: Rolling | None,
 ) -> tuple[float, float]:
     """Forces of joints and lasting contacts over a sub-step of length h.
 
     As `resting.hold_contacts`, with joints listed in `which`; allowed: closing error, m or rad; moment (j, 3): half of the
     joints' impulses on b is added. Returns (residual relative to the speed gained, worst closing error).
     """
-    n, count = len(members), count_joint_rows(joints, which)
-    rows, first_row, frames = contact_rows(bodies, contacts, members, number, count)
+    n, count, extra = len(members), count_joint_rows(joints, which), count_rolling_rows(rolling)
+    rows, first_row, frames = contact_rows(bodies, contacts, members, number, extra + count)
     start = len(rows.bias) - count
+    if rolling is not None:
+        fill_rolling_rows(
+            bodies, contacts, rolling, number, angular_acceleration, frames, first_row, h, rows, start - extra
+        )
     start_contact_impulses(rows, first_row, force, h)
-    direction, beta = _start_joint_rows(joints, which, bodies, rotation, number, memory, h, rows, start)
+    direction, beta = _start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed, rows, start)
     level = np.zeros(len(first_row))
     scale, u = fill_contact_bias(
         bodies, contacts, frames, turning, level, acceleration, angular_acceleration, h, rows, first_row
@@ -229,7 +250,7 @@ def hold_jointed(
             solve, rows, n, first_row, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale
         )
     _finish(joints, which, bodies, members, rows, first_row, start, h, memory, direction, force, moment)
-    return residual / scale, worst
+    return residual / scale if np.isfinite(scale) else np.inf, worst if np.isfinite(worst) else np.inf
 
 
 @jit
@@ -247,7 +268,7 @@ def _close_at_end(joints, which, bodies, acceleration, members, h, memory, rows,
     for i in range(count):
         rows.bias[start + i] = 2.0 / h * value[i] - u[start + i] - beta[i]
         largest = max(largest, abs(rows.bias[start + i]))
-    return _violation(joints, which, value, rows.impulse[start:]), largest
+    return _violation(joints, which, memory, value, rows.impulse[start:]), largest
 
 
 @jit
@@ -265,27 +286,30 @@ def _finish(joints, which, bodies, members, rows, first_row, start, h, memory, d
 
 
 @jit
-def _start_joint_rows(joints, which, bodies, rotation, number, memory, h, rows, start):
+def _start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed, rows, start):
     """Joints' rows from `start` on, with bounds, softness and first impulses; their coordinates and rates are remembered.
 
-    Returns their directions (s, 3) and the terms beta (s,) of soft ones.
+    Limits that are not reached carry nothing. Returns their directions (s, 3) and the terms beta (s,) of soft ones.
     """
     count = rows.bias.shape[0] - start
     value, direction, u, beta = np.empty(count), np.empty((count, 3)), np.empty(count), np.zeros(count)
-    weight = np.empty(rows.bias.shape[0])
+    weight = np.empty(count)
     joint_rows(joints, which, bodies, rotation, number, memory.angle, rows, start, value, direction)
     relative_point_velocity(joints, which, bodies, rotation, direction, u)
-    row_weights(rows, weight)
+    joint_weights(joints, which, rows, start, weight)
     i = 0
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
             r = start + i
             rows.lower[r], rows.upper[r], rows.impulse[r] = joints.lower[k] * h, joints.upper[k] * h, memory.force[k] * h
-            memory.start_value[k], memory.start_rate[k] = value[i], u[i]
-            if joints.stiffness[k] < np.inf:
-                rows.softness[r], beta[i] = soft_row(
-                    joints.stiffness[k], joints.damping[k], joints.rate[k], weight[r], value[i], u[i], h
-                )
+            memory.start_value[k], memory.start_rate[k], memory.weight[k] = value[i], u[i], weight[i]
+            memory.steepness[k] = np.sqrt(np.sum(direction[i] ** 2))
+            memory.slack[k] = limit_side(joints, k) != 0.0 and not is_reached(joints, k, value[i], allowed)
+            if memory.slack[k]:
+                rows.lower[r] = rows.upper[r] = rows.impulse[r] = 0.0
+            elif joints.stiffness[k] < np.inf:
+                stiffness, damping = spring_of(joints, k, weight[i])
+                rows.softness[r], beta[i] = soft_row(stiffness, damping, joints.rate[k], weight[i], value[i], u[i], h)
             i += 1
     return direction, beta
 
@@ -317,13 +341,16 @@ def _write_wrenches(bodies, members, y, h, wrench):
 
 
 @jit
-def _violation(joints, which, value, impulse):
-    """Largest distance of a row from its law: coordinates that must be at their target, or are on the wrong side of it."""
+def _violation(joints, which, memory, value, impulse):
+    """Largest distance of a row from its law: coordinates that must be at their target, or are on the wrong side of it.
+
+    The values are remembered; limits that were slack at the start are the business of `next_switch`.
+    """
     worst, i = 0.0, 0
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
-            x = value[i]
-            if joints.stiffness[k] < np.inf:
+            x = memory.end_value[k] = value[i]
+            if joints.stiffness[k] < np.inf or memory.slack[k]:
                 x = 0.0
             if joints.lower[k] < 0.0 < joints.upper[k] or impulse[i] != 0.0:
                 worst = max(worst, abs(x))

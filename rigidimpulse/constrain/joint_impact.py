@@ -5,8 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.joint_rows import is_linear, joint_rows
-from rigidimpulse.constrain.rows import BOUNDED, Rows, make_rows
+from rigidimpulse.constrain.joint_limits import is_reached, limit_side
+from rigidimpulse.constrain.joint_rows import is_linear, joint_rows, relative_point_velocity
+from rigidimpulse.constrain.newton import solve_newton
+from rigidimpulse.constrain.rows import BOUNDED, Rows, change_velocities, make_rows
+
+# Residual asked of the solver, relative to the fastest rate.
+SOLVE_TOLERANCE = 1e-12
 
 
 class JointBlock(NamedTuple):
@@ -20,8 +25,11 @@ class JointBlock(NamedTuple):
 
 
 @jit
-def impact_rows(joints, which, bodies, rotation, members, number, memory, moment):
-    """The `JointBlock` of the joints listed in `which`: hard rows hold, limits that are reached stop, soft rows are too slow."""
+def impact_rows(joints, which, bodies, rotation, members, number, memory, allowed, moment):
+    """The `JointBlock` of the joints listed in `which`: hard rows hold, limits that are reached stop, soft rows are too slow.
+
+    allowed: closing error, m or rad.
+    """
     for k in range(members.shape[0]):
         number[members[k]] = k
     count = np.int64(0)
@@ -37,11 +45,37 @@ def impact_rows(joints, which, bodies, rotation, members, number, memory, moment
                 direction[i] = 0.0
             if rows.kind[i] == BOUNDED or joints.stiffness[k] < np.inf:
                 rows.kind[i] = BOUNDED
-                holds = memory.active[k] and joints.stiffness[k] == np.inf
+                holds = joints.stiffness[k] == np.inf and (memory.active[k] or is_reached(joints, k, value[i], allowed))
                 rows.lower[i] = -np.inf if holds and joints.lower[k] < 0.0 else 0.0
                 rows.upper[i] = np.inf if holds and joints.upper[k] > 0.0 else 0.0
             i += 1
     return JointBlock(members, rows, joint, direction, moment)
+
+
+@jit
+def _fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows):
+    """Rates of all rows, to their bias; returns the fastest approach to a hard limit that is reached, m/s or rad/s."""
+    count = rows.bias.shape[0]
+    again, value, direction = make_rows(count), np.empty(count), np.empty((count, 3))
+    joint_rows(joints, which, bodies, rotation, number, memory.angle, again, np.int64(0), value, direction)
+    relative_point_velocity(joints, which, bodies, rotation, direction, rows.bias)
+    fastest, i = 0.0, 0
+    for j in which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            if joints.stiffness[k] == np.inf and is_reached(joints, k, value[i], allowed):
+                fastest = max(fastest, -limit_side(joints, k) * rows.bias[i])
+            i += 1
+    return fastest
+
+
+def stop_at_limits(joints, which, bodies, rotation, members, number, memory, allowed: float, moment) -> None:
+    """Impacts without rebound on the hard limits that are reached; arguments as of `impact_rows`."""
+    block = impact_rows(joints, which, bodies, rotation, members, number, memory, allowed, moment)
+    rows = block.rows
+    if _fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows) > 0.0:
+        solve_newton(rows, len(members), SOLVE_TOLERANCE * float(np.abs(rows.bias).max()))
+        change_velocities(bodies, members, rows)
+        add_moments(block, rows.impulse)
 
 
 def copy_rows(source: Rows, rows: Rows, start: int) -> None:

@@ -1,15 +1,21 @@
 """Coordinates and rows of joints.
 
-A joint has an anchor and a frame of three axes on each of its bodies; the frames coincide at the start. With d = p_b -
-p_a the offset of the anchors, e_k and f_k the axes carried by a and b, and E = [e]^T [f], its coordinates x and their
-rates u = J v are
+A joint has an anchor and a frame of three axes on each of its bodies. With d = p_b - p_a the offset of the anchors, e_k
+and f_k the axes carried by a and b, E = [e]^T [f] and (k, l, m) cyclic, its coordinates x and their rates u = J v are
 
     along k      x = e_k . d                                     force along e_k at p_b
-    about k      x = (E_ml - E_lm) / 2, (k, l, m) cyclic         torque along e_k   (all three rotations held)
-    across k     x = e_k . (e_0 x f_0), k = 1, 2                 torque along e_k   (free to turn about e_0)
-    twist        x = angle of f_1 in the plane of e_1, e_2       torque along e_0   (counted through full turns)
-    swing        x = angle between e_0 and f_0                   torque along e_0 x f_0
+    radius k     x = |d - e_k (e_k . d)|                         force along it at p_b   (from the line of e_k)
     distance     x = |d|                                         force along d / |d|
+    about k      x = (E_ml - E_lm) / 2                           torque along e_k   (all three rotations held)
+    across k, i  x = e_i . (e_k x f_k), i != k                   torque along e_i   (free to turn about e_k)
+    twist k      x = atan2(E_ml - E_lm, E_ll + E_mm)             torque along (e_k + f_k) / (1 + e_k . f_k)
+    swing k      x = angle between e_k and f_k                   torque along e_k x f_k
+    angle        x = angle of the rotation E, 0 to pi            torque along its axis
+
+The twist about k is the second factor of E = swing twist, the swing being the shortest turn that takes e_k to f_k
+(Huyghe 1996; Dobrowolski 2015). It is counted through full turns; it is not defined where e_k = -f_k, and its torque
+grows without bound on the way there. Swing and angle have no direction at 0 (x along the first free axis is taken) and
+turn round at pi.
 
 A row asks for x = target, x >= target or x <= target, hard or as a spring and damper (see `softness`); what it may
 exert is kept between its bounds. The rows of all joints are one table: whatever the joint, the kernels see coordinates
@@ -24,8 +30,9 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.rows import BOUNDED, FREE, write_body, write_row
 
-ALONG, ABOUT, ACROSS, TWIST, SWING, DISTANCE = 0, 3, 6, 9, 10, 11
-"""Coordinates; ALONG, ABOUT and ACROSS plus the axis."""
+ALONG, RADIUS, DISTANCE, ABOUT, TWIST, SWING, ANGLE, ACROSS = 0, 3, 6, 7, 10, 13, 16, 17
+"""Coordinates; ALONG, RADIUS, ABOUT, TWIST and SWING plus the axis k; ACROSS plus 3 k + i."""
+TINY = 1e-300
 
 
 class Joints(NamedTuple):
@@ -45,6 +52,7 @@ class Joints(NamedTuple):
     stiffness: np.ndarray  # (k,) N/m or N m/rad; inf: hard
     damping: np.ndarray  # (k,) N s/m or N m s/rad
     rate: np.ndarray  # (k,) m/s or rad/s, the rate that the damping strives for
+    per_mass: np.ndarray  # (k,) bool, stiffness and damping are those of a unit of the mass or inertia that the row moves
 
 
 @jit
@@ -73,41 +81,76 @@ def _relative_rotation(e, f, out):
 
 
 @jit
-def _measure(code, d, e, f, near, direction):
-    """Coordinate and the direction (3,) that it grows in; a TWIST is taken near the angle `near`."""
-    if code < ABOUT:
+def _linear(code, d, e, direction):
+    """Coordinate that is a length and the direction (3,) that it grows in."""
+    if code < RADIUS:
         for r in range(3):
             direction[r] = e[r, code]
         return direction[0] * d[0] + direction[1] * d[1] + direction[2] * d[2]
-    if code == DISTANCE:
-        length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    first, axis = 0, code - RADIUS
+    x, y, z = d[0], d[1], d[2]
+    if code != DISTANCE:
+        first = (axis + 1) % 3
+        along = e[0, axis] * x + e[1, axis] * y + e[2, axis] * z
+        x, y, z = x - along * e[0, axis], y - along * e[1, axis], z - along * e[2, axis]
+    length = sqrt(x * x + y * y + z * z)
+    if length > 0.0:
+        direction[0], direction[1], direction[2] = x / length, y / length, z / length
+    else:
         for r in range(3):
-            direction[r] = d[r] / length if length > 0.0 else e[r, 0]
-        return length
+            direction[r] = e[r, first]
+    return length
+
+
+@jit
+def _along_axes(e, x, y, z, direction):
+    """direction = e (x, y, z) / |(x, y, z)|; returns the length, 0 without touching direction."""
+    length = sqrt(x * x + y * y + z * z)
+    if length > 0.0:
+        for r in range(3):
+            direction[r] = (x * e[r, 0] + y * e[r, 1] + z * e[r, 2]) / length
+    return length
+
+
+@jit
+def _angular(code, e, f, near, direction):
+    """Coordinate that is an angle and the direction (3,) that it grows in; a TWIST is taken near the angle `near`."""
     turn = np.empty((3, 3))
     _relative_rotation(e, f, turn)
-    if code == SWING:
-        x, y = -turn[2, 0], turn[1, 0]  # e_0 x f_0 lies across e_0
-        size = sqrt(x * x + y * y)
+    if code >= ACROSS:
+        k, i = (code - ACROSS) // 3, (code - ACROSS) % 3
+        direction[:] = e[:, i]
+        return -turn[(k + 2) % 3, k] if i == (k + 1) % 3 else turn[(k + 1) % 3, k]
+    if code == ANGLE:
+        direction[:] = e[:, 0]
+        x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
+        return atan2(_along_axes(e, x, y, z, direction), turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
+    k = (code - ABOUT) % 3
+    after, last = (k + 1) % 3, (k + 2) % 3
+    if code >= SWING:
+        direction[:] = e[:, after]
+        across = np.zeros(3)
+        across[after], across[last] = -turn[last, k], turn[after, k]
+        return atan2(_along_axes(e, across[0], across[1], across[2], direction), turn[k, k])
+    if code >= TWIST:
+        share = 1.0 / max(1.0 + turn[k, k], TINY)
         for r in range(3):
-            direction[r] = (x * e[r, 1] + y * e[r, 2]) / size if size > 0.0 else e[r, 1]
-        return atan2(size, turn[0, 0])
-    axis = 0 if code == TWIST else (code - ABOUT if code < ACROSS else code - ACROSS)
-    for r in range(3):
-        direction[r] = e[r, axis]
-    if code == TWIST:
-        angle = atan2(turn[2, 1], turn[1, 1])
+            direction[r] = share * (e[r, k] + f[r, k])
+        angle = atan2(turn[last, after] - turn[after, last], turn[after, after] + turn[last, last])
         return angle + 2.0 * pi * np.rint((near - angle) / (2.0 * pi))
-    if code < ACROSS:
-        after, last = (axis + 1) % 3, (axis + 2) % 3
-        return 0.5 * (turn[last, after] - turn[after, last])
-    return -turn[2, 0] if axis == 1 else turn[1, 0]
+    direction[:] = e[:, k]
+    return 0.5 * (turn[last, after] - turn[after, last])
+
+
+@jit
+def _measure(code, d, e, f, near, direction):
+    return _linear(code, d, e, direction) if is_linear(code) else _angular(code, e, f, near, direction)
 
 
 @jit
 def is_linear(code):
     """Whether a coordinate is a length, and its row a force."""
-    return code < ABOUT or code == DISTANCE
+    return code < ABOUT
 
 
 @jit

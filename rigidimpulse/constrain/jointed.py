@@ -8,8 +8,8 @@ import numpy as np
 
 from rigidimpulse.constrain.joint import Joint
 from rigidimpulse.constrain.joint_forces import close_joints, hold_jointed, make_memory, stop_joints
-from rigidimpulse.constrain.joint_impact import impact_rows
-from rigidimpulse.constrain.newton import solve_newton
+from rigidimpulse.constrain.joint_impact import impact_rows, stop_at_limits
+from rigidimpulse.constrain.joint_limits import next_switch
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.integrate.course import FIXED
@@ -19,10 +19,16 @@ TURN = 0.02
 """rad, how far the bodies of a joint may turn against each other in a sub-step."""
 SWAY = 0.7
 """rad, how far the fastest oscillation may go in a sub-step that the tension of joints keeps up across them; 2 is unstable."""
+NOT_CLOSED = 1e3
+"""How many times farther than allowed joints may be off before that is reported."""
 MOST_SUB_STEPS = 256
 """Sub-steps in a step."""
 SHORT = 1e-5
 """Part of a step below which a sub-step is planned as a longer one: closing divides by its length."""
+MOST_CUTS = 20
+"""Times a sub-step is cut to end where a limit is reached or lets go."""
+STEEP = 1e3
+"""Torque of a twist over that about a fixed axis, above which it counts as undefined: half a turn of swing but for 2e-3 rad."""
 
 
 class JointState:
@@ -33,6 +39,7 @@ class JointState:
         names: of the joints. whole: (j,) bool, not broken.
         moment: (j, 3) N s, impulse on b at the instant being worked on. shock: (j, 3) N s, by impacts, so far.
         pull: (j, 3) N, last force on b.
+        are_closed: whether the forces found last close the joints.
         began: (j,) s, start of the present sub-step. length: (j,) s, that of the one before.
         reactions: (time, joint, force (3,) on b) at the ends of sub-steps.
 
@@ -49,10 +56,13 @@ class JointState:
         self.moment = np.zeros((len(joints), 3))
         self.shock = np.zeros((len(joints), 3))
         self.pull = np.zeros((len(joints), 3))
+        self.are_closed = True
         self.began = np.zeros(len(joints))
         self.length = np.zeros(len(joints))
         self.reactions: list[tuple[float, int, np.ndarray]] = []
         self._allowed = TOLERANCES.joint * world.joint_size
+        self._joint_of_row = np.repeat(np.arange(len(joints)), np.diff(self.table.first))
+        self._limited = bool(np.any((self.table.lower == 0.0) != (self.table.upper == 0.0)))
         self._dynamic = world.dynamic
         self._of_body: dict[int, list[int]] = {}
         for j, pair in enumerate(zip(self.table.body_a.tolist(), self.table.body_b.tolist(), strict=True)):
@@ -103,6 +113,11 @@ class JointState:
             self.table, which, now, state.rotation, members, context.column, memory, elapsed, self.moment
         )
         state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
+        if self._limited:
+            # An impact at this instant: what came before goes on unchanged.
+            stop_at_limits(
+                self.table, which, now, state.rotation, members, context.column, memory, self._allowed, self.shock
+            )
         memory.wrench[members] = 0.0
         self.length[which] = elapsed[which]
         context.log.book(group.time, "joints", mechanical_energy(now, context.world, members) - before)
@@ -111,14 +126,15 @@ class JointState:
         """The joints' part in the impulses of an impact (`JointBlock`)."""
         state = context.state
         return impact_rows(
-            self.table, group.joints, state.now, state.rotation, group.members, context.column, self.memory, self.shock
+            self.table, group.joints, state.now, state.rotation, group.members, context.column, self.memory, self._allowed,
+            self.shock,
         )
 
     def sub_step(self, context, group, h: float) -> float:
         """Length of the next sub-step: h, the rest of the step, or a part of it. Very short rests are planned as longer ones."""
         world, now = context.world, context.state.now
         fastest = 0.0
-        rates = self._tension_rates(context, group.joints)
+        rates = max(self._tension_rates(context, group.joints), self._spring_rate(group.joints))
         for a, b in zip(self.table.body_a[group.joints].tolist(), self.table.body_b[group.joints].tolist(), strict=True):
             spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
             fastest = max(fastest, float(np.linalg.norm(spins[1] - spins[0])))
@@ -126,6 +142,16 @@ class JointState:
         pieces = min(max(math.ceil(fastest * step / TURN), math.ceil(rates * step / SWAY), 1), MOST_SUB_STEPS)
         piece = step / pieces
         return piece if h > piece * (1.0 + SHORT) else max(h, SHORT * step)
+
+    def _spring_rate(self, which: np.ndarray) -> float:
+        """Fastest oscillation [rad/s] of soft rows that other joints pull at: alone they are exact at any length."""
+        if len(which) < 2:
+            return 0.0
+        table, memory = self.table, self.memory
+        works = np.isfinite(table.stiffness) & ~memory.slack & np.isin(self._joint_of_row, which)
+        stiffness = table.stiffness[works]
+        square = np.where(table.per_mass[works], stiffness, stiffness * memory.weight[works])
+        return math.sqrt(square.max(initial=0.0))
 
     def _tension_rates(self, context, which: np.ndarray) -> float:
         """Bound of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m r))."""
@@ -138,35 +164,59 @@ class JointState:
                     squares[i] = squares.get(i, 0.0) + square
         return math.sqrt(max(squares.values(), default=0.0))
 
-    def hold(self, context, group, contacts, turning, force, rest: float) -> tuple[float, float]:
+    def hold(self, context, group, contacts, turning, force, rest: float, rolling) -> tuple[float, float]:
         """Forces into context.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         state, memory = context.state, self.memory
         others = self.bodies_of(group.joints)
         others = others[~context.world.dynamic[others]]
-        h = self.sub_step(context, group, rest)
+        h, cuts = self.sub_step(context, group, rest), 0
         while True:
             for i in others:
                 memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, group.time + h)
             moment = self.moment.copy()
             residual, worst = hold_jointed(
-                solve_newton, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
+                context.solve_rows, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
                 group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
-                context.wrench, moment,
+                context.wrench, moment, rolling,
             )
             self.pull[group.joints] = 2.0 * (moment[group.joints] - self.moment[group.joints]) / h
             shorter = self.sub_step(context, group, h)
             if shorter < 0.5 * h:
                 # Only the forces show how short it has to be.
                 h = shorter
-            elif not self._break(context, group):
+                continue
+            if self._break(context, group):
+                continue
+            switch = next_switch(self.table, group.joints, memory, h, self._allowed)
+            if cuts == MOST_CUTS or switch >= h * (1.0 - SHORT):
                 break
+            h, cuts = max(switch, SHORT * context.world.accuracy.step), cuts + 1
         self.moment[:] = moment
         self._log(group, h)
         self.began[group.joints] = group.time
-        if worst > 1e3 * self._allowed:
-            names = tuple(context.world.names[i] for i in group.members)
-            context.log.report(group.time, "joints not closed", names, f"off by {worst:.1e}; use a smaller step")
+        self._report(context, group, worst)
+        self.are_closed = worst <= NOT_CLOSED * self._allowed
         return h, residual
+
+    def let_go(self, group) -> None:
+        """Forget the forces of the group's joints, which are not to be used."""
+        self.memory.wrench[group.members] = 0.0
+        self.pull[group.joints] = 0.0
+        for j in group.joints.tolist():
+            self.memory.force[self.table.first[j] : self.table.first[j + 1]] = 0.0
+
+    def _report(self, context, group, worst: float) -> None:
+        """Report joints that are off by `worst` m or rad, and those near the singularity of a twist."""
+        names = tuple(context.world.names[i] for i in group.members)
+        if worst > NOT_CLOSED * self._allowed:
+            context.log.report(group.time, "joints not closed", names, f"off by {worst:.1e}; use a smaller step")
+        for j in group.joints.tolist():
+            if self.memory.steepness[self.table.first[j] : self.table.first[j + 1]].max(initial=0.0) > STEEP:
+                pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
+                context.log.report(
+                    group.time, "singular joint", pair,
+                    f"{self.names[j]}: its axis has swung by half a turn, where the twist about it is not defined; limit the swing",
+                )
 
     def _break(self, context, group) -> bool:
         """Take out the most overloaded joint, if there is one."""

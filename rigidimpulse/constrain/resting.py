@@ -16,7 +16,7 @@ normal velocity is set to zero in the metric of mass, which only dissipates; oth
 and it would hover for ever.
 
 A contact that slips stops at t = |u_t| / |a_t + W_t f|, and its friction changes there: the sub-step ends at the first
-such time (stop split).
+such time (stop split). The same holds for rolling and spinning friction (see `rolling`).
 """
 
 from typing import NamedTuple
@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.rolling import Rolling, add_rolling_wrench, count_rolling_rows, fill_rolling_rows, rolling_slip
 from rigidimpulse.constrain.rows import (
     FREE,
     Rows,
@@ -92,16 +93,18 @@ def fill_contact_bias(bodies, contacts, frames, turning, excess, acceleration, a
 
 def hold_contacts(
     solve, bodies, contacts: Contacts, members, turning, excess, acceleration, angular_acceleration, h: float, shortest: float,
-    number, force, wrench,
+    number, force, wrench, rolling: Rolling | None = None,
 ) -> Held:
     """Contact forces of the sub-step for m contacts.
 
     solve: a solver of rows; members: movable bodies of the group; turning (m, 3) from `contact_motion`; excess (m,): gaps to be
     closed, m; acceleration, angular_acceleration (n, 3) of the bodies without contacts; h: length of the sub-step, s, that is
     not split in parts below `shortest`; force (m, 3) in (n, t1, t2) [N], start and answer; wrench (n, 6): force and torque on the
-    members are added. May change velocities (capture).
+    members are added; rolling: their rolling friction, if any. May change velocities (capture).
     """
-    rows, first_row, frames = contact_rows(bodies, contacts, members, number, 0)
+    extra = count_rolling_rows(rolling)
+    rows, first_row, frames = contact_rows(bodies, contacts, members, number, extra)
+    start = len(rows.bias) - extra
     start_contact_impulses(rows, first_row, force, h)
     n, rough = len(members), contacts.static_friction > 0.0
 
@@ -109,6 +112,10 @@ def hold_contacts(
         scale, u = fill_contact_bias(
             bodies, contacts, frames, turning, excess, acceleration, angular_acceleration, h, rows, first_row
         )
+        if rolling is not None:
+            fill_rolling_rows(
+                bodies, contacts, rolling, number, angular_acceleration, frames, first_row, h, rows, start
+            )
         slides = rough & (np.abs(u[:, 1]) + np.abs(u[:, 2]) > SLIP * scale)
         residual = solve_with_slip(solve, rows, n, first_row, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale)
         return residual / scale, scale, u, slides
@@ -121,30 +128,37 @@ def hold_contacts(
             break
         capture(solve, bodies, members, rows, first_row[loaded], u[loaded, 0], target)
         residual, scale, u, slides = attempt(h)
-    if np.any(slides) and residual <= POOR and np.any(_end_slip(rows, n, first_row, slides)[1] <= SLIP * scale):
-        brief = BRIEF * h
+    disc, slip = first_row[slides] + 1, u[slides, 1:]
+    second = disc + 1
+    if rolling is not None:
+        rolled = rolling_slip(bodies, contacts, rolling, frames, start, SLIP * scale)
+        disc, second, slip = (np.concatenate(both) for both in zip((disc, second, slip), rolled, strict=True))
+    if len(disc) and residual <= POOR and np.any(np.abs(_end_slip(rows, n, disc, second)).sum(axis=1) <= SLIP * scale):
+        brief, whole = BRIEF * h, rows.impulse.copy()
         rows.impulse[:] *= BRIEF
         attempt(brief)
-        stop = _first_stop(rows, n, first_row, slides, u[:, 1:], brief)
-        h = stop if shortest < stop < h else h
-        rows.impulse[:] *= h / brief
-        residual, *_ = attempt(h)
+        stop = _first_stop(slip, _end_slip(rows, n, disc, second), brief)
+        if shortest < stop < h:
+            rows.impulse[:] *= stop / brief
+            stopped, *_ = attempt(stop)
+            if stopped <= max(residual, POOR):
+                residual, h, whole = stopped, stop, rows.impulse
+        rows.impulse[:] = whole
     world_force = add_contact_wrench(contacts, rows, first_row, frames, h, force, wrench)
+    if rolling is not None:
+        add_rolling_wrench(contacts, rolling, rows, frames, h, start, wrench)
     return Held(residual, h, slides, world_force)
 
 
-def _end_slip(rows: Rows, n: int, first_row: np.ndarray, slides: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Slip (s, 2) at the end, and its size (s,), of the contacts that slip at the start."""
+def _end_slip(rows: Rows, n: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Slip (s, 2) at the end along pairs of rows; a single row is given twice."""
     after = rows.bias + response_to(rows, n, rows.impulse)
-    disc = first_row[slides] + 1
-    slip = np.column_stack([after[disc], after[disc + 1]])
-    return slip, np.abs(slip).sum(axis=1)
+    return np.column_stack([after[first], np.where(second > first, after[second], 0.0)])
 
 
-def _first_stop(rows: Rows, n: int, first_row: np.ndarray, slides: np.ndarray, slip: np.ndarray, brief: float) -> float:
-    """When the first slipping contact stops [s], if its slip (m, 2) goes on as it does over a brief time."""
-    slip = slip[slides]
-    change = (_end_slip(rows, n, first_row, slides)[0] - slip) / brief
+def _first_stop(slip: np.ndarray, end: np.ndarray, brief: float) -> float:
+    """When the first of s slips (s, 2) stops [s], if it goes on to change as it does over a brief time, to `end`."""
+    change = (end - slip) / brief
     slows = np.einsum("ij,ij->i", slip, change) < 0.0
     time = -np.einsum("ij,ij->i", slip, change)[slows] / np.einsum("ij,ij->i", change, change)[slows]
     return float(time.min(initial=np.inf))

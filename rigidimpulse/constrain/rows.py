@@ -167,7 +167,7 @@ def row_velocities(bodies, contacts, first_row, frames, u):
 @jit
 def rows_of(rows, i):
     """Rows of the contact whose normal is row i: 3, or 1 without friction."""
-    return 3 if i + 1 < rows.kind.shape[0] and rows.kind[i + 1] == DISC else 1
+    return 3 if i + 1 < rows.kind.shape[0] and rows.kind[i + 1] == DISC and rows.master[i + 1] == i else 1
 
 
 @jit
@@ -300,7 +300,7 @@ def solve_with_slip(solve, rows: Rows, n: int, first_row: np.ndarray, contacts, 
     """Solve rows that begin with those of contacts; contacts that slip, or come to slip, have dynamic friction.
 
     solve: a solver of rows, as `newton.solve_newton`; slides (m,) bool: contacts that slip from the start; target: residual
-    asked for, m/s; slow: slip that is none, m/s. Returns the residual, m/s.
+    asked for, m/s; slow: slip that is none, m/s. Returns the residual, m/s: inf where there is no finite answer, and then no impulse.
     """
     rough = contacts.static_friction > 0.0
     disc = first_row[rough] + 1
@@ -316,4 +316,7 @@ def solve_with_slip(solve, rows: Rows, n: int, first_row: np.ndarray, contacts, 
             warm = False
         elif not let_slip(rows, n, first_row, contacts.dynamic_friction, slow):
             break
+    if not np.all(np.isfinite(rows.impulse)):
+        rows.impulse[:] = 0.0
+        return np.inf
     return residual

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidimpulse.constrain.arrival import arrive
+from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.detect.features import CORNER, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, pressing
-from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.respond.impulse import Contacts
 
 if TYPE_CHECKING:
@@ -21,8 +21,6 @@ MARGIN = 2.0
 NO_FORCE = np.zeros(3)
 SLACK = 1e-9
 """Contacts that leave or approach slower than the held ones by this part are held."""
-GAIN = 1e-11
-"""Part of its kinetic energy that a body on immovable things may gain by rounding."""
 
 
 @dataclass
@@ -32,7 +30,8 @@ class Group:
     Attributes:
         members: movable bodies, in order of index.
         pairs: places in the window of the contacting pairs.
-        contacts: all contacts within the margin; `place` (m,) their pairs, `keys` who they are.
+        contacts: all contacts within the margin; `place` (m,) their pairs, `kinds` (m,) and `features` (m, 2) what touches, `keys`
+            who they are.
         delta: (m,) gap at which lasting contacts are held, m.
         approach: (m,) u.n, m/s; negative approaches.
         rest_speed: (m,) a slower rebound is none, m/s.
@@ -42,6 +41,7 @@ class Group:
         held: (m,) bool, contacts that carry forces. rests: whether all members stand still.
         still: m/s, approach speed that counts as none.
         joints: the joints of the members.
+        heap: members that are stepped as a heap (see `constrain/heap`), None where there is none.
 
     """
 
@@ -51,6 +51,7 @@ class Group:
     contacts: Contacts
     place: np.ndarray
     kinds: np.ndarray
+    features: np.ndarray
     keys: list[tuple[int, ...]]
     delta: np.ndarray
     approach: np.ndarray
@@ -63,6 +64,7 @@ class Group:
     rests: bool = False
     still: float = 0.0
     joints: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    heap: np.ndarray | None = None
 
     def slow(self) -> np.ndarray:
         """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
@@ -182,30 +184,6 @@ def _components(context, window, time: float, reached, real: np.ndarray, integer
     return groups
 
 
-def note_arrival(context, members: list[int], time: float) -> bool:
-    """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows.
-
-    A body that only rested on, slid or rolled over things that do not move cannot have gained energy: what it has gained, since
-    the forces are constant over a sub-step while the contact moves, is taken off its velocities. Returns whether any was.
-    """
-    world, state = context.world, context.state
-    guarded = False
-    for i in members:
-        if not state.under_contact[i]:
-            continue
-        one = np.array([i])
-        state.arrival_energy[i] = mechanical_energy(state.now, world, one)
-        gained = state.arrival_energy[i] - state.energy_at_start[i]
-        kinetic = kinetic_energy(state.now, world, one)
-        if state.on_rest_of_world[i] and gained > GAIN * kinetic > 0.0:
-            share = float(np.sqrt(max(1.0 - gained / kinetic, 0.0)))
-            state.now.velocity[i] *= share
-            state.now.angular_velocity[i] *= share
-            context.log.book(time, "guard", kinetic_energy(state.now, world, one) - kinetic)
-            guarded = True
-    return guarded
-
-
 def make_group(
     context, window, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray, joints: np.ndarray
 ) -> Group:
@@ -227,6 +205,7 @@ def make_group(
         contacts=contacts,
         place=place,
         kinds=integer[rows, 2],
+        features=integer[rows, 3:5],
         keys=[contact_key(*row) for row in integer[rows].tolist()],
         delta=window.delta[place],
         approach=np.empty(len(rows)),

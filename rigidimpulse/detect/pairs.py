@@ -20,6 +20,8 @@ class BroadPhase:
             return Skip("a dynamic body and another are needed for contact")
 
         def detect(context, window) -> None:
+            if context.heaps is not None:
+                context.heaps.gather(context, window)
             window.find_pairs()
 
         return Bound(detect, f"{world.num_bodies} bodies may touch")

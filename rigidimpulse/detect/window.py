@@ -65,6 +65,8 @@ class Window:
         tolerance: m, gap error of an impact.
         since, repeats: s, instant of contact, and how often the pair came to contact at it.
         wake: (n,) s, when bodies must be looked at again though nothing meets them.
+        inside: (n,) bool, members of heaps: their pairs with each other and with immovable bodies are not swept.
+        heaps_begun: whether the heaps of the step have been stepped from its start.
         witness: (10,) points on a and b, normal and gap where the pair comes to contact.
         tries: how often the pair came to contact at one instant without an impulse.
     """
@@ -84,6 +86,8 @@ class Window:
         self.since = np.zeros(0)
         self.repeats = np.zeros(0, np.int64)
         self.wake = np.full(context.world.num_bodies, np.inf)
+        self.inside = np.zeros(context.world.num_bodies, bool)
+        self.heaps_begun = False
         self._moves = (context.state.course.mode != FIXED) | context.world.dynamic
 
     def find_pairs(self) -> None:
@@ -105,12 +109,18 @@ class Window:
 
     def touching(self, time: float, bodies: np.ndarray) -> list[Group]:
         """Groups of touching bodies that the given ones belong to at `time`."""
-        return touching_groups(self.context, self, time, bodies)
+        groups = touching_groups(self.context, self, time, bodies)
+        return groups if self.context.heaps is None else self.context.heaps.join(self.context, self, time, groups)
+
+    def _is_shut(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Which pairs are not swept, since a heap's solver looks after them."""
+        free = self.context.world.dynamic & ~self.inside
+        return ~(free[a] | free[b])
 
     def _append(self, a: np.ndarray, b: np.ndarray, start: float) -> np.ndarray:
         """Add pairs whose bodies may meet and that are not there yet; returns their places."""
         world = self.context.world
-        keep = world.may_collide(a, b)
+        keep = world.may_collide(a, b) & ~self._is_shut(a, b)
         a, b = a[keep], b[keep]
         first = len(self.a)
         size = np.minimum(world.size[a], world.size[b])
@@ -150,9 +160,37 @@ class Window:
         if len(fresh):
             self._append(np.minimum(fresh, body), np.maximum(fresh, body), time)
 
+    def change_courses(self, bodies: np.ndarray, time: float) -> None:
+        """The same for the members of heaps, all at once."""
+        context = self.context
+        free = context.world.dynamic & ~self.inside
+        moved = np.zeros(context.world.num_bodies, bool)
+        moved[bodies] = True
+        known = np.flatnonzero(moved[self.a] | moved[self.b])
+        self.sweep_again(known, time)
+        if not free.any():
+            return
+        self.touch[known] = context.world.least_touch(self.a[known], self.b[known])
+        self.tries[known] = 0
+        path_boxes(
+            context.state.course, bodies, time, self.end, context.world.bound_radius, context.box_min, context.box_max
+        )
+        context.box_min[bodies] -= MARGIN * context.world.largest_delta
+        context.box_max[bodies] += MARGIN * context.world.largest_delta
+        pairs = np.empty((len(bodies) + 64, 2), np.int64)
+        low, high = context.box_min.copy(), context.box_max.copy()
+        low[~(moved | free)], high[~(moved | free)] = np.inf, -np.inf
+        count = overlapping_pairs(low, high, free, pairs)
+        if count < 0:
+            pairs = np.empty((-count, 2), np.int64)
+            count = overlapping_pairs(low, high, free, pairs)
+        n = context.world.num_bodies
+        fresh = ~np.isin(pairs[:count, 0] * n + pairs[:count, 1], self.a * n + self.b)
+        self._append(pairs[:count, 0][fresh], pairs[:count, 1][fresh], time)
+
     def active_bodies(self) -> np.ndarray:
-        """Bodies that move."""
-        return np.flatnonzero(self.context.state.course.mode != FIXED)
+        """Bodies that move, but for those in heaps."""
+        return np.flatnonzero((self.context.state.course.mode != FIXED) & ~self.inside)
 
     def bodies_at(self, time: float) -> np.ndarray:
         """Bodies that come to contact or are called at `time`."""
@@ -177,7 +215,9 @@ class Window:
     def sweep_again(self, places: np.ndarray, time: float) -> None:
         """Let pairs be swept from `time` on, but for those that are given up."""
         self.time[places] = np.inf
-        self.start[places[self.repeats[places] <= MAX_REPEATS]] = time
+        again = (self.repeats[places] <= MAX_REPEATS) & ~self._is_shut(self.a[places], self.b[places])
+        self.start[places[again]] = time
+        self.start[places[~again]] = np.nan
 
     def count_contacts(self, time: float) -> None:
         """Count contacts at one instant; a pair with too many is left alone until the end of the step, and reported."""

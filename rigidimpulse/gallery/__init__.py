@@ -33,6 +33,9 @@ _MODULES = {
     "off_centre_disk": "off_centre_disk",
     "rifle": "rifle",
     "toss": "tosses",
+    "rolling": "rolling",
+    "arm": "arm",
+    "pile": "pile",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 

@@ -6,6 +6,8 @@
       PRESCRIBED   q(t) = exp(w0 s) q0, constant velocity and world angular velocity (its acceleration must be 0)
       FREE         no torque: closed form (free_top)
       FORCED       constant world torque: power series (forced_top)
+      STEPPED      as PRESCRIBED: a straight way to a pose that a heap's solver found; the body's own velocities run from those
+                   at the start to those at the end of the step
 
 The sweep and the integration both read the path here, so the impact time and the motion cannot disagree. A row is set
 by its owner (all columns but `top`), then made ready by `begin`. Evaluation only reads; it may be called in any order.
@@ -18,7 +20,7 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.integrate import forced_top, free_top
 
-FIXED, PRESCRIBED, FREE, FORCED = 0, 1, 2, 3
+FIXED, PRESCRIBED, FREE, FORCED, STEPPED = 0, 1, 2, 3, 4
 
 TOP_SIZE = max(free_top.FREE_TOP_SIZE, forced_top.FORCED_TOP_SIZE)
 """Length of a row of `Course.top`."""
@@ -42,11 +44,13 @@ class Course(NamedTuple):
     torque: np.ndarray
     """(n, 3) N m, constant; read in mode FORCED only"""
     mode: np.ndarray
-    """(n,) int64: FIXED, PRESCRIBED, FREE, FORCED"""
+    """(n,) int64: FIXED, PRESCRIBED, FREE, FORCED, STEPPED"""
     inertia: np.ndarray
     """(n, 3) kg m^2, principal moments; read in modes FREE and FORCED"""
     top: np.ndarray
     """(n, TOP_SIZE) constants of the rotation, written by `begin`"""
+    stepped: np.ndarray
+    """(n, 13) velocity and angular velocity at `start`, their changes until the end of the step, and its length, s; read in mode STEPPED"""
 
 
 def make_course(num_bodies: int) -> Course:
@@ -68,6 +72,7 @@ def make_course(num_bodies: int) -> Course:
         mode=np.zeros(num_bodies, dtype=np.int64),
         inertia=np.ones((num_bodies, 3)),
         top=np.zeros((num_bodies, TOP_SIZE)),
+        stepped=np.zeros((num_bodies, 13)),
     )
 
 
@@ -80,7 +85,7 @@ def begin(course, i):
         return
     if mode == FREE or mode == FORCED:
         free_top.prepare(inertia, q, w, top)
-    elif mode == PRESCRIBED:
+    elif mode == PRESCRIBED or mode == STEPPED:
         free_top.keep_axis(q, w, top)
 
 
@@ -114,6 +119,18 @@ def pose_at(course, i, t, x_out, q_out):
 @jit
 def state_at(course, i, t, x_out, q_out, v_out, w_out):
     """Write position, quaternion, velocity (3,) and world angular velocity (3,) of body i at the time t >= start."""
+    motion_at(course, i, t, x_out, q_out, v_out, w_out)
+    if course.mode[i] == STEPPED:
+        line = course.stepped[i]
+        share = min((t - course.start[i]) / line[12], 1.0)
+        for k in range(3):
+            v_out[k] = line[k] + share * line[6 + k]
+            w_out[k] = line[3 + k] + share * line[9 + k]
+
+
+@jit
+def motion_at(course, i, t, x_out, q_out, v_out, w_out):
+    """The same, with the velocities of the path: those by which pose changes. They differ in mode STEPPED only."""
     _start_pose(course, i, x_out, q_out)
     s = t - course.start[i]
     moves = course.mode[i] != FIXED

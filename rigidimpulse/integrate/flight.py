@@ -33,7 +33,11 @@ def integrate(context, window, group: Group) -> None:
     """Give new courses to members whose velocity, pose or wrench changed, and set the gaps at which pairs meet next."""
     state, now = context.state, context.state.now
     course = state.course
+    if group.heap is not None:
+        context.heaps.take_courses(context, window, group)
     for n, i in enumerate(group.members):
+        if window.inside[i]:
+            continue
         changed = (
             group.moved
             or np.any(now.velocity[i] != group.velocity[n])
@@ -57,7 +61,8 @@ def take_course(context, window, i: int, time: float, wrench: np.ndarray, rests:
         rests = True
     context.recorder.flush(course, i, time, state.correction[i])
     state.correction[i] = 0.0
-    _book_contact_work(context, i, time)
+    context.contact_log.close([i], time)
+    book_contact_work(context, i, time)
     if rests:
         now.velocity[i] = now.angular_velocity[i] = 0.0
     course.start[i] = time
@@ -74,7 +79,7 @@ def take_course(context, window, i: int, time: float, wrench: np.ndarray, rests:
         window.change_course(i, time)
 
 
-def _book_contact_work(context, i: int, time: float) -> None:
+def book_contact_work(context, i: int, time: float) -> None:
     """Work that contact forces did along the course that ends: what its energy changed by."""
     arrival = context.state.arrival_energy.pop(i, None)
     if arrival is not None:

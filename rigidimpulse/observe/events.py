@@ -37,11 +37,13 @@ class Event:
 class EventLog:
     """Collects impacts, energy changes by cause, and events while a run goes on.
 
+    spans: changes of energy that go on for a while: start, end [s], cause, change [J].
     stretches: courses under contact forces: start, end [s], body, energy at the start [J], work of the forces [J].
     """
 
     impacts: list[np.ndarray] = field(default_factory=list)
     energy: list[tuple[float, str, float]] = field(default_factory=list)
+    spans: list[tuple[float, float, str, float]] = field(default_factory=list)
     stretches: list[tuple[float, float, int, float, float]] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
 
@@ -55,6 +57,11 @@ class EventLog:
         """Book a change of mechanical energy [J]; negative is dissipated."""
         if change != 0.0:
             self.energy.append((time, cause, change))
+
+    def book_over(self, start: float, end: float, cause: str, change: float) -> None:
+        """Book a change of mechanical energy [J] that went on from start to end [s]."""
+        if change != 0.0:
+            self.spans.append((start, end, cause, change))
 
     def note(self, time: float, kind: str, bodies: tuple[str, ...], message: str) -> None:
         """Keep an event that is no problem: what the scene asked for."""

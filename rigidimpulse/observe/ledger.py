@@ -19,7 +19,7 @@ class Ledger:
         potential: (f,) J, of gravity and constant forces, zero at the world's origin.
         momentum: (f, 3) kg m/s.
         angular_momentum: (f, 3) kg m2/s about the world's origin.
-        dissipated: by cause ("impact", "contact", "capture", "lift"), (f,) J taken from the bodies until each frame; a
+        dissipated: by cause ("impact", "contact", "capture", "lift", "heap"), (f,) J taken from the bodies until each frame; a
             negative value is energy fed in (a moving support, a lift out of the contact margin).
 
     """
@@ -55,6 +55,9 @@ def make_ledger(times, position, orientation, velocity, angular_velocity, mass, 
         stamps = np.array([t for t, c, _ in log.energy if c == cause])
         sums = np.concatenate([[0.0], np.cumsum([-e for _, c, e in log.energy if c == cause])])
         dissipated[cause] = sums[np.searchsorted(stamps, times, side="right")]
+    for start, end, cause, change in log.spans:
+        done = np.clip((times - start) / (end - start), 0.0, 1.0)
+        dissipated[cause] = dissipated.get(cause, 0.0) - change * done
     if log.stretches:
         dissipated["contact"] = _contact_work(times, kinetic + potential, log.stretches)
     return Ledger(times, kinetic.sum(1), potential.sum(1), momentum, angular, dissipated)

@@ -40,7 +40,7 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import along, cross, dot, subtract
-from rigidimpulse.integrate.course import FIXED, FORCED, PRESCRIBED, state_at
+from rigidimpulse.integrate.course import FIXED, FORCED, PRESCRIBED, STEPPED, motion_at
 from rigidimpulse.rotation import quaternion_to_matrix
 
 # Offsets are numpy integers because numba would compile a kernel anew for every literal int that it is called with.
@@ -162,7 +162,7 @@ def motion_bound(course, i, t, horizon, row):
 
     Works for every mode of a course: fixed, prescribed, free, and turning under a constant world torque.
     """
-    state_at(
+    motion_at(
         course, i, t, row[POSITION:VELOCITY], row[ORIENTATION:SPIN_BOUND], row[VELOCITY:SPIN], row[SPIN:ACCELERATION]
     )
     quaternion_to_matrix(row[ORIENTATION:SPIN_BOUND], row[AXES:ORIENTATION].reshape((3, 3)))
@@ -170,7 +170,7 @@ def motion_bound(course, i, t, horizon, row):
     none = (0.0, 0.0, 0.0)
     pull = (course.acceleration[i, 0], course.acceleration[i, 1], course.acceleration[i, 2])
     put(row, ACCELERATION, none if mode == FIXED else pull)
-    if mode == FIXED or mode == PRESCRIBED:
+    if mode == FIXED or mode == PRESCRIBED or mode == STEPPED:
         put(row, SPIN_RATE, none)
         row[SPIN_BOUND] = length(vector(row, SPIN))
         row[SPIN_RATE_BOUND] = 0.0

@@ -19,7 +19,7 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.features import along, cross, dot, subtract
 from rigidimpulse.detect.manifold import pair_gap
-from rigidimpulse.integrate.course import Course, state_at
+from rigidimpulse.integrate.course import Course, motion_at
 from rigidimpulse.rotation import quaternion_to_matrix
 from rigidimpulse.sweep.bound import length, put, scaled
 from rigidimpulse.sweep.guard_layout import FIRST, GAP, NORMAL, POINT_FIRST, POINT_SECOND, SECOND
@@ -36,7 +36,7 @@ def measure(geometry, course, shape_of_body, a, b, t, witness):
     x, q, v, w = np.empty((2, 3)), np.empty((2, 4)), np.empty((2, 3)), np.empty((2, 3))
     axes, points = np.empty((2, 3, 3)), np.zeros(7)
     for side in range(2):
-        state_at(course, b if side else a, t, x[side], q[side], v[side], w[side])
+        motion_at(course, b if side else a, t, x[side], q[side], v[side], w[side])
         quaternion_to_matrix(q[side], axes[side])
     gap = pair_gap(geometry, shape_of_body[a], x[0], axes[0], shape_of_body[b], x[1], axes[1], inf, points)
     point_a, point_b = (points[0], points[1], points[2]), (points[3], points[4], points[5])

@@ -3,10 +3,10 @@
 Squeezed: two kinematic walls close on a body until there is no room. No rigid motion is left; the status must name the
 body, every number must stay finite, and the body must not be shot out: its speed stays within ten times the walls'.
 
-Overlap at the start: bodies drawn inside each other, half way, at the same place, or one hollow in the other. The status says so
-before the first frame. Whatever is done about it, energy must not be made: without gravity and at rest, a body pushed out
-by its whole size in a step of 1/60 s would have 60 sizes a second; energy that was not there before stays below that of
-falling through its own size, m g s, the bound here with g = 9.81.
+Overlap at the start: bodies drawn inside each other, half way, at the same place, or one inside the other. The status says so
+before the first frame, and from the first step on they are apart. Energy must not be made: without gravity and at rest, a
+body pushed out by its whole size in a step of 1/60 s would have 60 sizes a second; energy that was not there before stays
+below that of falling through its own size, m g s, the bound here with g = 9.81.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from rigidimpulse.body import Body
-from rigidimpulse.gallery.hard.parts import GRAVITY, dull, finite, floor_scene
+from rigidimpulse.gallery.hard.parts import GRAVITY, apart, dull, finite, floor_scene
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
 from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
@@ -73,13 +73,14 @@ def inside() -> Scene:
 
 
 def check_overlap(run: Recording) -> list[Check]:
-    """Check that it is reported at once, and that no energy is made."""
+    """Check that it is reported at once and resolved, and that no energy is made."""
     assert run.ledger is not None
     reported = sum(event.kind == "overlap at the start" for event in run.status.events)
     made = run.ledger.kinetic.max() if np.all(np.isfinite(run.ledger.kinetic)) else math.inf
     momentum = np.linalg.norm(run.ledger.momentum, axis=1).max()
     return [
         finite(run),
+        apart(run),
         at_least("overlaps reported before the first frame", reported, 1, "the status says so"),
         at_most("energy made, J", made, GRAVITY * SIZE, "no explosion: m g s, m = 1 kg"),
         at_most("momentum made, kg m/s", momentum, 1e-12, "nothing acts from outside"),

@@ -19,7 +19,8 @@ by 750 rad; refined four times the error falls from 2e-4 by the factor of ten th
 
 Rattleback: half an ellipsoid with mass turned by an angle against its axes. Spun against its sense it begins to rock and
 turns back (G. T. Walker 1896). The smooth body that rolls without slip, integrated to 1e-9, turns back to -1.00 of its
-spin in 1.9 s; this one has 10,242 corners and loses energy from corner to corner (e = 0), so only the sign is asked for.
+spin in 1.9 s; this one has 10,242 corners, 3 mm apart, and loses energy from corner to corner (e = 0): it turns back to -0.60
+of its spin, and one of 40,962 corners to -0.75. To rock from corner to corner at all it must rise by 7e-6 J; it begins with 1e-4 J.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ COIN, COIN_THICKNESS = 0.0116, 0.00233
 TOP, OFFSET, TOP_SPIN = 0.02, 0.006, 150.0
 AXES = (0.1, 0.02, 0.015)
 SKEW = math.radians(5.0)
-BACK_SPIN, WOBBLE = -3.0, 0.3
+BACK_SPIN, WOBBLE = -3.0, 1.0
 """rad/s, about the vertical and about the level axes."""
 
 
@@ -185,7 +186,7 @@ def check_rattleback(run: Recording) -> list[Check]:
     spin = run.angular_velocity("back")[:, 2] / BACK_SPIN
     return [
         finite(run),
-        at_most("spin over the first spin, at its lowest", spin.min(), -0.05, "it turns back (Walker 1896)"),
+        at_most("spin over the first spin, at its lowest", spin.min(), -0.3, "it turns back (Walker 1896)"),
         above_floor(run),
         energy_never_grows(run, 2.0 * AXES[0]),
         undisturbed(run),

@@ -1,0 +1,63 @@
+"""No energy from constant contact forces.
+
+Over a sub-step contact forces are constant while contacts move, so they do a little work that they should not. Bodies that
+together touched nothing that moves by itself cannot have gained energy: what they gained is taken off what moves against the
+motion of their common rigid body, V, W, by one factor:
+
+    v_i = V + W x (x_i - X) + dv_i,  w_i = W + dw_i,    T = T_rigid(V, W) + T_d(dv, dw),    T_d' = T_d - gained
+
+T_rigid and T_d are orthogonal, so momentum and angular momentum stay. Where the ground takes part, V = W = 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
+
+GAIN = 1e-11
+"""Part of their kinetic energy that bodies may gain by rounding."""
+
+
+def note_arrival(context, members: list[int], time: float) -> bool:
+    """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows.
+
+    What groups of them gained is taken off their velocities as soon as all have arrived. Returns whether any was.
+    """
+    world, state = context.world, context.state
+    guarded = False
+    touched = [i for i in members if state.under_contact[i]]
+    for i in touched:
+        state.arrival_energy[i] = mechanical_energy(state.now, world, np.array([i]))
+        state.arrival_time[i] = time
+    for first in sorted({int(state.closed[i]) for i in touched} - {-1}):
+        group = np.flatnonzero((state.closed == first) & state.under_contact)
+        if np.any(state.arrival_time[group] != time) or np.ptp(state.course.start[group]) > 0.0:
+            continue
+        gained = sum(state.arrival_energy[i] - state.energy_at_start[i] for i in group.tolist())
+        before = kinetic_energy(state.now, world, group)
+        if gained > GAIN * before:
+            take_off(state.now, world, group, gained, bool(state.grounded[first]))
+            context.log.book(time, "guard", kinetic_energy(state.now, world, group) - before)
+            guarded = True
+    return guarded
+
+
+def take_off(now, world, members: np.ndarray, energy: float, grounded: bool) -> None:
+    """Take energy [J] off the motion of the members against each other, or against the ground; as much as there is."""
+    mass, x = world.mass[members, None], now.position[members]
+    v, w = now.velocity[members], now.angular_velocity[members]
+    inertia = np.linalg.inv(now.inv_inertia[members])
+    common_v, common_w, r = np.zeros(3), np.zeros(3), np.zeros_like(x)
+    if not grounded:
+        r = x - (mass * x).sum(axis=0) / mass.sum()
+        common_v = (mass * v).sum(axis=0) / mass.sum()
+        momentum = (np.cross(r, mass * v) + np.einsum("ijk,ik->ij", inertia, w)).sum(axis=0)
+        steiner = np.einsum("i,ij,ij->", mass[:, 0], r, r) * np.eye(3) - np.einsum("i,ij,ik->jk", mass[:, 0], r, r)
+        common_w = np.linalg.solve(inertia.sum(axis=0) + steiner, momentum)
+    rigid_v = common_v + np.cross(common_w, r)
+    dv, dw = v - rigid_v, w - common_w
+    available = 0.5 * float((mass * dv**2).sum() + np.einsum("ij,ijk,ik->", dw, inertia, dw))
+    if available > 0.0:
+        share = np.sqrt(max(1.0 - energy / available, 0.0))
+        now.velocity[members], now.angular_velocity[members] = rigid_v + share * dv, common_w + share * dw

@@ -1,0 +1,392 @@
+"""Heaps: islands of many bodies, stepped by the sub-stepped solver (`heap_solver`) instead of from contact to contact.
+
+At the start of a step islands are chosen (`heap_islands`); their bodies get courses (mode STEPPED) that end in the poses
+which the solver found for the end of the step. Pairs inside a heap are not swept; pairs of a member and any other body are,
+and at their contact the impulse is found exactly and the heap is stepped anew from there, the other body with it if it is slow
+enough. Contacts are held at a gap, the skin. A heap whose members all stay within PLAY skins of one place and below
+CALM sqrt(g r) for REST sqrt(r / g) s (r: inner radius) stands still, to the bit, until something touches it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimpulse._jit import jit
+from rigidimpulse.constrain.energy_guard import note_arrival
+from rigidimpulse.constrain.heap_islands import FAST, SPIN, TALL, islands, refusals, support_levels
+from rigidimpulse.constrain.heap_stepper import HeapStepper, Outcome
+from rigidimpulse.detect.groups import Group, empty_contacts
+from rigidimpulse.detect.touching import bring_all, contacts_of_pairs
+from rigidimpulse.integrate.course import FIXED, FREE, STEPPED, begin, state_at
+from rigidimpulse.integrate.flight import book_contact_work
+from rigidimpulse.observe.energy import mechanical_energy
+from rigidimpulse.plan import Bound, Skip
+from rigidimpulse.rotation import product
+
+CALM, PLAY, REST = 0.05, 0.5, 3.0
+LEAVING = 0.1
+"""Part of its speed at which a fast body must leave a heap that it has hit to be no part of it."""
+MOST_PIECES = 4
+"""Parts of a step at most, between which a heap's courses begin anew."""
+TOUCHES = 5.0
+"""Skins within which a body at rest belongs to the heap that comes near it."""
+
+
+@jit
+def _arrive(course, members, time):
+    """End the courses of members at `time`: from there on they fly freely."""
+    x, q, v, w = np.empty(3), np.empty(4), np.empty(3), np.empty(3)
+    for i in members:
+        state_at(course, i, time, x, q, v, w)
+        course.start[i], course.mode[i] = time, FREE
+        course.position[i], course.orientation[i] = x, q
+        course.velocity[i], course.angular_velocity[i] = v, w
+        begin(course, i)
+
+
+@jit
+def _depart(course, members, time, length, bodies, position, orientation, velocity):
+    """Courses from the present poses to the given ones (k, 3), (k, 4), where the velocities are (k, 6)."""
+    for k in range(members.shape[0]):
+        i = members[k]
+        a, b = bodies.orientation[i], orientation[k]
+        q0, q1, q2, q3 = product(b[0], b[1], b[2], b[3], a[0], -a[1], -a[2], -a[3])
+        if q0 < 0.0:
+            q0, q1, q2, q3 = -q0, -q1, -q2, -q3
+        sine = np.sqrt(q1 * q1 + q2 * q2 + q3 * q3)
+        factor = 2.0 * np.arctan2(sine, q0) / (sine * length) if sine > 0.0 else 0.0
+        course.start[i], course.mode[i] = time, STEPPED
+        course.angular_velocity[i, 0] = factor * q1
+        course.angular_velocity[i, 1] = factor * q2
+        course.angular_velocity[i, 2] = factor * q3
+        for c in range(3):
+            course.position[i, c] = bodies.position[i, c]
+            course.velocity[i, c] = (position[k, c] - bodies.position[i, c]) / length
+            course.acceleration[i, c] = course.torque[i, c] = 0.0
+            course.stepped[i, c], course.stepped[i, 3 + c] = bodies.velocity[i, c], bodies.angular_velocity[i, c]
+            course.stepped[i, 6 + c] = velocity[k, c] - bodies.velocity[i, c]
+            course.stepped[i, 9 + c] = velocity[k, 3 + c] - bodies.angular_velocity[i, c]
+        for c in range(4):
+            course.orientation[i, c] = a[c]
+        course.stepped[i, 12] = length
+        begin(course, i)
+
+
+@dataclass(frozen=True)
+class HeapForces:
+    """Contact inside heaps."""
+
+    contact_solver: str
+    stage: str = "constrain"
+    name: str = "heaps (sub-stepped)"
+
+    def bind(self, world) -> Bound | Skip:
+        """In where heaps are possible; the reason is told anew when the run is over."""
+        reason = why_no_heaps(world)
+        return Skip(reason) if reason else Bound(step_heap, "bodies may heap up")
+
+
+def why_no_heaps(world) -> str:
+    """Why a scene cannot have heaps; empty where it can."""
+    from rigidimpulse.constrain.heap_islands import MANY
+
+    solver = world.accuracy.contact_solver
+    if solver not in ("auto", "substepped"):
+        return f"contact_solver is {solver!r}"
+    if not world.can_collide or not world.can_press:
+        return "nothing presses bodies together"
+    if solver == "auto" and np.count_nonzero(world.dynamic) < MANY:
+        return f"fewer than {MANY} movable bodies"
+    return ""
+
+
+def step_heap(context, window, group: Group) -> None:
+    """Step the heap of a group to the end of the window."""
+    if group.heap is not None:
+        context.heaps.step(context, window, group)
+
+
+class Heaps:
+    """The heaps of a run.
+
+    Attributes:
+        label: (n,) the heap that a body belongs to, -1 for none; heaps at rest keep theirs.
+        calm: (n,) s, for how long a member has hardly moved.
+        stepper: the solver and its contacts.
+
+    """
+
+    def __init__(self, world) -> None:
+        """No heaps yet."""
+        self.stepper = HeapStepper(world)
+        self.label = np.full(world.num_bodies, -1, np.int64)
+        self.calm = np.zeros(world.num_bodies)
+        self._stood = np.full((world.num_bodies, 7), np.inf)
+        self._auto = world.accuracy.contact_solver == "auto"
+        self._jointed = np.zeros(world.num_bodies, bool)
+        self._ends: dict[int, float] = {}
+        self._began: dict[int, tuple[float, np.ndarray, float]] = {}
+        self._outcome: Outcome | None = None
+        self._outcome_end = 0.0
+        self._most = self._steps = 0
+        self._refused: dict[str, int] = {}
+        if world.joints_of_scene:
+            ends = np.concatenate([world.joints.body_a, world.joints.body_b])
+            self._jointed[ends[ends >= 0]] = True
+
+    def summary(self) -> str:
+        """What became of heaps in the run."""
+        refused = ", ".join(f"{reason} ({count})" for reason, count in sorted(self._refused.items()))
+        text = f"{self._steps} steps of heaps, largest {self._most} bodies" if self._steps else "no heaps"
+        return f"{text}; left to newton, islands times steps: {refused}" if refused else text
+
+    def gather(self, context, window) -> None:
+        """Choose the heaps of the step: `window.inside` marks their bodies."""
+        world, course, time = context.world, context.state.course, window.begin
+        self._end_courses(context, np.flatnonzero(course.mode == STEPPED), time)
+        member = world.dynamic & (course.mode != FIXED)
+        if not member.any() or not window.end > time:
+            return
+        ahead = window.end - time
+        everybody = np.arange(world.num_bodies)
+        bring_all(
+            course, everybody, time, context.state.now, context.state.rotation, context.acceleration, context.angular_acceleration
+        )
+        context.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
+        member &= self._slow(context, everybody)
+        a, b = self._near(context, member, ahead)
+        while True:
+            woken = self._touched(context, member, a, b)
+            if not len(woken):
+                break
+            member[woken] = True
+            a, b = self._near(context, member, ahead)
+        root = islands(world.num_bodies, a, b, member)
+        root[~member] = -1
+        refused = refusals(world, root, self.label >= 0, self._jointed, a, b, self._auto)
+        chosen = member & ~np.isin(root, np.array(sorted(refused), np.int64))
+        chosen = self._low(context, window, chosen, root, refused)
+        for reason in refused.values():
+            self._refused[reason] = self._refused.get(reason, 0) + 1
+        self.label[member & ~chosen] = -1
+        self._settle(context, chosen, root, a, b, time)
+        window.inside |= chosen
+
+    def _slow(self, context, bodies: np.ndarray) -> np.ndarray:
+        """Which bodies are slow enough for sub-steps."""
+        world, now = context.world, context.state.now
+        h = self.stepper.sub_step(context, np.flatnonzero(world.dynamic))
+        speed = np.linalg.norm(now.velocity[bodies], axis=1)
+        spin = np.linalg.norm(now.angular_velocity[bodies], axis=1)
+        return (speed * h <= FAST * self.stepper.inner[bodies]) & (spin * world.accuracy.step <= SPIN)
+
+    def _near(self, context, member: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray]:
+        members = np.flatnonzero(member)
+        widen = self.stepper.widening(context, members, ahead)
+        return self.stepper.near_pairs(context.state.now.position, members, widen, np.flatnonzero(~member & ~self._excluded(context)))
+
+    def _excluded(self, context) -> np.ndarray:
+        """Movable bodies under way that are no members: they are swept."""
+        return context.world.dynamic & (context.state.course.mode != FIXED)
+
+    def _touched(self, context, member: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Bodies at rest that members touch, and all of the heaps they belong to."""
+        world = context.world
+        resting = world.dynamic & ~member & (context.state.course.mode == FIXED)
+        which = np.flatnonzero(resting[a] | resting[b])
+        if not len(which):
+            return which
+        a, b = a[which], b[which]
+        margin = TOUCHES * np.minimum(self.stepper.skin[a], self.stepper.skin[b])
+        while True:
+            count = contacts_of_pairs(
+                self.stepper.geometry, world.shape_of_body, context.state.now, context.state.rotation, a, b, margin,
+                context.scratch_pairs, context.contact_real, context.contact_int, world.cylinders,
+            )  # fmt: skip
+            if count >= 0:
+                break
+            context.grow_contacts(-count)
+        touched = np.unique(context.contact_int[:count, :2])
+        touched = touched[resting[touched]]
+        labels = self.label[touched]
+        mates = np.flatnonzero(resting & np.isin(self.label, labels[labels >= 0]))
+        return np.union1d(touched, mates)
+
+    def _low(self, context, window, chosen: np.ndarray, root: np.ndarray, refused: dict[int, str]) -> np.ndarray:
+        """Leave out islands that begin as tall columns."""
+        begins = chosen & (self.label < 0)
+        old = np.unique(root[chosen & ~begins])
+        begins &= ~np.isin(root, old)
+        if not self._auto or not begins.any():
+            return chosen
+        self._set_up(context, np.flatnonzero(begins), window.begin, window.end - window.begin)
+        stepper = self.stepper
+        level = support_levels(stepper.bodies, stepper.pairs, stepper.table.rows, TALL)
+        tall = np.unique(root[stepper.body[level == TALL + 1]])
+        refused.update(dict.fromkeys(tall.tolist(), "tall"))
+        return chosen & ~np.isin(root, tall)
+
+    def _settle(self, context, chosen: np.ndarray, root: np.ndarray, a: np.ndarray, b: np.ndarray, time: float) -> None:
+        """Label the heaps; let those that have been calm for long stand still."""
+        world, course, now = context.world, context.state.course, context.state.now
+        moving = np.unique(root[np.where(world.moving[a], b, a)][world.moving[a] | world.moving[b]])
+        for r in np.unique(root[chosen]).tolist():
+            members = np.flatnonzero(chosen & (root == r))
+            strength = float(np.linalg.norm(context.acceleration[members], axis=1).max())
+            enough = REST * np.sqrt(self.stepper.inner[members] / strength) if strength > 0.0 else np.inf
+            if r in moving or np.any(self.calm[members] < enough):
+                self.label[members] = r
+                continue
+            before = mechanical_energy(now, world, members)
+            context.recorder.flush_all(course, members, time)
+            now.velocity[members] = now.angular_velocity[members] = 0.0
+            course.mode[members], course.start[members] = FIXED, time
+            course.velocity[members] = course.angular_velocity[members] = 0.0
+            context.log.book(time, "heap", mechanical_energy(now, world, members) - before)
+            chosen[members] = False
+            self.calm[members] = 0.0
+
+    def _end_courses(self, context, members: np.ndarray, time: float) -> None:
+        """Bring members to `time` and let them fly from there; book what the step took of their energy."""
+        if not len(members):
+            return
+        state, world = context.state, context.world
+        context.recorder.flush_all(state.course, members, time)
+        _arrive(state.course, members, time)
+        state.course.acceleration[members] = world.steady_acceleration[members]
+        bring_all(state.course, members, time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
+        for label in np.unique(self.label[members]).tolist():
+            self._book(context, label, time)
+
+    def _book(self, context, label: int, time: float) -> None:
+        if label in self._began:
+            start, members, energy = self._began.pop(label)
+            change = mechanical_energy(context.state.now, context.world, members) - energy
+            context.log.book_over(start, time, "heap", change)
+
+    def close(self, context, time: float) -> None:
+        """Book what the steps under way take until `time`, the end of the run."""
+        self._end_courses(context, np.flatnonzero(context.state.course.mode == STEPPED), time)
+
+    def join(self, context, window, time: float, groups: list[Group]) -> list[Group]:
+        """The groups at `time` with the heaps that they touch; at the start of a step all of its heaps."""
+        state, first = context.state, not window.heaps_begun
+        window.heaps_begun = True
+        hit = [group for group in groups if np.any(self.label[group.members] >= 0)]
+        due = [label for label, end in self._ends.items() if end <= time]
+        members = np.flatnonzero(window.inside & (np.isin(self.label, due) | first))
+        if len(members) and not hit:
+            hit = [_bare_group(time, members, context)]
+            groups = groups + hit
+        for group in hit:
+            labels = self.label[group.members]
+            members = np.union1d(members, np.flatnonzero(np.isin(self.label, labels[labels >= 0])))
+            away = np.setdiff1d(members, group.members)
+            stepped = members[state.course.mode[members] == STEPPED]
+            self._end_courses(context, stepped[state.course.start[stepped] < time], time)
+            bring_all(
+                state.course, away, time, state.now, state.rotation, context.acceleration, context.angular_acceleration
+            )
+            group.heap = members
+            group.members = np.union1d(group.members, members)
+            group.velocity = state.now.velocity[group.members].copy()
+            group.angular_velocity = state.now.angular_velocity[group.members].copy()
+        return groups
+
+    def step(self, context, window, group: Group) -> None:
+        """Step the heap of a group from its time to the end of the window, with what touches it and is slow."""
+        world = context.world
+        stays = self._slow(context, group.members) | ~self._leaves(context, group)
+        near = group.members[stays & ~self._jointed[group.members]]
+        assert group.heap is not None
+        members = np.union1d(group.heap, near)
+        label = int(self.label[group.heap].max())
+        self.label[np.setdiff1d(members, group.heap)] = label
+        group.heap = members
+        window.inside[members] = True
+        context.wrench[group.members] = 0.0
+        for i in members[context.state.under_contact[members]].tolist():
+            note_arrival(context, [i], group.time)
+            book_contact_work(context, i, group.time)
+            context.state.under_contact[i] = False
+        end = self._end_of(context, window, group.time, members)
+        self._set_up(context, members, group.time, end - group.time)
+        for label in np.unique(self.label[members]).tolist():
+            mine = members[self.label[members] == label]
+            self._ends[label] = end
+            self._began[label] = group.time, mine, mechanical_energy(context.state.now, world, mine)
+        self._outcome = self.stepper.step(context, group.time, end)
+        self._outcome_end = end
+        if end < window.end:
+            window.wake[members] = end
+        self._steps += 1
+        self._most = max(self._most, len(members))
+
+    def _end_of(self, context, window, time: float, members: np.ndarray) -> float:
+        """When the courses of members end: before the step does where straight ways would stray from those of turning bodies.
+
+        A point at r from the centre strays by r (w h)^2 / 8 in h s; half of the skin is allowed, within MOST_PIECES a step.
+        """
+        stepper, step = self.stepper, context.world.accuracy.step
+        spin = np.linalg.norm(context.state.now.angular_velocity[members], axis=1)
+        stray = float((spin * np.sqrt(stepper.reach[members] / (4.0 * stepper.skin[members]))).max())
+        pieces = min(max(math.ceil(stray * step), 1), MOST_PIECES)
+        left = max(math.ceil((window.end - time) * pieces / step - 1e-6), 1)
+        return window.end if left == 1 else time + (window.end - time) / left
+
+    def _leaves(self, context, group: Group) -> np.ndarray:
+        """Which members (k,) bool leave all that they touch at a speed worth the name."""
+        slowest = np.full(context.world.num_bodies, np.inf)
+        np.minimum.at(slowest, group.contacts.body_a, group.approach)
+        np.minimum.at(slowest, group.contacts.body_b, group.approach)
+        speed = np.linalg.norm(context.state.now.velocity[group.members], axis=1)
+        return slowest[group.members] > LEAVING * speed
+
+    def _set_up(self, context, members: np.ndarray, time: float, ahead: float) -> None:
+        """Put members, in their order, and the immovable bodies near them before the solver."""
+        world, order = context.world, self.stepper.rank
+        members = members[np.argsort(order[members], kind="stable")]
+        fixed = np.flatnonzero(~world.dynamic)
+        moving = fixed[world.moving[fixed]]
+        bring_all(
+            context.state.course, moving, time, context.state.now, context.state.rotation, context.acceleration,
+            context.angular_acceleration,
+        )  # fmt: skip
+        self.stepper.set_up(context, members, fixed, ahead)
+
+    def take_courses(self, context, window, group: Group) -> None:
+        """Give the members of a group's heap the courses that the solver found."""
+        out, state, time = self._outcome, context.state, group.time
+        assert out is not None
+        length = self._outcome_end - time
+        context.recorder.flush_all(state.course, out.members, time)
+        _depart(state.course, out.members, time, length, state.now, out.position, out.orientation, out.velocity)
+        state.correction[out.members] = 0.0
+        self._note_calm(context, out, length)
+        window.change_courses(out.members, time)
+
+    def _note_calm(self, context, out: Outcome, length: float) -> None:
+        """For how long each member has hardly moved from where it was."""
+        members, stepper = out.members, self.stepper
+        strength, inner = np.linalg.norm(context.acceleration[members], axis=1), stepper.inner[members]
+        play = PLAY * stepper.skin[members]
+        moved = np.linalg.norm(out.position - self._stood[members, :3], axis=1)
+        turned = 2.0 * np.linalg.norm(out.orientation - self._stood[members, 3:], axis=1)
+        speed = np.linalg.norm(out.velocity[:, :3], axis=1) + inner * np.linalg.norm(out.velocity[:, 3:], axis=1)
+        calm = (moved <= play) & (inner * turned <= play) & (speed <= CALM * np.sqrt(strength * inner))
+        self.calm[members] = np.where(calm, self.calm[members] + length, 0.0)
+        left = members[~calm]
+        self._stood[left] = np.hstack([out.position, out.orientation])[~calm]
+
+
+def _bare_group(time: float, members: np.ndarray, context) -> Group:
+    """A group of bodies without contacts of the exact kind."""
+    now, none = context.state.now, np.zeros(0, np.int64)
+    return Group(
+        time=time, members=members, pairs=none, contacts=empty_contacts(0), place=none, kinds=none,
+        features=np.zeros((0, 2), np.int64), keys=[], delta=np.zeros(0), approach=np.zeros(0), rest_speed=np.zeros(0),
+        live=np.zeros(0, bool), velocity=now.velocity[members].copy(), angular_velocity=now.angular_velocity[members].copy(),
+    )  # fmt: skip

@@ -1,0 +1,115 @@
+"""Which bodies are a heap: islands of bodies that may touch in a step, and which of them the sub-stepped solver takes.
+
+The exact solver is the better one wherever it can be afforded. "auto" takes an island for a heap only where all of this holds:
+
+    many        at least MANY movable bodies (KEPT for one that is a heap already)
+    no joints   they want exact rows
+and, where a heap begins (who comes near one later is taken in):
+    alike       no two neighbours of masses beyond RATIO : 1
+    dull        no restitution above REBOUND: a rebound is found at the end of the step only
+    low         no body more than TALL others above a support: long columns want exact rows
+
+"substepped" takes every island without joints. Bodies that move farther than FAST of their inner radius in a sub-step, or spin
+more than SPIN in a step, are no part of any: they are swept.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse._jit import jit
+from rigidimpulse.constrain.heap_rows import SEPARATION, SKIN
+
+MANY, KEPT = 60, 30
+RATIO, REBOUND, TALL = 30.0, 0.5, 12
+FAST, SPIN = 0.5, 2.5
+
+
+@jit
+def islands(number, first, second, movable):
+    """Root (l,) of each of `number` bodies: the lowest one that pairs of movable bodies join it with."""
+    root = np.arange(number)
+    for p in range(first.shape[0]):
+        if not (movable[first[p]] and movable[second[p]]):
+            continue
+        a, b = first[p], second[p]
+        while root[a] != a:
+            root[a] = root[root[a]]
+            a = root[a]
+        while root[b] != b:
+            root[b] = root[root[b]]
+            b = root[b]
+        root[max(a, b)] = min(a, b)
+    for i in range(number):
+        a = i
+        while root[a] != a:
+            a = root[a]
+        root[i] = a
+    return root
+
+
+@jit
+def support_levels(bodies, pairs, rows, tall):
+    """How many bodies each one is above what cannot be moved, by closed contacts, (l,): at most tall + 1; 0 for immovable ones.
+
+    Bodies without support have tall + 2.
+    """
+    number = bodies.mass.shape[0]
+    level = np.full(number, tall + 2, np.int64)
+    for i in range(number):
+        if bodies.mass[i, 0] == 0.0:
+            level[i] = 0
+    changed = True
+    while changed:
+        changed = False
+        for p in range(pairs.first.shape[0]):
+            closed = False
+            for c in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
+                closed = closed or rows[c, SEPARATION] <= rows[c, SKIN]
+            if not closed:
+                continue
+            a, b = pairs.first[p], pairs.second[p]
+            low, high = (a, b) if level[a] < level[b] else (b, a)
+            reached = min(level[low] + 1, tall + 1)
+            if level[low] <= tall + 1 and reached < level[high]:
+                level[high] = reached
+                changed = True
+    return level
+
+
+def refusals(
+    world, root: np.ndarray, heap_before: np.ndarray, jointed: np.ndarray, a: np.ndarray, b: np.ndarray, auto: bool
+) -> dict[int, str]:
+    """Why islands are no heaps, by their root; what holds of contacts (`low`) is not looked at here.
+
+    Args:
+        world: the compiled scene.
+        root: (n,) of every body; -1 for those in no island.
+        heap_before: (n,) bool, members of heaps. jointed: (n,) bool.
+        a: (k,) bodies of the pairs that may touch in the step; likewise b.
+        auto: False where every island without joints is taken.
+
+    """
+    out: dict[int, str] = {}
+    members = np.flatnonzero(root >= 0)
+    size = np.bincount(root[members], minlength=len(root))
+    was_heap = np.zeros(len(root), bool)
+    was_heap[root[members[heap_before[members]]]] = True
+    for r in np.unique(root[members[jointed[members]]]).tolist():
+        out[r] = "joints"
+    owner = np.where(root[a] >= 0, root[a], root[b])
+    if not auto:
+        alone = np.setdiff1d(np.flatnonzero(size), owner)
+        out.update(dict.fromkeys(alone.tolist(), "alone"))
+        return out
+    for r in np.flatnonzero((size > 0) & (size < np.where(was_heap, KEPT, MANY))).tolist():
+        out[r] = "few bodies"
+    coefficient = world.coefficients[world.material_of_body[a], world.material_of_body[b], 0]
+    both = world.dynamic[a] & world.dynamic[b]
+    heavy = np.maximum(world.mass[a], world.mass[b]) > RATIO * np.minimum(world.mass[a], world.mass[b])
+    begins = ~was_heap[owner]
+    for r in np.unique(owner[begins & (coefficient > REBOUND)]).tolist():
+        out.setdefault(r, "restitution")
+    for r in np.unique(owner[begins & both & heavy]).tolist():
+        out.setdefault(r, "mass ratio")
+    return out
