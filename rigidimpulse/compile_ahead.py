@@ -71,6 +71,7 @@ def _respond_and_detect(context) -> None:
     from rigidimpulse.constrain.drift import needs_lift
     from rigidimpulse.constrain.resting import hold_contacts
     from rigidimpulse.constrain.rows import change_velocities, changes_of, contact_rows, response_to, row_velocities
+    from rigidimpulse.detect.touching import bring_gyroscopic, refresh_pose
     from rigidimpulse.detect.window import Window
     from rigidimpulse.observe.contact_log import fill_contacts_and_forces
     from rigidimpulse.respond.block import log_block
@@ -90,6 +91,8 @@ def _respond_and_detect(context) -> None:
     change_velocities(now, members, rows)
     changes_of(now, members, rows)
     needs_lift(contacts, np.ones(1, bool), one)
+    refresh_pose(members, now, state.rotation, state.course.inertia)
+    bring_gyroscopic(members, now, state.rotation, state.course.inertia, context.angular_acceleration)
     fill_contacts_and_forces(contacts, now.position, np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)))
     motion = contact_motion(
         world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
@@ -122,7 +125,6 @@ def _move_sweep_and_solve(context) -> None:
     zero = np.zeros(1)
     start_courses(context)
     context.recorder.start(state.course)
-    Window(context, 1.0 / 60.0).find_pairs()
     bring_all(state.course, np.array([1]), 0.0, now, state.rotation, context.acceleration, context.angular_acceleration)
     context.bring(1, 0.0)
     Window(context, 1.0 / 60.0).change_course(1, 0.0)
