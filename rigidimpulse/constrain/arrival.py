@@ -56,6 +56,12 @@ def remember_forces(state, time: float, keys, contacts: Contacts, force, world_f
         )
 
 
+def forget_forces(state, contacts: Contacts) -> None:
+    """Whatever acted between the bodies of these contacts does not any more."""
+    for pair in set(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)):
+        state.pair_force.pop(pair, None)
+
+
 def arrive(context, group) -> bool:
     """End the sub-steps of the group's pairs; returns whether there were any."""
     state, now, contacts = context.state, context.state.now, group.contacts

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.constrain.arrival import remember_forces
+from rigidimpulse.constrain.arrival import forget_forces, remember_forces
 from rigidimpulse.constrain.contact_motion import Motion, contact_motion
 from rigidimpulse.constrain.drift import lift_contacts, needs_lift
 from rigidimpulse.constrain.foresight import ALLOWED
@@ -63,6 +63,7 @@ def hold(context, window, group: Group) -> None:
     if group.heap is not None:
         return
     context.wrench[group.members] = 0.0
+    forget_forces(context.state, group.contacts)
     group.held = group.slow()
     if not group.held.any() and not len(group.joints):
         return
@@ -91,6 +92,7 @@ def hold(context, window, group: Group) -> None:
     if failed and _makes_energy(context, group, h):
         context.wrench[group.members] = 0.0
         force[:] = 0.0
+        forget_forces(state, contacts)
         if len(group.joints):
             context.joints.let_go(group)
     ends = np.concatenate([contacts.body_a, contacts.body_b])

@@ -35,7 +35,9 @@ LEAST_LEAN = 1e-3
 ON_ITS_SIDE = 0.7
 # Sine of the angle of two edges below which they count as parallel: the place of contact would run along them too fast to follow.
 PARALLEL = 0.05
-POINT, LINE, FACE = np.arange(3)
+# Cosine of normal and axis of a cylinder, or one less it, that is none.
+ALIGNED = 1e-9
+POINT, LINE, FACE, UNKNOWN = np.arange(4)
 
 
 @jit
@@ -90,18 +92,9 @@ def side_radius(geometry, p, rotation, normal):
 
 
 @jit
-def _core(geometry, kind, feature, is_a, rotation, direction):
-    """What a rounded body is at a contact: its radius, and POINT, LINE (unit direction (3,) in the world) or FACE."""
-    point = kind == HALF_SPACE_CONTACT or (kind == VERTEX_FACE and is_a) or (kind == FACE_VERTEX and not is_a)
-    line = kind == EDGE_EDGE
-    if kind == CORNER:
-        point, line = feature % 2 == 0, feature % 2 == 1
-        feature = feature // 2
-    if point:
-        return geometry.radius[_owner(geometry.vertex_first, feature)], POINT
-    if not line:
-        return geometry.radius[_owner(geometry.triangle_first, feature)], FACE
-    tail, head, d = geometry.vertex[geometry.edge[feature, 0]], geometry.vertex[geometry.edge[feature, 1]], np.empty(3)
+def _edge_direction(geometry, edge, rotation, direction):
+    """Unit direction (3,) of an edge in the world."""
+    tail, head, d = geometry.vertex[geometry.edge[edge, 0]], geometry.vertex[geometry.edge[edge, 1]], np.empty(3)
     length = 0.0
     for k in range(3):
         d[k] = head[k] - tail[k]
@@ -109,6 +102,52 @@ def _core(geometry, kind, feature, is_a, rotation, direction):
     _rotated(rotation, d, direction)
     for k in range(3):
         direction[k] /= sqrt(length)
+
+
+@jit
+def _cylinder_core(geometry, p, rotation, normal, direction):
+    """A cylinder is a face at its caps, a line with its radius at its side, and at its rims the line along them."""
+    axis = np.empty(3)
+    _rotated(rotation, geometry.frame[p, 3:6], axis)
+    along = _dot(normal, axis)
+    if 1.0 - abs(along) < ALIGNED:
+        return 0.0, FACE
+    if abs(along) < ALIGNED:
+        direction[:] = axis
+        return geometry.radius[p], LINE
+    _cross(axis, normal, direction)
+    size = sqrt(_dot(direction, direction))
+    for k in range(3):
+        direction[k] /= size
+    return 0.0, LINE
+
+
+@jit
+def _core(geometry, p, kind, feature, is_a, rotation, normal, direction):
+    """What a body (of the single primitive p, or -1) is at a contact: its radius, and POINT, LINE (unit direction (3,)) or FACE.
+
+    UNKNOWN where a pair was stopped by its sweep alone, and for cylinders that are parts of a body.
+    """
+    if feature < 0 or (kind > HALF_SPACE_CONTACT and p < 0):
+        return 0.0, UNKNOWN
+    if kind > HALF_SPACE_CONTACT:
+        if geometry.kind[p] == CYLINDER:
+            return _cylinder_core(geometry, p, rotation, normal, direction)
+        which, feature = feature % 3, feature // 3
+        if geometry.radius[p] > 0.0:
+            return geometry.radius[p], POINT
+        point, line = which == 0, which == 1
+    else:
+        point = kind == HALF_SPACE_CONTACT or (kind == VERTEX_FACE and is_a) or (kind == FACE_VERTEX and not is_a)
+        line = kind == EDGE_EDGE
+        if kind == CORNER:
+            point, line = feature % 2 == 0, feature % 2 == 1
+            feature = feature // 2
+    if point:
+        return geometry.radius[_owner(geometry.vertex_first, feature)], POINT
+    if not line:
+        return geometry.radius[_owner(geometry.triangle_first, feature)], FACE
+    _edge_direction(geometry, feature, rotation, direction)
     return geometry.radius[_owner(geometry.edge_first, feature)], LINE
 
 
@@ -221,14 +260,8 @@ def _place_velocity(geometry, shape_of_body, rotation, bodies, contacts, c, kind
     ea, eb, va, vb, outward_rate = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     flat_a = pa >= 0 and geometry.kind[pa] == HALF_SPACE
     flat_b = pb >= 0 and geometry.kind[pb] == HALF_SPACE
-    if kind > HALF_SPACE_CONTACT or feature_a < 0:
-        # A cylinder, or a pair that was stopped by its sweep alone.
-        ra, rb = side_radius(geometry, pa, rotation[a], n), side_radius(geometry, pb, rotation[b], n)
-        core_a = FACE if flat_a or (ra == 0.0 and rb > 0.0) else POINT
-        core_b = FACE if flat_b or (rb == 0.0 and ra > 0.0) else POINT
-    else:
-        ra, core_a = (0.0, FACE) if flat_a else _core(geometry, kind, feature_a, True, rotation[a], ea)
-        rb, core_b = (0.0, FACE) if flat_b else _core(geometry, kind, feature_b, False, rotation[b], eb)
+    ra, core_a = (0.0, FACE) if flat_a else _core(geometry, pa, kind, feature_a, True, rotation[a], n, ea)
+    rb, core_b = (0.0, FACE) if flat_b else _core(geometry, pb, kind, feature_b, False, rotation[b], n, eb)
     _centre_velocity(bodies, a, contacts.arm_a[c], n, -ra, va)
     _centre_velocity(bodies, b, contacts.arm_b[c], n, rb, vb)
     distance = ra + rb + contacts.gap[c]
@@ -240,7 +273,7 @@ def _place_velocity(geometry, shape_of_body, rotation, bodies, contacts, c, kind
         for k in range(3):
             outward_rate[k] = -normal_rate[k]
         _on_face(geometry, pa, rotation[a], bodies, a, contacts.arm_a[c], va, ra, -n, outward_rate, place)
-    elif ra + rb > 0.0:
+    elif ra + rb > 0.0 and core_a != UNKNOWN and core_b != UNKNOWN:
         _between_cores(bodies, a, b, core_a, core_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate)
     elif not (
         core_a == LINE and core_b == LINE
