@@ -62,7 +62,8 @@ class ImpactResponse:
 
 def respond_to_impacts(context, group: Group, kernel, law: int) -> None:
     """Apply the impulses of the group's approaching contacts and log them."""
-    live = np.flatnonzero(group.live)
+    rattles = _rattles(context, group.contacts)
+    live = np.flatnonzero(group.live | rattles)
     if not len(live):
         return
     contacts = group.contacts if len(live) == len(group.live) else select(group.contacts, live)
@@ -73,7 +74,7 @@ def respond_to_impacts(context, group: Group, kernel, law: int) -> None:
     if group.approach[live].min() >= -tolerance:
         return
     now = context.state.now
-    rest_speed = np.where(_rattles(context, group.time, contacts), np.inf, rest_speed)
+    rest_speed = np.where(rattles[live], np.inf, rest_speed)
     before = kinetic_energy(now, context.world, group.members)
     joints = context.joints.impact_block(context, group) if len(group.joints) else None
     together = _bear_each_other(context, group)
@@ -102,11 +103,11 @@ def _bear_each_other(context, group: Group) -> bool:
     return any(state.force_of(group.keys[c])[0] > 0.0 for c in np.flatnonzero(between).tolist())
 
 
-def _rattles(context, time: float, contacts: Contacts) -> np.ndarray:
+def _rattles(context, contacts: Contacts) -> np.ndarray:
     """Contacts of pairs that came back RATTLES times in a row without ever having been farther apart than nothing to speak of.
 
     Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
-    a bouncing ball they are replaced by one inelastic impact.
+    a bouncing ball they are replaced by one inelastic impact, of all these pairs at once.
     """
     rattles = np.zeros(len(contacts.gap), bool)
     for c, pair in enumerate(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)):
