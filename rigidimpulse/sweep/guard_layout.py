@@ -36,6 +36,7 @@ _SIZES = {
     "cylinder": 2 * CYLINDER_SIZE,
     "cylinder_axes": 9,  # columns: two directions across the second cylinder, and its axis
     "closest": LIMIT_SIZE,  # of the pieces looked at last
+    "thinned": LIMIT_SIZE,  # the same with cylinders thinned to their axes
     "limit": LIMIT_SIZE,  # of the pieces that limit the safe time
     "towards": 3,  # direction from a to b along which they do, in the axes of its carrier; zeros if there is none
     "witness": GAP + 1,
@@ -46,7 +47,7 @@ _SIZES = {
 }
 _STARTS = np.concatenate([[0], np.cumsum(list(_SIZES.values()))])
 MOTION, ROTATION, ORIGIN, SEEN, CORNER, FACE, CYLINDER, CYLINDER_AXES = _STARTS[:8]
-CLOSEST, LIMIT, TOWARDS, WITNESS, PLACE, TURN, FRAME, STACK_TIME, WORK_SIZE = _STARTS[8:]
+CLOSEST, THINNED, LIMIT, TOWARDS, WITNESS, PLACE, TURN, FRAME, STACK_TIME, WORK_SIZE = _STARTS[8:]
 """Places in the float array, in the order of `_SIZES`."""
 
 PRIMITIVE_A, ELEMENT_A, PRIMITIVE_B, ELEMENT_B, CARRIER, COUNT, BASE, STACK = np.array([0, 1, 2, 3, 4, 5, 7, 8])

@@ -10,7 +10,8 @@ n turning with both edges e_a (at rest in A) and e_b, seen from A: n stays acros
     m = f (n x e_a),   f = -n.(w x e_b) / ((n x e_a).e_b),     n(s) = n cos(nu s) + (m / nu) sin(nu s),   nu = |m|
 
 and for D the vector from a corner of A to one of B, f_ij = n.D:   f' = m.D + n.y',   f'' = -nu^2 n.D + 2 m.y' + n.y'',
-|f'''| <= J + 3 nu |y''| + 3 nu^2 |y'| + nu^3 |D|, the lengths bounded over [0, h].
+|f'''| <= J + 3 nu |y''| + 3 nu^2 |y'| + nu^3 |D|, the lengths bounded over [0, h]. A cylinder whose side touches takes part as its axis, an
+edge grown by its radius: no point of it is outside of that.
 
 Records lie in the arrays `work` and `index` (`guard_layout`). The argument `cylinders` is None where no shape is a
 cylinder: then nothing of them is compiled.
@@ -24,7 +25,7 @@ from rigidimpulse.detect.cylinder_features import (
     cylinder_support,
     cylinder_triangle_distance,
 )
-from rigidimpulse.detect.features import cross, dot, subtract
+from rigidimpulse.detect.features import along, cross, dot, subtract
 from rigidimpulse.sweep.bound import (
     SEEN_ARM_JERK,
     SEEN_JERK,
@@ -58,9 +59,11 @@ from rigidimpulse.sweep.guard_layout import (
     POINT_SECOND,
     SECOND,
     SEEN,
+    THINNED,
 )
 from rigidimpulse.sweep.guard_root import cylinder_safe_until, point_safe_until, safe_until
 
+_ON_SIDE = 1e-6  # cosine to the axis below which a normal is one of the side of a cylinder
 _TURN = 0.5  # rad, angle that a direction turns at most: beyond it the third derivatives take over
 
 
@@ -131,6 +134,29 @@ def _with_edges(work, index, edges, normal, threshold, horizon):
             bend = nu * nu * gap - 2.0 * dot(m, velocity) - dot(normal, acceleration) + rest * horizon / 3.0
             horizon = safe_until(gap - threshold, closing, bend, horizon)
     return horizon
+
+
+@jit
+def _with_thinned(work, index, normal, threshold, horizon):
+    """Safe time of the two pieces along n turning with crossing edges, the sides of cylinders among them; 0 if none cross."""
+    is_side = True
+    for side in range(2):
+        if index[COUNT + side] == 0:
+            centre, axis, half_height, radius = _cylinder_record(work, side)
+            is_side = is_side and abs(dot(normal, axis)) < _ON_SIDE
+            put(work, CORNER + 9 * side, along(centre, -half_height, axis))
+            put(work, CORNER + 9 * side + 3, along(centre, half_height, axis))
+            threshold += radius
+    if not is_side:
+        return 0.0
+    first, second = index[COUNT], index[COUNT + 1]
+    index[COUNT], index[COUNT + 1] = first if first else 2, second if second else 2
+    _, edges = closest_simplices(work, index, THINNED)
+    s = 0.0
+    if edges >= 0:
+        s = _with_edges(work, index, edges, vector(work, THINNED + NORMAL), threshold, horizon)
+    index[COUNT], index[COUNT + 1] = first, second
+    return s
 
 
 @jit
@@ -214,6 +240,9 @@ def pieces_safe_until(work, index, threshold, horizon, cylinders):
         put(work, CLOSEST + NORMAL, (0.0, 0.0, 0.0))
     elif edges >= 0:
         best = max(best, _with_edges(work, index, edges, normal, threshold, horizon))
+    elif cylinders is not None:
+        if index[COUNT + 1] == 0:
+            best = max(best, _with_thinned(work, index, normal, threshold, horizon))
     work[CLOSEST + GAP] = separation
     put(work, CLOSEST + DIRECTION, direction)
     return best, carrier
