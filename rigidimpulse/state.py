@@ -39,7 +39,8 @@ class State:
         energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at, at
             arrival_time [s].
         under_contact: (n,) bool, bodies whose course carries contact forces.
-        closed: (n,) first body of its group if nothing that moves by itself takes part, else -1. grounded: (n,) bool, if what stands does.
+        closed: (n,) first body of its group if nothing that moves by itself takes part, else -1. ground: by that
+            first body, directions (k, 3) along which what stands pushes the group.
         rebounds: by pair, time and speed of the last rebound and how many in a row were short.
         contact_force: last force of a held contact, in its frame [N], and when it began, by its key (`groups.contact_key`).
         sub_step: (n,) s, length of the last one of a group of contacts that turn, at its first body.
@@ -69,7 +70,7 @@ class State:
         self.energy_at_start = np.zeros(n)
         self.arrival_time = np.full(n, -np.inf)
         self.closed = np.full(n, -1)
-        self.grounded = np.zeros(n, bool)
+        self.ground: dict[int, np.ndarray] = {}
         self.arrival_energy: dict[int, float] = {}
 
 
