@@ -48,7 +48,7 @@ def note_arrival(context, members: list[int], time: float) -> bool:
 
 
 def take_off(now, world, members: np.ndarray, energy: float, ground: np.ndarray) -> None:
-    """Take energy [J] off the motion of the members against each other or the ground, which pushes along `ground` (k, 3); as much as there is."""
+    """Take energy [J], or all there is, off how the members move against each other or the ground, which pushes along `ground` (k, 3)."""
     mass, x = world.mass[members, None], now.position[members]
     v, w = now.velocity[members], now.angular_velocity[members]
     inertia = np.linalg.inv(now.inv_inertia[members])
