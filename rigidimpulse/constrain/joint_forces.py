@@ -35,7 +35,7 @@ from rigidimpulse.constrain.rows import (
     scaled_wrench,
     solve_with_slip,
 )
-from rigidimpulse.constrain.softness import end_rate, soft_row
+from rigidimpulse.constrain.softness import end_rate, is_slow, soft_row
 from rigidimpulse.integrate.course import FORCED, Course, begin, make_course, pose_at
 from rigidimpulse.rotation import quaternion_to_matrix, to_matrix
 
@@ -126,17 +126,26 @@ def _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed
                 rows.kind[i] = BOUNDED
                 rows.lower[i] = rows.upper[i] = 0.0
             elif not hard:
-                rows.kind[i] = FREE
-                stiffness, damping = spring_of(joints, k, weight[i])
-                rows.bias[i] -= end_rate(
-                    stiffness, damping, weight[i], memory.start_value[k], memory.start_rate[k], value[i], elapsed[j]
-                )
+                rows.kind[i] = BOUNDED
+                rows.lower[i], rows.upper[i], rate = _spring_impulse(joints, j, k, weight[i], value[i], memory, elapsed[j])
+                rows.bias[i] -= rate
             elif rows.kind[i] == BOUNDED:
                 rows.lower[i] = -np.inf if joints.lower[k] < 0.0 else 0.0
                 rows.upper[i] = np.inf if joints.upper[k] > 0.0 else 0.0
             scale = max(scale, abs(rows.bias[i]))
             i += 1
     return rows, direction, scale
+
+
+@jit
+def _spring_impulse(joints, j, k, weight, value, memory, h):
+    """Least and most impulse nu of soft row k of joint j at the end of a sub-step of length h, and the rate that it strives for."""
+    stiffness, damping = spring_of(joints, k, weight)
+    rate, a = end_rate(stiffness, damping, weight, memory.start_value[k], memory.start_rate[k], value, h)
+    if not is_slow(stiffness, damping, weight, h):
+        return -np.inf, np.inf, rate
+    own = (rate - memory.start_rate[k] - (a - damping * weight * joints.rate[k]) * h) / weight - 0.5 * h * memory.force[k]
+    return own, own, rate
 
 
 @jit

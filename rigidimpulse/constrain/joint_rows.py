@@ -6,11 +6,17 @@ and f_k the axes carried by a and b, E = [e]^T [f] and (k, l, m) cyclic, its coo
     along k      x = e_k . d                                     force along e_k at p_b
     radius k     x = |d - e_k (e_k . d)|                         force along it at p_b   (from the line of e_k)
     distance     x = |d|                                         force along d / |d|
-    about k      x = (E_ml - E_lm) / 2                           torque along e_k   (all three rotations held)
-    across k, i  x = e_i . (e_k x f_k), i != k                   torque along e_i   (free to turn about e_k)
+    about k      x = e_k . phi, exp(phi) = E                     torque along row k of dphi/dw   (all three rotations held)
+    across k, i  x = angle . e_i of the swing of e_k to f_k      torque along dx/dw              (free to turn about e_k; i != k)
     twist k      x = atan2(E_ml - E_lm, E_ll + E_mm)             torque along (e_k + f_k) / (1 + e_k . f_k)
     swing k      x = angle between e_k and f_k                   torque along e_k x f_k
     angle        x = angle of the rotation E, 0 to pi            torque along its axis
+
+Torques act along the gradients of the coordinates, so x' = u at any angle and springs have the energy k x^2 / 2. With theta = |phi|,
+
+    dphi/dw = 1 - [phi]x / 2 + c [phi]x^2,   c = (1 - theta / 2 cot(theta / 2)) / theta^2    (Bullo and Murray 1995),
+
+and the swing by the angle b of e_k to f_k = (f_k, f_l, f_m) in the axes of a has x = g (-f_m, f_l) along l and m, g = b / sin b.
 
 The twist about k is the second factor of E = swing twist, the swing being the shortest turn that takes e_k to f_k
 (Huyghe 1996; Dobrowolski 2015). It is counted through full turns; it is not defined where e_k = -f_k, and its torque
@@ -29,10 +35,14 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.rows import BOUNDED, FREE, write_body, write_row
+from rigidimpulse.rotation import from_columns
 
 ALONG, RADIUS, DISTANCE, ABOUT, TWIST, SWING, ANGLE, ACROSS = 0, 3, 6, 7, 10, 13, 16, 17
 """Coordinates; ALONG, RADIUS, ABOUT, TWIST and SWING plus the axis k; ACROSS plus 3 k + i."""
 TINY = 1e-300
+SMALL = 1e-8
+FLAT = 1e-3
+"""rad, below which series are taken."""
 
 
 class Joints(NamedTuple):
@@ -113,33 +123,68 @@ def _along_axes(e, x, y, z, direction):
 
 
 @jit
+def _about(turn, e, k, direction):
+    """Part k of the rotation vector of `turn`, with its gradient (3,) in the world."""
+    q0, q1, q2, q3 = from_columns(
+        turn[0, 0], turn[1, 0], turn[2, 0], turn[0, 1], turn[1, 1], turn[2, 1], turn[0, 2], turn[1, 2], turn[2, 2]
+    )
+    half = sqrt(q1 * q1 + q2 * q2 + q3 * q3)
+    angle = 2.0 * atan2(half, q0)
+    grown = angle / half if half > SMALL else 2.0
+    curve = (1.0 - 0.5 * angle * q0 / half) / (angle * angle) if angle > FLAT else 1.0 / 12.0 + angle * angle / 720.0
+    phi = (grown * q1, grown * q2, grown * q3)
+    x, after, last = phi[k], phi[(k + 1) % 3], phi[(k + 2) % 3]
+    own = 1.0 + curve * (x * x - angle * angle)
+    for r in range(3):
+        direction[r] = own * e[r, k] + (curve * x * after + 0.5 * last) * e[r, (k + 1) % 3]
+        direction[r] += (curve * x * last - 0.5 * after) * e[r, (k + 2) % 3]
+    return x
+
+
+@jit
+def _across(turn, e, k, i, direction):
+    """Part i of the swing of axis k, with its gradient (3,) in the world."""
+    after, last = (k + 1) % 3, (k + 2) % 3
+    upright, left, right = turn[k, k], turn[after, k], turn[last, k]
+    sine = sqrt(left * left + right * right)
+    swing = atan2(sine, upright)
+    grown, slope = 1.0 + swing * swing / 6.0, 1.0 / 3.0
+    if swing > FLAT:
+        sine = max(sine, SMALL)
+        grown, slope = swing / sine, (sine - swing * upright) / (sine * sine * sine)
+    first = i == after
+    own, other = (right, left) if first else (left, right)
+    for r in range(3):
+        direction[r] = (grown * upright + slope * own * own) * e[r, i] - grown * other * e[r, k]
+        direction[r] -= slope * own * other * e[r, last if first else after]
+    return -grown * right if first else grown * left
+
+
+@jit
 def _angular(code, e, f, near, direction):
     """Coordinate that is an angle and the direction (3,) that it grows in; a TWIST is taken near the angle `near`."""
     turn = np.empty((3, 3))
     _relative_rotation(e, f, turn)
     if code >= ACROSS:
-        k, i = (code - ACROSS) // 3, (code - ACROSS) % 3
-        direction[:] = e[:, i]
-        return -turn[(k + 2) % 3, k] if i == (k + 1) % 3 else turn[(k + 1) % 3, k]
+        return _across(turn, e, (code - ACROSS) // 3, (code - ACROSS) % 3, direction)
     if code == ANGLE:
         direction[:] = e[:, 0]
         x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
         return atan2(_along_axes(e, x, y, z, direction), turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
     k = (code - ABOUT) % 3
+    if code < TWIST:
+        return _about(turn, e, k, direction)
     after, last = (k + 1) % 3, (k + 2) % 3
     if code >= SWING:
         direction[:] = e[:, after]
         across = np.zeros(3)
         across[after], across[last] = -turn[last, k], turn[after, k]
         return atan2(_along_axes(e, across[0], across[1], across[2], direction), turn[k, k])
-    if code >= TWIST:
-        share = 1.0 / max(1.0 + turn[k, k], TINY)
-        for r in range(3):
-            direction[r] = share * (e[r, k] + f[r, k])
-        angle = atan2(turn[last, after] - turn[after, last], turn[after, after] + turn[last, last])
-        return angle + 2.0 * pi * np.rint((near - angle) / (2.0 * pi))
-    direction[:] = e[:, k]
-    return 0.5 * (turn[last, after] - turn[after, last])
+    share = 1.0 / max(1.0 + turn[k, k], TINY)
+    for r in range(3):
+        direction[r] = share * (e[r, k] + f[r, k])
+    angle = atan2(turn[last, after] - turn[after, last], turn[after, after] + turn[last, last])
+    return angle + 2.0 * pi * np.rint((near - angle) / (2.0 * pi))
 
 
 @jit

@@ -12,8 +12,13 @@ obeys, with z = 2 x(h) / h (the velocity of the row in `joint_forces`) and q = 1
     z + softness p = beta,     softness = W (1 - q) / q,
     beta = 2 / (h q) [(A - 1) x_0 + (B - h) u_0 + R c W r] + 2 x_0 / h + 2 u_0
 
-and the velocity at the end is set to x'(h), with the a that x(h) shows. So a soft joint is the damped oscillator it
-stands for, drives are implicit, and k -> infinity is the hard joint.
+The a that x(h) shows gives the velocity at the end, x'(h), and the impulse of the row over the sub-step,
+
+    int f dt = (x'(h) - u_0 - (a - c W r) h) / W.
+
+A row that is slow over h (w h and 2 s h below SLOW) is given that impulse: rows that pull at each other then stay of second
+order, for the others' pull that grows on the way is in theirs. A faster one is stopped at x'(h), which is stable however
+stiff it is. So a soft joint is the damped oscillator it stands for, drives are implicit, and k -> infinity is the hard joint.
 """
 
 from math import cos, exp, expm1, sin, sqrt
@@ -23,6 +28,7 @@ from rigidimpulse._jit import jit
 SERIES = 0.5
 TERMS = 24
 CRITICAL = 1e-2
+SLOW = 1.0
 
 
 @jit
@@ -82,9 +88,15 @@ def soft_row(stiffness, damping, rate, weight, x, u, h):
 
 
 @jit
+def is_slow(stiffness, damping, weight, h):
+    """Whether a row's own oscillation is slow over h."""
+    return stiffness * weight * h * h < SLOW and damping * weight * h < SLOW
+
+
+@jit
 def end_rate(stiffness, damping, weight, x, u, x_end, h):
-    """x'(h) of the module's head, with the acceleration that took x, u to x_end in h."""
+    """x'(h) of the module's head, and the acceleration a that took x, u to x_end in h."""
     square, twice_s = stiffness * weight, damping * weight
     total, first, _ = response(square, twice_s, h)
     a = (x_end - (1.0 - square * total) * x - first * u) / total
-    return -square * first * x + (1.0 - twice_s * first - square * total) * u + first * a
+    return -square * first * x + (1.0 - twice_s * first - square * total) * u + first * a, a

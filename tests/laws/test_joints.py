@@ -71,6 +71,44 @@ def test_soft_slider_is_a_damped_oscillator_at_any_step(stiffness: float, dampin
     np.testing.assert_allclose(run.velocity("load")[:, 2], exact[:, 1], atol=1e-8 * np.abs(exact[:, 1]).max())
 
 
+@pytest.mark.parametrize(
+    "joint", [ri.FixedJoint(None, "block", stiffness=5.0), ri.HingeJoint(None, "block", (0, 0, 0), (0, 0, 1), stiffness=5.0)]
+)
+def test_springs_of_a_joint_keep_energy_at_large_angles(joint: object) -> None:
+    """T + k theta^2 / 2 stays, theta the whole turn (fixed) or the swing of the axis (hinge): 0.5 rad, three springs that pull at each other.
+
+    Of second order, measured 7e-5 in sub-steps of 0.02 rad. Torques along the axes instead of along the gradients of the angles
+    lose all of it or make 1,700 times as much; end rates that are those of each row alone are off by 4e-2.
+    """
+    scene = ri.Scene(gravity=(0, 0, 0))
+    scene.add(ri.Body("block", ri.Shape.box((0.3, 0.2, 0.1)), mass=MASS, angular_velocity=(9, -6, 5)))
+    scene.add(joint)
+    run = ri.simulate(scene, 2.0)
+    w, x, y, z = run.orientation("block").T
+    whole = isinstance(joint, ri.FixedJoint)
+    theta = 2 * np.arctan2(np.hypot(np.hypot(x, y), z), np.abs(w)) if whole else 2 * np.arctan2(np.hypot(x, y), np.hypot(w, z))
+    total = run.ledger.kinetic + 0.5 * 5.0 * theta**2
+    assert theta.max() > 0.4
+    np.testing.assert_allclose(total, total[0], rtol=2e-4)
+
+
+def test_spring_at_a_hinge_off_the_centre_is_of_second_order() -> None:
+    """theta'' = -k theta / I about the hinge; errors at steps of 1/120, 1/240, 1/480 s, in which it turns by less than 0.02 rad."""
+    inertia, errors = MASS / 12 * (0.09 + 0.04) + MASS * 0.16, []
+    for step in (1 / 120, 1 / 240, 1 / 480):
+        scene = ri.Scene(gravity=(0, 0, 0))
+        turning = {"velocity": (0, 0.8, 0), "angular_velocity": (0, 0, 2)}
+        scene.add(ri.Body("arm", ri.Shape.box((0.3, 0.2, 0.1)), mass=MASS, position=(0.4, 0, 0), **turning))
+        held = [ri.Limit("xyz", lower=0, upper=0), ri.Limit(rotation="xy", lower=0, upper=0)]
+        scene.add(ri.SixAxisJoint(None, "arm", (0, 0, 0), limits=[*held, ri.Limit(rotation="z", lower=0, upper=0, stiffness=6.0)]))
+        run = ri.simulate(scene, 2.0, accuracy=ri.Accuracy(step=step))
+        exact = 2 * np.cos(np.sqrt(6.0 / inertia) * run.times)
+        errors.append(np.abs(run.angular_velocity("arm")[:, 2] - exact).max())
+    # 2.6e-4, 6.4e-5, 1.6e-5; of first order before, with 1e-2.
+    assert errors[0] < 5e-4
+    np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), 2.0, atol=0.2)
+
+
 def test_hanging_chain_of_a_hundred_links_bears_a_thousandfold_ball() -> None:
     scene = ri.Scene(gravity=(0, 0, -G))
     above = None

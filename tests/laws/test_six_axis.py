@@ -192,9 +192,9 @@ def test_drive_by_acceleration_does_not_feel_mass_nor_lever() -> None:
         drive = ri.Drive(2.0, damping=3.0, mode="acceleration", rotation="x")
         scene.add(ri.SixAxisJoint(None, "door", (0, 0, 0), ((0, 0, 1), (1, 0, 0), (0, 1, 0)), hinge, [drive]))
         run = ri.simulate(scene, 1.0)
-        # Off the centre a drive is of first order; one that did not feel the lever would be slower by a factor of 20.
+        # One that did not feel the lever would be slower by a factor of 20. Off the centre a drive is of second order.
         exact = 2 * (1 - np.exp(-3 * run.times))
-        np.testing.assert_allclose(run.angular_velocity("door")[:, 2], exact, atol=1e-9 if arm == 0.0 else 1e-2)
+        np.testing.assert_allclose(run.angular_velocity("door")[:, 2], exact, atol=1e-9 if arm == 0.0 else 2e-4)
 
 
 def test_frames_that_differ_at_the_start_are_closed_by_position() -> None:
