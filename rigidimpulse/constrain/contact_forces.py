@@ -83,8 +83,7 @@ def hold(context, window, group: Group) -> None:
     before = kinetic_energy(now, context.world, group.members)
     rest = window.end - group.time
     if len(group.joints):
-        rolling = rolling_of(context.world, now, contacts)
-        h, residual = context.joints.hold(context, group, contacts, motion.turning, force, rest, rolling)
+        h, residual = _hold_jointed(context, group, subset, contacts, motion, force, rest)
     else:
         h, residual = _hold_turning(context, group, subset, contacts, keys, motion, force, rest)
     context.log.book(group.time, "capture", kinetic_energy(now, context.world, group.members) - before)
@@ -151,19 +150,41 @@ def _hold_turning(
     plan = GROWTH * state.sub_step[first] if state.under_contact[first] else np.inf
     h = min(h, plan)
     held = hold_over(h, excess)
-    error = context.foresight.gap_errors(context, group, contacts, subset, motion, context.wrench, held.length)
-    error[force[:, 0] == 0.0] = 0.0
-    worst = float(np.max(np.abs(error) / (ALLOWED * delta)))
-    if worst > 1.0:
-        spin = float(np.linalg.norm(state.now.angular_velocity[group.members], axis=1).max())
-        share = min(worst ** (-1.0 / 3.0), TURN_OF_BODY / (spin * held.length)) if spin > 0.0 else worst ** (-1.0 / 3.0)
-        share = min(max(share, step / (MOST_SUB_STEPS * held.length)), 1.0)
+    error, share = _foresee(context, group, subset, contacts, motion, force, held.length)
+    if share < 1.0:
         state.sub_step[first] = share * held.length
         held = hold_over(share * held.length, excess + share**3 * error)
     elif h >= plan or not state.under_contact[first]:
         state.sub_step[first] = max(h, step / MOST_SUB_STEPS)
     remember_forces(state, group.time, keys, contacts, force, held.force, held.slides)
     return held.length, held.residual
+
+
+def _hold_jointed(context, group: Group, subset, contacts, motion: Motion, force, rest: float) -> tuple[float, float]:
+    """Forces of joints and contacts over a sub-step of at most `rest`; returns its length and the residual."""
+    joints, step = context.joints, context.world.accuracy.step
+    rolling, moment = rolling_of(context.world, context.state.now, contacts), joints.moment.copy()
+    h, residual = joints.hold(context, group, contacts, motion.turning, force, sub_step(motion.fastest, step, rest), rolling)
+    if motion.fastest * step > STEADY:
+        _, share = _foresee(context, group, subset, contacts, motion, force, h)
+        if share < 1.0:
+            joints.moment[:] = moment
+            h, residual = joints.hold(context, group, contacts, motion.turning, force, share * h, rolling)
+    return h, residual
+
+
+def _foresee(context, group: Group, subset, contacts, motion: Motion, force, h: float) -> tuple[np.ndarray, float]:
+    """Errors (m,) of gaps after h [m] under the forces found, and the share of h after which they would be allowed."""
+    error = context.foresight.gap_errors(context, group, contacts, subset, motion, context.wrench, h)
+    error[force[:, 0] == 0.0] = 0.0
+    worst = float(np.max(np.abs(error) / (ALLOWED * group.delta[subset])))
+    if worst <= 1.0:
+        return error, 1.0
+    spin = float(np.linalg.norm(context.state.now.angular_velocity[group.members], axis=1).max())
+    share = worst ** (-1.0 / 3.0)
+    if spin > 0.0:
+        share = min(share, TURN_OF_BODY / (spin * h))
+    return error, min(max(share, context.world.accuracy.step / (MOST_SUB_STEPS * h)), 1.0)
 
 
 def sub_step(rate: float, step: float, rest: float) -> float:

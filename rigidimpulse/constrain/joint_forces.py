@@ -40,6 +40,8 @@ from rigidimpulse.integrate.course import FORCED, Course, begin, make_course, po
 from rigidimpulse.rotation import quaternion_to_matrix, to_matrix
 
 MAX_ROUNDS = 20
+MOST_FAILURES = 3
+"""Rounds in a row that close joints no better, after which the best is taken."""
 # Residual asked of the solver, and of closing, relative to the speed gained in the sub-step.
 SOLVE_TOLERANCE = 1e-12
 TINY = 1e-300
@@ -247,19 +249,25 @@ def hold_jointed(
     )
     slides = np.abs(u[:, 1]) + np.abs(u[:, 2]) > SLIP * scale
     scale = max(scale, h * float(np.sqrt(np.max(np.sum(acceleration[members] ** 2, axis=1)))))
-    residual = worst = 0.0
+    residual, best, kept, failures = 0.0, np.inf, rows.impulse, 0
     for round_ in range(MAX_ROUNDS):
         worst, largest = _close_at_end(
             joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench
         )
-        if round_ > 1 and worst <= allowed:
+        closer = worst <= max(best, allowed)
+        failures = 0 if closer else failures + 1
+        if closer:
+            best, kept = worst, rows.impulse.copy()
+        if (round_ > 1 and worst <= allowed) or failures == MOST_FAILURES or not np.isfinite(worst):
             break
         scale = max(scale, largest)
         residual = solve_with_slip(
             solve, rows, n, first_row, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale
         )
+    rows.impulse[:] = kept
+    worst, _ = _close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench)
     _finish(joints, which, bodies, members, rows, first_row, start, h, memory, direction, force, moment)
-    return residual / scale if np.isfinite(scale) else np.inf, worst if np.isfinite(worst) else np.inf
+    return residual / scale, worst
 
 
 @jit
@@ -277,6 +285,8 @@ def _close_at_end(joints, which, bodies, acceleration, members, h, memory, rows,
     for i in range(count):
         rows.bias[start + i] = 2.0 / h * value[i] - u[start + i] - beta[i]
         largest = max(largest, abs(rows.bias[start + i]))
+    if not np.all(np.isfinite(value)):
+        return np.inf, largest
     return _violation(joints, which, memory, value, rows.impulse[start:]), largest
 
 

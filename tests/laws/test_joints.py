@@ -75,7 +75,7 @@ def test_soft_slider_is_a_damped_oscillator_at_any_step(stiffness: float, dampin
     "joint", [ri.FixedJoint(None, "block", stiffness=5.0), ri.HingeJoint(None, "block", (0, 0, 0), (0, 0, 1), stiffness=5.0)]
 )
 def test_springs_of_a_joint_keep_energy_at_large_angles(joint: object) -> None:
-    """T + k theta^2 / 2 stays, theta the whole turn (fixed) or the swing of the axis (hinge): 0.5 rad, three springs that pull at each other.
+    """T + k theta^2 / 2 stays, theta the whole turn (fixed) or the swing of the axis (hinge): 0.5 rad, three coupled springs.
 
     Of second order, measured 7e-5 in sub-steps of 0.02 rad. Torques along the axes instead of along the gradients of the angles
     lose all of it or make 1,700 times as much; end rates that are those of each row alone are off by 4e-2.
