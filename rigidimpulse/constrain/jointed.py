@@ -179,6 +179,9 @@ class JointState:
                 group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
                 context.wrench, moment, rolling,
             )
+            if not np.all(np.isfinite(moment[group.joints])):
+                # No pose closes the joints, and the search for one ran away: they pull at nothing.
+                moment = self.moment.copy()
             self.pull[group.joints] = 2.0 * (moment[group.joints] - self.moment[group.joints]) / h
             shorter = self.sub_step(context, group, h)
             if shorter < 0.5 * h:
@@ -209,7 +212,8 @@ class JointState:
         """Report joints that are off by `worst` m or rad, and those near the singularity of a twist."""
         names = tuple(context.world.names[i] for i in group.members)
         if worst > NOT_CLOSED * self._allowed:
-            context.log.report(group.time, "joints not closed", names, f"off by {worst:.1e}; use a smaller step")
+            far = f"off by {worst:.1e}" if math.isfinite(worst) else "no pose closes them"
+            context.log.report(group.time, "joints not closed", names, f"{far}; use a smaller step")
         for j in group.joints.tolist():
             if self.memory.steepness[self.table.first[j] : self.table.first[j + 1]].max(initial=0.0) > STEEP:
                 pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
@@ -222,7 +226,7 @@ class JointState:
         """Take out the most overloaded joint, if there is one."""
         which = group.joints
         load = np.linalg.norm(self.pull[which], axis=1) / self.break_force[which]
-        if not len(which) or load.max() <= 1.0:
+        if not len(which) or not load.max() > 1.0:
             return False
         j = int(which[np.argmax(load)])
         self.whole[j] = False
