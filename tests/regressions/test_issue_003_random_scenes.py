@@ -89,3 +89,17 @@ def test_a_cylinder_that_is_drawn_flush_on_a_box_stands_on_it(box, radius: float
     assert run.status.ok, run.status.message
     gaps = 2.0 * TOLERANCES.contact_gap * 2.0 * radius
     np.testing.assert_allclose(run.position("drum"), [drum["position"]] * len(run.times), atol=gaps)
+
+
+def test_bodies_that_sink_in_a_heap_have_room_for_their_contacts() -> None:
+    """Contacts of sunk bodies were written beyond the end of the heap's table: the process died ("free(): invalid next size").
+
+    A cube of 1,000 t on one of 1 kg is not for soft contacts: it sinks in, and both are looked at again and again.
+    """
+    scene = ri.Scene(gravity=(0, 0, -G))
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
+    scene.add(ri.Body("light", ri.Shape.box(1.0), position=(0, 0, 0.5), mass=1.0, material=ROUGH))
+    scene.add(ri.Body("heavy", ri.Shape.box(1.0), position=(0, 0, 1.5), mass=1e6, material=ROUGH))
+    run = ri.simulate(scene, 0.5, accuracy=ri.Accuracy(contact_solver="substepped"))
+    assert np.all(np.isfinite(run.positions))
+    assert run.position("heavy")[-1, 2] > 0.4
