@@ -179,9 +179,6 @@ class JointState:
                 group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
                 context.wrench, moment, rolling,
             )
-            if not np.all(np.isfinite(moment[group.joints])):
-                # No pose closes the joints, and the search for one ran away: they pull at nothing.
-                moment = self.moment.copy()
             self.pull[group.joints] = 2.0 * (moment[group.joints] - self.moment[group.joints]) / h
             shorter = self.sub_step(context, group, h)
             if shorter < 0.5 * h:
@@ -226,7 +223,7 @@ class JointState:
         """Take out the most overloaded joint, if there is one."""
         which = group.joints
         load = np.linalg.norm(self.pull[which], axis=1) / self.break_force[which]
-        if not len(which) or not load.max() > 1.0:
+        if not len(which) or load.max() <= 1.0:
             return False
         j = int(which[np.argmax(load)])
         self.whole[j] = False

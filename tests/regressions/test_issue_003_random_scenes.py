@@ -21,9 +21,11 @@ def rise(run: ri.Recording) -> float:
 
 
 def test_bodies_that_left_their_contacts_carry_no_forces_of_them() -> None:
-    """A heavy load tips a light wedge and flies off: the forces between them went on acting until the end of the step, on both.
+    """A heavy load tips a light wedge over its edges and flies off.
 
-    Energy grew by 1.3 J. It may grow by two gaps of contact of the load, whose size is at most its length: 2e-3 J.
+    Bodies that had left their contacts went on with the forces of these, and places of contact on edges were not followed: energy
+    grew by 1.3 J.
+    It may grow by two gaps of contact of the load, whose size is at most its length: 2e-3 J.
     """
     mass, radius, height = 1000.0, 0.02, 0.04
     corners = [
@@ -96,10 +98,10 @@ def test_bodies_that_sink_in_a_heap_have_room_for_their_contacts() -> None:
 
     A cube of 1,000 t on one of 1 kg is not for soft contacts: it sinks in, and both are looked at again and again.
     """
-    scene = ri.Scene(gravity=(0, 0, -G))
-    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
-    scene.add(ri.Body("light", ri.Shape.box(1.0), position=(0, 0, 0.5), mass=1.0, material=ROUGH))
-    scene.add(ri.Body("heavy", ri.Shape.box(1.0), position=(0, 0, 1.5), mass=1e6, material=ROUGH))
+    scene, dull = ri.Scene(gravity=(0, 0, -G)), ri.Material(restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=dull))
+    scene.add(ri.Body("light", ri.Shape.box(1.0), position=(0, 0, 0.5), mass=1.0, material=dull))
+    scene.add(ri.Body("heavy", ri.Shape.box(1.0), position=(0, 0, 1.5), mass=1e6, material=dull))
     run = ri.simulate(scene, 0.5, accuracy=ri.Accuracy(contact_solver="substepped"))
     assert np.all(np.isfinite(run.positions))
     assert run.position("heavy")[-1, 2] > 0.4
