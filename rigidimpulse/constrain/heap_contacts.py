@@ -45,6 +45,8 @@ SLIDE, TURN = 0.04, 0.03
 """Part of the inner radius, and rad, after which touching pairs are looked at again."""
 AHEAD, FARTHEST = 0.2, 1.0
 """Contacts are looked for at least and at most that many inner radii away."""
+MOST_SUNK = 8
+"""Contacts of a pair of bodies that sank into each other, at most."""
 POINTS = np.int64(4)
 """Contacts kept of one normal, beside the deepest."""
 NEAR = 0.2
@@ -264,7 +266,7 @@ def store_contacts(
     shape, material, convex (polyhedra), radius (about the centre of mass), inner, skin, factor by body number. Returns the rows used.
     """
     c = np.int64(0)
-    deep, deep_ids, one = np.empty((8, 10)), np.empty((8, 3), np.int64), np.ones(factor.shape[0])
+    deep, deep_ids, one = np.empty((MOST_SUNK, 10)), np.empty((MOST_SUNK, 3), np.int64), np.ones(factor.shape[0])
     for k in range(places.shape[0]):
         p = places[k]
         a, b = pairs.first[p], pairs.second[p]

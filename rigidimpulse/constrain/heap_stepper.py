@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.constrain.heap_contacts import AHEAD, convex_polyhedra, inner_radii, margins, shrunk_geometry, store_contacts
+from rigidimpulse.constrain.heap_contacts import AHEAD, MOST_SUNK, convex_polyhedra, inner_radii, margins, shrunk_geometry, store_contacts
 from rigidimpulse.constrain.heap_rows import HeapBodies, HeapPairs, set_poses
 from rigidimpulse.constrain.heap_solver import FREQUENCY, advance, note_approach, outgrown, softness, stale_pairs
 from rigidimpulse.constrain.heap_table import HeapTable
@@ -192,7 +192,8 @@ class HeapStepper:
                 break
             context.grow_contacts(-found)
         self._write_back()
-        table.make_room(found)
+        # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
+        table.make_room(found + MOST_SUNK * count + 1)
         pairs.start[:] = table.start[self.place]
         table.used = store_contacts(
             world.geometry, world.shape_of_body[body], world.material_of_body[body], world.coefficients, self.convex[body], bodies, pairs,

@@ -274,7 +274,7 @@ def hold_jointed(
 def _close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench):
     """Bias of the joints' rows for the next round; wrench: that of the present impulses.
 
-    Returns the violation at the end under that wrench, and the largest bias.
+    Returns the violation at the end under that wrench, inf if there is no end, and the largest bias.
     """
     n, count = members.shape[0], beta.shape[0]
     y, u, value, largest = np.empty((n, 6)), np.empty(rows.bias.shape[0]), np.empty(count), 0.0
@@ -285,8 +285,6 @@ def _close_at_end(joints, which, bodies, acceleration, members, h, memory, rows,
     for i in range(count):
         rows.bias[start + i] = 2.0 / h * value[i] - u[start + i] - beta[i]
         largest = max(largest, abs(rows.bias[start + i]))
-    if not np.all(np.isfinite(value)):
-        return np.inf, largest
     return _violation(joints, which, memory, value, rows.impulse[start:]), largest
 
 
@@ -369,6 +367,8 @@ def _violation(joints, which, memory, value, impulse):
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
             x = memory.end_value[k] = value[i]
+            if not np.isfinite(x):
+                worst = np.inf
             if joints.stiffness[k] < np.inf or memory.slack[k]:
                 x = 0.0
             if joints.lower[k] < 0.0 < joints.upper[k] or impulse[i] != 0.0:

@@ -209,7 +209,8 @@ class JointState:
         """Report joints that are off by `worst` m or rad, and those near the singularity of a twist."""
         names = tuple(context.world.names[i] for i in group.members)
         if worst > NOT_CLOSED * self._allowed:
-            context.log.report(group.time, "joints not closed", names, f"off by {worst:.1e}; use a smaller step")
+            far = f"off by {worst:.1e}" if math.isfinite(worst) else "no pose closes them"
+            context.log.report(group.time, "joints not closed", names, f"{far}; use a smaller step")
         for j in group.joints.tolist():
             if self.memory.steepness[self.table.first[j] : self.table.first[j + 1]].max(initial=0.0) > STEEP:
                 pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))

@@ -201,6 +201,8 @@ def test_rope_is_slack_until_it_is_taut() -> None:
         (ri.HingeJoint(None, "load", (0, 0, 0), (0, 0, 1), lower=1.0, upper=0.0), "lower"),
         (ri.DistanceJoint(None, "load", (0, 0, 0), (0, 0, 0)), "length"),
         (ri.BallJoint(None, "load", (0, 0, float("nan"))), "anchor"),
+        (ri.BallJoint(None, "load", (0, 0, 0), break_force=-1.0), "break_force = -1.0"),
+        (ri.HingeJoint(None, "load", (0, 0, 0), (0, 0, 1), motor=5.0), "motor = 5.0; give ri.Motor"),
     ],
 )
 def test_bad_joints_are_refused_by_name(joint: object, problem: str) -> None:
@@ -208,4 +210,13 @@ def test_bad_joints_are_refused_by_name(joint: object, problem: str) -> None:
     scene.add(ri.Body("load", ri.Shape.sphere(0.1)))
     scene.add(joint)
     with pytest.raises(ri.SceneError, match=problem):
+        ri.simulate(scene, 0.1)
+
+
+def test_two_joints_of_one_name_are_refused() -> None:
+    """`run.reaction(name)` could be that of either."""
+    scene = ri.Scene(bodies=[ri.Body("load", ri.Shape.sphere(0.1))])
+    for x in (0, 1):
+        scene.add(ri.BallJoint(None, "load", (x, 0, 0), name="pin"))
+    with pytest.raises(ri.SceneError, match="another joint has the name 'pin'"):
         ri.simulate(scene, 0.1)
