@@ -113,18 +113,21 @@ def hold(context, window, group: Group) -> None:
 
 
 def _makes_energy(context, group: Group, h: float) -> bool:
-    """Whether forces that are no solution give the members more kinetic energy than they have, or would have without them."""
+    """Whether forces that are no solution give the members more kinetic energy than they have, or would have without them.
+
+    On the way, too: half of what joints do is taken back before they are stopped.
+    """
     now, i = context.state.now, group.members
     inertia = np.linalg.inv(now.inv_inertia[i])
+    taken_back = context.joints.memory.wrench[i] if len(group.joints) else np.zeros((len(i), 6))
     energies = []
-    for share in (0.0, 1.0):
-        wrench = share * context.wrench[i]
+    for wrench in (np.zeros((len(i), 6)), context.wrench[i], context.wrench[i] - taken_back):
         v = now.velocity[i] + h * (context.acceleration[i] + now.inv_mass[i, None] * wrench[:, :3])
         spin = context.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], wrench[:, 3:])
         w = now.angular_velocity[i] + h * spin
         energies.append(0.5 * float((context.world.mass[i] * (v**2).sum(1)).sum() + np.einsum("ij,ijk,ik->", w, inertia, w)))
     most = max(energies[0], kinetic_energy(now, context.world, i))
-    return not energies[1] <= (1.0 + PLAY) * most
+    return not np.max(energies[1:]) <= (1.0 + PLAY) * most
 
 
 def _hold_turning(

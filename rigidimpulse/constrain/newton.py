@@ -13,7 +13,8 @@ with a halving line search on |F|. It is written in the changes of y and p since
 goes with it. F' has a 6 x 6 block wherever two bodies share a row and is solved by sparse block elimination
 (`block_lu`), so that chains and stacks cost in proportion to their length. Where the line search fails k is raised; as
 the last resort one step is made with the radii frozen, for which the problem is convex. The answer with the least
-residual of the natural map is returned, with that residual.
+residual of the natural map is returned, with that residual; one whose impulses are larger must have a residual that is
+smaller in proportion. Rows that contradict each other have no answer: their impulses would grow without end.
 """
 
 from math import sqrt
@@ -245,7 +246,7 @@ def solve_newton(rows, n, target):
     y, u, r = np.empty((n, 6)), np.empty(count), np.empty(count)
     trial, q, frozen = rows.impulse.copy(), rows.impulse.copy(), np.full(count, -1.0)
     _velocities(rows, q, y, u)
-    best = natural_residual(rows, u, q, weight)
+    best, largest = natural_residual(rows, u, q, weight), np.abs(q).max()
     k, free_k, failures, stagnant, previous, convex = REGULARISATION_START, REGULARISATION_FREE, 0, 0, best, False
     for _ in range(MAX_OUTER):
         if best <= max(target, rounding_floor(rows, weight, rows.impulse)) or stagnant > 4:
@@ -263,8 +264,9 @@ def solve_newton(rows, n, target):
         q[:] = trial
         _velocities(rows, q, y, u)
         reached = natural_residual(rows, u, q, weight)
-        if reached < best:
-            best = reached
+        now = np.abs(q).max()
+        if reached < best and (largest == 0.0 or reached * now <= best * largest):
+            best, largest = reached, now
             rows.impulse[:] = q
         if reached > 0.5 * previous and k <= REGULARISATION_LEAST:
             stagnant += 1
