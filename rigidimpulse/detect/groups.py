@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidimpulse.constrain.arrival import arrive
+from rigidimpulse.constrain.contact_motion import contact_motion
 from rigidimpulse.constrain.energy_guard import note_arrival
+from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import CORNER, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, pressing
 from rigidimpulse.respond.impulse import Contacts
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 MARGIN = 2.0
 """Contacts are looked for within this many delta."""
 NO_FORCE = np.zeros(3)
+LIFTED = 10.0
+"""Approach speed that a lift may make, in held gaps of turning (gap over size) times the speed: arms and normals turn a little."""
 SLACK = 1e-9
 """Contacts that leave or approach slower than the held ones by this part are held."""
 
@@ -39,7 +43,7 @@ class Group:
         velocity, angular_velocity, position: of the members as they arrived.
         moved: whether a lift has changed poses.
         held: (m,) bool, contacts that carry forces. rests: whether all members stand still.
-        still: m/s, approach speed that counts as none.
+        still: m/s, approach speed that counts as none. scale: m/s, largest speed of a contact point.
         joints: the joints of the members.
         heap: members that are stepped as a heap (see `constrain/heap`), None where there is none.
 
@@ -63,12 +67,16 @@ class Group:
     held: np.ndarray | None = None
     rests: bool = False
     still: float = 0.0
+    scale: float = 0.0
     joints: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     heap: np.ndarray | None = None
 
     def slow(self) -> np.ndarray:
         """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
-        return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + self.still
+        still = self.still
+        if self.moved:
+            still += LIFTED * self.scale * TOLERANCES.contact_gap
+        return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + still
 
 
 def empty_contacts(m: int) -> Contacts:
@@ -240,8 +248,11 @@ def classify(context, group: Group) -> None:
     least = 0.0
     if not np.all(world.dynamic[contacts.body_a] & world.dynamic[contacts.body_b]):
         least = float(world.steady_strength[group.members].max())
+    turning = contact_motion(
+        world.geometry, world.shape_of_body, state.rotation, state.now, contacts, group.kinds, group.features
+    ).turning
     pressing(
-        context.state.now, contacts, context.acceleration, context.angular_acceleration, force, least, group.delta,
+        state.now, contacts, turning, context.acceleration, context.angular_acceleration, force, least, group.delta,
         group.approach, group.rest_speed,
     )
     group.live |= np.abs(group.approach) <= group.rest_speed

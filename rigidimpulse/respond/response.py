@@ -62,21 +62,21 @@ class ImpactResponse:
 
 def respond_to_impacts(context, group: Group, kernel, law: int) -> None:
     """Apply the impulses of the group's approaching contacts and log them."""
-    live = np.flatnonzero(group.live)
+    rattles = _rattles(context, group)
+    live = np.flatnonzero(group.live | rattles)
     if not len(live):
         return
     contacts = group.contacts if len(live) == len(group.live) else select(group.contacts, live)
-    rest_speed = group.rest_speed[live]
+    rest_speed = np.where(rattles, np.inf, group.rest_speed)[live]
     scale = speed_scale(context.state.now, contacts)
-    tolerance = TOLERANCES.approach * scale + SLOW * float(rest_speed.max())
-    group.still = tolerance
+    tolerance = TOLERANCES.approach * scale + SLOW * float(group.rest_speed[live].max())
+    group.still, group.scale = tolerance, scale
     if group.approach[live].min() >= -tolerance:
         return
     now = context.state.now
-    rest_speed = np.where(_rattles(context, group.time, contacts), np.inf, rest_speed)
     before = kinetic_energy(now, context.world, group.members)
     joints = context.joints.impact_block(context, group) if len(group.joints) else None
-    together = _bear_each_other(context, group)
+    together = bool(rattles.any()) or _bear_each_other(context, group)
     for _ in range(MAX_CALLS):
         count, _, capped = kernel(
             now, contacts, law, together, rest_speed, tolerance, scale, context.column, joints, context.impact_log
@@ -102,16 +102,18 @@ def _bear_each_other(context, group: Group) -> bool:
     return any(state.force_of(group.keys[c])[0] > 0.0 for c in np.flatnonzero(between).tolist())
 
 
-def _rattles(context, time: float, contacts: Contacts) -> np.ndarray:
-    """Contacts of pairs that came back RATTLES times in a row without ever having been farther apart than nothing to speak of.
+def _rattles(context, group: Group) -> np.ndarray:
+    """Contacts (m,) within the held gap, of pairs that came back RATTLES times in a row without ever having been farther apart.
 
     Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
-    a bouncing ball they are replaced by one inelastic impact.
+    a bouncing ball they are replaced by one inelastic impact, of all that rattle together: pair after pair, a light body would stop
+    heavy ones in as many impacts as their masses' ratio, and each impact would be followed by the next.
     """
+    contacts = group.contacts
     rattles = np.zeros(len(contacts.gap), bool)
     for c, pair in enumerate(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)):
         _, _, count = context.state.rebounds.get(pair, NEVER)
-        rattles[c] = count >= RATTLES and contacts.restitution[c] < 1.0
+        rattles[c] = count >= RATTLES and contacts.restitution[c] < 1.0 and contacts.gap[c] <= group.delta[c]
     return rattles
 
 
