@@ -103,7 +103,7 @@ def _bear_each_other(context, group: Group) -> bool:
 
 
 def _rattles(context, group: Group) -> np.ndarray:
-    """Contacts (m,) within the held gap, of pairs that came back RATTLES times in a row without ever having been farther apart.
+    """Contacts (m,) of pairs that came back RATTLES times in a row without ever having been farther apart.
 
     Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
     a bouncing ball they are replaced by one inelastic impact, of all that rattle together: pair after pair, a light body would stop
@@ -113,7 +113,7 @@ def _rattles(context, group: Group) -> np.ndarray:
     rattles = np.zeros(len(contacts.gap), bool)
     for c, pair in enumerate(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)):
         _, _, count = context.state.rebounds.get(pair, NEVER)
-        rattles[c] = count >= RATTLES and contacts.restitution[c] < 1.0 and contacts.gap[c] <= group.delta[c]
+        rattles[c] = count >= RATTLES and contacts.restitution[c] < 1.0
     return rattles
 
 
