@@ -17,9 +17,12 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.manifold import MAX_PER_NORMAL, pair_contacts, reduce_contacts
-from rigidimpulse.integrate.course import FIXED, state_at
+from rigidimpulse.integrate.course import FIXED, place_at, state_at
 from rigidimpulse.respond.impulse import inverse_effective_mass, relative_velocity
 from rigidimpulse.rotation import quaternion_to_matrix
+
+# Part of the bounding radii that rounding may take.
+ROUND_OFF = 1e-9
 
 
 @jit
@@ -69,6 +72,34 @@ def bring(course, i, time, bodies, rotation, acceleration, angular_acceleration)
 def bring_all(course, members, time, bodies, rotation, acceleration, angular_acceleration):
     for i in members:
         bring(course, i, time, bodies, rotation, acceleration, angular_acceleration)
+
+
+@jit
+def near_pairs(course, time, pairs, margin, radius, bodies, seen, near):
+    """Write the pairs of the given bodies (k,) that are not `seen` (p,) yet and whose bounding spheres are near at `time`.
+
+    margin: gap that counts as near, relative to that at which contacts are held; radius (n,) m. near (p,): their places, in order.
+    Marks the pairs that were looked at as seen, and returns how many are near.
+    """
+    x, y = np.empty(3), np.empty(3)
+    asked = np.zeros(radius.shape[0], np.bool_)
+    for i in bodies:
+        asked[i] = True
+    count = 0
+    for p in range(pairs.a.shape[0]):
+        a, b = pairs.a[p], pairs.b[p]
+        if seen[p] or not (asked[a] or asked[b]):
+            continue
+        seen[p] = True
+        reach = (radius[a] + radius[b]) * (1.0 + ROUND_OFF) + margin * pairs.delta[p]
+        if reach < np.inf:
+            place_at(course, a, time, x)
+            place_at(course, b, time, y)
+            if (y[0] - x[0]) ** 2 + (y[1] - x[1]) ** 2 + (y[2] - x[2]) ** 2 > reach * reach:
+                continue
+        near[count] = p
+        count += 1
+    return count
 
 
 @jit
