@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidimpulse.constrain.arrival import arrive
-from rigidimpulse.constrain.contact_motion import contact_motion
 from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import CORNER, FACE_VERTEX, VERTEX_FACE
@@ -82,8 +81,7 @@ class Group:
 
 def empty_contacts(m: int) -> Contacts:
     """Arrays for m contacts."""
-    vectors = [np.empty((m, 3)) for _ in range(3)]
-    return Contacts(np.empty(m, np.int64), np.empty(m, np.int64), *vectors, *(np.empty(m) for _ in range(5)))
+    return Contacts(*np.empty((2, m), np.int64), *np.empty((3, m, 3)), *np.empty((5, m)))
 
 
 def collect(context, window, pairs: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -247,11 +245,8 @@ def classify(context, group: Group) -> None:
     least = 0.0
     if not (world.dynamic[contacts.body_a] & world.dynamic[contacts.body_b]).all():
         least = float(world.steady_strength[group.members].max())
-    turning = contact_motion(
-        world.geometry, world.shape_of_body, state.rotation, state.now, contacts, group.kinds, group.features
-    ).turning
     pressing(
-        state.now, contacts, turning, context.acceleration, context.angular_acceleration, force, least, group.delta,
-        group.approach, group.rest_speed,
+        world.geometry, world.shape_of_body, state.rotation, state.now, contacts, group.kinds, group.features,
+        context.acceleration, context.angular_acceleration, force, least, group.delta, group.approach, group.rest_speed,
     )
     group.live |= np.abs(group.approach) <= group.rest_speed

@@ -16,6 +16,7 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.contact_motion import contact_motion
 from rigidimpulse.detect.manifold import MAX_PER_NORMAL, pair_contacts, reduce_contacts
 from rigidimpulse.integrate.course import FIXED, place_at, state_at
 from rigidimpulse.respond.impulse import inverse_effective_mass, relative_velocity
@@ -176,9 +177,14 @@ def _point_acceleration(acceleration, angular_acceleration, i, r, n):
 
 @jit
 def pressing(
-    bodies, contacts, turning, acceleration, angular_acceleration, normal_force, least, delta, approach, rest_speed
+    geometry, shape_of_body, rotation, bodies, contacts, kinds, features, acceleration, angular_acceleration, normal_force, least,
+    delta, approach, rest_speed,
 ):
-    """Fill approach (m,) = u.n and rest_speed (m,) = sqrt(2 a delta) [m/s]; a is at least `least`; turning (m, 3) of `contact_motion`."""
+    """Fill approach (m,) = u.n and rest_speed (m,) = sqrt(2 a delta) [m/s]; a is at least `least`.
+
+    kinds (m,), features (m, 2): what touches; acceleration, angular_acceleration (n, 3); normal_force (m,) N carried; delta (m,) m.
+    """
+    turning = contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, features).turning
     u = np.empty(3)
     k = np.empty((3, 3))
     for c in range(contacts.gap.shape[0]):

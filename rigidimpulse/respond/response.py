@@ -9,7 +9,6 @@ import numpy as np
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.groups import Group, classify
 from rigidimpulse.observe.energy import kinetic_energy
-from rigidimpulse.observe.events import IMPACT_DTYPE
 from rigidimpulse.plan import Bound, Skip
 from rigidimpulse.respond.impulse import Contacts, select, speed_scale
 from rigidimpulse.respond.kinematic import respond_kinematic
@@ -63,7 +62,7 @@ class ImpactResponse:
 def respond_to_impacts(context, group: Group, kernel, law: int) -> None:
     """Apply the impulses of the group's approaching contacts and log them."""
     rattles = _rattles(context, group)
-    live = np.flatnonzero(group.live | rattles)
+    live = (group.live | rattles).nonzero()[0]
     if not len(live):
         return
     contacts = group.contacts if len(live) == len(group.live) else select(group.contacts, live)
@@ -76,12 +75,12 @@ def respond_to_impacts(context, group: Group, kernel, law: int) -> None:
     now = context.state.now
     before = kinetic_energy(now, context.world, group.members)
     joints = context.joints.impact_block(context, group) if len(group.joints) else None
-    together = bool(rattles.any()) or _bear_each_other(context, group)
+    together = len(live) > 1 and (bool(rattles.any()) or _bear_each_other(context, group))
     for _ in range(MAX_CALLS):
         count, _, capped = kernel(
             now, contacts, law, together, rest_speed, tolerance, scale, context.column, joints, context.impact_log
         )
-        _log(context, group.time, contacts, context.impact_log[:count])
+        context.log.impacts.add(group.time, contacts, now.position, context.impact_log, count)
         _remember_rebounds(context, group, contacts, context.impact_log[:count])
         if capped:
             names = tuple(context.world.names[i] for i in group.members)
@@ -127,20 +126,3 @@ def _remember_rebounds(context, group: Group, contacts: Contacts, rows: np.ndarr
         if group.time > last:
             count = count + 1 if speed * (group.time - last) < delta[pair] else 0
         context.state.rebounds[pair] = (group.time, float(row[6]), count)
-
-
-def _log(context, time: float, contacts: Contacts, rows: np.ndarray) -> None:
-    if not len(rows):
-        return
-    c = rows[:, 0].astype(np.int64)
-    table = np.empty(len(rows), IMPACT_DTYPE)
-    table["time"] = time
-    table["body_a"], table["body_b"] = contacts.body_a[c], contacts.body_b[c]
-    position = context.state.now.position
-    at_a = position[contacts.body_a[c]] + contacts.arm_a[c]
-    at_b = position[contacts.body_b[c]] + contacts.arm_b[c]
-    table["point"] = 0.5 * (at_a + at_b)
-    table["normal"] = contacts.normal[c]
-    table["impulse"], table["tangent_impulse"] = rows[:, 1], rows[:, 2:5]
-    table["approach_speed"], table["separation_speed"] = rows[:, 5], rows[:, 6]
-    context.log.impacts.append(table)
