@@ -63,8 +63,7 @@ class ImpactRows:
         rows, column = self.rows[: self.count], 0
         table = np.empty(self.count, IMPACT_DTYPE)
         for name in IMPACT_DTYPE.names or ():
-            field = table[name].reshape(self.count, -1)
-            width = field.shape[1] if self.count else 0
+            width = IMPACT_DTYPE[name].itemsize // 8
             table[name] = rows[:, column : column + width].reshape(table[name].shape)
             column += width
         return table

@@ -102,18 +102,18 @@ def _bear_each_other(context, group: Group) -> bool:
 
 
 def _rattles(context, group: Group) -> np.ndarray:
-    """Contacts (m,) of pairs that came back RATTLES times in a row without ever having been farther apart.
+    """Contacts (m,) of pairs that came back RATTLES times in a row without ever having been farther apart than the held gap.
 
     Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
     a bouncing ball they are replaced by one inelastic impact, of all that rattle together: pair after pair, a light body would stop
-    heavy ones in as many impacts as their masses' ratio, and each impact would be followed by the next.
+    heavy ones in as many impacts as their masses' ratio, and each impact would be followed by the next. A body between two others hits
+    them in turn, so pairs on their way rattle as soon as one does.
     """
-    contacts = group.contacts
-    rattles = np.zeros(len(contacts.gap), bool)
-    for c, pair in enumerate(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)):
-        _, _, count = context.state.rebounds.get(pair, NEVER)
-        rattles[c] = count >= RATTLES and contacts.restitution[c] < 1.0
-    return rattles
+    contacts, rebounds = group.contacts, context.state.rebounds
+    pairs = zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)
+    count = np.array([rebounds.get(pair, NEVER)[2] for pair in pairs], np.int64)
+    count[contacts.restitution >= 1.0] = 0
+    return count >= (RATTLES // 2 if (count >= RATTLES).any() else RATTLES)
 
 
 def _remember_rebounds(context, group: Group, contacts: Contacts, rows: np.ndarray) -> None:
