@@ -178,7 +178,7 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
     position, orientation = np.empty_like(recorder.position), np.empty_like(recorder.orientation)
     for i in range(world.num_bodies):
         position[:, i], orientation[:, i] = world.body_pose(i, recorder.position[:, i], recorder.orientation[:, i])
-    impacts = context.log.impact_table()
+    impacts = context.log.impacts.table()
     close_stretches(context)
     ledger = make_ledger(
         times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,

@@ -47,10 +47,13 @@ def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> Non
 def release(context, window: Window, time: float, bodies: np.ndarray, groups: list[Group]) -> None:
     """Let go those bodies that still carry the forces of contacts they have left."""
     state = context.state
+    bodies = bodies[state.under_contact[bodies]]
+    if not len(bodies):
+        return
     free = np.zeros(6)
     held = np.concatenate([group.members for group in groups]) if groups else bodies[:0]
     left = np.setdiff1d(bodies, held)
-    left = left[state.under_contact[left] & (state.course.start[left] < time) & ~window.inside[left]]
+    left = left[(state.course.start[left] < time) & ~window.inside[left]]
     for i in left.tolist():
         context.bring(i, time)
     for i in left.tolist():

@@ -9,8 +9,10 @@ import numpy as np
 
 from rigidimpulse.constrain.arrival import arrive
 from rigidimpulse.constrain.energy_guard import note_arrival
+from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import CORNER, FACE_VERTEX, VERTEX_FACE
-from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, pressing
+from rigidimpulse.detect.pair_table import live_contacts
+from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, near_pairs, pressing
 from rigidimpulse.respond.impulse import Contacts
 
 if TYPE_CHECKING:
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 MARGIN = 2.0
 """Contacts are looked for within this many delta."""
 NO_FORCE = np.zeros(3)
+LIFTED = 10.0
+"""Approach speed that a lift may make, in held gaps of turning (gap over size) times the speed: arms and normals turn a little."""
 SLACK = 1e-9
 """Contacts that leave or approach slower than the held ones by this part are held."""
 
@@ -39,7 +43,7 @@ class Group:
         velocity, angular_velocity, position: of the members as they arrived.
         moved: whether a lift has changed poses.
         held: (m,) bool, contacts that carry forces. rests: whether all members stand still.
-        still: m/s, approach speed that counts as none.
+        still: m/s, approach speed that counts as none. scale: m/s, largest speed of a contact point.
         joints: the joints of the members.
         heap: members that are stepped as a heap (see `constrain/heap`), None where there is none.
 
@@ -63,18 +67,21 @@ class Group:
     held: np.ndarray | None = None
     rests: bool = False
     still: float = 0.0
+    scale: float = 0.0
     joints: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     heap: np.ndarray | None = None
 
     def slow(self) -> np.ndarray:
         """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
-        return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + self.still
+        still = self.still
+        if self.moved:
+            still += LIFTED * self.scale * TOLERANCES.contact_gap
+        return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + still
 
 
 def empty_contacts(m: int) -> Contacts:
     """Arrays for m contacts."""
-    vectors = [np.empty((m, 3)) for _ in range(3)]
-    return Contacts(np.empty(m, np.int64), np.empty(m, np.int64), *vectors, *(np.empty(m) for _ in range(5)))
+    return Contacts(*np.empty((2, m), np.int64), *np.empty((3, m, 3)), *np.empty((5, m)))
 
 
 def collect(context, window, pairs: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -94,7 +101,7 @@ def collect(context, window, pairs: np.ndarray, time: float) -> tuple[np.ndarray
             break
         context.grow_contacts(-count)
     real, integer = context.contact_real[:count].copy(), context.contact_int[:count].copy()
-    for p in pairs[window.time[pairs] <= time]:
+    for p in pairs[window.time[pairs] <= time].tolist():
         a, b = window.a[p], window.b[p]
         if not np.any((integer[:, 0] == a) & (integer[:, 1] == b)) and np.any(window.witness[p, 6:9]):
             real = np.vstack([real, window.witness[p]])
@@ -105,25 +112,17 @@ def collect(context, window, pairs: np.ndarray, time: float) -> tuple[np.ndarray
 def touching_groups(context, window, time: float, bodies: np.ndarray) -> list[Group]:
     """Groups that the given bodies belong to at `time`; all bodies asked about are brought to it."""
     world, state = context.world, context.state
-    seen = np.zeros(len(window.a), bool)
-    brought = np.zeros(world.num_bodies, bool)
-    reached = np.zeros(world.num_bodies, bool)
+    seen, near = np.zeros(len(window.a), bool), np.empty(len(window.a), np.int64)
+    brought, reached = np.zeros(world.num_bodies, bool), np.zeros(world.num_bodies, bool)
     frontier = np.asarray(bodies, np.int64)
-    reals, integers = [np.zeros((0, 10))], [np.zeros((0, 5), np.int64)]
+    reals, integers = [], []
     while len(frontier):
         reached[frontier] = True
-        mark = np.zeros(world.num_bodies, bool)
-        mark[frontier] = True
-        pairs = np.flatnonzero((mark[window.a] | mark[window.b]) & ~seen)
+        pairs = near[: near_pairs(state.course, time, window.pairs, MARGIN, world.bound_radius, frontier, seen, near)]
         partners = _joint_partners(context, frontier)
-        if not len(pairs) and not len(partners):
-            break
-        seen[pairs] = True
-        mark[:] = False
-        mark[window.a[pairs]] = True
-        mark[window.b[pairs]] = True
-        mark[partners] = True
-        fresh = np.flatnonzero(mark & ~brought)
+        mark = np.zeros(world.num_bodies, bool)
+        mark[frontier] = mark[window.a[pairs]] = mark[window.b[pairs]] = mark[partners] = True
+        fresh = (mark & ~brought).nonzero()[0]
         brought[fresh] = True
         bring_all(
             state.course, fresh, time, state.now, state.rotation, context.acceleration, context.angular_acceleration
@@ -131,8 +130,11 @@ def touching_groups(context, window, time: float, bodies: np.ndarray) -> list[Gr
         real, integer = collect(context, window, pairs, time)
         reals.append(real)
         integers.append(integer)
-        touched = np.union1d(integer[:, :2], partners)
-        frontier = touched[world.dynamic[touched] & ~reached[touched]]
+        mark[:] = False
+        mark[integer[:, 0]] = mark[integer[:, 1]] = mark[partners] = True
+        frontier = (mark & world.dynamic & ~reached).nonzero()[0]
+    if not reals:
+        return []
     return _components(context, window, time, reached, np.concatenate(reals), np.concatenate(integers))
 
 
@@ -158,7 +160,8 @@ def _components(context, window, time: float, reached, real: np.ndarray, integer
             low, high = sorted((root(a), root(b)))
             parent[high] = low
 
-    for a, b in integer[:, :2].tolist():
+    ends_of_contacts = integer[:, :2].tolist()
+    for a, b in ends_of_contacts:
         join(a, b)
     jointed: JointState | None = context.joints
     joints, at = np.zeros(0, np.int64), []
@@ -168,10 +171,10 @@ def _components(context, window, time: float, reached, real: np.ndarray, integer
             ends = jointed.bodies_of(np.array([j])).tolist()
             join(ends[0], ends[-1])
             at.append(jointed.movable_end(j))
-    owner = np.array([root(a if dynamic[a] else b) for a, b in integer[:, :2].tolist()], np.int64)
+    owner = np.array([root(a if dynamic[a] else b) for a, b in ends_of_contacts], np.int64)
     owner_of_joint = np.array([root(i) for i in at], np.int64)
     groups = []
-    for o in np.union1d(owner, owner_of_joint):
+    for o in sorted({*owner.tolist(), *owner_of_joint.tolist()}):
         groups.append(make_group(context, window, time, real, integer, owner == o, joints[owner_of_joint == o]))
     for group in groups:
         if arrive(context, group):
@@ -189,19 +192,21 @@ def make_group(
 ) -> Group:
     """The group of the contacts marked in `which`, sorted by pair, and of the given joints."""
     world, state = context.world, context.state
-    rows = np.flatnonzero(which)
-    rows = rows[np.lexsort((integer[rows, 4], integer[rows, 3], integer[rows, 2], integer[rows, 1], integer[rows, 0]))]
+    rows = which.nonzero()[0]
+    if len(rows) > 1:
+        rows = rows[np.lexsort((integer[rows, 4], integer[rows, 3], integer[rows, 2], integer[rows, 1], integer[rows, 0]))]
     contacts = empty_contacts(len(rows))
     fill_contacts(state.now, real, integer, rows, world.material_of_body, world.coefficients, contacts)
-    touched = np.unique(integer[rows, :2])
+    mark = np.zeros(world.num_bodies, bool)
+    mark[contacts.body_a] = mark[contacts.body_b] = True
     if len(joints):
-        touched = np.union1d(touched, context.joints.bodies_of(joints))
-    members = touched[world.dynamic[touched]]
+        mark[context.joints.bodies_of(joints)] = True
+    members = (mark & world.dynamic).nonzero()[0]
     place = window.find(contacts.body_a, contacts.body_b)
     group = Group(
         time=time,
         members=members,
-        pairs=np.unique(place),
+        pairs=np.array(sorted(set(place.tolist())), np.int64),
         contacts=contacts,
         place=place,
         kinds=integer[rows, 2],
@@ -210,9 +215,9 @@ def make_group(
         delta=window.delta[place],
         approach=np.empty(len(rows)),
         rest_speed=np.empty(len(rows)),
-        live=window.is_live(time, place, contacts.gap),
-        velocity=state.now.velocity[members].copy(),
-        angular_velocity=state.now.angular_velocity[members].copy(),
+        live=live_contacts(window.pairs, place, contacts.gap, time),
+        velocity=state.now.velocity[members],
+        angular_velocity=state.now.angular_velocity[members],
         joints=joints,
     )
     classify(context, group)
@@ -238,10 +243,10 @@ def classify(context, group: Group) -> None:
     contacts = group.contacts
     force = np.array([state.force_of(key)[0] for key in group.keys])
     least = 0.0
-    if not np.all(world.dynamic[contacts.body_a] & world.dynamic[contacts.body_b]):
+    if not (world.dynamic[contacts.body_a] & world.dynamic[contacts.body_b]).all():
         least = float(world.steady_strength[group.members].max())
     pressing(
-        context.state.now, contacts, context.acceleration, context.angular_acceleration, force, least, group.delta,
-        group.approach, group.rest_speed,
+        world.geometry, world.shape_of_body, state.rotation, state.now, contacts, group.kinds, group.features,
+        context.acceleration, context.angular_acceleration, force, least, group.delta, group.approach, group.rest_speed,
     )
     group.live |= np.abs(group.approach) <= group.rest_speed

@@ -3,11 +3,12 @@ contact.
 
 The acceleration that presses contact i together, without the force the contact itself carried before, is
 
-    a_i = -n.(acceleration of b's point - acceleration of a's point) + f_i (n.K n)
+    a_i = -n.(a_b + alpha_b x r_b - a_a - alpha_a x r_a) - d(u.n)/dt + f_i (n.K n)
 
-with the present accelerations of the bodies (forces and contacts included) and f_i the normal force it carried. It is
-what a rebound is measured against: one that rises less than delta, v^2 < 2 a delta, is none, and a contact that
-leaves more slowly than that is held.
+with the present accelerations of the bodies (forces and contacts included), d(u.n)/dt what the gap gains at constant
+velocities, as the place of contact wanders and the normal turns (constrain/contact_motion.py), and f_i the normal force
+it carried. It is what a rebound is measured against: one that rises less than delta, v^2 < 2 a delta, is none, and a
+contact that leaves more slowly than that is held. So a ball that slides in a spinning hollow is held without gravity.
 """
 
 from math import sqrt
@@ -15,10 +16,14 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.contact_motion import contact_motion
 from rigidimpulse.detect.manifold import MAX_PER_NORMAL, pair_contacts, reduce_contacts
-from rigidimpulse.integrate.course import FIXED, state_at
+from rigidimpulse.integrate.course import FIXED, place_at, state_at
 from rigidimpulse.respond.impulse import inverse_effective_mass, relative_velocity
 from rigidimpulse.rotation import quaternion_to_matrix
+
+# Part of the bounding radii that rounding may take.
+ROUND_OFF = 1e-9
 
 
 @jit
@@ -68,6 +73,34 @@ def bring(course, i, time, bodies, rotation, acceleration, angular_acceleration)
 def bring_all(course, members, time, bodies, rotation, acceleration, angular_acceleration):
     for i in members:
         bring(course, i, time, bodies, rotation, acceleration, angular_acceleration)
+
+
+@jit
+def near_pairs(course, time, pairs, margin, radius, bodies, seen, near):
+    """Write the pairs of the given bodies (k,) that are not `seen` (p,) yet and whose bounding spheres are near at `time`.
+
+    margin: gap that counts as near, relative to that at which contacts are held; radius (n,) m. near (p,): their places, in order.
+    Marks the pairs that were looked at as seen, and returns how many are near.
+    """
+    x, y = np.empty(3), np.empty(3)
+    asked = np.zeros(radius.shape[0], np.bool_)
+    for i in bodies:
+        asked[i] = True
+    count = 0
+    for p in range(pairs.a.shape[0]):
+        a, b = pairs.a[p], pairs.b[p]
+        if seen[p] or not (asked[a] or asked[b]):
+            continue
+        seen[p] = True
+        reach = (radius[a] + radius[b]) * (1.0 + ROUND_OFF) + margin * pairs.delta[p]
+        if reach < np.inf:
+            place_at(course, a, time, x)
+            place_at(course, b, time, y)
+            if (y[0] - x[0]) ** 2 + (y[1] - x[1]) ** 2 + (y[2] - x[2]) ** 2 > reach * reach:
+                continue
+        near[count] = p
+        count += 1
+    return count
 
 
 @jit
@@ -133,28 +166,35 @@ def fill_contacts(bodies, real, integer, rows, material_of_body, coefficients, c
 
 
 @jit
-def _point_acceleration(bodies, acceleration, angular_acceleration, i, r, n):
-    """n.(a + alpha x r + w x (w x r)) of body i."""
-    a, alpha, w = acceleration[i], angular_acceleration[i], bodies.angular_velocity[i]
-    wr = w[0] * r[0] + w[1] * r[1] + w[2] * r[2]
-    ww = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-    x = a[0] + alpha[1] * r[2] - alpha[2] * r[1] + w[0] * wr - ww * r[0]
-    y = a[1] + alpha[2] * r[0] - alpha[0] * r[2] + w[1] * wr - ww * r[1]
-    z = a[2] + alpha[0] * r[1] - alpha[1] * r[0] + w[2] * wr - ww * r[2]
+def _point_acceleration(acceleration, angular_acceleration, i, r, n):
+    """n.(a + alpha x r) of body i."""
+    a, alpha = acceleration[i], angular_acceleration[i]
+    x = a[0] + alpha[1] * r[2] - alpha[2] * r[1]
+    y = a[1] + alpha[2] * r[0] - alpha[0] * r[2]
+    z = a[2] + alpha[0] * r[1] - alpha[1] * r[0]
     return n[0] * x + n[1] * y + n[2] * z
 
 
 @jit
-def pressing(bodies, contacts, acceleration, angular_acceleration, normal_force, least, delta, approach, rest_speed):
-    """Fill approach (m,) = u.n and rest_speed (m,) = sqrt(2 a delta) [m/s]; a is at least `least`."""
+def pressing(
+    geometry, shape_of_body, rotation, bodies, contacts, kinds, features, acceleration, angular_acceleration, normal_force, least,
+    delta, approach, rest_speed,
+):
+    """Fill approach (m,) = u.n and rest_speed (m,) = sqrt(2 a delta) [m/s]; a is at least `least`.
+
+    kinds (m,), features (m, 2): what touches; acceleration, angular_acceleration (n, 3); normal_force (m,) N carried; delta (m,) m.
+    """
+    turning = contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, features).turning
     u = np.empty(3)
     k = np.empty((3, 3))
     for c in range(contacts.gap.shape[0]):
         n = contacts.normal[c]
         approach[c] = relative_velocity(bodies, contacts, c, u)
         a = _point_acceleration(
-            bodies, acceleration, angular_acceleration, contacts.body_a[c], contacts.arm_a[c], n
-        ) - _point_acceleration(bodies, acceleration, angular_acceleration, contacts.body_b[c], contacts.arm_b[c], n)
+            acceleration, angular_acceleration, contacts.body_a[c], contacts.arm_a[c], n
+        ) - _point_acceleration(acceleration, angular_acceleration, contacts.body_b[c], contacts.arm_b[c], n)
+        for i in range(3):
+            a -= turning[c, i] * n[i]
         if normal_force[c] > 0.0:
             inverse_effective_mass(bodies, contacts, c, k)
             for i in range(3):

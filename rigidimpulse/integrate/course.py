@@ -90,6 +90,22 @@ def begin(course, i):
 
 
 @jit
+def take(course, i, time, bodies, acceleration, torque, mode):
+    """Let body i go on from where it is now, at `time`, with a constant acceleration (3,) m/s^2 and torque (3,) N m, in a mode."""
+    course.start[i] = time
+    course.mode[i] = mode
+    for k in range(3):
+        course.position[i, k] = bodies.position[i, k]
+        course.velocity[i, k] = bodies.velocity[i, k]
+        course.angular_velocity[i, k] = bodies.angular_velocity[i, k]
+        course.acceleration[i, k] = acceleration[k]
+        course.torque[i, k] = torque[k]
+    for k in range(4):
+        course.orientation[i, k] = bodies.orientation[i, k]
+    begin(course, i)
+
+
+@jit
 def _start_pose(course, i, x_out, q_out):
     for k in range(3):
         x_out[k] = course.position[i, k]
@@ -104,6 +120,15 @@ def _add_displacement(course, i, s, x_out):
         # Adding nothing could still turn -0 into 0: a body that stays keeps its very bits.
         if displacement != 0.0:
             x_out[k] += displacement
+
+
+@jit
+def place_at(course, i, t, x_out):
+    """Write the position (3,) of body i at the time t >= start."""
+    for k in range(3):
+        x_out[k] = course.position[i, k]
+    if course.mode[i] != FIXED:
+        _add_displacement(course, i, t - course.start[i], x_out)
 
 
 @jit

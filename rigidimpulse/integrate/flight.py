@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 
+from rigidimpulse._jit import jit
 from rigidimpulse.detect.groups import Group
-from rigidimpulse.integrate.course import FIXED, FORCED, FREE, begin
+from rigidimpulse.detect.pair_table import sweep_pair_again
+from rigidimpulse.integrate.course import FIXED, FORCED, FREE, take
 from rigidimpulse.observe.energy import mechanical_energy
 from rigidimpulse.plan import Bound, Skip
 
@@ -15,6 +18,7 @@ HALF_KEPT = 0.55
 """Held contacts nearer than this part of delta are guarded at half of their gap."""
 LEAVING = 1e-6
 """Part of its gap by which a leaving pair may come nearer before it counts as contact again."""
+NOTHING = np.zeros(3)
 
 
 @dataclass(frozen=True)
@@ -35,20 +39,17 @@ def integrate(context, window, group: Group) -> None:
     course = state.course
     if group.heap is not None:
         context.heaps.take_courses(context, window, group)
-    for n, i in enumerate(group.members):
-        if window.inside[i]:
+    for n, i in enumerate(group.members.tolist()):
+        if window.inside[i] or (group.rests and course.mode[i] == FIXED):
             continue
-        changed = (
+        if (
             group.moved
-            or np.any(now.velocity[i] != group.velocity[n])
-            or np.any(now.angular_velocity[i] != group.angular_velocity[n])
-            or np.any(context.wrench[i])
             or state.under_contact[i]
-        )
-        if group.rests and course.mode[i] == FIXED:
-            continue
-        if changed:
-            take_course(context, window, int(i), group.time, context.wrench[i], group.rests)
+            or (now.velocity[i] != group.velocity[n]).any()
+            or (now.angular_velocity[i] != group.angular_velocity[n]).any()
+            or context.wrench[i].any()
+        ):
+            take_course(context, window, i, group.time, context.wrench[i], group.rests)
     set_touch(context, window, group)
 
 
@@ -56,24 +57,24 @@ def take_course(context, window, i: int, time: float, wrench: np.ndarray, rests:
     """Body i leaves its course at `time` for one from its present state, with a constant wrench (6,)."""
     state, world, now = context.state, context.world, context.state.now
     course = state.course
-    if not (np.all(np.isfinite(now.velocity[i])) and np.all(np.isfinite(now.angular_velocity[i]))):
+    if not isfinite(float(now.velocity[i].sum() + now.angular_velocity[i].sum())):
         context.quarantine(i, time)
         rests = True
     context.recorder.flush(course, i, time, state.correction[i])
     state.correction[i] = 0.0
     context.contact_log.close([i], time)
     book_contact_work(context, i, time)
+    pressed = not rests and bool(wrench.any())
     if rests:
         now.velocity[i] = now.angular_velocity[i] = 0.0
-    course.start[i] = time
-    course.position[i], course.orientation[i] = now.position[i], now.orientation[i]
-    course.velocity[i], course.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]
-    course.acceleration[i] = 0.0 if rests else world.steady_acceleration[i] + world.inv_mass[i] * wrench[:3]
-    course.torque[i] = 0.0 if rests else wrench[3:]
-    course.mode[i] = FIXED if rests else (FORCED if np.any(wrench[3:]) else FREE)
-    begin(course, i)
-    state.under_contact[i] = not rests and bool(np.any(wrench))
-    if state.under_contact[i]:
+        take(course, i, time, now, NOTHING, NOTHING, FIXED)
+    else:
+        acceleration = world.steady_acceleration[i]
+        if pressed:
+            acceleration = acceleration + world.inv_mass[i] * wrench[:3]
+        take(course, i, time, now, acceleration, wrench[3:], FORCED if pressed and wrench[3:].any() else FREE)
+    state.under_contact[i] = pressed
+    if pressed:
         state.energy_at_start[i] = mechanical_energy(now, world, np.array([i]))
     if window is not None:
         window.change_course(i, time)
@@ -88,19 +89,27 @@ def book_contact_work(context, i: int, time: float) -> None:
 
 
 def set_touch(context, window, group: Group) -> None:
-    """Gaps at which the group's pairs come to contact next: held pairs are guarded at half their gap, leaving ones where they are."""
-    least = np.full(len(window.a), np.inf)
-    np.minimum.at(least, group.place, group.contacts.gap)
-    held = np.zeros(len(window.a), bool)
-    if group.held is not None:
-        held[group.place[group.held]] = True
-    for p in np.unique(group.place):
-        delta = window.delta[p]
-        touch = context.world.least_touch(window.a[p : p + 1], window.b[p : p + 1])[0]
-        if held[p]:
-            touch = 0.5 * delta if least[p] > HALF_KEPT * delta else 0.5 * least[p]
-        elif least[p] <= touch:
-            touch = least[p] * (1.0 - LEAVING) if touch > 0.0 else min(least[p], 0.0)
-        if touch != window.touch[p]:
-            window.touch[p] = touch
-            window.sweep_again(np.array([p]), group.time)
+    """Gaps at which the group's pairs come to contact next."""
+    if len(group.place):
+        held = np.zeros(len(group.place), bool) if group.held is None else group.held
+        set_touch_gaps(window.pairs, group.place, group.contacts.gap, held, group.time, context.world.dynamic, window.inside)
+
+
+@jit
+def set_touch_gaps(pairs, place, gap, held, time, dynamic, inside):
+    """Held pairs are guarded at half their gap, leaving ones where they are; place, gap, held (m,) of contacts, pair after pair."""
+    first = 0
+    while first < place.shape[0]:
+        p, last, nearest, is_held = place[first], first, np.inf, False
+        while last < place.shape[0] and place[last] == p:
+            nearest, is_held = min(nearest, gap[last]), is_held or held[last]
+            last += 1
+        first = last
+        delta, touch = pairs.delta[p], pairs.least[p]
+        if is_held:
+            touch = 0.5 * delta if nearest > HALF_KEPT * delta else 0.5 * nearest
+        elif nearest <= touch:
+            touch = nearest * (1.0 - LEAVING) if touch > 0.0 else min(nearest, 0.0)
+        if touch != pairs.touch[p]:
+            pairs.touch[p] = touch
+            sweep_pair_again(pairs, p, time, dynamic, inside)

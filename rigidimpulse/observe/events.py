@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rigidimpulse._jit import jit
+
 IMPACT_DTYPE = np.dtype(
     [
         ("time", np.float64),
@@ -20,6 +22,51 @@ IMPACT_DTYPE = np.dtype(
     ]
 )
 """One row an impulse at a contact point: s, indices, m, unit (a to b), N s >= 0, N s on b, m/s, m/s."""
+ROW_LENGTH = IMPACT_DTYPE.itemsize // 8
+FIRST_ROWS = 64
+
+
+@jit
+def write_impacts(time, contacts, position, log, count, rows, first):
+    """Write `count` rows of a log of impulses (see `respond.impulse.log_impact`) into rows (k, ROW_LENGTH) from `first` on.
+
+    contacts: those that the log numbers; position (n, 3) m of the centres of mass.
+    """
+    for s in range(count):
+        row, c = rows[first + s], int(log[s, 0])
+        a, b = contacts.body_a[c], contacts.body_b[c]
+        row[0], row[1], row[2], row[9] = time, a, b, log[s, 1]
+        for k in range(3):
+            row[3 + k] = 0.5 * ((position[a, k] + contacts.arm_a[c, k]) + (position[b, k] + contacts.arm_b[c, k]))
+            row[6 + k] = contacts.normal[c, k]
+            row[10 + k] = log[s, 2 + k]
+        row[13], row[14] = log[s, 5], log[s, 6]
+
+
+class ImpactRows:
+    """The impacts of a run, in a table of numbers that doubles when it is full; the columns are those of `IMPACT_DTYPE`."""
+
+    def __init__(self) -> None:
+        """Empty."""
+        self.rows = np.empty((FIRST_ROWS, ROW_LENGTH))
+        self.count = 0
+
+    def add(self, time: float, contacts, position: np.ndarray, log: np.ndarray, count: int) -> None:
+        """Keep the impacts that `write_impacts` describes."""
+        while self.count + count > len(self.rows):
+            self.rows = np.concatenate([self.rows, np.empty_like(self.rows)])
+        write_impacts(time, contacts, position, log, count, self.rows, self.count)
+        self.count += count
+
+    def table(self) -> np.ndarray:
+        """All impacts in order of time, `IMPACT_DTYPE`."""
+        rows, column = self.rows[: self.count], 0
+        table = np.empty(self.count, IMPACT_DTYPE)
+        for name in IMPACT_DTYPE.names or ():
+            width = IMPACT_DTYPE[name].itemsize // 8
+            table[name] = rows[:, column : column + width].reshape(table[name].shape)
+            column += width
+        return table
 
 
 @dataclass(frozen=True)
@@ -41,17 +88,11 @@ class EventLog:
     stretches: courses under contact forces: start, end [s], body, energy at the start [J], work of the forces [J].
     """
 
-    impacts: list[np.ndarray] = field(default_factory=list)
+    impacts: ImpactRows = field(default_factory=ImpactRows)
     energy: list[tuple[float, str, float]] = field(default_factory=list)
     spans: list[tuple[float, float, str, float]] = field(default_factory=list)
     stretches: list[tuple[float, float, int, float, float]] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
-
-    def impact_table(self) -> np.ndarray:
-        """All impacts in order of time, `IMPACT_DTYPE`."""
-        if not self.impacts:
-            return np.zeros(0, IMPACT_DTYPE)
-        return np.concatenate(self.impacts)
 
     def book(self, time: float, cause: str, change: float) -> None:
         """Book a change of mechanical energy [J]; negative is dissipated."""

@@ -9,7 +9,6 @@ import numpy as np
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.groups import Group, classify
 from rigidimpulse.observe.energy import kinetic_energy
-from rigidimpulse.observe.events import IMPACT_DTYPE
 from rigidimpulse.plan import Bound, Skip
 from rigidimpulse.respond.impulse import Contacts, select, speed_scale
 from rigidimpulse.respond.kinematic import respond_kinematic
@@ -62,27 +61,26 @@ class ImpactResponse:
 
 def respond_to_impacts(context, group: Group, kernel, law: int) -> None:
     """Apply the impulses of the group's approaching contacts and log them."""
-    rattles = _rattles(context, group.contacts)
-    live = np.flatnonzero(group.live | rattles)
+    rattles = _rattles(context, group)
+    live = (group.live | rattles).nonzero()[0]
     if not len(live):
         return
     contacts = group.contacts if len(live) == len(group.live) else select(group.contacts, live)
-    rest_speed = group.rest_speed[live]
+    rest_speed = np.where(rattles, np.inf, group.rest_speed)[live]
     scale = speed_scale(context.state.now, contacts)
-    tolerance = TOLERANCES.approach * scale + SLOW * float(rest_speed.max())
-    group.still = tolerance
+    tolerance = TOLERANCES.approach * scale + SLOW * float(group.rest_speed[live].max())
+    group.still, group.scale = tolerance, scale
     if group.approach[live].min() >= -tolerance:
         return
     now = context.state.now
-    rest_speed = np.where(rattles[live], np.inf, rest_speed)
     before = kinetic_energy(now, context.world, group.members)
     joints = context.joints.impact_block(context, group) if len(group.joints) else None
-    together = _bear_each_other(context, group)
+    together = len(live) > 1 and (bool(rattles.any()) or _bear_each_other(context, group))
     for _ in range(MAX_CALLS):
         count, _, capped = kernel(
             now, contacts, law, together, rest_speed, tolerance, scale, context.column, joints, context.impact_log
         )
-        _log(context, group.time, contacts, context.impact_log[:count])
+        context.log.impacts.add(group.time, contacts, now.position, context.impact_log, count)
         _remember_rebounds(context, group, contacts, context.impact_log[:count])
         if capped:
             names = tuple(context.world.names[i] for i in group.members)
@@ -103,17 +101,19 @@ def _bear_each_other(context, group: Group) -> bool:
     return any(state.force_of(group.keys[c])[0] > 0.0 for c in np.flatnonzero(between).tolist())
 
 
-def _rattles(context, contacts: Contacts) -> np.ndarray:
-    """Contacts of pairs that came back RATTLES times in a row without ever having been farther apart than nothing to speak of.
+def _rattles(context, group: Group) -> np.ndarray:
+    """Contacts (m,) of pairs that came back RATTLES times in a row without ever having been farther apart than the held gap.
 
     Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
-    a bouncing ball they are replaced by one inelastic impact, of all these pairs at once.
+    a bouncing ball they are replaced by one inelastic impact, of all that rattle together: pair after pair, a light body would stop
+    heavy ones in as many impacts as their masses' ratio, and each impact would be followed by the next. A body between two others hits
+    them in turn, so pairs on their way rattle as soon as one does.
     """
-    rattles = np.zeros(len(contacts.gap), bool)
-    for c, pair in enumerate(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)):
-        _, _, count = context.state.rebounds.get(pair, NEVER)
-        rattles[c] = count >= RATTLES and contacts.restitution[c] < 1.0
-    return rattles
+    contacts, rebounds = group.contacts, context.state.rebounds
+    pairs = zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)
+    count = np.array([rebounds.get(pair, NEVER)[2] for pair in pairs], np.int64)
+    count[contacts.restitution >= 1.0] = 0
+    return count >= (RATTLES // 2 if (count >= RATTLES).any() else RATTLES)
 
 
 def _remember_rebounds(context, group: Group, contacts: Contacts, rows: np.ndarray) -> None:
@@ -126,20 +126,3 @@ def _remember_rebounds(context, group: Group, contacts: Contacts, rows: np.ndarr
         if group.time > last:
             count = count + 1 if speed * (group.time - last) < delta[pair] else 0
         context.state.rebounds[pair] = (group.time, float(row[6]), count)
-
-
-def _log(context, time: float, contacts: Contacts, rows: np.ndarray) -> None:
-    if not len(rows):
-        return
-    c = rows[:, 0].astype(np.int64)
-    table = np.empty(len(rows), IMPACT_DTYPE)
-    table["time"] = time
-    table["body_a"], table["body_b"] = contacts.body_a[c], contacts.body_b[c]
-    position = context.state.now.position
-    at_a = position[contacts.body_a[c]] + contacts.arm_a[c]
-    at_b = position[contacts.body_b[c]] + contacts.arm_b[c]
-    table["point"] = 0.5 * (at_a + at_b)
-    table["normal"] = contacts.normal[c]
-    table["impulse"], table["tangent_impulse"] = rows[:, 1], rows[:, 2:5]
-    table["approach_speed"], table["separation_speed"] = rows[:, 5], rows[:, 6]
-    context.log.impacts.append(table)

@@ -30,6 +30,6 @@ FAMILIES: dict[str, tuple[str, tuple[str, ...]]] = {
     "impossible": ("Impossible starts and ends", ("squeezed_ball", "squeezed_box", "deep_overlap", "coincident", "ball_in_ball")),
     "same_film": ("The same film", ("scale_1e-3", "scale_1e3", "shifted", "rotated", "renamed", "reordered")),
     "meshes": ("Meshes that are not clean", ("dirty_mesh", "flipped_floor", "inside_out", "many_triangles", "needle", "plate")),
-    "crowds": ("Crowds", ("balls_216", "balls_216_elastic", "random_impacts", "random_impacts_1e6", "dominoes", "superellipsoids")),
+    "crowds": ("Crowds", ("balls_216", "balls_216_elastic", "random_impacts", "dominoes", "superellipsoids")),
 }
 """Module of each family, with its title and the names of its cases."""
