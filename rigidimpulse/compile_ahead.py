@@ -104,7 +104,8 @@ def _respond_and_detect(context) -> None:
     start_courses(context)
     window = Window(context, 1.0 / 60.0)
     window.find_pairs()
-    group = window.touching(0.0, members)[0]
+    groups, _ = window.touching(0.0, members)
+    group = groups[0]
     respond_to_impacts(context, group, respond_sequential, LAWS["auto"])
 
 

@@ -36,11 +36,10 @@ class State:
         time: s, every body's course is known from here on.
         course: path of every body since its last change of course.
         now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
-        energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at, at
-            arrival_time [s].
+        energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at.
         under_contact: (n,) bool, bodies whose course carries contact forces.
-        closed: (n,) first body of its group if nothing that moves by itself takes part, else -1. ground: by that
-            first body, directions (k, 3) along which what stands pushes the group.
+        sharing: (n,) first body of the group whose forces bodies under contact share. closed: (n,) bool, whether nothing that moves by
+            itself takes part in them. ground: by that first body, directions (k, 3) along which what stands pushes the group.
         rebounds: by pair, time and speed of the last rebound and how many in a row were short.
         contact_force: last force of a held contact, in its frame [N], and when it began, by its key (`groups.contact_key`).
         sub_step: (n,) s, length of the last one of a group of contacts that turn, at its first body.
@@ -68,8 +67,8 @@ class State:
         self.under_contact = np.zeros(n, bool)
         self.rebounds: dict[tuple[int, int], tuple[float, float, int]] = {}
         self.energy_at_start = np.zeros(n)
-        self.arrival_time = np.full(n, -np.inf)
-        self.closed = np.full(n, -1)
+        self.sharing = np.zeros(n, np.int64)
+        self.closed = np.zeros(n, bool)
         self.ground: dict[int, np.ndarray] = {}
         self.arrival_energy: dict[int, float] = {}
 

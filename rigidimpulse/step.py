@@ -34,8 +34,8 @@ def step(context, plan, end: float) -> None:
 def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> None:
     """Everything that happens at `time` to the groups that the given bodies touch."""
     window.wake[bodies] = np.inf
-    groups = window.touching(time, bodies)
-    release(context, window, time, bodies, groups)
+    groups, reached = window.touching(time, bodies)
+    release(context, window, time, reached, groups)
     for group in groups:
         plan.run("respond", context, group)
         plan.run("forces", context, group)
@@ -54,7 +54,5 @@ def release(context, window: Window, time: float, bodies: np.ndarray, groups: li
     held = np.concatenate([group.members for group in groups]) if groups else bodies[:0]
     left = np.setdiff1d(bodies, held)
     left = left[(state.course.start[left] < time) & ~window.inside[left]]
-    for i in left.tolist():
-        context.bring(i, time)
     for i in left.tolist():
         take_course(context, window, i, time, free, rests=False)

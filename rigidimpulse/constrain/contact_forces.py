@@ -95,7 +95,8 @@ def hold(context, window, group: Group) -> None:
         if len(group.joints):
             context.joints.let_go(group)
     ends = np.concatenate([contacts.body_a, contacts.body_b])
-    state.closed[group.members] = -1 if len(group.joints) or np.any(context.world.moving[ends]) else group.members[0]
+    state.sharing[group.members] = group.members[0]
+    state.closed[group.members] = not len(group.joints) and not np.any(context.world.moving[ends])
     state.ground[int(group.members[0])] = _ground(context.world, contacts)
     context.contact_log.replace(group.members.tolist(), group.time, contacts, now.position, force)
     for key, f in zip(keys, force, strict=True):

@@ -23,28 +23,25 @@ PARALLEL = 1e-6
 """Sine of the angle of directions that count as one."""
 
 
-def note_arrival(context, members: list[int], time: float) -> bool:
+def note_arrival(context, bodies: list[int], time: float) -> set[int]:
     """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows.
 
-    What groups of them gained is taken off their velocities as soon as all have arrived. Returns whether any was.
+    All that share forces arrive together; what groups of them gained is taken off their velocities. Returns those slowed.
     """
     world, state = context.world, context.state
-    guarded = False
-    touched = [i for i in members if state.under_contact[i]]
+    slowed: set[int] = set()
+    touched = [i for i in bodies if state.under_contact[i]]
     for i in touched:
         state.arrival_energy[i] = mechanical_energy(state.now, world, np.array([i]))
-        state.arrival_time[i] = time
-    for first in sorted({int(state.closed[i]) for i in touched} - {-1}):
-        group = np.flatnonzero((state.closed == first) & state.under_contact)
-        if np.any(state.arrival_time[group] != time) or np.ptp(state.course.start[group]) > 0.0:
-            continue
+    for first in sorted({int(state.sharing[i]) for i in touched if state.closed[i]}):
+        group = np.array([i for i in touched if state.sharing[i] == first])
         gained = sum(state.arrival_energy[i] - state.energy_at_start[i] for i in group.tolist())
         before = kinetic_energy(state.now, world, group)
         if gained > GAIN * before:
             take_off(state.now, world, group, gained, state.ground[first])
             context.log.book(time, "guard", kinetic_energy(state.now, world, group) - before)
-            guarded = True
-    return guarded
+            slowed.update(group.tolist())
+    return slowed
 
 
 def take_off(now, world, members: np.ndarray, energy: float, ground: np.ndarray) -> None:

@@ -109,8 +109,12 @@ def collect(context, window, pairs: np.ndarray, time: float) -> tuple[np.ndarray
     return real, integer
 
 
-def touching_groups(context, window, time: float, bodies: np.ndarray) -> list[Group]:
-    """Groups that the given bodies belong to at `time`; all bodies asked about are brought to it."""
+def touching_groups(context, window, time: float, bodies: np.ndarray) -> tuple[list[Group], np.ndarray]:
+    """Groups that the given bodies belong to at `time`, and all bodies looked at, which are brought to it.
+
+    Bodies that share the forces of a group come along when one of them is looked at, even if they touch nothing any more: those
+    forces end for all of them at once, or momentum would not be kept.
+    """
     world, state = context.world, context.state
     seen, near = np.zeros(len(window.a), bool), np.empty(len(window.a), np.int64)
     brought, reached = np.zeros(world.num_bodies, bool), np.zeros(world.num_bodies, bool)
@@ -119,7 +123,7 @@ def touching_groups(context, window, time: float, bodies: np.ndarray) -> list[Gr
     while len(frontier):
         reached[frontier] = True
         pairs = near[: near_pairs(state.course, time, window.pairs, MARGIN, world.bound_radius, frontier, seen, near)]
-        partners = _joint_partners(context, frontier)
+        partners = _partners(context, frontier)
         mark = np.zeros(world.num_bodies, bool)
         mark[frontier] = mark[window.a[pairs]] = mark[window.b[pairs]] = mark[partners] = True
         fresh = (mark & ~brought).nonzero()[0]
@@ -134,15 +138,21 @@ def touching_groups(context, window, time: float, bodies: np.ndarray) -> list[Gr
         mark[integer[:, 0]] = mark[integer[:, 1]] = mark[partners] = True
         frontier = (mark & world.dynamic & ~reached).nonzero()[0]
     if not reals:
-        return []
-    return _components(context, window, time, reached, np.concatenate(reals), np.concatenate(integers))
+        return [], frontier
+    groups = _components(context, window, time, reached, np.concatenate(reals), np.concatenate(integers))
+    _end_sub_steps(context, groups, time, reached.nonzero()[0])
+    return groups, reached.nonzero()[0]
 
 
-def _joint_partners(context, bodies: np.ndarray) -> np.ndarray:
-    """All bodies of the joints at the given ones, themselves included."""
-    if context.joints is None:
-        return np.zeros(0, np.int64)
-    return context.joints.bodies_of(context.joints.at(bodies))
+def _partners(context, bodies: np.ndarray) -> np.ndarray:
+    """All bodies of the joints at the given ones, and those that share forces with them; themselves included."""
+    state = context.state
+    partners = np.zeros(0, np.int64) if context.joints is None else context.joints.bodies_of(context.joints.at(bodies))
+    pressed = bodies[state.under_contact[bodies]]
+    if not len(pressed):
+        return partners
+    sharers = (state.under_contact & np.isin(state.sharing, state.sharing[pressed])).nonzero()[0]
+    return np.concatenate([partners, sharers])
 
 
 def _components(context, window, time: float, reached, real: np.ndarray, integer: np.ndarray) -> list[Group]:
@@ -176,15 +186,21 @@ def _components(context, window, time: float, reached, real: np.ndarray, integer
     groups = []
     for o in sorted({*owner.tolist(), *owner_of_joint.tolist()}):
         groups.append(make_group(context, window, time, real, integer, owner == o, joints[owner_of_joint == o]))
+    return groups
+
+
+def _end_sub_steps(context, groups: list[Group], time: float, bodies: np.ndarray) -> None:
+    """What happens to all bodies brought at once when forces that were constant over a sub-step end."""
     for group in groups:
         if arrive(context, group):
             classify(context, group)
-        if note_arrival(context, group.members.tolist(), time):
+    guarded = note_arrival(context, bodies.tolist(), time)
+    for group in groups:
+        if not guarded.isdisjoint(group.members.tolist()):
             classify(context, group)
-        if jointed is not None and len(group.joints):
-            jointed.arrive(context, group)
+        if len(group.joints):
+            context.joints.arrive(context, group)
             classify(context, group)
-    return groups
 
 
 def make_group(

@@ -68,10 +68,10 @@ class Window:
             count = overlapping_pairs(box_min, box_max, self._moves, pairs)
         self._append(pairs[:count, 0], pairs[:count, 1], self.begin)
 
-    def touching(self, time: float, bodies: np.ndarray) -> list[Group]:
-        """Groups of touching bodies that the given ones belong to at `time`."""
-        groups = touching_groups(self.context, self, time, bodies)
-        return groups if self.context.heaps is None else self.context.heaps.join(self.context, self, time, groups)
+    def touching(self, time: float, bodies: np.ndarray) -> tuple[list[Group], np.ndarray]:
+        """Groups of touching bodies that the given ones belong to at `time`, and all bodies looked at."""
+        groups, reached = touching_groups(self.context, self, time, bodies)
+        return groups if self.context.heaps is None else self.context.heaps.join(self.context, self, time, groups), reached
 
     def _is_shut(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Which pairs are not swept, since a heap's solver looks after them."""
