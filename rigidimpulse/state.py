@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.constrain.arrival import PairForce
-from rigidimpulse.constrain.energy_guard import note_arrival
+from rigidimpulse.constrain.energy_guard import Ground, note_arrival
 from rigidimpulse.constrain.foresight import Foresight
 from rigidimpulse.constrain.heap import Heaps, why_no_heaps
 from rigidimpulse.constrain.jointed import JointState
@@ -38,8 +38,8 @@ class State:
         now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
         energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at.
         under_contact: (n,) bool, bodies whose course carries contact forces.
-        sharing: (n,) first body of the group whose forces bodies under contact share. closed: (n,) bool, whether nothing that moves by
-            itself takes part in them. ground: by that first body, directions (k, 3) along which what stands pushes the group.
+        sharing: (n,) first body of the group whose forces bodies under contact share. closed: (n,) bool, whether those make no
+            energy. ground: by that first body, what stands by the group.
         rebounds: by pair, time and speed of the last rebound and how many in a row were short.
         contact_force: last force of a held contact, in its frame [N], and when it began, by its key (`groups.contact_key`).
         sub_step: (n,) s, length of the last one of a group of contacts that turn, at its first body.
@@ -69,7 +69,7 @@ class State:
         self.energy_at_start = np.zeros(n)
         self.sharing = np.zeros(n, np.int64)
         self.closed = np.zeros(n, bool)
-        self.ground: dict[int, np.ndarray] = {}
+        self.ground: dict[int, Ground] = {}
         self.arrival_energy: dict[int, float] = {}
 
 
@@ -119,7 +119,7 @@ class StepContext:
         """Bring body i to `time` on its course."""
         state = self.state
         bring(state.course, i, time, state.now, state.rotation, self.acceleration, self.angular_acceleration)
-        note_arrival(self, [i], time)
+        note_arrival(self, [i])
 
     def pose_matrix(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Position (3,) and rotation matrix (3, 3) of body i at `time` on its present course."""

@@ -10,6 +10,7 @@ import numpy as np
 from rigidimpulse.constrain.arrival import forget_forces, remember_forces
 from rigidimpulse.constrain.contact_motion import Motion, contact_motion
 from rigidimpulse.constrain.drift import lift_contacts, needs_lift
+from rigidimpulse.constrain.energy_guard import note_hold
 from rigidimpulse.constrain.foresight import ALLOWED
 from rigidimpulse.constrain.resting import Held, hold_contacts
 from rigidimpulse.constrain.rolling import rolling_of
@@ -18,7 +19,7 @@ from rigidimpulse.detect.groups import Group, collect, make_group
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.plan import Bound, Skip
-from rigidimpulse.respond.impulse import Contacts, select
+from rigidimpulse.respond.impulse import select
 
 # Residual of the solver that is reported, relative to the speed gained in the step, and energy that such forces may make, relative.
 UNSOLVED = 1e-6
@@ -94,10 +95,7 @@ def hold(context, window, group: Group) -> None:
         forget_forces(state, contacts)
         if len(group.joints):
             context.joints.let_go(group)
-    ends = np.concatenate([contacts.body_a, contacts.body_b])
-    state.sharing[group.members] = group.members[0]
-    state.closed[group.members] = not len(group.joints) and not np.any(context.world.moving[ends])
-    state.ground[int(group.members[0])] = _ground(context.world, contacts)
+    note_hold(context, group, contacts, force)
     context.contact_log.replace(group.members.tolist(), group.time, contacts, now.position, force)
     for key, f in zip(keys, force, strict=True):
         state.contact_force[key] = (f, group.time)
@@ -195,12 +193,6 @@ def sub_step(rate: float, step: float, rest: float) -> float:
     """Length of the next sub-step [s], where arms turn at `rate` [rad/s] and the rest of the step is left."""
     piece = step / min(max(math.ceil(rate * step / TURN), 1), MOST_SUB_STEPS)
     return piece if rest > piece * (1.0 + SHORTEST) else max(rest, SHORTEST * step)
-
-
-def _ground(world, contacts: Contacts) -> np.ndarray:
-    """Directions (k, 3) along which what stands pushes: normals, and every way where there is friction."""
-    stands = ~(world.dynamic[contacts.body_a] & world.dynamic[contacts.body_b])
-    return np.eye(3) if np.any(stands & (contacts.static_friction > 0.0)) else contacts.normal[stands]
 
 
 def _lift(context, window, group: Group) -> None:

@@ -1,8 +1,8 @@
 """No energy from constant contact forces.
 
 Over a sub-step contact forces are constant while contacts move, so they do a little work that they should not. Bodies that
-together touched nothing that moves by itself cannot have gained energy: what they gained is taken off what moves against the
-motion of their common rigid body, V, W, by one factor:
+together touched nothing but each other and ground of one velocity cannot have gained energy, seen from that ground: what they
+gained is taken off what moves against the motion of their common rigid body, V, W, by one factor:
 
     v_i = V + W x (x_i - X) + dv_i,  w_i = W + dw_i,    T = T_rigid(V, W) + T_d(dv, dw),    T_d' = T_d - gained
 
@@ -12,6 +12,8 @@ a smooth floor: V level, W upright), and are zero where the ground has friction.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,23 +25,73 @@ PARALLEL = 1e-6
 """Sine of the angle of directions that count as one."""
 
 
-def note_arrival(context, bodies: list[int], time: float) -> set[int]:
-    """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows.
+@dataclass(frozen=True)
+class Ground:
+    """What stands by a group of bodies.
 
-    All that share forces arrive together; what groups of them gained is taken off their velocities. Returns those slowed.
+    Attributes:
+        velocity: (3,) m/s of all that stands, seen from where it does no work.
+        pushes: (k, 3) directions along which it may push.
+
     """
-    world, state = context.world, context.state
+
+    velocity: np.ndarray
+    pushes: np.ndarray
+
+
+def note_hold(context, group, contacts, force: np.ndarray) -> None:
+    """Remember who shares the forces (m, 3) of the held contacts from now on, and whether they may make energy.
+
+    They may not where all that stands moves with one velocity, and joints are neither driven nor springs.
+    """
+    world, state, now = context.world, context.state, context.state.now
+    first, members = int(group.members[0]), group.members
+    pairs = np.column_stack([contacts.body_a, contacts.body_b])
+    stands = ~world.dynamic[pairs]
+    supports, rough = np.unique(pairs[stands]), bool(np.any(stands.any(axis=1) & (contacts.static_friction > 0.0)))
+    passive, tied = True, False
+    if len(group.joints):
+        ends = context.joints.bodies_of(group.joints)
+        tied = context.joints.hold_to_world(group.joints)
+        rough = rough or tied or not np.all(world.dynamic[ends])
+        supports = np.union1d(supports, ends[~world.dynamic[ends]])
+        # Without contact joints keep energy by themselves, up and down: what they gain they lose.
+        passive = context.joints.are_passive(group.joints) and bool(np.any(force[:, 0] > 0.0))
+    velocity = now.velocity[supports[0]].copy() if len(supports) else np.zeros(3)
+    steady = not np.any(now.angular_velocity[supports]) and not np.any(now.velocity[supports] != velocity)
+    state.sharing[members] = first
+    state.closed[members] = passive and steady and not (tied and np.any(velocity))
+    state.ground[first] = Ground(velocity, np.eye(3) if rough else contacts.normal[stands.any(axis=1)])
+
+
+def note_arrival(context, bodies: list[int]) -> None:
+    """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows."""
+    for i in bodies:
+        if context.state.under_contact[i]:
+            context.state.arrival_energy[i] = mechanical_energy(context.state.now, context.world, np.array([i]))
+
+
+def guard_energy(context, bodies: list[int], time: float) -> set[int]:
+    """Take what groups of the bodies gained since they share their forces off their velocities; returns those slowed.
+
+    All that share forces arrive together. The energy is that seen from the ground, which has the velocity U:
+
+        E - E_0 - sum m (v - v_0).U + sum m a.U (t - t_0),    a: gravity and constant forces.
+    """
+    world, state, course, now = context.world, context.state, context.state.course, context.state.now
     slowed: set[int] = set()
     touched = [i for i in bodies if state.under_contact[i]]
-    for i in touched:
-        state.arrival_energy[i] = mechanical_energy(state.now, world, np.array([i]))
     for first in sorted({int(state.sharing[i]) for i in touched if state.closed[i]}):
-        group = np.array([i for i in touched if state.sharing[i] == first])
-        gained = sum(state.arrival_energy[i] - state.energy_at_start[i] for i in group.tolist())
-        before = kinetic_energy(state.now, world, group)
+        group, ground = np.array([i for i in touched if state.sharing[i] == first]), state.ground[first]
+        change = now.velocity[group] - course.velocity[group] - (time - course.start[group, None]) * world.steady_acceleration[group]
+        gained = mechanical_energy(now, world, group) - float(state.energy_at_start[group].sum())
+        gained -= float(world.mass[group] @ (change @ ground.velocity))
+        before = kinetic_energy(now, world, group)
         if gained > GAIN * before:
-            take_off(state.now, world, group, gained, state.ground[first])
-            context.log.book(time, "guard", kinetic_energy(state.now, world, group) - before)
+            now.velocity[group] -= ground.velocity
+            take_off(now, world, group, gained, ground.pushes)
+            now.velocity[group] += ground.velocity
+            context.log.book(time, "guard", kinetic_energy(now, world, group) - before)
             slowed.update(group.tolist())
     return slowed
 

@@ -85,6 +85,15 @@ class JointState:
         both = np.unique(np.concatenate([self.table.body_a[joints], self.table.body_b[joints]]))
         return both[both >= 0]
 
+    def are_passive(self, which: np.ndarray) -> bool:
+        """Whether joints are neither driven nor springs."""
+        rows = np.isin(self._joint_of_row, which)
+        return bool(np.all(np.isinf(self.table.stiffness[rows])))
+
+    def hold_to_world(self, which: np.ndarray) -> bool:
+        """Whether one of the joints is fixed to the world."""
+        return bool(np.any(self.table.body_a[which] < 0) or np.any(self.table.body_b[which] < 0))
+
     def moving_bodies(self, context) -> np.ndarray:
         """Dynamic bodies with joints that do not rest."""
         bodies = np.array(sorted(self._of_body), np.int64)

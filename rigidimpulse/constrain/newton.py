@@ -169,6 +169,14 @@ def _evaluate(rows, base, change, q, r, frozen, u, p, slope, residual):
 
 
 @jit
+def _largest(p):
+    worst = 0.0
+    for i in range(p.shape[0]):
+        worst = max(worst, abs(p[i]))
+    return worst
+
+
+@jit
 def _speed(rows, y, line):
     """Largest velocity of a row that y (n, 6) stands for."""
     multiply(rows, y, line)
@@ -246,7 +254,7 @@ def solve_newton(rows, n, target):
     y, u, r = np.empty((n, 6)), np.empty(count), np.empty(count)
     trial, q, frozen = rows.impulse.copy(), rows.impulse.copy(), np.full(count, -1.0)
     _velocities(rows, q, y, u)
-    best, largest = natural_residual(rows, u, q, weight), np.abs(q).max()
+    best, largest = natural_residual(rows, u, q, weight), _largest(q)
     k, free_k, failures, stagnant, previous, convex = REGULARISATION_START, REGULARISATION_FREE, 0, 0, best, False
     for _ in range(MAX_OUTER):
         if best <= max(target, rounding_floor(rows, weight, rows.impulse)) or stagnant > 4:
@@ -264,7 +272,7 @@ def solve_newton(rows, n, target):
         q[:] = trial
         _velocities(rows, q, y, u)
         reached = natural_residual(rows, u, q, weight)
-        now = np.abs(q).max()
+        now = _largest(q)
         if reached < best and (largest == 0.0 or reached * now <= best * largest):
             best, largest = reached, now
             rows.impulse[:] = q

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidimpulse.constrain.arrival import arrive
-from rigidimpulse.constrain.energy_guard import note_arrival
+from rigidimpulse.constrain.energy_guard import guard_energy, note_arrival
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import CORNER, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.detect.pair_table import live_contacts
@@ -194,12 +194,14 @@ def _end_sub_steps(context, groups: list[Group], time: float, bodies: np.ndarray
     for group in groups:
         if arrive(context, group):
             classify(context, group)
-    guarded = note_arrival(context, bodies.tolist(), time)
+    note_arrival(context, bodies.tolist())
     for group in groups:
-        if not guarded.isdisjoint(group.members.tolist()):
-            classify(context, group)
         if len(group.joints):
             context.joints.arrive(context, group)
+            classify(context, group)
+    slowed = guard_energy(context, bodies.tolist(), time)
+    for group in groups:
+        if not slowed.isdisjoint(group.members.tolist()):
             classify(context, group)
 
 
