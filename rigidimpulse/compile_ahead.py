@@ -119,16 +119,21 @@ def _move_sweep_and_solve(context) -> None:
     from rigidimpulse.constrain.rows import make_rows
     from rigidimpulse.detect.touching import bring_all
     from rigidimpulse.detect.window import Window
+    from rigidimpulse.integrate.course import FREE, take
+    from rigidimpulse.integrate.flight import set_touch_gaps
     from rigidimpulse.simulation import start_courses
     from rigidimpulse.sweep import bisection
 
-    state, now = context.state, context.state.now
+    state, now, world = context.state, context.state.now, context.world
     zero = np.zeros(1)
     start_courses(context)
     context.recorder.start(state.course)
     bring_all(state.course, np.array([1]), 0.0, now, state.rotation, context.acceleration, context.angular_acceleration)
     context.bring(1, 0.0)
-    Window(context, 1.0 / 60.0).change_course(1, 0.0)
+    take(state.course, 1, 0.0, now, np.zeros(3), np.zeros(3), FREE)
+    window = Window(context, 1.0 / 60.0)
+    window.change_course(1, 0.0)
+    set_touch_gaps(window.pairs, np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool), 0.0, world.dynamic, window.inside)
     solve_newton(make_rows.py_func(0), 1, 1.0)
     bisection.sweep(context.detector, state.course, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
 

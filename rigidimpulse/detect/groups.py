@@ -265,6 +265,7 @@ def classify(context, group: Group) -> None:
         least = float(world.steady_strength[group.members].max())
     pressing(
         world.geometry, world.shape_of_body, state.rotation, state.now, contacts, group.kinds, group.features,
-        context.acceleration, context.angular_acceleration, force, least, group.delta, group.approach, group.rest_speed,
+        context.acceleration, context.angular_acceleration, force, least, world.accuracy.step, group.delta, group.approach,
+        group.rest_speed,
     )
     group.live |= np.abs(group.approach) <= group.rest_speed

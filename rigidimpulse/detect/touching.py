@@ -22,7 +22,7 @@ from rigidimpulse.integrate.course import FIXED, place_at, state_at
 from rigidimpulse.respond.impulse import inverse_effective_mass, relative_velocity
 from rigidimpulse.rotation import quaternion_to_matrix
 
-# Part of the bounding radii that rounding may take.
+# Part of bounding radii and of held gaps that rounding may take.
 ROUND_OFF = 1e-9
 
 
@@ -178,9 +178,11 @@ def _point_acceleration(acceleration, angular_acceleration, i, r, n):
 @jit
 def pressing(
     geometry, shape_of_body, rotation, bodies, contacts, kinds, features, acceleration, angular_acceleration, normal_force, least,
-    delta, approach, rest_speed,
+    step, delta, approach, rest_speed,
 ):
     """Fill approach (m,) = u.n and rest_speed (m,) = sqrt(2 a delta) [m/s]; a is at least `least`.
+
+    What the motion gives counts where it makes more than round-off of delta in a step [s]: bodies that stand still do so by round-off.
 
     kinds (m,), features (m, 2): what touches; acceleration, angular_acceleration (n, 3); normal_force (m,) N carried; delta (m,) m.
     """
@@ -193,8 +195,9 @@ def pressing(
         a = _point_acceleration(
             acceleration, angular_acceleration, contacts.body_a[c], contacts.arm_a[c], n
         ) - _point_acceleration(acceleration, angular_acceleration, contacts.body_b[c], contacts.arm_b[c], n)
-        for i in range(3):
-            a -= turning[c, i] * n[i]
+        turn = turning[c, 0] * n[0] + turning[c, 1] * n[1] + turning[c, 2] * n[2]
+        if abs(turn) * step * step > ROUND_OFF * delta[c]:
+            a -= turn
         if normal_force[c] > 0.0:
             inverse_effective_mass(bodies, contacts, c, k)
             for i in range(3):
