@@ -309,7 +309,7 @@ class Heaps:
         window.inside[members] = True
         context.wrench[group.members] = 0.0
         for i in members[context.state.under_contact[members]].tolist():
-            note_arrival(context, [i], group.time)
+            note_arrival(context, [i])
             book_contact_work(context, i, group.time)
             context.state.under_contact[i] = False
         end = self._end_of(context, window, group.time, members)
