@@ -15,7 +15,7 @@ from rigidimpulse.constrain.foresight import ALLOWED
 from rigidimpulse.constrain.resting import Held, hold_contacts
 from rigidimpulse.constrain.rolling import rolling_of
 from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.groups import Group, collect, make_group
+from rigidimpulse.detect.groups import MARGIN, Group, collect, make_group
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.plan import Bound, Skip
@@ -36,6 +36,8 @@ SHORTEST = 1e-5
 """Part of a step that is not split."""
 SHORTEST_STOP = 1e-3
 """Part of a step within which it does not matter when a contact stops."""
+LIFT_MARGIN = 30.0
+"""Held gaps within which contacts are looked for that a lift may close."""
 STEADY = 1e-9
 """rad in a step; what turns less does not."""
 
@@ -196,23 +198,28 @@ def sub_step(rate: float, step: float, rest: float) -> float:
 
 
 def _lift(context, window, group: Group) -> None:
-    """Bring sunken contacts back to their gap and look at the group's contacts again."""
+    """Bring sunken contacts back to their gap and look at the group's contacts again.
+
+    A light body turns far to make room for a heavy one: what it may come near is looked for farther away.
+    """
     state, now = context.state, context.state.now
     before = mechanical_energy(now, context.world, group.members)
-    lift_contacts(now, group.contacts, group.held, group.delta, group.members, context.column)
+    around, held = _look(context, window, group, LIFT_MARGIN), dict(zip(group.keys, group.held.tolist(), strict=True))
+    lifted = np.array([held.get(key, False) for key in around.keys], bool)
+    lift_contacts(now, around.contacts, lifted, around.delta, group.members, context.column)
     refresh_pose(group.members, now, state.rotation, state.course.inertia)
     context.log.book(group.time, "lift", mechanical_energy(now, context.world, group.members) - before)
     group.moved = True
-    real, integer = collect(context, window, group.pairs, group.time)
-    if not len(real):
-        group.held = np.zeros(0, bool)
-        return
-    acceleration, angular = context.acceleration[group.members].copy(), context.angular_acceleration[group.members].copy()
-    again = make_group(context, window, group.time, real, integer, np.ones(len(real), bool), group.joints)
+    again = _look(context, window, group, MARGIN)
     for name in ("contacts", "place", "kinds", "features", "keys", "delta", "approach", "rest_speed", "live"):
         setattr(group, name, getattr(again, name))
-    context.acceleration[group.members], context.angular_acceleration[group.members] = acceleration, angular
     group.held = group.slow()
+
+
+def _look(context, window, group: Group, margin: float) -> Group:
+    """The same group with its contacts at the present poses, within so many held gaps."""
+    real, integer = collect(context, window, group.pairs, group.time, margin)
+    return make_group(context, window, group.time, real, integer, np.ones(len(real), bool), group.joints)
 
 
 def _rests(context, group: Group, h: float) -> bool:

@@ -84,8 +84,8 @@ def empty_contacts(m: int) -> Contacts:
     return Contacts(*np.empty((2, m), np.int64), *np.empty((3, m, 3)), *np.empty((5, m)))
 
 
-def collect(context, window, pairs: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Manifolds of window pairs at the present poses: copies of the filled buffer rows.
+def collect(context, window, pairs: np.ndarray, time: float, margin: float = MARGIN) -> tuple[np.ndarray, np.ndarray]:
+    """Manifolds of window pairs at the present poses within so many held gaps: copies of the filled buffer rows.
 
     A pair that just came to contact but has no manifold (it overlaps, since its sweep does not back up time) has the
     witness of its sweep for a contact.
@@ -94,7 +94,7 @@ def collect(context, window, pairs: np.ndarray, time: float) -> tuple[np.ndarray
     while True:
         count = contacts_of_pairs(
             world.geometry, world.shape_of_body, state.now, state.rotation, window.a[pairs], window.b[pairs],
-            MARGIN * window.delta[pairs], context.scratch_pairs, context.contact_real, context.contact_int,
+            margin * window.delta[pairs], context.scratch_pairs, context.contact_real, context.contact_int,
             world.cylinders,
         )
         if count >= 0:
