@@ -31,6 +31,7 @@ from rigidimpulse.constrain.rows import (
     move_bodies,
     multiply,
     multiply_transposed,
+    response_to,
     rows_of,
     scaled_wrench,
     solve_with_slip,
@@ -162,15 +163,18 @@ def _add_moments(joints, which, rows, start, direction, moment):
             i += 1
 
 
-def close_joints(joints, which, bodies, rotation, members, number, angle, allowed: float) -> bool:
+def close_joints(joints, which, bodies, contacts, rotation, members, number, angle, allowed: float) -> bool:
     """Bring the joints' coordinates back to their targets by the least displacement in the metric of mass.
 
-    Done only where one is off by more than `allowed` [m or rad]; returns whether bodies were moved.
+    Done only where one is off by more than `allowed` [m or rad]; contacts keep half of their gaps, if they have any. Returns whether bodies
+    were moved.
     """
-    moved, last = False, np.inf
+    moved, last, m = False, np.inf, len(contacts.gap)
+    smooth, room = contacts._replace(static_friction=np.zeros(m)), 0.5 * np.maximum(contacts.gap, 0.0)
     before = bodies.position[members].copy(), bodies.orientation[members].copy()
     for _ in range(MAX_ROUNDS):
-        rows, worst = _closing_rows(joints, which, bodies, rotation, members, number, angle)
+        rows, _, _ = contact_rows(bodies, smooth, members, number, count_joint_rows(joints, which))
+        worst = _fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, m)
         if not worst < last:
             # No pose closes them; the one before was the best.
             bodies.position[members], bodies.orientation[members] = before
@@ -180,33 +184,34 @@ def close_joints(joints, which, bodies, rotation, members, number, angle, allowe
             break
         moved, last = True, worst
         before = bodies.position[members].copy(), bodies.orientation[members].copy()
+        rows.bias[:m] = room
         solve_newton(rows, len(members), 1e-3 * allowed)
+        room += response_to(rows, len(members), rows.impulse)[:m]
         move_bodies(bodies, members, rows)
         rotation[members] = to_matrix(bodies.orientation[members])
     return moved
 
 
 @jit
-def _closing_rows(joints, which, bodies, rotation, members, number, angle):
-    """Rows of the displacement that closes the joints, and the worst error of a coordinate."""
-    count = count_joint_rows(joints, which)
-    for k in range(members.shape[0]):
-        number[members[k]] = k
-    rows, value, direction = make_rows(count), np.empty(count), np.empty((count, 3))
-    joint_rows(joints, which, bodies, rotation, number, angle, rows, np.int64(0), value, direction)
+def _fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, start):
+    """Rows, from `start` on, of the displacement that closes the joints; returns the worst error of a coordinate."""
+    count = rows.bias.shape[0] - start
+    value, direction = np.empty(count), np.empty((count, 3))
+    joint_rows(joints, which, bodies, rotation, number, angle, rows, start, value, direction)
     worst, i = 0.0, 0
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
-            rows.bias[i], rows.lower[i], rows.upper[i] = value[i], joints.lower[k], joints.upper[k]
+            r = start + i
+            rows.bias[r], rows.lower[r], rows.upper[r] = value[i], joints.lower[k], joints.upper[k]
             if joints.stiffness[k] < np.inf:
-                rows.kind[i] = BOUNDED
-                rows.lower[i] = rows.upper[i] = 0.0
+                rows.kind[r] = BOUNDED
+                rows.lower[r] = rows.upper[r] = 0.0
             elif joints.lower[k] < 0.0 and (joints.upper[k] > 0.0 or value[i] > 0.0):
                 worst = max(worst, abs(value[i]))
             elif joints.upper[k] > 0.0 and value[i] < 0.0:
                 worst = max(worst, abs(value[i]))
             i += 1
-    return rows, worst
+    return worst
 
 
 @jit

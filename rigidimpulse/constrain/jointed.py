@@ -113,7 +113,7 @@ class JointState:
             now.velocity[i] -= now.inv_mass[i] * held[:3]
             now.angular_velocity[i] -= now.inv_inertia[i] @ held[3:]
         moved = close_joints(
-            self.table, which, now, state.rotation, members, context.column, memory.angle, self._allowed
+            self.table, which, now, group.contacts, state.rotation, members, context.column, memory.angle, self._allowed
         )
         if moved:
             refresh_pose(members, now, state.rotation, state.course.inertia)
