@@ -12,6 +12,7 @@ from rigidimpulse.constrain.contact_motion import Motion, contact_motion
 from rigidimpulse.constrain.drift import lift_contacts, needs_lift
 from rigidimpulse.constrain.energy_guard import note_hold
 from rigidimpulse.constrain.foresight import ALLOWED
+from rigidimpulse.constrain.joint_forces import UNSOLVED
 from rigidimpulse.constrain.resting import Held, hold_contacts
 from rigidimpulse.constrain.rolling import rolling_of
 from rigidimpulse.conventions import TOLERANCES
@@ -21,9 +22,8 @@ from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.plan import Bound, Skip
 from rigidimpulse.respond.impulse import select
 
-# Residual of the solver that is reported, relative to the speed gained in the step, and energy that such forces may make, relative.
-UNSOLVED = 1e-6
 PLAY = 1e-3
+"""Energy that forces which are no solution may make, relative."""
 TURN = 0.01
 """rad, how far arms and normals of contacts may turn in a sub-step."""
 MOST_SUB_STEPS = 256

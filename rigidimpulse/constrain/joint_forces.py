@@ -42,7 +42,9 @@ from rigidimpulse.rotation import quaternion_to_matrix, to_matrix
 
 MAX_ROUNDS = 20
 MOST_FAILURES = 3
-"""Rounds in a row that close joints no better, after which the best is taken."""
+"""Rounds in a row that close joints no better or are not solved, after which the best is taken."""
+UNSOLVED = 1e-6
+"""Residual of the solver that counts as none, relative to the speed gained in the sub-step."""
 # Residual asked of the solver, and of closing, relative to the speed gained in the sub-step.
 SOLVE_TOLERANCE = 1e-12
 TINY = 1e-300
@@ -259,9 +261,9 @@ def hold_jointed(
         worst, largest = _close_at_end(
             joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench
         )
-        closer = worst <= max(best, allowed)
+        closer = worst <= max(best, allowed) and residual <= UNSOLVED * scale
         failures = 0 if closer else failures + 1
-        if closer:
+        if worst <= max(best, allowed):
             best, kept = worst, rows.impulse.copy()
         if (round_ > 1 and worst <= allowed) or failures == MOST_FAILURES or not np.isfinite(worst):
             break

@@ -28,6 +28,7 @@ from rigidimpulse.constrain.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMEN
 MAX_OUTER = 60
 MAX_INNER = 60
 MAX_HALVINGS = 8
+MOST_IDLE = 8
 REGULARISATION_START = 1e-3
 REGULARISATION_LEAST = 1e-12
 REGULARISATION_FREE = 1e-9
@@ -255,7 +256,7 @@ def solve_newton(rows, n, target):
     trial, q, frozen = rows.impulse.copy(), rows.impulse.copy(), np.full(count, -1.0)
     _velocities(rows, q, y, u)
     best, largest = natural_residual(rows, u, q, weight), _largest(q)
-    k, free_k, failures, stagnant, previous, convex = REGULARISATION_START, REGULARISATION_FREE, 0, 0, best, False
+    k, free_k, failures, stagnant, idle, previous, convex = REGULARISATION_START, REGULARISATION_FREE, 0, 0, 0, best, False
     for _ in range(MAX_OUTER):
         if best <= max(target, rounding_floor(rows, weight, rows.impulse)) or stagnant > 4:
             break
@@ -278,6 +279,9 @@ def solve_newton(rows, n, target):
             rows.impulse[:] = q
         if reached > 0.5 * previous and k <= REGULARISATION_LEAST:
             stagnant += 1
+        idle = idle + 1 if reached > 0.9 * previous else 0
+        if idle > MOST_IDLE:
+            break
         previous = reached
         k = max(k * 0.3, 1e-2) if convex else max(k * (0.1 if failures < 3 else 0.3), REGULARISATION_LEAST)
         convex = False
