@@ -132,6 +132,7 @@ def _move_sweep_and_solve(context) -> None:
     context.bring(1, 0.0)
     take(state.course, 1, 0.0, now, np.zeros(3), np.zeros(3), FREE)
     window = Window(context, 1.0 / 60.0)
+    window.find_pairs()
     window.change_course(1, 0.0)
     set_touch_gaps(window.pairs, np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool), 0.0, world.dynamic, window.inside)
     solve_newton(make_rows.py_func(0), 1, 1.0)
