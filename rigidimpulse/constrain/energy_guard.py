@@ -88,9 +88,12 @@ def guard_energy(context, bodies: list[int], time: float) -> set[int]:
         gained -= float(world.mass[group] @ (change @ ground.velocity))
         before = kinetic_energy(now, world, group)
         if gained > GAIN * before:
+            v, w = now.velocity[group].copy(), now.angular_velocity[group].copy()
             now.velocity[group] -= ground.velocity
             take_off(now, world, group, gained, ground.pushes)
             now.velocity[group] += ground.velocity
+            # Frames on the way have their share of it.
+            state.correction[group] += np.hstack([now.velocity[group] - v, now.angular_velocity[group] - w])
             context.log.book(time, "guard", kinetic_energy(now, world, group) - before)
             slowed.update(group.tolist())
     return slowed

@@ -129,13 +129,15 @@ def test_second_order_at_every_frame(scene: Callable, fps: float) -> None:
 def error_inside(scene: Callable, step: float) -> tuple[float, float]:
     """Error of the spin [rad/s] in the middle of steps, but for the mean of those at their ends; largest change of its rate [rad/s^3].
 
-    The first step is left out: it lifts bodies drawn touching to the gap.
+    The first step is left out: it lifts bodies drawn touching to the gap. So is what follows 0.15 s: there the curvature of the error
+    itself, of second order, is no longer small beside it.
     """
     run, name, _, spin = scene(step, 2.0 / step)
-    error = run.angular_velocity(name) - spin
+    early = run.times < 0.15
+    error = (run.angular_velocity(name) - spin)[early]
     error = error[: len(error) // 2 * 2 - 1]
     middle = error[1::2] - 0.5 * (error[:-1:2] + error[2::2])
-    rate = np.diff(spin, 2, axis=0) / (0.5 * step) ** 2
+    rate = np.diff(spin[early], 2, axis=0) / (0.5 * step) ** 2
     return float(np.abs(middle[1:]).max()), float(np.abs(rate).max())
 
 
