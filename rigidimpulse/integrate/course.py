@@ -1,16 +1,23 @@
 """The course of every body: its exact path since the last time that something acted on it.
 
-    x(t) = x0 + v0 s + 1/2 a s^2,    v(t) = v0 + a s,    s = t - start
+    x(t) = x0 + v0 s + 1/2 a s^2 + 1/6 j s^3,    v(t) = v0 + a s + 1/2 j s^2,    s = t - start
     rotation, by mode:
       FIXED        none, the body never moves
       PRESCRIBED   q(t) = exp(w0 s) q0, constant velocity and world angular velocity (its acceleration must be 0)
       FREE         no torque: closed form (free_top)
-      FORCED       constant world torque: power series (forced_top)
+      FORCED       world torque tau0 + tau1 s: power series (forced_top)
       STEPPED      as PRESCRIBED: a straight way to a pose that a heap's solver found; the body's own velocities run from those
                    at the start to those at the end of the step
 
 The sweep and the integration both read the path here, so the impact time and the motion cannot disagree. A row is set
 by its owner (all columns but `top`), then made ready by `begin`. Evaluation only reads; it may be called in any order.
+
+A force F(s) and a torque that vary over a stretch of length h enter by their two moments, F for instance by
+
+    M0 = integral of F ds,   M1 = integral of (h - s) F ds,   m a = (6 M1 / h - 2 M0) / h,   m j = (6 M0 - 12 M1 / h) / h^2:
+
+the line that has the same moments leaves v(h) and x(h) as they are, and the rotation to order 4. With forces F_1 ... F_4 of a
+step of the classical Runge-Kutta method, M0 = h (F_1 + 2 F_2 + 2 F_3 + F_4) / 6 and M1 = h^2 (F_1 + F_2 + F_3) / 6.
 """
 
 from typing import NamedTuple
@@ -40,9 +47,13 @@ class Course(NamedTuple):
     angular_velocity: np.ndarray
     """(n, 3) rad/s at `start`"""
     acceleration: np.ndarray
-    """(n, 3) m/s^2, constant"""
+    """(n, 3) m/s^2 at `start`"""
+    jerk: np.ndarray
+    """(n, 3) m/s^3, constant; read in modes FREE and FORCED only"""
     torque: np.ndarray
-    """(n, 3) N m, constant; read in mode FORCED only"""
+    """(n, 3) N m at `start`; read in mode FORCED only"""
+    torque_rate: np.ndarray
+    """(n, 3) N m/s, constant; read in mode FORCED only"""
     mode: np.ndarray
     """(n,) int64: FIXED, PRESCRIBED, FREE, FORCED, STEPPED"""
     inertia: np.ndarray
@@ -68,7 +79,9 @@ def make_course(num_bodies: int) -> Course:
         velocity=vectors(),
         angular_velocity=vectors(),
         acceleration=vectors(),
+        jerk=vectors(),
         torque=vectors(),
+        torque_rate=vectors(),
         mode=np.zeros(num_bodies, dtype=np.int64),
         inertia=np.ones((num_bodies, 3)),
         top=np.zeros((num_bodies, TOP_SIZE)),
@@ -81,7 +94,7 @@ def begin(course, i):
     """Prepare `course.top[i]`; call it after any other column of row i has changed."""
     mode = course.mode[i]
     inertia, q, w, top = course.inertia[i], course.orientation[i], course.angular_velocity[i], course.top[i]
-    if mode == FORCED and forced_top.prepare(inertia, q, w, course.torque[i], top):
+    if mode == FORCED and forced_top.prepare(inertia, q, w, course.torque[i], course.torque_rate[i], top):
         return
     if mode == FREE or mode == FORCED:
         free_top.prepare(inertia, q, w, top)
@@ -98,9 +111,48 @@ def _start_pose(course, i, x_out, q_out):
 
 
 @jit
+def jerk_of(course, i):
+    """Jerk of body i as three numbers, m/s^3."""
+    if course.mode[i] == FREE or course.mode[i] == FORCED:
+        return course.jerk[i, 0], course.jerk[i, 1], course.jerk[i, 2]
+    return 0.0, 0.0, 0.0
+
+
+@jit
+def torque_rate_of(course, i):
+    """Rate of the torque on body i as three numbers, N m/s."""
+    if course.mode[i] == FORCED:
+        return course.torque_rate[i, 0], course.torque_rate[i, 1], course.torque_rate[i, 2]
+    return 0.0, 0.0, 0.0
+
+
+@jit
+def _with_rate(values, i, rate, s):
+    """Row i of an array (n, 3) plus `rate` (three numbers) times s."""
+    x, y, z = values[i, 0], values[i, 1], values[i, 2]
+    # Adding nothing could still turn -0 into 0.
+    if rate[0] != 0.0 or rate[1] != 0.0 or rate[2] != 0.0:
+        return x + s * rate[0], y + s * rate[1], z + s * rate[2]
+    return x, y, z
+
+
+@jit
+def acceleration_at(course, i, t):
+    """Acceleration of body i at the time t as three numbers, m/s^2; that of a FIXED body is not looked at."""
+    return _with_rate(course.acceleration, i, jerk_of(course, i), t - course.start[i])
+
+
+@jit
+def torque_at(course, i, t):
+    """Torque on body i at the time t as three numbers, N m; it acts in mode FORCED only."""
+    return _with_rate(course.torque, i, torque_rate_of(course, i), t - course.start[i])
+
+
+@jit
 def _add_displacement(course, i, s, x_out):
+    mean = _with_rate(course.acceleration, i, jerk_of(course, i), s / 3.0)
     for k in range(3):
-        displacement = s * (course.velocity[i, k] + 0.5 * s * course.acceleration[i, k])
+        displacement = s * (course.velocity[i, k] + 0.5 * s * mean[k])
         # Adding nothing could still turn -0 into 0: a body that stays keeps its very bits.
         if displacement != 0.0:
             x_out[k] += displacement
@@ -134,8 +186,9 @@ def motion_at(course, i, t, x_out, q_out, v_out, w_out):
     _start_pose(course, i, x_out, q_out)
     s = t - course.start[i]
     moves = course.mode[i] != FIXED
+    mean = _with_rate(course.acceleration, i, jerk_of(course, i), 0.5 * s)
     for k in range(3):
-        v_out[k] = course.velocity[i, k] + s * course.acceleration[i, k] if moves else 0.0
+        v_out[k] = course.velocity[i, k] + s * mean[k] if moves else 0.0
         w_out[k] = course.angular_velocity[i, k] if moves else 0.0
     if moves and s != 0.0:
         _add_displacement(course, i, s, x_out)
