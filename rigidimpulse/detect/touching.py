@@ -16,7 +16,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.manifold import MAX_PER_NORMAL, pair_contacts, reduce_contacts
-from rigidimpulse.integrate.course import FIXED, state_at
+from rigidimpulse.integrate.course import FIXED, acceleration_at, state_at, torque_at
 from rigidimpulse.respond.impulse import inverse_effective_mass, relative_velocity
 from rigidimpulse.rotation import quaternion_to_matrix
 
@@ -57,10 +57,9 @@ def bring(course, i, time, bodies, rotation, acceleration, angular_acceleration)
         acceleration[i, k] = 0.0
         angular_acceleration[i, k] = 0.0
     if bodies.inv_mass[i] > 0.0 and course.mode[i] != FIXED:
-        for k in range(3):
-            acceleration[i, k] = course.acceleration[i, k]
+        acceleration[i, 0], acceleration[i, 1], acceleration[i, 2] = acceleration_at(course, i, time)
         gyroscopic_acceleration(
-            rotation[i], course.inertia[i], bodies.angular_velocity[i], course.torque[i], angular_acceleration[i]
+            rotation[i], course.inertia[i], bodies.angular_velocity[i], torque_at(course, i, time), angular_acceleration[i]
         )
 
 

@@ -20,6 +20,7 @@ the line that has the same moments leaves v(h) and x(h) as they are, and the rot
 step of the classical Runge-Kutta method, M0 = h (F_1 + 2 F_2 + 2 F_3 + F_4) / 6 and M1 = h^2 (F_1 + F_2 + F_3) / 6.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -127,6 +128,20 @@ def torque_rate_of(course, i):
 
 
 @jit
+def turning_points(rate, bend, growth):
+    """Roots of rate + bend s + growth s^2 / 2, growth not 0, the lower one first; inf where there is none.
+
+    They are where a coordinate of a path turns. One may be nan where both are 0.
+    """
+    square = bend * bend - 2.0 * growth * rate
+    if square < 0.0:
+        return math.inf, math.inf
+    q = -(bend + math.copysign(math.sqrt(square), bend))  # no cancellation
+    first, second = q / growth, 2.0 * rate / q
+    return (first, second) if first < second else (second, first)
+
+
+@jit
 def _with_rate(values, i, rate, s):
     """Row i of an array (n, 3) plus `rate` (three numbers) times s."""
     x, y, z = values[i, 0], values[i, 1], values[i, 2]
@@ -150,9 +165,12 @@ def torque_at(course, i, t):
 
 @jit
 def _add_displacement(course, i, s, x_out):
-    mean = _with_rate(course.acceleration, i, jerk_of(course, i), s / 3.0)
+    varies = course.mode[i] == FREE or course.mode[i] == FORCED
     for k in range(3):
-        displacement = s * (course.velocity[i, k] + 0.5 * s * mean[k])
+        mean = course.acceleration[i, k]
+        if varies and course.jerk[i, k] != 0.0:
+            mean += s * course.jerk[i, k] / 3.0
+        displacement = s * (course.velocity[i, k] + 0.5 * s * mean)
         # Adding nothing could still turn -0 into 0: a body that stays keeps its very bits.
         if displacement != 0.0:
             x_out[k] += displacement
@@ -186,9 +204,12 @@ def motion_at(course, i, t, x_out, q_out, v_out, w_out):
     _start_pose(course, i, x_out, q_out)
     s = t - course.start[i]
     moves = course.mode[i] != FIXED
-    mean = _with_rate(course.acceleration, i, jerk_of(course, i), 0.5 * s)
+    varies = course.mode[i] == FREE or course.mode[i] == FORCED
     for k in range(3):
-        v_out[k] = course.velocity[i, k] + s * mean[k] if moves else 0.0
+        mean = course.acceleration[i, k]
+        if varies and course.jerk[i, k] != 0.0:
+            mean += 0.5 * s * course.jerk[i, k]
+        v_out[k] = course.velocity[i, k] + s * mean if moves else 0.0
         w_out[k] = course.angular_velocity[i, k] if moves else 0.0
     if moves and s != 0.0:
         _add_displacement(course, i, s, x_out)
