@@ -102,8 +102,8 @@ def first_sample_below(geometry, course, shape_a, shape_b, start, end, samples, 
     return np.inf
 
 
-def random_pair(rng):
-    """Two random bodies a random gap apart; None if they overlap wherever they are put."""
+def random_pair(rng, rates=False):
+    """Two random bodies a random gap apart, with jerks and torque rates if asked for; None if they overlap wherever they are put."""
     pair = Pair(*rng.choice(NAMES, 2))
     for body, kind in enumerate(pair.shapes):
         plane = NAMES[kind] == "half space"
@@ -120,6 +120,10 @@ def random_pair(rng):
             torque=rng.normal(size=3) * 10 ** rng.uniform(-1, 2) * (mode == FORCED),
             inertia=split.sum() - split,
         )
+        if rates and free:
+            pair.course.jerk[body] = rng.normal(size=3) * 10 ** rng.uniform(0, 5)
+            pair.course.torque_rate[body] = rng.normal(size=3) * 10 ** rng.uniform(0, 5)
+            begin(pair.course, body)
     direction, wanted = rng.normal(size=3), 10 ** rng.uniform(-4, 0.3)
     near, far = 0.0, 20.0
     for _ in range(40):
@@ -130,11 +134,15 @@ def random_pair(rng):
     return pair if 1e-8 < pair.gap(0.0) < 10.0 else None
 
 
+@pytest.mark.parametrize("rates", [False, True])
 @pytest.mark.parametrize("seed", range(8))
-def test_random_pairs_against_dense_sampling(seed):
-    """All kinds, random motions: both methods agree, nothing is touched before, and the gap is right at the time found."""
+def test_random_pairs_against_dense_sampling(seed, rates):
+    """All kinds, random motions: both methods agree, nothing is touched before, and the gap is right at the time found.
+
+    Jerks and torque rates move points by centimetres to metres in a step, ten decades more than the rounding allowed for.
+    """
     rng = np.random.default_rng(seed)
-    for pair in filter(None, (random_pair(rng) for _ in range(120))):
+    for pair in filter(None, (random_pair(rng, rates) for _ in range(300 if rates else 120))):
         end = STEP * 10 ** rng.uniform(-1, 1)
         touch = 10 ** rng.uniform(-9, -4)
         if pair.gap(0.0) < 2.0 * touch:
@@ -200,6 +208,56 @@ def test_ball_thrown_at_a_ball_meets_the_root_of_the_quartic(method):
         pair = Pair("sphere", "sphere").set(1, FREE, x, velocity=v, acceleration=a)
         time, status, _, _ = pair.sweep(method, end=2.0, touch=0.0)
         square = np.polynomial.Polynomial([x @ x - 1.0, 2.0 * x @ v, v @ v + x @ a, v @ a, 0.25 * a @ a])
+        roots = [r.real for r in square.roots() if abs(r.imag) < 1e-9 and 0.0 < r.real < 2.0]
+        assert (status == IMPACT) == bool(roots)
+        if roots:
+            assert time == pytest.approx(min(roots), abs=1e-9)
+
+
+@pytest.mark.parametrize("method", GUARDED)
+def test_ball_with_jerk_meets_a_plane_at_the_root_of_the_cubic(method):
+    """z = z0 + v t + a t^2 / 2 + j t^3 / 6, with three real roots, one, or one that is missed by a little: the first one counts.
+
+    A parabola in its place is off by j t^3 / 6, up to metres.
+    """
+    rng = np.random.default_rng(6)
+    for trial in range(400):
+        roots = rng.uniform(-1.0, 2.0, size=3)
+        growth = rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-1, 2)
+        cubic = np.polynomial.Polynomial.fromroots(roots) * growth
+        if trial % 2:
+            turns = cubic.deriv().roots()
+            cubic += 10 ** rng.uniform(-6, 0) - cubic(turns[np.argmax(cubic.deriv(2)(turns))])  # its valley is above 0
+        z, v, a, j = cubic.coef * (1.0, 1.0, 2.0, 6.0)
+        if z < 1e-3:
+            continue
+        pair = Pair("half space", "sphere").set(1, FREE, (0, 0, 0.5 + z), (1, 0, v), acceleration=(0, 2, a), jerk=(3, 0, j))
+        time, status, queries, _ = pair.sweep(method, end=2.0, touch=0.0)
+        real = [r.real for r in cubic.roots() if abs(r.imag) < 1e-12 and 0.0 < r.real < 2.0]
+        assert (status == IMPACT) == bool(real)
+        assert queries <= 3
+        if real:
+            steepness = abs(cubic.deriv()(min(real)))
+            assert abs(time - min(real)) < 1e-13 * np.abs(cubic.coef).max() / steepness
+
+
+@pytest.mark.parametrize("method", GUARDED)
+def test_ball_with_jerk_returns_to_a_plane(method):
+    """From the very gap of contact it leaves, slower and slower, by v t + a t^2 / 2 - |j| t^3 / 6, and is back at the root of that."""
+    pair = Pair("half space", "sphere").set(1, FREE, (0, 0, 0.5), (0, 0, 1.0), acceleration=(0, 0, 2.0), jerk=(0, 0, -30.0))
+    back = (1.0 + np.sqrt(1.0 + 4.0 * 5.0)) / 10.0  # 1 + t - 5 t^2 = 0
+    assert pair.sweep(method, end=2.0, touch=0.0)[0] == pytest.approx(back, abs=1e-14)
+    assert pair.sweep(method, end=0.5 * back, touch=0.0)[1] == SEPARATE
+
+
+@pytest.mark.parametrize("method", GUARDED)
+def test_balls_with_jerk_meet_at_the_root_of_the_sextic(method):
+    rng = np.random.default_rng(7)
+    for _ in range(100):
+        x, v, a, j = rng.normal(size=(4, 3)) * np.array([3.0, 3.0, 6.0, 20.0])[:, None] + np.array([[0, 0, 4], [0, 0, 0], [0, 0, 0], [0, 0, 0]])
+        pair = Pair("sphere", "sphere").set(1, FREE, x, velocity=v, acceleration=a, jerk=j)
+        time, status, _, _ = pair.sweep(method, end=2.0, touch=0.0)
+        square = sum(np.polynomial.Polynomial([x[k], v[k], a[k] / 2.0, j[k] / 6.0]) ** 2 for k in range(3)) - 1.0
         roots = [r.real for r in square.roots() if abs(r.imag) < 1e-9 and 0.0 < r.real < 2.0]
         assert (status == IMPACT) == bool(roots)
         if roots:
