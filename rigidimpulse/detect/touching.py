@@ -16,7 +16,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.manifold import MAX_PER_NORMAL, pair_contacts, reduce_contacts
-from rigidimpulse.integrate.course import FIXED, acceleration_at, state_at, torque_at
+from rigidimpulse.integrate.course import FIXED, JERK, TORQUE_RATE, rate_of, row_at, state_at
 from rigidimpulse.respond.impulse import inverse_effective_mass, relative_velocity
 from rigidimpulse.rotation import quaternion_to_matrix
 
@@ -57,10 +57,10 @@ def bring(course, i, time, bodies, rotation, acceleration, angular_acceleration)
         acceleration[i, k] = 0.0
         angular_acceleration[i, k] = 0.0
     if bodies.inv_mass[i] > 0.0 and course.mode[i] != FIXED:
-        acceleration[i, 0], acceleration[i, 1], acceleration[i, 2] = acceleration_at(course, i, time)
-        gyroscopic_acceleration(
-            rotation[i], course.inertia[i], bodies.angular_velocity[i], torque_at(course, i, time), angular_acceleration[i]
-        )
+        s = time - course.start[i]
+        acceleration[i, 0], acceleration[i, 1], acceleration[i, 2] = row_at(course.acceleration, i, rate_of(course, i, JERK), s)
+        torque = row_at(course.torque, i, rate_of(course, i, TORQUE_RATE), s)
+        gyroscopic_acceleration(rotation[i], course.inertia[i], bodies.angular_velocity[i], torque, angular_acceleration[i])
 
 
 @jit

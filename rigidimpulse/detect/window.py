@@ -12,7 +12,7 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.broadphase import overlapping_pairs, overlapping_with
 from rigidimpulse.detect.groups import MARGIN, Group, touching_groups
-from rigidimpulse.integrate.course import FIXED, FREE, acceleration_at, jerk_of, pose_at, turning_points
+from rigidimpulse.integrate.course import FIXED, FREE, JERK, pose_at, rate_of, row_at, turning_points
 
 NEAR = 1e-6
 """Contacts that much farther away than the declared gap, relative to it, are in contact too."""
@@ -35,16 +35,17 @@ def path_box(course, i, begin, end, radius, box_min, box_max):
     h = end - begin
     s = begin - course.start[i]
     mode = course.mode[i]
-    accelerations, jerk = acceleration_at(course, i, begin), jerk_of(course, i)
+    growth = rate_of(course, i, JERK)
+    pull = row_at(course.acceleration, i, growth, s)
     for k in range(3):
-        a = accelerations[k] if mode >= FREE else 0.0
-        v = 0.0 if mode == FIXED else course.velocity[i, k] + (a - 0.5 * jerk[k] * s) * s
-        last = x[k] + v * h + 0.5 * a * h * h + jerk[k] * h * h * h / 6.0
+        a, jerk = pull[k] if mode >= FREE else 0.0, 0.0 if mode == FIXED else growth[k]
+        v = 0.0 if mode == FIXED else course.velocity[i, k] + (a - 0.5 * jerk * s) * s
+        last = x[k] + v * h + 0.5 * a * h * h + jerk * h * h * h / 6.0
         low, high = min(x[k], last), max(x[k], last)
-        if jerk[k] != 0.0:
-            for turn in turning_points(v, a, jerk[k]):
+        if jerk != 0.0:
+            for turn in turning_points(v, a, jerk):
                 if 0.0 < turn < h:
-                    apex = x[k] + turn * (v + turn * (0.5 * a + turn * jerk[k] / 6.0))
+                    apex = x[k] + turn * (v + turn * (0.5 * a + turn * jerk / 6.0))
                     low, high = min(low, apex), max(high, apex)
         elif a != 0.0 and 0.0 < -v / a < h:
             apex = x[k] - 0.5 * v * v / a

@@ -30,8 +30,8 @@ from rigidimpulse.integrate import forced_top, free_top
 
 FIXED, PRESCRIBED, FREE, FORCED, STEPPED = 0, 1, 2, 3, 4
 
-TOP_SIZE = max(free_top.FREE_TOP_SIZE, forced_top.FORCED_TOP_SIZE)
-"""Length of a row of `Course.top`."""
+JERK, TORQUE_RATE, TOP_SIZE = max(free_top.FREE_TOP_SIZE, forced_top.FORCED_TOP_SIZE) + np.array([0, 3, 6])
+"""Places in a row of `Course.top`, and its length. The constants of the rotation come first."""
 
 
 class Course(NamedTuple):
@@ -49,20 +49,27 @@ class Course(NamedTuple):
     """(n, 3) rad/s at `start`"""
     acceleration: np.ndarray
     """(n, 3) m/s^2 at `start`"""
-    jerk: np.ndarray
-    """(n, 3) m/s^3, constant; read in modes FREE and FORCED only"""
     torque: np.ndarray
     """(n, 3) N m at `start`; read in mode FORCED only"""
-    torque_rate: np.ndarray
-    """(n, 3) N m/s, constant; read in mode FORCED only"""
     mode: np.ndarray
     """(n,) int64: FIXED, PRESCRIBED, FREE, FORCED, STEPPED"""
     inertia: np.ndarray
     """(n, 3) kg m^2, principal moments; read in modes FREE and FORCED"""
     top: np.ndarray
-    """(n, TOP_SIZE) constants of the rotation, written by `begin`"""
+    """(n, TOP_SIZE) constants of the rotation, written by `begin`, then jerk and torque rate (an array of their own would cost every
+    kernel that gets a course some 3 % of its time)"""
     stepped: np.ndarray
     """(n, 13) velocity and angular velocity at `start`, their changes until the end of the step, and its length, s; read in mode STEPPED"""
+
+    @property
+    def jerk(self) -> np.ndarray:
+        """(n, 3) m/s^3, constant, a view; 0 but in modes FREE and FORCED: `begin` sees to it."""
+        return self.top[:, JERK:TORQUE_RATE]
+
+    @property
+    def torque_rate(self) -> np.ndarray:
+        """(n, 3) N m/s, constant, a view; 0 but in mode FORCED: `begin` sees to it."""
+        return self.top[:, TORQUE_RATE:]
 
 
 def make_course(num_bodies: int) -> Course:
@@ -80,9 +87,7 @@ def make_course(num_bodies: int) -> Course:
         velocity=vectors(),
         angular_velocity=vectors(),
         acceleration=vectors(),
-        jerk=vectors(),
         torque=vectors(),
-        torque_rate=vectors(),
         mode=np.zeros(num_bodies, dtype=np.int64),
         inertia=np.ones((num_bodies, 3)),
         top=np.zeros((num_bodies, TOP_SIZE)),
@@ -92,39 +97,17 @@ def make_course(num_bodies: int) -> Course:
 
 @jit
 def begin(course, i):
-    """Prepare `course.top[i]`; call it after any other column of row i has changed."""
+    """Prepare `course.top[i]`; call it after any other column of row i has changed. Rates that the mode has not are set to 0."""
     mode = course.mode[i]
     inertia, q, w, top = course.inertia[i], course.orientation[i], course.angular_velocity[i], course.top[i]
-    if mode == FORCED and forced_top.prepare(inertia, q, w, course.torque[i], course.torque_rate[i], top):
+    if mode != FORCED:
+        top[TORQUE_RATE if mode == FREE else JERK :] = 0.0
+    if mode == FORCED and forced_top.prepare(inertia, q, w, course.torque[i], top[TORQUE_RATE:], top):
         return
     if mode == FREE or mode == FORCED:
         free_top.prepare(inertia, q, w, top)
     elif mode == PRESCRIBED or mode == STEPPED:
         free_top.keep_axis(q, w, top)
-
-
-@jit
-def _start_pose(course, i, x_out, q_out):
-    for k in range(3):
-        x_out[k] = course.position[i, k]
-    for k in range(4):
-        q_out[k] = course.orientation[i, k]
-
-
-@jit
-def jerk_of(course, i):
-    """Jerk of body i as three numbers, m/s^3."""
-    if course.mode[i] == FREE or course.mode[i] == FORCED:
-        return course.jerk[i, 0], course.jerk[i, 1], course.jerk[i, 2]
-    return 0.0, 0.0, 0.0
-
-
-@jit
-def torque_rate_of(course, i):
-    """Rate of the torque on body i as three numbers, N m/s."""
-    if course.mode[i] == FORCED:
-        return course.torque_rate[i, 0], course.torque_rate[i, 1], course.torque_rate[i, 2]
-    return 0.0, 0.0, 0.0
 
 
 @jit
@@ -142,47 +125,40 @@ def turning_points(rate, bend, growth):
 
 
 @jit
-def _with_rate(values, i, rate, s):
-    """Row i of an array (n, 3) plus `rate` (three numbers) times s."""
+def rate_of(course, i, which):
+    """JERK or TORQUE_RATE of body i as three numbers."""
+    return course.top[i, which], course.top[i, which + 1], course.top[i, which + 2]
+
+
+@jit
+def row_at(values, i, rate, s):
+    """Row i of an array (n, 3) that grows by `rate` (three numbers) a second, after s: three numbers."""
     x, y, z = values[i, 0], values[i, 1], values[i, 2]
+    a, b, c = rate
     # Adding nothing could still turn -0 into 0.
-    if rate[0] != 0.0 or rate[1] != 0.0 or rate[2] != 0.0:
-        return x + s * rate[0], y + s * rate[1], z + s * rate[2]
-    return x, y, z
+    return (x + s * a, y + s * b, z + s * c) if a != 0.0 or b != 0.0 or c != 0.0 else (x, y, z)
 
 
 @jit
-def acceleration_at(course, i, t):
-    """Acceleration of body i at the time t as three numbers, m/s^2; that of a FIXED body is not looked at."""
-    return _with_rate(course.acceleration, i, jerk_of(course, i), t - course.start[i])
-
-
-@jit
-def torque_at(course, i, t):
-    """Torque on body i at the time t as three numbers, N m; it acts in mode FORCED only."""
-    return _with_rate(course.torque, i, torque_rate_of(course, i), t - course.start[i])
-
-
-@jit
-def _add_displacement(course, i, s, x_out):
-    varies = course.mode[i] == FREE or course.mode[i] == FORCED
-    for k in range(3):
-        mean = course.acceleration[i, k]
-        if varies and course.jerk[i, k] != 0.0:
-            mean += s * course.jerk[i, k] / 3.0
-        displacement = s * (course.velocity[i, k] + 0.5 * s * mean)
-        # Adding nothing could still turn -0 into 0: a body that stays keeps its very bits.
-        if displacement != 0.0:
-            x_out[k] += displacement
+def _moved(x, v, a, j, s):
+    """x + v s + a s^2 / 2 + j s^3 / 6."""
+    # Adding nothing could still turn -0 into 0: a body that stays keeps its very bits.
+    if j != 0.0:
+        a += s * j / 3.0
+    displacement = s * (v + 0.5 * s * a)
+    return x + displacement if displacement != 0.0 else x
 
 
 @jit
 def pose_at(course, i, t, x_out, q_out):
     """Write position (3,) and quaternion (4,) of body i at the time t >= start."""
-    _start_pose(course, i, x_out, q_out)
-    s = t - course.start[i]
-    if course.mode[i] != FIXED and s != 0.0:
-        _add_displacement(course, i, s, x_out)
+    s = t - course.start[i] if course.mode[i] != FIXED else 0.0
+    for k in range(3):
+        x_out[k] = _moved(course.position[i, k], course.velocity[i, k], course.acceleration[i, k], course.top[i, JERK + k], s)
+    if s == 0.0:
+        for k in range(4):
+            q_out[k] = course.orientation[i, k]
+    else:
         q_out[0], q_out[1], q_out[2], q_out[3], _, _, _ = forced_top.rotation(course.top[i], s)
 
 
@@ -201,18 +177,17 @@ def state_at(course, i, t, x_out, q_out, v_out, w_out):
 @jit
 def motion_at(course, i, t, x_out, q_out, v_out, w_out):
     """The same, with the velocities of the path: those by which pose changes. They differ in mode STEPPED only."""
-    _start_pose(course, i, x_out, q_out)
-    s = t - course.start[i]
     moves = course.mode[i] != FIXED
-    varies = course.mode[i] == FREE or course.mode[i] == FORCED
+    s = t - course.start[i] if moves else 0.0
+    mean = row_at(course.acceleration, i, rate_of(course, i, JERK), 0.5 * s)
     for k in range(3):
-        mean = course.acceleration[i, k]
-        if varies and course.jerk[i, k] != 0.0:
-            mean += 0.5 * s * course.jerk[i, k]
-        v_out[k] = course.velocity[i, k] + s * mean if moves else 0.0
+        x_out[k] = _moved(course.position[i, k], course.velocity[i, k], course.acceleration[i, k], course.top[i, JERK + k], s)
+        v_out[k] = course.velocity[i, k] + s * mean[k] if moves else 0.0
         w_out[k] = course.angular_velocity[i, k] if moves else 0.0
-    if moves and s != 0.0:
-        _add_displacement(course, i, s, x_out)
+    if s == 0.0:
+        for k in range(4):
+            q_out[k] = course.orientation[i, k]
+    else:
         q0, q1, q2, q3, wx, wy, wz = forced_top.rotation(course.top[i], s)
         q_out[0], q_out[1], q_out[2], q_out[3] = q0, q1, q2, q3
         w_out[0], w_out[1], w_out[2] = wx, wy, wz

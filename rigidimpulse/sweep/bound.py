@@ -42,17 +42,8 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import along, cross, dot, subtract
-from rigidimpulse.integrate.course import (
-    FIXED,
-    FORCED,
-    PRESCRIBED,
-    STEPPED,
-    acceleration_at,
-    jerk_of,
-    motion_at,
-    torque_at,
-    torque_rate_of,
-)
+from rigidimpulse.integrate.course import FIXED, FORCED, PRESCRIBED, STEPPED, TORQUE_RATE, motion_at, rate_of, row_at
+from rigidimpulse.integrate.course import JERK as JERK_OF_COURSE
 from rigidimpulse.rotation import quaternion_to_matrix
 
 # Offsets are numpy integers because numba would compile a kernel anew for every literal int that it is called with.
@@ -179,10 +170,11 @@ def motion_bound(course, i, t, horizon, row):
         course, i, t, row[POSITION:VELOCITY], row[ORIENTATION:SPIN_BOUND], row[VELOCITY:SPIN], row[SPIN:ACCELERATION]
     )
     quaternion_to_matrix(row[ORIENTATION:SPIN_BOUND], row[AXES:ORIENTATION].reshape((3, 3)))
-    mode = course.mode[i]
+    mode, s = course.mode[i], t - course.start[i]
     none = (0.0, 0.0, 0.0)
-    put(row, ACCELERATION, none if mode == FIXED else acceleration_at(course, i, t))
-    put(row, JERK, jerk_of(course, i))
+    growth = rate_of(course, i, JERK_OF_COURSE)
+    put(row, ACCELERATION, none if mode == FIXED else row_at(course.acceleration, i, growth, s))
+    put(row, JERK, none if mode == FIXED else growth)
     if mode == FIXED or mode == PRESCRIBED or mode == STEPPED:
         put(row, SPIN_RATE, none)
         row[SPIN_BOUND] = length(vector(row, SPIN))
@@ -190,8 +182,9 @@ def motion_bound(course, i, t, horizon, row):
         row[JERK_BOUND] = 0.0
         return
     moments = (course.inertia[i, 0], course.inertia[i, 1], course.inertia[i, 2])
-    torque = torque_at(course, i, t) if mode == FORCED else none
-    _write_spin_bounds(moments, torque, torque_rate_of(course, i), horizon, row)
+    torque_rate = rate_of(course, i, TORQUE_RATE)
+    torque = row_at(course.torque, i, torque_rate, s) if mode == FORCED else none
+    _write_spin_bounds(moments, torque, torque_rate, horizon, row)
 
 
 @jit

@@ -11,7 +11,7 @@ from math import inf
 from rigidimpulse._jit import jit
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import along, dot
-from rigidimpulse.integrate.course import FIXED, jerk_of
+from rigidimpulse.integrate.course import FIXED, JERK, rate_of
 from rigidimpulse.rotation import rotated
 from rigidimpulse.sweep.bound import length, scaled
 from rigidimpulse.sweep.guard_root import cubic_safe_until
@@ -30,7 +30,7 @@ def relative_flight(course, a, b, t):
         x = along(x, sign, row(course.position, i))
         if course.mode[i] != FIXED:
             s = t - course.start[i]
-            pull, growth = row(course.acceleration, i), jerk_of(course, i)
+            pull, growth = row(course.acceleration, i), rate_of(course, i, JERK)
             start_velocity = row(course.velocity, i)
             x = along(x, sign * s, along(start_velocity, 0.5 * s, along(pull, s / 3.0, growth)))
             v = along(v, sign, along(start_velocity, s, along(pull, 0.5 * s, growth)))
@@ -48,7 +48,7 @@ def rounding_slack(course, reach, a, b, shape_a, shape_b, end):
         s = end - course.start[i]
         size += length(row(course.position, i))
         if course.mode[i] != FIXED:
-            mean = along(row(course.acceleration, i), s / 3.0, jerk_of(course, i))
+            mean = along(row(course.acceleration, i), s / 3.0, rate_of(course, i, JERK))
             size += s * length(along(row(course.velocity, i), 0.5 * s, mean))
         if reach[shape] < inf:
             size += reach[shape]

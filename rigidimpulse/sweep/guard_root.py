@@ -42,7 +42,6 @@ from rigidimpulse.sweep.bound import (
     vector,
 )
 
-
 _MAX_STEPS = 100  # on a cubic: 5 to 8, a few dozen where it grazes
 
 

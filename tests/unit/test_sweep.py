@@ -254,7 +254,8 @@ def test_ball_with_jerk_returns_to_a_plane(method):
 def test_balls_with_jerk_meet_at_the_root_of_the_sextic(method):
     rng = np.random.default_rng(7)
     for _ in range(100):
-        x, v, a, j = rng.normal(size=(4, 3)) * np.array([3.0, 3.0, 6.0, 20.0])[:, None] + np.array([[0, 0, 4], [0, 0, 0], [0, 0, 0], [0, 0, 0]])
+        x, v, a, j = rng.normal(size=(4, 3)) * np.array([3.0, 3.0, 6.0, 20.0])[:, None]
+        x[2] += 4.0
         pair = Pair("sphere", "sphere").set(1, FREE, x, velocity=v, acceleration=a, jerk=j)
         time, status, _, _ = pair.sweep(method, end=2.0, touch=0.0)
         square = sum(np.polynomial.Polynomial([x[k], v[k], a[k] / 2.0, j[k] / 6.0]) ** 2 for k in range(3)) - 1.0
