@@ -2,7 +2,7 @@
 
 Each body flies with an acceleration that changes at a constant rate (jerk) and turns freely, under a world torque tau that does
 the same (tau'), or at a constant rate.
-One instant of a body is a record of floats (the offsets `POSITION` ... `JERK_BOUND` below), written by
+One instant of a body is a record of floats (the offsets `POSITION` ... `CENTRE_JERK` below), written by
 `motion_bound`:
 
     x, v, acc, jerk   of the centre of mass      w, alpha   spin and its rate of change, world
@@ -42,14 +42,13 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import along, cross, dot, subtract
-from rigidimpulse.integrate.course import FIXED, FORCED, PRESCRIBED, STEPPED, TORQUE_RATE, motion_at, rate_of, row_at
-from rigidimpulse.integrate.course import JERK as JERK_OF_COURSE
+from rigidimpulse.integrate.course import FIXED, FORCED, JERK, PRESCRIBED, STEPPED, TORQUE_RATE, motion_at, rate_of, row_at
 from rigidimpulse.rotation import quaternion_to_matrix
 
 # Offsets are numpy integers because numba would compile a kernel anew for every literal int that it is called with.
 
 POSITION, VELOCITY, SPIN, ACCELERATION, SPIN_RATE, AXES, ORIENTATION = np.array([0, 3, 6, 9, 12, 15, 24])
-SPIN_BOUND, SPIN_RATE_BOUND, JERK_BOUND, JERK, MOTION_SIZE = np.array([28, 29, 30, 31, 34])
+SPIN_BOUND, SPIN_RATE_BOUND, JERK_BOUND, CENTRE_JERK, MOTION_SIZE = np.array([28, 29, 30, 31, 34])
 """Offsets into the record of a body: x, v, w, acc, alpha (3 each), rotation matrix (9), quaternion (4), W, A, K, jerk (3)."""
 
 SEEN_VELOCITY, SEEN_SPIN, SEEN_ACCELERATION, SEEN_TURN, SEEN_JERK, SEEN_ARM_JERK = np.array([0, 3, 6, 9, 12, 13])
@@ -172,9 +171,9 @@ def motion_bound(course, i, t, horizon, row):
     quaternion_to_matrix(row[ORIENTATION:SPIN_BOUND], row[AXES:ORIENTATION].reshape((3, 3)))
     mode, s = course.mode[i], t - course.start[i]
     none = (0.0, 0.0, 0.0)
-    growth = rate_of(course, i, JERK_OF_COURSE)
+    growth = rate_of(course, i, JERK)
     put(row, ACCELERATION, none if mode == FIXED else row_at(course.acceleration, i, growth, s))
-    put(row, JERK, none if mode == FIXED else growth)
+    put(row, CENTRE_JERK, none if mode == FIXED else growth)
     if mode == FIXED or mode == PRESCRIBED or mode == STEPPED:
         put(row, SPIN_RATE, none)
         row[SPIN_BOUND] = length(vector(row, SPIN))
@@ -257,7 +256,7 @@ def relative_motion(work, carrier, other, axes, horizon, seen):
     put(work, seen + SEEN_TURN, turned_back(work, axes + AXES, beta))
 
     spin, rate, jerk = work[carrier + SPIN_BOUND], work[carrier + SPIN_RATE_BOUND], work[carrier + JERK_BOUND]
-    growth = subtract(vector(work, other + JERK), vector(work, carrier + JERK))
+    growth = subtract(vector(work, other + CENTRE_JERK), vector(work, carrier + CENTRE_JERK))
     most, growing = max(length(pull), length(along(pull, horizon, growth))), length(growth)
     speed = max(length(dv), length(along(dv, horizon, along(pull, 0.5 * horizon, growth))))
     speed += 0.125 * horizon * horizon * growing  # what the path of a velocity bulges beyond its chord
