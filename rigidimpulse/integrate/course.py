@@ -10,7 +10,8 @@
                    at the start to those at the end of the step
 
 The sweep and the integration both read the path here, so the impact time and the motion cannot disagree. A row is set
-by its owner (all columns but `top`), then made ready by `begin`. Evaluation only reads; it may be called in any order.
+by its owner (all columns, and of `top` the rates at its end), then made ready by `begin`. Evaluation only reads; it may be called
+in any order.
 
 A force F(s) and a torque that vary over a stretch of length h enter by their two moments, F for instance by
 
