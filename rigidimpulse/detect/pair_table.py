@@ -13,7 +13,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.broadphase import overlapping_with
-from rigidimpulse.integrate.course import FIXED, FREE, pose_at
+from rigidimpulse.integrate.course import FIXED, FREE, JERK, place_at, rate_of, row_at, turning_points
 
 NEAR = 1e-6
 """Contacts that much farther away than the declared gap, relative to it, are in contact too."""
@@ -25,18 +25,25 @@ MAX_REPEATS = 100
 
 @jit
 def path_box(course, i, begin, end, radius, box_min, box_max):
-    """Box of the sphere of `radius` about the centre of body i along its parabola from begin to end."""
-    x, q = np.empty(3), np.empty(4)
-    pose_at(course, i, begin, x, q)
+    """Box of the sphere of `radius` about the centre of body i along its parabola or cubic from begin to end."""
+    x = np.empty(3)
+    place_at(course, i, begin, x)
     h = end - begin
     s = begin - course.start[i]
     mode = course.mode[i]
+    growth = rate_of(course, i, JERK)
+    pull = row_at(course.acceleration, i, growth, s)
     for k in range(3):
-        a = course.acceleration[i, k] if mode >= FREE else 0.0
-        v = 0.0 if mode == FIXED else course.velocity[i, k] + a * s
-        last = x[k] + v * h + 0.5 * a * h * h
+        a, jerk = pull[k] if mode >= FREE else 0.0, 0.0 if mode == FIXED else growth[k]
+        v = 0.0 if mode == FIXED else course.velocity[i, k] + (a - 0.5 * jerk * s) * s
+        last = x[k] + v * h + 0.5 * a * h * h + jerk * h * h * h / 6.0
         low, high = min(x[k], last), max(x[k], last)
-        if a != 0.0 and 0.0 < -v / a < h:
+        if jerk != 0.0:
+            for turn in turning_points(v, a, jerk):
+                if 0.0 < turn < h:
+                    apex = x[k] + turn * (v + turn * (0.5 * a + turn * jerk / 6.0))
+                    low, high = min(low, apex), max(high, apex)
+        elif a != 0.0 and 0.0 < -v / a < h:
             apex = x[k] - 0.5 * v * v / a
             low, high = min(low, apex), max(high, apex)
         box_min[i, k] = low - radius

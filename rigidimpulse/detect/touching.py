@@ -18,7 +18,7 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.contact_motion import contact_motion
 from rigidimpulse.detect.manifold import MAX_PER_NORMAL, pair_contacts, reduce_contacts
-from rigidimpulse.integrate.course import FIXED, place_at, state_at
+from rigidimpulse.integrate.course import FIXED, JERK, TORQUE_RATE, place_at, rate_of, row_at, state_at
 from rigidimpulse.respond.impulse import inverse_effective_mass, relative_velocity
 from rigidimpulse.rotation import quaternion_to_matrix
 
@@ -62,11 +62,10 @@ def bring(course, i, time, bodies, rotation, acceleration, angular_acceleration)
         acceleration[i, k] = 0.0
         angular_acceleration[i, k] = 0.0
     if bodies.inv_mass[i] > 0.0 and course.mode[i] != FIXED:
-        for k in range(3):
-            acceleration[i, k] = course.acceleration[i, k]
-        gyroscopic_acceleration(
-            rotation[i], course.inertia[i], bodies.angular_velocity[i], course.torque[i], angular_acceleration[i]
-        )
+        s = time - course.start[i]
+        acceleration[i, 0], acceleration[i, 1], acceleration[i, 2] = row_at(course.acceleration, i, rate_of(course, i, JERK), s)
+        torque = row_at(course.torque, i, rate_of(course, i, TORQUE_RATE), s)
+        gyroscopic_acceleration(rotation[i], course.inertia[i], bodies.angular_velocity[i], torque, angular_acceleration[i])
 
 
 @jit

@@ -1,18 +1,27 @@
 """The course of every body: its exact path since the last time that something acted on it.
 
-    x(t) = x0 + v0 s + 1/2 a s^2,    v(t) = v0 + a s,    s = t - start
+    x(t) = x0 + v0 s + 1/2 a s^2 + 1/6 j s^3,    v(t) = v0 + a s + 1/2 j s^2,    s = t - start
     rotation, by mode:
       FIXED        none, the body never moves
       PRESCRIBED   q(t) = exp(w0 s) q0, constant velocity and world angular velocity (its acceleration must be 0)
       FREE         no torque: closed form (free_top)
-      FORCED       constant world torque: power series (forced_top)
+      FORCED       world torque tau0 + tau1 s: power series (forced_top)
       STEPPED      as PRESCRIBED: a straight way to a pose that a heap's solver found; the body's own velocities run from those
                    at the start to those at the end of the step
 
 The sweep and the integration both read the path here, so the impact time and the motion cannot disagree. A row is set
-by its owner (all columns but `top`), then made ready by `begin`. Evaluation only reads; it may be called in any order.
+by its owner (all columns, and of `top` the rates at its end), then made ready by `begin`. Evaluation only reads; it may be called
+in any order.
+
+A force F(s) and a torque that vary over a stretch of length h enter by their two moments, F for instance by
+
+    M0 = integral of F ds,   M1 = integral of (h - s) F ds,   m a = (6 M1 / h - 2 M0) / h,   m j = (6 M0 - 12 M1 / h) / h^2:
+
+the line that has the same moments leaves v(h) and x(h) as they are, and the rotation to order 4. With forces F_1 ... F_4 of a
+step of the classical Runge-Kutta method, M0 = h (F_1 + 2 F_2 + 2 F_3 + F_4) / 6 and M1 = h^2 (F_1 + F_2 + F_3) / 6.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +31,8 @@ from rigidimpulse.integrate import forced_top, free_top
 
 FIXED, PRESCRIBED, FREE, FORCED, STEPPED = 0, 1, 2, 3, 4
 
-TOP_SIZE = max(free_top.FREE_TOP_SIZE, forced_top.FORCED_TOP_SIZE)
-"""Length of a row of `Course.top`."""
+JERK, TORQUE_RATE, TOP_SIZE = max(free_top.FREE_TOP_SIZE, forced_top.FORCED_TOP_SIZE) + np.array([0, 3, 6])
+"""Places in a row of `Course.top`, and its length. The constants of the rotation come first."""
 
 
 class Course(NamedTuple):
@@ -40,17 +49,28 @@ class Course(NamedTuple):
     angular_velocity: np.ndarray
     """(n, 3) rad/s at `start`"""
     acceleration: np.ndarray
-    """(n, 3) m/s^2, constant"""
+    """(n, 3) m/s^2 at `start`"""
     torque: np.ndarray
-    """(n, 3) N m, constant; read in mode FORCED only"""
+    """(n, 3) N m at `start`; read in mode FORCED only"""
     mode: np.ndarray
     """(n,) int64: FIXED, PRESCRIBED, FREE, FORCED, STEPPED"""
     inertia: np.ndarray
     """(n, 3) kg m^2, principal moments; read in modes FREE and FORCED"""
     top: np.ndarray
-    """(n, TOP_SIZE) constants of the rotation, written by `begin`"""
+    """(n, TOP_SIZE) constants of the rotation, written by `begin`, then jerk and torque rate (an array of their own would cost every
+    kernel that gets a course some 3 % of its time)"""
     stepped: np.ndarray
     """(n, 13) velocity and angular velocity at `start`, their changes until the end of the step, and its length, s; read in mode STEPPED"""
+
+    @property
+    def jerk(self) -> np.ndarray:
+        """(n, 3) m/s^3, constant, a view; 0 but in modes FREE and FORCED: `begin` sees to it."""
+        return self.top[:, JERK:TORQUE_RATE]
+
+    @property
+    def torque_rate(self) -> np.ndarray:
+        """(n, 3) N m/s, constant, a view; 0 but in mode FORCED: `begin` sees to it."""
+        return self.top[:, TORQUE_RATE:]
 
 
 def make_course(num_bodies: int) -> Course:
@@ -78,10 +98,12 @@ def make_course(num_bodies: int) -> Course:
 
 @jit
 def begin(course, i):
-    """Prepare `course.top[i]`; call it after any other column of row i has changed."""
+    """Prepare `course.top[i]`; call it after any other column of row i has changed. Rates that the mode has not are set to 0."""
     mode = course.mode[i]
     inertia, q, w, top = course.inertia[i], course.orientation[i], course.angular_velocity[i], course.top[i]
-    if mode == FORCED and forced_top.prepare(inertia, q, w, course.torque[i], top):
+    if mode != FORCED:
+        top[TORQUE_RATE if mode == FREE else JERK :] = 0.0
+    if mode == FORCED and forced_top.prepare(inertia, q, w, course.torque[i], top[TORQUE_RATE:], top):
         return
     if mode == FREE or mode == FORCED:
         free_top.prepare(inertia, q, w, top)
@@ -100,44 +122,68 @@ def take(course, i, time, bodies, acceleration, torque, mode):
         course.angular_velocity[i, k] = bodies.angular_velocity[i, k]
         course.acceleration[i, k] = acceleration[k]
         course.torque[i, k] = torque[k]
+        course.top[i, JERK + k] = course.top[i, TORQUE_RATE + k] = 0.0
     for k in range(4):
         course.orientation[i, k] = bodies.orientation[i, k]
     begin(course, i)
 
 
 @jit
-def _start_pose(course, i, x_out, q_out):
-    for k in range(3):
-        x_out[k] = course.position[i, k]
-    for k in range(4):
-        q_out[k] = course.orientation[i, k]
+def turning_points(rate, bend, growth):
+    """Roots of rate + bend s + growth s^2 / 2, growth not 0, the lower one first; inf where there is none.
+
+    They are where a coordinate of a path turns. One may be nan where both are 0.
+    """
+    square = bend * bend - 2.0 * growth * rate
+    if square < 0.0:
+        return math.inf, math.inf
+    q = -(bend + math.copysign(math.sqrt(square), bend))  # no cancellation
+    first, second = q / growth, 2.0 * rate / q
+    return (first, second) if first < second else (second, first)
 
 
 @jit
-def _add_displacement(course, i, s, x_out):
-    for k in range(3):
-        displacement = s * (course.velocity[i, k] + 0.5 * s * course.acceleration[i, k])
-        # Adding nothing could still turn -0 into 0: a body that stays keeps its very bits.
-        if displacement != 0.0:
-            x_out[k] += displacement
+def rate_of(course, i, which):
+    """JERK or TORQUE_RATE of body i as three numbers."""
+    return course.top[i, which], course.top[i, which + 1], course.top[i, which + 2]
+
+
+@jit
+def row_at(values, i, rate, s):
+    """Row i of an array (n, 3) that grows by `rate` (three numbers) a second, after s: three numbers."""
+    x, y, z = values[i, 0], values[i, 1], values[i, 2]
+    a, b, c = rate
+    # Adding nothing could still turn -0 into 0.
+    return (x + s * a, y + s * b, z + s * c) if a != 0.0 or b != 0.0 or c != 0.0 else (x, y, z)
+
+
+@jit
+def _moved(x, v, a, j, s):
+    """x + v s + a s^2 / 2 + j s^3 / 6."""
+    # Adding nothing could still turn -0 into 0: a body that stays keeps its very bits.
+    if j != 0.0:
+        a += s * j / 3.0
+    displacement = s * (v + 0.5 * s * a)
+    return x + displacement if displacement != 0.0 else x
 
 
 @jit
 def place_at(course, i, t, x_out):
     """Write the position (3,) of body i at the time t >= start."""
+    s = t - course.start[i] if course.mode[i] != FIXED else 0.0
     for k in range(3):
-        x_out[k] = course.position[i, k]
-    if course.mode[i] != FIXED:
-        _add_displacement(course, i, t - course.start[i], x_out)
+        x_out[k] = _moved(course.position[i, k], course.velocity[i, k], course.acceleration[i, k], course.top[i, JERK + k], s)
 
 
 @jit
 def pose_at(course, i, t, x_out, q_out):
     """Write position (3,) and quaternion (4,) of body i at the time t >= start."""
-    _start_pose(course, i, x_out, q_out)
-    s = t - course.start[i]
-    if course.mode[i] != FIXED and s != 0.0:
-        _add_displacement(course, i, s, x_out)
+    place_at(course, i, t, x_out)
+    s = t - course.start[i] if course.mode[i] != FIXED else 0.0
+    if s == 0.0:
+        for k in range(4):
+            q_out[k] = course.orientation[i, k]
+    else:
         q_out[0], q_out[1], q_out[2], q_out[3], _, _, _ = forced_top.rotation(course.top[i], s)
 
 
@@ -156,14 +202,17 @@ def state_at(course, i, t, x_out, q_out, v_out, w_out):
 @jit
 def motion_at(course, i, t, x_out, q_out, v_out, w_out):
     """The same, with the velocities of the path: those by which pose changes. They differ in mode STEPPED only."""
-    _start_pose(course, i, x_out, q_out)
-    s = t - course.start[i]
     moves = course.mode[i] != FIXED
+    s = t - course.start[i] if moves else 0.0
+    mean = row_at(course.acceleration, i, rate_of(course, i, JERK), 0.5 * s)
     for k in range(3):
-        v_out[k] = course.velocity[i, k] + s * course.acceleration[i, k] if moves else 0.0
+        x_out[k] = _moved(course.position[i, k], course.velocity[i, k], course.acceleration[i, k], course.top[i, JERK + k], s)
+        v_out[k] = course.velocity[i, k] + s * mean[k] if moves else 0.0
         w_out[k] = course.angular_velocity[i, k] if moves else 0.0
-    if moves and s != 0.0:
-        _add_displacement(course, i, s, x_out)
+    if s == 0.0:
+        for k in range(4):
+            q_out[k] = course.orientation[i, k]
+    else:
         q0, q1, q2, q3, wx, wy, wz = forced_top.rotation(course.top[i], s)
         q_out[0], q_out[1], q_out[2], q_out[3] = q0, q1, q2, q3
         w_out[0], w_out[1], w_out[2] = wx, wy, wz

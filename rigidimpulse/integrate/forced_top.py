@@ -1,14 +1,16 @@
-"""Rotation of a body under a torque that is constant in the world.
+"""Rotation of a body under a torque that is constant in the world or changes linearly with time.
 
-Body frame, principal moments I, angular velocity w; e = R^T d for two fixed directions d of the world:
-    I1 w1' = (I2 - I3) w2 w3 + |tau| e_1.x (and cyclic),   e' = e x w,   d_1 = tau / |tau|,   d_2 normal to d_1,
-so that the angular momentum in the world is L0 + tau t. These equations are quadratic: the coefficients of the power
-series of w, e_1, e_2 follow one from another by Cauchy products. The series up to ORDER is computed once; it serves for
+Body frame, principal moments I, angular velocity w, tau(t) = tau0 + tau1 t; e = R^T d for two fixed directions d of the world:
+    I1 w1' = (I2 - I3) w2 w3 + ((|tau0| + p t) e_1 + r t e_2).x (and cyclic),   e' = e x w,
+    d_1 = tau0 / |tau0|,   d_2 normal to d_1,   tau1 = p d_1 + r d_2,
+so that the angular momentum in the world is L0 + tau0 t + tau1 t^2 / 2. These equations are quadratic: the coefficients of the
+power series of w, e_1, e_2 follow one from another by Cauchy products. The series up to ORDER is computed once; it serves for
 any time up to `segment`, where its last terms reach round-off, and is begun anew from there on. Segments depend on the
 start alone, never on the time asked for, so the path is one smooth function of time. The attitude follows from e_1, e_2
 and e_1 x e_2.
 
-If w is zero or parallel to the torque and both lie on a principal axis, that axis is kept: angle = w t + tau t^2 / 2I.
+If w is zero or parallel to the torque, tau0 and tau1 are parallel and all lie on a principal axis, that axis is kept:
+angle = w t + tau0 t^2 / 2I + tau1 t^3 / 6I.
 
 Source: A. Jorba and M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor
 methods, Experimental Mathematics 14:99, 2005 (the segment from the last terms).
@@ -27,20 +29,24 @@ FORCED_AXIS, FORCED = 4.0, 5.0  # kinds of rotation, after those of free_top
 _KIND = 0
 _BASE = 1  # (4,) orientation at the start
 _RATE = 5  # (3,) world angular velocity at the start (axis)
-_ACCELERATION = 8  # (3,) world angular acceleration (axis)
+_ACCELERATION = 8  # (3,) world angular acceleration at the start (axis)
+_JERK = 11  # (3,) its rate (axis)
 
 _INERTIA = 5  # (3,)
-_TORQUE = 8  # |tau|
+_TORQUE = 8  # |tau0|
 _TIME_SCALE = 9  # 1/s, a power of two: the series is in (time * scale), and w is in units of the scale
 SEGMENT = 10  # s
-_SERIES = 11  # (ORDER + 1, _STRIDE) coefficients of w, e_1, e_2
+_TORQUE_RATE = 11  # |tau1|
+_RATE_ALONG = 12  # p
+_RATE_ACROSS = 13  # r
+_SERIES = 14  # (ORDER + 1, _STRIDE) coefficients of w, e_1, e_2
 _STRIDE = 9
 FORCED_TOP_SIZE = _SERIES + _STRIDE * (ORDER + 1)
 
 _PARALLEL = 1e-15
 """sine of the angle between vectors that are taken for parallel: what round-off of their turn to the body leaves"""
 _NO_TORQUE = 1e-280
-"""rad/s^2, angular acceleration taken for none: squares would underflow"""
+"""rad/s^2, and rad/s^3: angular acceleration and its rate taken for none: squares would underflow"""
 _MOST_SEGMENTS = 100_000
 """segments after which the rotation is given up: some 30,000 rad, a tenth of a second of work"""
 _LAST_TERM = 1e-15
@@ -52,8 +58,11 @@ def _fill_series(c):
     """Coefficients 1 to ORDER from coefficients 0, and the length of the segment."""
     i1, i2, i3 = c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2]
     k1, k2, k3 = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
-    push = c[_TORQUE] / c[_TIME_SCALE] / c[_TIME_SCALE]
+    scale = c[_TIME_SCALE]
+    push = c[_TORQUE] / scale / scale
     g1, g2, g3 = push / i1, push / i2, push / i3
+    varies = c[_TORQUE_RATE] != 0.0
+    p, r = c[_RATE_ALONG] / scale / scale / scale, c[_RATE_ACROSS] / scale / scale / scale
     segment = math.inf
     for n in range(ORDER):
         w1, w2, w3, a1, a2, a3, b1, b2, b3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -76,10 +85,14 @@ def _fill_series(c):
         share = 1.0 / (n + 1.0)
         here = _SERIES + _STRIDE * n
         e1, e2, e3 = c[here + 3], c[here + 4], c[here + 5]
+        w1, w2, w3 = k1 * w1 + g1 * e1, k2 * w2 + g2 * e2, k3 * w3 + g3 * e3
+        if varies and n > 0:
+            before = here - _STRIDE
+            w1 += (p * c[before + 3] + r * c[before + 6]) / i1
+            w2 += (p * c[before + 4] + r * c[before + 7]) / i2
+            w3 += (p * c[before + 5] + r * c[before + 8]) / i3
         here += _STRIDE
-        c[here] = share * (k1 * w1 + g1 * e1)
-        c[here + 1] = share * (k2 * w2 + g2 * e2)
-        c[here + 2] = share * (k3 * w3 + g3 * e3)
+        c[here], c[here + 1], c[here + 2] = share * w1, share * w2, share * w3
         c[here + 3], c[here + 4], c[here + 5] = share * a1, share * a2, share * a3
         c[here + 6], c[here + 7], c[here + 8] = share * b1, share * b2, share * b3
         # The last terms stay below round-off for x <= (_LAST_TERM / |c_n|)^(1/n); some of them may vanish by symmetry.
@@ -89,15 +102,43 @@ def _fill_series(c):
                 largest = max(largest, abs(c[here + k]))
             if largest > 0.0:
                 segment = min(segment, math.exp(math.log(_LAST_TERM / largest) / (n + 1.0)))
-    c[SEGMENT] = segment / c[_TIME_SCALE]
+    c[SEGMENT] = segment / scale
 
 
 @jit
-def _start_series(c, wx, wy, wz, ex, ey, ez):
-    """Begin a series at body angular velocity w and unit torque direction e; set scale and segment."""
+def _direction(x, y, z):
+    """Unit vector along a vector, and its size; zeros for a zero vector."""
+    largest = max(abs(x), abs(y), abs(z))
+    if largest == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    x, y, z = x / largest, y / largest, z / largest
+    size = math.sqrt(x * x + y * y + z * z)
+    return x / size, y / size, z / size, size * largest
+
+
+@jit
+def _across(ex, ey, ez, ux, uy, uz):
+    """Cosine and sine between the unit vectors e and u, and the part of u that is normal to e."""
+    cosine = ex * ux + ey * uy + ez * uz
+    ux, uy, uz = ux - cosine * ex, uy - cosine * ey, uz - cosine * ez
+    # Once more: what is left of nearly parallel vectors is not normal to e yet.
+    rest = ex * ux + ey * uy + ez * uz
+    ux, uy, uz = ux - rest * ex, uy - rest * ey, uz - rest * ez
+    return cosine, math.sqrt(ux * ux + uy * uy + uz * uz), ux, uy, uz
+
+
+@jit
+def _start_series(c, wx, wy, wz, ex, ey, ez, ux, uy, uz):
+    """Begin a series at body angular velocity w and unit directions e of tau0 and u of tau1; set scale and segment.
+
+    |tau0| and |tau1| are read; e is u where tau0 is none, and u is not read where tau1 is none.
+    """
     i1, i2, i3 = c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2]
     coupling = max(1.0, abs(i2 - i3) / i1, abs(i3 - i1) / i2, abs(i1 - i2) / i3)
     rate = coupling * max(abs(wx), abs(wy), abs(wz)) + math.sqrt(c[_TORQUE] / min(i1, i2, i3))
+    growth = c[_TORQUE_RATE]
+    if growth != 0.0:
+        rate += (growth / min(i1, i2, i3)) ** (1.0 / 3.0)
     scale = math.ldexp(1.0, math.frexp(rate)[1])
     c[_TIME_SCALE] = scale
     c[_SERIES], c[_SERIES + 1], c[_SERIES + 2] = wx / scale, wy / scale, wz / scale
@@ -105,13 +146,20 @@ def _start_series(c, wx, wy, wz, ex, ey, ez):
     # d_2 is normal to the torque and to the body axis x or y, whichever is farther from it.
     nx, ny, nz = (0.0, ez, -ey) if abs(ex) <= abs(ey) else (-ez, 0.0, ex)
     size = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if growth != 0.0:
+        cosine, sine, mx, my, mz = _across(ex, ey, ez, ux, uy, uz)
+        if sine > _PARALLEL:
+            nx, ny, nz, size = mx, my, mz, sine
+        else:
+            sine = 0.0
+        c[_RATE_ALONG], c[_RATE_ACROSS] = growth * cosine, growth * sine
     c[_SERIES + 6], c[_SERIES + 7], c[_SERIES + 8] = nx / size, ny / size, nz / size
     _fill_series(c)
 
 
 @jit
 def _advance(c, t):
-    """Body angular velocity, e_1, and the turn since the start of the series, t seconds after it: ten numbers."""
+    """The turn since the start of the series, body angular velocity, e_1 and e_2, t seconds after it: 13 numbers."""
     x = t * c[_TIME_SCALE]
     w1, w2, w3, a1, a2, a3, b1, b2, b3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for n in range(ORDER, -1, -1):
@@ -139,7 +187,7 @@ def _advance(c, t):
         p3 * a3 + q3 * b3 + r3 * n3,
     )
     scale = c[_TIME_SCALE]
-    return scale * w1, scale * w2, scale * w3, a1, a2, a3, g0, g1, g2, g3
+    return g0, g1, g2, g3, scale * w1, scale * w2, scale * w3, a1, a2, a3, b1, b2, b3
 
 
 @jit
@@ -150,39 +198,47 @@ def _parallel(ax, ay, az, bx, by, bz):
 
 
 @jit
-def prepare(inertia, q, w_world, torque, constants_out):
+def prepare(inertia, q, w_world, torque, torque_rate, constants_out):
     """Write the constants (FORCED_TOP_SIZE,) of the motion from orientation q (4,) and angular velocity (3,), rad/s.
 
-    `w_world` and `torque` (3,), N m, are in the world; `inertia` (3,): principal moments, kg m^2, all > 0. Returns
-    False and writes nothing if the torque is none: then the body is a free top.
+    `w_world`, `torque` (3,), N m, and `torque_rate` (3,), N m/s, are in the world; `inertia` (3,): principal moments,
+    kg m^2, all > 0. Returns False and writes nothing if torque and rate are none: then the body is a free top.
     """
     c = constants_out
     i1, i2, i3 = inertia[0], inertia[1], inertia[2]
-    tx, ty, tz = torque[0], torque[1], torque[2]
-    largest = max(abs(tx), abs(ty), abs(tz))
-    if largest <= _NO_TORQUE * min(i1, i2, i3):
+    none = _NO_TORQUE * min(i1, i2, i3)
+    has_torque = max(abs(torque[0]), abs(torque[1]), abs(torque[2])) > none
+    has_rate = max(abs(torque_rate[0]), abs(torque_rate[1]), abs(torque_rate[2])) > none
+    if not (has_torque or has_rate):
         return False
     q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
     norm = 1.0 / math.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
     q0, q1, q2, q3 = norm * q0, norm * q1, norm * q2, norm * q3
     c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = q0, q1, q2, q3
-    tx, ty, tz = tx / largest, ty / largest, tz / largest
-    size = math.sqrt(tx * tx + ty * ty + tz * tz)
-    ex, ey, ez = rotated(q0, -q1, -q2, -q3, tx / size, ty / size, tz / size)
+    ux, uy, uz, growth, bx, by, bz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if has_rate:
+        ux, uy, uz, growth = _direction(torque_rate[0], torque_rate[1], torque_rate[2])
+        ux, uy, uz = rotated(q0, -q1, -q2, -q3, ux, uy, uz)
+        bx, by, bz = growth * ux / i1, growth * uy / i2, growth * uz / i3
+    ex, ey, ez, magnitude = ux, uy, uz, 0.0
+    if has_torque:
+        ex, ey, ez, magnitude = _direction(torque[0], torque[1], torque[2])
+        ex, ey, ez = rotated(q0, -q1, -q2, -q3, ex, ey, ez)
     vx, vy, vz = w_world[0], w_world[1], w_world[2]
     wx, wy, wz = rotated(q0, -q1, -q2, -q3, vx, vy, vz)
-    magnitude = size * largest
     ax, ay, az = magnitude * ex / i1, magnitude * ey / i2, magnitude * ez / i3
-    if _parallel(ex, ey, ez, ax, ay, az) and _parallel(ex, ey, ez, wx, wy, wz):
+    if _parallel(ex, ey, ez, ax, ay, az) and _parallel(ex, ey, ez, wx, wy, wz) and _parallel(ex, ey, ez, bx, by, bz):
         c[_KIND] = FORCED_AXIS
         ax, ay, az = rotated(q0, q1, q2, q3, ax, ay, az)
+        bx, by, bz = rotated(q0, q1, q2, q3, bx, by, bz)
         c[_RATE], c[_RATE + 1], c[_RATE + 2] = vx, vy, vz
         c[_ACCELERATION], c[_ACCELERATION + 1], c[_ACCELERATION + 2] = ax, ay, az
+        c[_JERK], c[_JERK + 1], c[_JERK + 2] = bx, by, bz
     else:
         c[_KIND] = FORCED
         c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2] = i1, i2, i3
-        c[_TORQUE] = magnitude
-        _start_series(c, wx, wy, wz, ex, ey, ez)
+        c[_TORQUE], c[_TORQUE_RATE] = magnitude, growth
+        _start_series(c, wx, wy, wz, ex, ey, ez, ux, uy, uz)
     return True
 
 
@@ -193,12 +249,21 @@ def _last_segment(constants, t):
     for _ in range(_MOST_SEGMENTS):
         if not t > c[SEGMENT]:
             return c, t
-        t -= c[SEGMENT]
-        wx, wy, wz, ex, ey, ez, g0, g1, g2, g3 = _advance(c, c[SEGMENT])
+        h = c[SEGMENT]
+        t -= h
+        g0, g1, g2, g3, wx, wy, wz, ex, ey, ez, fx, fy, fz = _advance(c, h)
         q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
         q0, q1, q2, q3 = product(q0, q1, q2, q3, g0, g1, g2, g3)
         c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = q0, q1, q2, q3
-        _start_series(c, wx, wy, wz, ex, ey, ez)
+        ux, uy, uz, growth = 0.0, 0.0, 0.0, c[_TORQUE_RATE]
+        if growth != 0.0:
+            cosine, sine = c[_RATE_ALONG] / growth, c[_RATE_ACROSS] / growth
+            ux, uy, uz = cosine * ex + sine * fx, cosine * ey + sine * fy, cosine * ez + sine * fz
+            now, grown = c[_TORQUE], h * growth
+            ex, ey, ez, c[_TORQUE] = _direction(now * ex + grown * ux, now * ey + grown * uy, now * ez + grown * uz)
+            if c[_TORQUE] == 0.0:
+                ex, ey, ez = ux, uy, uz
+        _start_series(c, wx, wy, wz, ex, ey, ez, ux, uy, uz)
     return c, math.nan
 
 
@@ -214,14 +279,20 @@ def rotation(constants, t):
     if c[_KIND] == FORCED:
         if t > c[SEGMENT]:
             c, t = _last_segment(c, t)
-        wx, wy, wz, _, _, _, g0, g1, g2, g3 = _advance(c, t)
+        g0, g1, g2, g3, wx, wy, wz, _, _, _, _, _, _ = _advance(c, t)
         q0, q1, q2, q3 = product(c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], g0, g1, g2, g3)
         wx, wy, wz = rotated(q0, q1, q2, q3, wx, wy, wz)
         return q0, q1, q2, q3, wx, wy, wz
     wx, wy, wz = c[_RATE], c[_RATE + 1], c[_RATE + 2]
     ax, ay, az = c[_ACCELERATION], c[_ACCELERATION + 1], c[_ACCELERATION + 2]
+    bx, by, bz = c[_JERK], c[_JERK + 1], c[_JERK + 2]
     h = 0.5 * t
-    e0, e1, e2, e3 = exponential(t * (wx + h * ax), t * (wy + h * ay), t * (wz + h * az))
+    mx, my, mz = ax, ay, az
+    if bx != 0.0 or by != 0.0 or bz != 0.0:  # (adding nothing could turn -0 into 0)
+        third = t / 3.0
+        mx, my, mz = ax + third * bx, ay + third * by, az + third * bz
+        ax, ay, az = ax + h * bx, ay + h * by, az + h * bz
+    e0, e1, e2, e3 = exponential(t * (wx + h * mx), t * (wy + h * my), t * (wz + h * mz))
     q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
     q0, q1, q2, q3 = product(e0, e1, e2, e3, q0, q1, q2, q3)
     return q0, q1, q2, q3, wx + t * ax, wy + t * ay, wz + t * az

@@ -1,17 +1,19 @@
 """How two bodies move past each other in the next instants, and how far the motion can stray from that.
 
-Each body flies with constant acceleration and turns freely, under a constant world torque tau, or at a constant rate.
-One instant of a body is a record of floats (the offsets `POSITION` ... `JERK_BOUND` below), written by
+Each body flies with an acceleration that changes at a constant rate (jerk) and turns freely, under a world torque tau that does
+the same (tau'), or at a constant rate.
+One instant of a body is a record of floats (the offsets `POSITION` ... `CENTRE_JERK` below), written by
 `motion_bound`:
 
-    x, v, acc     centre of mass, its velocity and acceleration      w, alpha   spin and its rate of change, world
+    x, v, acc, jerk   of the centre of mass      w, alpha   spin and its rate of change, world
     W >= |w|      A >= |alpha|      K >= rate of alpha in the body's own axes                   bounds over [t, t + h]
 
-Spin bounds. With I the principal moments, T the kinetic energy of rotation, L = I w and kappa = max |I_i - I_j| / I_k,
+Spin bounds. With I the principal moments, T the kinetic energy of rotation, L = I w, kappa = max |I_i - I_j| / I_k and |tau| the
+greater one of both ends,
 
     W^2  = max of sum x_i  under  sum I_i x_i <= (sqrt(2 T) + h |tau| / sqrt(I_min))^2,
                                   sum I_i^2 x_i >= (|L| - h |tau|)^2,  x_i >= 0
-    A   <= |tau| / I_min + kappa W^2 / sqrt(3)                K <= W |tau| / I_min + 2 kappa W A / sqrt(3)
+    A   <= |tau| / I_min + kappa W^2 / sqrt(3)                K <= (W |tau| + |tau'|) / I_min + 2 kappa W A / sqrt(3)
 
 (x_i = w_i^2; the constraints say that energy and angular momentum change no faster than the torque lets them).
 
@@ -25,10 +27,10 @@ exact),
 Both y' and y'' vanish for bodies that move as one. Capitals bound the letters over [0, h] (D: d, U: u, C: c, O: w, B:
 beta):
 
-    J_c = W_a |acc_b - acc_a| + 3 A_a U + 2 W_a C + K_a D + 2 A_a W_a D + W_a^2 U
+    J_c = |jerk_b - jerk_a| + W_a |acc_b - acc_a| + 3 A_a U + 2 W_a C + K_a D + 2 A_a W_a D + W_a^2 U
     J_r = B' + 3 O B + O^3,   B' = K_a + K_b + O (A_a + A_b) + W_a B
 
-The bounds start from direct sums and are tightened by X <- min(X, |X(0)| + h X').
+|acc_b - acc_a| is the greater one of both ends. The bounds start from direct sums and are tightened by X <- min(X, |X(0)| + h X').
 """
 
 from __future__ import annotations
@@ -40,14 +42,14 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import along, cross, dot, subtract
-from rigidimpulse.integrate.course import FIXED, FORCED, PRESCRIBED, STEPPED, motion_at
+from rigidimpulse.integrate.course import FIXED, FORCED, JERK, PRESCRIBED, STEPPED, TORQUE_RATE, motion_at, rate_of, row_at
 from rigidimpulse.rotation import quaternion_to_matrix
 
 # Offsets are numpy integers because numba would compile a kernel anew for every literal int that it is called with.
 
 POSITION, VELOCITY, SPIN, ACCELERATION, SPIN_RATE, AXES, ORIENTATION = np.array([0, 3, 6, 9, 12, 15, 24])
-SPIN_BOUND, SPIN_RATE_BOUND, JERK_BOUND, MOTION_SIZE = np.array([28, 29, 30, 31])
-"""Offsets into the record of a body: x, v, w, acc, alpha (3 each), rotation matrix (9), quaternion (4), W, A, K."""
+SPIN_BOUND, SPIN_RATE_BOUND, JERK_BOUND, CENTRE_JERK, MOTION_SIZE = np.array([28, 29, 30, 31, 34])
+"""Offsets into the record of a body: x, v, w, acc, alpha (3 each), rotation matrix (9), quaternion (4), W, A, K, jerk (3)."""
 
 SEEN_VELOCITY, SEEN_SPIN, SEEN_ACCELERATION, SEEN_TURN, SEEN_JERK, SEEN_ARM_JERK = np.array([0, 3, 6, 9, 12, 13])
 SEEN_SPIN_SIZE, SEEN_TURN_SIZE, SEEN_SIZE = np.array([14, 15, 16])
@@ -129,8 +131,8 @@ def _fastest_spin(moments, energy, momentum):
 
 
 @jit
-def _write_spin_bounds(moments, torque_world, horizon, row):
-    """Write alpha, W, A and K of a body that turns freely or under a torque."""
+def _write_spin_bounds(moments, torque_world, torque_rate, horizon, row):
+    """Write alpha, W, A and K of a body that turns freely or under a torque that changes at `torque_rate`."""
     spin, torque = turned_back(row, AXES, vector(row, SPIN)), turned_back(row, AXES, torque_world)
     i, j, k = moments
     momentum = (i * spin[0], j * spin[1], k * spin[2])
@@ -141,14 +143,15 @@ def _write_spin_bounds(moments, torque_world, horizon, row):
     least = min(i, j, k)
     kappa = max(abs(i - j) / k, abs(j - k) / i, abs(k - i) / j)
     torque_size, spin_now, rate_now = length(torque), length(spin), length(rate)
-    kick = torque_size / least
+    torque_size = max(torque_size, length(turned_back(row, AXES, along(torque_world, horizon, torque_rate))))
+    kick, kick_rate = torque_size / least, length(torque_rate) / least
     energy = (sqrt(dot(spin, momentum)) + horizon * torque_size / sqrt(least)) ** 2
     spin_bound = max(_fastest_spin(moments, energy, max(length(momentum) - horizon * torque_size, 0.0) ** 2), spin_now)
     rate_bound = 0.0
     jerk_bound = 0.0
     for _ in range(_TIGHTENINGS):
         rate_bound = kick + kappa * spin_bound * spin_bound / sqrt(3.0)
-        jerk_bound = spin_bound * kick + 2.0 / sqrt(3.0) * kappa * spin_bound * rate_bound
+        jerk_bound = spin_bound * kick + 2.0 / sqrt(3.0) * kappa * spin_bound * rate_bound + kick_rate
         rate_bound = max(rate_now, min(rate_bound, rate_now + horizon * jerk_bound))
         spin_bound = max(spin_now, min(spin_bound, spin_now + horizon * rate_bound))
     row[SPIN_BOUND] = spin_bound * _WIDEN
@@ -160,16 +163,17 @@ def _write_spin_bounds(moments, torque_world, horizon, row):
 def motion_bound(course, i, t, horizon, row):
     """Write the motion of body i at time t, with bounds that hold until t + horizon, into row (MOTION_SIZE,).
 
-    Works for every mode of a course: fixed, prescribed, free, and turning under a constant world torque.
+    Works for every mode of a course: fixed, prescribed, free, and turning under a world torque.
     """
     motion_at(
         course, i, t, row[POSITION:VELOCITY], row[ORIENTATION:SPIN_BOUND], row[VELOCITY:SPIN], row[SPIN:ACCELERATION]
     )
     quaternion_to_matrix(row[ORIENTATION:SPIN_BOUND], row[AXES:ORIENTATION].reshape((3, 3)))
-    mode = course.mode[i]
+    mode, s = course.mode[i], t - course.start[i]
     none = (0.0, 0.0, 0.0)
-    pull = (course.acceleration[i, 0], course.acceleration[i, 1], course.acceleration[i, 2])
-    put(row, ACCELERATION, none if mode == FIXED else pull)
+    growth = rate_of(course, i, JERK)
+    put(row, ACCELERATION, none if mode == FIXED else row_at(course.acceleration, i, growth, s))
+    put(row, CENTRE_JERK, none if mode == FIXED else growth)
     if mode == FIXED or mode == PRESCRIBED or mode == STEPPED:
         put(row, SPIN_RATE, none)
         row[SPIN_BOUND] = length(vector(row, SPIN))
@@ -177,8 +181,9 @@ def motion_bound(course, i, t, horizon, row):
         row[JERK_BOUND] = 0.0
         return
     moments = (course.inertia[i, 0], course.inertia[i, 1], course.inertia[i, 2])
-    torque = (course.torque[i, 0], course.torque[i, 1], course.torque[i, 2]) if mode == FORCED else none
-    _write_spin_bounds(moments, torque, horizon, row)
+    torque_rate = rate_of(course, i, TORQUE_RATE)
+    torque = row_at(course.torque, i, torque_rate, s) if mode == FORCED else none
+    _write_spin_bounds(moments, torque, torque_rate, horizon, row)
 
 
 @jit
@@ -192,10 +197,10 @@ def stop_turning(row):
 
 
 @jit
-def _centre_jerk(spin, rate, jerk, distance, speed, velocity, acceleration, pull, horizon):
-    """J_c from W, A, K of the carrier, |d|, the largest |v_b - v_a|, |u|, |c| and |acc_b - acc_a|."""
+def _centre_jerk(spin, rate, jerk, distance, speed, velocity, acceleration, pull, pull_rate, horizon):
+    """J_c from W, A, K of the carrier, |d|, the largest |v_b - v_a|, |u|, |c|, the largest |acc_b - acc_a| and |jerk_b - jerk_a|."""
     if spin == 0.0 and rate == 0.0:
-        return 0.0
+        return pull_rate * _WIDEN
     far = distance + horizon * speed
     fast = speed + spin * far
     bend = pull + 2.0 * spin * speed + (rate + spin * spin) * far
@@ -205,6 +210,7 @@ def _centre_jerk(spin, rate, jerk, distance, speed, velocity, acceleration, pull
         result = (
             spin * pull + 3.0 * rate * fast + 2.0 * spin * bend + (jerk + 2.0 * rate * spin) * far + spin * spin * fast
         )
+        result += pull_rate
         bend = max(acceleration, min(bend, acceleration + horizon * result))
         fast = max(velocity, min(fast, velocity + horizon * bend))
     return result * _WIDEN
@@ -250,9 +256,12 @@ def relative_motion(work, carrier, other, axes, horizon, seen):
     put(work, seen + SEEN_TURN, turned_back(work, axes + AXES, beta))
 
     spin, rate, jerk = work[carrier + SPIN_BOUND], work[carrier + SPIN_RATE_BOUND], work[carrier + JERK_BOUND]
-    speed = max(length(dv), length(along(dv, horizon, pull)))
+    growth = subtract(vector(work, other + CENTRE_JERK), vector(work, carrier + CENTRE_JERK))
+    most, growing = max(length(pull), length(along(pull, horizon, growth))), length(growth)
+    speed = max(length(dv), length(along(dv, horizon, along(pull, 0.5 * horizon, growth))))
+    speed += 0.125 * horizon * horizon * growing  # what the path of a velocity bulges beyond its chord
     work[seen + SEEN_JERK] = _centre_jerk(
-        spin, rate, jerk, length(d), speed, length(u), length(c), length(pull), horizon
+        spin, rate, jerk, length(d), speed, length(u), length(c), most, growing, horizon
     )
     both_spins, both_rates = spin + work[other + SPIN_BOUND], rate + work[other + SPIN_RATE_BOUND]
     both_jerks, spin_now, turn_now = jerk + work[other + JERK_BOUND], length(w), length(beta)

@@ -40,7 +40,7 @@ def _later(t, s):
 @jit
 def _flight_safe_until(frame, course, scratch, a, b, shape_a, shape_b, t, threshold, horizon):
     """Return (safe time of the bounding spheres or planes, whether it is exact for the shapes)."""
-    x, v, acceleration = relative_flight(course, a, b, t)
+    x, v, acceleration, jerk = relative_flight(course, a, b, t)
     plane_a, plane_b = scratch.plane[shape_a], scratch.plane[shape_b]
     if plane_a >= 0 or plane_b >= 0:
         i, plane, other = a if plane_a >= 0 else b, max(plane_a, plane_b), shape_b if plane_a >= 0 else shape_a
@@ -49,12 +49,12 @@ def _flight_safe_until(frame, course, scratch, a, b, shape_a, shape_b, t, thresh
         sign, ball = 1.0 if plane_a >= 0 else -1.0, scratch.ball[other]
         n0, n1, n2 = sign * frame[plane, 0], sign * frame[plane, 1], sign * frame[plane, 2]
         level = frame[plane, 3] + scratch.reach[other] + threshold
-        return plane_safe_until(course, i, n0, n1, n2, level, ball, x, v, acceleration, horizon), ball
+        return plane_safe_until(course, i, n0, n1, n2, level, ball, x, v, acceleration, jerk, horizon), ball
     reach = scratch.reach[shape_a] + scratch.reach[shape_b] + threshold
     if reach == inf:
         return 0.0, False
     exact = scratch.ball[shape_a] and scratch.ball[shape_b]
-    return spheres_safe_until(x, v, acceleration, reach, exact, horizon), exact
+    return spheres_safe_until(x, v, acceleration, jerk, reach, exact, horizon), exact
 
 
 @jit

@@ -52,12 +52,14 @@ def random_course(rng, modes):
             course.angular_velocity[i] = rng.normal(size=3) * 10 ** rng.uniform(-2, 2) * (rng.random() < 0.9)
         if mode in (FREE, FORCED):
             course.acceleration[i] = rng.normal(size=3) * 10 ** rng.uniform(-1, 2)
+            course.jerk[i] = rng.normal(size=3) * 10 ** rng.uniform(-1, 4) * (rng.random() < 0.5)
         split = 10 ** rng.uniform(-1, 1, size=3)
         course.inertia[i] = split.sum() - split
         if rng.random() < 0.3:
             course.inertia[i, : rng.integers(2, 4)] = course.inertia[i, 0]
         if mode == FORCED:
             course.torque[i] = rng.normal(size=3) * 10 ** rng.uniform(-2, 3) * course.inertia[i].min()
+            course.torque_rate[i] = rng.normal(size=3) * 10 ** rng.uniform(-1, 5) * course.inertia[i].min() * (rng.random() < 0.5)
         begin(course, i)
     return course
 
@@ -94,7 +96,7 @@ def test_never_optimistic(seed):
         velocity, acceleration = map(np.array, observe(work, h, arm))
         seen = work[2 * MOTION_SIZE :]
         jerk = seen[SEEN_JERK] + seen[SEEN_ARM_JERK] * np.linalg.norm(r)
-        travelled = np.abs(course.velocity).max() * (t + h)
+        travelled = np.abs(course.velocity).max() * (t + h) + np.abs(course.jerk).max() * (t + h) ** 3
         rounding = ROUND_OFF * (np.abs(course.position).max() + travelled + np.linalg.norm(r))
         start = seen_point(course, t, r)
         for s in h * np.append(rng.random(4), 1.0):
@@ -141,12 +143,24 @@ def test_bodies_that_move_as_one_see_each_other_at_rest():
 def test_without_rotation_there_is_no_jerk():
     """Two parabolas differ by a parabola."""
     course = random_course(np.random.default_rng(0), [FREE, FREE])
-    course.angular_velocity[:] = 0.0
+    course.angular_velocity[:] = course.jerk[:] = 0.0
     for i in range(2):
         begin(course, i)
     work = motions(course, 0.0, 1.0)
     observe(work, 1.0, np.ones(3))
     assert work[2 * MOTION_SIZE + SEEN_JERK] == 0.0
+    assert work[2 * MOTION_SIZE + SEEN_ARM_JERK] == 0.0
+
+
+def test_without_rotation_jerk_is_that_of_the_centres():
+    """Two cubics differ by a cubic, whose third derivative is the difference of theirs."""
+    course = random_course(np.random.default_rng(0), [FREE, FREE])
+    course.angular_velocity[:], course.jerk[:] = 0.0, ((1.0, 2.0, 3.0), (4.0, 6.0, 3.0))
+    for i in range(2):
+        begin(course, i)
+    work = motions(course, 0.4, 1.0)
+    observe(work, 1.0, np.ones(3))
+    assert work[2 * MOTION_SIZE + SEEN_JERK] == pytest.approx(5.0, rel=1e-11)
     assert work[2 * MOTION_SIZE + SEEN_ARM_JERK] == 0.0
 
 

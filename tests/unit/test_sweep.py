@@ -4,155 +4,25 @@ Where a closed form exists it is the law; elsewhere the least gap of the two bod
 sampled along the paths. Coordinates are a few metres, so gaps are good to ROUND_OFF = 1e-13 m, way travelled included.
 """
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 import trimesh
-from contact_scenes import box, capsule, half_space, mesh, prism, sphere
+from contact_scenes import box, capsule, half_space, mesh, sphere
+from sweep_pairs import ROUND_OFF, SHAPES, Pair, check_random_pairs, cylinder, random_pair, shape
 
-from rigidimpulse._jit import jit
-from rigidimpulse.detect.manifold import pair_gap
-from rigidimpulse.geometry import CYLINDER, ROUND, CompiledShape, Primitive, build_geometry
-from rigidimpulse.integrate.course import FIXED, FORCED, FREE, PRESCRIBED, begin, make_course, pose_at
-from rigidimpulse.rotation import quaternion_to_matrix
+from rigidimpulse.geometry import ROUND, CompiledShape, Primitive, build_geometry
+from rigidimpulse.integrate.course import FIXED, FREE, PRESCRIBED
 from rigidimpulse.sweep import after, bisection, conservative, linear
 from rigidimpulse.sweep.guard import make_scratch
 from rigidimpulse.sweep.impact_time import IMPACT, SEPARATE, TOUCHING
 
-ROUND_OFF = 1e-13
 GUARDED = [bisection, conservative]
-STEP = 1.0 / 60.0
-
-
-def cylinder(radius, height):
-    return Primitive(CYLINDER, radius, frame=np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.5 * height]))
-
-
-def shape(*primitives):
-    return CompiledShape(primitives)
-
-
-SHAPES = {
-    "sphere": shape(sphere(0.5)),
-    "ball": shape(sphere(0.05)),
-    "box": shape(mesh(box(1.0, 0.6, 0.4))),
-    "needle": shape(mesh(box(3.0, 0.01, 0.01))),
-    "capsule": shape(capsule(0.2, 1.0)),
-    "cylinder": shape(cylinder(0.4, 0.8)),
-    "disc": shape(cylinder(0.5, 0.02)),
-    "hull": shape(mesh(trimesh.convex.convex_hull(np.random.default_rng(1).normal(size=(14, 3)) * 0.4))),
-    "notch": shape(mesh(prism([(-0.5, -0.5), (0.5, -0.5), (0.5, -0.1), (-0.1, -0.1), (-0.1, 0.5), (-0.5, 0.5)], 0.5))),
-    "half space": shape(half_space()),
-    "compound": shape(sphere(0.3, at=(0.5, 0.0, 0.0)), cylinder(0.2, 1.0), capsule(0.1, 1.6)),
-}
-GEOMETRY = build_geometry(list(SHAPES.values()))
-SCRATCH = make_scratch(GEOMETRY)
-NAMES = list(SHAPES)
-
-
-class Pair:
-    """Two bodies on their courses; body 0 is fixed at the origin unless set otherwise."""
-
-    def __init__(self, name_a, name_b, geometry=GEOMETRY, scratch=SCRATCH, names=NAMES):
-        self.shapes = names.index(name_a), names.index(name_b)
-        self.detector = SimpleNamespace(
-            geometry=geometry, shape_of_body=np.array(self.shapes, dtype=np.int64), sweep_scratch=scratch, max_queries=10_000
-        )
-        self.course = make_course(2)
-
-    def set(self, body, mode, position=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0), turned=(1, 0, 0, 0), **rows):
-        course = self.course
-        course.mode[body] = mode
-        course.position[body], course.velocity[body], course.angular_velocity[body] = position, velocity, spin
-        course.orientation[body] = np.array(turned) / np.linalg.norm(turned)
-        for name, value in rows.items():
-            getattr(course, name)[body] = value
-        begin(course, body)
-        return self
-
-    def sweep(self, method=bisection, end=STEP, touch=1e-6, tolerance=1e-15, start=0.0, swapped=False):
-        """(time, status, queries, witness) of the pair."""
-        a, b = np.array([int(swapped)]), np.array([int(not swapped)])
-        rows = [np.array([float(value)]) for value in (start, touch, tolerance)]
-        result = method.sweep(self.detector, self.course, a, b, rows[0], end, rows[1], rows[2])
-        return result.time[0], result.status[0], result.queries[0], result.witness[0]
-
-    def gap(self, t):
-        return gap_at(self.detector.geometry, self.course, *self.shapes, t)
-
-
-@jit
-def gap_at(geometry, course, shape_a, shape_b, t):
-    """Least gap of bodies 0 and 1 at time t."""
-    x, q, axes, points = np.empty((2, 3)), np.empty((2, 4)), np.empty((2, 3, 3)), np.empty(7)
-    for i in range(2):
-        pose_at(course, i, t, x[i], q[i])
-        quaternion_to_matrix(q[i], axes[i])
-    return pair_gap(geometry, shape_a, x[0], axes[0], shape_b, x[1], axes[1], np.inf, points)
-
-
-@jit
-def first_sample_below(geometry, course, shape_a, shape_b, start, end, samples, level):
-    """First of the sampled times at which the gap is below a level; inf if none is."""
-    for i in range(samples + 1):
-        t = start + (end - start) * i / samples
-        if gap_at(geometry, course, shape_a, shape_b, t) < level:
-            return t
-    return np.inf
-
-
-def random_pair(rng):
-    """Two random bodies a random gap apart; None if they overlap wherever they are put."""
-    pair = Pair(*rng.choice(NAMES, 2))
-    for body, kind in enumerate(pair.shapes):
-        plane = NAMES[kind] == "half space"
-        mode = rng.choice([FIXED, PRESCRIBED] if plane else [FREE, FREE, FREE, FORCED, PRESCRIBED, FIXED])
-        split = 10 ** rng.uniform(-0.7, 0.7, size=3)
-        still, free = mode == FIXED, mode in (FREE, FORCED)
-        pair.set(
-            body,
-            mode,
-            velocity=np.zeros(3) if still else rng.normal(size=3) * 10 ** rng.uniform(-1, 1.5),
-            spin=np.zeros(3) if still else rng.normal(size=3) * 10 ** rng.uniform(-1, 1 if plane else 2),
-            turned=rng.normal(size=4),
-            acceleration=rng.normal(size=3) * 10.0 * free,
-            torque=rng.normal(size=3) * 10 ** rng.uniform(-1, 2) * (mode == FORCED),
-            inertia=split.sum() - split,
-        )
-    direction, wanted = rng.normal(size=3), 10 ** rng.uniform(-4, 0.3)
-    near, far = 0.0, 20.0
-    for _ in range(40):
-        middle = 0.5 * (near + far)
-        pair.course.position[1] = direction / np.linalg.norm(direction) * middle
-        near, far = (middle, far) if pair.gap(0.0) < wanted else (near, middle)
-    pair.course.position[1] = direction / np.linalg.norm(direction) * far
-    return pair if 1e-8 < pair.gap(0.0) < 10.0 else None
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_random_pairs_against_dense_sampling(seed):
     """All kinds, random motions: both methods agree, nothing is touched before, and the gap is right at the time found."""
-    rng = np.random.default_rng(seed)
-    for pair in filter(None, (random_pair(rng) for _ in range(120))):
-        end = STEP * 10 ** rng.uniform(-1, 1)
-        touch = 10 ** rng.uniform(-9, -4)
-        if pair.gap(0.0) < 2.0 * touch:
-            continue
-        time, status, _, witness = pair.sweep(end=end, touch=touch)
-        other, other_status, _, _ = pair.sweep(conservative, end=end, touch=touch)
-        assert status == other_status
-        last = end if status == SEPARATE else time
-        sample = (*pair.shapes, 0.0, last)
-        assert first_sample_below(GEOMETRY, pair.course, *sample, 200, touch - ROUND_OFF) == np.inf
-        if status == SEPARATE:
-            continue
-        assert status == IMPACT
-        assert abs(pair.gap(time) - touch) < ROUND_OFF + 1e-11 * touch
-        assert abs(pair.gap(other) - touch) < ROUND_OFF + 1e-11 * touch
-        assert abs(witness[9] - touch) < ROUND_OFF
-        assert np.linalg.norm(witness[6:9]) == pytest.approx(1.0, abs=1e-12)
-        assert witness[3:6] - witness[0:3] == pytest.approx(witness[9] * witness[6:9], abs=1e-9)
+    check_random_pairs(np.random.default_rng(seed), 120, rates=False)
 
 
 def test_swapped_bodies_meet_at_the_same_time():
