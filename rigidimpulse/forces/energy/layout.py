@@ -75,7 +75,8 @@ def compile_energies(world: World, energies: Sequence[Energy]) -> list[CompiledE
         raise SceneError(f"energies are {energies!r}", "give a list with one or more, such as [NoOverlap(), GravityPotential()]")
     for energy in energies:
         if isinstance(energy, type) or not callable(getattr(energy, "compile", None)):
-            raise SceneError(f"{energy!r} is no energy of bodies", "give PinPoints, RestoreShape, NoOverlap, PointOnSurface or GravityPotential")
+            remedy = "give PinPoints, RestoreShape, NoOverlap, PointOnSurface or GravityPotential"
+            raise SceneError(f"{energy!r} is no energy of bodies", remedy)
     return [energy.compile(world) for energy in energies]
 
 
@@ -118,7 +119,7 @@ class _Layout:
         self._set_stiffness(at)
         last, done = np.inf, 0
         for _ in range(MAX_ROUNDS):
-            at, report = minimise(self.terms, self.move, at, self.metric, self.length, max_iterations - done)
+            at, report = minimise(self.terms, self.move, at, self.metric, self.length, self._extent(at), max_iterations - done)
             done += report.iterations
             apart = self._apart(at)
             report = replace(report, iterations=done, residual=apart, value=self._value(at))
@@ -148,9 +149,13 @@ class _Layout:
         """Return the largest distance of exact pins, m."""
         return max((float(np.linalg.norm(pin.apart(at))) for pin in self.pins), default=0.0)
 
+    def _extent(self, at: Poses) -> float:
+        """Return the size of coordinates, m."""
+        return max(self.length, float(np.abs(at.position).max()))
+
     def _closed(self, at: Poses) -> float:
         """Return the distance at which pins are closed, m: rounding of where they are."""
-        return TOLERANCES.joint * self.length + 4.0 * TOLERANCES.round_off * float(np.abs(at.position).max())
+        return TOLERANCES.joint * self.length + 4.0 * TOLERANCES.round_off * self._extent(at)
 
     def _value(self, at: Poses) -> float:
         """Return the sum of all but exact pins, J."""

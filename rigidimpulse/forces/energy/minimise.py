@@ -2,9 +2,9 @@
 
     (H + m M) s = -g,    z <- move(z, s),    m smaller after good steps, larger after bad ones
 
-M measures steps: s.M s is a square of lengths. m is at least what makes H + m M positive definite, which its sparse factors tell; where the gradient
-vanishes and H still has a negative direction (a pendulum on its head), that direction is followed. Source: J. Nocedal, S. Wright, Numerical
-Optimization, 2006, chapters 3.4 and 10.3 (Levenberg and Marquardt).
+M measures steps: s.M s is a square of lengths. m is at least what makes H + m M positive definite, which its sparse factors tell; where
+the gradient vanishes and H still has a negative direction (a pendulum on its head), that direction is followed. Source: J. Nocedal,
+S. Wright, Numerical Optimization, 2006, chapters 3.4 and 10.3 (Levenberg and Marquardt).
 """
 
 from __future__ import annotations
@@ -22,11 +22,16 @@ STEP = 1e-12
 START, LEAST, MOST = 1e-3, 1e-10, 1e12
 """Shift at the start, least and largest one, relative to the largest curvature."""
 ROUND_OFF = 1e-14
+"""Change of the value, relative to its parts, that rounding hides."""
+CALM = 5e-16
+"""Gradient, relative to the largest curvature times `extent`, by the root of the number of variables, that is rounding."""
+LONGEST = 0.5
+"""Component of a step, relative to `length`, beyond which it is shortened."""
 NEGATIVE = 1e-8
 """Curvature, relative to the largest, that is not negative yet."""
 SIDESTEP = 0.1
 """Step along a negative direction, relative to `length`."""
-FAR = 1e6
+FAR = 500.0
 """Way, relative to `length`, after which there is no minimum."""
 
 
@@ -93,9 +98,9 @@ class _Search:
 
     @property
     def scale(self) -> float:
-        """Largest curvature; where there is none, that of the gradient over `length`."""
+        """Largest curvature, or the gradient over `length` where that is larger."""
         curvature = float(np.abs(self.at.hessian.diagonal()).max(initial=0.0))
-        return max(curvature, 1e-6 * float(np.linalg.norm(self.at.gradient)) / self.length)
+        return max(curvature, float(np.linalg.norm(self.at.gradient)) / self.length)
 
     def moved(self, step: np.ndarray) -> Any:
         """Return the point after a step in scaled coordinates."""
@@ -106,10 +111,15 @@ class _Search:
         return _factors(csc_array(self.at.hessian + shift * eye_array(len(self.root), format="csc")))
 
     def step(self) -> np.ndarray:
-        """Return the step, and raise the shift as far as it needs."""
+        """Return the step, shortened if it is long, and raise the shift as far as it needs."""
         while (factors := self.factors(self.shift)) is None:
             self.shift = max(10.0 * self.shift, 1e-6 * self.scale)
-        return -factors.solve(self.at.gradient)
+        step = -factors.solve(self.at.gradient)
+        return step * min(1.0, LONGEST * self.length / float(np.abs(step).max(initial=1e-300)))
+
+    def definite(self) -> bool:
+        """Whether no curvature is negative."""
+        return self.scale == 0.0 or self.factors(NEGATIVE * self.scale) is not None
 
     def sidestep(self) -> bool:
         """Follow the most negative curvature; whether there is one that lowers the value."""
@@ -129,7 +139,7 @@ class _Search:
         """Take a step if it is good, and adapt the shift; None where rounding hides whether it is."""
         z = self.moved(step)
         at = self.terms(z)
-        promised = 0.5 * float(-self.at.gradient @ step + self.shift * (step @ step))
+        promised = -float(self.at.gradient @ step + 0.5 * step @ (self.at.hessian @ step))
         gained = self.at.value - at.value
         blind = promised <= ROUND_OFF * (self.at.magnitude + at.magnitude)
         calmer = bool(np.linalg.norm(at.gradient) < np.linalg.norm(self.at.gradient))
@@ -150,6 +160,7 @@ def minimise(
     start: Any,
     metric: np.ndarray,
     length: float,
+    extent: float,
     max_iterations: int,
     least_shift: float = LEAST,
 ) -> tuple[Any, Report]:
@@ -160,7 +171,7 @@ def minimise(
         move: gives the point after a step (k,).
         start: the first point.
         metric: (k,) diagonal of M.
-        length: size of things, in the unit of M.
+        length: size of things, in the unit of M. extent: size of the coordinates, whose rounding shows in the gradient.
         max_iterations: steps tried at most.
         least_shift: relative to the largest curvature; what H has below it counts as flat.
 
@@ -171,30 +182,29 @@ def minimise(
     search = _Search(expand, move, start, metric, length)
     ok, message, iteration, way = False, f"not at a minimum after {max_iterations} iterations: allow more with max_iterations", 0, 0.0
     while iteration < max_iterations:
-        if not np.any(search.at.gradient) and search.at.hessian.nnz == 0:
-            ok, message = True, "nothing acts"
+        calm = float(np.linalg.norm(search.at.gradient)) <= CALM * search.scale * extent * np.sqrt(len(metric))
+        if calm and (search.definite() or not search.sidestep()):
+            ok, message = True, "at a minimum"
             break
         least = least_shift * search.scale
         search.shift = max(search.shift, least)
         step = search.step()
         small = float(np.linalg.norm(step)) <= STEP * length
         if small and search.shift > least:
-            factors = search.factors(least)
-            if factors is None and search.sidestep():
+            # Small by the shift alone, perhaps.
+            if search.definite():
+                search.shift = least
+                step = search.step()
+                small = float(np.linalg.norm(step)) <= STEP * length
+            elif search.sidestep():
                 iteration += 1
                 continue
-            if factors is not None:
-                search.shift = least
-                step = -factors.solve(search.at.gradient)
-                small = float(np.linalg.norm(step)) <= STEP * length
-            else:
-                small = True
         if small:
             ok, message = True, "at a minimum"
             break
         iteration += 1
         taken = search.try_step(step)
-        way += float(np.linalg.norm(step)) if taken else 0.0
+        way += float(np.abs(step).max()) if taken else 0.0
         if taken is None:
             ok, message = True, "at a minimum, within rounding"
             break

@@ -6,8 +6,9 @@ with the depths r by which points of the two bodies are on the wrong side of a p
 of b  k r n,  of a  -k r n,  n the normal of the best plane from a to b; as it is the best, these are the exact gradient, and the second
 derivatives are those of V(poses, plane) with the plane eliminated. V is 0 exactly if the bodies are apart, by `gap` or more.
 
-Bodies are taken as convex pieces: boxes and hulls with their corners, spheres and capsules exactly, cylinders as prisms of `SIDES` sides around
-them, meshes as their convex hull (give a compound for a concave body). The contacts of `detect` do not serve here: they want bodies apart.
+Bodies are taken as convex pieces: boxes and hulls with their corners, spheres and capsules exactly, cylinders as prisms of `SIDES` sides
+around them, meshes as their convex hull (give a compound for a concave body). The contacts of `detect` do not serve here: they want bodies
+apart.
 """
 
 from __future__ import annotations
@@ -68,8 +69,7 @@ class NoOverlap:
     def compile(self, world: World) -> CompiledNoOverlap:
         """Bind the term to a compiled scene."""
         where = "NoOverlap"
-        names = world.names if self.bodies is None else self.bodies
-        bodies = np.sort(body_indices(world, names if isinstance(names, str) else list(names), where))
+        bodies = np.sort(body_indices(world, world.names if self.bodies is None else self.bodies, where))
         weight = positive(self.weight, "weight", "N/m", where)
         try:
             gap = number(self.gap, "gap", "m")

@@ -2,14 +2,14 @@
 
     V = min over T = (R, t) of  k/2 sum_i <|p - T p0|^2>_i,    <|p - T p0|^2>_i = |x_i - R x0_i - t|^2 + s_i |R_i - R R0_i|^2
 
-x0_i, R0_i is the layout wanted, <>_i the mean over the sphere of radius rho_i around body i, the smallest about its centre of mass that holds
-it, so s_i = rho_i^2 / 3 with the sum of squares of matrix entries. The best motion is that of Kabsch (Acta Cryst. A32, 1976):
+x0_i, R0_i is the layout wanted, <>_i the mean over the sphere of radius rho_i around body i, the smallest about its centre of mass that
+holds it, so s_i = rho_i^2 / 3 with the sum of squares of matrix entries. The best motion is that of Kabsch (Acta Cryst. A32, 1976):
 
     t = mean of x_i - R x0_i,    R = U diag(1, 1, det U V') V'    from    U S V' = sum_i (x_i - mean x) (x0_i - mean x0)' + s_i R_i R0_i'
 
-As V is at its least in T, its gradient is that at fixed T: forces -k (x_i - R x0_i - t), torques likewise, which sum up to nothing; the second
-derivatives are those of V(x, T) with T eliminated. Source: M. Müller, B. Heidelberger, M. Teschner, M. Gross, Meshless deformations based
-on shape matching, SIGGRAPH 2005.
+As V is at its least in T, its gradient is that at fixed T: forces -k (x_i - R x0_i - t), torques likewise, which sum up to nothing; the
+second derivatives are those of V(x, T) with T eliminated. Source: M. Müller, B. Heidelberger, M. Teschner, M. Gross, Meshless deformations
+based on shape matching, SIGGRAPH 2005.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class RestoreShape:
     def compile(self, world: World) -> CompiledShapeMatch:
         """Bind the group to a compiled scene."""
         where = f"RestoreShape({list(self.bodies)!r})"
-        bodies = body_indices(world, list(self.bodies) if not isinstance(self.bodies, str) else self.bodies, where)
+        bodies = body_indices(world, self.bodies, where)
         weight = positive(self.weight, "weight", "N/m", where)
         if len(bodies) < 2:
             raise SceneError(f"it has {len(bodies)} bodies", "name two or more", where)

@@ -2,8 +2,8 @@
 
     V = k d^2 / 2,    d(p) the signed distance of the point p from the surface, negative inside,    force on a  -k d n  at p
 
-n is the direction from the nearest place of the surface, where b gets the opposite force. V is smooth but at points that have several nearest
-places (in the middle of the solid) and at its edges from inside. The second derivatives leave out how n turns.
+n is the direction from the nearest place of the surface, where b gets the opposite force. V is smooth but at points that have several
+nearest places, in the middle of the solid. The second derivatives leave out how n turns.
 Source: Witkin, Fleischer, Barr 1987, attachment to an implicit surface.
 """
 
@@ -55,32 +55,29 @@ class PointOnSurface:
         except SceneError as error:
             raise error.within(where) from None
         weight = positive(self.weight, "weight", "N/m", where)
-        shape = int(world.shape_of_body[b])
-        geometry = build_geometry([world.shapes[shape], _POINT])
-        return CompiledSurfacePoint(a, b, body_point(world, a, anchor), weight, geometry)
+        parts = world.shapes[int(world.shape_of_body[b])].primitives
+        geometries = [build_geometry([CompiledShape((part,)), _POINT]) for part in parts]
+        return CompiledSurfacePoint(a, b, body_point(world, a, anchor), weight, geometries)
 
 
 @dataclass(frozen=True, eq=False)
 class CompiledSurfacePoint:
-    """A point at `arm` (3,) m of body a (-1: the world) and body b, shape 0 of `geometry`; its shape 1 is a point."""
+    """A point at `arm` (3,) m of body a (-1: the world) and body b; each part of b is shape 0 of a geometry whose shape 1 is a point."""
 
     a: int
     b: int
     arm: np.ndarray
     weight: float
-    geometry: Geometry
+    geometries: list[Geometry]
 
     def expand(self, at: Poses, total: Expansion) -> None:
         """Add the term to a sum."""
         c = at.rotation[self.a] @ self.arm if self.a >= 0 else np.zeros(3)
         p = at.position[self.a] + c if self.a >= 0 else self.arm
         local = (p - at.position[self.b]) @ at.rotation[self.b]
-        out = np.zeros(7)
-        pair_gap(self.geometry, 1, local, np.eye(3), 0, np.zeros(3), np.eye(3), np.inf, out)
-        inside = bool(contains(self.geometry, 0, local[None])[0])
-        away = at.rotation[self.b] @ (local - (_from_inside(self.geometry, local, out[3:6]) if inside else out[3:6]))
-        d = float(np.linalg.norm(away)) * (-1.0 if inside else 1.0)
-        n = away / d if d != 0.0 else away
+        # Of parts that overlap the least distance counts: it is 0 on the surface of all together, and not on what is inside.
+        d, away = min((_distance(geometry, local) for geometry in self.geometries), key=lambda found: found[0])
+        n = at.rotation[self.b] @ (away / d if d != 0.0 else away)
         c_b = p - at.position[self.b]
         motion = np.concatenate([n @ levers(c), -n @ levers(c_b)])
         bodies = np.array([self.a, self.b])
@@ -90,18 +87,23 @@ class CompiledSurfacePoint:
         total.add(value, bodies[bodies >= 0], gradient[kept].reshape(-1, 6), hessian[np.ix_(kept, kept)])
 
 
-def _from_inside(geometry: Geometry, p: np.ndarray, nearest: np.ndarray) -> np.ndarray:
-    """Return the place (3,) m of the surface nearest to a point p inside: for cylinders, which the kernels take as full, it is found here."""
-    for k in range(int(geometry.shape_first[0]), int(geometry.shape_first[1])):
-        if geometry.kind[k] != CYLINDER:
-            continue
-        centre, axis, half = geometry.frame[k, :3], geometry.frame[k, 3:6], float(geometry.frame[k, 6])
-        height = float((p - centre) @ axis)
-        across = p - centre - height * axis
-        off, radius = float(np.linalg.norm(across)), float(geometry.radius[k])
-        if abs(height) > half or off > radius:
-            continue
-        if radius - off < half - abs(height) and off > 0.0:
-            return p + (radius / off - 1.0) * across
-        return p + (np.copysign(half, height) - height) * axis
-    return nearest
+def _distance(geometry: Geometry, p: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return the signed distance of a point p (3,) m from shape 0, and the way (3,) m to it from the nearest place of the surface."""
+    out = np.zeros(7)
+    pair_gap(geometry, 1, p, np.eye(3), 0, np.zeros(3), np.eye(3), np.inf, out)
+    if not contains(geometry, 0, p[None])[0]:
+        away = p - out[3:6]
+        return float(np.linalg.norm(away)), away
+    away = -_way_out_of_cylinder(geometry, p) if geometry.kind[0] == CYLINDER else p - out[3:6]
+    return -float(np.linalg.norm(away)), away
+
+
+def _way_out_of_cylinder(geometry: Geometry, p: np.ndarray) -> np.ndarray:
+    """Return the way (3,) m from a point p in a cylinder to its surface; the kernels take it as full."""
+    centre, axis, half = geometry.frame[0, :3], geometry.frame[0, 3:6], float(geometry.frame[0, 6])
+    height = float((p - centre) @ axis)
+    across = p - centre - height * axis
+    off, radius = float(np.linalg.norm(across)), float(geometry.radius[0])
+    if radius - off < half - abs(height) and off > 0.0:
+        return (radius / off - 1.0) * across
+    return (np.copysign(half, height) - height) * axis

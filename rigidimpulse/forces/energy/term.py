@@ -13,6 +13,7 @@ Source of the idea: A. Witkin, K. Fleischer, A. Barr, Energy constraints on para
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -106,7 +107,7 @@ def body_index(world: World, name: str | None, where: str) -> int:
     return world.names.index(name)
 
 
-def body_indices(world: World, names: tuple[str, ...] | list[str], where: str) -> np.ndarray:
+def body_indices(world: World, names: Sequence[str], where: str) -> np.ndarray:
     """Return the indices (b,) of bodies. Raises SceneError for a name that is unknown or there twice."""
     if isinstance(names, str):
         raise SceneError(f"bodies is the text {names!r}", f"give a list of names: [{names!r}]", where)
@@ -145,7 +146,7 @@ def levers(c: np.ndarray) -> np.ndarray:
 
 
 def turning(c: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """Return the second derivatives (..., 3, 3) by rotation of points at the arms c (..., 3) with the derivatives f (..., 3) of the energy."""
+    """Return the second derivatives (..., 3, 3) by rotation of points at the arms c (..., 3), f (..., 3) the derivatives of the energy."""
     product = f[..., :, None] * c[..., None, :]
     return 0.5 * (product + np.swapaxes(product, -1, -2)) - np.sum(f * c, axis=-1)[..., None, None] * np.eye(3)
 
