@@ -25,6 +25,8 @@ ROUND_OFF = 1e-14
 """Change of the value, relative to its parts, that rounding hides."""
 CALM = 5e-16
 """Gradient, relative to the largest curvature times `extent`, by the root of the number of variables, that is rounding."""
+CALMER = 0.9
+"""Factor by which the gradient must fall where rounding hides the value."""
 LONGEST = 0.5
 """Component of a step, relative to `length`, beyond which it is shortened."""
 NEGATIVE = 1e-8
@@ -65,6 +67,10 @@ class Terms(NamedTuple):
     hessian: csc_array
 
 
+Expand = Callable[[Any], Terms]
+Move = Callable[[Any, np.ndarray], Any]
+
+
 def _factors(matrix: csc_array) -> Any:
     """Return the factors of a symmetric matrix, None if it is not positive definite."""
     try:
@@ -83,9 +89,9 @@ class _Search:
 
     """
 
-    def __init__(self, expand: Callable[[Any], Terms], move: Callable[[Any, np.ndarray], Any], z: Any, metric: np.ndarray, length: float):
+    def __init__(self, expand: Expand, move: Move, z: Any, metric: np.ndarray, sizes: tuple[float, float]) -> None:
         self._expand, self._move = expand, move
-        self.root, self.length = np.sqrt(metric), length
+        self.root, (self.length, self.extent) = np.sqrt(metric), sizes
         self.z = z
         self.at = self.terms(z)
         self.shift = START * self.scale
@@ -95,6 +101,16 @@ class _Search:
         raw = self._expand(z)
         unit = diags_array(1.0 / self.root)
         return raw._replace(gradient=raw.gradient / self.root, hessian=csc_array(unit @ raw.hessian @ unit))
+
+    @property
+    def calm(self) -> float:
+        """Gradient that is rounding of the coordinates."""
+        return CALM * self.scale * self.extent * len(self.root) ** 0.5
+
+    @property
+    def noise(self) -> float:
+        """Value that is rounding of the coordinates where all terms are next to nothing."""
+        return self.scale * (CALM * self.extent) ** 2 * len(self.root)
 
     @property
     def scale(self) -> float:
@@ -141,8 +157,8 @@ class _Search:
         at = self.terms(z)
         promised = -float(self.at.gradient @ step + 0.5 * step @ (self.at.hessian @ step))
         gained = self.at.value - at.value
-        blind = promised <= ROUND_OFF * (self.at.magnitude + at.magnitude)
-        calmer = bool(np.linalg.norm(at.gradient) < np.linalg.norm(self.at.gradient))
+        blind = promised <= ROUND_OFF * (self.at.magnitude + at.magnitude) + self.noise
+        calmer = bool(np.linalg.norm(at.gradient) < CALMER * np.linalg.norm(self.at.gradient))
         if not (gained >= 1e-4 * promised or (blind and calmer)):
             self.shift = max(8.0 * self.shift, 1e-6 * self.scale)
             return None if blind else False
@@ -155,8 +171,8 @@ class _Search:
 
 
 def minimise(
-    expand: Callable[[Any], Terms],
-    move: Callable[[Any, np.ndarray], Any],
+    expand: Expand,
+    move: Move,
     start: Any,
     metric: np.ndarray,
     length: float,
@@ -179,10 +195,11 @@ def minimise(
         The point, and how it went.
 
     """
-    search = _Search(expand, move, start, metric, length)
+    search = _Search(expand, move, start, metric, (length, extent))
+    probed = False
     ok, message, iteration, way = False, f"not at a minimum after {max_iterations} iterations: allow more with max_iterations", 0, 0.0
     while iteration < max_iterations:
-        calm = float(np.linalg.norm(search.at.gradient)) <= CALM * search.scale * extent * np.sqrt(len(metric))
+        calm = float(np.linalg.norm(search.at.gradient)) <= search.calm
         if calm and (search.definite() or not search.sidestep()):
             ok, message = True, "at a minimum"
             break
@@ -190,10 +207,10 @@ def minimise(
         search.shift = max(search.shift, least)
         step = search.step()
         small = float(np.linalg.norm(step)) <= STEP * length
-        if small and search.shift > least:
+        if small and search.shift > least and not probed:
             # Small by the shift alone, perhaps.
             if search.definite():
-                search.shift = least
+                search.shift, probed = least, True
                 step = search.step()
                 small = float(np.linalg.norm(step)) <= STEP * length
             elif search.sidestep():
@@ -204,6 +221,7 @@ def minimise(
             break
         iteration += 1
         taken = search.try_step(step)
+        probed = probed and not taken
         way += float(np.abs(step).max()) if taken else 0.0
         if taken is None:
             ok, message = True, "at a minimum, within rounding"
