@@ -58,7 +58,7 @@ def scene() -> Scene:
     wood = Material(density=600.0, static_friction=FRICTION, dynamic_friction=FRICTION)
     scene = Scene(gravity=(0.0, 0.0, -GRAVITY))
     scene.add(Body("floor", Shape.half_space(), motion="static", material=wood))
-    tray, box, dot = Shape.box((TRAY, TRAY, THICK)), Shape.box((WIDTH, WIDTH, HEIGHT)), Shape.sphere(0.012)
+    tray, box, dot = Shape.box((TRAY, TRAY, THICK)), Shape.box((WIDTH, WIDTH, HEIGHT)), Shape.sphere(0.018)
     for name in LANES:
         times, places = path(name)
         # Straight lines need no frames between their ends.
