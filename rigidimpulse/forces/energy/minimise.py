@@ -36,6 +36,10 @@ SIDESTEP = 0.1
 FAR = 500.0
 """Way, relative to `length`, after which there is no minimum."""
 
+ENDLESS = "there is no minimum: bodies go away without end; pin them, or let something hold them"
+KINK = "no step lowers the value any more: the energies have a kink here"
+MORE = "not at a minimum after {} iterations: allow more with max_iterations"
+
 
 @dataclass(frozen=True)
 class Report:
@@ -196,8 +200,7 @@ def minimise(
 
     """
     search = _Search(expand, move, start, metric, (length, extent))
-    probed = False
-    ok, message, iteration, way = False, f"not at a minimum after {max_iterations} iterations: allow more with max_iterations", 0, 0.0
+    ok, message, iteration, way, probed = False, MORE.format(max_iterations), 0, 0.0, False
     while iteration < max_iterations:
         calm = float(np.linalg.norm(search.at.gradient)) <= search.calm
         if calm and (search.definite() or not search.sidestep()):
@@ -226,11 +229,8 @@ def minimise(
         if taken is None:
             ok, message = True, "at a minimum, within rounding"
             break
-        if way > FAR * length:
-            message = "there is no minimum: bodies go away without end; pin them, or let something hold them"
-            break
-        if not taken and search.shift > MOST * search.scale:
-            message = "no step lowers the value any more: the energies have a kink here"
+        if way > FAR * length or (not taken and search.shift > MOST * search.scale):
+            message = ENDLESS if way > FAR * length else KINK
             break
     gradient = float(np.abs(search.at.gradient * search.root).max(initial=0.0))
     return search.z, Report(ok, message, search.at.value, gradient, iteration)
