@@ -36,6 +36,8 @@ _MODULES = {
     "rolling": "rolling",
     "arm": "arm",
     "pile": "pile",
+    "smoothed_path": "smoothed_path",
+    "settled_layout": "settled_layout",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 
