@@ -204,7 +204,7 @@ def _lift(context, window, group: Group) -> None:
     """
     state, now = context.state, context.state.now
     before = mechanical_energy(now, context.world, group.members)
-    around, held = _look(context, window, group, LIFT_MARGIN), dict(zip(group.keys, group.held.tolist(), strict=True))
+    around, held = _look(context, window, group, LIFT_MARGIN), dict(zip(group.keys, group.slow().tolist(), strict=True))
     lifted = np.array([held.get(key, False) for key in around.keys], bool)
     lift_contacts(now, around.contacts, lifted, around.delta, group.members, context.column)
     refresh_pose(group.members, now, state.rotation, state.course.inertia)
