@@ -6,7 +6,8 @@ skipped is not in the plan: it costs nothing, and `explain` says why.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Protocol
@@ -23,9 +24,9 @@ class Skip:
 
 @dataclass(frozen=True)
 class Bound:
-    """An effect that is in: the function of its stage, and why it is in."""
+    """An effect that is in: the function of its stage (None: others call it, by its clock), and why it is in."""
 
-    function: Callable
+    function: Callable | None
     reason: str
 
 
@@ -70,17 +71,29 @@ class Plan:
             bound = effect.bind(world)
             line = Line(effect.stage, effect.name, isinstance(bound, Bound), bound.reason)
             self.lines.append(line)
-            if isinstance(bound, Bound):
+            if isinstance(bound, Bound) and bound.function is not None:
                 self._stages[effect.stage].append((bound.function, line))
+        self._inner = 0.0
         self.steps = bool(self._stages["detect"] or self._stages["constrain"])
 
     def run(self, stage: str, *arguments) -> None:
         """Run a stage's effects in order, adding up their time."""
         for function, line in self._stages[stage]:
-            start = perf_counter()
+            start, inner = perf_counter(), self._inner
             function(*arguments)
-            line.seconds += perf_counter() - start
+            line.seconds += perf_counter() - start - (self._inner - inner)
             line.calls += 1
+
+    @contextmanager
+    def clock(self, name: str) -> Iterator[None]:
+        """Give the time spent inside to the effect of a name, and not to the one that runs."""
+        start = perf_counter()
+        yield
+        spent = perf_counter() - start
+        line = next(line for line in self.lines if line.name == name)
+        line.seconds += spent
+        line.calls += 1
+        self._inner += spent
 
     def tell(self, name: str, reason: str) -> None:
         """Say of an effect what it did in the run, in the place of why it is in."""

@@ -20,8 +20,10 @@ from rigidimpulse.detect.window import Window
 from rigidimpulse.errors import SceneError
 from rigidimpulse.forces.constant import ConstantForces
 from rigidimpulse.forces.gravity import FreeRotation, Gravity
+from rigidimpulse.forces.kinds import bind_forces, force_kinds
 from rigidimpulse.integrate.course import FIXED, FREE, PRESCRIBED, begin
 from rigidimpulse.integrate.flight import ExactFlight
+from rigidimpulse.integrate.forced_flight import ForcedFlight, SumOfForces
 from rigidimpulse.integrate.prescribed import KeyframePaths
 from rigidimpulse.observe.events import EventLog
 from rigidimpulse.observe.ledger import make_ledger
@@ -77,13 +79,14 @@ def simulate(
     recorder = Recorder(times, world.num_bodies)
     log = EventLog()
     context = StepContext(world, recorder, log)
+    bind_forces(context, plan, times)
     start_courses(context)
     recorder.start(context.state.course)
     resolve_overlaps(context)
     # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
     paths = KeyframePaths(world)
     for end in (float(duration), max(float(duration), float(times[-1]))):
-        if plan.steps:
+        if plan.steps or context.forces is not None:
             run_steps(context, plan, paths, end, progress)
         else:
             paths.start_segments(context, end)
@@ -118,10 +121,13 @@ def make_plan(world: World) -> Plan:
         FreeRotation(),
         Gravity(),
         ConstantForces(),
+        *force_kinds(world),
+        SumOfForces(),
         ContactForces(),
         HeapForces(accuracy.contact_solver),
         ImpactTime(accuracy.impact_time),
         ExactFlight(),
+        ForcedFlight(),
     ]
     return Plan(world, effects)
 
@@ -180,9 +186,10 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         position[:, i], orientation[:, i] = world.body_pose(i, recorder.position[:, i], recorder.orientation[:, i])
     impacts = context.log.impacts.table()
     close_stretches(context)
+    work = None if context.forces is None else context.forces.finish(world, times, recorder)
     ledger = make_ledger(
         times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
-        np.where(world.dynamic, world.mass, 0.0), world.inertia, world.steady_acceleration, context.log,
+        np.where(world.dynamic, world.mass, 0.0), world.inertia, world.steady_acceleration, context.log, work,
     )
     return Recording(
         times=times,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from rigidimpulse.respond.impulse import BodyState
 from rigidimpulse.rotation import to_matrix
 from rigidimpulse.sweep.guard import SweepScratch, make_scratch
 from rigidimpulse.world import World
+
+if TYPE_CHECKING:
+    from rigidimpulse.forces.varying import VaryingForces
 
 CONTACT_CAPACITY = 1024
 PAIR_CAPACITY = 4096
@@ -72,7 +76,6 @@ class State:
         self.ground: dict[int, Ground] = {}
         self.arrival_energy: dict[int, float] = {}
 
-
     def force_of(self, key: tuple[int, ...]) -> np.ndarray:
         """Force (3,) N that a contact carries until now, in its frame; zeros if its bodies have parted since."""
         force, time = self.contact_force.get(key, (NO_FORCE, -np.inf))
@@ -113,6 +116,7 @@ class StepContext:
         self.solve_rows = row_solver(world.accuracy.contact_solver)
         self.foresight = Foresight(world)
         self.joints = JointState(world) if world.joints_of_scene else None
+        self.forces: VaryingForces | None = None
         self.heaps = None if why_no_heaps(world) else Heaps(world)
 
     def bring(self, i: int, time: float) -> None:

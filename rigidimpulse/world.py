@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from rigidimpulse.mass import body_mass
 from rigidimpulse.material import combine, combine_rolling
 from rigidimpulse.rotation import conjugate, from_matrix, multiply, rotate
 from rigidimpulse.scene import Scene, validate
+
+if TYPE_CHECKING:
+    from rigidimpulse.forces.force import ForceTable
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +106,14 @@ class World:
         return self.contact_gap * float(finite.max()) if len(finite) else 0.0
 
     @cached_property
+    def force_tables(self) -> list[ForceTable]:
+        """The forces that vary, by class."""
+        steady = _steady_forces(self.scene)
+        forces = [effect for effect in self.scene.effects if effect.stage == "forces" and effect not in steady]
+        classes = dict.fromkeys(type(force) for force in forces)
+        return [c.compile([force for force in forces if type(force) is c], self) for c in classes]
+
+    @cached_property
     def joints(self) -> Joints:
         """The table of joints."""
         return compile_joints(self.joints_of_scene, self)
@@ -120,7 +132,7 @@ class World:
     @property
     def can_press(self) -> bool:
         """Whether anything but impacts can press bodies together: steady forces, a moving support, the spin of what is no ball."""
-        return bool(np.any(self.steady_acceleration) or np.any(self.moving) or not np.all(self.ball[self.dynamic]))
+        return bool(self.force_tables or np.any(self.steady_acceleration) or np.any(self.moving) or not np.all(self.ball[self.dynamic]))
 
     def may_collide(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Which pairs take part in contact at all: at least one of the bodies is dynamic."""
@@ -167,9 +179,8 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
     inv_mass = np.where(dynamic, 1.0 / mass, 0.0)
     factor = np.array([body.gravity_factor for body in bodies], float)
     gravity = factor[:, None] * np.asarray(scene.gravity, float) * dynamic[:, None]
-    forces = [effect for effect in scene.effects if isinstance(effect, ConstantForce)]
-    push = push_of_forces(forces, [body.name for body in bodies], inv_mass)
-    return World(
+    push = push_of_forces(_steady_forces(scene), [body.name for body in bodies], inv_mass)
+    world = World(
         scene=scene,
         accuracy=resolve_accuracy(accuracy),
         names=[body.name for body in bodies],
@@ -205,6 +216,16 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
         apart=_pairs_apart(joints, [body.name for body in bodies]),
         joints_of_scene=joints,
     )
+    # Bad forces are refused here.
+    _ = world.force_tables
+    return world
+
+
+def _steady_forces(scene: Scene) -> list[ConstantForce]:
+    """Constant forces at the centres of mass of bodies whose mass stays."""
+    losing = {effect.body for effect in scene.effects if getattr(effect, "takes_mass", False)}
+    forces = [effect for effect in scene.effects if isinstance(effect, ConstantForce)]
+    return [force for force in forces if force.point is None and force.body not in losing]
 
 
 def _pairs_apart(joints: list[Joint], names: list[str]) -> np.ndarray:

@@ -139,6 +139,7 @@ def _hold_turning(
     rolling = rolling_of(context.world, state.now, contacts)
 
     def hold_over(h: float, excess: np.ndarray) -> Held:
+        h = group.load(context, h)
         context.wrench[group.members] = 0.0
         return hold_contacts(
             context.solve_rows, state.now, contacts, group.members, motion.turning, excess, context.acceleration,
@@ -219,7 +220,7 @@ def _lift(context, window, group: Group) -> None:
 def _look(context, window, group: Group, margin: float) -> Group:
     """The same group with its contacts at the present poses, within so many held gaps."""
     real, integer = collect(context, window, group.pairs, group.time, margin)
-    return make_group(context, window, group.time, real, integer, np.ones(len(real), bool), group.joints)
+    return make_group(context, window, group.time, real, integer, np.ones(len(real), bool), group.joints, group.members)
 
 
 def _rests(context, group: Group, h: float) -> bool:
@@ -229,7 +230,7 @@ def _rests(context, group: Group, h: float) -> bool:
     supports = np.unique(np.concatenate([group.contacts.body_a, group.contacts.body_b]))
     if len(group.joints):
         supports = np.union1d(supports, context.joints.bodies_of(group.joints))
-    if np.any(world.moving[supports]):
+    if np.any(world.moving[supports]) or (group.loaded and not context.forces.may_rest(i)):
         return False
     limit = TOLERANCES.rest * world.steady_strength[i] * h
     force, torque = context.wrench[i, :3], context.wrench[i, 3:]

@@ -42,21 +42,21 @@ class Ground:
 def note_hold(context, group, contacts, force: np.ndarray) -> None:
     """Remember who shares the forces (m, 3) of the held contacts from now on, and whether they may make energy.
 
-    They may not where all that stands moves with one velocity, and joints are neither driven nor springs.
+    They may not where all that stands moves with one velocity, joints are neither driven nor springs, and no other force varies.
     """
     world, state, now = context.world, context.state, context.state.now
     first, members = int(group.members[0]), group.members
     pairs = np.column_stack([contacts.body_a, contacts.body_b])
     stands = ~world.dynamic[pairs]
     supports, rough = np.unique(pairs[stands]), bool(np.any(stands.any(axis=1) & (contacts.static_friction > 0.0)))
-    passive, tied = True, False
+    passive, tied = group.free is None, False
     if len(group.joints):
         ends = context.joints.bodies_of(group.joints)
         tied = context.joints.hold_to_world(group.joints)
         rough = rough or tied or not np.all(world.dynamic[ends])
         supports = np.union1d(supports, ends[~world.dynamic[ends]])
         # Without contact joints keep energy by themselves, up and down: what they gain they lose.
-        passive = context.joints.are_passive(group.joints) and bool(np.any(force[:, 0] > 0.0))
+        passive = passive and context.joints.are_passive(group.joints) and bool(np.any(force[:, 0] > 0.0))
     velocity = now.velocity[supports[0]].copy() if len(supports) else np.zeros(3)
     steady = not np.any(now.angular_velocity[supports]) and not np.any(now.velocity[supports] != velocity)
     state.sharing[members] = first

@@ -98,6 +98,8 @@ def why_no_heaps(world) -> str:
         return f"contact_solver is {solver!r}"
     if not world.can_collide or not world.can_press:
         return "nothing presses bodies together"
+    if world.force_tables:
+        return "forces vary"
     if solver == "auto" and np.count_nonzero(world.dynamic) < MANY:
         return f"fewer than {MANY} movable bodies"
     return ""

@@ -101,7 +101,7 @@ class Joint:
             hand), m for a slider (way of b along the axis) and for a distance; upper alone for a ball joint (angle
             between the two axes, rad).
         stiffness, damping: make the joint soft: N/m and N s/m along, N m/rad and N m s/rad about its axes.
-        break_force: N, the joint is gone when its force exceeds it.
+        break_force: N, the joint is gone when its force exceeds it. release_time: s, when it lets go: of a stage, of a bomb.
         collide: whether the two bodies touch each other.
 
     """
@@ -115,6 +115,7 @@ class Joint:
     stiffness: float | None = None
     damping: float = 0.0
     break_force: float = math.inf
+    release_time: float = math.inf
     collide: bool = False
     stage: ClassVar[str] = "constrain"
 
@@ -274,6 +275,8 @@ def compile_joints(joints: list[Joint], world) -> Joints:
             raise SceneError(f"it joins {joint.a!r} to itself", "name two different bodies", joint.label)
         if not joint.break_force > 0.0:
             raise SceneError(f"break_force = {joint.break_force}", "give a force in N, > 0, or leave it out", joint.label)
+        if not joint.release_time >= 0.0:
+            raise SceneError(f"release_time = {joint.release_time}", "give a time in s, >= 0, or leave it out", joint.label)
         if joint.name is not None and sum(other.name == joint.name for other in joints) > 1:
             raise SceneError(f"another joint has the name {joint.name!r}, too", "give each joint a name of its own", joint.label)
         motor = getattr(joint, "motor", None)

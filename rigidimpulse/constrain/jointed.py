@@ -52,6 +52,7 @@ class JointState:
         self.memory = make_memory(world.joints, world.inertia)
         self.names = [joint.name or f"joint{j}" for j, joint in enumerate(joints)]
         self.break_force = np.array([joint.break_force for joint in joints])
+        self.release_time = np.array([joint.release_time for joint in joints])
         self.whole = np.ones(len(joints), bool)
         self.moment = np.zeros((len(joints), 3))
         self.shock = np.zeros((len(joints), 3))
@@ -147,6 +148,8 @@ class JointState:
         for a, b in zip(self.table.body_a[group.joints].tolist(), self.table.body_b[group.joints].tolist(), strict=True):
             spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
             fastest = max(fastest, float(np.linalg.norm(spins[1] - spins[0])))
+        waits = self.release_time[group.joints] - group.time
+        h = min(h, float(waits[waits > 0.0].min(initial=np.inf)))
         step = world.accuracy.step
         pieces = min(max(math.ceil(fastest * step / TURN), math.ceil(rates * step / SWAY), 1), MOST_SUB_STEPS)
         piece = step / pieces
@@ -180,6 +183,7 @@ class JointState:
         others = others[~context.world.dynamic[others]]
         h, cuts = self.sub_step(context, group, rest), 0
         while True:
+            h = group.load(context, h)
             for i in others:
                 memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, group.time + h)
             moment = self.moment.copy()
@@ -229,18 +233,26 @@ class JointState:
                 )
 
     def _break(self, context, group) -> bool:
-        """Take out the most overloaded joint, if there is one."""
+        """Take out a joint whose time has come, or the most overloaded one, if there is one."""
         which = group.joints
+        due = which[self.release_time[which] <= group.time]
+        if len(due):
+            self._take_out(context, group, int(due[0]), "joint let go", "")
+            return True
         load = np.linalg.norm(self.pull[which], axis=1) / self.break_force[which]
         if not len(which) or load.max() <= 1.0:
             return False
         j = int(which[np.argmax(load)])
-        self.whole[j] = False
-        group.joints = which[which != j]
-        pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
-        context.log.note(group.time, "joint broke", pair, f"{self.names[j]}: {np.linalg.norm(self.pull[j]):.6g} N")
-        self.reactions.append((group.time, j, np.zeros(3)))
+        self._take_out(context, group, j, "joint broke", f": {np.linalg.norm(self.pull[j]):.6g} N")
         return True
+
+    def _take_out(self, context, group, j: int, kind: str, why: str) -> None:
+        """The joint is gone."""
+        self.whole[j] = False
+        group.joints = group.joints[group.joints != j]
+        pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
+        context.log.note(group.time, kind, pair, f"{self.names[j]}{why}")
+        self.reactions.append((group.time, j, np.zeros(3)))
 
     def log_rest(self, group) -> None:
         """Forces on b from here on, while the group rests."""

@@ -15,8 +15,8 @@ A contact that carries load but leaves slowly (it would rise less than the gap i
 normal velocity is set to zero in the metric of mass, which only dissipates; otherwise the force would do work on it
 and it would hover for ever.
 
-A contact that slips stops at t = |u_t| / |a_t + W_t f|, and its friction changes there: the sub-step ends at the first
-such time (stop split). The same holds for rolling and spinning friction (see `rolling`).
+A contact that slips stops at t = |u_t| / |a_t + W_t f|, and its friction changes there, also where it slips back: the sub-step ends at the
+first such time (stop split). The same holds for rolling and spinning friction (see `rolling`).
 """
 
 from typing import NamedTuple
@@ -133,7 +133,7 @@ def hold_contacts(
     if rolling is not None:
         rolled = rolling_slip(bodies, contacts, rolling, frames, start, SLIP * scale)
         disc, second, slip = (np.concatenate(both) for both in zip((disc, second, slip), rolled, strict=True))
-    if len(disc) and residual <= POOR and np.any(np.abs(_end_slip(rows, n, disc, second)).sum(axis=1) <= SLIP * scale):
+    if len(disc) and residual <= POOR and _stops(slip, _end_slip(rows, n, disc, second), SLIP * scale):
         brief, whole = BRIEF * h, rows.impulse.copy()
         rows.impulse[:] *= BRIEF
         attempt(brief)
@@ -154,6 +154,11 @@ def _end_slip(rows: Rows, n: int, first: np.ndarray, second: np.ndarray) -> np.n
     """Slip (s, 2) at the end along pairs of rows; a single row is given twice."""
     after = rows.bias + response_to(rows, n, rows.impulse)
     return np.column_stack([after[first], np.where(second > first, after[second], 0.0)])
+
+
+def _stops(slip: np.ndarray, end: np.ndarray, none: float) -> bool:
+    """Whether one of s slips (s, 2) stops or turns back until the end; speeds up to `none` are none."""
+    return bool(np.any((np.abs(end).sum(axis=1) <= none) | (np.einsum("ij,ij->i", slip, end) < 0.0)))
 
 
 def _first_stop(slip: np.ndarray, end: np.ndarray, brief: float) -> float:

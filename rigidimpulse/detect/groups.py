@@ -46,6 +46,8 @@ class Group:
         still: m/s, approach speed that counts as none. scale: m/s, largest speed of a contact point.
         joints: the joints of the members.
         heap: members that are stepped as a heap (see `constrain/heap`), None where there is none.
+        free: accelerations and angular accelerations (k, 3) of the members but for varying forces, None where these do not act.
+        loaded: whether varying forces are constant over the sub-step of contacts or joints.
 
     """
 
@@ -70,6 +72,12 @@ class Group:
     scale: float = 0.0
     joints: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     heap: np.ndarray | None = None
+    free: tuple[np.ndarray, np.ndarray] | None = None
+    loaded: bool = False
+
+    def load(self, context, h: float) -> float:
+        """Take varying forces as constant over a sub-step of h s at most; returns how long it may be."""
+        return h if self.free is None else context.forces.load(context, self, h)
 
     def slow(self) -> np.ndarray:
         """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
@@ -131,6 +139,8 @@ def touching_groups(context, window, time: float, bodies: np.ndarray) -> tuple[l
         bring_all(
             state.course, fresh, time, state.now, state.rotation, context.acceleration, context.angular_acceleration
         )
+        if context.forces is not None and context.forces.flow is not None:
+            context.forces.flow.weigh(fresh, time)
         real, integer = collect(context, window, pairs, time)
         reals.append(real)
         integers.append(integer)
@@ -145,9 +155,11 @@ def touching_groups(context, window, time: float, bodies: np.ndarray) -> tuple[l
 
 
 def _partners(context, bodies: np.ndarray) -> np.ndarray:
-    """All bodies of the joints at the given ones, and those that share forces with them; themselves included."""
+    """All bodies of the joints at the given ones, those tied by forces, and those that share forces with them; themselves included."""
     state = context.state
     partners = np.zeros(0, np.int64) if context.joints is None else context.joints.bodies_of(context.joints.at(bodies))
+    if context.forces is not None:
+        partners = np.concatenate([partners, context.forces.partners(bodies)])
     pressed = bodies[state.under_contact[bodies]]
     if not len(pressed):
         return partners
@@ -181,12 +193,30 @@ def _components(context, window, time: float, reached, real: np.ndarray, integer
             ends = jointed.bodies_of(np.array([j])).tolist()
             join(ends[0], ends[-1])
             at.append(jointed.movable_end(j))
+    forced = np.zeros(0, np.int64)
+    if context.forces is not None:
+        forced = np.flatnonzero(reached & context.forces.acts)
+        for first, i in context.forces.ties(forced):
+            join(first, i)
     owner = np.array([root(a if dynamic[a] else b) for a, b in ends_of_contacts], np.int64)
     owner_of_joint = np.array([root(i) for i in at], np.int64)
-    groups = []
-    for o in sorted({*owner.tolist(), *owner_of_joint.tolist()}):
-        groups.append(make_group(context, window, time, real, integer, owner == o, joints[owner_of_joint == o]))
+    owner_of_forced = np.array([root(i) for i in forced.tolist()], np.int64)
+    owners, groups = sorted({*owner.tolist(), *owner_of_joint.tolist()}), []
+    for o in owners:
+        tied = forced[owner_of_forced == o]
+        groups.append(make_group(context, window, time, real, integer, owner == o, joints[owner_of_joint == o], tied))
+    if len(free := forced[~np.isin(owner_of_forced, owners)]):
+        groups.append(_free_group(context, time, free))
     return groups
+
+
+def _free_group(context, time: float, members: np.ndarray) -> Group:
+    """Bodies that nothing but forces hold: no contacts, no joints."""
+    none, now = np.zeros(0, np.int64), context.state.now
+    return Group(
+        time, members, none, empty_contacts(0), none, none, np.zeros((0, 2), np.int64), [], np.zeros(0), np.zeros(0), np.zeros(0),
+        np.zeros(0, bool), now.velocity[members], now.angular_velocity[members],
+    )
 
 
 def _end_sub_steps(context, groups: list[Group], time: float, bodies: np.ndarray) -> None:
@@ -206,9 +236,9 @@ def _end_sub_steps(context, groups: list[Group], time: float, bodies: np.ndarray
 
 
 def make_group(
-    context, window, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray, joints: np.ndarray
+    context, window, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray, joints: np.ndarray, tied: np.ndarray
 ) -> Group:
-    """The group of the contacts marked in `which`, sorted by pair, and of the given joints."""
+    """The group of the contacts marked in `which`, sorted by pair, of the given joints, and of the bodies tied to them by forces."""
     world, state = context.world, context.state
     rows = which.nonzero()[0]
     if len(rows) > 1:
@@ -219,6 +249,7 @@ def make_group(
     mark[contacts.body_a] = mark[contacts.body_b] = True
     if len(joints):
         mark[context.joints.bodies_of(joints)] = True
+    mark[tied] = True
     members = (mark & world.dynamic).nonzero()[0]
     place = window.find(contacts.body_a, contacts.body_b)
     group = Group(

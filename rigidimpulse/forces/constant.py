@@ -1,16 +1,17 @@
-"""Constant forces at centres of mass.
+"""Constant forces.
 
     a = g + sum F / m,    V = -sum F . x,    impulse over a time T: F T
 
 The acceleration is as uniform as gravity's, so paths between impacts stay parabolas and the rotation stays free: exact, without
-an integrator (law B1 of impulse and momentum: the impulse of a constant force is F T).
+an integrator (law B1 of impulse and momentum: the impulse of a constant force is F T). So much for forces at centres of mass; those at
+points of a body, and those on a body that loses mass, vary (see `varying`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,19 +20,22 @@ from rigidimpulse.body import vector
 from rigidimpulse.errors import SceneError, unknown_name
 from rigidimpulse.plan import Bound, Skip
 
+if TYPE_CHECKING:
+    from rigidimpulse.forces.force import ForceTable
+
 
 @dataclass(frozen=True, eq=False)
 class ConstantForce:
-    """A force that keeps its strength and its direction in the world and acts at the centre of mass of a dynamic body.
+    """A force that keeps its strength and its direction in the world and acts on a dynamic body.
 
     `Scene.add` takes it; it is checked when the scene is compiled: a `SceneError` names the body where it is unknown or not
-    dynamic, where the force is not three finite numbers, and where a `point` is given. The torque of a force at a point of the
-    body would turn with the body, and the course of a body is exact for torques that are constant in the world only.
+    dynamic, and where the force or the point is not three finite numbers. At the centre of mass paths stay parabolas, exactly; at a
+    point of the body the torque turns with it, and a numerical integrator comes in.
 
     Attributes:
         body: name of the body.
         force: (3,) N, world frame.
-        point: None, the centre of mass; any other point is refused.
+        point: (3,) m, where it acts, in world coordinates at the start; it moves with the body. None: the centre of mass.
 
     """
 
@@ -39,10 +43,31 @@ class ConstantForce:
     force: ArrayLike
     point: ArrayLike | None = None
     stage: ClassVar[str] = "forces"
+    kind: ClassVar[str] = "forces at points"
 
     def bind(self, _world) -> Skip:
         """Constant forces are one line of the plan, not one each."""
         return Skip("a constant force; see constant forces")
+
+    @classmethod
+    def compile(cls, forces: Sequence[Self], world) -> ForceTable:
+        """Check and bind forces whose torque or effect varies: those at points, and those on bodies that lose mass."""
+        from rigidimpulse.forces.force import body_point, checked_vector, dynamic_body, named
+        from rigidimpulse.forces.timed import TimedForces
+
+        body, points, strength = [], [], []
+        for force in forces:
+            where = f"ConstantForce({force.body!r})"
+            i = dynamic_body(world, force.body, where)
+            body.append(i)
+            strength.append(checked_vector(force.force, "force", "N", where))
+            point = world.position[i] if force.point is None else checked_vector(force.point, "point", "m", where)
+            points.append(body_point(world, i, point))
+        value = np.array(strength)
+        names = named(cls.kind, [None] * len(forces), [f"constant force on {f.body}" for f in forces])
+        table = TimedForces(cls.kind, names, body, points, lambda _, rows: value[rows], f"{len(forces)} acting")
+        table.is_steady = True
+        return table
 
 
 @dataclass(frozen=True)
@@ -80,11 +105,6 @@ def push_of_forces(forces: Sequence[ConstantForce], names: list[str], inv_mass: 
         i = names.index(force.body)
         if inv_mass[i] == 0.0:
             raise SceneError(f"body {force.body!r} is not dynamic", "a force moves dynamic bodies only: name one of them", where)
-        if force.point is not None:
-            raise SceneError(
-                f"point is {force.point!r}: its torque would turn with the body, which no path in closed form follows",
-                "leave the point out: the force then acts at the centre of mass", where,
-            )  # fmt: skip
         try:
             total[i] += vector(force.force, "force", "N")
         except SceneError as error:

@@ -112,8 +112,11 @@ def begin(course, i):
 
 
 @jit
-def take(course, i, time, bodies, acceleration, torque, mode):
-    """Let body i go on from where it is now, at `time`, with a constant acceleration (3,) m/s^2 and torque (3,) N m, in a mode."""
+def take(course, i, time, bodies, acceleration, torque, jerk, torque_rate, mode):
+    """Let body i go on from where it is now, at `time`, in a mode.
+
+    acceleration (3,) m/s^2 and torque (3,) N m at `time`, jerk (3,) m/s^3 and torque_rate (3,) N m/s from then on.
+    """
     course.start[i] = time
     course.mode[i] = mode
     for k in range(3):
@@ -122,7 +125,8 @@ def take(course, i, time, bodies, acceleration, torque, mode):
         course.angular_velocity[i, k] = bodies.angular_velocity[i, k]
         course.acceleration[i, k] = acceleration[k]
         course.torque[i, k] = torque[k]
-        course.top[i, JERK + k] = course.top[i, TORQUE_RATE + k] = 0.0
+        course.top[i, JERK + k] = jerk[k]
+        course.top[i, TORQUE_RATE + k] = torque_rate[k]
     for k in range(4):
         course.orientation[i, k] = bodies.orientation[i, k]
     begin(course, i)

@@ -29,7 +29,9 @@ class ExactFlight:
     name: str = "exact flight"
 
     def bind(self, world) -> Bound | Skip:
-        """Always in: it is what moves bodies."""
+        """In where no force varies: it is what moves bodies."""
+        if world.force_tables:
+            return Skip("forces vary")
         return Bound(integrate, "paths between impacts are exact")
 
 
@@ -48,6 +50,7 @@ def integrate(context, window, group: Group) -> None:
             or (now.velocity[i] != group.velocity[n]).any()
             or (now.angular_velocity[i] != group.angular_velocity[n]).any()
             or context.wrench[i].any()
+            or group.free is not None
         ):
             take_course(context, window, i, group.time, context.wrench[i], group.rests)
     set_touch(context, window, group)
@@ -63,19 +66,27 @@ def take_course(context, window, i: int, time: float, wrench: np.ndarray, rests:
     context.recorder.flush(course, i, time, state.correction[i])
     state.correction[i] = 0.0
     context.contact_log.close([i], time)
+    if context.forces is not None:
+        context.forces.log.end(i, time)
     book_contact_work(context, i, time)
     pressed = not rests and bool(wrench.any())
     if rests:
         now.velocity[i] = now.angular_velocity[i] = 0.0
-        take(course, i, time, now, NOTHING, NOTHING, FIXED)
+        take(course, i, time, now, NOTHING, NOTHING, NOTHING, NOTHING, FIXED)
+    elif context.forces is not None and context.forces.acts[i]:
+        total, rate = wrench + context.forces.value[i], context.forces.rate[i]
+        acceleration, jerk = world.steady_acceleration[i] + world.inv_mass[i] * total[:3], world.inv_mass[i] * rate[:3]
+        turned = total[3:].any() or rate[3:].any()
+        take(course, i, time, now, acceleration, total[3:], jerk, rate[3:], FORCED if turned else FREE)
     else:
         acceleration = world.steady_acceleration[i]
         if pressed:
             acceleration = acceleration + world.inv_mass[i] * wrench[:3]
-        take(course, i, time, now, acceleration, wrench[3:], FORCED if pressed and wrench[3:].any() else FREE)
+        turned = pressed and wrench[3:].any()
+        take(course, i, time, now, acceleration, wrench[3:], NOTHING, NOTHING, FORCED if turned else FREE)
     state.under_contact[i] = pressed
     if pressed:
-        state.energy_at_start[i] = mechanical_energy(now, world, np.array([i]))
+        state.energy_at_start[i] = mechanical_energy(now, world, np.array([i])) - work_of_forces(context, i)
     if window is not None:
         window.change_course(i, time)
 
@@ -84,8 +95,13 @@ def book_contact_work(context, i: int, time: float) -> None:
     """Work that contact forces did along the course that ends: what its energy changed by."""
     arrival = context.state.arrival_energy.pop(i, None)
     if arrival is not None:
-        begun = context.state.energy_at_start[i]
+        begun, arrival = context.state.energy_at_start[i], arrival - work_of_forces(context, i)
         context.log.stretches.append((context.state.course.start[i], time, i, begun, arrival - begun))
+
+
+def work_of_forces(context, i: int) -> float:
+    """What varying forces did on body i until its present course began, J."""
+    return 0.0 if context.forces is None else float(context.forces.log.work[i])
 
 
 def set_touch(context, window, group: Group) -> None:

@@ -37,19 +37,21 @@ class Ledger:
         return self.kinetic + self.potential
 
 
-def make_ledger(times, position, orientation, velocity, angular_velocity, mass, inertia, steady_acceleration, log) -> Ledger:
+def make_ledger(times, position, orientation, velocity, angular_velocity, mass, inertia, steady_acceleration, log, work=None) -> Ledger:
     """Ledger of recorded principal-frame states.
 
     Arrays are (f, n, ...) for all bodies: centre of mass, principal orientation, velocity, world spin; mass (n,) with 0 for
     bodies that are not dynamic, principal inertia (n, 3), acceleration by gravity and constant forces (n, 3); log: energy
-    changes by cause and courses under contact forces.
+    changes by cause and courses under contact forces; work: what varying forces did (`ForceWork`), if there are any.
     """
+    share = np.ones((1, 1)) if work is None or work.mass_share is None else work.mass_share
+    mass, inertia = share * mass, share[:, :, None] * inertia
     spin_body = rotate_inverse(orientation, angular_velocity)
-    angular_body = spin_body * np.where(mass > 0.0, 1.0, 0.0)[:, None] * inertia
+    angular_body = spin_body * np.where(mass > 0.0, 1.0, 0.0)[:, :, None] * inertia
     kinetic = 0.5 * (mass * (velocity**2).sum(-1) + (spin_body * angular_body).sum(-1))
-    potential = -(mass[:, None] * steady_acceleration * position).sum(-1)
-    momentum = (mass[:, None] * velocity).sum(1)
-    angular = (rotate(orientation, angular_body) + np.cross(position, mass[:, None] * velocity)).sum(1)
+    potential = -(mass[:, :, None] * steady_acceleration * position).sum(-1)
+    momentum = (mass[:, :, None] * velocity).sum(1)
+    angular = (rotate(orientation, angular_body) + np.cross(position, mass[:, :, None] * velocity)).sum(1)
     dissipated: dict[str, np.ndarray] = {}
     for cause in sorted({c for _, c, _ in log.energy}):
         stamps = np.array([t for t, c, _ in log.energy if c == cause])
@@ -59,8 +61,16 @@ def make_ledger(times, position, orientation, velocity, angular_velocity, mass, 
         done = np.clip((times - start) / (end - start), 0.0, 1.0)
         dissipated[cause] = dissipated.get(cause, 0.0) - change * done
     if log.stretches:
-        dissipated["contact"] = _contact_work(times, kinetic + potential, log.stretches)
-    return Ledger(times, kinetic.sum(1), potential.sum(1), momentum, angular, dissipated)
+        given = 0.0 if work is None else work.on_bodies(position.shape[1])
+        dissipated["contact"] = _contact_work(times, kinetic + potential - given, log.stretches)
+    stored = potential.sum(1)
+    if work is not None:
+        stored = stored + work.potential.sum(1)
+        dissipated.update(work.taken())
+        if work.mass_share is not None:
+            total = kinetic.sum(1) + stored + sum(dissipated.values())
+            dissipated["mass that left"] = total[0] - total
+    return Ledger(times, kinetic.sum(1), stored, momentum, angular, dissipated)
 
 
 def _contact_work(times: np.ndarray, energy: np.ndarray, stretches) -> np.ndarray:

@@ -1,0 +1,65 @@
+"""Harmonic forces.
+
+    F(t) = A d sin(w t + phi),  w = 2 pi f,    impulse over a time T, phi = 0:  A d (1 - cos w T) / w
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rigidimpulse.forces.force import Force, body_point, checked_direction, checked_number, checked_vector, dynamic_body, named
+from rigidimpulse.forces.timed import TimedForces
+from rigidimpulse.world import World
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicForce(Force):
+    """A force that goes to and fro along a direction of the world: A sin(2 pi f t + phase).
+
+    Checked when the scene is compiled: a `SceneError` names a body that is unknown or not dynamic, and numbers that are not finite.
+
+    Attributes:
+        body: name of the body.
+        amplitude: A, N.
+        frequency: f, Hz: cycles a second. From an angular frequency w [rad/s]: w / (2 pi).
+        direction: (3,) of the force in the world; its length does not matter.
+        phase: rad.
+        point: (3,) m, where it acts, in world coordinates at the start; it moves with the body. None: the centre of mass.
+        name: what the ledger calls it; None makes one of the body's name.
+
+    """
+
+    body: str
+    amplitude: float
+    frequency: float
+    direction: ArrayLike
+    phase: float = 0.0
+    point: ArrayLike | None = None
+    name: str | None = None
+    kind: ClassVar[str] = "harmonic forces"
+
+    @classmethod
+    def compile(cls, forces: Sequence[Self], world: World) -> TimedForces:
+        """Check and bind all harmonic forces."""
+        body, points, amplitude, rate, phase = [], [], [], [], []
+        for force in forces:
+            where = f"HarmonicForce({force.body!r})"
+            i = dynamic_body(world, force.body, where)
+            body.append(i)
+            amplitude.append(checked_number(force.amplitude, "amplitude", "N", where) * checked_direction(force.direction, where))
+            rate.append(2.0 * np.pi * checked_number(force.frequency, "frequency", "Hz", where))
+            phase.append(checked_number(force.phase, "phase", "rad", where))
+            point = world.position[i] if force.point is None else checked_vector(force.point, "point", "m", where)
+            points.append(body_point(world, i, point))
+        a, w, phi = np.array(amplitude), np.array(rate), np.array(phase)
+
+        def strength(time: np.ndarray, rows: np.ndarray) -> np.ndarray:
+            return np.sin(w[rows] * time + phi[rows])[:, None] * a[rows]
+
+        names = named(cls.kind, [f.name for f in forces], [f"harmonic force on {f.body}" for f in forces])
+        return TimedForces(cls.kind, names, body, points, strength, f"{len(forces)} acting")

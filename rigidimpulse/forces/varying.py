@@ -1,0 +1,222 @@
+"""Bodies under forces that vary.
+
+Where bodies touch nothing and no joint holds them, a step under their forces is one of Nystroem's (`integrate.force_step`), as long as its
+error allows. Where contacts or joints hold them, forces are constant over a sub-step of length h, that of its middle:
+
+    F = F(t + h/2, x(h/2), v(h/2)),    x, v: flown under what accelerated the body last, contacts included
+
+which is of second order in h as contact forces are, and leaves a body that stands still where it is. The sub-step is so short that the
+path is off by no more than is allowed,  |F(h/2) - F| h^2 / (6 m),  F at both ends.
+
+What each force did, impulse, angular impulse about the world's origin and work, is the integral of its line along the very course.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.detect.touching import refresh_pose
+from rigidimpulse.forces.force import ForceTable, Instant
+from rigidimpulse.forces.force_log import ForceLog, ForceWork
+from rigidimpulse.forces.mass_flow import BurningForces, MassFlow
+from rigidimpulse.integrate.force_step import Lines, Room, nystroem
+
+IN_FLIGHT, IN_CONTACT = 0.03, 3.0
+"""How far a path may be off, relative to the size, or in rad of turn: in roots of the accuracy's tolerance, inside a step of bodies that
+fly and for each step of the run of those in contact. 1e-8 and 1e-6 by default."""
+SHORTEST = 2.0**-14
+"""Part of the run's step below which it is not split for forces."""
+SAFETY, LEAST_CHANGE, MOST_CHANGE = 0.9, 0.2, 5.0
+"""How step lengths follow errors."""
+ASIDE = 1e-9
+"""Part of a step by which forces are taken inside of its ends: where they jump the step's own side counts."""
+
+
+class VaryingForces:
+    """The varying forces of a run.
+
+    Attributes:
+        acts: (n,) bool, bodies that feel them.
+        value, rate: (n, 6) force and torque on bodies at the start of their courses, and how they change a second.
+        flow: masses that change, if there are any. log: what each force did.
+
+    """
+
+    def __init__(self, world, course, times: np.ndarray, clocks) -> None:
+        """clocks: lines of the plan by kind, which get the time that forces take; times (f,) s of the frames."""
+        n = world.num_bodies
+        self._world = world
+        self._tables: list[ForceTable] = world.force_tables
+        self._clocks = [clocks[table.kind] for table in self._tables]
+        self._first = np.cumsum([0, *(len(table.body) for table in self._tables)])
+        self._body = np.concatenate([table.body for table in self._tables])
+        self.acts = np.zeros(n, bool)
+        self.acts[self._body] = True
+        self._component = _components(n, np.concatenate([table.links for table in self._tables]))
+        self._restless = np.zeros(n, bool)
+        for table in self._tables:
+            self._restless[table.body] |= not table.is_steady
+        self._course = course
+        self._room = Room(course, world.inv_mass)
+        self._plan = np.full(n, world.accuracy.step)
+        self._in_flight, self._in_contact = IN_FLIGHT * world.accuracy.tolerance**0.5, IN_CONTACT * world.accuracy.tolerance**0.5
+        self._size = np.minimum(world.bound_radius, world.size)
+        burners = [table for table in self._tables if isinstance(table, BurningForces)]
+        self.flow = MassFlow(burners, world, course) if burners else None
+        self._others = np.zeros((n, 6))
+        self.value, self.rate = np.zeros((n, 6)), np.zeros((n, 6))
+        self.log = ForceLog(times, self._body, course)
+
+    def partners(self, bodies: np.ndarray) -> np.ndarray:
+        """All bodies that a force ties to the given ones, themselves included where forces act on them."""
+        bodies = bodies[self.acts[bodies]]
+        return np.flatnonzero(self.acts & np.isin(self._component, self._component[bodies])) if len(bodies) else bodies
+
+    def ties(self, bodies: np.ndarray) -> list[tuple[int, int]]:
+        """Pairs of the given bodies such that those tied by forces hang together."""
+        first: dict[int, int] = {}
+        return [(first.setdefault(int(self._component[i]), int(i)), int(i)) for i in bodies if self.acts[i]]
+
+    def may_rest(self, bodies: np.ndarray) -> bool:
+        """Whether the forces on bodies at rest stay as they are."""
+        return not self._restless[bodies].any()
+
+    def fly(self, context, members: np.ndarray, time: float, end: float) -> np.ndarray:
+        """Forces on members that nothing holds, from `time` to `end` at most, into `value` and `rate`; returns for how long, (m,) s."""
+        state, now = context.state, context.state.now
+        rest = min(end, self._next_break(time)) - time
+        if rest <= 0.0:  # the end of the run
+            return np.zeros(len(members))
+        h = np.zeros(len(self.acts))
+        h[members] = _pieces(rest, self._together(members, self._plan[members], np.minimum))
+        shortest = SHORTEST * self._world.accuracy.step
+        todo = members
+        while len(todo):
+            first = self._evaluate(time + ASIDE * h, todo, now, state.rotation)
+
+            def evaluate(share: float, bodies, rotation, todo=todo):
+                return self._evaluate(time + h * min(share, 1.0 - ASIDE), todo, bodies, rotation)
+
+            rows, sums = nystroem(evaluate, self._room, first, todo, h, now, self._world.steady_acceleration)
+            error = self._errors(now, todo, sums.off, h[todo], 1.0 / 12.0) / self._in_flight
+            error = self._together(todo, error, np.maximum)
+            grow = np.clip(SAFETY * np.maximum(error, 1e-30) ** -0.25, LEAST_CHANGE, MOST_CHANGE)
+            done = (error <= 1.0) | (h[todo] <= shortest)
+            ready = todo[done]
+            follows = np.where(h[ready] < self._plan[ready], np.maximum(self._plan[ready], h[ready] * grow[done]), h[ready] * grow[done])
+            self._plan[ready] = np.clip(follows, shortest, self._world.accuracy.step)
+            self._keep(ready, time, rows, sums, h)
+            self._report(context, time, ready[error[done] > 1.0])
+            todo, again = todo[~done], grow[~done]
+            h[todo] = self._plan[todo] = _pieces(rest, np.maximum(h[todo] * again, shortest))
+        return h[members]
+
+    def load(self, context, group, h: float) -> float:
+        """Forces on a group that contacts or joints hold, over h s at most, into the accelerations and `value`; returns for how long."""
+        state, now, world = context.state, context.state.now, self._world
+        members = group.members[self.acts[group.members]]
+        time, step = group.time, world.accuracy.step
+        plan = float(self._plan[members].min())
+        h = min(h, self._next_break(time) - time, plan)
+        _, start = self._evaluate(np.full(len(self.acts), time + ASIDE * h), members, now, state.rotation)
+        if not group.loaded:
+            # What else acted last: contacts and joints.
+            pull = (state.course.acceleration[members] - world.steady_acceleration[members]) * world.mass[members, None]
+            self._others[members] = np.hstack([pull, state.course.torque[members]]) - self.value[members]
+        last = start + self._others
+        while True:
+            if self.flow is not None:
+                # What holds the members feels all their masses: those of the middle.
+                self.flow.weigh(members, time + 0.5 * h)
+                refresh_pose(members, now, state.rotation, state.course.inertia)
+            half = np.full(len(self.acts), 0.5 * h)
+            self._room.fly(members, half, now, world.steady_acceleration, last)
+            value, total = self._evaluate(time + half, members, self._room.bodies, self._room.rotation)
+            self._room.fly(members, 2.0 * half, now, world.steady_acceleration, last)
+            _, end = self._evaluate(time + 2.0 * (1.0 - ASIDE) * half, members, self._room.bodies, self._room.rotation)
+            # On both sides of the middle: a path that turns comes back to its force.
+            sides = [self._errors(now, members, total - f, 2.0 * half[members], 1.0 / 6.0).max() for f in (start, end)]
+            error = max(sides) / (self._in_contact * h / step)
+            grow = min(max(SAFETY * max(error, 1e-30) ** -0.5, LEAST_CHANGE), MOST_CHANGE)
+            if error <= 1.0 or h <= SHORTEST * step:
+                break
+            h = max(h * grow, SHORTEST * step)
+        self._plan[members] = min(max(plan, h * grow) if h < plan and error <= 1.0 else h * grow, step)
+        rows, sums = (Lines(f, np.zeros_like(f), np.zeros_like(f)) for f in (value, total))
+        self._keep(members, time, rows, sums, np.full(len(self.acts), h))
+        group.loaded = True
+        context.acceleration[members] = group.free[0][self.acts[group.members]] + now.inv_mass[members, None] * total[members, :3]
+        turned = np.einsum("ijk,ik->ij", now.inv_inertia[members], total[members, 3:])
+        context.angular_acceleration[members] = group.free[1][self.acts[group.members]] + turned
+        return h
+
+    def _evaluate(self, time: np.ndarray, members: np.ndarray, bodies, rotation) -> tuple[np.ndarray, np.ndarray]:
+        """Forces of all rows (k, 6), 0 for those of other bodies, and their sums (n, 6) on bodies of the mass of now; time (n,) s."""
+        value, asked = np.zeros((len(self._body), 6)), np.zeros(len(self.acts), bool)
+        asked[members] = True
+        at = Instant(time, bodies, rotation, self._course)
+        for table, first, clock in zip(self._tables, self._first[:-1], self._clocks, strict=True):
+            rows = np.flatnonzero(asked[table.body])
+            if len(rows):
+                with clock():
+                    value[first + rows] = table.wrench(at, rows)
+        total = np.zeros((len(self.acts), 6))
+        np.add.at(total, self._body, value)
+        return value, total if self.flow is None else total * self.flow.since_weighed(time)[:, None]
+
+    def _errors(self, bodies, members: np.ndarray, off: np.ndarray, h: np.ndarray, part: float) -> np.ndarray:
+        """Errors (m,) of the members' poses by wrenches that are off by (n, 6) over h (m,) s, relative to the size."""
+        square = part * h**2
+        moved = square * bodies.inv_mass[members] * np.linalg.norm(off[members, :3], axis=1) / self._size[members]
+        turned = square * np.linalg.norm(np.einsum("ijk,ik->ij", bodies.inv_inertia[members], off[members, 3:]), axis=1)
+        return np.maximum(moved, turned)
+
+    def _together(self, members: np.ndarray, values: np.ndarray, best) -> np.ndarray:
+        """The least or the largest (best) of the values (m,) of all members that forces tie, for each of them."""
+        _, first, label = np.unique(self._component[members], return_index=True, return_inverse=True)
+        common = values[first].copy()
+        best.at(common, label, values)
+        return common[label]
+
+    def _keep(self, members: np.ndarray, time: float, rows: Lines, sums: Lines, h: np.ndarray) -> None:
+        """From `time` on these lines act on members, for h (n,) s."""
+        self.value[members] = sums.value[members]
+        self.rate[members] = sums.change[members] / h[members, None]
+        self.log.begin(members, time, rows.value, rows.change, h)
+
+    def finish(self, world, times: np.ndarray, recorder) -> ForceWork:
+        """What the forces did until the frames, and their potential energy there."""
+        self.log.finish()
+        starts = np.cumsum([0, *(len(table.names) for table in self._tables)])[:-1]
+        names = [name for table in self._tables for name in table.names]
+        cause = np.concatenate([first + table.cause for first, table in zip(starts, self._tables, strict=True)])
+        potential = [table.potential(times, recorder.position, recorder.orientation) for table in self._tables]
+        share = None if self.flow is None else self.flow.shares_at(times)
+        return ForceWork(names, self._body, cause, self.log.at_frames, np.concatenate(potential, axis=1), share)
+
+    def _next_break(self, time: float) -> float:
+        return min(table.next_break(time * (1.0 + 1e-12) + 1e-300) for table in self._tables)
+
+    def _report(self, context, time: float, bodies: np.ndarray) -> None:
+        for i in bodies.tolist():
+            context.log.report(
+                time, "forces change too fast", (self._world.names[i],),
+                f"the path may be off by more than {self._in_flight:.1g} of the size in a step; use a smaller step or soften the force",
+            )
+
+
+def _pieces(rest: float, h):
+    """Lengths of equal pieces of the rest that are not longer than h, so that nothing short is left at the end."""
+    return rest / np.maximum(np.ceil(rest / h * (1.0 - 1e-9)), 1.0)
+
+
+def _components(n: int, links: np.ndarray) -> np.ndarray:
+    """Label (n,) of each body: that of the first one it is linked with."""
+    label = np.arange(n)
+    changed = True
+    while changed:
+        least = label.copy()
+        for a, b in links:
+            least[a] = least[b] = min(least[a], least[b])
+        changed, label = bool(np.any(least != label)), least
+    return label
