@@ -15,6 +15,7 @@ import numpy as np
 from rigidimpulse.errors import SceneError
 from rigidimpulse.forces.energy.term import CompiledEnergy, Energy, Expansion, Poses, poses
 from rigidimpulse.forces.force import Force, ForceTable, Instant, named
+from rigidimpulse.rotation import to_matrix
 from rigidimpulse.world import World
 
 
@@ -65,7 +66,7 @@ class EnergyForces(ForceTable):
         self._carried = np.unique(everything[(everything >= 0) & world.moving[everything]])
         self.is_steady = not len(self._carried)
         self.reason = f"{len(terms)} acting"
-        self._terms, self._world = terms, world
+        self._terms, self._start = terms, poses(world.position, world.orientation)
 
     def wrench(self, at: Instant, rows: np.ndarray) -> np.ndarray:
         """Force and torque of rows."""
@@ -80,11 +81,13 @@ class EnergyForces(ForceTable):
 
     def _poses(self, at: Instant, time: float) -> Poses:
         """Poses of all bodies: those that forces move are at theirs, the others on their courses."""
-        position, orientation = self._world.position.copy(), self._world.orientation.copy()
-        position[self.body], orientation[self.body] = at.bodies.position[self.body], at.bodies.orientation[self.body]
+        position, orientation, rotation = (values.copy() for values in self._start)
+        i = self.body
+        position[i], orientation[i], rotation[i] = at.bodies.position[i], at.bodies.orientation[i], at.rotation[i]
         for i in self._carried.tolist():
             position[i], orientation[i] = at.carried_pose(i, time)
-        return poses(position, orientation)
+            rotation[i] = to_matrix(orientation[i])
+        return Poses(position, orientation, rotation)
 
     def potential(self, times: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Value of each term (f, terms)."""
