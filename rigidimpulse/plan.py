@@ -6,20 +6,25 @@ skipped is not in the plan: it costs nothing, and `explain` says why.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Protocol
 
+from rigidimpulse.errors import SceneError
+
 STAGES = ("detect", "respond", "forces", "constrain", "sweep", "integrate", "observe")
+NEEDED = ("steady load", "varying load", "contact forces", "impact time", "exact flight", "forced flight")
+"""Effects that the loop cannot do without where they are in: bodies would not move, or hit each other without end."""
 
 
 @dataclass(frozen=True)
 class Skip:
-    """Why an effect is left out."""
+    """Why an effect is out, and the function of its stage if it could be in all the same."""
 
     reason: str
+    function: Callable | None = None
 
 
 @dataclass(frozen=True)
@@ -60,15 +65,34 @@ class Line:
     calls: int = 0
 
 
+def _as_chosen(bound: Bound | Skip, name: str, wanted: bool | None) -> Bound | Skip:
+    """What `bind` said, or what the caller wants."""
+    if wanted is False and isinstance(bound, Bound):
+        if name in NEEDED:
+            raise SceneError(f"effects: {name!r} cannot be out: {bound.reason}", "leave out 'contact detection', or what it works for")
+        return Skip(f"left out by the caller; {bound.reason}")
+    if wanted is True and isinstance(bound, Skip):
+        if bound.function is None:
+            raise SceneError(f"effects: {name!r} cannot be in: {bound.reason}", "give the scene what it needs, or leave it out")
+        return Bound(bound.function, f"wanted by the caller; {bound.reason}")
+    return bound
+
+
 class Plan:
     """The bound effects of a run. Call a stage by its name: `plan.respond(...)` runs all its effects in order."""
 
-    def __init__(self, world, effects: Sequence[Effect]) -> None:
-        """Bind the effects to a world."""
+    def __init__(self, world, effects: Sequence[Effect], chosen: Mapping[str, bool] | None = None) -> None:
+        """Bind the effects to a world; chosen: names of effects that are to be in or out whatever the scene calls for.
+
+        Raises:
+            SceneError: an effect that is to be in has nothing to work on, or one that is to be out cannot be spared.
+
+        """
+        chosen = chosen or {}
         self.lines: list[Line] = []
         self._stages: dict[str, list[tuple[Callable, Line]]] = {stage: [] for stage in STAGES}
         for effect in effects:
-            bound = effect.bind(world)
+            bound = _as_chosen(effect.bind(world), effect.name, chosen.get(effect.name))
             line = Line(effect.stage, effect.name, isinstance(bound, Bound), bound.reason)
             self.lines.append(line)
             if isinstance(bound, Bound) and bound.function is not None:

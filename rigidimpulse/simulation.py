@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -14,16 +14,17 @@ from rigidimpulse.compile_ahead import compile_kernels
 from rigidimpulse.constrain.contact_forces import ContactForces
 from rigidimpulse.constrain.heap import HeapForces
 from rigidimpulse.constrain.jointed import reaction_table
+from rigidimpulse.constrain.kinds import Friction, JointRows, RollingFriction
 from rigidimpulse.detect.overlap import resolve_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.detect.window import Window
-from rigidimpulse.errors import SceneError
+from rigidimpulse.errors import SceneError, unknown_name
 from rigidimpulse.forces.constant import ConstantForces
-from rigidimpulse.forces.gravity import FreeRotation, Gravity
+from rigidimpulse.forces.gravity import FreeRotation, Gravity, SteadyLoad
 from rigidimpulse.forces.kinds import bind_forces, force_kinds
 from rigidimpulse.integrate.course import FIXED, FREE, PRESCRIBED, begin
 from rigidimpulse.integrate.flight import ExactFlight
-from rigidimpulse.integrate.forced_flight import ForcedFlight, SumOfForces
+from rigidimpulse.integrate.forced_flight import ForcedFlight, VaryingLoad
 from rigidimpulse.integrate.prescribed import KeyframePaths
 from rigidimpulse.observe.events import EventLog
 from rigidimpulse.observe.ledger import make_ledger
@@ -49,6 +50,7 @@ def simulate(
     fps: float = 60.0,
     *,
     accuracy: str | Accuracy = "standard",
+    effects: Mapping[str, bool] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Simulate a scene and record it. Deterministic: the same scene gives the same bits, at any frame rate.
@@ -58,26 +60,32 @@ def simulate(
         duration: s, >= 0.
         fps: frames per second; changes what is recorded, never what happens.
         accuracy: "preview", "standard", "exact" or an `Accuracy`.
+        effects: effects, by their names in `run.plan.explain()`, that are to be in (True) or out (False) whatever the scene calls for. The
+            status says where one is out that the scene calls for.
         progress: called after every step with the simulated time in s.
 
     Returns:
         The recording, with round(duration * fps) + 1 frames; the first is the initial state.
 
     Raises:
-        SceneError: the scene cannot be simulated as it is; names the body, the value and the remedy.
+        SceneError: the scene cannot be simulated as it is; names the body, the value and the remedy. Or an effect is unknown, cannot be in
+            or cannot be out.
 
     """
     times = frame_times(duration, fps)
-    world = compile_scene(scene, accuracy)
+    left_out = chosen_out(scene, accuracy, effects)
+    world = compile_scene(scene, accuracy, frozenset(left_out))
     if len(times) * world.num_bodies > MOST_POSES:
         raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
     if not kernels_are_cached():
         logger.warning("compiling kernels for the first run on this machine, once: this takes about half a minute")
         if world.can_collide:
             compile_kernels(world)
-    plan = make_plan(world)
+    plan = make_plan(world, effects)
     recorder = Recorder(times, world.num_bodies)
     log = EventLog()
+    for name, reason in left_out.items():
+        log.report(0.0, "effect left out", (name,), f"the scene calls for it: {reason}")
     context = StepContext(world, recorder, log)
     bind_forces(context, plan, times)
     start_courses(context)
@@ -112,24 +120,39 @@ def frame_times(duration: float, fps: float) -> np.ndarray:
     return np.arange(round(duration * fps) + 1) / fps
 
 
-def make_plan(world: World) -> Plan:
-    """Bind every effect there is to the world; the plan keeps those that the scene calls for."""
+def chosen_out(scene: Scene, accuracy: str | Accuracy, effects: Mapping[str, bool] | None) -> dict[str, str]:
+    """Names of effects that are to be out though the scene calls for them, and why it does."""
+    if not effects:
+        return {}
+    lines = {line.name: line for line in make_plan(compile_scene(scene, accuracy)).lines}
+    for name in effects:
+        if name not in lines:
+            raise unknown_name("effect", name, lines)
+    return {name: lines[name].reason for name, wanted in effects.items() if not wanted and lines[name].included}
+
+
+def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
+    """Bind every effect there is to the world; the plan keeps those that the scene calls for, and obeys what was chosen by name."""
     accuracy = world.accuracy
     effects = [
         BroadPhase(),
         ImpactResponse(accuracy.response, accuracy.restitution),
-        FreeRotation(),
         Gravity(),
         ConstantForces(),
         *force_kinds(world),
-        SumOfForces(),
+        SteadyLoad(),
+        FreeRotation(),
+        VaryingLoad(),
+        JointRows(),
+        Friction(),
+        RollingFriction(),
         ContactForces(),
         HeapForces(accuracy.contact_solver),
         ImpactTime(accuracy.impact_time),
         ExactFlight(),
         ForcedFlight(),
     ]
-    return Plan(world, effects)
+    return Plan(world, effects, chosen)
 
 
 def start_courses(context: StepContext) -> None:

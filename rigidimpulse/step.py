@@ -38,7 +38,7 @@ def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> Non
     release(context, window, time, reached, groups)
     for group in groups:
         plan.run("respond", context, group)
-        plan.run("forces", context, group)
+        plan.run("forces", context, window, group)
         plan.run("constrain", context, window, group)
         plan.run("integrate", context, window, group)
     window.settle(time)

@@ -44,7 +44,7 @@ class World:
         half_space, ball: (n,) bool, the shape is half spaces only; one sphere about the centre of mass.
         touch_gap: gap at which faces and rims meet, as a fraction of the smaller body's size.
         apart: (p,) pairs a * n + b, a < b, that do not touch each other since a joint joins them.
-        joints_of_scene: the joints as written.
+        joints_of_scene: the joints as written. left_out: names of effects that the caller leaves out.
         contact_gap: gap at which lasting contacts are held, as a fraction of the smaller body's size.
 
     """
@@ -83,6 +83,7 @@ class World:
     touch_gap: float
     apart: np.ndarray
     joints_of_scene: list[Joint]
+    left_out: frozenset[str]
 
     @property
     def num_bodies(self) -> int:
@@ -110,7 +111,7 @@ class World:
         """The forces that vary, by class."""
         steady = _steady_forces(self.scene)
         forces = [effect for effect in self.scene.effects if effect.stage == "forces" and effect not in steady]
-        classes = dict.fromkeys(type(force) for force in forces)
+        classes = dict.fromkeys(type(force) for force in forces if force.kind not in self.left_out)
         return [c.compile([force for force in forces if type(force) is c], self) for c in classes]
 
     @cached_property
@@ -150,8 +151,8 @@ class World:
         return position - rotate(turned, self.offset[i]), turned
 
 
-def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
-    """Check a scene and compile it.
+def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out: frozenset[str] = frozenset()) -> World:
+    """Check a scene and compile it, but for the effects of the names that are left out.
 
     Raises:
         SceneError: naming the body, the value and the remedy.
@@ -160,7 +161,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
     validate(scene)
     bodies = list(scene.bodies)
     masses = [body_mass(body) for body in bodies]
-    joints = [effect for effect in scene.effects if isinstance(effect, Joint)]
+    joints = [effect for effect in scene.effects if isinstance(effect, Joint) and "joints" not in left_out]
     dynamic = np.array([body.motion == "dynamic" for body in bodies], bool)
     moving = np.array([body.motion == "kinematic" and _is_driven(body) for body in bodies], bool)
     offset = np.array([m.center_of_mass for m in masses], float).reshape(-1, 3)
@@ -178,8 +179,13 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
     mass = np.array([m.mass for m in masses], float)
     inv_mass = np.where(dynamic, 1.0 / mass, 0.0)
     factor = np.array([body.gravity_factor for body in bodies], float)
+    if "gravity" in left_out:
+        factor[:] = 0.0
+    if "friction" in left_out:
+        coefficients[:, :, 1:3] = 0.0
     gravity = factor[:, None] * np.asarray(scene.gravity, float) * dynamic[:, None]
-    push = push_of_forces(_steady_forces(scene), [body.name for body in bodies], inv_mass)
+    steady = [] if "constant forces" in left_out else _steady_forces(scene)
+    push = push_of_forces(steady, [body.name for body in bodies], inv_mass)
     world = World(
         scene=scene,
         accuracy=resolve_accuracy(accuracy),
@@ -207,7 +213,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
         static_max=high,
         material_of_body=material_of_body,
         coefficients=coefficients,
-        rolling=rolling,
+        rolling=None if "rolling friction" in left_out else rolling,
         flat=_has_faces(geometry, shape_of_body),
         half_space=np.array([_all_half_spaces(geometry, k) for k in shape_of_body], bool),
         ball=np.array([_is_ball(geometry, k) for k in shape_of_body], bool),
@@ -215,6 +221,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard") -> World:
         touch_gap=TOLERANCES.touch_gap,
         apart=_pairs_apart(joints, [body.name for body in bodies]),
         joints_of_scene=joints,
+        left_out=left_out,
     )
     # Bad forces are refused here.
     _ = world.force_tables

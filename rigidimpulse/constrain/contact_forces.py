@@ -47,17 +47,18 @@ class ContactForces:
     """Lasting contact and joints, solved exactly for each group of touching or joined bodies."""
 
     stage: str = "constrain"
-    name: str = "contact forces (newton)"
+    name: str = "contact forces"
 
     def bind(self, world) -> Bound | Skip:
         """In where something can press bodies together."""
+        how = f"{world.accuracy.contact_solver}: "
         if world.joints_of_scene:
-            return Bound(hold, f"{len(world.joints_of_scene)} joints")
+            return Bound(hold, f"{how}{len(world.joints_of_scene)} joints")
         if not world.can_collide:
             return Skip("nothing can collide")
         if not world.can_press:
-            return Skip("no force, no moving support and no spin presses bodies together")
-        return Bound(hold, "bodies may come to rest on each other")
+            return Skip("no force, no moving support and no spin presses bodies together", hold)
+        return Bound(hold, f"{how}bodies may come to rest on each other")
 
 
 def hold(context, window, group: Group) -> None:

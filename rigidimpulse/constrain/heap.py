@@ -81,12 +81,12 @@ class HeapForces:
 
     contact_solver: str
     stage: str = "constrain"
-    name: str = "heaps (sub-stepped)"
+    name: str = "heaps"
 
     def bind(self, world) -> Bound | Skip:
         """In where heaps are possible; the reason is told anew when the run is over."""
         reason = why_no_heaps(world)
-        return Skip(reason) if reason else Bound(step_heap, "bodies may heap up")
+        return Skip(reason) if reason else Bound(step_heap, "sub-stepped: bodies may heap up")
 
 
 def why_no_heaps(world) -> str:

@@ -12,7 +12,7 @@ class BroadPhase:
     """Pairs of overlapping swept boxes; manifolds are looked for among them."""
 
     stage: str = "detect"
-    name: str = "broad phase and manifolds"
+    name: str = "contact detection"
 
     def bind(self, world) -> Bound | Skip:
         """In where a dynamic body may meet another."""

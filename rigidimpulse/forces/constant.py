@@ -72,7 +72,7 @@ class ConstantForce:
 
 @dataclass(frozen=True)
 class ConstantForces:
-    """Acceleration of the group's bodies by all constant forces."""
+    """Constant forces at centres of mass; they are in all courses."""
 
     stage: str = "forces"
     name: str = "constant forces"
@@ -82,12 +82,9 @@ class ConstantForces:
         if not np.any(world.push):
             return Skip("no constant force acts")
 
-        def push(context, group) -> None:
-            context.acceleration[group.members] += world.push[group.members]
-
         pushed = [world.names[i] for i in np.flatnonzero(world.push.any(axis=1))]
         named = f"{pushed[0]!r}" if len(pushed) == 1 else f"{len(pushed)} bodies"
-        return Bound(push, f"on {named} at the centre of mass: paths stay parabolas")
+        return Bound(None, f"on {named} at the centre of mass: paths stay parabolas")
 
 
 def push_of_forces(forces: Sequence[ConstantForce], names: list[str], inv_mass: np.ndarray) -> np.ndarray:

@@ -15,15 +15,17 @@ WHOLE = 1.0 - 1e-9
 
 
 @dataclass(frozen=True)
-class SumOfForces:
-    """What bodies feel but for varying forces, for those that add to it."""
+class VaryingLoad:
+    """Marks the groups that varying forces act on."""
 
     stage: str = "forces"
-    name: str = "sum of forces"
+    name: str = "varying load"
 
     def bind(self, world) -> Bound | Skip:
         """In where a force varies."""
-        return Bound(note_free, "forces vary") if world.force_tables else Skip("no force varies")
+        if not world.force_tables:
+            return Skip("no force varies")
+        return Bound(note_free, "where contacts or joints hold bodies it is constant over a sub-step")
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class ForcedFlight:
         return Bound(integrate_forced, "steps of order 4, as long as their error allows; impacts are exact on them")
 
 
-def note_free(context, group: Group) -> None:
+def note_free(context, _window, group: Group) -> None:
     """Keep the members' accelerations without varying forces, if these act on one of them."""
     if context.forces.acts[group.members].any():
         group.free = context.acceleration[group.members], context.angular_acceleration[group.members]

@@ -42,10 +42,7 @@ class ImpactResponse:
     restitution: str
     stage: str = "respond"
 
-    @property
-    def name(self) -> str:
-        """Name of the slot's choice."""
-        return f"{self.method} impulses"
+    name: str = "impulses"
 
     def bind(self, world) -> Bound | Skip:
         """In where something can collide."""
@@ -56,7 +53,7 @@ class ImpactResponse:
         def respond(context, group: Group) -> None:
             respond_to_impacts(context, group, kernel, law)
 
-        return Bound(respond, REASONS[self.method])
+        return Bound(respond, f"{self.method}: {REASONS[self.method]}")
 
 
 def respond_to_impacts(context, group: Group, kernel, law: int) -> None:

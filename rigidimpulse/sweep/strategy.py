@@ -25,10 +25,7 @@ class ImpactTime:
     method: str
     stage: str = "sweep"
 
-    @property
-    def name(self) -> str:
-        """Name of the slot's choice."""
-        return f"impact time ({self.method})"
+    name: str = "impact time"
 
     def bind(self, world) -> Bound | Skip:
         """In where something can collide."""
@@ -39,7 +36,7 @@ class ImpactTime:
         def sweep(context, window) -> None:
             sweep_window(context, window, method)
 
-        return Bound(sweep, REASONS[self.method])
+        return Bound(sweep, f"{self.method}: {REASONS[self.method]}")
 
 
 def sweep_window(context, window, method) -> None:

@@ -1,0 +1,52 @@
+"""What the stage constrain works on, each a line of the plan: joints, friction, rolling friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimpulse.plan import Bound, Skip
+
+
+@dataclass(frozen=True)
+class JointRows:
+    """Rows of joints."""
+
+    stage: str = "constrain"
+    name: str = "joints"
+
+    def bind(self, world) -> Bound | Skip:
+        """In where the scene has joints."""
+        if not world.joints_of_scene:
+            return Skip("the scene has none")
+        return Bound(None, ", ".join(dict.fromkeys(type(joint).__name__ for joint in world.joints_of_scene)))
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Tangential rows of contacts, and tangential impulses."""
+
+    stage: str = "constrain"
+    name: str = "friction"
+
+    def bind(self, world) -> Bound | Skip:
+        """In where a pair of materials that may meet has a coefficient."""
+        if not world.can_collide:
+            return Skip("nothing can collide")
+        greatest = float(world.coefficients[:, :, 1:3].max())
+        return Bound(None, f"coefficients up to {greatest:g}") if greatest > 0.0 else Skip("no pair of materials has a coefficient")
+
+
+@dataclass(frozen=True)
+class RollingFriction:
+    """Rows of moments at contacts."""
+
+    stage: str = "constrain"
+    name: str = "rolling friction"
+
+    def bind(self, world) -> Bound | Skip:
+        """In where a pair of materials has a length."""
+        if world.rolling is None or not world.can_collide:
+            return Skip("no material asks for it")
+        return Bound(None, f"lengths up to {float(np.max(world.rolling)):g} m")
