@@ -38,6 +38,8 @@ _MODULES = {
     "pile": "pile",
     "smoothed_path": "smoothed_path",
     "settled_layout": "settled_layout",
+    "emergency_stop": "emergency_stop",
+    "rear_end_crash": "rear_end_crash",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 
