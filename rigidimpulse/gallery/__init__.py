@@ -40,6 +40,14 @@ _MODULES = {
     "settled_layout": "settled_layout",
     "emergency_stop": "emergency_stop",
     "rear_end_crash": "rear_end_crash",
+    "pendulum": "pendulum",
+    "kinematic_bounce": "kinematic_bounce",
+    "backing_up_bisection": "backing_up",
+    "backing_up_linear": "backing_up",
+    "pool_aim": "pool",
+    "pool_follow": "pool",
+    "pool_draw": "pool",
+    "pool_swerve": "pool",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 
