@@ -1,6 +1,7 @@
 """Backing up time to an impact, by bisection (A3) and by a linear approximation (A4): the same batons thrown at a floor.
 
-A capsule of length L between its ends and radius r, thrown with v_z from the height z0, spinning with w about a level axis through its middle:
+A capsule of length L between its ends and radius r, thrown with v_z from the height z0, spinning with w about a level axis through its
+middle:
 
     gap(t) = z0 + v_z t - g t^2 / 2 - (L / 2) |sin(a0 + w t)| - r
 
@@ -9,8 +10,8 @@ Bisection finds its first root, to 1e-13 of a body's size: over the closing spee
 
     t = t_i + gap(t_i) / c(t_i),    c = -gap',    error  1/2 |gap''| (t - t_i)^2 / c
 
-and the run meets this t itself to 1e-11 s. The error is of second order in the step: 3e-6 to 5e-4 s here, millions of times that of bisection.
-"""
+and the run meets this t itself to 1e-11 s. The error is of second order in the step: 3e-6 to 5e-4 s here, millions of times that of
+bisection."""
 
 from __future__ import annotations
 
@@ -126,9 +127,9 @@ def _tangent(name: str) -> tuple[float, float]:
 
 
 SCENES = (
-    GalleryScene("backing_up_bisection", "Batons hit a floor: time backed up by bisection (animation notes A3)", scene, check_bisection, DURATION),
+    GalleryScene("backing_up_bisection", "Batons hit a floor: time is backed up by bisection (A3)", scene, check_bisection, DURATION),
     GalleryScene(
-        "backing_up_linear", "The same batons: time backed up by a linear approximation (animation notes A4)", scene, check_linear, DURATION,
+        "backing_up_linear", "The same batons: time is backed up by a tangent (A4)", scene, check_linear, DURATION,
         accuracy=Accuracy(impact_time="linear", step=STEP),
     ),
 )  # fmt: skip

@@ -7,8 +7,8 @@ Sliding friction mu m g is all that slows the car, whichever wheel bears how muc
 With the centre of mass a height h above the road, half way between axles L apart, the friction under it tips the weight onto the front
 axle until moments balance, N_front L = m g (L / 2 + mu h); once the car stands both bear half. V = 29 m/s and mu = 0.8 stop in 3.695 s,
 53.6 m. All forces are constant until the stop, so the ways are polynomials and errors are those of the equations of contact, solved to
-some 1e-12, and of the held gap, 1e-6 of the car: 1e-6 relative is generous, and a step that stops a sixtieth of a second late is off by 2e-3.
-"""
+some 1e-12, and of the held gap, 1e-6 of the car: 1e-6 relative is generous, and a step that stops a sixtieth of a second late is off by
+2e-3."""
 
 from __future__ import annotations
 
@@ -63,9 +63,7 @@ def check(run: Recording) -> list[Check]:
         at_most("error of the time of the stop, relative", abs(stop / TIME - 1.0), RELATIVE, "t = V / (mu g)"),
         at_most("time of the stop from 3.695, s", abs(stop - PRINTED_TIME), 5e-4, "as printed in the dynamics notes"),
         at_most("speed once it stands, m/s", np.abs(speed[run.times > TIME]).max(), 0.0, "friction holds it"),
-        at_most(
-            "front axle while it slides, of its load", abs(_front(run, last) / sliding - 1.0), RELATIVE, "m g (1/2 + mu h / L)"
-        ),
+        at_most("front axle while it slides, of its load", abs(_front(run, last) / sliding - 1.0), RELATIVE, "m g (1/2 + mu h / L)"),
         at_most("front axle at rest, of its load", abs(_front(run, -1) / half_weight - 1.0), RELATIVE, "m g / 2"),
         at_least("bumper from the cow, m", _spare(run), SPARE - RELATIVE * WAY, "V^2 / (2 mu g) fits"),
     ]

@@ -2,14 +2,14 @@
 
     E(p) = n.p + d,    impact where E changes sign,    v' = v - (1 + k)(v.n) n
 
-A ball that falls from the height h meets the floor with s = sqrt(2 g h), leaves with k s, meets it again after 2 k s / g, and so on: impact j
-(from 0) has the speed k^j s and the time
+A ball that falls from the height h meets the floor with s = sqrt(2 g h), leaves with k s, meets it again after 2 k s / g, and so on:
+impact j (from 0) has the speed k^j s and the time
 
     t_j = s / g + (2 s / g) (k + k^2 + ... + k^j)
 
 Speed along the floor and spin stay. Each lane has a light ball and one eight thousand times as heavy side by side: their paths are the
-same bits until they rest. Roots and products of sixteen digits, some twenty impacts: 1e-11. Impulses with friction would slow both down and take the spin.
-"""
+same bits until they rest. Roots and products of sixteen digits, some twenty impacts: 1e-11. Impulses with friction would slow both down
+and take the spin."""
 
 from __future__ import annotations
 

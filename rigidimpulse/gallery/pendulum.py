@@ -8,11 +8,10 @@ at the reduced length l = (I + m d^2) / (m d). Let go at the angle a0 (k = sin(a
 Over a full swing the momentum comes back, so what the pivot gives is what gravity takes: on average m g, straight up, and nothing sideways,
 however far it swings. l = 1 m and 45 degrees: T = 2.086255872614 s, m g T up.
 
-Joints are of second order. At steps of h = 1/240 s the widest swing, a' up to 4.8 rad/s, turns by 0.02 rad a step: forces and rates are off by
-some (a' h)^2 / 12 = 3e-5 of themselves. The tension is m g (3 - 2 cos a0) = 3.3 m g at most, so means are off by 1e-4 of m g; periods by some
-3e-5, the bound is 1e-4; angles in 25 rad of phase by 1e-3, the bound is three times that. Frames of the reaction are joined by a cubic
-spline: an error of (w / fps)^4 / 180, nothing beside that. A reaction that is late by a frame is off by 1e-2.
-"""
+Joints are of second order. At steps of h = 1/240 s the widest swing, a' up to 4.8 rad/s, turns by 0.02 rad a step: forces and rates are
+off by some (a' h)^2 / 12 = 3e-5 of themselves. The tension is m g (3 - 2 cos a0) = 3.3 m g at most, so means are off by 1e-4 of m g;
+periods by some 3e-5, the bound is 1e-4; angles in 25 rad of phase by 1e-3, the bound is three times that. Frames of the reaction are
+joined by a cubic spline: an error of (w / fps)^4 / 180, nothing beside that. A reaction that is late by a frame is off by 1e-2."""
 
 from __future__ import annotations
 
@@ -70,7 +69,9 @@ def check(run: Recording) -> list[Check]:
         mean = _mean(run, f"pivot of {name}", period) / (MASS * GRAVITY)
         checks += [
             at_most(f"{name}: error of the angle, rad", np.abs(angle - _swing(start, run.times)).max(), ANGLE, "sin(a/2) = k sn(K - w t)"),
-            at_most(f"{name}: error of the period, relative", abs(_measured(run.times, angle) / period - 1.0), PERIOD, "4 K(k) sqrt(l / g)"),
+            at_most(
+                f"{name}: error of the period, relative", abs(_measured(run.times, angle) / period - 1.0), PERIOD, "4 K(k) sqrt(l / g)"
+            ),
             at_most(f"{name}: mean reaction but for the weight, of m g", abs(mean[2] - 1.0), MEAN, "m g T over a swing"),
             at_most(f"{name}: mean reaction sideways, of m g", np.abs(mean[:2]).max(), MEAN, "0 over a swing"),
         ]
@@ -125,5 +126,7 @@ def _mean(run: Recording, joint: str, period: float) -> np.ndarray:
 
 
 SCENES = (
-    GalleryScene("pendulum", "Pendulums, and what their pivots carry over a full swing (dynamics notes B3)", scene, check, DURATION, accuracy="exact"),
+    GalleryScene(
+        "pendulum", "Pendulums, and what their pivots carry over a full swing (dynamics notes B3)", scene, check, DURATION, accuracy="exact"
+    ),
 )

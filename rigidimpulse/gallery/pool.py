@@ -1,23 +1,23 @@
 """Pool shots (B15): aim at the ghost ball, follow, draw and swerve.
 
-A ball of radius R slides on the cloth with friction mu. With v its velocity, q = R w x z the velocity at which its spin would roll, the slip is
+A ball of radius R slides on the cloth with friction mu. With v its velocity, q = R w x z the velocity at which its spin would roll, the
+slip is
 
     u = v - q,    v' = -mu g u/|u|,    q' = (5/2) mu g u/|u|
 
-so u keeps its direction: the path is a parabola until t = 2 |u| / (7 mu g), when the ball rolls straight on with v - (2/7) u. Balls are smooth
-to each other: an impact along the line of centres d changes velocities alone,
+so u keeps its direction: the path is a parabola until t = 2 |u| / (7 mu g), when the ball rolls straight on with v - (2/7) u. Balls are
+smooth to each other: an impact along the line of centres d changes velocities alone,
 
     object ball (1 + e)/2 (v.d) d,    cue ball v - (1 + e)/2 (v.d) d
 
-so the object ball leaves along d: it goes to the pocket if the cue ball strikes it from the ghost ball, the place 2 R behind it on the line from
-the pocket. What the cue ball does then follows from the spin it still has: rolling it follows, with backspin it comes back, and with spin
-about its own way (masse) it swerves already before.
+so the object ball leaves along d: it goes to the pocket if the cue ball strikes it from the ghost ball, the place 2 R behind it on the
+line from the pocket. What the cue ball does then follows from the spin it still has: rolling it follows, with backspin it comes back, and
+with spin about its own way (masse) it swerves already before.
 
-Between events paths are polynomials and errors those of rounding and of the equations of contact, 1e-12; balls lie on a held gap of 1e-6 of
-their size, which the lever arms do not feel. An error of the impact's time of 1e-12 s turns the line of centres by v 1e-12 / 2 R = 4e-11, over a
-metre 4e-11 m. Errors before the impact grow by some ten in a thin cut, so 1e-9 m and m/s is the bound. A ball that rolls at once, or an impact
-with a friction of 0.01 between the balls, is off by 1e-2 m.
-"""
+Between events paths are polynomials and errors those of rounding and of the equations of contact, 1e-12; balls lie on a held gap of 1e-6
+of their size, which the lever arms do not feel. An error of the impact's time of 1e-12 s turns the line of centres by v 1e-12 / 2 R =
+4e-11, over a metre 4e-11 m. Errors before the impact grow by some ten in a thin cut, so 1e-9 m and m/s is the bound. A ball that rolls at
+once, or an impact with a friction of 0.01 between the balls, is off by 1e-2 m."""
 
 from __future__ import annotations
 
@@ -78,13 +78,13 @@ def straight(speed: float, spin: float) -> Shot:
 
 def swerve() -> Shot:
     """A masse: the cue ball goes round a ball in its way, rolls on and meets the object ball at the ghost ball."""
-    cue, velocity, rolling = np.array([-0.72, -0.33]), np.array([1.35, 1.53]), np.array([1.08, -2.7])
+    cue, velocity, rolling = np.array([-0.62, -0.33]), np.array([1.35, 1.45]), np.array([1.08, -2.7])
     slip = velocity - rolling
     time = slide_time(slip)
     place, speed = advance(cue, velocity, rolling, time)[0], velocity - 2.0 / 7.0 * slip
     struck_from = place + 0.22 * unit(speed)
     ball = struck_from + 2.0 * RADIUS * unit(POCKETS["right far"] - struck_from)
-    return Shot(cue, ball, velocity, rolling, "right far", blocker=np.array([-0.28, -0.07]))
+    return Shot(cue, ball, velocity, rolling, "right far", blocker=np.array([-0.2, -0.095]))
 
 
 def slide_time(slip: np.ndarray) -> float:
@@ -138,18 +138,37 @@ def check(make: Callable[[], Shot], law: str, run: Recording) -> list[Check]:
     strokes = run.impacts[np.isin(run.impacts["body_a"], balls) & np.isin(run.impacts["body_b"], balls)]
     # The normal goes from body a to body b.
     centres = strokes["normal"][0, :2] * (1.0 if strokes["body_b"][0] == run.index(OBJECT) else -1.0)
-    cue = np.array([advance(shot.cue, shot.velocity, shot.rolling, t)[0] if t < time else advance(place, left, q, t - time)[0] for t in run.times])
+    cue = np.array(
+        [advance(shot.cue, shot.velocity, shot.rolling, t)[0] if t < time else advance(place, left, q, t - time)[0] for t in run.times]
+    )
     ball = np.array([shot.ball if t < time else advance(shot.ball, given, np.zeros(2), t - time)[0] for t in run.times])
     towards = np.linalg.norm(ball - POCKETS[shot.pocket], axis=1)
     free = np.arange(len(towards)) < (np.argmax(towards < MOUTH) or len(towards))
     return [
         equal("impacts of balls", len(strokes), 1, "cue ball on object ball"),
         at_most("error of its time, s", abs(strokes["time"][0] - time), BOUND, "parabola, then a straight line"),
-        at_most("line of centres from that to the pocket, rad", abs(_angle(centres, POCKETS[shot.pocket] - shot.ball)), BOUND, "ghost ball"),
+        at_most(
+            "line of centres from that to the pocket, rad", abs(_angle(centres, POCKETS[shot.pocket] - shot.ball)), BOUND, "ghost ball"
+        ),
         at_most("error of the cue ball's path, m", np.linalg.norm(run.position(CUE)[:, :2] - cue, axis=1).max(), BOUND, law),
-        at_most("error of its last velocity, m/s", np.linalg.norm(run.velocity(CUE)[-1, :2] - (left - 2.0 / 7.0 * (left - q))), BOUND, "v - (2/7) u"),
-        at_most("error of the object ball's path, m", np.linalg.norm(run.position(OBJECT)[free, :2] - ball[free], axis=1).max(), BOUND, "along d"),
-        equal("object ball in the pocket", int(in_pocket(run.position(OBJECT)[-1], shot.pocket)), 1, "the struck ball leaves along the line of centres"),
+        at_most(
+            "error of its last velocity, m/s",
+            np.linalg.norm(run.velocity(CUE)[-1, :2] - (left - 2.0 / 7.0 * (left - q))),
+            BOUND,
+            "v - (2/7) u",
+        ),
+        at_most(
+            "error of the object ball's path, m",
+            np.linalg.norm(run.position(OBJECT)[free, :2] - ball[free], axis=1).max(),
+            BOUND,
+            "along d",
+        ),
+        equal(
+            "object ball in the pocket",
+            int(in_pocket(run.position(OBJECT)[-1], shot.pocket)),
+            1,
+            "the struck ball leaves along the line of centres",
+        ),
     ]
 
 

@@ -32,7 +32,9 @@ SMOOTH = {"static_friction": 0.0, "dynamic_friction": 0.0, "friction_combine": "
 def table(gravity: float, friction: float, restitution: float) -> Scene:
     """Return the table: cloth of this friction, top at z = 0, smooth cushions of this restitution, frame and tray, on the floor."""
     scene = Scene(gravity=(0.0, 0.0, -gravity))
-    cloth = Material(restitution=0.0, static_friction=friction, dynamic_friction=friction, friction_combine="maximum", restitution_combine="minimum")
+    cloth = Material(
+        restitution=0.0, static_friction=friction, dynamic_friction=friction, friction_combine="maximum", restitution_combine="minimum"
+    )
     rubber, felt = Material(restitution=restitution, **SMOOTH), Material(restitution=0.0, static_friction=0.5, rolling_friction=0.02)
     scene.add(Body("floor", Shape.half_space(offset=-DEPTH - BED), motion="static", material=felt))
     # Kinematic without a motion: it stays where it is, and is painted, where static bodies are grey.
@@ -56,7 +58,9 @@ def add_ball(scene: Scene, name: str, place: np.ndarray, velocity: np.ndarray | 
     resin = Material(restitution=0.95, **SMOOTH)
     # q = R w x z
     spin = (-q[1] / RADIUS, q[0] / RADIUS, 0.0)
-    scene.add(Body(name, Shape.sphere(RADIUS), position=(*place, RADIUS), velocity=(*v, 0.0), angular_velocity=spin, mass=MASS, material=resin))
+    scene.add(
+        Body(name, Shape.sphere(RADIUS), position=(*place, RADIUS), velocity=(*v, 0.0), angular_velocity=spin, mass=MASS, material=resin)
+    )
 
 
 def in_pocket(place: np.ndarray, pocket: str) -> bool:

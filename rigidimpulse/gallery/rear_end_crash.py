@@ -57,14 +57,20 @@ def check(run: Recording) -> list[Check]:
     sliding = np.searchsorted(run.times, 0.5 * (CRASH + STOP))
     push = run.contact_force("striking car")[sliding, 0]
     return [
-        at_most("V from the skid marks, relative error", abs(found / SPEED - 1.0), RELATIVE, "(1 + m_b/m_a) sqrt(2 mu g d m_b / (m_a + m_b))"),
+        at_most(
+            "V from the skid marks, relative error", abs(found / SPEED - 1.0), RELATIVE, "(1 + m_b/m_a) sqrt(2 mu g d m_b / (m_a + m_b))"
+        ),
         at_most("error of the skid at any time, of its length", error / skid, RELATIVE, "u t - a t^2 / 2"),
         at_most("error of the time of the blow, relative", abs(run.impacts["time"][0] / CRASH - 1.0), RELATIVE, "gap / V"),
-        at_most("error of the push while they slide, relative", abs(-push / (MASS_A * SLOWING) - 1.0), RELATIVE, "m_a mu m_b g / (m_a + m_b)"),
+        at_most(
+            "error of the push while they slide, relative", abs(-push / (MASS_A * SLOWING) - 1.0), RELATIVE, "m_a mu m_b g / (m_a + m_b)"
+        ),
         at_most("cars apart after the blow, of a car", np.abs(apart).max() / LENGTH, 2.0 * RELATIVE, "e = 0"),
         at_least("cars apart at any time, m", (struck - striking - LENGTH).min(), 0.0, "bodies stay apart"),
         at_most("speed at the end, m/s", np.abs(run.velocities[-1]).max(), RELATIVE, "the struck car brakes both"),
     ]
 
 
-SCENES = (GalleryScene("rear_end_crash", "A rear-end crash, its speed read from the skid marks (dynamics notes B12)", scene, check, DURATION),)
+SCENES = (
+    GalleryScene("rear_end_crash", "A rear-end crash, its speed read from the skid marks (dynamics notes B12)", scene, check, DURATION),
+)
