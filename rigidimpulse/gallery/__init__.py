@@ -48,6 +48,10 @@ _MODULES = {
     "pool_follow": "pool",
     "pool_draw": "pool",
     "pool_swerve": "pool",
+    "table_on_four_feet": "table_on_four_feet",
+    "pendulum_drift": "pendulum_drift",
+    "soft_hinge": "soft_hinge",
+    "crowd_momentum": "crowd_momentum",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 
