@@ -52,6 +52,7 @@ _MODULES = {
     "pendulum_drift": "pendulum_drift",
     "soft_hinge": "soft_hinge",
     "crowd_momentum": "crowd_momentum",
+    "marbles": "marbles",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 
