@@ -15,7 +15,9 @@ import itertools
 
 import numpy as np
 
+from rigidimpulse.accuracy import Accuracy
 from rigidimpulse.body import Body
+from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.inside import contains
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
 from rigidimpulse.geometry import build_geometry, compile_shape
@@ -29,9 +31,10 @@ PITCH, RADIUS = 0.25, 0.1
 REACH, SIDE = 2.5 * PITCH, 2.0 * PITCH
 """m: c of the octahedron, s of the cross."""
 PLACES = {"octahedron": (-0.9, 0.0, 1.4), "cross": (0.9, 0.0, 1.6)}
+SKIN = TOLERANCES.skin * RADIUS
 NUDGE = 0.15
 """m/s, sideways: columns of marbles that fall straight stay columns."""
-DURATION = 2.5
+DURATION = 1.5
 CELLS = np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)])
 _STEPS = np.arange(-4, 5)
 LATTICES = {"octahedron": PITCH * _STEPS, "cross": PITCH * (_STEPS[:-1] + 0.5)}
@@ -48,7 +51,7 @@ def scene() -> Scene:
     """Return the floor, and a marble at every point of the lattices that is in its solid."""
     scene = Scene()
     scene.add(Body("floor", Shape.half_space(), motion="static"))
-    glass, marble = Material(density=2400.0, restitution=0.6, static_friction=0.3), Shape.sphere(RADIUS)
+    glass, marble = Material(density=2400.0, restitution=0.3, static_friction=0.3), Shape.sphere(RADIUS)
     rng = np.random.default_rng(1)
     for name, solid in solids().items():
         points = _lattice(name)
@@ -71,7 +74,7 @@ def check(run: Recording) -> list[Check]:
         checks.append(equal(f"{name}: marbles", len(found), len(expected), "number of lattice points inside"))
         checks.append(equal(f"{name}: points taken for the other side", len(found ^ expected), 0, "closed form of the solid"))
     lowest = RADIUS - run.positions[:, 1:, 2].min()
-    return [*checks, at_most("deepest marble in the floor, m", lowest, 1e-9, "bodies stay apart")]
+    return [*checks, at_most("deepest marble in the floor, m", lowest, SKIN, "soft contacts eat the skin of a heap")]
 
 
 def _lattice(name: str) -> np.ndarray:
@@ -98,5 +101,8 @@ def _cross() -> Shape:
 
 
 SCENES = (
-    GalleryScene("marbles", "Marbles fill a convex and a concave solid, and scatter (animation notes A6, A7)", scene, check, DURATION),
-)
+    GalleryScene(
+        "marbles", "Marbles fill a convex and a concave solid, and scatter (animation notes A6, A7)", scene, check, DURATION,
+        accuracy=Accuracy(contact_solver="substepped"),
+    ),
+)  # fmt: skip
