@@ -9,7 +9,8 @@ Momentum is a sum of rounding: some hundred impacts of 1e-16 of the momentum tha
 in touch or joined they are moved by some 1e-6 of their size to keep their gap: two of COUNT that pass each other have another angular
 momentum then, 2e-8 / COUNT of the whole each time, so its bound is 1e-8. Energy: impacts only take; joints are of second order, a
 relative spin of 4 rad/s turns by 0.07 rad in a step, 0.07^2 / 12 = 4e-4 of the pairs' spinning, some hundredth of all: 1e-5. Friction
-that acts on one of two bodies, or an impulse at two points a millimetre apart, is off by 1e-3."""
+that acts on one of two bodies, or an impulse at two points a millimetre apart, is off by 1e-3.
+"""
 
 from __future__ import annotations
 

@@ -8,7 +8,8 @@ With the centre of mass a height h above the road, half way between axles L apar
 axle until moments balance, N_front L = m g (L / 2 + mu h); once the car stands both bear half. V = 29 m/s and mu = 0.8 stop in 3.695 s,
 53.6 m. All forces are constant until the stop, so the ways are polynomials and errors are those of the equations of contact, solved to
 some 1e-12, and of the held gap, 1e-6 of the car: 1e-6 relative is generous, and a step that stops a sixtieth of a second late is off by
-2e-3."""
+2e-3.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +55,7 @@ def check(run: Recording) -> list[Check]:
     error = np.abs(way - (SPEED * t - 0.5 * FRICTION * GRAVITY * t**2)).max()
     speed = run.velocity("car")[:, 0]
     # The deceleration between two frames well inside the slide gives the time of the stop, whatever the frame rate.
-    last = np.searchsorted(run.times, 0.9 * TIME)
+    last = int(np.searchsorted(run.times, 0.9 * TIME))
     stop = SPEED * run.times[last] / (SPEED - speed[last])
     half_weight = 0.5 * MASS * GRAVITY
     sliding = half_weight * (1.0 + FRICTION * CENTRE_HEIGHT / AXLE)

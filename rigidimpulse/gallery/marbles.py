@@ -7,7 +7,8 @@
 
 A point is in a convex polyhedron if it is behind all face planes, in a concave one if a ray from it crosses the surface an odd number of
 times. Many points are in line with vertices and edges of the octahedron; a parity that counts those twice is wrong for half of them.
-There is a marble where a point is inside, and only there: counts and places are the closed form's, to the bit."""
+There is a marble where a point is inside, and only there. How they fall has no law here: the soft solver of heaps does it, quickly.
+"""
 
 from __future__ import annotations
 

@@ -11,7 +11,8 @@ however far it swings. l = 1 m and 45 degrees: T = 2.086255872614 s, m g T up.
 Joints are of second order. At steps of h = 1/240 s the widest swing, a' up to 4.8 rad/s, turns by 0.02 rad a step: forces and rates are
 off by some (a' h)^2 / 12 = 3e-5 of themselves. The tension is m g (3 - 2 cos a0) = 3.3 m g at most, so means are off by 1e-4 of m g;
 periods by some 3e-5, the bound is 1e-4; angles in 25 rad of phase by 1e-3, the bound is three times that. Frames of the reaction are
-joined by a cubic spline: an error of (w / fps)^4 / 180, nothing beside that. A reaction that is late by a frame is off by 1e-2."""
+joined by a cubic spline: an error of (w / fps)^4 / 180, nothing beside that. A reaction that is late by a frame is off by 1e-2.
+"""
 
 from __future__ import annotations
 

@@ -17,7 +17,8 @@ with spin about its own way (masse) it swerves already before.
 Between events paths are polynomials and errors those of rounding and of the equations of contact, 1e-12; balls lie on a held gap of 1e-6
 of their size, which the lever arms do not feel. An error of the impact's time of 1e-12 s turns the line of centres by v 1e-12 / 2 R =
 4e-11, over a metre 4e-11 m. Errors before the impact grow by some ten in a thin cut, so 1e-9 m and m/s is the bound. A ball that rolls at
-once, or an impact with a friction of 0.01 between the balls, is off by 1e-2 m."""
+once, or an impact with a friction of 0.01 between the balls, is off by 1e-2 m.
+"""
 
 from __future__ import annotations
 
@@ -106,14 +107,14 @@ def advance(place: np.ndarray, v: np.ndarray, q: np.ndarray, time: float) -> tup
 
 def meeting(shot: Shot) -> float:
     """Return when the cue ball touches the object ball, s."""
-    from scipy.optimize import brentq
+    from scipy.optimize import root_scalar
 
     def gap(t: float) -> float:
         return float(np.linalg.norm(shot.ball - advance(shot.cue, shot.velocity, shot.rolling, t)[0])) - 2.0 * RADIUS
 
     times = np.linspace(0.0, 4.0, 4001)
     first = next(k for k, t in enumerate(times) if gap(t) < 0.0)
-    return float(brentq(gap, times[first - 1], times[first], xtol=1e-15, rtol=1e-15))
+    return float(root_scalar(gap, bracket=(times[first - 1], times[first]), xtol=1e-15, rtol=1e-15).root)
 
 
 def scene(make: Callable[[], Shot]) -> Scene:
@@ -144,31 +145,19 @@ def check(make: Callable[[], Shot], law: str, run: Recording) -> list[Check]:
     ball = np.array([shot.ball if t < time else advance(shot.ball, given, np.zeros(2), t - time)[0] for t in run.times])
     towards = np.linalg.norm(ball - POCKETS[shot.pocket], axis=1)
     free = np.arange(len(towards)) < (np.argmax(towards < MOUTH) or len(towards))
+    aside = _angle(centres, POCKETS[shot.pocket] - shot.ball)
+    cue_error = np.linalg.norm(run.position(CUE)[:, :2] - cue, axis=1).max()
+    ball_error = np.linalg.norm(run.position(OBJECT)[free, :2] - ball[free], axis=1).max()
+    speed_error = float(np.linalg.norm(run.velocity(CUE)[-1, :2] - (left - 2.0 / 7.0 * (left - q))))
+    potted = in_pocket(run.position(OBJECT)[-1], shot.pocket)
     return [
         equal("impacts of balls", len(strokes), 1, "cue ball on object ball"),
         at_most("error of its time, s", abs(strokes["time"][0] - time), BOUND, "parabola, then a straight line"),
-        at_most(
-            "line of centres from that to the pocket, rad", abs(_angle(centres, POCKETS[shot.pocket] - shot.ball)), BOUND, "ghost ball"
-        ),
-        at_most("error of the cue ball's path, m", np.linalg.norm(run.position(CUE)[:, :2] - cue, axis=1).max(), BOUND, law),
-        at_most(
-            "error of its last velocity, m/s",
-            np.linalg.norm(run.velocity(CUE)[-1, :2] - (left - 2.0 / 7.0 * (left - q))),
-            BOUND,
-            "v - (2/7) u",
-        ),
-        at_most(
-            "error of the object ball's path, m",
-            np.linalg.norm(run.position(OBJECT)[free, :2] - ball[free], axis=1).max(),
-            BOUND,
-            "along d",
-        ),
-        equal(
-            "object ball in the pocket",
-            int(in_pocket(run.position(OBJECT)[-1], shot.pocket)),
-            1,
-            "the struck ball leaves along the line of centres",
-        ),
+        at_most("line of centres from that to the pocket, rad", abs(aside), BOUND, "ghost ball"),
+        at_most("error of the cue ball's path, m", cue_error, BOUND, law),
+        at_most("error of its last velocity, m/s", speed_error, BOUND, "v - (2/7) u"),
+        at_most("error of the object ball's path, m", ball_error, BOUND, "along d"),
+        equal("object ball in the pocket", int(potted), 1, "the struck ball leaves along the line of centres"),
     ]
 
 

@@ -6,7 +6,8 @@ A door of moment I about its hinge is held to an angle by a spring k and a dampe
 
 Forces of soft rows are found such that the oscillator is solved over a sub-step exactly, whatever w h is; at the ends of steps angle and
 rate are the closed form's to rounding, some 1e-13 a step: 1e-10 in fifty. Between them the force is constant. A semi-implicit spring is
-off by (w h)^2 / 24 of the phase and explodes at w h = 2; an implicit one damps what has no damper by half in a swing at w h = 0.5."""
+off by (w h)^2 / 24 of the phase and explodes at w h = 2; an implicit one damps what has no damper by half in a swing at w h = 0.5.
+"""
 
 from __future__ import annotations
 

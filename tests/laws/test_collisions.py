@@ -6,7 +6,8 @@
     rear-end crash: V = (1 + m_b / m_a) sqrt(2 mu g d m_b / (m_a + m_b))
 
 mu = m_a m_b / (m_a + m_b). n is that of the centres where they touch, a root of a quadratic: 1e-12 relative. An impulse without the
-reduced mass, or n from the end of a step, is off by percents."""
+reduced mass, or n from the end of a step, is off by percents.
+"""
 
 from __future__ import annotations
 

@@ -6,7 +6,8 @@
 
 Forces are constant over each stretch, so paths are polynomials: rounding and the equations' 1e-12, and the held gap of 1e-6 of the size
 that a body is lifted by. 1e-9 relative; a slide that ends on a grid of 1/60 s is off by 1e-3, friction along each axis on its own by up
-to 40 %."""
+to 40 %.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """Kinematic response: v' = v - (1 + k) (v.n) n at the root of E(p(t)) = 0, whatever mass and spin (animation notes A1).
 
 Bounds: roots and products of sixteen digits, 1e-12 of the speed and of the time. Impulses would divide the change by the masses' share,
-off by tens of percent, and friction would turn spin into speed."""
+off by tens of percent, and friction would turn spin into speed.
+"""
 
 from __future__ import annotations
 

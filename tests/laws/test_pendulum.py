@@ -4,7 +4,8 @@
 
 for a point mass, here on a string that turns freely at both ends (a distance joint through its centre). Joints are of second order: with
 steps of 1/240 s and rates a' up to 7 rad/s rates and tensions are off by (a' h)^2 / 12 = 7e-5, tensions being up to 5 m g: 5e-4 of m g. A
-reaction that is late by a step of 1/60 s, or lacks l a'^2, is off by 1e-2 and more."""
+reaction that is late by a step of 1/60 s, or lacks l a'^2, is off by 1e-2 and more.
+"""
 
 from __future__ import annotations
 
