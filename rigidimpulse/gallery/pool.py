@@ -30,12 +30,12 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.gallery.pool_table import CUE, OBJECT, POCKETS, RADIUS, add_ball, in_pocket, table
+from rigidimpulse.gallery.pool_table import CUE, OBJECT, POCKETS, RADIUS, RESTITUTION, add_ball, in_pocket, table
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
 from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
 
-GRAVITY, CLOTH, RESTITUTION = 9.81, 0.2, 0.95
+GRAVITY, CLOTH = 9.81, 0.2
 BOUND = 1e-9
 MOUTH = 0.12
 """m from the middle of a pocket, where the paths of balls that go into it are compared no more."""
@@ -70,11 +70,11 @@ def aim() -> Shot:
     return Shot(cue, ball, velocity, velocity, "right far")
 
 
-def straight(speed: float, spin: float) -> Shot:
+def straight(pocket: str, speed: float, spin: float) -> Shot:
     """A straight shot: cue ball, object ball and pocket in line; q = spin v."""
-    ball = np.array([0.1, -0.05])
-    way = unit(POCKETS["right far"] - ball)
-    return Shot(ball - 0.45 * way, ball, speed * way, spin * speed * way, "right far")
+    ball = np.array([0.1, -0.05 * np.sign(POCKETS[pocket][1])])
+    way = unit(POCKETS[pocket] - ball)
+    return Shot(ball - 0.45 * way, ball, speed * way, spin * speed * way, pocket)
 
 
 def swerve() -> Shot:
@@ -119,7 +119,7 @@ def meeting(shot: Shot) -> float:
 
 def scene(make: Callable[[], Shot]) -> Scene:
     """Return the table with the balls of a shot."""
-    shot, scene = make(), table(GRAVITY, CLOTH, RESTITUTION)
+    shot, scene = make(), table(GRAVITY, CLOTH)
     add_ball(scene, CUE, shot.cue, shot.velocity, shot.rolling)
     add_ball(scene, OBJECT, shot.ball)
     if shot.blocker is not None:
@@ -173,7 +173,9 @@ def _entry(name: str, description: str, make: Callable[[], Shot], law: str, dura
 
 SCENES = (
     _entry("pool_aim", "a cut shot, aimed at the ghost ball", aim, "u = v - q after the impact: a parabola", 1.3),
-    _entry("pool_follow", "the cue ball rolls and follows", partial(straight, 1.6, 1.0), "u is backward: it goes on", 1.6),
-    _entry("pool_draw", "backspin brings the cue ball back", partial(straight, 2.0, -1.8), "u is forward: it comes back", 1.15),
+    _entry("pool_follow", "the cue ball rolls and follows", partial(straight, "right far", 1.6, 1.0), "u is backward: it goes on", 1.6),
+    _entry(
+        "pool_draw", "backspin brings the cue ball back", partial(straight, "right near", 2.0, -1.8), "u is forward: it comes back", 1.15
+    ),
     _entry("pool_swerve", "the cue ball swerves round a ball", swerve, "parabola until 2 |u| / (7 mu g)", 1.6),
 )

@@ -14,9 +14,11 @@ from rigidimpulse.shape import Shape
 
 CUE, OBJECT = "cue ball", "object ball"
 RADIUS, MASS = 0.5 * 57.15e-3, 0.17
+RESTITUTION = 0.95
+"""Between balls, and at cushions."""
 LENGTH, WIDTH, POCKET = 1.6, 0.8, 0.12
 """m: field of play, side of the square holes."""
-BED, RAIL, RAIL_HEIGHT, FRAME, DEPTH = 0.03, 0.05, 0.036, 0.05, 0.1
+BED, RAIL, RAIL_HEIGHT, FRAME, DEPTH = 0.02, 0.05, 0.034, 0.04, 0.07
 """m: thickness of the cloth's slab, width and height of the cushions, width of the frame, height from the tray to the cloth."""
 _X, _Y = 0.5 * (LENGTH - POCKET), 0.5 * (WIDTH - POCKET)
 POCKETS = {
@@ -29,13 +31,13 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 SMOOTH = {"static_friction": 0.0, "dynamic_friction": 0.0, "friction_combine": "maximum", "restitution_combine": "minimum"}
 
 
-def table(gravity: float, friction: float, restitution: float) -> Scene:
-    """Return the table: cloth of this friction, top at z = 0, smooth cushions of this restitution, frame and tray, on the floor."""
+def table(gravity: float, friction: float) -> Scene:
+    """Return the table: cloth of this friction, top at z = 0, smooth cushions, frame and tray, on the floor."""
     scene = Scene(gravity=(0.0, 0.0, -gravity))
     cloth = Material(
         restitution=0.0, static_friction=friction, dynamic_friction=friction, friction_combine="maximum", restitution_combine="minimum"
     )
-    rubber, felt = Material(restitution=restitution, **SMOOTH), Material(restitution=0.0, static_friction=0.5, rolling_friction=0.02)
+    rubber, felt = Material(restitution=RESTITUTION, **SMOOTH), Material(restitution=0.0, static_friction=0.5, rolling_friction=0.02)
     scene.add(Body("floor", Shape.half_space(offset=-DEPTH - BED), motion="static", material=felt))
     # Kinematic without a motion: it stays where it is, and is painted, where static bodies are grey.
     scene.add(Body("cloth", _bed(), motion="kinematic", material=cloth))
@@ -55,7 +57,7 @@ def add_ball(scene: Scene, name: str, place: np.ndarray, velocity: np.ndarray | 
     """
     v = np.zeros(2) if velocity is None else velocity
     q = np.zeros(2) if rolling is None else rolling
-    resin = Material(restitution=0.95, **SMOOTH)
+    resin = Material(restitution=RESTITUTION, **SMOOTH)
     # q = R w x z
     spin = (-q[1] / RADIUS, q[0] / RADIUS, 0.0)
     scene.add(
