@@ -13,6 +13,7 @@ import rigidimpulse
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from rigidimpulse.accuracy import Accuracy
     from rigidimpulse.gallery.record import Check, GalleryScene
     from rigidimpulse.recording import Recording
     from rigidimpulse.scene import Scene
@@ -50,13 +51,13 @@ class Commands(click.Group):
 
 
 class Job(NamedTuple):
-    """A scene to run: name, how to make it, how long [s], frames per second, accuracy preset, gallery record."""
+    """A scene to run: name, how to make it, how long [s], frames per second, accuracy, gallery record."""
 
     name: str
     make: Callable[[], Scene]
     duration: float
     fps: float
-    accuracy: str
+    accuracy: str | Accuracy
     entry: GalleryScene | None
 
 

@@ -11,7 +11,10 @@ import rigidimpulse as ri
 from rigidimpulse import gallery
 from rigidimpulse.gallery.event_driven import DisksInRectangle
 
-REPEATED = ("spot", "disks_in_a_box", "pool_break", "superball", "cradle_two", "rifle", "galperin_2")
+REPEATED = (
+    "spot", "disks_in_a_box", "pool_break", "superball", "cradle_two", "rifle", "galperin_2",
+    "rear_end_crash", "pool_swerve", "backing_up_linear",
+)  # fmt: skip
 """Scenes run a second time and at other frame rates."""
 
 

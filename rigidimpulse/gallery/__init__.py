@@ -38,6 +38,21 @@ _MODULES = {
     "pile": "pile",
     "smoothed_path": "smoothed_path",
     "settled_layout": "settled_layout",
+    "emergency_stop": "emergency_stop",
+    "rear_end_crash": "rear_end_crash",
+    "pendulum": "pendulum",
+    "kinematic_bounce": "kinematic_bounce",
+    "backing_up_bisection": "backing_up",
+    "backing_up_linear": "backing_up",
+    "pool_aim": "pool",
+    "pool_follow": "pool",
+    "pool_draw": "pool",
+    "pool_swerve": "pool",
+    "table_on_four_feet": "table_on_four_feet",
+    "pendulum_drift": "pendulum_drift",
+    "soft_hinge": "soft_hinge",
+    "crowd_momentum": "crowd_momentum",
+    "marbles": "marbles",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 
