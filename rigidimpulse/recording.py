@@ -15,6 +15,7 @@ from rigidimpulse.observe.contacts import CONTACT_DTYPE, forces_on
 
 if TYPE_CHECKING:
     from rigidimpulse.observe.events import Event
+    from rigidimpulse.observe.impulses import Impulses
     from rigidimpulse.observe.ledger import Ledger
     from rigidimpulse.plan import Plan
     from rigidimpulse.scene import Scene
@@ -60,6 +61,7 @@ class Recording:
         reactions: (f, 3) N by joint, see `reaction`.
         contacts: structured array, one row a stretch of time over which a lasting contact carries the same force (see
             observe.contacts.CONTACT_DTYPE); stretches that no frame sees are left out. `contacts_at`, `contact_force` by frame.
+        by_cause: impulses by body and cause, see `impulses`; None in a loaded recording.
 
     """
 
@@ -77,6 +79,7 @@ class Recording:
     scene: Scene | None = None
     reactions: dict[str, np.ndarray] = field(default_factory=dict)
     contacts: np.ndarray = field(default_factory=lambda: np.zeros(0, CONTACT_DTYPE))
+    by_cause: Impulses | None = None
 
     def index(self, name: str) -> int:
         """Index of a body.
@@ -121,6 +124,20 @@ class Recording:
         if name not in self.reactions:
             raise unknown_name("joint", name, self.reactions)
         return self.reactions[name]
+
+    def impulses(self, name: str) -> dict[str, np.ndarray]:
+        """Impulse on a body by cause until each frame, (f, 3) N s; together they are its change of momentum.
+
+        Causes: "gravity", "constant forces", each other force by its name, "joint NAME", "contact with NAME" (lasting contact), "impacts
+        with NAME", and "corrections", what ends sub-steps: small, but for heaps, whose contacts are all in it.
+
+        Raises:
+            SceneError: for an unknown name, listing the known ones; for a recording that was loaded from a file.
+
+        """
+        if self.by_cause is None:
+            raise SceneError("a loaded recording knows no causes", "ask the run that simulate() returned")
+        return self.by_cause.of(name)
 
     def contacts_at(self, frame: int) -> np.ndarray:
         """Rows of `contacts` that carry load at a frame (an index of `times`, negative ones from the end).

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from rigidimpulse.integrate.flight import ExactFlight
 from rigidimpulse.integrate.forced_flight import ForcedFlight, VaryingLoad
 from rigidimpulse.integrate.prescribed import KeyframePaths
 from rigidimpulse.observe.events import EventLog
+from rigidimpulse.observe.impulses import Impulses
 from rigidimpulse.observe.ledger import make_ledger
 from rigidimpulse.observe.recorder import Recorder
 from rigidimpulse.plan import Plan
@@ -37,6 +39,9 @@ from rigidimpulse.state import StepContext
 from rigidimpulse.step import react, step
 from rigidimpulse.sweep.strategy import ImpactTime
 from rigidimpulse.world import World, compile_scene
+
+if TYPE_CHECKING:
+    from rigidimpulse.forces.force_log import ForceWork
 
 logger = logging.getLogger("rigidimpulse")
 
@@ -201,6 +206,26 @@ def close_stretches(context: StepContext) -> None:
         context.log.stretches.append((state.course.start[i], np.inf, i, state.energy_at_start[i], 0.0))
 
 
+def impulses_by_cause(context: StepContext, times: np.ndarray, impacts: np.ndarray, work: ForceWork | None) -> Impulses:
+    """Split what bodies gained by cause."""
+    world, recorder = context.world, context.recorder
+    # Mass at the frames over that at the end of the run, and in the middle between frames.
+    share = np.ones((len(times), world.num_bodies)) if work is None or work.mass_share is None else work.mass_share
+    middle = 0.5 * (share + np.vstack([share[:1], share[:-1]]))
+    mass = np.where(world.dynamic, world.mass, 0.0)
+    gained = np.diff(recorder.velocity, axis=0, prepend=recorder.velocity[:1])
+    return Impulses(
+        names=list(world.names),
+        times=times,
+        pull=mass[:, None, None] * np.stack([world.gravity, world.push], axis=1),
+        held=np.cumsum(np.diff(times, prepend=0.0)[:, None] * middle, axis=0),
+        book=context.impulses,
+        forces=work,
+        impacts=impacts,
+        gained=np.cumsum(middle[:, :, None] * mass[:, None] * gained, axis=0),
+    )
+
+
 def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration: float) -> Recording:
     """Body-frame poses, impacts and ledger from what the recorder holds."""
     world, recorder = context.world, context.recorder
@@ -214,6 +239,7 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
         np.where(world.dynamic, world.mass, 0.0), world.inertia, world.steady_acceleration, context.log, work,
     )
+    contacts = context.contact_log.table()
     return Recording(
         times=times,
         names=list(world.names),
@@ -228,5 +254,6 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         plan=plan,
         scene=world.scene,
         reactions=reaction_table(context.joints, times),
-        contacts=context.contact_log.table(),
+        contacts=contacts,
+        by_cause=impulses_by_cause(context, times, impacts, work),
     )

@@ -19,6 +19,7 @@ from rigidimpulse.geometry import Geometry
 from rigidimpulse.integrate.course import Course, make_course, pose_at
 from rigidimpulse.observe.contact_log import ContactLog
 from rigidimpulse.observe.events import EventLog
+from rigidimpulse.observe.impulses import ImpulseBook
 from rigidimpulse.observe.recorder import Recorder
 from rigidimpulse.respond.impulse import BodyState
 from rigidimpulse.rotation import to_matrix
@@ -101,7 +102,8 @@ class StepContext:
         self.state = State(world)
         self.recorder = recorder
         self.log = log
-        self.contact_log = ContactLog(recorder.times)
+        self.impulses = ImpulseBook(recorder.times)
+        self.contact_log = ContactLog(recorder.times, self.impulses)
         self.detector = Detector(world.geometry, world.shape_of_body, make_scratch(world.geometry), world.accuracy.iterations)
         self.contact_real = np.empty((CONTACT_CAPACITY, 10))
         self.contact_int = np.empty((CONTACT_CAPACITY, 5), np.int64)

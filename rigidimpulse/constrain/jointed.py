@@ -56,6 +56,7 @@ class JointState:
         self.whole = np.ones(len(joints), bool)
         self.moment = np.zeros((len(joints), 3))
         self.shock = np.zeros((len(joints), 3))
+        self._booked_shock = np.zeros((len(joints), 3))
         self.pull = np.zeros((len(joints), 3))
         self.are_closed = True
         self.began = np.zeros(len(joints))
@@ -122,6 +123,7 @@ class JointState:
         stop_joints(
             self.table, which, now, state.rotation, members, context.column, memory, elapsed, self.moment
         )
+        self._book(context, which, group.time)
         state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
         if self._limited:
             # An impact at this instant: what came before goes on unchanged.
@@ -131,6 +133,16 @@ class JointState:
         memory.wrench[members] = 0.0
         self.length[which] = elapsed[which]
         context.log.book(group.time, "joints", mechanical_energy(now, context.world, members) - before)
+
+    def _book(self, context, which: np.ndarray, time: float) -> None:
+        """Impulses on b of the sub-steps that end: half of what their forces were, and what stopped the joints."""
+        for j in which.tolist():
+            a, b, cause = int(self.table.body_a[j]), int(self.table.body_b[j]), f"joint {self.names[j]}"
+            began = float(self.began[j])
+            if time > began:
+                context.impulses.add(cause, a, b, began, time, 0.5 * self.pull[j] + self.moment[j] / (time - began))
+            context.impulses.add_at(cause, a, b, time, self.shock[j] - self._booked_shock[j])
+        self._booked_shock[which] = self.shock[which]
 
     def impact_block(self, context, group):
         """The joints' part in the impulses of an impact (`JointBlock`)."""

@@ -74,6 +74,14 @@ class ForceWork:
         np.add.at(total, self.body, self.done[:, :, 6].T)
         return total.T
 
+    def impulses_on(self, i: int) -> dict[str, np.ndarray]:
+        """Impulses (f, 3) N s of each force on a body."""
+        total: dict[str, np.ndarray] = {}
+        for row in np.flatnonzero(self.body == i).tolist():
+            name = self.names[self.cause[row]]
+            total[name] = total.get(name, 0.0) + self.done[:, row, :3]
+        return total
+
     def taken(self) -> dict[str, np.ndarray]:
         """Energy (f,) J that each force took from bodies and did not keep as potential energy."""
         total = np.zeros((len(self.names), len(self.done)))

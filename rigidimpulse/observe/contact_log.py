@@ -8,6 +8,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.observe.contacts import CONTACT_DTYPE
+from rigidimpulse.observe.impulses import ImpulseBook
 from rigidimpulse.respond.friction import tangents
 
 
@@ -35,9 +36,9 @@ class Stretch:
 class ContactLog:
     """Collects contact forces while a run goes on; those that no frame sees are dropped."""
 
-    def __init__(self, times: np.ndarray) -> None:
-        """times (f,) s, of the frames."""
-        self.times = times
+    def __init__(self, times: np.ndarray, book: ImpulseBook) -> None:
+        """times (f,) s, of the frames; book: where impulses go."""
+        self.times, self._book = times, book
         self._open: dict[int, Stretch] = {}
         self._done: list[np.ndarray] = []
 
@@ -68,7 +69,9 @@ class ContactLog:
     def table(self) -> np.ndarray:
         """All contacts that a frame sees, in order of their start."""
         for stretch in {id(s): s for s in self._open.values()}.values():
-            self._keep(stretch.rows[np.isinf(stretch.rows["end"])])
+            lasting = stretch.rows[np.isinf(stretch.rows["end"])]
+            self._keep(lasting)
+            self._count(lasting, self.times[-1])
         self._open.clear()
         if not self._done:
             return np.zeros(0, CONTACT_DTYPE)
@@ -82,6 +85,15 @@ class ContactLog:
             ends &= np.isin(rows["body_a"], bodies) | np.isin(rows["body_b"], bodies)
         rows["end"][ends] = time
         self._keep(rows[ends])
+        self._count(rows[ends], time)
+
+    def _count(self, rows: np.ndarray, end: float) -> None:
+        """Book the impulses of contacts that carried their forces until `end`."""
+        total: dict[tuple[int, int], np.ndarray] = {}
+        for a, b, force in zip(rows["body_a"].tolist(), rows["body_b"].tolist(), rows["force"], strict=True):
+            total[a, b] = total.get((a, b), 0.0) + force
+        for (a, b), force in total.items():
+            self._book.add("contact with", a, b, float(rows["start"][0]), end, force)
 
     def _keep(self, rows: np.ndarray) -> None:
         seen = np.searchsorted(self.times, rows["start"]) < np.searchsorted(self.times, rows["end"])
