@@ -4,8 +4,7 @@ Spring between vertices i and j, d = x_j - x_i, l = |d|, n = d / l, of rest leng
 
     E = k (l - L)^2 / 2,    dE/dx_j = k (l - L) n = -dE/dx_i,    H_jj = k (n n^T + max(0, 1 - L / l) (1 - n n^T))
 
-H is the exact second derivative where the spring is stretched; where it is compressed its negative part is left out, so that H
-is positive semidefinite. Hinge over the edge from a to b, e = b - a, with the opposite vertices c of the left and d of the right
+where max(0, .) leaves out the negative part of compressed springs, so that H is positive semidefinite; without it H is exact. Hinge over the edge from a to b, e = b - a, with the opposite vertices c of the left and d of the right
 face, N_c = (a - c) x (b - c), N_d = (b - d) x (a - d):
 
     phi = atan2((N_c x N_d) . e / |e|, N_c . N_d),    0 where flat;    E = kappa (phi - phi_0)^2 / 2,    H = kappa (grad phi)(grad phi)^T
@@ -60,12 +59,12 @@ def add_spring_gradient(x, spring, rest, stiffness, gradient):
 
 
 @jit
-def add_spring_hessian(x, spring, rest, stiffness, slot, block):
-    """Add H to blocks (b, 3, 3); slot (s, 4): places of the blocks ii, jj, ij, ji."""
+def add_spring_hessian(x, spring, rest, stiffness, least, slot, block):
+    """Add H to blocks (b, 3, 3), with max(least, .) for max(0, .); slot (s, 4): places of the blocks ii, jj, ij, ji."""
     for s in range(spring.shape[0]):
         d = subtract(row(x, spring[s, 1]), row(x, spring[s, 0]))
         length = sqrt(dot(d, d))
-        across = stiffness[s] * max(0.0, 1.0 - rest[s] / length) if length > 0.0 else stiffness[s]
+        across = stiffness[s] * max(least, 1.0 - rest[s] / length) if length > 0.0 else stiffness[s]
         both = (stiffness[s] - across) / (length * length) if length > 0.0 else 0.0
         for p in range(3):
             for q in range(3):

@@ -18,7 +18,7 @@ from rigidimpulse.flexible.balance import lever_place, set_momenta, take_energy
 from rigidimpulse.flexible.body import FlexibleBody
 from rigidimpulse.flexible.contact_planes import LIFT, SLIPS, RigidMotion, Touches, joined, make_contacts, make_surfaces, sides_of
 from rigidimpulse.flexible.contact_terms import NetContacts
-from rigidimpulse.flexible.minimise import Problem, Solution, minimise, set_penalties
+from rigidimpulse.flexible.minimise import Problem, Solution, minimise, set_penalties, value_of
 from rigidimpulse.flexible.net import Net
 from rigidimpulse.material import combine
 from rigidimpulse.rotation import quaternion_from_rotation_vector, to_matrix
@@ -209,7 +209,13 @@ class Flexibles:
         speed = float(np.sqrt(mass @ speeds / mass.sum()))
         problem = Problem(self.net.damped(start, span), span, goal, self._free, M / span**2, speed)
         set_penalties(problem, contacts, z[: len(start)])
-        return minimise(problem, contacts, z, self.tolerance), contacts, problem, slots
+        onward = z.copy()
+        onward[: len(start)][self._free] += span * self.velocity[self._free]
+        if value_of(problem, contacts, onward) < value_of(problem, contacts, z):
+            z = onward
+        solution = minimise(problem, contacts, z, self.tolerance)
+        self._force_of = dict(zip(contacts.key.tolist(), solution.force, strict=True))
+        return solution, contacts, problem, slots
 
     def _recall(self, contacts: NetContacts) -> None:
         """Start from the forces of the last step."""
@@ -267,7 +273,6 @@ class Flexibles:
             taken = excess - take_energy(net.mass, end, velocity, pieces, excess)
         self.energy_taken += taken
         self.position, self.velocity = end, velocity
-        self._force_of = dict(zip(contacts.key.tolist(), solution.force, strict=True))
         self._sides = sides_of(touches, end, rigid.end_rotation, self._surfaces.skip.size)
         given = self._given(contacts, impulse, rigid, hold * h, end)
         ramp = np.stack([4.0 * given / h, -6.0 * given / h**2])

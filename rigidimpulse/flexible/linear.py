@@ -71,10 +71,16 @@ def diagonal_inverses(diagonal, block, rigid, contacts, D, node_inverse, rigid_i
 
 @jit
 def _invert(A):
-    """Invert a symmetric positive definite matrix (3, 3) in place, by cofactors."""
+    """Invert a symmetric matrix (3, 3) in place, by cofactors; of one that is not positive definite the mean of its diagonal."""
     a, b, c = row(A, 0), row(A, 1), row(A, 2)
     bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
     determinant = a[0] * bc[0] + a[1] * bc[1] + a[2] * bc[2]
+    if not (a[0] > 0.0 and ab[2] > 0.0 and determinant > 0.0):
+        mean = (abs(a[0]) + abs(b[1]) + abs(c[2])) / 3.0
+        A[:] = 0.0
+        for k in range(3):
+            A[k, k] = 1.0 / mean
+        return
     for k in range(3):
         A[k, 0], A[k, 1], A[k, 2] = bc[k] / determinant, ca[k] / determinant, ab[k] / determinant
 
@@ -120,7 +126,9 @@ def conjugate_gradients(first, column, block, free, rigid, contacts, no_aim, D, 
             return count
         apply_matrix(first, column, block, free, rigid, contacts, no_aim, D, p, image)
         bend = _inner(p, image)
-        if bend <= 0.0:  # round-off: the matrix is positive definite
+        if bend <= 0.0:  # a direction of negative curvature: what is there so far goes downhill (Steihaug 1983)
+            if count == 0:
+                z[:] = p
             return count
         step = size / bend
         for i in range(r.shape[0]):

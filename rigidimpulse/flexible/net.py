@@ -102,10 +102,14 @@ class Net:
         add_hinge_gradient(x, self.hinge, self.hinge_rest, self.hinge_stiffness, gradient)
         return gradient
 
-    def hessian(self, x: np.ndarray) -> np.ndarray:
-        """Blocks (b, 3, 3) in N/m, by `pattern`, of the positive semidefinite part of the second derivatives at x (n, 3)."""
+    def hessian(self, x: np.ndarray, exact: bool = False) -> np.ndarray:
+        """Blocks (b, 3, 3) in N/m, by `pattern`, of the second derivatives at vertices x (n, 3).
+
+        Of those of springs the positive semidefinite part, or all; of those of hinges always Gauss and Newton's part.
+        """
         block = np.zeros((len(self.pattern.column), 3, 3))
-        add_spring_hessian(x, self.spring, self.spring_rest, self.spring_stiffness, self.pattern.spring_slot, block)
+        least = -np.inf if exact else 0.0
+        add_spring_hessian(x, self.spring, self.spring_rest, self.spring_stiffness, least, self.pattern.spring_slot, block)
         add_hinge_hessian(x, self.hinge, self.hinge_stiffness, self.pattern.hinge_slot, block)
         return block
 
