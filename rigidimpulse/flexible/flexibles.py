@@ -28,6 +28,8 @@ GAP = 0.01
 """Gap at which nets are kept from bodies, relative to the mean length of their edges."""
 ROUNDS = 5
 """Most times that contacts are looked for again on the way that was solved for."""
+MIDPOINT_EXCESS = 1e-3
+"""Energy out of nothing, relative to twice the kinetic energy, above which a step of the midpoint rule is done again by Euler's."""
 ALIKE = 0.95
 """Cosine of the angle between two normals above which one plane guards both places."""
 SCHEMES = ("euler", "midpoint")
@@ -39,6 +41,7 @@ class FlexibleStep(NamedTuple):
     impulse: np.ndarray  # (n, 6) N s, N m s about the centre of mass: what the nets gave each body over the step
     ramp: np.ndarray  # (2, n, 6) N, N m: force and torque at the start and their rate (per s), with that impulse (see the module)
     energy_taken: float  # J, motion taken off against energy out of nothing
+    energy_made: float  # J, of it what no motion was left to be taken from
     num_contacts: int
     converged: bool
     unresolved: int  # contacts still found after the last round
@@ -164,7 +167,14 @@ class Flexibles:
             if unresolved == 0 or rounds == ROUNDS:
                 break
             touches, midpoint = joined([touches, new]), False
-        return self._finish(start + lift, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h)
+        done = self._finish(start + lift, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h)
+        if done is None:  # the midpoint rule would make energy here
+            touches, midpoint = joined([touches]), False
+            solution, contacts, problem, slots = self._solve(touches, rigid, h, flight, target, start, midpoint)
+            end = solution.z[: len(start)]
+            done = self._finish(start, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h)
+            assert done is not None
+        return done
 
     def _place_held(self, rigid: RigidMotion, target: np.ndarray) -> None:
         """Write where held vertices are at the end of the step."""
@@ -248,8 +258,8 @@ class Flexibles:
                 fresh.append(c)
         return Touches(*(column[np.array(fresh, np.int64)] for column in found))
 
-    def _finish(self, start, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h) -> FlexibleStep:
-        """Take over the new state; see `balance` for what is set right."""
+    def _finish(self, start, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h) -> FlexibleStep | None:
+        """Take over the new state; see `balance` for what is set right. None if the midpoint rule shall not be taken."""
         n, net, free = len(start), self.net, self._free
         before, x0 = self.velocity.copy(), self.position
         way = end - start
@@ -267,16 +277,18 @@ class Flexibles:
         excess = kinetic + net.energy(end) - net.energy(x0) - work
         if np.any(start != x0):  # what lifting costs is no motion's to give
             excess -= net.energy(start) - net.energy(x0)
-        taken = 0.0
+        if midpoint and excess > MIDPOINT_EXCESS * float(net.mass @ np.einsum("ij,ij->i", velocity, velocity)):
+            return None
+        taken, made = 0.0, 0.0
         if excess > 0.0:
-            pieces = self._pieces or [np.flatnonzero(free)]
-            taken = excess - take_energy(net.mass, end, velocity, pieces, excess)
+            made = take_energy(net.mass, end, velocity, self._pieces or [np.flatnonzero(free)], excess)
+            taken = excess - made
         self.energy_taken += taken
         self.position, self.velocity = end, velocity
         self._sides = sides_of(touches, end, rigid.end_rotation, self._surfaces.skip.size)
         given = self._given(contacts, impulse, rigid, hold * h, end)
         ramp = np.stack([4.0 * given / h, -6.0 * given / h**2])
-        return FlexibleStep(given, ramp, taken, len(contacts.key), solution.converged, unresolved)
+        return FlexibleStep(given, ramp, taken, made, len(contacts.key), solution.converged, unresolved)
 
     def _keep_momenta(self, start, end, velocity, before, impulse, contacts: NetContacts, rigid, h, midpoint) -> None:
         """Set momentum and angular momentum of free pieces to what acted on them."""

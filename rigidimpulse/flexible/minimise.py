@@ -29,6 +29,8 @@ from rigidimpulse.flexible.net import Net
 
 MOST_ITERATIONS = 100
 MOST_LINEAR = 2000
+UPDATE = 0.3
+"""Error at which forces of contacts are taken over, relative to the error that this makes."""
 FLOOR = 1e-15
 """Round-off of forces, relative to stiffness times coordinates."""
 
@@ -112,7 +114,8 @@ def minimise(p: Problem, contacts: NetContacts, z: np.ndarray, tolerance: float)
     stiffness = np.trace(p.net.hessian(z[:n])[p.net.pattern.diagonal], axis1=1, axis2=2)
     noise = FLOOR * p.h * np.sqrt(float(np.sum((stiffness * np.abs(z[:n]).max(initial=0.0)) ** 2 / p.net.mass)) / total)
     force = np.empty_like(contacts.force)
-    linear, value, previous, iteration, blind = 0, value_of(p, contacts, z), np.inf, 0, False
+    linear, value, previous, iteration, blind, stepped = 0, value_of(p, contacts, z), np.inf, 0, False, False
+    last = np.inf
     while True:
         gradient = _gradient(p, contacts, z, force)
         residual = np.where(held[:, None], 0.0, -gradient)
@@ -126,11 +129,14 @@ def minimise(p: Problem, contacts: NetContacts, z: np.ndarray, tolerance: float)
         if done or iteration == MOST_ITERATIONS:
             return Solution(z, force, gradient, iteration, linear, max(error, broken), done)
         iteration += 1
-        if error <= max(goal, 10.0 * broken) and broken > goal:
+        if broken > goal and (error <= goal or (stepped and error <= UPDATE * _effect(p, contacts, force, mass))):
             contacts.force[:] = force
+            if broken > 0.2 * last:  # it closes in slowly: near the goal higher penalties no longer hinder the search
+                contacts.penalty[:] *= 4.0
+            last = broken
             pressing = np.einsum("ij,ij->i", force, contacts.normal)
             contacts.radius[:] = contacts.friction * np.maximum(pressing, 0.0)
-            value, previous, blind = value_of(p, contacts, z), np.inf, False
+            value, previous, blind, stepped = value_of(p, contacts, z), np.inf, False, False
             continue
         accuracy = min(0.1, max(0.1 * goal / error, 0.5 * error / previous if previous < np.inf else 0.1))
         exact = 0.1 * previous < error < previous
@@ -138,9 +144,17 @@ def minimise(p: Problem, contacts: NetContacts, z: np.ndarray, tolerance: float)
         step, count = _newton_step(p, contacts, z, residual, accuracy, exact)
         linear += count
         moved, new = _search(p, contacts, z, step, value, float(np.sum(residual * step)))
-        blind = moved is None
+        blind, stepped = moved is None, True
         z = z + step if moved is None else moved
         value = value_of(p, contacts, z) if moved is None else new
+
+
+def _effect(p: Problem, contacts: NetContacts, force: np.ndarray, mass: np.ndarray) -> float:
+    """Error (m/s) that taking over the forces of the contacts will make."""
+    change = np.zeros((len(mass), 3))
+    add_contact_gradient(len(p.free), contacts, force - contacts.force, change)
+    change[: len(p.free)][~p.free] = 0.0
+    return p.h * float(np.sqrt(np.sum(change**2 / mass[:, None]) / p.net.mass.sum()))
 
 
 def _newton_step(p: Problem, contacts: NetContacts, z: np.ndarray, residual: np.ndarray, accuracy: float, exact: bool) -> tuple[np.ndarray, int]:
