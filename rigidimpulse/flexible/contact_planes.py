@@ -150,15 +150,14 @@ def _no_touches() -> Touches:
     return Touches(index, np.zeros((0, 3), np.int64), flat, index, flat, flat, np.zeros(0), np.zeros(0), np.zeros(0))
 
 
-def make_surfaces(geometry: Geometry, shape_of_body, radius, position, face, skip: np.ndarray, gap: float, longest: float) -> Surfaces:
-    """Prepare the surfaces of a scene; samples on balls wider than the longest edge (m) of the nets are left to the vertices."""
+def make_surfaces(geometry: Geometry, shape_of_body, radius, position, face, skip: np.ndarray, gap: float) -> Surfaces:
+    """Prepare the surfaces of a scene: bodies as in `World`, vertices (v, 3) m and faces (f, 3) of all nets; see `Surfaces`."""
     samples, radii, owner = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0, np.int64)]
     for b, shape in enumerate(shape_of_body):
         points, r = sample_points(geometry, int(shape))
-        kept = r <= longest
-        samples.append(points[kept])
-        radii.append(r[kept])
-        owner.append(np.full(int(kept.sum()), b))
+        samples.append(points)
+        radii.append(r)
+        owner.append(np.full(len(points), b))
     faces = build_geometry([CompiledShape((Primitive(ROUND, vertices=position, faces=face),))]) if len(face) else None
     return Surfaces(
         geometry, shape_of_body, np.asarray(radius, float), faces, np.concatenate(samples), np.concatenate(radii),

@@ -43,7 +43,7 @@ class FlexibleStep(NamedTuple):
     energy_taken: float  # J, motion taken off against energy out of nothing
     energy_made: float  # J, of it what no motion was left to be taken from
     num_contacts: int
-    converged: bool
+    converged: bool  # False: solved without friction, or not at all
     unresolved: int  # contacts still found after the last round
 
 
@@ -119,16 +119,17 @@ class Flexibles:
         return [piece for piece in pieces if free[piece].all()]
 
     def _prepare_contact(self, world: World, owner: np.ndarray) -> None:
-        edges = self.net.lengths(self.position)[: max(1, len(self.net.spring))] if len(self.net.spring) else np.zeros(1)
+        edges = self.net.lengths(self.position) if len(self.net.spring) else np.ones(1)
         skip = np.zeros((len(owner), world.num_bodies), bool)
         for vertices, bodies, _ in (self._held, self._joined):
             skip[vertices[bodies >= 0], bodies[bodies >= 0]] = True
         skip[np.ix_(~self._free, ~world.dynamic)] = True
         pairs = [[combine(net.material, body.material)[1:3] for body in world.scene.bodies] for net in self.bodies]
         self._friction = np.array(pairs, float).reshape(len(self.bodies), world.num_bodies, 2)[owner]
-        gap = GAP * float(edges.mean())
+        self._edge = float(edges.mean())
+        gap = GAP * self._edge
         self._surfaces = make_surfaces(
-            world.geometry, world.shape_of_body, world.bound_radius, self.position, self.net.face, skip, gap, float(edges.max())
+            world.geometry, world.shape_of_body, world.bound_radius, self.position, self.net.face, skip, gap
         )
 
     def energy(self) -> float:
@@ -139,6 +140,27 @@ class Flexibles:
         """Vertices (v, 3) m of a flexible body now."""
         k = [body.name for body in self.bodies].index(name)
         return self.position[self.first[k] : self.first[k + 1]]
+
+    def step_limit(self, rigid: RigidMotion, within: float) -> float:
+        """Longest step (s) in which what may touch moves by no more than an edge of the nets relative to them.
+
+        Longer steps let nothing pass either, but a net that is struck harder than that is taken by surprise: its faces turn far within
+        the step, and friction on them is that of the place where they were.
+
+        Args:
+            rigid: the bodies now. within: s, only bodies that may reach a net by then count.
+
+        """
+        low, high = self.position.min(axis=0), self.position.max(axis=0)
+        limit = np.inf
+        for b, radius in enumerate(self._surfaces.radius):
+            spin = float(np.linalg.norm(rigid.angular_velocity[b])) * radius if np.isfinite(radius) else 0.0
+            speeds = np.linalg.norm(self.velocity - rigid.velocity[b], axis=1) + spin
+            speed = float(speeds.max(initial=0.0))
+            apart = np.maximum(0.0, np.maximum(low - rigid.position[b], rigid.position[b] - high))
+            if speed > 0.0 and float(np.linalg.norm(apart)) - radius <= within * speed:
+                limit = min(limit, self._edge / speed)
+        return limit
 
     def step(self, time: float, h: float, rigid: RigidMotion) -> FlexibleStep:
         """Step all nets from `time` to time + h s, together with the rigid bodies that they touch.
@@ -169,7 +191,7 @@ class Flexibles:
             touches, midpoint = joined([touches, new]), False
         done = self._finish(start + lift, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h)
         if done is None:  # the midpoint rule would make energy here
-            touches, midpoint = joined([touches]), False
+            midpoint = False
             solution, contacts, problem, slots = self._solve(touches, rigid, h, flight, target, start, midpoint)
             end = solution.z[: len(start)]
             done = self._finish(start, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h)
@@ -224,6 +246,11 @@ class Flexibles:
         if value_of(problem, contacts, onward) < value_of(problem, contacts, z):
             z = onward
         solution = minimise(problem, contacts, z, self.tolerance)
+        if not solution.converged and np.any(contacts.friction):  # jammed: without friction the problem of a round is the whole one
+            contacts.friction[:], contacts.radius[:] = 0.0, 0.0
+            contacts.force[~contacts.fastened] = 0.0
+            set_penalties(problem, contacts, z[: len(start)])
+            solution = minimise(problem, contacts, z, self.tolerance)._replace(converged=False)
         self._force_of = dict(zip(contacts.key.tolist(), solution.force, strict=True))
         return solution, contacts, problem, slots
 
