@@ -79,13 +79,18 @@ class Run:
         """(n, 3, 3) in world axes."""
         return np.einsum("nij,nj,nkj->nik", self.R, self.world.dynamic[:, None] / self.world.inertia, self.R)
 
+    def motion(self, h: float) -> RigidMotion:
+        """Rigid bodies over a step, without the nets."""
+        end = self.x + h * self.v + 0.5 * h * h * self.world.gravity
+        return RigidMotion(
+            self.x, self.R, self.v, self.w, end, turned(self.R, h * self.w), self.world.inv_mass, self.inverse_inertia(),
+            self.world.dynamic,
+        )  # fmt: skip
+
     def step(self, h: float) -> FlexibleStep:
         """One step; paths of the impulses are J h / m long, as the ramp makes them."""
-        world = self.world
-        end = self.x + h * self.v + 0.5 * h * h * world.gravity
-        motion = RigidMotion(
-            self.x, self.R, self.v, self.w, end, turned(self.R, h * self.w), world.inv_mass, self.inverse_inertia(), world.dynamic
-        )  # fmt: skip
+        world, motion = self.world, self.motion(h)
+        end = motion.end_position
         done = self.nets.step(self.time, h, motion)
         gained = world.inv_mass[:, None] * done.impulse[:, :3]
         spun = np.einsum("nij,nj->ni", motion.inv_inertia, done.impulse[:, 3:])
