@@ -3,5 +3,6 @@
 from rigidimpulse.flexible.body import FlexibleBody
 from rigidimpulse.flexible.contact_planes import RigidMotion
 from rigidimpulse.flexible.flexibles import Flexibles, FlexibleStep
+from rigidimpulse.flexible.track import FlexibleTrack
 
-__all__ = ["FlexibleBody", "FlexibleStep", "Flexibles", "RigidMotion"]
+__all__ = ["FlexibleBody", "FlexibleStep", "FlexibleTrack", "Flexibles", "RigidMotion"]

@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidimpulse.flexible.contact_terms import NetContacts
 from rigidimpulse.flexible.touching import fit_boxes, sample_points, samples_on_faces, vertices_on_bodies
-from rigidimpulse.geometry import CompiledShape, Geometry, Primitive, ROUND, build_geometry
+from rigidimpulse.geometry import ROUND, CompiledShape, Geometry, Primitive, build_geometry
 
 LIFT = 0.2
 """Share of a missing gap that a vertex is moved by, per step, without any velocity."""

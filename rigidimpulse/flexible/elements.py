@@ -4,8 +4,9 @@ Spring between vertices i and j, d = x_j - x_i, l = |d|, n = d / l, of rest leng
 
     E = k (l - L)^2 / 2,    dE/dx_j = k (l - L) n = -dE/dx_i,    H_jj = k (n n^T + max(0, 1 - L / l) (1 - n n^T))
 
-where max(0, .) leaves out the negative part of compressed springs, so that H is positive semidefinite; without it H is exact. Hinge over the edge from a to b, e = b - a, with the opposite vertices c of the left and d of the right
-face, N_c = (a - c) x (b - c), N_d = (b - d) x (a - d):
+where max(0, .) leaves out the negative part of compressed springs, so that H is positive semidefinite; without it H is exact.
+Hinge over the edge from a to b, e = b - a, with the opposite vertices c of the left and d of the right face, N_c = (a - c) x (b - c),
+N_d = (b - d) x (a - d):
 
     phi = atan2((N_c x N_d) . e / |e|, N_c . N_d),    0 where flat;    E = kappa (phi - phi_0)^2 / 2,    H = kappa (grad phi)(grad phi)^T
 

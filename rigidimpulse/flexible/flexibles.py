@@ -2,7 +2,12 @@
 
 A step takes the rigid bodies as they would move without the nets, solves nets, contacts and the reaction of every touched body at once
 (see `minimise`), and returns the impulses that the bodies got. Over the step of h s an impulse J moves its body by h J / m, as implicit
-Euler does: that is what the force F0 + F1 s with the moments J and h J, F0 = 4 J / h, F1 = -6 J / h^2, does exactly.
+Euler does, but that part of it which bears a steady load L, as in the step before and no more than gravity's, by half of that:
+
+    d = h J / m - h^2 L / 2 m    exactly by the force    F(s) = 4 J / h - 3 L + (6 L - 6 J / h) s / h
+
+It is constant where J = h L: a body at rest stays there. A constant force J / h would move the body by h J / 2 m and leave it inside
+the net by up to h^2 F / 2 m, or let it go on through it.
 """
 
 from __future__ import annotations
@@ -19,7 +24,7 @@ from rigidimpulse.flexible.body import FlexibleBody
 from rigidimpulse.flexible.contact_planes import LIFT, SLIPS, RigidMotion, Touches, joined, make_contacts, make_surfaces, sides_of
 from rigidimpulse.flexible.contact_terms import NetContacts
 from rigidimpulse.flexible.minimise import Problem, Solution, minimise, set_penalties, value_of
-from rigidimpulse.flexible.net import Net
+from rigidimpulse.flexible.net import join
 from rigidimpulse.material import combine
 from rigidimpulse.rotation import quaternion_from_rotation_vector, to_matrix
 from rigidimpulse.world import World
@@ -39,7 +44,7 @@ class FlexibleStep(NamedTuple):
     """What a step of nets did to n rigid bodies, and how it went."""
 
     impulse: np.ndarray  # (n, 6) N s, N m s about the centre of mass: what the nets gave each body over the step
-    ramp: np.ndarray  # (2, n, 6) N, N m: force and torque at the start and their rate (per s), with that impulse (see the module)
+    ramp: np.ndarray  # (2, n, 6) N, N m: force and torque at the start, and their rates per s (see the module)
     energy_taken: float  # J, motion taken off against energy out of nothing
     energy_made: float  # J, of it what no motion was left to be taken from
     num_contacts: int
@@ -58,7 +63,7 @@ class Flexibles:
 
     """
 
-    def __init__(self, world: World, scheme: str = "euler", tolerance: float = 1e-9) -> None:
+    def __init__(self, world: World, scheme: str = "euler", tolerance: float = 1e-6) -> None:
         """Compile the flexible bodies of a scene.
 
         Args:
@@ -92,6 +97,7 @@ class Flexibles:
         self._prepare_contact(world, owner)
         self._force_of: dict[int, np.ndarray] = {}
         self._sides: dict[int, float] = {}
+        self._load = np.zeros((world.num_bodies, 3))
         self.energy_taken = 0.0
 
     def _fasten(self, world: World) -> None:
@@ -173,6 +179,7 @@ class Flexibles:
         del time
         start = self.position
         flight = start + h * self.velocity + h * h * self._gravity
+        rigid = rigid._replace(end_position=rigid.end_position - 0.5 * h * h * rigid.inv_mass[:, None] * self._load)
         target = start.copy()
         self._place_held(rigid, target)
         touches = self._surfaces.find(start, np.where(self._free[:, None], flight, target), rigid, self._sides, self._surfaces.gap)
@@ -314,17 +321,20 @@ class Flexibles:
         self.position, self.velocity = end, velocity
         self._sides = sides_of(touches, end, rigid.end_rotation, self._surfaces.skip.size)
         given = self._given(contacts, impulse, rigid, hold * h, end)
-        ramp = np.stack([4.0 * given / h, -6.0 * given / h**2])
+        load = np.concatenate([self._load, np.zeros_like(self._load)], axis=1)
+        ramp = np.stack([4.0 * given / h - 3.0 * load, 6.0 * load / h - 6.0 * given / h**2])
+        self._bear(given[:, :3] / h, rigid, h)
         return FlexibleStep(given, ramp, taken, made, len(contacts.key), solution.converged, unresolved)
 
     def _keep_momenta(self, start, end, velocity, before, impulse, contacts: NetContacts, rigid, h, midpoint) -> None:
-        """Set momentum and angular momentum of free pieces to what acted on them."""
+        """Set momentum, angular momentum and the way of the centre of free pieces to what acted on them."""
         if not self._pieces:
             return
         mass = self.net.mass
         place = np.einsum("mk,mkj->mj", contacts.weight, start[contacts.node])
         on = contacts.unknown >= 0
-        lever = lever_place(rigid.position, rigid.velocity, rigid.end_position, h)
+        shift = 0.5 * h * h * rigid.inv_mass[:, None] * self._load
+        lever = lever_place(rigid.position, rigid.velocity, rigid.end_position + shift, h) - shift
         place[on] = lever[contacts.body[on]] + contacts.arm[on]
         for piece in self._pieces:
             m, x0 = mass[piece], start[piece]
@@ -332,13 +342,23 @@ class Flexibles:
             mine = np.isin(contacts.node[:, 0], piece)
             fall = h * (m[:, None] * self._gravity[piece]).sum(0)
             momentum = m @ before[piece] + fall + impulse[mine].sum(0)
-            angular = (m[:, None] * np.cross(x0 - origin, before[piece])).sum(0)
+            angular = (m[:, None] * np.cross(self.position[piece] - origin, before[piece])).sum(0)
             angular += np.cross(place[mine] - origin, impulse[mine]).sum(0)
             if midpoint:  # its centre follows the parabola: gravity acts at the mean of its places, not at the first
                 angular += 0.5 * h * np.cross(m @ before[piece], fall) / m.sum()
+            went = 0.5 * h * (momentum + m @ before[piece]) if midpoint else h * momentum
+            end[piece] += origin + went / m.sum() - m @ end[piece] / m.sum()
             v = velocity[piece]
             set_momenta(m, end[piece] - origin, v, momentum, angular)
             velocity[piece] = v
+
+    def _bear(self, force: np.ndarray, rigid: RigidMotion, h: float) -> None:
+        """Keep what the nets bear of each body, (n, 3) N: their force, as far as it is no more than what the body flies with."""
+        end = rigid.end_position + 0.5 * h * h * rigid.inv_mass[:, None] * self._load
+        weight = 2.0 / h**2 * (end - rigid.position - h * rigid.velocity)
+        size = np.linalg.norm(weight, axis=1) / np.where(rigid.movable, rigid.inv_mass, np.inf)
+        strength = np.linalg.norm(force, axis=1)
+        self._load = force * np.divide(np.minimum(size, strength), strength, out=np.zeros_like(size), where=strength > 0.0)[:, None]
 
     def _given(self, contacts: NetContacts, impulse, rigid: RigidMotion, hold, end) -> np.ndarray:
         """Impulses (n, 6) that the nets gave the bodies."""
@@ -364,21 +384,3 @@ def _with_fastened(contacts: NetContacts, vertices, bodies, places, rigid: Rigid
         np.ones(k), flat.copy(), np.zeros(k), np.ones(k, bool), -1 - vertices,
     )  # fmt: skip
     return NetContacts(*(np.concatenate(column) for column in zip(contacts, added, strict=True)))
-
-
-def join(nets: list[Net]) -> Net:
-    """Return several nets as one; of none an empty one."""
-    first = np.concatenate([[0], np.cumsum([len(net.mass) for net in nets])]).astype(np.int64)
-
-    def all_of(name: str, *shape: int) -> np.ndarray:
-        return np.concatenate([np.zeros((0, *shape)), *(getattr(net, name) for net in nets)])
-
-    def indices(name: str, width: int) -> np.ndarray:
-        parts = [getattr(net, name) + start for net, start in zip(nets, first, strict=False)]
-        return np.concatenate([np.zeros((0, width), np.int64), *parts])
-
-    return Net(
-        all_of("position", 3), all_of("mass"), indices("spring", 2), all_of("spring_rest"), all_of("spring_stiffness"),
-        all_of("spring_damping"), indices("hinge", 4), all_of("hinge_rest"), all_of("hinge_stiffness"), all_of("hinge_damping"),
-        indices("face", 3),
-    )  # fmt: skip

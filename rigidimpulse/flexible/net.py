@@ -37,12 +37,16 @@ LEAST_STRUT_WEIGHT = 0.05
 """Corners of a face that a ray meets by less than this weight get no strut of their own."""
 
 
-def _none(*shape: int):
-    return field(default_factory=lambda: np.zeros(shape))
+def _nothing() -> np.ndarray:
+    return np.zeros(0)
 
 
-def _no_index(width: int):
-    return field(default_factory=lambda: np.zeros((0, width), np.int64))
+def _no_hinges() -> np.ndarray:
+    return np.zeros((0, 4), np.int64)
+
+
+def _no_faces() -> np.ndarray:
+    return np.zeros((0, 3), np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +54,11 @@ class Net:
     """n point masses with s springs and g hinges.
 
     Attributes:
-        position: (n, 3) m at the start. velocity: (n, 3) m/s at the start. mass: (n,) kg, > 0.
+        position: (n, 3) m at the start. mass: (n,) kg, > 0.
         spring: (s, 2) vertices. spring_rest: (s,) m. spring_stiffness: (s,) N/m. spring_damping: (s,) N s/m.
         hinge: (g, 4) vertices a, b of the edge, c, d opposite. hinge_rest: (g,) rad. hinge_stiffness: (g,) N m.
             hinge_damping: (g,) N m s.
         face: (f, 3) triangles, for contact and for the eye; may be empty.
-        fixed: (n,) bool, vertices that do not move by themselves (pinned to the world).
 
     """
 
@@ -65,11 +68,11 @@ class Net:
     spring_rest: np.ndarray
     spring_stiffness: np.ndarray
     spring_damping: np.ndarray
-    hinge: np.ndarray = _no_index(4)
-    hinge_rest: np.ndarray = _none(0)
-    hinge_stiffness: np.ndarray = _none(0)
-    hinge_damping: np.ndarray = _none(0)
-    face: np.ndarray = _no_index(3)
+    hinge: np.ndarray = field(default_factory=_no_hinges)
+    hinge_rest: np.ndarray = field(default_factory=_nothing)
+    hinge_stiffness: np.ndarray = field(default_factory=_nothing)
+    hinge_damping: np.ndarray = field(default_factory=_nothing)
+    face: np.ndarray = field(default_factory=_no_faces)
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -211,3 +214,21 @@ def _first_hit(x, face, i: int, direction) -> tuple[int, np.ndarray] | None:
         return None
     hit = int(np.flatnonzero(met)[np.argmin(t[met])])
     return hit, np.clip(np.array([1.0 - u[hit] - v[hit], u[hit], v[hit]]), 0.0, 1.0)
+
+
+def join(nets: list[Net]) -> Net:
+    """Return several nets as one; of none an empty one."""
+    first = np.concatenate([[0], np.cumsum([len(net.mass) for net in nets])]).astype(np.int64)
+
+    def all_of(name: str, *shape: int) -> np.ndarray:
+        return np.concatenate([np.zeros((0, *shape)), *(getattr(net, name) for net in nets)])
+
+    def indices(name: str, width: int) -> np.ndarray:
+        parts = [getattr(net, name) + start for net, start in zip(nets, first, strict=False)]
+        return np.concatenate([np.zeros((0, width), np.int64), *parts])
+
+    return Net(
+        all_of("position", 3), all_of("mass"), indices("spring", 2), all_of("spring_rest"), all_of("spring_stiffness"),
+        all_of("spring_damping"), indices("hinge", 4), all_of("hinge_rest"), all_of("hinge_stiffness"), all_of("hinge_damping"),
+        indices("face", 3),
+    )  # fmt: skip

@@ -12,7 +12,7 @@ from math import inf
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.features import along, dot, row, subtract
+from rigidimpulse.detect.features import dot, row, subtract
 from rigidimpulse.flexible.distance import STACK, first_touch, first_touch_of_triangle, signed_distance
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, Geometry
 

@@ -88,13 +88,13 @@ class Run:
         )  # fmt: skip
 
     def step(self, h: float) -> FlexibleStep:
-        """One step; paths of the impulses are J h / m long, as the ramp makes them."""
+        """One step: bodies fly under gravity and the ramp F0 + F1 s; their spin takes the impulse of the torque and its way."""
         world, motion = self.world, self.motion(h)
-        end = motion.end_position
         done = self.nets.step(self.time, h, motion)
         gained = world.inv_mass[:, None] * done.impulse[:, :3]
         spun = np.einsum("nij,nj->ni", motion.inv_inertia, done.impulse[:, 3:])
-        self.x, self.R = end + h * gained, turned(motion.end_rotation, h * spun)
+        way = 0.5 * h * h * done.ramp[0, :, :3] + h**3 / 6.0 * done.ramp[1, :, :3]
+        self.x, self.R = motion.end_position + world.inv_mass[:, None] * way, turned(motion.end_rotation, h * spun)
         self.v, self.w = self.v + h * world.gravity + gained, self.w + spun
         self.time += h
         return done
