@@ -145,7 +145,7 @@ def minimise(p: Problem, contacts: NetContacts, z: np.ndarray, tolerance: float)
         step, count = _newton_step(p, contacts, z, residual, accuracy, exact)
         linear += count
         moved, new = _search(p, contacts, z, step, value, float(np.sum(residual * step)))
-        blind, stepped = moved is None, True
+        blind, stepped = moved is None or value - new <= 1e-13 * abs(value), True
         z = z + step if moved is None else moved
         value = value_of(p, contacts, z) if moved is None else new
 
