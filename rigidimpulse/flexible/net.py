@@ -8,9 +8,7 @@ a sheet is a property of its material, not of its mesh: with A the area of the f
     k = E_s A / L^2     (van Gelder 1998; E_s N/m, force per width and strain: Young's modulus times thickness)
     kappa = 3 B L^2 / A     (Grinspun et al. 2003; B N m, flexural rigidity)
 
-Struts hold a closed mesh open: from every vertex a ray runs inwards to the face it meets, and three struts join the vertex with the
-corners of that face, as a column of the area S of the vertex would: k = E_v S w / 2 L, E_v in Pa (Young's modulus), w the place
-of the hit in the face; half, since every column is met from both its ends.
+Struts hold a closed mesh open, see `struts`.
 """
 
 from __future__ import annotations
@@ -31,10 +29,8 @@ from rigidimpulse.flexible.elements import (
     spring_lengths,
 )
 from rigidimpulse.flexible.pattern import Pattern, build_pattern
+from rigidimpulse.flexible.struts import inner_struts
 from rigidimpulse.geometry import unique_edges
-
-LEAST_STRUT_WEIGHT = 0.05
-"""Corners of a face that a ray meets by less than this weight get no strut of their own."""
 
 
 def _nothing() -> np.ndarray:
@@ -166,7 +162,7 @@ def sheet(
     hinge = np.column_stack([spring[two], opposite[left], opposite[right]])
     hinge_stiffness = 3.0 * bending * length[two] ** 2 / edge_area[two]
     if inner > 0.0:
-        strut, strut_stiffness = _struts(x, face, area_vector, vertex_area, inner)
+        strut, strut_stiffness = inner_struts(x, face, inner)
         spring, spring_stiffness = np.concatenate([spring, strut]), np.concatenate([spring_stiffness, strut_stiffness])
     spring, hinge = np.ascontiguousarray(spring), np.ascontiguousarray(hinge)
     rest, angle = np.empty(len(spring)), np.empty(len(hinge))
@@ -176,44 +172,6 @@ def sheet(
         x, mass * vertex_area / vertex_area.sum(), spring, rest, spring_stiffness, damping * spring_stiffness, hinge, angle,
         hinge_stiffness, damping * hinge_stiffness, np.ascontiguousarray(face),
     )  # fmt: skip
-
-
-def _struts(x, face, area_vector, vertex_area, inner) -> tuple[np.ndarray, np.ndarray]:
-    """Struts (k, 2) through the inside of a closed mesh, and their stiffness (k,) N/m."""
-    normal = np.zeros_like(x)
-    for k in range(3):
-        np.add.at(normal, face[:, k], area_vector)
-    struts: dict[tuple[int, int], float] = {}
-    for i in range(len(x)):
-        hit = _first_hit(x, face, i, -normal[i])
-        if hit is None:
-            continue
-        for j, weight in zip(face[hit[0]], hit[1], strict=True):
-            if weight >= LEAST_STRUT_WEIGHT and j != i:
-                key = (min(i, int(j)), max(i, int(j)))
-                length = float(np.linalg.norm(x[j] - x[i]))
-                struts[key] = struts.get(key, 0.0) + 0.5 * inner * vertex_area[i] * weight / length
-    return np.array(sorted(struts), np.int64).reshape(-1, 2), np.array([struts[key] for key in sorted(struts)])
-
-
-def _first_hit(x, face, i: int, direction) -> tuple[int, np.ndarray] | None:
-    """First face that the ray from vertex i meets, and its barycentric coordinates there (3,)."""
-    a = x[face[:, 0]]
-    e1, e2 = x[face[:, 1]] - a, x[face[:, 2]] - a
-    p = np.cross(direction, e2)
-    determinant = np.einsum("ij,ij->i", e1, p)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = x[i] - a
-        u = np.einsum("ij,ij->i", s, p) / determinant
-        q = np.cross(s, e1)
-        v = q @ direction / determinant
-        t = np.einsum("ij,ij->i", e2, q) / determinant
-        slack = 1e-9  # rays along edges of a regular mesh shall not slip between its faces
-        met = (u >= -slack) & (v >= -slack) & (u + v <= 1.0 + slack) & (t > 0.0) & ~np.any(face == i, axis=1)
-    if not met.any():
-        return None
-    hit = int(np.flatnonzero(met)[np.argmin(t[met])])
-    return hit, np.clip(np.array([1.0 - u[hit] - v[hit], u[hit], v[hit]]), 0.0, 1.0)
 
 
 def join(nets: list[Net]) -> Net:

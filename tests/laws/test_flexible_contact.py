@@ -182,18 +182,19 @@ def test_cloth_fastened_to_a_body(motion: str) -> None:
 
 
 def test_jelly_keeps_its_volume() -> None:
-    """A closed cube under its weight: rho g L / E_v = 4 % at its foot. Struts are no solid, and it swings: it may
-    change by three times that. Empty it collapses."""
+    """A closed cube under its weight: rho g L / E_v = 4 % of strain at its foot, half of that on average; it may lose as much as its
+    foot while it swings. Struts along normals only buckle and twist flat within 3 s; without any it collapses at once."""
     x, faces = cube_mesh(7, 0.4)
     body = FlexibleBody("cube", x, faces, stiffness=200.0, inner_stiffness=1e5, mass=64.0, position=(0, 0, 0.205), damping=0.01)
     scene = ri.Scene(bodies=[floor()])
     scene.add(body)
     run = Run(scene, tolerance=1e-6)
     shares = []
-    for _ in range(120):
+    for _ in range(200):
         run.step(1.0 / 60.0)
         shares.append(volume(run.nets.position, faces) / volume(x, faces))
-    assert np.abs(np.array(shares) - 1.0).max() < 3.0 * 0.039
+    assert np.abs(np.array(shares) - 1.0).max() < 0.039
+    assert shares[-1] == pytest.approx(1.0 - 0.5 * 0.039, abs=0.005)
     assert np.abs(run.nets.velocity).max() < 0.05
     empty = FlexibleBody("cube", x, faces, stiffness=200.0, mass=64.0, position=(0, 0, 0.205), damping=0.01)
     scene = ri.Scene(bodies=[floor()])
