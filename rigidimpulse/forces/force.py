@@ -74,6 +74,10 @@ class ForceTable(ABC):
         """Next instant after `time` at which a force or its rate jumps, s."""
         return np.inf
 
+    def longest_steps(self) -> np.ndarray:
+        """Longest step (k,) s over which each row still looks smooth: a force that repeats within a step is not seen."""
+        return np.full(len(self.body), np.inf)
+
     def potential(self, times: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Potential energy of each force at f instants, (f, forces) J, 0 for those that have none.
 

@@ -58,7 +58,10 @@ class VaryingForces:
             self._restless[table.body] |= not table.is_steady
         self._course = course
         self._room = Room(course, world.inv_mass)
-        self._plan = np.full(n, world.accuracy.step)
+        self._longest = np.full(n, world.accuracy.step)
+        for table in self._tables:
+            np.minimum.at(self._longest, table.body, table.longest_steps())
+        self._plan = self._longest.copy()
         self._in_flight, self._in_contact = IN_FLIGHT * world.accuracy.tolerance**0.5, IN_CONTACT * world.accuracy.tolerance**0.5
         self._size = np.minimum(world.bound_radius, world.size)
         burners = [table for table in self._tables if isinstance(table, BurningForces)]
@@ -104,7 +107,7 @@ class VaryingForces:
             done = (error <= 1.0) | (h[todo] <= shortest)
             ready = todo[done]
             follows = np.where(h[ready] < self._plan[ready], np.maximum(self._plan[ready], h[ready] * grow[done]), h[ready] * grow[done])
-            self._plan[ready] = np.clip(follows, shortest, self._world.accuracy.step)
+            self._plan[ready] = np.clip(follows, shortest, self._longest[ready])
             self._keep(ready, time, rows, sums, h)
             self._report(context, time, ready[error[done] > 1.0])
             todo, again = todo[~done], grow[~done]
@@ -141,7 +144,8 @@ class VaryingForces:
             if error <= 1.0 or h <= SHORTEST * step:
                 break
             h = max(h * grow, SHORTEST * step)
-        self._plan[members] = min(max(plan, h * grow) if h < plan and error <= 1.0 else h * grow, step)
+        follows = max(plan, h * grow) if h < plan and error <= 1.0 else h * grow
+        self._plan[members] = np.minimum(follows, self._longest[members])
         rows, sums = (Lines(f, np.zeros_like(f), np.zeros_like(f)) for f in (value, total))
         self._keep(members, time, rows, sums, np.full(len(self.acts), h))
         group.loaded = True
