@@ -109,7 +109,7 @@ class VaryingForces:
             follows = np.where(h[ready] < self._plan[ready], np.maximum(self._plan[ready], h[ready] * grow[done]), h[ready] * grow[done])
             self._plan[ready] = np.clip(follows, shortest, self._longest[ready])
             self._keep(ready, time, rows, sums, h)
-            self._report(context, time, ready[error[done] > 1.0])
+            self._report(context, time, ready[error[done] > 1.0], self._in_flight)
             todo, again = todo[~done], grow[~done]
             h[todo] = self._plan[todo] = _pieces(rest, np.maximum(h[todo] * again, shortest))
         return h[members]
@@ -144,6 +144,13 @@ class VaryingForces:
             if error <= 1.0 or h <= SHORTEST * step:
                 break
             h = max(h * grow, SHORTEST * step)
+        if np.any(still := ~np.any(now.velocity[members], axis=1) & ~np.any(now.angular_velocity[members], axis=1)):
+            # What stands and rests bears the forces of where it is, not of where it would fall to without contacts.
+            self._room.fly(members, half, now, world.steady_acceleration, last)
+            self._room.stay(members[still], now, state.rotation)
+            value, total = self._evaluate(time + half, members, self._room.bodies, self._room.rotation)
+        if error > 1.0:
+            self._report(context, time, members, self._in_contact)
         follows = max(plan, h * grow) if h < plan and error <= 1.0 else h * grow
         self._plan[members] = np.minimum(follows, self._longest[members])
         rows, sums = (Lines(f, np.zeros_like(f), np.zeros_like(f)) for f in (value, total))
@@ -201,11 +208,11 @@ class VaryingForces:
     def _next_break(self, time: float) -> float:
         return min(table.next_break(time * (1.0 + 1e-12) + 1e-300) for table in self._tables)
 
-    def _report(self, context, time: float, bodies: np.ndarray) -> None:
+    def _report(self, context, time: float, bodies: np.ndarray, allowed: float) -> None:
         for i in bodies.tolist():
             context.log.report(
                 time, "forces change too fast", (self._world.names[i],),
-                f"the path may be off by more than {self._in_flight:.1g} of the size in a step; use a smaller step or soften the force",
+                f"the path may be off by more than {allowed:.1g} of the size in a step; use a smaller step or soften the force",
             )
 
 
