@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.detect.touching import refresh_pose
-from rigidimpulse.forces.force import ForceTable, Instant
+from rigidimpulse.forces.force import ForceTable, Instant, check_names
 from rigidimpulse.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.forces.mass_flow import BurningForces, MassFlow
 from rigidimpulse.integrate.force_step import Lines, Room, nystroem
@@ -43,10 +43,14 @@ class VaryingForces:
     """
 
     def __init__(self, world, course, times: np.ndarray, clocks) -> None:
-        """clocks: lines of the plan by kind, which get the time that forces take; times (f,) s of the frames."""
+        """clocks: lines of the plan by kind, which get the time that forces take; times (f,) s of the frames.
+
+        Raises SceneError for forces of one name.
+        """
         n = world.num_bodies
         self._world = world
         self._tables: list[ForceTable] = world.force_tables
+        check_names(self._tables)
         self._clocks = [clocks[table.kind] for table in self._tables]
         self._first = np.cumsum([0, *(len(table.body) for table in self._tables)])
         self._body = np.concatenate([table.body for table in self._tables])
