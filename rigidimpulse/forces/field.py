@@ -131,7 +131,10 @@ class PointAttractor(Force):
             s = checked_number(force.strength, "strength", "m^(p+1)/s2", where)
             p = checked_number(force.power, "power", "", where)
             e = checked_number(force.softening, "softening", "m", where, least=0.0)
-            rows += [(k, i, middle, *point, s, p, e) for i in dynamic_bodies(world, force.bodies, where).tolist() if i != middle]
+            pulled = [i for i in dynamic_bodies(world, force.bodies, where).tolist() if i != middle]
+            if not pulled:
+                raise SceneError("it attracts no body but its centre", "name other bodies, or leave it out", where)
+            rows += [(k, i, middle, *point, s, p, e) for i in pulled]
         names = named(cls.kind, [f.name for f in forces], ["attractor"] * len(forces))
         return AttractorForces(names, np.array(rows).reshape(-1, 9), world.mass)
 

@@ -18,6 +18,7 @@ from rigidimpulse.errors import SceneError, unknown_name
 from rigidimpulse.integrate.course import Course, pose_at, state_at
 from rigidimpulse.plan import Skip
 from rigidimpulse.rotation import rotate, rotate_inverse
+from rigidimpulse.shape import normalized_quaternion
 
 if TYPE_CHECKING:
     from rigidimpulse.respond.impulse import BodyState
@@ -74,6 +75,10 @@ class ForceTable(ABC):
         """Next instant after `time` at which a force or its rate jumps, s."""
         return np.inf
 
+    def longest_steps(self) -> np.ndarray:
+        """Longest step (k,) s over which each row still looks smooth: a force that repeats within a step is not seen."""
+        return np.full(len(self.body), np.inf)
+
     def potential(self, times: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Potential energy of each force at f instants, (f, forces) J, 0 for those that have none.
 
@@ -110,12 +115,14 @@ def dynamic_body(world: World, name: str, where: str) -> int:
 
 
 def dynamic_bodies(world: World, names: Sequence[str] | None, where: str) -> np.ndarray:
-    """Indices of dynamic bodies, of all for None. Raises SceneError as `dynamic_body` does."""
-    if names is None:
-        return np.flatnonzero(world.dynamic)
+    """Indices of dynamic bodies, of all for None. Raises SceneError as `dynamic_body` does, and where there are none."""
     if isinstance(names, str):
         raise SceneError(f"bodies is the text {names!r}", f"give a list of names: [{names!r}]", where)
-    return np.array(sorted({dynamic_body(world, name, where) for name in names}), np.int64)
+    found = np.flatnonzero(world.dynamic) if names is None else sorted({dynamic_body(world, name, where) for name in names})
+    if not len(found):
+        what = "no body of the scene is dynamic" if names is None else "bodies is empty"
+        raise SceneError(what, "add a dynamic body, or leave the force out", where)
+    return np.array(found, np.int64)
 
 
 def end_of(world: World, name: str | None, where: str) -> int:
@@ -142,6 +149,17 @@ def checked_direction(value: ArrayLike, where: str) -> np.ndarray:
     if length == 0.0:
         raise SceneError("direction is zero", "give the direction of the force", where)
     return direction / length
+
+
+def checked_orientation(value: ArrayLike, where: str) -> np.ndarray:
+    """A unit quaternion (4,), or a SceneError for what is none."""
+    try:
+        q = np.array(value, float)
+    except (TypeError, ValueError):
+        q = np.zeros(0)
+    if q.shape != (4,) or not np.all(np.isfinite(q)) or not q.any():
+        raise SceneError(f"orientation is {value!r}", "give a quaternion (w, x, y, z)", where)
+    return normalized_quaternion(q)
 
 
 def checked_number(value: float, name: str, unit: str, where: str, *, least: float = -np.inf) -> float:
@@ -179,6 +197,25 @@ def named(kind: str, given: Sequence[str | None], told: Sequence[str]) -> list[s
             count += 1
         names.append(candidate)
     return names
+
+
+CAUSES = frozenset(("capture", "contact", "guard", "heap", "impact", "joints", "lift", "mass that left", "overlap"))
+"""What the ledger calls other things than forces."""
+
+
+def check_names(tables: Sequence[ForceTable]) -> None:
+    """Refuse names that the ledger could not keep apart.
+
+    Raises:
+        SceneError: forces of two kinds have the same name, or one has that of another cause.
+
+    """
+    seen = dict.fromkeys(CAUSES, "the ledger")
+    for table in tables:
+        for name in table.names:
+            if name in seen:
+                raise SceneError(f"{table.kind}: {name!r} is a name of {seen[name]}, too", "give the force a name of its own")
+        seen.update(dict.fromkeys(table.names, table.kind))
 
 
 def no_links() -> np.ndarray:

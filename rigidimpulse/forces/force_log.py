@@ -121,10 +121,11 @@ class ForceLog:
             self._value[rows], self._rate[rows] = value[rows], change[rows] / length[i]
 
     def end(self, i: int, time: float) -> None:
-        """The lines that act on body i end at `time`."""
-        rows, start = self._rows[i], self._begun[i]
-        if time <= start:
+        """The lines that act on body i end at `time`, if there are any."""
+        start = self._begun[i]
+        if i not in self._rows or time <= start:
             return
+        rows = self._rows[i]
         first, last = int(self._written[i]), int(np.searchsorted(self._times, time, side="left"))
         for f in range(first, last):
             self.at_frames[f, rows] = self._total[rows]

@@ -16,6 +16,10 @@ from rigidimpulse.forces.force import Force, body_point, checked_direction, chec
 from rigidimpulse.forces.timed import TimedForces
 from rigidimpulse.world import World
 
+PART_OF_PERIOD = 0.25
+"""Longest step in periods: at its ends and middle, where forces are taken, a force of a period or a half is zero or as at the start."""
+TINY = 1e-300
+
 
 @dataclass(frozen=True, eq=False)
 class HarmonicForce(Force):
@@ -62,4 +66,5 @@ class HarmonicForce(Force):
             return np.sin(w[rows] * time + phi[rows])[:, None] * a[rows]
 
         names = named(cls.kind, [f.name for f in forces], [f"harmonic force on {f.body}" for f in forces])
-        return TimedForces(cls.kind, names, body, points, strength, f"{len(forces)} acting")
+        reason = f"{len(forces)} acting"
+        return TimedForces(cls.kind, names, body, points, strength, reason, longest=PART_OF_PERIOD * 2.0 * np.pi / np.maximum(np.abs(w), TINY))

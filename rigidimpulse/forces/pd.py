@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.errors import SceneError
-from rigidimpulse.forces.force import Force, ForceTable, Instant, checked_number, checked_vector, dynamic_body, named, no_links
+from rigidimpulse.forces.force import Force, ForceTable, Instant, checked_number, checked_orientation, checked_vector, dynamic_body, named, no_links
 from rigidimpulse.keyframes import Keyframes
 from rigidimpulse.rotation import conjugate, multiply, quaternion_from_rotation_vector, rotate, rotation_vector
-from rigidimpulse.shape import normalized_quaternion
 from rigidimpulse.world import World
 
 
@@ -99,6 +98,7 @@ def _hand(force: PDController, world: World, where: str) -> Hand:
     turns = force.orientation is not None or (isinstance(force.position, Keyframes) and force.position.orientations is not None)
     if gains[2] > 0.0 and not turns:
         raise SceneError(f"angular_stiffness is {force.angular_stiffness!r}, but there is no orientation", "give the orientation", where)
+    _check_targets(force, gains, turns, where)
     start = body.unit_orientation()
     if isinstance(force.position, Keyframes):
         if force.orientation is not None:
@@ -107,14 +107,30 @@ def _hand(force: PDController, world: World, where: str) -> Hand:
         times, positions, orientations = force.position.arrays(start)
     else:
         place = body.position if force.position is None else checked_vector(force.position, "position", "m", where)
-        turn = start if force.orientation is None else normalized_quaternion(force.orientation)
+        turn = start if force.orientation is None else checked_orientation(force.orientation, where)
         times, positions, orientations = np.zeros(1), np.array([place], float), np.array([turn])
     velocity = None if force.velocity is None else checked_vector(force.velocity, "velocity", "m/s", where)
     spin = None if force.angular_velocity is None else checked_vector(force.angular_velocity, "angular_velocity", "rad/s", where)
-    most = np.array([force.max_force, force.max_torque], float)
-    if not np.all(most > 0.0):
-        raise SceneError(f"max_force, max_torque are {most.tolist()}", "give values > 0, or leave them out", where)
-    return Hand(i, times, positions, orientations, velocity, spin, gains, most)
+    most = [
+        value if (value := getattr(force, name)) == math.inf else checked_number(value, name, unit, where)
+        for name, unit in (("max_force", "N"), ("max_torque", "N m"))
+    ]
+    if min(most) <= 0.0:
+        raise SceneError(f"max_force, max_torque are {most}", "give values > 0, or leave them out", where)
+    return Hand(i, times, positions, orientations, velocity, spin, gains, np.array(most, float))
+
+
+def _check_targets(force: PDController, gains: np.ndarray, turns: bool, where: str) -> None:
+    """Refuse targets that no gain pulls to."""
+    place = force.position is not None and not (isinstance(force.position, Keyframes) and turns and gains[2:].any())
+    needs = (
+        ("position", place, gains[:2], "a stiffness"), ("velocity", force.velocity is not None, gains[1:2], "a damping"),
+        ("orientation", force.orientation is not None, gains[2:], "an angular_stiffness"),
+        ("angular_velocity", force.angular_velocity is not None, gains[3:], "an angular_damping"),
+    )  # fmt: skip
+    for name, given, gain, remedy in needs:
+        if given and not gain.any():
+            raise SceneError(f"{name} is given, but nothing pulls to it", f"give {remedy}, or leave the {name} out", where)
 
 
 class PDForces(ForceTable):

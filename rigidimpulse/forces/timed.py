@@ -19,15 +19,16 @@ class TimedForces(ForceTable):
 
     def __init__(
         self, kind: str, names: list[str], body: list[int], points: list[np.ndarray], strength: Callable, reason: str,
-        breaks: np.ndarray | None = None,
+        breaks: np.ndarray | None = None, longest: np.ndarray | None = None,
     ) -> None:
-        """body (k,), points (k, 3) m in principal frames; strength(time (r,), rows (r,)) -> (r, 3) N; breaks: s, sorted."""
+        """body (k,), points (k, 3) m in principal frames; strength(time (r,), rows (r,)) -> (r, 3) N; breaks: s, sorted; longest (k,) s."""
         self.kind, self.names, self.reason = kind, names, reason
         self.body, self.cause = np.array(body, np.int64), np.arange(len(body))
         self.links, self.is_steady = no_links(), False
         self._points, self._strength = np.array(points).reshape(-1, 3), strength
         self._turns = bool(np.any(self._points))
         self._breaks = np.zeros(0) if breaks is None else breaks
+        self._longest = np.full(len(body), np.inf) if longest is None else longest
 
     def wrench(self, at: Instant, rows: np.ndarray) -> np.ndarray:
         """Force and torque of rows."""
@@ -38,6 +39,10 @@ class TimedForces(ForceTable):
             arm = np.einsum("ijk,ik->ij", at.rotation[i], self._points[rows])
             wrench[:, 3:] = np.cross(arm, wrench[:, :3])
         return wrench
+
+    def longest_steps(self) -> np.ndarray:
+        """A part of the period where there is one."""
+        return self._longest
 
     def next_break(self, time: float) -> float:
         """Next kink."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.detect.touching import refresh_pose
-from rigidimpulse.forces.force import ForceTable, Instant
+from rigidimpulse.forces.force import ForceTable, Instant, check_names
 from rigidimpulse.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.forces.mass_flow import BurningForces, MassFlow
 from rigidimpulse.integrate.force_step import Lines, Room, nystroem
@@ -43,10 +43,14 @@ class VaryingForces:
     """
 
     def __init__(self, world, course, times: np.ndarray, clocks) -> None:
-        """clocks: lines of the plan by kind, which get the time that forces take; times (f,) s of the frames."""
+        """clocks: lines of the plan by kind, which get the time that forces take; times (f,) s of the frames.
+
+        Raises SceneError for forces of one name.
+        """
         n = world.num_bodies
         self._world = world
         self._tables: list[ForceTable] = world.force_tables
+        check_names(self._tables)
         self._clocks = [clocks[table.kind] for table in self._tables]
         self._first = np.cumsum([0, *(len(table.body) for table in self._tables)])
         self._body = np.concatenate([table.body for table in self._tables])
@@ -58,7 +62,10 @@ class VaryingForces:
             self._restless[table.body] |= not table.is_steady
         self._course = course
         self._room = Room(course, world.inv_mass)
-        self._plan = np.full(n, world.accuracy.step)
+        self._longest = np.full(n, world.accuracy.step)
+        for table in self._tables:
+            np.minimum.at(self._longest, table.body, table.longest_steps())
+        self._plan = self._longest.copy()
         self._in_flight, self._in_contact = IN_FLIGHT * world.accuracy.tolerance**0.5, IN_CONTACT * world.accuracy.tolerance**0.5
         self._size = np.minimum(world.bound_radius, world.size)
         burners = [table for table in self._tables if isinstance(table, BurningForces)]
@@ -104,9 +111,9 @@ class VaryingForces:
             done = (error <= 1.0) | (h[todo] <= shortest)
             ready = todo[done]
             follows = np.where(h[ready] < self._plan[ready], np.maximum(self._plan[ready], h[ready] * grow[done]), h[ready] * grow[done])
-            self._plan[ready] = np.clip(follows, shortest, self._world.accuracy.step)
+            self._plan[ready] = np.clip(follows, shortest, self._longest[ready])
             self._keep(ready, time, rows, sums, h)
-            self._report(context, time, ready[error[done] > 1.0])
+            self._report(context, time, ready[error[done] > 1.0], self._in_flight)
             todo, again = todo[~done], grow[~done]
             h[todo] = self._plan[todo] = _pieces(rest, np.maximum(h[todo] * again, shortest))
         return h[members]
@@ -141,7 +148,15 @@ class VaryingForces:
             if error <= 1.0 or h <= SHORTEST * step:
                 break
             h = max(h * grow, SHORTEST * step)
-        self._plan[members] = min(max(plan, h * grow) if h < plan and error <= 1.0 else h * grow, step)
+        if np.any(still := ~np.any(now.velocity[members], axis=1) & ~np.any(now.angular_velocity[members], axis=1)):
+            # What stands and rests bears the forces of where it is, not of where it would fall to without contacts.
+            self._room.fly(members, half, now, world.steady_acceleration, last)
+            self._room.stay(members[still], now, state.rotation)
+            value, total = self._evaluate(time + half, members, self._room.bodies, self._room.rotation)
+        if error > 1.0:
+            self._report(context, time, members, self._in_contact)
+        follows = max(plan, h * grow) if h < plan and error <= 1.0 else h * grow
+        self._plan[members] = np.minimum(follows, self._longest[members])
         rows, sums = (Lines(f, np.zeros_like(f), np.zeros_like(f)) for f in (value, total))
         self._keep(members, time, rows, sums, np.full(len(self.acts), h))
         group.loaded = True
@@ -197,11 +212,11 @@ class VaryingForces:
     def _next_break(self, time: float) -> float:
         return min(table.next_break(time * (1.0 + 1e-12) + 1e-300) for table in self._tables)
 
-    def _report(self, context, time: float, bodies: np.ndarray) -> None:
+    def _report(self, context, time: float, bodies: np.ndarray, allowed: float) -> None:
         for i in bodies.tolist():
             context.log.report(
                 time, "forces change too fast", (self._world.names[i],),
-                f"the path may be off by more than {self._in_flight:.1g} of the size in a step; use a smaller step or soften the force",
+                f"the path may be off by more than {allowed:.1g} of the size in a step; use a smaller step or soften the force",
             )
 
 

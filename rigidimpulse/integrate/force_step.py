@@ -64,6 +64,13 @@ class Room:
         """Bring the members to where they are after elapsed (n,) s (see `fly`)."""
         fly(self.course, members, elapsed, bodies, steady, wrench, self.bodies, self.rotation, *self._unused)
 
+    def stay(self, members, bodies: BodyState, rotation) -> None:
+        """Leave the members where they are."""
+        self.rotation[members] = rotation[members]
+        for mine, theirs in zip(self.bodies, bodies, strict=True):
+            if mine is not theirs:
+                mine[members] = theirs[members]
+
     def fly_speeds(self, members, elapsed, bodies: BodyState, steady, wrench) -> None:
         """The same for the velocities alone."""
         kept = [values[members] for values in (self.bodies.position, self.bodies.orientation, self.bodies.inv_inertia, self.rotation)]

@@ -13,6 +13,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from rigidimpulse.errors import SceneError
+from rigidimpulse.forces.energy.potential import GravityPotential
 from rigidimpulse.forces.energy.term import CompiledEnergy, Energy, Expansion, Poses, poses
 from rigidimpulse.forces.force import Force, ForceTable, Instant, named
 from rigidimpulse.rotation import to_matrix
@@ -45,6 +46,8 @@ class EnergyForce(Force):
         for force in forces:
             if not callable(getattr(force.term, "compile", None)):
                 raise SceneError(f"term is {force.term!r}", "give an energy term, such as ri.PinPoints(...)", "EnergyForce")
+            if isinstance(force.term, GravityPotential):
+                raise SceneError("GravityPotential acts in every run already", "leave it out", "EnergyForce")
             if getattr(force.term, "weight", 1.0) == math.inf:
                 raise SceneError(f"the weight of {force.term!r} is infinite", "give a finite weight, or use a joint", "EnergyForce")
             terms.append(force.term.compile(world))
