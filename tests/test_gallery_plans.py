@@ -1,0 +1,70 @@
+"""What each gallery scene calls for, as its author says, and what the planner takes in for it.
+
+A new scene needs a line here. Effects that go without saying are left out: steady load, impulses, impact time and exact flight where bodies
+may meet, varying load and forced flight where forces vary.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from rigidimpulse import gallery
+from rigidimpulse.forces import KINDS
+from rigidimpulse.simulation import make_plan
+from rigidimpulse.world import compile_scene
+
+CALLS_FOR = {
+    "spot": "contact detection, gravity, gyroscopic term, friction, contact forces",
+    "disks_in_a_box": "contact detection",
+    "pool_break": "contact detection",
+    "cradle_one": "contact detection",
+    "cradle_two": "contact detection",
+    "superball": "contact detection, gravity, friction, contact forces",
+    "wing_nut": "",
+    "galperin_0": "contact detection",
+    "galperin_1": "contact detection",
+    "galperin_2": "contact detection",
+    "galperin_3": "contact detection",
+    "two_spheres": "contact detection",
+    "off_centre_disk": "contact detection, gyroscopic term, contact forces",
+    "rifle": "contact detection, gyroscopic term, contact forces",
+    "toss": "contact detection, gravity, friction, contact forces",
+    "rolling": "contact detection, gravity, friction, rolling friction, contact forces",
+    "arm": "contact detection, gravity, gyroscopic term, joints, friction, contact forces",
+    "pile": "contact detection, gravity, friction, contact forces, heaps",
+    "smoothed_path": "contact detection, gravity, gyroscopic term, friction, contact forces",
+    "settled_layout": "contact detection, gravity, gyroscopic term, friction, contact forces",
+    "emergency_stop": "contact detection, gravity, gyroscopic term, friction, contact forces",
+    "rear_end_crash": "contact detection, gravity, gyroscopic term, friction, contact forces",
+    "pendulum": "contact detection, gravity, joints, friction, contact forces",
+    "kinematic_bounce": "contact detection, gravity, friction, contact forces",
+    "backing_up_bisection": "contact detection, gravity, gyroscopic term, friction, contact forces",
+    "backing_up_linear": "contact detection, gravity, gyroscopic term, friction, contact forces",
+    "pool_aim": "contact detection, gravity, friction, rolling friction, contact forces",
+    "pool_follow": "contact detection, gravity, friction, rolling friction, contact forces",
+    "pool_draw": "contact detection, gravity, friction, rolling friction, contact forces",
+    "pool_swerve": "contact detection, gravity, friction, rolling friction, contact forces",
+    "table_on_four_feet": "contact detection, gravity, gyroscopic term, friction, contact forces",
+    "pendulum_drift": "contact detection, gravity, gyroscopic term, joints, friction, contact forces",
+    "soft_hinge": "contact detection, gravity, gyroscopic term, joints, friction, contact forces",
+    "crowd_momentum": "contact detection, gravity, gyroscopic term, joints, friction, contact forces",
+    "marbles": "contact detection, gravity, friction, contact forces, heaps",
+}
+"""Names of effects, in the order of the loop."""
+MEETING = {"impulses", "impact time"}
+VARYING = {"varying load", "forced flight"}
+
+
+@pytest.mark.parametrize("name", gallery.names())
+def test_plan_takes_in_what_the_author_calls_for(name: str) -> None:
+    entry = gallery.load(name)
+    plan = make_plan(compile_scene(entry.scene(), entry.accuracy))
+    wanted = set(CALLS_FOR[name].split(", ")) - {""}
+    if "contact detection" in wanted:
+        wanted |= MEETING
+    wanted |= VARYING if wanted & (set(KINDS.values()) | {"flexible bodies"}) else {"exact flight"}
+    if wanted & (MEETING | VARYING | {"joints"}):
+        wanted.add("steady load")
+    assert {line.name for line in plan.lines if line.included} == wanted
+    text = plan.explain()
+    assert all(line.name in text and line.reason and line.reason in text for line in plan.lines)
