@@ -79,6 +79,14 @@ class ForceTable(ABC):
         """Longest step (k,) s over which each row still looks smooth: a force that repeats within a step is not seen."""
         return np.full(len(self.body), np.inf)
 
+    def give_way(self, value: np.ndarray, time: float) -> list[int]:
+        """Forces that end at `time` since they are too large, by their present rows (k, 6); they are gone from now on."""
+        return []
+
+    def share_until_break(self, value: np.ndarray, change: np.ndarray) -> float:
+        """Share of a step after which one becomes too large, 1 if none does; rows start with value (k, 6) and change by (k, 6)."""
+        return 1.0
+
     def potential(self, times: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Potential energy of each force at f instants, (f, forces) J, 0 for those that have none.
 

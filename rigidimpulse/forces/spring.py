@@ -21,6 +21,9 @@ from rigidimpulse.forces.force import Force, ForceTable, Instant, body_point, ch
 from rigidimpulse.rotation import rotate
 from rigidimpulse.world import World
 
+AT_LIMIT = 1e-6
+"""Part of its greatest force by which a spring may be short of it and break."""
+
 
 @dataclass(frozen=True, eq=False)
 class Spring(Force):
@@ -33,7 +36,7 @@ class Spring(Force):
         a, b: names of the bodies; None is the world.
         anchor_a, anchor_b: (3,) m, where it is fastened, in world coordinates at the start.
         stiffness: k, N/m. damping: c, N s/m, along the spring.
-        rest_length: l, m; None: its length at the start.
+        rest_length: l, m; None: its length at the start. break_force: N, it is gone when its force exceeds it.
         name: what the ledger calls it; None makes one of the bodies' names.
 
     """
@@ -45,6 +48,7 @@ class Spring(Force):
     stiffness: float
     damping: float = 0.0
     rest_length: float | None = None
+    break_force: float = math.inf
     name: str | None = None
     kind: ClassVar[str] = "springs"
 
@@ -68,13 +72,15 @@ class Spring(Force):
             # What stands is as good as the world.
             ends = [i if i >= 0 and (world.dynamic[i] or world.moving[i]) else -1 for i in ends]
             arms = [body_point(world, i, p) for i, p in zip(ends, points, strict=True)]
-            lines.append(Line(ends[0], ends[1], arms[0], arms[1], k, c, length))
+            if not spring.break_force > 0.0:
+                raise SceneError(f"break_force is {spring.break_force!r}", "give a force in N, > 0, or leave it out", where)
+            lines.append(Line(ends[0], ends[1], arms[0], arms[1], k, c, length, float(spring.break_force)))
         told = [f"spring {f.a or 'world'} - {f.b or 'world'}" for f in forces]
         return SpringForces(named(cls.kind, [f.name for f in forces], told), lines, world)
 
 
 class Line(NamedTuple):
-    """One spring: bodies (-1 the world), arms (3,) m along principal axes, N/m, N s/m, m."""
+    """One spring: bodies (-1 the world), arms (3,) m along principal axes, N/m, N s/m, m, N."""
 
     a: int
     b: int
@@ -83,6 +89,7 @@ class Line(NamedTuple):
     stiffness: float
     damping: float
     length: float
+    break_force: float
 
 
 @jit
@@ -129,6 +136,8 @@ class SpringForces(ForceTable):
         self._ends = np.array([[line.a, line.b] for line in lines], np.int64)
         self._arms = np.array([[line.arm_a, line.arm_b] for line in lines])
         self._table = np.array([[line.stiffness, line.damping, line.length] for line in lines])
+        self._stiffness = self._table[:, 0].copy()
+        self._limit, self._broke = np.array([line.break_force for line in lines]), np.full(len(lines), np.inf)
         dynamic = (self._ends >= 0) & world.dynamic[self._ends]
         self.cause, self._end = np.nonzero(dynamic)
         self.body = self._ends[self.cause, self._end]
@@ -147,6 +156,22 @@ class SpringForces(ForceTable):
         _pull(rows, self.cause, self._end, self._ends, self._arms, self._table, self._carried, carried, at.bodies, at.rotation, out)
         return out
 
+    def give_way(self, value: np.ndarray, time: float) -> list[int]:
+        """Springs that break."""
+        over = np.linalg.norm(value[:, :3], axis=1) >= self._limit[self.cause] * (1.0 - AT_LIMIT)
+        broken = np.unique(self.cause[over]).tolist()
+        self._limit[broken], self._table[broken, :2], self._broke[broken] = np.inf, 0.0, time
+        return broken
+
+    def share_until_break(self, value: np.ndarray, change: np.ndarray) -> float:
+        """Where |F + s dF| first is the limit: the root of a quadratic."""
+        limit = self._limit[self.cause]
+        f, df = value[:, :3], change[:, :3]
+        rows = np.flatnonzero(np.linalg.norm(f + df, axis=1) > limit)
+        a, b = (df[rows] ** 2).sum(axis=1), (f[rows] * df[rows]).sum(axis=1)
+        c = np.minimum((f[rows] ** 2).sum(axis=1) - limit[rows] ** 2, 0.0)
+        return float(np.min((np.sqrt(b * b - a * c) - b) / a, initial=1.0))
+
     def potential(self, times: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Potential energy of each spring (f, springs)."""
         ends = []
@@ -155,4 +180,5 @@ class SpringForces(ForceTable):
             place = position[:, i] + rotate(orientation[:, i], np.broadcast_to(arm, (len(times), *arm.shape)))
             ends.append(np.where((i < 0)[None, :, None], arm[None], place))
         length = np.linalg.norm(ends[1] - ends[0], axis=-1)
-        return 0.5 * self._table[:, 0] * (length - self._table[:, 2]) ** 2
+        energy = 0.5 * self._stiffness * (length - self._table[:, 2]) ** 2
+        return np.where(times[:, None] < self._broke, energy, 0.0)

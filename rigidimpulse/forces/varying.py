@@ -97,14 +97,18 @@ class VaryingForces:
         h = np.zeros(len(self.acts))
         h[members] = _pieces(rest, self._together(members, self._plan[members], np.minimum))
         shortest = SHORTEST * self._world.accuracy.step
-        todo = members
+        todo, cut = members, False
         while len(todo):
-            first = self._evaluate(time + ASIDE * h, todo, now, state.rotation)
+            first = self._start(context, time, h, todo)
 
             def evaluate(share: float, bodies, rotation, todo=todo):
                 return self._evaluate(time + h * min(share, 1.0 - ASIDE), todo, bodies, rotation)
 
             rows, sums = nystroem(evaluate, self._room, first, todo, h, now, self._world.steady_acceleration)
+            share = 1.0 if cut else self._share_until_break(rows)
+            if share < 1.0:
+                cut, h[todo] = True, np.maximum(share * h[todo], shortest)
+                continue
             error = self._errors(now, todo, sums.off, h[todo], 1.0 / 12.0) / self._in_flight
             error = self._together(todo, error, np.maximum)
             grow = np.clip(SAFETY * np.maximum(error, 1e-30) ** -0.25, LEAST_CHANGE, MOST_CHANGE)
@@ -125,7 +129,7 @@ class VaryingForces:
         time, step = group.time, world.accuracy.step
         plan = float(self._plan[members].min())
         h = min(h, self._next_break(time) - time, plan)
-        _, start = self._evaluate(np.full(len(self.acts), time + ASIDE * h), members, now, state.rotation)
+        _, start = self._start(context, time, np.full(len(self.acts), h), members)
         if not group.loaded:
             # What else acted last: contacts and joints.
             pull = (state.course.acceleration[members] - world.steady_acceleration[members]) * world.mass[members, None]
@@ -164,6 +168,23 @@ class VaryingForces:
         turned = np.einsum("ijk,ik->ij", now.inv_inertia[members], total[members, 3:])
         context.angular_acceleration[members] = group.free[1][self.acts[group.members]] + turned
         return h
+
+    def _start(self, context, time: float, h: np.ndarray, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces at the start of steps of h (n,) s, without those that give way there."""
+        state = context.state
+        forces = self._evaluate(time + ASIDE * h, members, state.now, state.rotation)
+        gone = False
+        for table, first in zip(self._tables, self._first[:-1], strict=True):
+            for k in table.give_way(forces[0][first : first + len(table.body)], time):
+                bodies = tuple(self._world.names[i] for i in table.body[table.cause == k])
+                context.log.note(time, "force ended", bodies, f"{table.names[k]} exceeded its greatest force")
+                gone = True
+        return self._evaluate(time + ASIDE * h, members, state.now, state.rotation) if gone else forces
+
+    def _share_until_break(self, rows: Lines) -> float:
+        """Share of a step after which a force gives way, 1 if none does."""
+        parts = zip(self._tables, self._first[:-1], self._first[1:], strict=True)
+        return min(table.share_until_break(rows.value[i:j], rows.change[i:j]) for table, i, j in parts)
 
     def _evaluate(self, time: np.ndarray, members: np.ndarray, bodies, rotation) -> tuple[np.ndarray, np.ndarray]:
         """Forces of all rows (k, 6), 0 for those of other bodies, and their sums (n, 6) on bodies of the mass of now; time (n,) s."""

@@ -2,8 +2,8 @@
 
     python tests/bench/unused_effects.py [pairs]
 
-For each effect of `tests/test_unused_effects.py` the plain scene is run in turn in a process that knows nothing of the effect and in one that
-has run a scene with it; the median of the ratios of their times should be 1 within the noise, which the ratio of two plain runs shows.
+For each effect of `tests/test_unused_effects.py` the plain scene is run in turn in a process that knows nothing of the effect and in one
+that has run a scene with it; the median of the ratios of their times should be 1 within the noise, which the ratio of two plain runs shows.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def seconds(*parts: str) -> tuple[float, str]:
 
 def main(pairs: int) -> None:
     """Print a line an effect."""
-    print(f"{platform.machine()}, {platform.processor() or platform.system()}, Python {platform.python_version()}; medians of {pairs} pairs")
+    print(f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}; medians of {pairs} pairs")
     rows = {"nothing": ("ground", "", [])} | EFFECTS
     for name, (kind, call, _) in rows.items():
         ratios, hashes = [], set()
