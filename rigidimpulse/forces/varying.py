@@ -70,7 +70,7 @@ class VaryingForces:
         self._size = np.minimum(world.bound_radius, world.size)
         burners = [table for table in self._tables if isinstance(table, BurningForces)]
         self.flow = MassFlow(burners, world, course) if burners else None
-        self._others = np.zeros((n, 6))
+        self._last = np.zeros((n, 6))
         self.value, self.rate = np.zeros((n, 6)), np.zeros((n, 6))
         self.log = ForceLog(times, self._body, course)
 
@@ -131,10 +131,11 @@ class VaryingForces:
         h = min(h, self._next_break(time) - time, plan)
         _, start = self._start(context, time, np.full(len(self.acts), h), members)
         if not group.loaded:
-            # What else acted last: contacts and joints.
             pull = (state.course.acceleration[members] - world.steady_acceleration[members]) * world.mass[members, None]
-            self._others[members] = np.hstack([pull, state.course.torque[members]]) - self.value[members]
-        last = start + self._others
+            self._last[members] = np.hstack([pull, state.course.torque[members]])
+        # Held bodies go on under the sum of what acted last: contacts and joints of the last sub-step beside forces of this one would not
+        # balance each other, and what damps along a held direction would make that grow.
+        last = np.where(state.under_contact[:, None], self._last, start)
         while True:
             if self.flow is not None:
                 # What holds the members feels all their masses: those of the middle.
