@@ -54,7 +54,7 @@ class ContactForces:
         if world.joints_of_scene:
             return Bound(hold, f"{len(world.joints_of_scene)} joints")
         if not world.can_collide:
-            return Skip("nothing can collide")
+            return Skip(world.why_no_impacts)
         if not world.can_press:
             return Skip("no force, no moving support and no spin presses bodies together")
         return Bound(hold, "bodies may come to rest on each other")

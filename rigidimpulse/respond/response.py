@@ -45,12 +45,12 @@ class ImpactResponse:
     @property
     def name(self) -> str:
         """Name of the slot's choice."""
-        return f"{self.method} impulses"
+        return "impulses" if self.method == "penalty" else f"{self.method} impulses"
 
     def bind(self, world) -> Bound | Skip:
         """In where something can collide."""
         if not world.can_collide:
-            return Skip("nothing can collide")
+            return Skip(world.why_no_impacts)
         kernel, law = KERNELS[self.method], LAWS[self.restitution]
 
         def respond(context, group: Group) -> None:
