@@ -38,7 +38,7 @@ class FreeRotation:
     def bind(self, world) -> Bound | Skip:
         """In where contacts or joints may act on bodies whose moments of inertia differ."""
         if not world.can_collide and not world.joints_of_scene:
-            return Skip("nothing can collide; free rotation is in closed form")
+            return Skip(f"{world.why_no_impacts}; free rotation is in closed form")
 
         def free(context, group) -> None:
             context.acceleration[group.members] = 0.0

@@ -69,6 +69,7 @@ class VaryingForces:
         self._in_flight, self._in_contact = IN_FLIGHT * world.accuracy.tolerance**0.5, IN_CONTACT * world.accuracy.tolerance**0.5
         self._size = np.minimum(world.bound_radius, world.size)
         self._switching = [table for table in self._tables if table.switches]
+        self._cut = 0.0
         burners = [table for table in self._tables if isinstance(table, BurningForces)]
         self.flow = MassFlow(burners, world, course) if burners else None
         self._others = np.zeros((n, 6))
@@ -129,6 +130,7 @@ class VaryingForces:
             h[todo] = self._plan[todo] = _pieces(rest, np.maximum(h[todo] * again, shortest))
         for table in self._switching:
             table.freeze(None)
+        self._cut = float(h[members[0]]) if switches > 1 else 0.0
         return h[members]
 
     def _fly_one_length(self, members: np.ndarray, time: float, length: float, state) -> np.ndarray:
@@ -159,7 +161,9 @@ class VaryingForces:
 
         if not differ(1.0):
             return 1.0
-        least = max(LEAST_PIECE * self._world.accuracy.step, 4.0 * np.spacing(time)) / length
+        # Forces that rise from nothing may come and go by round-off: pieces that follow each other grow, so that time goes on.
+        step = self._world.accuracy.step
+        least = max(LEAST_PIECE * step, 4.0 * np.spacing(time), min(2.0 * self._cut, SHORTEST * step)) / length
         low, high = 0.0, 1.0
         while high - low > least:
             middle = 0.5 * (low + high)

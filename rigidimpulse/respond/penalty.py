@@ -38,7 +38,7 @@ from rigidimpulse.respond.impulse import BodyState
 from rigidimpulse.respond.penalty_points import find_points, solid_geometry
 from rigidimpulse.rotation import to_matrix
 
-REST_DEPTH, IMPACT_DEPTH = 1e-4, 0.02
+REST_DEPTH, IMPACT_DEPTH = 4e-4, 0.02
 MOST_DAMPING = 3.0
 """z where restitutions below 0.024 ask for more."""
 CAPACITY = 256

@@ -24,7 +24,7 @@ from rigidimpulse.detect.features import along, closest_on_segments, dot, moved,
 from rigidimpulse.detect.inside import point_in_mesh
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, Primitive, build_geometry
 
-SIDES = 64
+SIDES = 24
 """Sides of the prism that stands for a cylinder."""
 ON_FACE = 1e-6
 """Part of the distance by which the way to a face may differ from that along its normal; the normal is exact however near the face is."""
