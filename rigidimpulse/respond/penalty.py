@@ -35,7 +35,7 @@ from rigidimpulse._jit import jit
 from rigidimpulse.detect.touching import bring_all
 from rigidimpulse.forces.force import ForceTable, Instant
 from rigidimpulse.respond.impulse import BodyState
-from rigidimpulse.respond.penalty_points import find_points, solid_geometry
+from rigidimpulse.respond.penalty_points import find_points, inward_axes, solid_geometry
 from rigidimpulse.rotation import to_matrix
 
 REST_DEPTH, IMPACT_DEPTH = 4e-4, 0.02
@@ -137,6 +137,7 @@ class PenaltyForces(ForceTable):
         self.is_steady = not world.moving.any()
         self._world, self._carried = world, np.flatnonzero(~world.dynamic)
         self._geometry = solid_geometry(world.shapes) if world.cylinders is not None else world.geometry
+        self._axes = inward_axes(self._geometry)
         a, b = np.triu_indices(world.num_bodies, 1)
         touch = (world.dynamic[a] | world.dynamic[b]) & ~np.isin(a * world.num_bodies + b, world.apart)
         self._pairs = np.stack([a[touch], b[touch]], axis=1)
@@ -165,7 +166,7 @@ class PenaltyForces(ForceTable):
         world = self._world
         while True:
             count = find_points(
-                self._geometry, world.shape_of_body, world.bound_radius, self._pairs, self._bodies.position, self._rotation,
+                self._geometry, *self._axes, world.shape_of_body, world.bound_radius, self._pairs, self._bodies.position, self._rotation,
                 self._real, self._integer,
             )
             if count <= len(self._real):
