@@ -72,7 +72,7 @@ class GalleryScene:
         description: one line.
         scene: makes the scene.
         check: compares a recording of `duration`, at any frame rate, with the laws of the scene.
-        duration: s. fps: frames per second. accuracy: preset.
+        duration: s. fps: frames per second. accuracy: preset or settings.
         cheaper: settings that are not enough for this scene: with them at least one check fails, or the run does.
             Shows both sides of an option; None where no option is the point.
         elsewhere: what common engines reach in this scene, as measured; empty if nobody measured it.
@@ -85,7 +85,7 @@ class GalleryScene:
     check: Callable[[Recording], list[Check]]
     duration: float
     fps: float = 60.0
-    accuracy: str = "standard"
+    accuracy: str | Accuracy = "standard"
     cheaper: Accuracy | None = None
     elsewhere: str = ""
 
