@@ -13,6 +13,7 @@ import rigidimpulse
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from rigidimpulse.accuracy import Accuracy
     from rigidimpulse.gallery.record import Check, GalleryScene
     from rigidimpulse.recording import Recording
     from rigidimpulse.scene import Scene
@@ -56,7 +57,7 @@ class Job(NamedTuple):
     make: Callable[[], Scene]
     duration: float
     fps: float
-    accuracy: str
+    accuracy: str | Accuracy
     entry: GalleryScene | None
 
 

@@ -76,8 +76,9 @@ class ForceTable(ABC):
         """Next instant after `time` at which a force or its rate jumps, s."""
         return np.inf
 
-    def freeze(self, at: Instant | None) -> None:
+    def freeze(self, _at: Instant | None) -> None:
         """From here on only the parts that act at an instant do, or all again (None)."""
+        return
 
     def switched(self, _at: Instant) -> bool:
         """Whether other parts act than those of `freeze`."""

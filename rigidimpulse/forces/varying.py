@@ -36,7 +36,7 @@ ASIDE = 1e-9
 """Part of a step by which forces are taken inside of its ends: where they jump the step's own side counts."""
 
 SWITCHED, LEAST_PIECE, MOST_SWITCHES = 1e-9, 1e-13, 20
-"""Part of a step by which it may end off a switch of forces, part of the run's step to which the switch is found, and how often in a step."""
+"""Part of a step by which it may end off a switch of forces; part of the run's step to which switches are found; how many in a step."""
 
 
 class VaryingForces:

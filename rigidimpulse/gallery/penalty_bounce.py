@@ -2,13 +2,14 @@
 
 All springs have the same stiffness k. A ball of mass m that comes with v goes in by x'' = -(k / m) x - (c / m) x' until the push ends: by
 v / w, w = sqrt(k / m), for pi / w without damping. With the damping ratio z it leaves the push after (pi - 2 asin z) / (w sqrt(1 - z^2))
-with e v, e = exp(-z (pi - 2 asin z) / sqrt(1 - z^2)), from where k x = -c e v. The ball beside them has the path of impulses, z = r + v |t - t0|.
+with e v, e = exp(-z (pi - 2 asin z) / sqrt(1 - z^2)), from where k x = -c e v. The ball beside them has the path of impulses,
+z = r + v |t - t0|.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from rigidimpulse.accuracy import Accuracy
 from rigidimpulse.body import Body
@@ -30,7 +31,8 @@ BOUND = 1e-6
 def scene() -> Scene:
     """Return a floor, balls that fly at it, and one on the path that impulses would give it."""
     scene = Scene(gravity=(0.0, 0.0, 0.0))
-    scene.add(Body("floor", Shape.box((3.0, 1.0, 1.0)), position=(0.75, 0.0, -0.5), motion="static", material=Material(static_friction=0.0)))
+    smooth = Material(static_friction=0.0)
+    scene.add(Body("floor", Shape.box((3.0, 1.0, 1.0)), position=(0.75, 0.0, -0.5), motion="static", material=smooth))
     for place, (name, (mass, e)) in enumerate(BALLS.items()):
         start = {"position": (0.5 * place, 0.0, RADIUS + HEIGHT), "velocity": (0.0, 0.0, -SPEED)}
         scene.add(Body(name, Shape.sphere(RADIUS), mass=mass, material=Material(restitution=e, static_friction=0.0), **start))
@@ -43,7 +45,7 @@ def scene() -> Scene:
 def _height(times: np.ndarray, mass: float, e: float) -> np.ndarray:
     """Height (f,) of a ball over the floor by the laws of the head."""
     w = np.sqrt(STIFFNESS / mass)
-    z = 0.0 if e == 1.0 else brentq(lambda z: np.log(e) + z * (np.pi - 2.0 * np.arcsin(z)) / np.sqrt(1.0 - z * z), 0.0, 0.99, xtol=1e-15)
+    z = root_scalar(lambda z: np.log(e) + z * (np.pi - 2.0 * np.arcsin(z)) / np.sqrt(1.0 - z * z), bracket=(0.0, 0.99), xtol=1e-15).root
     damped = w * np.sqrt(1.0 - z * z)
     end = (np.pi - 2.0 * np.arcsin(z)) / damped
     s = times - HIT

@@ -17,7 +17,8 @@ Inside the step it leaves the true path by
 
 of order 4 and larger than the error at the end, which is of order 5: it chooses h.
 
-In steps of one length the semi-implicit rule of Euler, v' = v + F h / m, x' = x + v' h, has the moments  M0 = h F, M1 = h^2 F  and so the line
+In steps of one length the semi-implicit rule of Euler, v' = v + F h / m, x' = x + v' h, has the moments  M0 = h F, M1 = h^2 F  and so
+the line
 
     L(s) = 4 F - 6 F s / h.
 

@@ -5,8 +5,8 @@ At every point that is inside (`penalty_points`), of depth d, with u the velocit
     N = k d - c u.n,  none where that would pull,        force on b:  N n + F_t,  on a the opposite, on the same line
     F_t = -mu N c_t u_t / sqrt((c_t |u_t|)^2 + (mu N)^2),    u_t = u - (u.n) n,    c_t = 2 sqrt(k m),    1 / m = n.K n
 
-so friction is mu N against the slip, mu the dynamic friction, and a damper c_t below a slip of about mu N / c_t: nothing sticks, what should
-stand on a slope creeps. Stored: V = k d^2 / 2. For a mass m at one point, w = sqrt(k/m), z = c / (2 sqrt(k m)), speed v, no gravity:
+so friction is mu N against the slip, mu the dynamic friction, and a damper c_t below a slip of about mu N / c_t: nothing sticks, what
+should stand on a slope creeps. Stored: V = k d^2 / 2. For a mass m at one point, w = sqrt(k/m), z = c / (2 sqrt(k m)), speed v, no gravity:
 
     without damping  duration pi / w,  greatest depth v / w
     with damping     e = exp(-z (pi - 2 asin z) / sqrt(1 - z^2)),  duration (pi - 2 asin z) / (w sqrt(1 - z^2)),   z < 1
@@ -29,7 +29,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.touching import bring_all
@@ -59,7 +59,7 @@ def damping_ratio(restitution: float) -> float:
         return 0.0
     if restitution <= restitution_of(MOST_DAMPING):
         return MOST_DAMPING
-    return float(brentq(lambda z: restitution_of(z) - restitution, 0.0, MOST_DAMPING, xtol=1e-15, rtol=1e-15))
+    return float(root_scalar(lambda z: restitution_of(z) - restitution, bracket=(0.0, MOST_DAMPING), xtol=1e-15).root)
 
 
 @jit
@@ -205,7 +205,7 @@ class PenaltyForces(ForceTable):
 
     def switched(self, at: Instant) -> bool:
         """Whether other points push than those of `freeze`."""
-        return not np.array_equal(self._pushing(at), self._frozen)
+        return self._frozen is None or not np.array_equal(self._pushing(at), self._frozen)
 
     def _pushing(self, at: Instant) -> np.ndarray:
         count = self._points(at)

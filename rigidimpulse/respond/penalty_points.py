@@ -5,13 +5,17 @@
     corner p of radius r and a surface of triangles:      d = r + s,               out along the way from p to the nearest surface point
     edges that cross, p and q where their lines are nearest:  d = (p - q).n,       out along n = +- e_a x e_b, out of both edges' wedges
 
-s is the depth of p in the solid, negative outside. A box, hull or mesh has its corners for points (radius 0), a sphere its centre, a capsule
-the two ends of its axis, and where a corner of a surface comes at the middle of its axis that one. Each point has its own spring, and both
-bodies are pushed along the same line. The nearest surface point of a corner is looked for on faces that push it back into its own body
-(n.m > 0, m the mean direction of its edges): the corners of a box that stands flush on another would else leave by its side. Whether
-a point is inside is asked a little way, NUDGE of the edges' length, inside of its own body: flush corners do not come and go. Source: the depth of each point is the distance
-to the nearest point of the surface (P. Moore, J. Wilhelms, Collision detection and response for computer animation, 1988); the nearest
-point of a triangle after Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
+s is the depth of p in the solid, negative outside. A box, hull or mesh has its corners for points (radius 0), a sphere its centre, a
+capsule the two ends of its axis, and where a corner of a surface comes at the middle of its axis that one. Each point has its own spring,
+and both bodies are pushed along the same line.
+
+The nearest surface point of a corner is looked for on faces that push it back into its own body (n.m > 0, m the mean direction of its
+edges): the corners of a box that stands flush on another would else leave by its side. Whether a point is inside is asked a little way,
+NUDGE of the edges' length, inside of its own body: flush corners do not come and go. Edges much deeper than the corners of the pair, or
+than its least deep edges, are no way out and left away.
+
+Sources: P. Moore, J. Wilhelms, Collision detection and response for computer animation, SIGGRAPH 1988 (a spring from each point that is
+inside to the nearest point of the surface); Ericson, Real-Time Collision Detection, 2005, section 5.1.5 (nearest point of a triangle).
 """
 
 from __future__ import annotations

@@ -107,7 +107,7 @@ def test_two_bodies_keep_their_momenta() -> None:
 
 
 def test_stiff_springs_tend_to_the_impulse() -> None:
-    """Off the impulse's velocities by what turns during contact, in proportion to pi / w: ten times less at a hundred times the stiffness."""
+    """Off the impulse's velocities by what turns during contact, as pi / w: ten times less at a hundred times the stiffness."""
     exact = off_centre(ri.Accuracy())
     assert len(exact.impacts) == 1
     errors = []
