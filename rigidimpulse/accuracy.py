@@ -2,11 +2,15 @@
 
 Slots
     impact_time     how the first contact in an interval is found (stage sweep)
-    response        how impulses are computed (stage respond)
+    response        how impulses are computed (stage respond); "penalty": none are, springs push bodies apart that are inside each other,
+                    with penalty_stiffness [N/m] and penalty_damping [N s/m] at every point that is inside; None: from weights, speeds
+                    and restitutions, see docs/penalty.md
     restitution     law that ends an impact: "newton" (speeds), "poisson" (impulses), "energetic" (works; Stronge), or "auto":
                     energetic where a contact has friction, Newton's where it has none. They differ only with friction, and
                     there where the contact couples normal and tangential motion (see respond/restitution.py)
-    integrator      how bodies move between impacts (stage integrate)
+    integrator      how bodies move between impacts (stage integrate): "exact" (forces that vary: steps of order 4, as long as their error
+                    allows), or in steps of one length, where forces vary and nothing collides by impulses: "runge_kutta" (of order 4),
+                    "semi_implicit" (Euler's, of order 1)
     contact_solver  how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for heaps of many bodies: see
                     docs/heaps.md), "qp" (the exact laws by a convex solver library: a reference), or "auto": per island of bodies
                     that may touch in a step, newton unless it is a large heap
@@ -36,9 +40,11 @@ class Accuracy(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     impact_time: Literal["bisection", "conservative", "linear", "after"] = "bisection"
-    response: Literal["sequential", "simultaneous", "kinematic"] = "sequential"
+    response: Literal["sequential", "simultaneous", "kinematic", "penalty"] = "sequential"
     restitution: Literal["auto", "newton", "poisson", "energetic"] = "auto"
-    integrator: Literal["exact"] = "exact"
+    penalty_stiffness: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
+    penalty_damping: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
+    integrator: Literal["exact", "semi_implicit", "runge_kutta"] = "exact"
     contact_solver: Literal["auto", "newton", "substepped", "qp"] = "auto"
     step: float = Field(default=1.0 / 60.0, gt=0.0, allow_inf_nan=False)
     tolerance: float = Field(default=1e-13, gt=0.0, le=1e-2, allow_inf_nan=False)

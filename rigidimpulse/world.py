@@ -12,6 +12,7 @@ from rigidimpulse.accuracy import Accuracy, resolve_accuracy
 from rigidimpulse.constrain.joint import Joint, compile_joints
 from rigidimpulse.constrain.joint_rows import Joints
 from rigidimpulse.conventions import TOLERANCES
+from rigidimpulse.errors import SceneError
 from rigidimpulse.forces.constant import ConstantForce, push_of_forces
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
 from rigidimpulse.mass import body_mass
@@ -112,7 +113,12 @@ class World:
         steady = _steady_forces(self.scene)
         forces = [effect for effect in self.scene.effects if effect.stage == "forces" and effect not in steady]
         classes = dict.fromkeys(type(force) for force in forces if force.kind not in self.left_out)
-        return [c.compile([force for force in forces if type(force) is c], self) for c in classes]
+        tables = [c.compile([force for force in forces if type(force) is c], self) for c in classes]
+        if self.accuracy.response == "penalty" and self.dynamic.any() and self.num_bodies > 1:
+            from rigidimpulse.respond.penalty import PenaltyForces
+
+            tables.append(PenaltyForces(self))
+        return tables
 
     @cached_property
     def joints(self) -> Joints:
@@ -127,8 +133,13 @@ class World:
 
     @property
     def can_collide(self) -> bool:
-        """Whether any two bodies may ever touch with consequence: a dynamic one and another."""
-        return bool(self.dynamic.any()) and self.num_bodies > 1
+        """Whether any two bodies may ever come to an impact: a dynamic one and another, unless springs push them apart."""
+        return bool(self.dynamic.any()) and self.num_bodies > 1 and self.accuracy.response != "penalty"
+
+    @property
+    def why_no_impacts(self) -> str:
+        """What `explain` says where `can_collide` is false."""
+        return "springs push bodies apart, see penalty forces" if self.accuracy.response == "penalty" else "nothing can collide"
 
     @property
     def can_press(self) -> bool:
@@ -137,7 +148,7 @@ class World:
 
     def may_collide(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Which pairs take part in contact at all: at least one of the bodies is dynamic."""
-        may = self.dynamic[a] | self.dynamic[b]
+        may = (self.dynamic[a] | self.dynamic[b]) & self.can_collide
         return may & ~np.isin(a * self.num_bodies + b, self.apart) if len(self.apart) else may
 
     def least_touch(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -224,8 +235,19 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         left_out=left_out,
     )
     # Bad forces are refused here.
-    _ = world.force_tables
+    if not world.force_tables or world.can_collide or joints:
+        _refuse_fixed_steps(world.accuracy)
     return world
+
+
+def _refuse_fixed_steps(accuracy: Accuracy) -> None:
+    """Raise a SceneError for an integrator of fixed steps, of a scene in which forces vary not at all or not alone."""
+    if accuracy.integrator != "exact":
+        raise SceneError(
+            f"integrator is {accuracy.integrator!r}, for bodies that nothing but forces that vary moves",
+            "use integrator='exact', or response='penalty' without joints",
+            "accuracy",
+        )
 
 
 def _steady_forces(scene: Scene) -> list[ConstantForce]:

@@ -55,7 +55,7 @@ class ContactForces:
         if world.joints_of_scene:
             return Bound(hold, f"{how}{len(world.joints_of_scene)} joints")
         if not world.can_collide:
-            return Skip("nothing can collide")
+            return Skip(world.why_no_impacts)
         if not world.can_press:
             return Skip("no force, no moving support and no spin presses bodies together", hold)
         return Bound(hold, f"{how}bodies may come to rest on each other")

@@ -17,7 +17,8 @@ class BroadPhase:
     def bind(self, world) -> Bound | Skip:
         """In where a dynamic body may meet another."""
         if not world.can_collide:
-            return Skip("a dynamic body and another are needed for contact")
+            springs = world.accuracy.response == "penalty"
+            return Skip(world.why_no_impacts if springs else "a dynamic body and another are needed for contact")
 
         def detect(context, window) -> None:
             if context.heaps is not None:

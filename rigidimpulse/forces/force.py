@@ -56,6 +56,7 @@ class ForceTable(ABC):
         links: (l, 2) dynamic bodies between which a force acts: they move together.
         is_steady: whether the forces change only if bodies move, so that bodies may come to rest under them.
         reason: what `explain` says of them.
+        switches: whether they begin and end where bodies are, so that steps must end there (`freeze`, `switched`).
 
     """
 
@@ -66,6 +67,7 @@ class ForceTable(ABC):
     links: np.ndarray
     is_steady: bool
     reason: str
+    switches: ClassVar[bool] = False
 
     @abstractmethod
     def wrench(self, at: Instant, rows: np.ndarray) -> np.ndarray:
@@ -86,6 +88,14 @@ class ForceTable(ABC):
     def share_until_break(self, value: np.ndarray, change: np.ndarray) -> float:
         """Share of a step after which one becomes too large, 1 if none does; rows start with value (k, 6) and change by (k, 6)."""
         return 1.0
+
+    def freeze(self, _at: Instant | None) -> None:
+        """From here on only the parts that act at an instant do, or all again (None)."""
+        return
+
+    def switched(self, _at: Instant) -> bool:
+        """Whether other parts act than those of `freeze`."""
+        return False
 
     def potential(self, times: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Potential energy of each force at f instants, (f, forces) J, 0 for those that have none.

@@ -57,7 +57,7 @@ class FreeRotation:
     def bind(self, world) -> Bound | Skip:
         """In where contacts or joints may act on bodies whose moments of inertia differ."""
         if not world.can_collide and not world.joints_of_scene:
-            return Skip("nothing loads spinning bodies; free rotation is in closed form", turn)
+            return Skip(f"{world.why_no_impacts}; free rotation is in closed form", turn)
         moments = world.inertia[world.dynamic]
         if np.all(moments == moments[:, :1]):
             return Skip("all bodies have equal moments of inertia", turn)

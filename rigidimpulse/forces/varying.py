@@ -8,6 +8,10 @@ error allows. Where contacts or joints hold them, forces are constant over a sub
 which is of second order in h as contact forces are, and leaves a body that stands still where it is. The sub-step is so short that the
 path is off by no more than is allowed,  |F(h/2) - F| h^2 / (6 m),  F at both ends.
 
+Where forces begin and end with places (`ForceTable.switches`), a step is flown with those that act at its start and ends, to round-off of
+time, where others do, looked for by bisection along its course: so the steps stay of their order. Steps of one length
+(`Accuracy.integrator`) do nothing of the kind.
+
 What each force did, impulse, angular impulse about the world's origin and work, is the integral of its line along the very course.
 """
 
@@ -19,7 +23,7 @@ from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.forces.force import ForceTable, Instant, check_names
 from rigidimpulse.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.forces.mass_flow import BurningForces, MassFlow
-from rigidimpulse.integrate.force_step import Lines, Room, nystroem
+from rigidimpulse.integrate.force_step import Lines, Room, nystroem, semi_implicit
 
 IN_FLIGHT, IN_CONTACT = 0.03, 30.0
 """How far a path may be off, relative to the size, or in rad of turn: in roots of the accuracy's tolerance, inside a step of bodies that
@@ -30,6 +34,9 @@ SAFETY, LEAST_CHANGE, MOST_CHANGE = 0.9, 0.2, 5.0
 """How step lengths follow errors."""
 ASIDE = 1e-9
 """Part of a step by which forces are taken inside of its ends: where they jump the step's own side counts."""
+
+SWITCHED, LEAST_PIECE, MOST_SWITCHES = 1e-9, 1e-13, 20
+"""Part of a step by which it may end off a switch of forces; part of the run's step to which switches are found; how many in a step."""
 
 
 class VaryingForces:
@@ -68,6 +75,8 @@ class VaryingForces:
         self._plan = self._longest.copy()
         self._in_flight, self._in_contact = IN_FLIGHT * world.accuracy.tolerance**0.5, IN_CONTACT * world.accuracy.tolerance**0.5
         self._size = np.minimum(world.bound_radius, world.size)
+        self._switching = [table for table in self._tables if table.switches]
+        self._cut = 0.0
         burners = [table for table in self._tables if isinstance(table, BurningForces)]
         self.flow = MassFlow(burners, world, course) if burners else None
         self._last = np.zeros((n, 6))
@@ -94,6 +103,11 @@ class VaryingForces:
         rest = min(end, self._next_break(time)) - time
         if rest <= 0.0:  # the end of the run
             return np.zeros(len(members))
+        if self._world.accuracy.integrator != "exact":
+            return self._fly_one_length(members, time, min(rest, self._world.accuracy.step), state)
+        for table in self._switching:
+            table.freeze(Instant(np.full(len(self.acts), time), now, state.rotation, self._course))
+        switches = 0
         h = np.zeros(len(self.acts))
         h[members] = _pieces(rest, self._together(members, self._plan[members], np.minimum))
         shortest = SHORTEST * self._world.accuracy.step
@@ -113,6 +127,11 @@ class VaryingForces:
             error = self._together(todo, error, np.maximum)
             grow = np.clip(SAFETY * np.maximum(error, 1e-30) ** -0.25, LEAST_CHANGE, MOST_CHANGE)
             done = (error <= 1.0) | (h[todo] <= shortest)
+            if self._switching and done.all() and switches < MOST_SWITCHES:
+                part, switches = self._switch(time, todo, now, sums, h), switches + 1
+                if part < 1.0:
+                    h[todo] *= part
+                    continue
             ready = todo[done]
             follows = np.where(h[ready] < self._plan[ready], np.maximum(self._plan[ready], h[ready] * grow[done]), h[ready] * grow[done])
             self._plan[ready] = np.clip(follows, shortest, self._longest[ready])
@@ -120,7 +139,47 @@ class VaryingForces:
             self._report(context, time, ready[error[done] > 1.0], self._in_flight)
             todo, again = todo[~done], grow[~done]
             h[todo] = self._plan[todo] = _pieces(rest, np.maximum(h[todo] * again, shortest))
+        for table in self._switching:
+            table.freeze(None)
+        self._cut = float(h[members[0]]) if switches > 1 else 0.0
         return h[members]
+
+    def _fly_one_length(self, members: np.ndarray, time: float, length: float, state) -> np.ndarray:
+        """The same in one step of a length, s, whatever its error."""
+        h = np.zeros(len(self.acts))
+        h[members] = length
+
+        def evaluate(share: float, bodies, rotation):
+            return self._evaluate(time + h * min(max(share, ASIDE), 1.0 - ASIDE), members, bodies, rotation)
+
+        first = evaluate(0.0, state.now, state.rotation)
+        if self._world.accuracy.integrator == "semi_implicit":
+            rows, sums = semi_implicit(first)
+        else:
+            rows, sums = nystroem(evaluate, self._room, first, members, h, state.now, self._world.steady_acceleration)
+        self._keep(members, time, rows, sums, h)
+        return h[members]
+
+    def _switch(self, time: float, members: np.ndarray, now, sums: Lines, h: np.ndarray) -> float:
+        """Part of a step of h (n,) s, the same for all members, after which other forces act; 1 if that is its end, or never."""
+        room, length = self._room, float(h[members[0]])
+        room.follow(members, now, self._world.steady_acceleration, sums.value, sums.change / length)
+
+        def differ(part: float) -> bool:
+            room.look(members, part * length)
+            at = Instant(np.full(len(self.acts), time + part * length), room.bodies, room.rotation, self._course)
+            return any(table.switched(at) for table in self._switching)
+
+        if not differ(1.0):
+            return 1.0
+        # Forces that rise from nothing may come and go by round-off: pieces that follow each other grow, so that time goes on.
+        step = self._world.accuracy.step
+        least = max(LEAST_PIECE * step, 4.0 * np.spacing(time), min(2.0 * self._cut, SHORTEST * step)) / length
+        low, high = 0.0, 1.0
+        while high - low > least:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if differ(middle) else (middle, high)
+        return 1.0 if high >= 1.0 - SWITCHED else max(high, least)
 
     def load(self, context, group, h: float) -> float:
         """Forces on a group that contacts or joints hold, over h s at most, into the accelerations and `value`; returns for how long."""

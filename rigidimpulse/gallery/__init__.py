@@ -36,6 +36,7 @@ _MODULES = {
     "rolling": "rolling",
     "arm": "arm",
     "pile": "pile",
+    "penalty_bounce": "penalty_bounce",
     "smoothed_path": "smoothed_path",
     "settled_layout": "settled_layout",
     "emergency_stop": "emergency_stop",

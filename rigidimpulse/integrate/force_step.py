@@ -17,6 +17,11 @@ Inside the step it leaves the true path by
 
 of order 4 and larger than the error at the end, which is of order 5: it chooses h.
 
+In steps of one length the semi-implicit rule of Euler, v' = v + F h / m, x' = x + v' h, has the moments  M0 = h F, M1 = h^2 F  and so
+the line
+
+    L(s) = 4 F - 6 F s / h.
+
 Mass that flows: m(t) enters by  F m(0) / m(t)  in the place of F, the mass in all else is that at the start of the step.
 """
 
@@ -28,7 +33,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.touching import bring
+from rigidimpulse.detect.touching import bring, bring_all
 from rigidimpulse.integrate.course import FORCED, FREE, make_course, take
 from rigidimpulse.respond.impulse import BodyState
 
@@ -45,6 +50,20 @@ def fly(course, members, elapsed, bodies, steady, wrench, out, rotation, acceler
         turned = wrench[i, 3] != 0.0 or wrench[i, 4] != 0.0 or wrench[i, 5] != 0.0
         take(course, i, -elapsed[i], bodies, pull, wrench[i, 3:], zero, zero, FORCED if turned else FREE)
         bring(course, i, 0.0, out, rotation, acceleration, angular_acceleration)
+
+
+@jit
+def follow(course, members, bodies, steady, value, rate):
+    """Let the members (k,) go from `bodies`, at time 0, along lines of force (n, 6) that change by rate (n, 6) a second."""
+    pull, jerk = np.empty(3), np.empty(3)
+    for i in members:
+        for k in range(3):
+            pull[k] = steady[i, k] + bodies.inv_mass[i] * value[i, k]
+            jerk[k] = bodies.inv_mass[i] * rate[i, k]
+        turned = False
+        for k in range(3, 6):
+            turned = turned or value[i, k] != 0.0 or rate[i, k] != 0.0
+        take(course, i, 0.0, bodies, pull, value[i, 3:], jerk, rate[i, 3:], FORCED if turned else FREE)
 
 
 class Room:
@@ -70,6 +89,14 @@ class Room:
         for mine, theirs in zip(self.bodies, bodies, strict=True):
             if mine is not theirs:
                 mine[members] = theirs[members]
+
+    def follow(self, members, bodies: BodyState, steady, value, rate) -> None:
+        """Let the members go along lines of force (see `follow`), for `look`."""
+        follow(self.course, members, bodies, steady, value, rate)
+
+    def look(self, members, elapsed: float) -> None:
+        """Bring the members to where the lines lead them after a time."""
+        bring_all(self.course, members, elapsed, self.bodies, self.rotation, *self._unused)
 
     def fly_speeds(self, members, elapsed, bodies: BodyState, steady, wrench) -> None:
         """The same for the velocities alone."""
@@ -104,4 +131,10 @@ def nystroem(evaluate: Callable, room: Room, first: Stage, members, h: np.ndarra
         Lines((2.0 * f1 + f2 + f3 - f4) / 3.0, f4 - f1, (f1 - f2 - f3 + f4) / 3.0)
         for f1, f2, f3, f4 in zip(first, second, third, fourth, strict=True)
     )
+    return rows, sums
+
+
+def semi_implicit(first: Stage) -> tuple[Lines, Lines]:
+    """The same of Euler's semi-implicit rule."""
+    rows, sums = (Lines(4.0 * f, -6.0 * f, np.zeros_like(f)) for f in first)
     return rows, sums

@@ -47,7 +47,7 @@ class ImpactResponse:
     def bind(self, world) -> Bound | Skip:
         """In where something can collide."""
         if not world.can_collide:
-            return Skip("nothing can collide")
+            return Skip(world.why_no_impacts)
         kernel, law = KERNELS[self.method], LAWS[self.restitution]
 
         def respond(context, group: Group) -> None:

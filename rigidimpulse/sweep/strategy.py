@@ -30,7 +30,7 @@ class ImpactTime:
     def bind(self, world) -> Bound | Skip:
         """In where something can collide."""
         if not world.can_collide:
-            return Skip("nothing can collide")
+            return Skip(world.why_no_impacts)
         method = importlib.import_module(f"rigidimpulse.sweep.{self.method}").sweep
 
         def sweep(context, window) -> None:
