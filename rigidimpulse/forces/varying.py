@@ -25,9 +25,9 @@ from rigidimpulse.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.forces.mass_flow import BurningForces, MassFlow
 from rigidimpulse.integrate.force_step import Lines, Room, nystroem, semi_implicit
 
-IN_FLIGHT, IN_CONTACT = 0.03, 30.0
+IN_FLIGHT, IN_CONTACT = 0.03, 3.0
 """How far a path may be off, relative to the size, or in rad of turn: in roots of the accuracy's tolerance, inside a step of bodies that
-fly and for each step of the run of those in contact. 1e-8 and 1e-5 by default."""
+fly and for each step of the run of those in contact. 1e-8 and 1e-6 by default."""
 SHORTEST = 2.0**-14
 """Part of the run's step below which it is not split for forces."""
 SAFETY, LEAST_CHANGE, MOST_CHANGE = 0.9, 0.2, 5.0
