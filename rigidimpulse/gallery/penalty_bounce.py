@@ -34,8 +34,16 @@ def scene() -> Scene:
     smooth = Material(static_friction=0.0)
     scene.add(Body("floor", Shape.box((3.0, 1.0, 1.0)), position=(0.75, 0.0, -0.5), motion="static", material=smooth))
     for place, (name, (mass, e)) in enumerate(BALLS.items()):
-        start = {"position": (0.5 * place, 0.0, RADIUS + HEIGHT), "velocity": (0.0, 0.0, -SPEED)}
-        scene.add(Body(name, Shape.sphere(RADIUS), mass=mass, material=Material(restitution=e, static_friction=0.0), **start))
+        scene.add(
+            Body(
+                name,
+                Shape.sphere(RADIUS),
+                position=(0.5 * place, 0.0, RADIUS + HEIGHT),
+                velocity=(0.0, 0.0, -SPEED),
+                mass=mass,
+                material=Material(restitution=e, static_friction=0.0),
+            )
+        )
     heights = RADIUS + np.array([HEIGHT, 0.0, SPEED * (DURATION - HIT)])
     path = Keyframes((0.0, HIT, DURATION), [(-0.5, 0.0, z) for z in heights])
     scene.add(Body("impulse", Shape.sphere(RADIUS), motion="kinematic", keyframes=path))
@@ -60,6 +68,7 @@ def check(run: Recording) -> list[Check]:
     for name, (mass, e) in BALLS.items():
         error = np.abs(run.position(name)[:, 2] - RADIUS - _height(run.times, mass, e)).max()
         checks.append(at_most(f"{name}: error of the height, m", error, BOUND, "a mass on a spring that does not pull"))
+    assert run.ledger is not None
     lost = sum(0.5 * mass * SPEED**2 * (1.0 - e * e) for mass, e in BALLS.values())
     error = abs(run.ledger.dissipated["penalty"][-1] - lost)
     checks.append(at_most("error of the energy lost, J", error, BOUND, "sum of m v^2 (1 - e^2) / 2"))

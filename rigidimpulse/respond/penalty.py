@@ -14,11 +14,12 @@ should stand on a slope creeps. Stored: V = k d^2 / 2. For a mass m at one point
 
 The textbook's e = exp(-pi z / sqrt(1 - z^2)) is that of a damper that pulls at the end; to first order in z they are the same.
 
-What is not given is found for each pair: c from its restitution by the law above, with the m of the point; k as the largest of
+What is not given is found for each pair: c from its restitution by the law above, with the m of the point; k as the larger of
 
     g M / (REST_DEPTH s)            the heavier body M sinks at rest by REST_DEPTH of the smaller one's size s
     m (U / (IMPACT_DEPTH s))^2      at their speeds at the start, U, they go in by IMPACT_DEPTH of it; 1 / m = 1 / m_a + 1 / m_b
-    m (pi / step)^2                 contact lasts a step at most
+
+and, without weight and speed at the start, m (pi / (2 step))^2: contact lasts two steps, as many as steps of one length need.
 
 Sources: P. Moore, J. Wilhelms, Collision detection and response for computer animation, SIGGRAPH 1988 (the method); T. Schwager,
 T. Poeschel, Coefficient of restitution and linear-dashpot model revisited, Granular Matter 9, 2007 (restitution without pull).
@@ -35,7 +36,8 @@ from rigidimpulse._jit import jit
 from rigidimpulse.detect.touching import bring_all
 from rigidimpulse.forces.force import ForceTable, Instant
 from rigidimpulse.respond.impulse import BodyState
-from rigidimpulse.respond.penalty_points import find_points, inward_axes, solid_geometry
+from rigidimpulse.respond.penalty_points import find_points
+from rigidimpulse.respond.penalty_surface import inward_axes, solid_geometry
 from rigidimpulse.rotation import to_matrix
 
 REST_DEPTH, IMPACT_DEPTH = 4e-4, 0.02
@@ -238,5 +240,6 @@ def _stiffness(world, pairs: np.ndarray) -> np.ndarray:
     strength = np.maximum(world.steady_strength[a], world.steady_strength[b])
     at_rest = strength * heavier / (REST_DEPTH * size)
     in_impact = mass * ((speed[a] + speed[b]) / (IMPACT_DEPTH * size)) ** 2
-    stiffness[a, b] = np.maximum(np.maximum(at_rest, in_impact), mass * (np.pi / accuracy.step) ** 2)
+    known = np.maximum(at_rest, in_impact)
+    stiffness[a, b] = np.where(known > 0.0, known, mass * (0.5 * np.pi / accuracy.step) ** 2)
     return stiffness

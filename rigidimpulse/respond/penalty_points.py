@@ -20,166 +20,16 @@ inside to the nearest point of the surface); Ericson, Real-Time Collision Detect
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import inf, sqrt
 
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.box_tree import STACK_ROWS
-from rigidimpulse.detect.features import along, closest_on_segments, cross, dot, edge_normals, in_edge_arc, moved, row, subtract, turned
+from rigidimpulse.detect.features import along, closest_on_segments, dot, moved, row, subtract, turned
 from rigidimpulse.detect.inside import point_in_mesh
-from rigidimpulse.geometry import CYLINDER, EDGE_CAPSULE, EDGE_HIDDEN, HALF_SPACE, ROUND, CompiledShape, Geometry, Primitive, build_geometry
-
-SIDES = 24
-"""Sides of the prism that stands for a cylinder."""
-ON_FACE = 1e-6
-"""Part of the distance by which the way to a face may differ from that along its normal; the normal is exact however near the face is."""
-
-NUDGE, MOST_DEPTH = 1e-6, 2.0
-OUT_OF_WEDGE = 0.5
-"""Sine of the angle by which the normal of crossing edges may be outside the arc between the normals of their faces."""
-EDGE = np.int64(1 << 40)
-"""Added to edges where they are told from vertices."""
-
-
-def solid_geometry(shapes: list[CompiledShape]) -> Geometry:
-    """Geometry of compiled shapes with a prism of SIDES sides in the place of each cylinder."""
-    solids = [
-        replace(shape, primitives=tuple(_prism(p) if p.kind == CYLINDER else p for p in shape.primitives)) for shape in shapes
-    ]
-    return build_geometry(solids)
-
-
-def _prism(cylinder: Primitive) -> Primitive:
-    """Prism inside a cylinder."""
-    centre, axis, half = cylinder.frame[:3], cylinder.frame[3:6], cylinder.frame[6]
-    u = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    u /= np.linalg.norm(u)
-    angle, k = 2.0 * np.pi * np.arange(SIDES) / SIDES, np.arange(SIDES)
-    rim = cylinder.radius * (np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * np.cross(axis, u))
-    following, zero = (k + 1) % SIDES, np.zeros(SIDES - 2, np.int64)
-    side = [np.stack([k, following, following + SIDES], 1), np.stack([k, following + SIDES, k + SIDES], 1)]
-    bottom, top = np.stack([zero, k[2:], k[1:-1]], 1), np.stack([zero, k[1:-1], k[2:]], 1) + SIDES
-    vertices = np.concatenate([centre - half * axis + rim, centre + half * axis + rim])
-    return Primitive(ROUND, vertices=vertices, faces=np.concatenate([*side, bottom, top]))
-
-
-def inward_axes(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
-    """Mean direction (V, 3) of the visible edges that leave each vertex of a surface, unit or 0, in the frame of its shape.
-
-    And the length (V,) m of the shortest of them, 0 where there is none.
-    """
-    total = np.zeros_like(geometry.vertex)
-    tail, head = geometry.edge[(geometry.edge_kind != EDGE_HIDDEN) & (geometry.edge_kind != EDGE_CAPSULE)].T
-    way = geometry.vertex[head] - geometry.vertex[tail]
-    long = np.linalg.norm(way, axis=1)
-    way /= long[:, None]
-    size = np.full(len(total), np.inf)
-    np.minimum.at(size, tail, long)
-    np.minimum.at(size, head, long)
-    np.add.at(total, tail, way)
-    np.add.at(total, head, -way)
-    length = np.linalg.norm(total, axis=1)[:, None]
-    return np.where(length > ON_FACE, total / np.maximum(length, ON_FACE), 0.0), np.where(np.isfinite(size), size, 0.0)
-
-
-@jit
-def _nearest_on_triangle(p, a, b, c):
-    """Nearest point of triangle abc to p."""
-    ab, ac, ap = subtract(b, a), subtract(c, a), subtract(p, a)
-    d1, d2 = dot(ab, ap), dot(ac, ap)
-    if d1 <= 0.0 and d2 <= 0.0:
-        return a
-    bp = subtract(p, b)
-    d3, d4 = dot(ab, bp), dot(ac, bp)
-    if d3 >= 0.0 and d4 <= d3:
-        return b
-    vc = d1 * d4 - d3 * d2
-    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-        return along(a, d1 / (d1 - d3), ab)
-    cp = subtract(p, c)
-    d5, d6 = dot(ab, cp), dot(ac, cp)
-    if d6 >= 0.0 and d5 <= d6:
-        return c
-    vb = d5 * d2 - d1 * d6
-    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-        return along(a, d2 / (d2 - d6), ac)
-    va = d3 * d6 - d5 * d4
-    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
-        return along(b, (d4 - d3) / ((d4 - d3) + (d5 - d6)), subtract(c, b))
-    size = va + vb + vc
-    return along(along(a, vb / size, ab), vc / size, ac)
-
-
-@jit
-def _box_squared(geometry, node, p):
-    """Squared distance of a point from the box of a node."""
-    total = 0.0
-    for k in range(3):
-        off = max(0.0, geometry.node_min[node, k] - p[k], p[k] - geometry.node_max[node, k])
-        total += off * off
-    return total
-
-
-@jit
-def nearest_on_surface(geometry, primitive, p, axis):
-    """Nearest point of a surface of triangles to p (x, y, z) in its frame: squared distance, point, triangle.
-
-    axis: if not 0, triangles count whose normals do not point against it; the triangle is -1 if none does.
-    """
-    free = axis[0] == 0.0 and axis[1] == 0.0 and axis[2] == 0.0
-    stack = np.empty(STACK_ROWS, np.int64)
-    stack[0] = geometry.node_first[primitive]
-    depth, best, nearest, place = 1, inf, p, np.int64(-1)
-    while depth > 0:
-        depth -= 1
-        node = stack[depth]
-        if _box_squared(geometry, node, p) >= best:
-            continue
-        child = geometry.node_child[node]
-        if child >= 0:
-            first_is_nearer = _box_squared(geometry, child, p) <= _box_squared(geometry, child + 1, p)
-            stack[depth] = child + 1 if first_is_nearer else child
-            stack[depth + 1] = child if first_is_nearer else child + 1
-            depth += 2
-            continue
-        start = geometry.node_start[node]
-        for t in range(start, start + geometry.node_count[node]):
-            if not (free or dot(axis, row(geometry.triangle_normal, t)) > 0.0):
-                continue
-            corner = geometry.triangle[t]
-            a, b, c = row(geometry.vertex, corner[0]), row(geometry.vertex, corner[1]), row(geometry.vertex, corner[2])
-            q = _nearest_on_triangle(p, a, b, c)
-            off = subtract(q, p)
-            if dot(off, off) < best:
-                best, nearest, place = dot(off, off), q, t
-    return best, nearest, place
-
-
-@jit
-def _turned_back(R, v):
-    """R^T v."""
-    return (
-        R[0, 0] * v[0] + R[1, 0] * v[1] + R[2, 0] * v[2],
-        R[0, 1] * v[0] + R[1, 1] * v[1] + R[2, 1] * v[2],
-        R[0, 2] * v[0] + R[1, 2] * v[1] + R[2, 2] * v[2],
-    )
-
-
-@jit
-def _add(real, integer, count, bodies, features, point, normal, depth):
-    """Write a point if there is room; bodies (a, b), normal from a to b; where a is the larger they are swapped. Returns count + 1."""
-    if count < real.shape[0]:
-        swap = bodies[0] > bodies[1]
-        sign = -1.0 if swap else 1.0
-        integer[count, 0], integer[count, 1] = (bodies[1], bodies[0]) if swap else bodies
-        integer[count, 2], integer[count, 3] = (features[1], features[0]) if swap else features
-        for k in range(3):
-            real[count, k] = point[k]
-            real[count, 3 + k] = sign * normal[k]
-        real[count, 6] = depth
-    return count + 1
+from rigidimpulse.geometry import HALF_SPACE, ROUND
+from rigidimpulse.respond.penalty_edges import crossing_edges, drop_deep_edges
+from rigidimpulse.respond.penalty_surface import NUDGE, ON_FACE, add_point, box_squared, nearest_on_surface, turned_back
 
 
 @jit
@@ -193,7 +43,7 @@ def _points_in_half_space(geometry, plane, other, bodies, position, rotation, re
             p = moved(rotation[b], row(position, b), row(geometry.vertex, v))
             depth = offset + geometry.radius[other] - dot(normal, p)
             if depth > 0.0:
-                count = _add(real, integer, count, bodies, (-1 - plane, v), p, normal, depth)
+                count = add_point(real, integer, count, bodies, (-1 - plane, v), p, normal, depth)
     return count
 
 
@@ -214,7 +64,7 @@ def _points_of_axes(geometry, first, second, bodies, position, rotation, real, i
     if depth > 0.0 and distance > 0.0:
         normal = (between[0] / distance, between[1] / distance, between[2] / distance)
         point = along(p, geometry.radius[first] - 0.5 * depth, normal)
-        count = _add(real, integer, count, bodies, (p_first, q_first), point, normal, depth)
+        count = add_point(real, integer, count, bodies, (p_first, q_first), point, normal, depth)
     return count
 
 
@@ -227,10 +77,10 @@ def _points_in_surface(geometry, axes, sizes, surface, other, bodies, position, 
         if not geometry.vertex_corner[v]:
             continue
         world = moved(rotation[b], row(position, b), row(geometry.vertex, v))
-        p = _turned_back(rotation[a], subtract(world, row(position, a)))
-        if _box_squared(geometry, root, p) > radius * radius:
+        p = turned_back(rotation[a], subtract(world, row(position, a)))
+        if box_squared(geometry, root, p) > radius * radius:
             continue
-        axis = _turned_back(rotation[a], turned(rotation[b], row(axes, v)))
+        axis = turned_back(rotation[a], turned(rotation[b], row(axes, v)))
         inside = geometry.closed[surface] and point_in_mesh(geometry, surface, along(p, NUDGE * sizes[v], axis))
         if radius == 0.0 and not inside:
             continue
@@ -247,7 +97,7 @@ def _points_in_surface(geometry, axes, sizes, surface, other, bodies, position, 
             normal = (out[0] / distance, out[1] / distance, out[2] / distance)
         depth = radius + (dot(out, normal) if inside else -distance)
         if depth > 0.0:
-            count = _add(real, integer, count, bodies, (-1 - surface, v), world, turned(rotation[a], normal), depth)
+            count = add_point(real, integer, count, bodies, (-1 - surface, v), world, turned(rotation[a], normal), depth)
     return count
 
 
@@ -269,102 +119,8 @@ def _corners_at_axis(geometry, surface, capsule, bodies, position, rotation, rea
         distance = sqrt(dot(out, out))
         if 0.0 < distance < geometry.radius[capsule]:
             normal = (out[0] / distance, out[1] / distance, out[2] / distance)
-            count = _add(real, integer, count, bodies, (corner, v), p, normal, geometry.radius[capsule] - distance)
+            count = add_point(real, integer, count, bodies, (corner, v), p, normal, geometry.radius[capsule] - distance)
     return count
-
-
-@jit
-def _ends(geometry, e, body, position, rotation):
-    """Start and way of an edge, world."""
-    p = moved(rotation[body], row(position, body), row(geometry.vertex, geometry.edge[e, 0]))
-    return p, subtract(moved(rotation[body], row(position, body), row(geometry.vertex, geometry.edge[e, 1])), p)
-
-
-@jit
-def _edge_near(geometry, e, body, surface, other, position, rotation):
-    """Whether an edge of a body may touch the box of a surface of another."""
-    p, d = _ends(geometry, e, body, position, rotation)
-    p = _turned_back(rotation[other], subtract(p, row(position, other)))
-    d, root = _turned_back(rotation[other], d), geometry.node_first[surface]
-    for k in range(3):
-        if max(p[k], p[k] + d[k]) < geometry.node_min[root, k] or min(p[k], p[k] + d[k]) > geometry.node_max[root, k]:
-            return False
-    return geometry.edge_kind[e] != EDGE_HIDDEN
-
-
-@jit
-def _leaves_wedge(geometry, e, body, way, rotation, n):
-    """Whether n points out of the wedge of an edge."""
-    length = sqrt(dot(way, way))
-    normal_0, normal_1 = edge_normals(geometry.edge_normal, e)
-    way = (way[0] / length, way[1] / length, way[2] / length)
-    normal_0, normal_1 = turned(rotation[body], normal_0), turned(rotation[body], normal_1)
-    return in_edge_arc(n, way, normal_0, normal_1, geometry.edge_kind[e], OUT_OF_WEDGE)
-
-
-@jit
-def _holds(geometry, surface, e, body, way, middle, position, rotation):
-    """Whether the solid of an edge holds a point, taken a little way into the edge's wedge."""
-    normal_0, normal_1 = edge_normals(geometry.edge_normal, e)
-    out = turned(rotation[body], along(normal_0, 1.0, normal_1))
-    point = subtract(along(middle, -NUDGE * sqrt(dot(way, way)), out), row(position, body))
-    return point_in_mesh(geometry, surface, _turned_back(rotation[body], point))
-
-
-@jit
-def _crossing_edges(geometry, first, second, bodies, position, rotation, real, integer, count):
-    """Edges of two surfaces that cross where the solids overlap."""
-    a, b = bodies
-    if not (geometry.closed[first] and geometry.closed[second]):
-        return count
-    for e in range(geometry.edge_first[first], geometry.edge_first[first + 1]):
-        if not _edge_near(geometry, e, a, second, b, position, rotation):
-            continue
-        p0, p_way = _ends(geometry, e, a, position, rotation)
-        for f in range(geometry.edge_first[second], geometry.edge_first[second + 1]):
-            if not _edge_near(geometry, f, b, first, a, position, rotation):
-                continue
-            q0, q_way = _ends(geometry, f, b, position, rotation)
-            s, t = closest_on_segments(p0, p_way, q0, q_way)
-            n = cross(p_way, q_way)
-            length = sqrt(dot(n, n))
-            if not (0.0 < s < 1.0 and 0.0 < t < 1.0) or length == 0.0:
-                continue
-            p, q = along(p0, s, p_way), along(q0, t, q_way)
-            n = (n[0] / length, n[1] / length, n[2] / length)
-            depth = dot(subtract(p, q), n)
-            if depth < 0.0:
-                n, depth = (-n[0], -n[1], -n[2]), -depth
-            back = (-n[0], -n[1], -n[2])
-            if (
-                depth > 0.0
-                and _leaves_wedge(geometry, e, a, p_way, rotation, n)
-                and _leaves_wedge(geometry, f, b, q_way, rotation, back)
-                and _holds(geometry, first, e, a, p_way, along(p, -0.5 * depth, n), position, rotation)
-                and _holds(geometry, second, f, b, q_way, along(p, -0.5 * depth, n), position, rotation)
-            ):
-                count = _add(real, integer, count, bodies, (EDGE + e, EDGE + f), p, n, depth)
-    return count
-
-
-@jit
-def _drop_deep_edges(real, integer, first, edges, end):
-    """Keep of rows [edges, end) those not much deeper than the corners [first, edges), or than the least deep of them: the way out."""
-    if end > real.shape[0] or end == edges:
-        return end
-    limit = 0.0
-    for c in range(first, edges):
-        limit = max(limit, real[c, 6])
-    if first == edges:
-        limit = inf
-        for c in range(edges, end):
-            limit = min(limit, real[c, 6])
-    kept = edges
-    for c in range(edges, end):
-        if real[c, 6] <= MOST_DEPTH * limit:
-            real[kept], integer[kept] = real[c], integer[c]
-            kept += 1
-    return kept
 
 
 @jit
@@ -389,8 +145,8 @@ def _points_of_primitives(geometry, axes, sizes, i, j, bodies, position, rotatio
         if thick_i and geometry.vertex_first[i + 1] == geometry.vertex_first[i] + 2:
             count = _corners_at_axis(geometry, j, i, back, position, rotation, real, integer, count)
     if not thick_i and not thick_j:
-        end = _crossing_edges(geometry, i, j, bodies, position, rotation, real, integer, count)
-        count = _drop_deep_edges(real, integer, first, count, end)
+        end = crossing_edges(geometry, i, j, bodies, position, rotation, real, integer, count)
+        count = drop_deep_edges(real, integer, first, count, end)
     return count
 
 
