@@ -18,7 +18,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.errors import SceneError
-from rigidimpulse.forces.force import Force, ForceTable, Instant, checked_number, checked_orientation, checked_vector, dynamic_body, named, no_links
+from rigidimpulse.forces.force import (
+    Force,
+    ForceTable,
+    Instant,
+    checked_number,
+    checked_orientation,
+    checked_vector,
+    dynamic_body,
+    named,
+    no_links,
+)
 from rigidimpulse.keyframes import Keyframes
 from rigidimpulse.rotation import conjugate, multiply, quaternion_from_rotation_vector, rotate, rotation_vector
 from rigidimpulse.world import World

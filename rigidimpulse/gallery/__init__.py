@@ -38,6 +38,15 @@ _MODULES = {
     "pile": "pile",
     "smoothed_path": "smoothed_path",
     "settled_layout": "settled_layout",
+    "rocket": "rocket",
+    "launcher": "launcher",
+    "handgun": "handgun",
+    "driven_oscillator": "driven_oscillator",
+    "parachute": "parachute",
+    "planets": "planets",
+    "coupled_springs": "coupled_springs",
+    "held_arm": "held_arm",
+    "pinned_shapes": "pinned_shapes",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 
