@@ -21,10 +21,10 @@ from rigidimpulse.shape import Shape
 
 GRAVITY = 9.81
 MASSES = {"stone": 8.0, "crate": 6.0, "crate on a parachute": 6.0, "canopy": 0.5}
-DRAG = {"stone": 0.2, "crate": 1.0, "canopy": 12.0}
+DRAG = {"stone": 0.5, "crate": 1.0, "canopy": 12.0}
 """N s2/m2."""
 LINE, APART = 2.0, 1.5
-DURATION = 3.0
+DURATION = 2.5
 BOUND = 1e-8
 JOINED = 5e-4
 """m/s and m: joints are of second order, (g h / u)^2 / 12 of u, 1e-3 m/s."""

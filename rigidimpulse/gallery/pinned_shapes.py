@@ -27,7 +27,7 @@ BLOCKS = tuple(f"block {i}{j}{k}" for i, j, k in itertools.product("01", "01", "
 BARS, BAR_LENGTH, PIN = ("upper bar", "middle bar", "lower bar"), 0.6, 500.0
 HANG = (0.0, 1.5, 1.0)
 DRAG = 3.0
-DURATION = 6.0
+DURATION = 4.0
 BOUND = 1e-5
 
 

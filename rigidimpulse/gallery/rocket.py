@@ -19,10 +19,10 @@ from rigidimpulse.shape import Shape
 MOON_GRAVITY, EARTH_GRAVITY = 1.62, 9.80665
 MASS, PROPELLANT, FLOW = 5.0, 3.2, 0.5
 """kg, kg, kg/s; it burns for 6.4 s."""
-EXHAUST = {"in space": 6.0, "on a moon": 2.0 * EARTH_GRAVITY}
+EXHAUST = {"in space": 4.0, "on a moon": 2.0 * EARTH_GRAVITY}
 """m/s; the second is a specific impulse of 2 s."""
 RADIUS, HEIGHT, APART = 0.3, 2.0, 3.0
-DURATION = 8.0
+DURATION = 7.0
 BOUND = 1e-8
 """Relative: steps are off by at most 1e-8 of the size."""
 

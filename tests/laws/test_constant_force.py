@@ -138,7 +138,6 @@ def test_the_plan_names_forces_only_where_they_act() -> None:
         (ri.ConstantForce("lift", (1, 0, 0)), "body 'lift' is not dynamic"),
         (ri.ConstantForce("block", (1, 0, float("nan"))), r"ConstantForce\('block'\).*force is"),
         (ri.ConstantForce("block", (1, 0)), "force is"),
-        (ri.ConstantForce("block", (1, 0, 0), point=(0, 0, 1)), "point is .* leave the point out"),
     ],
 )
 def test_bad_forces_are_refused_by_name(force: ri.ConstantForce, words: str) -> None:
