@@ -66,5 +66,5 @@ class HarmonicForce(Force):
             return np.sin(w[rows] * time + phi[rows])[:, None] * a[rows]
 
         names = named(cls.kind, [f.name for f in forces], [f"harmonic force on {f.body}" for f in forces])
-        reason = f"{len(forces)} acting"
-        return TimedForces(cls.kind, names, body, points, strength, reason, longest=PART_OF_PERIOD * 2.0 * np.pi / np.maximum(np.abs(w), TINY))
+        longest = PART_OF_PERIOD * 2.0 * np.pi / np.maximum(np.abs(w), TINY)
+        return TimedForces(cls.kind, names, body, points, strength, f"{len(forces)} acting", longest=longest)

@@ -187,7 +187,7 @@ class VaryingForces:
         members = group.members[self.acts[group.members]]
         time, step = group.time, world.accuracy.step
         plan = float(self._plan[members].min())
-        h = min(h, self._next_break(time) - time, plan)
+        given = h = min(h, self._next_break(time) - time, plan)
         _, start = self._start(context, time, np.full(len(self.acts), h), members)
         if not group.loaded:
             pull = (state.course.acceleration[members] - world.steady_acceleration[members]) * world.mass[members, None]
@@ -219,7 +219,8 @@ class VaryingForces:
             value, total = self._evaluate(time + half, members, self._room.bodies, self._room.rotation)
         if error > 1.0:
             self._report(context, time, members, self._in_contact)
-        follows = max(plan, h * grow) if h < plan and error <= 1.0 else h * grow
+        # Where others made it shorter, what was planned still holds.
+        follows = max(plan, h * grow) if h == given < plan and error <= 1.0 else h * grow
         self._plan[members] = np.minimum(follows, self._longest[members])
         rows, sums = (Lines(f, np.zeros_like(f), np.zeros_like(f)) for f in (value, total))
         self._keep(members, time, rows, sums, np.full(len(self.acts), h))

@@ -54,6 +54,15 @@ _MODULES = {
     "soft_hinge": "soft_hinge",
     "crowd_momentum": "crowd_momentum",
     "marbles": "marbles",
+    "rocket": "rocket",
+    "launcher": "launcher",
+    "handgun": "handgun",
+    "driven_oscillator": "driven_oscillator",
+    "parachute": "parachute",
+    "planets": "planets",
+    "coupled_springs": "coupled_springs",
+    "held_arm": "held_arm",
+    "pinned_shapes": "pinned_shapes",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 

@@ -1,8 +1,8 @@
 """Forces that vary do not know of frames, of other bodies far away, or of where a scene lies.
 
-The same bits at any frame rate, twice, and beside a body that no force ties to the others, whose steps are its own. Moved or turned as a whole
-a scene moves and turns as a whole, to rounding: 1e-14 of the place, grown by some hundred steps that follow each other, 1e-11; choices of step
-length could differ by rounding, and then results by 1e-8.
+The same bits at any frame rate, twice, and beside a body that no force ties to the others, whose steps are its own. Moved or turned as a
+whole a scene moves and turns as a whole, to rounding: 1e-14 of the place, grown by some hundred steps that follow each other, 1e-11;
+choices of step length could differ by rounding, and then results by 1e-8.
 """
 
 from __future__ import annotations

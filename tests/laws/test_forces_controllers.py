@@ -1,10 +1,10 @@
 """Controllers against the step response of a second-order system, and energy terms as forces (laws A15, A16).
 
-Laws. m x'' + c x' + k x = k x*: z = c / (2 sqrt(k m)), w_0 = sqrt(k / m), w_d = w_0 sqrt(1 - z^2),
-x = x* [1 - exp(-z w_0 t)(cos w_d t + z w_0 / w_d sin w_d t)] from rest, overshoot exp(-pi z / sqrt(1 - z^2)). The same about a principal axis
-with J, k_r, c_r. Velocity alone: v = v* + (v_0 - v*) exp(-c t / m). Saturated: F_max / m. On keyframes of constant speed with a damping the
-lag dies out. A pin of weight k is a spring of no length; a shape term keeps momentum, angular momentum and energy; with drag the
-bodies end where `settle` has the minimum. Handgun, B6: M = (m v)^2 / (k d^2).
+Laws. m x'' + c x' + k x = k x*: z = c / (2 sqrt(k m)), w_0 = sqrt(k / m), w_d = w_0 sqrt(1 - z^2), x = x* [1 - exp(-z w_0 t)(cos w_d t +
+z w_0 / w_d sin w_d t)] from rest, overshoot exp(-pi z / sqrt(1 - z^2)). The same about a principal axis with J, k_r, c_r. Velocity alone:
+v = v* + (v_0 - v*) exp(-c t / m). Saturated: F_max / m. On keyframes of constant speed with a damping the lag dies out. A pin of weight k
+is a spring of no length; a shape term keeps momentum, angular momentum and energy; with drag the bodies end where `settle` has the
+minimum. Handgun, B6: M = (m v)^2 / (k d^2).
 Tolerance: 1e-8 of the size inside each step, for 3 s 180 steps: 1e-7. A controller a step late is off by w_0 h, 1e-1.
 """
 

@@ -1,10 +1,11 @@
 """Drag, wind and other fields against closed forms.
 
-Laws. Linear: v = v0 exp(-c t / m), way (m / c)(v0 - v). Quadratic: v = v0 / (1 + c v0 t / m), way (m / c) ln(1 + c v0 t / m). Falling from
-rest with quadratic drag v = u tanh(g t / u), x = (u^2 / g) ln cosh(g t / u), u = sqrt(m g / c); a terminal speed is kept. With both, u is the
-root of c1 v + c2 v^2 = m g. In a wind drag pulls to the wind. Magnet: F = b v x B turns the velocity at the rate b B / m, speed stays.
-Tolerance: 1e-8 m, and 1e-8 m/s over a time m / c of a second: a path is off by at most 1e-8 of the size inside a step. First order would be
-off by 1e-2, drag with the square of v left out by 1.
+Laws. Linear: v = v0 exp(-c t / m), way (m / c)(v0 - v). Quadratic: v = v0 / (1 + c v0 t / m), way (m / c) ln(1 + c v0 t / m). Falling
+from rest with quadratic drag v = u tanh(g t / u), x = (u^2 / g) ln cosh(g t / u), u = sqrt(m g / c); a terminal speed is kept. With both,
+u is the root of c1 v + c2 v^2 = m g. In a wind drag pulls to the wind. Magnet: F = b v x B turns the velocity at the rate b B / m, speed
+stays.
+Tolerance: 1e-8 m, and 1e-8 m/s over a time m / c of a second: a path is off by at most 1e-8 of the size inside a step. First order would
+be off by 1e-2, drag with the square of v left out by 1.
 """
 
 from __future__ import annotations

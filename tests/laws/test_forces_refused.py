@@ -70,13 +70,19 @@ BAD = {
     "controller to nowhere": (ri.PDController("block", stiffness=1.0), r"stiffness is 1.0, but there is no position"),
     "controller to no turn": (ri.PDController("block", position=(0, 0, 0), angular_stiffness=1.0), r"but there is no orientation"),
     "controller of two minds": (
-        ri.PDController("block", position=KEYS, orientation=(1, 0, 0, 0), stiffness=1.0, angular_stiffness=1.0), r"keyframes and an orientation",
+        ri.PDController("block", position=KEYS, orientation=(1, 0, 0, 0), stiffness=1.0, angular_stiffness=1.0),
+        r"keyframes and an orientation",
     ),
     "controller without turn": (
         ri.PDController("block", orientation=(0, 0, 0, 0), angular_stiffness=1.0), r"orientation is \(0, 0, 0, 0\).*quaternion",
     ),
-    "target without gain": (ri.PDController("block", position=(0, 0, 0), angular_damping=1.0), r"position is given, but nothing pulls to it.*stiffness"),
-    "velocity without gain": (ri.PDController("block", velocity=(1, 0, 0), position=(0, 0, 0), stiffness=1.0), r"velocity is given, but nothing pulls to it.*damping"),
+    "target without gain": (
+        ri.PDController("block", position=(0, 0, 0), angular_damping=1.0), r"position is given, but nothing pulls to it.*stiffness",
+    ),
+    "velocity without gain": (
+        ri.PDController("block", velocity=(1, 0, 0), position=(0, 0, 0), stiffness=1.0),
+        r"velocity is given, but nothing pulls to it.*damping",
+    ),
     "controller too weak": (ri.PDController("block", position=(0, 0, 0), stiffness=1.0, max_force=0.0), r"max_force.*> 0"),
     "controller of text": (ri.PDController("block", position=(0, 0, 0), stiffness=1.0, max_force="all"), r"max_force"),
     "controller of a lift": (ri.PDController("lift", position=(0, 0, 0), stiffness=1.0), r"'lift' is not dynamic"),
@@ -101,7 +107,7 @@ def test_two_forces_of_one_name_are_refused() -> None:
     scene = table()
     for k in (1.0, 2.0):
         scene.add(ri.Spring(None, "block", (0, 0, 2), (0, 0, 1), k, name="rope"))
-    with pytest.raises(ri.SceneError, match="'rope'.*different names"):
+    with pytest.raises(ri.SceneError, match=r"'rope'.*different names"):
         ri.simulate(scene, 0.1)
 
 
@@ -111,7 +117,7 @@ def test_names_that_the_ledger_cannot_keep_apart_are_refused(one: str, other: st
     scene = table()
     scene.add(ri.Drag(1.0, name=one))
     scene.add(ri.Spring(None, "block", (0, 0, 2), (0, 0, 1), 10.0, name=other))
-    with pytest.raises(ri.SceneError, match="is a name of .* a name of its own"):
+    with pytest.raises(ri.SceneError, match=r"is a name of .* a name of its own"):
         ri.simulate(scene, 0.1)
 
 
@@ -120,7 +126,7 @@ def test_forces_on_no_body_are_refused(force: object) -> None:
     scene = ri.Scene()
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static"))
     scene.add(force)
-    with pytest.raises(ri.SceneError, match="no body of the scene is dynamic|bodies is empty"):
+    with pytest.raises(ri.SceneError, match=r"no body of the scene is dynamic|bodies is empty"):
         ri.simulate(scene, 0.1)
 
 

@@ -1,8 +1,9 @@
 """Springs against closed forms and a reference.
 
-Laws. Two masses on a spring through their centres swing with w^2 = k (1 / m_a + 1 / m_b); damped, w_0^2 as that and z = c (1 / m_a + 1 / m_b) /
-(2 w_0). A spring of length 0 and no rest length is the same oscillator in all directions. Off centre the reference integrates two boxes. A
-block with friction mu on a floor: turning points come nearer to the middle by 2 mu m g / k each, and it stops where k |x| < mu m g.
+Laws. Two masses on a spring through their centres swing with w^2 = k (1 / m_a + 1 / m_b); damped, w_0^2 as that and z = c (1 / m_a + 1 /
+m_b) / (2 w_0). A spring of length 0 and no rest length is the same oscillator in all directions. Off centre the reference integrates two
+boxes. A block with friction mu on a floor: turning points come nearer to the middle by 2 mu m g / k each, and it stops where k |x| < mu m
+g.
 Tolerance: 1e-8 of the size inside each step, all steps of 3 s off to one side: 2e-6; 1e-7 m is asked, an oscillator off by 1e-6 of its
 frequency would be at 2e-6. In contact a path may be off by 1e-6 of the size, 0.4 m, in each of 206 steps: 9e-5 m, of which 2e-5 is asked.
 """

@@ -2,10 +2,10 @@
 
 Laws. v = u ln(m_0 / (m_0 - q t)), x = u [t - (m_0 / q - t) ln(m_0 / (m_0 - q t))], then straight on. Under gravity -g t is added to v.
 Several thrusters: thrusts and flows add. A constant force F on a body that loses mass: v = (F / q) ln(m_0 / m). Offset by r, thrust turns
-a body about a principal axis by w' = r u q / I with I in proportion to m: w = (r u m_0 / I_0) ln(m_0 / m). Joined bodies share thrust as one.
-Stages: u_1 ln(m_0 / m_1) + u_2 ln(m_2 / m_3); for the launcher of B8 it is the escape speed at a payload of 8336.65 kg.
-Tolerance: 1e-8 of the size inside each step and its share of speed, so 1e-8 of the way and of the speed is asked; in joints a step is off by
-at most 1e-6 of the size: 1e-6 of the way. Mass that stays, or flow that takes momentum along, is off by tens of percent.
+a body about a principal axis by w' = r u q / I with I in proportion to m: w = (r u m_0 / I_0) ln(m_0 / m). Joined bodies share thrust as
+one. Stages: u_1 ln(m_0 / m_1) + u_2 ln(m_2 / m_3); for the launcher of B8 it is the escape speed at a payload of 8336.65 kg.
+Tolerance: 1e-8 of the size inside each step and its share of speed, so 1e-8 of the way and of the speed is asked; in joints a step is off
+by at most 1e-6 of the size: 1e-6 of the way. Mass that stays, or flow that takes momentum along, is off by tens of percent.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
 Laws. Harmonic A sin(w t + phi) at the centre of mass, m = 1.7: I = A (cos phi - cos(w t + phi)) / w, and the path is its integral.
 Sampled: the impulse is the trapezium rule's. A force at a point turns with nothing but its point; the reference integrates the box.
-Tolerance: inside a step a path is off by at most 1e-8 of the size (docs/forces.md), at its end by less than that, so 1e-8 m for
-each second or period is asked: 60 steps that were off by as much as they may, all to one side, would be at 6e-7. A sampled force is a line between
-its samples, which a path carries exactly: rounding, 1e-12. Frequencies taken for rad/s, or a phase left out, are off by 1.
+Tolerance: inside a step a path is off by at most 1e-8 of the size (docs/forces.md), at its end by less than that, so 1e-8 m for each
+second or period is asked: 60 steps that were off by as much as they may, all to one side, would be at 6e-7. A sampled force is a line
+between its samples, which a path carries exactly: rounding, 1e-12. Frequencies taken for rad/s, or a phase left out, are off by 1.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def test_harmonic_impulse_and_path(frequency: float, phase: float) -> None:
 
 
 def test_a_fast_force_is_seen_between_the_steps() -> None:
-    """50 Hz has a whole period in a step of 1/50: taken at ends and middle alone it is zero. Velocities inside a step are off by some E / h."""
+    """50 Hz has a whole period in a step of 1/50: at its ends and middle it is zero. Velocities inside a step are off by some E / h."""
     scene = ri.Scene(gravity=(0, 0, 0))
     scene.add(ri.Body("box", ri.Shape.box(SIZE), mass=MASS))
     scene.add(ri.HarmonicForce("box", 30.0, 50.0, (1, 0, 0)))

@@ -143,8 +143,8 @@ def test_an_elastic_ball_on_a_spring_between_walls(tolerance: float) -> None:
     first = np.arcsin(w * d / v0) / w
     hits = first * np.arange(1, 2 * len(run.impacts), 2)
     assert len(run.impacts) == int((3.0 / first + 1) // 2)
-    # A step that an impact cuts short is left at the speed of its line, off by some 12 E / h for a path off by E; 18 of them add up. Impacts
-    # at the end of their steps would be off by v h, 7e-2 m.
+    # A step that an impact cuts short is left at the speed of its line, off by some 12 E / h for a path off by E; 18 of them add up.
+    # Impacts at the end of their steps would be off by v h, 7e-2 m.
     speed = np.sqrt(v0**2 - w**2 * d**2)
     slow = 18 * 12.0 * 60.0 * 0.03 * np.sqrt(tolerance) * r
     np.testing.assert_allclose(run.impacts["time"], hits, rtol=0, atol=slow / w / speed)
