@@ -82,7 +82,7 @@ class Flexibles:
         names = [*world.names, *(body.name for body in self.bodies)]
         for name in {name for name in names if names.count(name) > 1}:
             raise SceneError("the scene has a body of this name already", "give it another", f"flexible body {name!r}")
-        nets = [body.compile() for body in self.bodies]
+        nets = [body.build() for body in self.bodies]
         self.first = np.concatenate([[0], np.cumsum([len(net.mass) for net in nets])]).astype(np.int64)
         self.net = join(nets)
         self.scheme, self.tolerance = scheme, tolerance
@@ -137,6 +137,11 @@ class Flexibles:
         self._surfaces = make_surfaces(
             world.geometry, world.shape_of_body, world.bound_radius, self.position, self.net.face, skip, gap
         )
+
+    @property
+    def weight(self) -> np.ndarray:
+        """Weight (v, 3) N of every vertex."""
+        return self.net.mass[:, None] * self._gravity
 
     def energy(self) -> float:
         """Kinetic and elastic energy in J."""
