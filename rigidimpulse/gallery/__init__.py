@@ -53,6 +53,9 @@ _MODULES = {
     "soft_hinge": "soft_hinge",
     "crowd_momentum": "crowd_momentum",
     "marbles": "marbles",
+    "cloth_on_ball": "cloth_on_ball",
+    "trampoline": "trampoline",
+    "jelly_on_stairs": "jelly_on_stairs",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 
