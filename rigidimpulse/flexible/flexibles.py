@@ -35,8 +35,8 @@ ROUNDS = 5
 """Most times that contacts are looked for again on the way that was solved for."""
 MIDPOINT_EXCESS = 1e-3
 """Energy out of nothing, relative to twice the kinetic energy, above which a step of the midpoint rule is done again by Euler's."""
-MIDPOINT_MADE = 1e-9
-"""The same for what no motion is left to be taken from; the solver's tolerance alone makes up to 1e-10."""
+MIDPOINT_MADE = 1e-7
+"""The same for what no motion is left to be taken from; the solver's tolerance alone makes 1e-8."""
 ALIKE = 0.95
 """Cosine of the angle between two normals above which one plane guards both places."""
 SCHEMES = ("euler", "midpoint")

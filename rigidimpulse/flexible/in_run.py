@@ -31,7 +31,7 @@ MOST_PIECES = 32
 """Parts into which a step of the run is cut at most where something fast comes near a net."""
 SHORTEST = 1e-9
 """Part of the run's step below which nets are not stepped: what rounding leaves at the end of a run."""
-MADE = 1e-8
+MADE = 1e-6
 """Energy made of nothing, relative to that of the nets, that is reported."""
 
 

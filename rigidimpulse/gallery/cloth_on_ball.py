@@ -17,8 +17,8 @@ from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
 from rigidimpulse.shape import Shape
 
-SIDE, CELLS = 1.6, 14
-AREA_DENSITY, STIFFNESS, BENDING, DAMPING = 0.3, 150.0, 2e-3, 0.05
+SIDE, CELLS = 1.6, 22
+AREA_DENSITY, STIFFNESS, BENDING, DAMPING = 0.3, 150.0, 2e-3, 0.1
 RADIUS, CENTRE = 0.4, (0.0, 0.0, 0.75)
 START = (0.03, -0.02, 1.6)
 DURATION = 4.0

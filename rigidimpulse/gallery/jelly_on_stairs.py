@@ -22,7 +22,7 @@ DENSITY, STIFFNESS, INNER, DAMPING = 600.0, 400.0, 4e4, 0.02
 TREAD, RISE, STEPS, WIDTH = 0.5, 0.22, 4, 1.4
 START, VELOCITY = (0.2, 0.0, 1.35), (0.9, 0.0, 0.0)
 SPIN = (0.0, 3.0, 0.5)
-DURATION = 3.5
+DURATION = 6.0
 
 
 def stairs() -> list[tuple[np.ndarray, np.ndarray]]:

@@ -4,7 +4,7 @@ Manifest (JSON)
     framing   see `camera.Framing`
     bodies    name, folder (group) and key in meshcat's tree, half spaces, number of the display geometry (-1: none),
               surface, pose of the first frame
-    nets      name, key in meshcat's tree and surface of each flexible body
+    nets      name, key in meshcat's tree, surface, and whether it is thin (cloth), of each flexible body
     numShapes, fade (s an arrow is seen), summary (a line of text)
 Messages, each with its kind
     shape     a display geometry at /shapes/k, shared by all bodies of that shape
@@ -25,7 +25,7 @@ from rigidimpulse.view.arrows import arrow_rows, fade_time, longest_arrow
 from rigidimpulse.view.camera import Path, frame_action, up_axis
 from rigidimpulse.view.display import SEGMENTS, DisplayMesh, display_mesh, display_planes
 from rigidimpulse.view.materials import net_surface, surface
-from rigidimpulse.view.nets import net_messages
+from rigidimpulse.view.nets import is_closed, net_messages
 from rigidimpulse.view.protocol import NetLike, RecordingLike
 from rigidimpulse.view.tracks import animation_message, body_tracks, pack_float32, quaternion_keys
 
@@ -77,7 +77,7 @@ def page_contents(recording: RecordingLike) -> tuple[dict[str, Any], list[tuple[
         "nets": [_net_entry(track, len(bodies) + k, num_coloured + k) for k, track in enumerate(nets)],
         "numShapes": len(meshes),
         "fade": fade_time(float(times[-1] - times[0])),
-        "summary": _summary(sum(dynamic), len(recording.impacts), float(times[-1] - times[0])),
+        "summary": _summary(sum(dynamic) + len(nets), len(recording.impacts), float(times[-1] - times[0])),
     }
     messages = [("shape", _shape_message(number, mesh)) for number, mesh in enumerate(meshes)]
     messages.append(("times", _property_message("impacts", "times", times)))
@@ -151,7 +151,9 @@ def _net_path(track: NetLike) -> Path:
 
 def _net_entry(track: NetLike, index: int, colour: int) -> dict[str, Any]:
     """Return what the manifest says of a net."""
-    return {"name": track.name, "key": _path_key(index, track.name), "surface": net_surface(colour, track.faces)}
+    closed = is_closed(track.faces)
+    surface = net_surface(colour, closed)
+    return {"name": track.name, "key": _path_key(index, track.name), "surface": surface, "thin": not closed}
 
 
 def _plane_entries(body: Any, orientation: np.ndarray, up: np.ndarray) -> list[dict[str, Any]]:

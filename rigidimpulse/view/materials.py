@@ -5,8 +5,6 @@ from __future__ import annotations
 import colorsys
 from typing import Any
 
-import numpy as np
-
 PALETTE = (
     "#2f7fb8",  # blue
     "#f0b43c",  # amber
@@ -57,10 +55,8 @@ def surface(index: int, body: Any) -> dict[str, Any]:
     }
 
 
-def net_surface(index: int, faces: np.ndarray) -> dict[str, Any]:
-    """Return how the page paints a flexible body with faces (t, 3): cloth is dull, what is closed shines like jelly; see `surface`."""
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    closed = bool(np.all(np.unique(edges, axis=0, return_counts=True)[1] == 2))
+def net_surface(index: int, closed: bool) -> dict[str, Any]:
+    """Return how the page paints a flexible body: cloth is dull, what is closed shines like jelly; see `surface`."""
     roughness, clearcoat = (0.3, 0.6) if closed else (0.75, 0.0)
     return {"color": color(index), "roughness": roughness, "metalness": 0.0, "clearcoat": clearcoat, "octants": False}
 

@@ -15,6 +15,12 @@ from rigidimpulse.view.protocol import NetLike
 from rigidimpulse.view.tracks import pack_float32
 
 
+def is_closed(faces: np.ndarray) -> bool:
+    """Whether every edge of the faces (t, 3) belongs to two of them."""
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    return bool(np.all(np.unique(edges, axis=0, return_counts=True)[1] == 2))
+
+
 def net_messages(track: NetLike, number: int) -> list[tuple[str, dict[str, Any]]]:
     """Return the messages of a net for `view.contents`, each with its kind: "net" (mesh) and "frames" (vertices of all frames).
 

@@ -1,5 +1,7 @@
 /* Flexible bodies: one mesh each, whose vertices are written anew for each picture, on straight lines between frames. */
 
+const DRAPE = 400; // steps of depth by which cloth is drawn nearer: its faces cut into round bodies between its vertices
+
 class Net {
   constructor(viewer, entry, number, times) {
     const path = ["nets", String(number)];
@@ -8,7 +10,7 @@ class Net {
     this.frames = frames;
     this.times = times;
     this.surface = makeSurface(entry.surface);
-    this.surface.side = THREE.DoubleSide;
+    Object.assign(this.surface, {side: THREE.DoubleSide, polygonOffset: entry.thin, polygonOffsetUnits: -DRAPE});
     const mesh = new THREE.Mesh(this.geometry, this.surface);
     mesh.castShadow = true;
     mesh.receiveShadow = true;
