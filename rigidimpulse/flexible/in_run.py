@@ -8,12 +8,17 @@ without the nets: under all that accelerates them now but for the nets' own forc
 What the nets gave comes back as a wrench that is linear in time, F0 + F1 (t - t0), see `flexibles`, which ends with the step. It is a force
 like others: courses follow it exactly, impacts and contacts on the way meet it. Bodies that no net touches keep their courses.
 
+A body that stands still on something is held: to the nets it is immovable, and their force on it constant. Else they would give way to it
+as to a free body and sink in. Where they press it much harder than before it is free all the same, unless they lose as much energy as a
+free body would get: no energy comes of nothing.
+
 Between the ends of steps vertices are on straight lines, and sums of energy and momentum change evenly.
 """
 
 from __future__ import annotations
 
 import math
+from copy import copy
 
 import numpy as np
 
@@ -21,7 +26,7 @@ from rigidimpulse.flexible.contact_planes import RigidMotion
 from rigidimpulse.flexible.flexibles import Flexibles, FlexibleStep
 from rigidimpulse.flexible.track import FlexibleTrack
 from rigidimpulse.forces.force import ForceTable, Instant, no_links
-from rigidimpulse.integrate.course import FORCED, FREE, begin, make_course, pose_at, state_at
+from rigidimpulse.integrate.course import FIXED, FORCED, FREE, begin, make_course, pose_at, state_at
 from rigidimpulse.rotation import to_matrix
 
 KIND = "flexible bodies"
@@ -31,6 +36,10 @@ MOST_PIECES = 32
 """Parts into which a step of the run is cut at most where something fast comes near a net."""
 SHORTEST = 1e-9
 """Part of the run's step below which nets are not stepped: what rounding leaves at the end of a run."""
+STILL = 1e-3
+"""Speed below which what a net presses stands still, relative to what gravity gives in a step."""
+HARDER = 2.0
+"""Times its last force that a net may press a body that is held, whatever the energy."""
 MADE = 1e-6
 """Energy made of nothing, relative to that of the nets, that is reported."""
 
@@ -74,13 +83,32 @@ class NetForces(ForceTable):
         sums = np.array(self.sums)
         return np.column_stack([np.interp(times, sums[:, 0], column) for column in sums[:, 1:].T])
 
-    def step(self, time: float, end: float, motion: RigidMotion) -> tuple[FlexibleStep, np.ndarray]:
-        """Step the nets; returns how it went and (n,) bool, the bodies that feel it."""
-        done = self.nets.step(time, end - time, motion)
-        self._start, self._end = time, end
+    def step(self, time: float, end: float, motion: RigidMotion, held: np.ndarray) -> tuple[FlexibleStep, np.ndarray]:
+        """Step the nets, with bodies that are held, (n,) bool; returns how it went and (n,) bool, the bodies that feel it."""
+        h, before = end - time, copy(self.nets)
+        done = self.nets.step(time, h, _fixed(motion, held) if held.any() else motion)
+        moved = held & self._might_move(done.impulse, h, motion)
+        if moved.any():
+            self.nets, held = before, held & ~moved
+            done = self.nets.step(time, h, _fixed(motion, held))
         self._value, self._rate = done.ramp[:, self.body]
+        steady = held[self.body]
+        self._value[steady], self._rate[steady] = done.impulse[self.body[steady]] / h, 0.0
+        self._start, self._end = time, end
         self.sums.append(self._sums())
         return done, motion.movable & np.any(done.ramp, axis=(0, 2))
+
+    def _might_move(self, impulse: np.ndarray, h: float, motion: RigidMotion) -> np.ndarray:
+        """Bodies (n,) bool that would get more energy from impulses (n, 6) than the nets lost, if nothing held them.
+
+        Not those that nets press no harder than before.
+        """
+        mean = np.zeros_like(impulse)
+        mean[self.body] = self._value + 0.5 * (self._end - self._start) * self._rate
+        size = np.linalg.norm(impulse.reshape(-1, 2, 3), axis=2)
+        harder = np.any(size > HARDER * h * np.linalg.norm(mean.reshape(-1, 2, 3), axis=2), axis=1)
+        gain = 0.5 * (motion.inv_mass * size[:, 0] ** 2 + np.einsum("ni,nij,nj->n", impulse[:, 3:], motion.inv_inertia, impulse[:, 3:]))
+        return harder & (gain > self.sums[-1][1:3].sum() - self._sums()[1:3].sum())
 
     def _sums(self) -> np.ndarray:
         nets = self.nets
@@ -118,7 +146,7 @@ class RunningNets:
                 end = time + (end - time) / math.ceil((end - time) / limit)
                 motion = self._motion(context, time, end)
             before = self._table.nets.position.copy()
-            done, pressed = self._table.step(time, end, motion)
+            done, pressed = self._table.step(time, end, motion, self._held(context, motion))
             context.forces.let_act(self.pressed | pressed)  # those that are let go need a course without
             self.pressed = pressed
             self._write(time, end, before)
@@ -138,6 +166,14 @@ class RunningNets:
         ledger.potential[:] -= sums[:, 0]
         ledger.momentum[:] += sums[:, 2:5]
         ledger.angular_momentum[:] += sums[:, 5:]
+
+    def _held(self, context, motion: RigidMotion) -> np.ndarray:
+        """Bodies (n,) bool that stand still on something."""
+        world, state = context.world, context.state
+        limit = STILL * world.accuracy.step * world.steady_strength
+        radius = np.where(world.dynamic, world.bound_radius, 0.0)
+        speed = np.linalg.norm(motion.velocity, axis=1) + radius * np.linalg.norm(motion.angular_velocity, axis=1)
+        return world.dynamic & (state.under_contact | (state.course.mode == FIXED)) & (speed <= limit)
 
     def _motion(self, context, time: float, end: float) -> RigidMotion:
         """All rigid bodies from `time` to `end`, without the nets."""
@@ -190,3 +226,16 @@ class RunningNets:
             report(time, "nets inside bodies", names, "contacts were left over; use a smaller step, or start nets clear of bodies")
         if done.energy_made > MADE * max(self._table.nets.energy(), 0.0):
             report(time, "nets made energy", names, f"{done.energy_made:.3g} J of nothing; use a smaller step or more damping")
+
+
+def _fixed(motion: RigidMotion, held: np.ndarray) -> RigidMotion:
+    """The motion with the held bodies, (n,) bool, where they are, immovable."""
+    return motion._replace(
+        end_position=np.where(held[:, None], motion.position, motion.end_position),
+        end_rotation=np.where(held[:, None, None], motion.rotation, motion.end_rotation),
+        velocity=np.where(held[:, None], 0.0, motion.velocity),
+        angular_velocity=np.where(held[:, None], 0.0, motion.angular_velocity),
+        inv_mass=np.where(held, 0.0, motion.inv_mass),
+        inv_inertia=np.where(held[:, None, None], 0.0, motion.inv_inertia),
+        movable=motion.movable & ~held,
+    )

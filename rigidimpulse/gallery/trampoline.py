@@ -1,7 +1,7 @@
 """Spot the cow bounces on a trampoline, a sheet whose rim is pinned.
 
-Laws: free fall until the sheet is touched; what the cow gets is what the sheet and its rim give: its momentum is the sum of gravity's impulse
-and the sheet's; energy is only taken, and some of it comes back: the cow bounces; it never gets below the sheet's reach, or through it.
+Laws: free fall until the sheet is touched; the cow's momentum is what gravity and the sheet gave it; energy is only taken, and some of it
+comes back: the cow bounces; it never passes the sheet.
 """
 
 from __future__ import annotations

@@ -124,6 +124,18 @@ def test_a_body_at_rest_wakes_when_a_net_falls_on_it() -> None:
     assert np.isfinite(run.positions).all()
 
 
+def test_a_cloth_lies_on_a_light_box_that_stands_on_the_floor() -> None:
+    # The box has 0.2 kg, the cloth 0.5 kg. Gap 0.8 mm; a net that gave way to the box as to a free body would sink 0.15 m into it.
+    scene = ri.Scene(gravity=(0.0, 0.0, -GRAVITY))
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
+    scene.add(ri.Body("box", ri.Shape.box((0.4, 0.4, 0.3)), mass=0.2, position=(0, 0, 0.15), material=ROUGH))
+    scene.add(sheet("cloth", 0.5, pinned=False, n=13, stiffness=100.0, bending=1e-3, area_density=0.5, damping=0.05))
+    run = ri.simulate(scene, 1.5)
+    depth = (np.array([0.2, 0.2, 0.15]) - np.abs(run.net("cloth")[0] - run.position("box")[:, None])).min(axis=2)
+    assert depth.max() < 5e-3
+    assert np.abs(run.position("box") - run.position("box")[0]).max() < 1e-3
+
+
 def test_files_and_pages_bring_nets_back(trampoline, tmp_path: Path) -> None:
     back = ri.load_recording(trampoline.export(tmp_path / "run.npz"))
     vertices, faces = trampoline.net("net")
