@@ -22,6 +22,7 @@ _HOMES = {
     "Drag": "forces.drag",
     "EnergyForce": "forces.energy.force",
     "FixedJoint": "constrain.joint",
+    "FlexibleBody": "flexible.body",
     "ForceField": "forces.field",
     "GravityPotential": "forces.energy.potential",
     "HarmonicForce": "forces.harmonic",

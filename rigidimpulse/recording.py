@@ -14,6 +14,7 @@ from rigidimpulse.errors import SceneError, unknown_name
 from rigidimpulse.observe.contacts import CONTACT_DTYPE, forces_on
 
 if TYPE_CHECKING:
+    from rigidimpulse.flexible.track import FlexibleTrack
     from rigidimpulse.observe.events import Event
     from rigidimpulse.observe.impulses import Impulses
     from rigidimpulse.observe.ledger import Ledger
@@ -62,6 +63,7 @@ class Recording:
         contacts: structured array, one row a stretch of time over which a lasting contact carries the same force (see
             observe.contacts.CONTACT_DTYPE); stretches that no frame sees are left out. `contacts_at`, `contact_force` by frame.
         by_cause: impulses by body and cause, see `impulses`; None in a loaded recording.
+        nets: frames of flexible bodies, see `net`.
 
     """
 
@@ -80,6 +82,7 @@ class Recording:
     reactions: dict[str, np.ndarray] = field(default_factory=dict)
     contacts: np.ndarray = field(default_factory=lambda: np.zeros(0, CONTACT_DTYPE))
     by_cause: Impulses | None = None
+    nets: list[FlexibleTrack] = field(default_factory=list)
 
     def index(self, name: str) -> int:
         """Index of a body.
@@ -113,6 +116,18 @@ class Recording:
     def center_of_mass(self, name: str) -> np.ndarray:
         """(f, 3) m."""
         return self.centers[:, self.index(name)]
+
+    def net(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (f, v, 3) m in the world and faces (t, 3) of a flexible body.
+
+        Raises:
+            SceneError: for an unknown name, listing the known ones.
+
+        """
+        for track in self.nets:
+            if track.name == name:
+                return track.vertices, track.faces
+        raise unknown_name("flexible body", name, [track.name for track in self.nets])
 
     def reaction(self, name: str) -> np.ndarray:
         """(f, 3) N, force of a joint on its body b; impulses at impacts are not in it.
@@ -158,13 +173,15 @@ class Recording:
         return forces_on(self.contacts, self.index(name), self.times)
 
     def state_hash(self) -> str:
-        """SHA-256 of all frames and impacts: equal if and only if two runs agree in every bit."""
+        """SHA-256 of all frames, nets and impacts: equal if and only if two runs agree in every bit."""
         import hashlib
 
         digest = hashlib.sha256()
         for array in (self.times, self.positions, self.orientations, self.velocities, self.angular_velocities):
             digest.update(np.ascontiguousarray(array).tobytes())
         digest.update(np.ascontiguousarray(self.impacts).tobytes())
+        for track in self.nets:
+            digest.update(np.ascontiguousarray(track.vertices).tobytes())
         return digest.hexdigest()
 
     def export(self, path: str | os.PathLike) -> Path:
@@ -223,6 +240,7 @@ class Recording:
             center_of_mass=self.centers,
             impacts=self.impacts,
             contacts=self.contacts,
+            **{key: array for number, track in enumerate(self.nets) for key, array in track.arrays(number).items()},
         )
 
 
@@ -245,8 +263,18 @@ def load_recording(path: str | os.PathLike) -> Recording:
                 centers=data["center_of_mass"],
                 impacts=data["impacts"],
                 contacts=data["contacts"],
+                nets=_nets_in(data),
             )
     except (OSError, KeyError, ValueError) as error:
         raise SceneError(
             f"{os.fspath(path)} is no recording: {error}", "give an .npz file written by Recording.export"
         ) from None
+
+
+def _nets_in(data: Any) -> list[FlexibleTrack]:
+    """Flexible bodies in the arrays of a file."""
+    if "net0_name" not in data:
+        return []
+    from rigidimpulse.flexible.track import tracks_in
+
+    return tracks_in(data)

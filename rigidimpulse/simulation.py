@@ -178,11 +178,12 @@ def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, end: float
     while context.state.time < end:
         now = context.state.time
         paths.start_segments(context, now)
-        if not np.any(context.state.course.mode != FIXED):
+        if context.nets is None and not np.any(context.state.course.mode != FIXED):
             context.state.time = min(paths.next_key(now), end)
             continue
         index = math.floor(now / size + 1e-9) + 1
-        step(context, plan, min(index * size, paths.next_key(now), end))
+        until = min(index * size, paths.next_key(now), end)
+        step(context, plan, until if context.nets is None else context.nets.advance(context, until))
         if progress is not None:
             progress(context.state.time)
 
@@ -239,6 +240,8 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
         np.where(world.dynamic, world.mass, 0.0), world.inertia, world.steady_acceleration, context.log, work,
     )
+    if context.nets is not None:
+        context.nets.add_to(ledger)
     contacts = context.contact_log.table()
     return Recording(
         times=times,
@@ -256,4 +259,5 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         reactions=reaction_table(context.joints, times),
         contacts=contacts,
         by_cause=impulses_by_cause(context, times, impacts, work),
+        nets=[] if context.nets is None else context.nets.tracks(),
     )

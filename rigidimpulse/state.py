@@ -27,6 +27,7 @@ from rigidimpulse.sweep.guard import SweepScratch, make_scratch
 from rigidimpulse.world import World
 
 if TYPE_CHECKING:
+    from rigidimpulse.flexible.in_run import RunningNets
     from rigidimpulse.forces.varying import VaryingForces
 
 CONTACT_CAPACITY = 1024
@@ -119,6 +120,7 @@ class StepContext:
         self.foresight = Foresight(world)
         self.joints = JointState(world) if world.joints_of_scene else None
         self.forces: VaryingForces | None = None
+        self.nets: RunningNets | None = None
         self.heaps = None if why_no_heaps(world) else Heaps(world)
 
     def bring(self, i: int, time: float) -> None:

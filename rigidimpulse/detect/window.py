@@ -127,8 +127,11 @@ class Window:
         self._append(pairs[:count, 0][fresh], pairs[:count, 1][fresh], time)
 
     def active_bodies(self) -> np.ndarray:
-        """Bodies that move, but for those in heaps."""
-        return np.flatnonzero((self.context.state.course.mode != FIXED) & ~self.inside)
+        """Bodies that move or that a net presses, but for those in heaps."""
+        moves = self.context.state.course.mode != FIXED
+        if self.context.nets is not None:
+            moves |= self.context.nets.pressed
+        return np.flatnonzero(moves & ~self.inside)
 
     def bodies_at(self, time: float) -> np.ndarray:
         """Bodies that come to contact or are called at `time`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,9 @@ from rigidimpulse.material import Material
 from rigidimpulse.plan import Skip
 from rigidimpulse.shape import Shape, check_orientation, rotation_matrix
 from rigidimpulse.surface import check_triangles
+
+if TYPE_CHECKING:
+    from rigidimpulse.forces.force import ForceTable
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +66,23 @@ class FlexibleBody:
     angular_velocity: ArrayLike = (0.0, 0.0, 0.0)
     gravity_factor: float = 1.0
     stage: ClassVar[str] = "forces"
+    kind: ClassVar[str] = "flexible bodies"
 
     def bind(self, _world) -> Skip:
         """Nets are moved by `Flexibles`, all together, not by a stage of their own."""
         return Skip("a flexible body; see flexible bodies")
+
+    @classmethod
+    def compile(cls, _bodies: Sequence[Self], world) -> ForceTable:
+        """Return what all nets of a compiled scene do to its rigid bodies.
+
+        Raises:
+            SceneError: naming the body, the value and the remedy.
+
+        """
+        from rigidimpulse.flexible.in_run import NetForces
+
+        return NetForces(world)
 
     @property
     def label(self) -> str:
@@ -88,7 +104,7 @@ class FlexibleBody:
             raise error.within(self.label) from None
         return vertices, faces
 
-    def compile(self) -> Net:
+    def build(self) -> Net:
         """Return its net, in its rest shape, placed where it starts.
 
         Raises:

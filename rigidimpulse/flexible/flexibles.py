@@ -35,6 +35,8 @@ ROUNDS = 5
 """Most times that contacts are looked for again on the way that was solved for."""
 MIDPOINT_EXCESS = 1e-3
 """Energy out of nothing, relative to twice the kinetic energy, above which a step of the midpoint rule is done again by Euler's."""
+MIDPOINT_MADE = 1e-7
+"""The same for what no motion is left to be taken from; the solver's tolerance alone makes 1e-8."""
 ALIKE = 0.95
 """Cosine of the angle between two normals above which one plane guards both places."""
 SCHEMES = ("euler", "midpoint")
@@ -82,7 +84,7 @@ class Flexibles:
         names = [*world.names, *(body.name for body in self.bodies)]
         for name in {name for name in names if names.count(name) > 1}:
             raise SceneError("the scene has a body of this name already", "give it another", f"flexible body {name!r}")
-        nets = [body.compile() for body in self.bodies]
+        nets = [body.build() for body in self.bodies]
         self.first = np.concatenate([[0], np.cumsum([len(net.mass) for net in nets])]).astype(np.int64)
         self.net = join(nets)
         self.scheme, self.tolerance = scheme, tolerance
@@ -137,6 +139,11 @@ class Flexibles:
         self._surfaces = make_surfaces(
             world.geometry, world.shape_of_body, world.bound_radius, self.position, self.net.face, skip, gap
         )
+
+    @property
+    def weight(self) -> np.ndarray:
+        """Weight (v, 3) N of every vertex."""
+        return self.net.mass[:, None] * self._gravity
 
     def energy(self) -> float:
         """Kinetic and elastic energy in J."""
@@ -316,6 +323,8 @@ class Flexibles:
         taken, made = 0.0, 0.0
         if excess > 0.0:
             made = take_energy(net.mass, end, velocity, self._pieces or [np.flatnonzero(free)], excess)
+            if midpoint and made > MIDPOINT_MADE * float(net.mass @ np.einsum("ij,ij->i", velocity, velocity)):
+                return None
             taken = excess - made
         self.energy_taken += taken
         self.position, self.velocity = end, velocity

@@ -1,9 +1,4 @@
-"""What a run leaves of a flexible body, and how a page gets it.
-
-A page shows a net as one mesh whose vertices are written anew for each frame: the manifest's entry names it, a `set_object` message
-brings its faces, and a `set_property` message hangs the vertices of all frames on the same node, as float32, frame by frame. Normals are
-left to the page: smooth ones follow from the faces.
-"""
+"""What a run leaves of a flexible body."""
 
 from __future__ import annotations
 
@@ -11,8 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
-from rigidimpulse.view.tracks import pack_float32
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,34 +33,3 @@ def tracks_in(arrays: Any) -> list[FlexibleTrack]:
         key = f"net{len(tracks)}"
         tracks.append(FlexibleTrack(str(arrays[f"{key}_name"]), arrays[f"{key}_vertices"], arrays[f"{key}_faces"]))
     return tracks
-
-
-def net_messages(track: FlexibleTrack, number: int) -> list[tuple[str, dict[str, Any]]]:
-    """Return the messages of a net for `view.contents`, each with its kind: "net" (mesh) and "frames" (vertices of all frames).
-
-    Raises:
-        ValueError: a vertex is not finite.
-
-    """
-    from meshcat.geometry import pack_numpy_array
-
-    if not np.isfinite(track.vertices).all():
-        raise ValueError(f"flexible body {track.name!r}: a vertex is not finite; look at the status of the run")
-    geometry, material, path = f"net geometry {number}", f"net material {number}", f"/nets/{number}"
-    attributes = {"position": pack_numpy_array(track.vertices[0].T.astype(np.float32))}
-    mesh = {
-        "type": "set_object",
-        "path": path,
-        "object": {
-            "metadata": {"version": 4.5, "type": "Object"},
-            "geometries": [{
-                "uuid": geometry,
-                "type": "BufferGeometry",
-                "data": {"attributes": attributes, "index": pack_numpy_array(track.faces.T.astype(np.uint32))},
-            }],
-            "materials": [{"uuid": material, "type": "MeshBasicMaterial", "side": 2}],
-            "object": {"uuid": f"net {number}", "type": "Mesh", "geometry": geometry, "material": material},
-        },
-    }  # fmt: skip
-    frames = {"type": "set_property", "path": path, "property": "frames", "value": pack_float32(track.vertices)}
-    return [("net", mesh), ("frames", frames)]

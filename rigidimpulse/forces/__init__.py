@@ -4,6 +4,7 @@ KINDS = {
     "ConstantForce": "forces at points",
     "Drag": "drag",
     "EnergyForce": "energy terms",
+    "FlexibleBody": "flexible bodies",
     "ForceField": "force fields",
     "PDController": "PD controllers",
     "PointAttractor": "attractors",

@@ -55,6 +55,7 @@ class ForceTable(ABC):
         body: (k,) dynamic body on which each row acts. cause: (k,) the force that it belongs to, a place in `names`.
         links: (l, 2) dynamic bodies between which a force acts: they move together.
         is_steady: whether the forces change only if bodies move, so that bodies may come to rest under them.
+        comes_and_goes: whether bodies feel them only while they are told so (`VaryingForces.let_act`).
         reason: what `explain` says of them.
         switches: whether they begin and end where bodies are, so that steps must end there (`freeze`, `switched`).
 
@@ -66,6 +67,7 @@ class ForceTable(ABC):
     cause: np.ndarray
     links: np.ndarray
     is_steady: bool
+    comes_and_goes = False
     reason: str
     switches: ClassVar[bool] = False
 

@@ -120,6 +120,10 @@ class ForceLog:
             rows = self._rows[i]
             self._value[rows], self._rate[rows] = value[rows], change[rows] / length[i]
 
+    def wrench(self, rows: np.ndarray, body: np.ndarray, time: float) -> np.ndarray:
+        """What acts on bodies (r,) by the lines of rows (r,) at `time`, (r, 6) N and N m."""
+        return self._value[rows] + self._rate[rows] * (time - self._begun[body])[:, None]
+
     def end(self, i: int, time: float) -> None:
         """The lines that act on body i end at `time`, if there are any."""
         start = self._begun[i]

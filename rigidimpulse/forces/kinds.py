@@ -38,3 +38,8 @@ def bind_forces(context, plan, times) -> None:
 
         clocks = {table.kind: partial(plan.clock, table.kind) for table in world.force_tables}
         context.forces = VaryingForces(world, context.state.course, times, clocks)
+        nets = [table for table in world.force_tables if table.kind == KINDS["FlexibleBody"]]
+        if nets:
+            from rigidimpulse.flexible.in_run import RunningNets
+
+            context.nets = RunningNets(context, nets[0], times, clocks[nets[0].kind])

@@ -61,8 +61,10 @@ class VaryingForces:
         self._clocks = [clocks[table.kind] for table in self._tables]
         self._first = np.cumsum([0, *(len(table.body) for table in self._tables)])
         self._body = np.concatenate([table.body for table in self._tables])
-        self.acts = np.zeros(n, bool)
-        self.acts[self._body] = True
+        self._always = np.zeros(n, bool)
+        for table in self._tables:
+            self._always[table.body] |= not table.comes_and_goes
+        self.acts = self._always.copy()
         self._component = _components(n, np.concatenate([table.links for table in self._tables]))
         self._restless = np.zeros(n, bool)
         for table in self._tables:
@@ -92,6 +94,15 @@ class VaryingForces:
         """Pairs of the given bodies such that those tied by forces hang together."""
         first: dict[int, int] = {}
         return [(first.setdefault(int(self._component[i]), int(i)), int(i)) for i in bodies if self.acts[i]]
+
+    def let_act(self, bodies: np.ndarray) -> None:
+        """From now on forces that come and go act on these bodies, (n,) bool, and on no others."""
+        self.acts = self._always | bodies
+
+    def present(self, table: ForceTable, time: float) -> np.ndarray:
+        """Wrenches (k, 6) of the rows of a table as courses have them at `time`, which lies in all of them."""
+        first = self._first[self._tables.index(table)]
+        return self.log.wrench(np.arange(first, first + len(table.body)), table.body, time)
 
     def may_rest(self, bodies: np.ndarray) -> bool:
         """Whether the forces on bodies at rest stay as they are."""

@@ -63,6 +63,9 @@ _MODULES = {
     "coupled_springs": "coupled_springs",
     "held_arm": "held_arm",
     "pinned_shapes": "pinned_shapes",
+    "cloth_on_ball": "cloth_on_ball",
+    "trampoline": "trampoline",
+    "jelly_on_stairs": "jelly_on_stairs",
 }
 """Module of each scene; it holds the records of its scenes in a tuple `SCENES`."""
 

@@ -4,16 +4,18 @@ Manifest (JSON)
     framing   see `camera.Framing`
     bodies    name, folder (group) and key in meshcat's tree, half spaces, number of the display geometry (-1: none),
               surface, pose of the first frame
+    nets      name, key in meshcat's tree, surface, and whether it is thin (cloth), of each flexible body
     numShapes, fade (s an arrow is seen), summary (a line of text)
 Messages, each with its kind
     shape     a display geometry at /shapes/k, shared by all bodies of that shape
     times     frame times as a property of /impacts        rows      arrows as a property of /impacts
     motion    the animation of all bodies that move
+    net, frames   faces of a flexible body, and its vertices in all frames, at /nets/k
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -22,8 +24,9 @@ from rigidimpulse.shape import rotation_matrix
 from rigidimpulse.view.arrows import arrow_rows, fade_time, longest_arrow
 from rigidimpulse.view.camera import Path, frame_action, up_axis
 from rigidimpulse.view.display import SEGMENTS, DisplayMesh, display_mesh, display_planes
-from rigidimpulse.view.materials import surface
-from rigidimpulse.view.protocol import RecordingLike
+from rigidimpulse.view.materials import net_surface, surface
+from rigidimpulse.view.nets import is_closed, net_messages
+from rigidimpulse.view.protocol import NetLike, RecordingLike
 from rigidimpulse.view.tracks import animation_message, body_tracks, pack_float32, quaternion_keys
 
 MANY_SHAPES = 50
@@ -31,6 +34,8 @@ MANY_SHAPES = 50
 FEW_SEGMENTS = 24
 LEVEL = 0.99
 """Least cosine of the slope of a half space that is drawn as the ground and not as a wall or a ramp."""
+NET_MARGIN = 0.03
+"""Margin about the vertices of a net in the picture, relative to its extent."""
 
 
 def page_contents(recording: RecordingLike) -> tuple[dict[str, Any], list[tuple[str, dict[str, Any]]]]:
@@ -47,7 +52,9 @@ def page_contents(recording: RecordingLike) -> tuple[dict[str, Any], list[tuple[
     poses = [_finite_poses(recording, body.name) for body in bodies]
     numbers, meshes = _shared_meshes(bodies)
     up = up_axis(recording.scene.gravity)
-    framing = frame_action(_paths(bodies, poses, numbers, meshes), up)
+    nets = list(recording.nets)
+    framing = frame_action(_paths(bodies, poses, numbers, meshes) + [_net_path(track) for track in nets], up)
+    framing = replace(framing, movers=[name for name in framing.movers if name not in {track.name for track in nets}])
     entries, tracks = [], {}
     num_coloured = 0
     for index, body in enumerate(bodies):
@@ -67,13 +74,16 @@ def page_contents(recording: RecordingLike) -> tuple[dict[str, Any], list[tuple[
     manifest = {
         "framing": asdict(framing),
         "bodies": entries,
+        "nets": [_net_entry(track, len(bodies) + k, num_coloured + k) for k, track in enumerate(nets)],
         "numShapes": len(meshes),
         "fade": fade_time(float(times[-1] - times[0])),
-        "summary": _summary(sum(dynamic), len(recording.impacts), float(times[-1] - times[0])),
+        "summary": _summary(sum(dynamic) + len(nets), len(recording.impacts), float(times[-1] - times[0])),
     }
     messages = [("shape", _shape_message(number, mesh)) for number, mesh in enumerate(meshes)]
     messages.append(("times", _property_message("impacts", "times", times)))
     messages.append(("rows", _property_message("impacts", "rows", rows)))
+    for number, track in enumerate(nets):
+        messages += net_messages(track, number)
     moving = {path: body_keys for path, body_keys in tracks.items() if body_keys}
     if moving:
         messages.append(("motion", animation_message(moving, float(times[-1]))))
@@ -130,6 +140,20 @@ def _paths(
             )
             paths.append(Path(body.name, position, radii[number], moves))
     return paths
+
+
+def _net_path(track: NetLike) -> Path:
+    """Return the places of all vertices of a net in all frames, as a path."""
+    vertices = np.asarray(track.vertices, dtype=np.float64)
+    margin = NET_MARGIN * float(np.linalg.norm(np.ptp(vertices[0], axis=0)))
+    return Path(track.name, vertices.reshape(-1, 3), margin, moves=True)
+
+
+def _net_entry(track: NetLike, index: int, colour: int) -> dict[str, Any]:
+    """Return what the manifest says of a net."""
+    closed = is_closed(track.faces)
+    surface = net_surface(colour, closed)
+    return {"name": track.name, "key": _path_key(index, track.name), "surface": surface, "thin": not closed}
 
 
 def _plane_entries(body: Any, orientation: np.ndarray, up: np.ndarray) -> list[dict[str, Any]]:

@@ -19,7 +19,7 @@ from typing import Any
 from rigidimpulse.view.contents import page_contents
 from rigidimpulse.view.protocol import RecordingLike
 
-SCRIPTS = ("look.js", "arrows.js", "transport.js", "hud.js", "main.js")
+SCRIPTS = ("look.js", "arrows.js", "nets.js", "transport.js", "hud.js", "main.js")
 DEFAULT_TITLE = "rigidimpulse"
 
 

@@ -22,6 +22,25 @@ class SceneLike(Protocol):
         ...
 
 
+class NetLike(Protocol):
+    """Frames of a flexible body."""
+
+    @property
+    def name(self) -> str:
+        """Of the body."""
+        ...
+
+    @property
+    def vertices(self) -> FloatArray:
+        """Vertices (f, v, 3), m, world."""
+        ...
+
+    @property
+    def faces(self) -> npt.NDArray[np.integer]:
+        """Triangles (t, 3)."""
+        ...
+
+
 class RecordingLike(Protocol):
     """A simulated motion: f frames of every body, and the impacts between them."""
 
@@ -38,6 +57,11 @@ class RecordingLike(Protocol):
     @property
     def impacts(self) -> npt.NDArray[Any]:
         """Structured array: time, body_a, body_b, point, normal, impulse, tangent_impulse."""
+        ...
+
+    @property
+    def nets(self) -> Sequence[NetLike]:
+        """The flexible bodies."""
         ...
 
     def position(self, name: str, /) -> FloatArray:

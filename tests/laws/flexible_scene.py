@@ -47,7 +47,7 @@ class SpringNet(FlexibleBody):
 
     springs: Net | None = None
 
-    def compile(self) -> Net:
+    def build(self) -> Net:
         assert self.springs is not None
         return self.springs
 

@@ -159,13 +159,16 @@ async function main() {
   const {times, rows} = viewer.scene_tree.find(["impacts"]).object;
   const impacts = new ImpactArrows(rows, manifest.fade);
   viewer.set_object(["impacts"], impacts.object);
+  const nets = makeNets(viewer, manifest.nets, times);
+  nets.forEach((net) => stage.surfaces.push(net.surface));
   const transport = new Transport(viewer.animator, times, () => {
     impacts.show(transport.time);
+    nets.forEach((net) => net.show(transport.frame, transport.time));
     bar.update();
   });
   const bar = makeBar(transport, rows);
   startViewing(viewer, stage, transport, bar);
-  expose(viewer, stage, transport, impacts);
+  expose(viewer, stage, transport, impacts, nets);
   element("summary").textContent = manifest.summary;
   transport.seek(transport.start);
   transport.play();
@@ -199,7 +202,7 @@ function startViewing(viewer, stage, transport, bar) {
 }
 
 /* For scripts and tests. */
-function expose(viewer, stage, transport, impacts) {
+function expose(viewer, stage, transport, impacts, nets) {
   window.rigidimpulse = {
     get time() { return transport.time; },
     get playing() { return transport.playing; },
@@ -211,6 +214,7 @@ function expose(viewer, stage, transport, impacts) {
       const node = stage.nodes.get(name);
       return [...node.position.toArray(), ...node.quaternion.toArray()];
     },
+    vertices: (number) => [...nets[number].geometry.attributes.position.array],
     visibleArrows: () => (impacts.object.parent.visible ? impacts.visible : []),
     viewer,
   };

@@ -1,0 +1,171 @@
+"""Flexible bodies in runs, through the public surface: momentum and energy between nets and rigid bodies, rest, files, pages."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flexible_scene import cube_mesh, sheet_mesh
+
+import rigidimpulse as ri
+
+GRAVITY = 9.81
+ROUGH = ri.Material(static_friction=0.6, dynamic_friction=0.5)
+
+
+def sheet(name: str, height: float, *, pinned: bool, n: int = 7, **more) -> ri.FlexibleBody:
+    """A square sheet of 1 m about the z axis, its rim pinned or free."""
+    vertices, faces = sheet_mesh(n)
+    vertices = vertices - [0.5, 0.5, 0.0]
+    rim = np.flatnonzero(np.abs(vertices[:, :2]).max(axis=1) > 0.499).tolist() if pinned else []
+    settings = {"stiffness": 2000.0, "damping": 0.002, "area_density": 1.0, "position": (0.0, 0.0, height)} | more
+    return ri.FlexibleBody(name, vertices, faces, pinned=rim, material=ROUGH, **settings)
+
+
+def trampoline_scene() -> ri.Scene:
+    scene = ri.Scene(gravity=(0.0, 0.0, -GRAVITY))
+    scene.add(sheet("net", 1.0, pinned=True))
+    scene.add(ri.Body("ball", ri.Shape.sphere(0.15), mass=3.0, position=(0.03, 0.02, 1.4), material=ROUGH))
+    return scene
+
+
+@pytest.fixture(scope="module")
+def trampoline() -> ri.Recording:
+    return ri.simulate(trampoline_scene(), 0.8)
+
+
+def test_a_ball_bounces_on_a_trampoline_by_the_impulses_of_the_net(trampoline) -> None:
+    # m v - m v0 = m g t + J. Without the net's rate the impulse of a step would be off by tenths of it, 0.1 N s and more.
+    parts = trampoline.impulses("ball")
+    assert set(parts) <= {"gravity", "flexible bodies", "corrections"}
+    gained = 3.0 * trampoline.velocity("ball")
+    np.testing.assert_allclose(parts["gravity"] + parts["flexible bodies"], gained, atol=1e-11)
+    assert trampoline.velocity("ball")[:, 2].max() > 1.0  # it came down with 2.2 m/s
+    assert trampoline.position("ball")[:, 2].min() > 0.5
+    assert trampoline.status.ok, trampoline.status.message
+
+
+def test_energy_balances_and_does_not_rise(trampoline) -> None:
+    # 3.0 kg fall 0.25 m: 7 J. The balance is round-off; what a step may make is of second order, J (h L - J) / 2 m (docs/flexible.md).
+    ledger = trampoline.ledger
+    taken = np.sum(list(ledger.dissipated.values()), axis=0)
+    assert np.abs(ledger.total + taken - ledger.total[0]).max() < 1e-11
+    assert np.diff(ledger.total).max() < 1e-3 * 7.0
+    assert ledger.dissipated["flexible bodies"][-1] > 0.1
+
+
+def test_what_a_free_net_and_a_ball_exchange_cancels() -> None:
+    # No gravity, nothing pinned: p and L of both together stay, whatever they exchange (the ball alone loses a tenth of its 6 kg m/s).
+    scene = ri.Scene(gravity=(0.0, 0.0, 0.0))
+    scene.add(sheet("net", 0.0, pinned=False))
+    scene.add(ri.Body("ball", ri.Shape.sphere(0.15), mass=2.0, position=(0.1, 0.05, 0.3), velocity=(0.2, 0.0, -3.0), material=ROUGH))
+    run = ri.simulate(scene, 0.4)
+    ledger = run.ledger
+    lost = 2.0 * np.linalg.norm(run.velocity("ball")[-1] - run.velocity("ball")[0])
+    assert lost > 0.6
+    np.testing.assert_allclose(ledger.momentum - ledger.momentum[0], 0.0, atol=1e-11)
+    # Frames are ends of steps. The rotation in a step is of second order in what the net gives: without the ball's part it were off by 0.1.
+    np.testing.assert_allclose(ledger.angular_momentum - ledger.angular_momentum[0], 0.0, atol=1e-3)
+
+
+def test_the_same_bits_twice_and_at_any_frame_rate(trampoline) -> None:
+    again = ri.simulate(trampoline_scene(), 0.8)
+    assert again.state_hash() == trampoline.state_hash()
+    coarse = ri.simulate(trampoline_scene(), 0.8, fps=10.0)
+    assert np.array_equal(coarse.positions, trampoline.positions[::6])
+    assert np.array_equal(coarse.net("net")[0][1:], trampoline.net("net")[0][6::6])
+
+
+def boxes_scene(*nets: ri.FlexibleBody) -> ri.Scene:
+    scene = ri.Scene(gravity=(0.0, 0.0, -GRAVITY))
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static"))
+    scene.add(ri.Body("box", ri.Shape.box((0.3, 0.2, 0.1)), position=(0, 0, 0.3), angular_velocity=(1.0, 2.0, 0.5)))
+    scene.add(ri.Body("ball", ri.Shape.sphere(0.1), position=(0.05, 0.0, 0.6), velocity=(0.5, 0.0, 0.0)))
+    for net in nets:
+        scene.add(net)
+    return scene
+
+
+def test_a_net_far_away_leaves_the_bits_of_rigid_bodies_as_they_are() -> None:
+    alone = ri.simulate(boxes_scene(), 1.0)
+    beside = ri.simulate(boxes_scene(sheet("net", 50.0, pinned=True, n=4)), 1.0)
+    assert np.array_equal(alone.positions, beside.positions)
+    assert np.array_equal(alone.orientations, beside.orientations)
+    assert np.array_equal(alone.velocities, beside.velocities)
+
+
+def test_a_net_without_load_falls_as_a_stone_does() -> None:
+    # Implicit Euler alone would be off by g h t / 2 = 0.04 m.
+    scene = ri.Scene(gravity=(0.0, 0.0, -GRAVITY))
+    scene.add(ri.Body("stone", ri.Shape.sphere(0.1), position=(0.0, 0.0, 5.0)))
+    scene.add(sheet("cloth", 3.0, pinned=False, n=4, position=(3.0, 0.0, 5.0)))
+    run = ri.simulate(scene, 0.5)
+    heights = run.net("cloth")[0][:, :, 2].mean(axis=1)
+    np.testing.assert_allclose(heights, run.position("stone")[:, 2], atol=1e-6)
+
+
+def test_a_body_at_rest_wakes_when_a_net_falls_on_it() -> None:
+    # A cube of jelly of 4 kg comes down on the end of a plank that rests on a block: it tips. Asleep it would stay where it is.
+    scene = ri.Scene(gravity=(0.0, 0.0, -GRAVITY))
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
+    scene.add(ri.Body("block", ri.Shape.box((0.1, 0.4, 0.2)), motion="static", position=(0, 0, 0.1), material=ROUGH))
+    scene.add(ri.Body("plank", ri.Shape.box((1.0, 0.3, 0.05)), mass=1.0, position=(0, 0, 0.225), material=ROUGH))
+    vertices, faces = cube_mesh(3, 0.2)
+    scene.add(ri.FlexibleBody(
+        "jelly", vertices, faces, stiffness=500.0, inner_stiffness=5e4, damping=0.01, mass=4.0, position=(0.38, 0, 1.2), material=ROUGH,
+    ))  # fmt: skip
+    run = ri.simulate(scene, 1.0)
+    frame = int(0.3 * 60)
+    assert not run.velocities[frame, 2].any()  # at rest before the jelly comes, after 0.41 s
+    assert run.orientation("plank")[-1] @ run.orientation("plank")[frame] < 0.999
+    assert np.isfinite(run.positions).all()
+
+
+def test_a_cloth_lies_on_a_light_box_that_stands_on_the_floor() -> None:
+    # The box has 0.2 kg, the cloth 0.5 kg. Gap 0.8 mm; a net that gave way to the box as to a free body would sink 0.15 m into it.
+    scene = ri.Scene(gravity=(0.0, 0.0, -GRAVITY))
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
+    scene.add(ri.Body("box", ri.Shape.box((0.4, 0.4, 0.3)), mass=0.2, position=(0, 0, 0.15), material=ROUGH))
+    scene.add(sheet("cloth", 0.5, pinned=False, n=13, stiffness=100.0, bending=1e-3, area_density=0.5, damping=0.05))
+    run = ri.simulate(scene, 1.5)
+    depth = (np.array([0.2, 0.2, 0.15]) - np.abs(run.net("cloth")[0] - run.position("box")[:, None])).min(axis=2)
+    assert depth.max() < 5e-3
+    assert np.abs(run.position("box") - run.position("box")[0]).max() < 1e-3
+
+
+def test_files_and_pages_bring_nets_back(trampoline, tmp_path: Path) -> None:
+    back = ri.load_recording(trampoline.export(tmp_path / "run.npz"))
+    vertices, faces = trampoline.net("net")
+    assert vertices.shape == (49, 49, 3) and faces.shape == (72, 3)
+    assert np.array_equal(back.net("net")[0], vertices) and np.array_equal(back.net("net")[1], faces)
+    page = trampoline.export(tmp_path / "run.html").read_text()
+    assert 'data-kind="frames"' in page and '"name":"net"' in page
+    with pytest.raises(ri.SceneError, match="net"):
+        trampoline.net("cloth")
+
+
+def test_nets_can_be_left_out_by_name() -> None:
+    run = ri.simulate(trampoline_scene(), 0.5, effects={"flexible bodies": False})
+    assert run.nets == []
+    np.testing.assert_allclose(run.position("ball")[-1, 2], 1.4 - 0.5 * GRAVITY * 0.25, atol=1e-12)
+    assert not run.status.ok  # it says so
+
+
+def test_two_bodies_of_one_name_are_refused() -> None:
+    scene = trampoline_scene()
+    scene.add(sheet("ball", 2.0, pinned=False, n=3))
+    with pytest.raises(ri.SceneError, match="'ball'"):
+        ri.simulate(scene, 0.1)
+
+
+def test_scenes_without_nets_load_nothing_of_them() -> None:
+    code = (
+        "import sys, rigidimpulse as ri; s = ri.Scene(); s.add(ri.Body('b', ri.Shape.sphere(1.0)));"
+        "r = ri.simulate(s, 0.1);"
+        "print([m for m in sys.modules if m.startswith('rigidimpulse.flexible')], 'flexible bodies' in r.plan.explain())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip().splitlines()[-1] == "[] True"
