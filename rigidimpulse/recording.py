@@ -229,6 +229,7 @@ class Recording:
         return path
 
     def _write_npz(self, path: Path) -> None:
+        nets: Any = {key: array for number, track in enumerate(self.nets) for key, array in track.arrays(number).items()}
         np.savez_compressed(
             path,
             times=self.times,
@@ -240,7 +241,7 @@ class Recording:
             center_of_mass=self.centers,
             impacts=self.impacts,
             contacts=self.contacts,
-            **{key: array for number, track in enumerate(self.nets) for key, array in track.arrays(number).items()},
+            **nets,
         )
 
 

@@ -32,6 +32,7 @@ CALLS_FOR = {
     "rolling": "contact detection, gravity, friction, rolling friction, contact forces",
     "arm": "contact detection, gravity, gyroscopic term, joints, friction, contact forces",
     "pile": "contact detection, gravity, friction, contact forces, heaps",
+    "penalty_bounce": "penalty forces",
     "smoothed_path": "contact detection, gravity, gyroscopic term, friction, contact forces",
     "settled_layout": "contact detection, gravity, gyroscopic term, friction, contact forces",
     "emergency_stop": "contact detection, gravity, gyroscopic term, friction, contact forces",
@@ -49,6 +50,18 @@ CALLS_FOR = {
     "soft_hinge": "contact detection, gravity, gyroscopic term, joints, friction, contact forces",
     "crowd_momentum": "contact detection, gravity, gyroscopic term, joints, friction, contact forces",
     "marbles": "contact detection, gravity, friction, contact forces, heaps",
+    "rocket": "contact detection, gravity, thrusters, gyroscopic term, friction, contact forces",
+    "launcher": "contact detection, thrusters, gyroscopic term, joints, friction, contact forces",
+    "handgun": "contact detection, springs, gyroscopic term, friction, contact forces",
+    "driven_oscillator": "contact detection, springs, harmonic forces, friction, contact forces",
+    "parachute": "contact detection, gravity, drag, gyroscopic term, joints, friction, contact forces",
+    "planets": "contact detection, attractors, friction, contact forces",
+    "coupled_springs": "contact detection, springs, friction, contact forces",
+    "held_arm": "contact detection, gravity, PD controllers, gyroscopic term, joints, friction, contact forces",
+    "pinned_shapes": "contact detection, gravity, drag, energy terms, gyroscopic term, friction, contact forces",
+    "cloth_on_ball": "flexible bodies",
+    "trampoline": "contact detection, gravity, flexible bodies, gyroscopic term, friction, contact forces",
+    "jelly_on_stairs": "flexible bodies",
 }
 """Names of effects, in the order of the loop."""
 MEETING = {"impulses", "impact time"}

@@ -56,6 +56,10 @@ EFFECTS = {
     "thrusters": ("flight", 'scene.add(ri.Thruster("a", 10.0, 0.1, (0, 0, 1), 1.0))', ["rigidimpulse.forces.thruster"]),
     "harmonic forces": ("ground", 'scene.add(ri.HarmonicForce("a", 1.0, 2.0, (1, 0, 0)))', ["rigidimpulse.forces.harmonic"]),
     "sampled forces": ("balls", 'scene.add(ri.SampledForce("a", [0, 1], [(0, 0, 1), (0, 0, 0)]))', ["rigidimpulse.forces.sampled"]),
+    "flexible bodies": (
+        "flight", 'scene.add(ri.FlexibleBody("net", [(5, 0, 0), (6, 0, 0), (5, 1, 0)], [(0, 1, 2)], mass=0.1, stiffness=100.0))',
+        ["rigidimpulse.flexible"],
+    ),
     "constant forces": ("ground", 'scene.add(ri.ConstantForce("a", (1, 0, 0)))', []),
     "gravity": ("balls", "scene.gravity = (0, 0, -1)", []),
     "joints": ("ground", 'scene.add(ri.BallJoint("a", "b", (0.25, 0, 0.3)))', ["rigidimpulse.constrain.joint_forces"]),

@@ -230,7 +230,7 @@ def check_names(tables: Sequence[ForceTable]) -> None:
         SceneError: forces of two kinds have the same name, or one has that of another cause.
 
     """
-    seen = dict.fromkeys(CAUSES, "the ledger")
+    seen: dict[str, str] = dict.fromkeys(CAUSES, "the ledger")
     for table in tables:
         for name in table.names:
             if name in seen:

@@ -8,6 +8,8 @@ enough.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from rigidimpulse.body import Body
@@ -41,7 +43,7 @@ def scene() -> Scene:
         place = (at + 0.5 * length, 0.0, 0.5)
         scene.add(Body(name, Shape.box((length - 0.04, 0.12, 0.08)), mass=mass, position=place, material=hard))
         scene.add(HingeJoint(before, name, (at, 0.0, 0.5), (0.0, 1.0, 0.0), name=f"hinge of the {name}"))
-        gains = {"stiffness": STIFFNESS, "damping": DAMPING, "angular_stiffness": TURN, "angular_damping": TURN_DAMPING}
+        gains: dict[str, Any] = {"stiffness": STIFFNESS, "damping": DAMPING, "angular_stiffness": TURN, "angular_damping": TURN_DAMPING}
         scene.add(PDController(name, position=place, orientation=(1.0, 0.0, 0.0, 0.0), **gains))
         at, before = at + length, name
     ball = Shape.sphere(0.1)

@@ -11,6 +11,7 @@ Stages and payload are bodies of their own, held by fixed joints that let go (`r
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +47,8 @@ def payload() -> float:
     """Return the payload that reaches escape speed, kg."""
     from scipy.optimize import brentq
 
-    return float(brentq(lambda p: final_speed(p) - ESCAPE, 1e3, 1e5))
+    root: Any = brentq(lambda p: final_speed(p) - ESCAPE, 1e3, 1e5)
+    return float(root)
 
 
 def scene() -> Scene:
@@ -61,7 +63,7 @@ def scene() -> Scene:
     for k, name in enumerate(STAGES):
         _, propellant, impulse = STAGES[name]
         lit = k * (BURN + COAST)
-        thrust = {"exhaust_velocity": SLOWER * impulse * GRAVITY, "mass_flow": propellant / BURN, "propellant": propellant}
+        thrust: dict[str, Any] = {"exhaust_velocity": SLOWER * impulse * GRAVITY, "mass_flow": propellant / BURN, "propellant": propellant}
         scene.add(Thruster(name, direction=(0.0, 0.0, 1.0), start=lit, **thrust))
         scene.add(FixedJoint(name, names[k + 1], name=f"above {name}", release_time=lit + BURN))
     return scene
