@@ -229,7 +229,9 @@ class Recording:
         return path
 
     def _write_npz(self, path: Path) -> None:
-        nets: Any = {key: array for number, track in enumerate(self.nets) for key, array in track.arrays(number).items()}
+        nets: dict[str, Any] = {}
+        for number, track in enumerate(self.nets):
+            nets.update(track.arrays(number))
         np.savez_compressed(
             path,
             times=self.times,

@@ -34,6 +34,8 @@ MANY_SHAPES = 50
 FEW_SEGMENTS = 24
 LEVEL = 0.99
 """Least cosine of the slope of a half space that is drawn as the ground and not as a wall or a ramp."""
+NET_COLOUR = 2
+"""Colours of the palette that are left out between bodies and nets: amber blanches on level cloth."""
 NET_MARGIN = 0.03
 """Margin about the vertices of a net in the picture, relative to its extent."""
 
@@ -74,7 +76,7 @@ def page_contents(recording: RecordingLike) -> tuple[dict[str, Any], list[tuple[
     manifest = {
         "framing": asdict(framing),
         "bodies": entries,
-        "nets": [_net_entry(track, len(bodies) + k, num_coloured + k) for k, track in enumerate(nets)],
+        "nets": [_net_entry(track, len(bodies) + k, num_coloured + NET_COLOUR + k) for k, track in enumerate(nets)],
         "numShapes": len(meshes),
         "fade": fade_time(float(times[-1] - times[0])),
         "summary": _summary(sum(dynamic) + len(nets), len(recording.impacts), float(times[-1] - times[0])),
