@@ -75,7 +75,7 @@ def test_plan_takes_in_what_the_author_calls_for(name: str) -> None:
     wanted = set(CALLS_FOR[name].split(", ")) - {""}
     if "contact detection" in wanted:
         wanted |= MEETING
-    wanted |= VARYING if wanted & (set(KINDS.values()) | {"flexible bodies"}) else {"exact flight"}
+    wanted |= VARYING if wanted & (set(KINDS.values()) | {"penalty forces"}) else {"exact flight"}
     if wanted & (MEETING | VARYING | {"joints"}):
         wanted.add("steady load")
     assert {line.name for line in plan.lines if line.included} == wanted
