@@ -210,7 +210,7 @@ def check_names(tables: Sequence[ForceTable]) -> None:
         SceneError: forces of two kinds have the same name, or one has that of another cause.
 
     """
-    seen = dict.fromkeys(CAUSES, "the ledger")
+    seen: dict[str, str] = {cause: "the ledger" for cause in CAUSES}
     for table in tables:
         for name in table.names:
             if name in seen:

@@ -41,8 +41,12 @@ def scene() -> Scene:
         place = (at + 0.5 * length, 0.0, 0.5)
         scene.add(Body(name, Shape.box((length - 0.04, 0.12, 0.08)), mass=mass, position=place, material=hard))
         scene.add(HingeJoint(before, name, (at, 0.0, 0.5), (0.0, 1.0, 0.0), name=f"hinge of the {name}"))
-        gains = {"stiffness": STIFFNESS, "damping": DAMPING, "angular_stiffness": TURN, "angular_damping": TURN_DAMPING}
-        scene.add(PDController(name, position=place, orientation=(1.0, 0.0, 0.0, 0.0), **gains))
+        scene.add(
+            PDController(
+                name, position=place, orientation=(1.0, 0.0, 0.0, 0.0), stiffness=STIFFNESS, damping=DAMPING,
+                angular_stiffness=TURN, angular_damping=TURN_DAMPING,
+            )
+        )  # fmt: skip
         at, before = at + length, name
     ball = Shape.sphere(0.1)
     scene.add(Body("ball", ball, mass=1.5, position=BALL_START, velocity=(0.0, 0.0, BALL_SPEED), material=hard))

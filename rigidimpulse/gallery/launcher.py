@@ -46,7 +46,7 @@ def payload() -> float:
     """Return the payload that reaches escape speed, kg."""
     from scipy.optimize import brentq
 
-    return float(brentq(lambda p: final_speed(p) - ESCAPE, 1e3, 1e5))
+    return brentq(lambda p: final_speed(p) - ESCAPE, 1e3, 1e5)  # pyright: ignore[reportReturnType]
 
 
 def scene() -> Scene:
@@ -61,8 +61,8 @@ def scene() -> Scene:
     for k, name in enumerate(STAGES):
         _, propellant, impulse = STAGES[name]
         lit = k * (BURN + COAST)
-        thrust = {"exhaust_velocity": SLOWER * impulse * GRAVITY, "mass_flow": propellant / BURN, "propellant": propellant}
-        scene.add(Thruster(name, direction=(0.0, 0.0, 1.0), start=lit, **thrust))
+        speed = SLOWER * impulse * GRAVITY
+        scene.add(Thruster(name, speed, propellant / BURN, (0.0, 0.0, 1.0), propellant, lit))
         scene.add(FixedJoint(name, names[k + 1], name=f"above {name}", release_time=lit + BURN))
     return scene
 

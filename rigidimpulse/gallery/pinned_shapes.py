@@ -56,8 +56,8 @@ def scene() -> Scene:
         place = SPACING * (np.array([int(c) for c in name.split()[1]]) - 0.5)
         scene.add(Body(name, Shape.box(BLOCK), mass=0.5, position=place, material=bouncy, gravity_factor=0.0))
     ball = Shape.sphere(0.12)
-    start = {"position": (-1.5, 0.05, 0.12), "velocity": (3.0, 0.0, 0.0)}
-    scene.add(Body("ball", ball, mass=0.8, material=bouncy, gravity_factor=0.0, **start))
+    start, speed = (-1.5, 0.05, 0.12), (3.0, 0.0, 0.0)
+    scene.add(Body("ball", ball, mass=0.8, material=bouncy, gravity_factor=0.0, position=start, velocity=speed))
     scene.add(EnergyForce(RestoreShape(list(BLOCKS), WEIGHT), name="shape"))
     for k, pin in enumerate(chain(scene)):
         scene.add(EnergyForce(pin, name=f"pin {k + 1}"))
