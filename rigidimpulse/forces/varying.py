@@ -30,6 +30,8 @@ IN_FLIGHT, IN_CONTACT = 0.03, 3.0
 fly and for each step of the run of those in contact. 1e-8 and 1e-6 by default."""
 SHORTEST = 2.0**-14
 """Part of the run's step below which it is not split for forces."""
+FIRST = 2.0**-6
+"""Part of the run's step that the first sub-step of bodies takes that have just come to be held."""
 SAFETY, LEAST_CHANGE, MOST_CHANGE = 0.9, 0.2, 5.0
 """How step lengths follow errors."""
 ASIDE = 1e-9
@@ -81,7 +83,7 @@ class VaryingForces:
         self._cut = 0.0
         burners = [table for table in self._tables if isinstance(table, BurningForces)]
         self.flow = MassFlow(burners, world, course) if burners else None
-        self._last = np.zeros((n, 6))
+        self._last, self._held_until, self._was_held = np.zeros((n, 6)), np.full(n, -np.inf), np.zeros(n, bool)
         self.value, self.rate = np.zeros((n, 6)), np.zeros((n, 6))
         self.log = ForceLog(times, self._body, course)
 
@@ -198,6 +200,11 @@ class VaryingForces:
         members = group.members[self.acts[group.members]]
         time, step = group.time, world.accuracy.step
         plan = float(self._plan[members].min())
+        if not group.loaded:
+            self._was_held[members] = self._held_until[members] >= time - ASIDE * step
+        if not self._was_held[members].any():
+            # Nobody knows yet what contacts and joints do: forces that answer the fall would throw what has just landed.
+            h = min(h, FIRST * step)
         given = h = min(h, self._next_break(time) - time, plan)
         _, start = self._start(context, time, np.full(len(self.acts), h), members)
         if not group.loaded:
@@ -205,7 +212,7 @@ class VaryingForces:
             self._last[members] = np.hstack([pull, state.course.torque[members]])
         # Held bodies go on under the sum of what acted last: contacts and joints of the last sub-step beside forces of this one would not
         # balance each other, and what damps along a held direction would make that grow.
-        last = np.where(state.under_contact[:, None], self._last, start)
+        last = np.where(self._was_held[:, None], self._last, start)
         while True:
             if self.flow is not None:
                 # What holds the members feels all their masses: those of the middle.
@@ -235,6 +242,7 @@ class VaryingForces:
         self._plan[members] = np.minimum(follows, self._longest[members])
         rows, sums = (Lines(f, np.zeros_like(f), np.zeros_like(f)) for f in (value, total))
         self._keep(members, time, rows, sums, np.full(len(self.acts), h))
+        self._held_until[members] = time + h
         group.loaded = True
         context.acceleration[members] = group.free[0][self.acts[group.members]] + now.inv_mass[members, None] * total[members, :3]
         turned = np.einsum("ijk,ik->ij", now.inv_inertia[members], total[members, 3:])

@@ -175,3 +175,19 @@ def test_a_block_hung_on_a_spring_at_its_length_rests() -> None:
     run = ri.simulate(scene, 1.0)
     np.testing.assert_array_equal(run.velocity("block")[-30:], 0.0)
     np.testing.assert_allclose(run.contact_force("block")[-1], (0, 0, 2.0 * 9.81 - 5.0), rtol=0, atol=1e-5)
+
+
+def test_damping_along_a_held_direction_does_not_swing_up() -> None:
+    """A block slides on a smooth floor in a field that damps its height alone, c h / 2 m = 4: the floor carries m g, nothing else.
+
+    Forces of the middle of a sub-step that answered the floor's force of the one before would grow four times a sub-step.
+    """
+    smooth = ri.Material(static_friction=0.0, dynamic_friction=0.0, restitution=0.0)
+    scene = ri.Scene(gravity=(0, 0, -9.81))
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=smooth))
+    scene.add(ri.Body("block", ri.Shape.box(0.2), mass=0.1, position=(0, 0, 0.1), velocity=(1, 0, 0), material=smooth))
+    scene.add(ri.ForceField(lambda t, x, v: -48.0 * v * (0.0, 0.0, 1.0)))
+    run = ri.simulate(scene, 1.0, accuracy=ri.Accuracy(tolerance=1e-2))
+    assert run.status.ok, run.status.message
+    np.testing.assert_allclose(run.contact_force("block")[10:-1], np.broadcast_to((0, 0, 0.981), (50, 3)), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(run.position("block")[:, 0], run.times, rtol=0, atol=1e-12)
