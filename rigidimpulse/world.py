@@ -118,6 +118,10 @@ class World:
             from rigidimpulse.respond.penalty import PenaltyForces
 
             tables.append(PenaltyForces(self))
+        if tables:
+            from rigidimpulse.forces.force import check_names
+
+            check_names(tables)
         return tables
 
     @cached_property

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.detect.touching import refresh_pose
-from rigidimpulse.forces.force import ForceTable, Instant, check_names
+from rigidimpulse.forces.force import ForceTable, Instant
 from rigidimpulse.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.forces.mass_flow import BurningForces, MassFlow
 from rigidimpulse.integrate.force_step import Lines, Room, nystroem, semi_implicit
@@ -59,7 +59,6 @@ class VaryingForces:
         n = world.num_bodies
         self._world = world
         self._tables: list[ForceTable] = world.force_tables
-        check_names(self._tables)
         self._clocks = [clocks[table.kind] for table in self._tables]
         self._first = np.cumsum([0, *(len(table.body) for table in self._tables)])
         self._body = np.concatenate([table.body for table in self._tables])
