@@ -19,6 +19,7 @@ from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.resting import SLIP, SOLVE_TOLERANCE
 from rigidimpulse.constrain.rows import change_velocities, contact_rows, row_velocities, solve_with_slip
 from rigidimpulse.respond.impulse import Contacts, select
+from rigidimpulse.rotation import cross
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,8 @@ class PairForce:
 
 def remember_forces(state, time: float, keys, contacts: Contacts, force, world_force, slides) -> None:
     """Keep the forces of m contacts from `time` on: force (m, 3) in their frames, world_force (m, 3) N on b, slides (m,) bool."""
-    torque_a = np.cross(contacts.arm_a, world_force)
-    torque_b = np.cross(contacts.arm_b, world_force)
+    torque_a = cross(contacts.arm_a, world_force)
+    torque_b = cross(contacts.arm_b, world_force)
     for pair in sorted(set(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True))):
         at = np.flatnonzero((contacts.body_a == pair[0]) & (contacts.body_b == pair[1]))
         pull = world_force[at].sum(axis=0)

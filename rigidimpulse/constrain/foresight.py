@@ -18,6 +18,7 @@ from rigidimpulse.constrain.contact_motion import contact_motion
 from rigidimpulse.detect.touching import bring_all
 from rigidimpulse.integrate.course import FORCED, begin, make_course
 from rigidimpulse.respond.impulse import BodyState, Contacts
+from rigidimpulse.rotation import cross
 
 ALLOWED = 0.1
 """Part of delta by which a gap may be off at the end of a sub-step."""
@@ -58,8 +59,8 @@ class Foresight:
             group.features[subset],
         ).turning
         a, b = contacts.body_a, contacts.body_b
-        point_a = self.acceleration[a] + np.cross(self.angular_acceleration[a], ahead.arm_a)
-        point_b = self.acceleration[b] + np.cross(self.angular_acceleration[b], ahead.arm_b)
+        point_a = self.acceleration[a] + cross(self.angular_acceleration[a], ahead.arm_a)
+        point_b = self.acceleration[b] + cross(self.angular_acceleration[b], ahead.arm_b)
         return np.einsum("ij,ij->i", point_b - point_a + turning, normal) * (h * h / 6.0)
 
     def _bring(self, now: BodyState, members: np.ndarray, acceleration: np.ndarray, wrench: np.ndarray, h: float) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from rigidimpulse.flexible.contact_terms import NetContacts
 from rigidimpulse.flexible.touching import fit_boxes, sample_points, samples_on_faces, vertices_on_bodies
 from rigidimpulse.geometry import ROUND, CompiledShape, Geometry, Primitive, build_geometry
+from rigidimpulse.rotation import cross
 
 LIFT = 0.2
 """Share of a missing gap that a vertex is moved by, per step, without any velocity."""
@@ -142,7 +143,7 @@ def sides_of(touches: Touches, x: np.ndarray, rotation: np.ndarray, first_key: i
 
 
 def _face_normals(corners: np.ndarray) -> np.ndarray:
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def _no_touches() -> Touches:
@@ -185,7 +186,7 @@ def make_contacts(
     before -= normal * np.einsum("ij,ij->i", before, normal)[:, None]
     aim = rigid.end_position[b] + arm + before + touches.target[:, None] * normal
     slip = np.einsum("mk,mkj->mj", touches.weight, velocity[touches.node]) - rigid.velocity[b]
-    slip -= np.cross(rigid.angular_velocity[b], place - rigid.position[b])
+    slip -= cross(rigid.angular_velocity[b], place - rigid.position[b])
     slip -= normal * np.einsum("ij,ij->i", slip, normal)[:, None]
     pair = friction[touches.node[:, 0], b]
     grip = np.where(np.linalg.norm(slip, axis=1) > slow, pair[:, 1], pair[:, 0])

@@ -26,7 +26,7 @@ from rigidimpulse.flexible.contact_terms import NetContacts
 from rigidimpulse.flexible.minimise import Problem, Solution, minimise, set_penalties, value_of
 from rigidimpulse.flexible.net import join
 from rigidimpulse.material import combine
-from rigidimpulse.rotation import quaternion_from_rotation_vector, to_matrix
+from rigidimpulse.rotation import cross, quaternion_from_rotation_vector, to_matrix
 from rigidimpulse.world import World
 
 GAP = 0.01
@@ -351,10 +351,10 @@ class Flexibles:
             mine = np.isin(contacts.node[:, 0], piece)
             fall = h * (m[:, None] * self._gravity[piece]).sum(0)
             momentum = m @ before[piece] + fall + impulse[mine].sum(0)
-            angular = (m[:, None] * np.cross(self.position[piece] - origin, before[piece])).sum(0)
-            angular += np.cross(place[mine] - origin, impulse[mine]).sum(0)
+            angular = (m[:, None] * cross(self.position[piece] - origin, before[piece])).sum(0)
+            angular += cross(place[mine] - origin, impulse[mine]).sum(0)
             if midpoint:  # its centre follows the parabola: gravity acts at the mean of its places, not at the first
-                angular += 0.5 * h * np.cross(m @ before[piece], fall) / m.sum()
+                angular += 0.5 * h * cross(m @ before[piece], fall) / m.sum()
             went = 0.5 * h * (momentum + m @ before[piece]) if midpoint else h * momentum
             end[piece] += origin + went / m.sum() - m @ end[piece] / m.sum()
             v = velocity[piece]
@@ -372,11 +372,11 @@ class Flexibles:
     def _given(self, contacts: NetContacts, impulse, rigid: RigidMotion, hold, end) -> np.ndarray:
         """Impulses (n, 6) that the nets gave the bodies."""
         given = np.zeros((len(rigid.inv_mass), 6))
-        np.subtract.at(given, contacts.body, np.concatenate([impulse, np.cross(contacts.arm, impulse)], axis=1))
+        np.subtract.at(given, contacts.body, np.concatenate([impulse, cross(contacts.arm, impulse)], axis=1))
         vertices, bodies, _ = self._held
         on = bodies >= 0
         arm = end[vertices[on]] - rigid.end_position[bodies[on]]
-        np.subtract.at(given, bodies[on], np.concatenate([hold[vertices[on]], np.cross(arm, hold[vertices[on]])], axis=1))
+        np.subtract.at(given, bodies[on], np.concatenate([hold[vertices[on]], cross(arm, hold[vertices[on]])], axis=1))
         return given
 
 

@@ -27,7 +27,7 @@ from rigidimpulse.flexible.flexibles import Flexibles, FlexibleStep
 from rigidimpulse.flexible.track import FlexibleTrack
 from rigidimpulse.forces.force import ForceTable, Instant, no_links
 from rigidimpulse.integrate.course import FIXED, FORCED, FREE, begin, make_course, pose_at, state_at
-from rigidimpulse.rotation import to_matrix
+from rigidimpulse.rotation import cross, to_matrix
 
 KIND = "flexible bodies"
 SCHEME = "midpoint"
@@ -115,7 +115,7 @@ class NetForces(ForceTable):
         momentum = nets.net.mass[:, None] * nets.velocity
         kinetic = 0.5 * float(np.sum(momentum * nets.velocity))
         stored = nets.net.energy(nets.position) - float(np.sum(nets.weight * nets.position))
-        return np.array([self._end, kinetic, stored, *momentum.sum(axis=0), *np.cross(nets.position, momentum).sum(axis=0)])
+        return np.array([self._end, kinetic, stored, *momentum.sum(axis=0), *cross(nets.position, momentum).sum(axis=0)])
 
 
 class RunningNets:

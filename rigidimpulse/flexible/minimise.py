@@ -27,6 +27,7 @@ from rigidimpulse.flexible.contact_terms import (
 )
 from rigidimpulse.flexible.linear import conjugate_gradients, diagonal_inverses
 from rigidimpulse.flexible.net import Net
+from rigidimpulse.rotation import cross
 
 MOST_ITERATIONS = 100
 MOST_LINEAR = 2000
@@ -93,7 +94,7 @@ def set_penalties(p: Problem, contacts: NetContacts, x: np.ndarray) -> None:
     give = np.einsum("mk,mk->m", contacts.weight**2, 1.0 / stiffness[contacts.node])
     movable = contacts.unknown >= 0
     inverse = np.linalg.inv(p.rigid)[contacts.unknown[movable]] if movable.any() else np.zeros((0, 6, 6))
-    lever = np.cross(contacts.arm[movable], contacts.normal[movable])
+    lever = cross(contacts.arm[movable], contacts.normal[movable])
     lever = np.concatenate([contacts.normal[movable], lever], axis=1)
     give[movable] += np.einsum("mi,mij,mj->m", lever, inverse, lever)
     contacts.penalty[:] = np.where(movable, 1.0, 1.0) / give

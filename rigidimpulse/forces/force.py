@@ -17,7 +17,7 @@ from rigidimpulse.body import number, vector
 from rigidimpulse.errors import SceneError, unknown_name
 from rigidimpulse.integrate.course import Course, pose_at, state_at
 from rigidimpulse.plan import Skip
-from rigidimpulse.rotation import rotate, rotate_inverse
+from rigidimpulse.rotation import cross, rotate, rotate_inverse
 from rigidimpulse.shape import normalized_quaternion
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Instant(NamedTuple):
         x, q, v, w = np.empty(3), np.empty(4), np.empty(3), np.empty(3)
         state_at(self.course, i, time, x, q, v, w)
         r = rotate(q, arm)
-        return x + r, v + np.cross(w, r)
+        return x + r, v + cross(w, r)
 
 
 class ForceTable(ABC):

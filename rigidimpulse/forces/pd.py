@@ -30,7 +30,7 @@ from rigidimpulse.forces.force import (
     no_links,
 )
 from rigidimpulse.keyframes import Keyframes
-from rigidimpulse.rotation import conjugate, multiply, quaternion_from_rotation_vector, rotate, rotation_vector
+from rigidimpulse.rotation import conjugate, cross, multiply, quaternion_from_rotation_vector, rotate, rotation_vector
 from rigidimpulse.world import World
 
 
@@ -153,40 +153,59 @@ class PDForces(ForceTable):
         self.links = no_links()
         self.is_steady = all(len(hand.times) == 1 for hand in hands)
         self.reason = f"{len(hands)} acting"
-        self._hands, self._offset, self._turn = hands, world.offset, world.turn
+        self._offset, self._turn = world.offset[self.body], world.turn[self.body]
+        self._place = np.array([hand.positions[0] for hand in hands])
+        self._orientation = np.array([hand.orientations[0] for hand in hands])
+        self._keyed = [r for r, hand in enumerate(hands) if len(hand.times) > 1]
+        self._hands = hands
+        self._velocity, self._has_velocity = _given([hand.velocity for hand in hands])
+        self._spin, self._has_spin = _given([hand.angular_velocity for hand in hands])
+        self._gains, self._most = np.array([hand.gains for hand in hands]), np.array([hand.most for hand in hands])
         self._breaks = np.unique(np.concatenate([hand.times for hand in hands]))
 
     def wrench(self, at: Instant, rows: np.ndarray) -> np.ndarray:
         """Force and torque of rows."""
-        return np.array([self._one(at, self._hands[r]) for r in rows]).reshape(-1, 6)
+        i, (k, c, k_r, c_r) = self.body[rows], self._gains[rows].T[:, :, None]
+        origin, turn, speed, spin = self._aims(at.time, rows)
+        arm = rotate(turn, self._offset[rows])
+        spin = np.where(self._has_spin[rows], self._spin[rows], spin)
+        speed = np.where(self._has_velocity[rows], self._velocity[rows], speed + cross(spin, arm))
+        off = multiply(multiply(turn, self._turn[rows]), conjugate(at.bodies.orientation[i]))
+        force = k * (origin + arm - at.bodies.position[i]) + c * (speed - at.bodies.velocity[i])
+        torque = k_r * rotation_vector(off) + c_r * (spin - at.bodies.angular_velocity[i])
+        return np.hstack([_limited(force, self._most[rows, 0]), _limited(torque, self._most[rows, 1])])
+
+    def _aims(self, time: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Origins, orientations, velocities of the origins and spins of the poses wished for; time (n,) s of the bodies."""
+        origin, turn = self._place[rows], self._orientation[rows]
+        speed, spin = np.zeros_like(origin), np.zeros_like(origin)
+        for r in self._keyed:
+            for m in np.flatnonzero(rows == r):
+                origin[m], turn[m], speed[m], spin[m] = _aim(self._hands[r], float(time[self.body[r]]))
+        return origin, turn, speed, spin
 
     def next_break(self, time: float) -> float:
         """Next key."""
         k = int(np.searchsorted(self._breaks, time, side="right"))
         return float(self._breaks[k]) if k < len(self._breaks) else np.inf
 
-    def _one(self, at: Instant, hand: Hand) -> np.ndarray:
-        i, (k, c, k_r, c_r) = hand.body, hand.gains
-        origin, turn, speed, spin = _aim(hand, float(at.time[i]))
-        spin = spin if hand.angular_velocity is None else hand.angular_velocity
-        speed = speed + np.cross(spin, rotate(turn, self._offset[i])) if hand.velocity is None else hand.velocity
-        force = k * (origin + rotate(turn, self._offset[i]) - at.bodies.position[i]) + c * (speed - at.bodies.velocity[i])
-        torque = c_r * (spin - at.bodies.angular_velocity[i])
-        if k_r > 0.0:
-            off = multiply(multiply(turn, self._turn[i]), conjugate(at.bodies.orientation[i]))
-            torque = torque + k_r * rotation_vector(off)
-        wrench = np.concatenate([force, torque])
-        for part, most in ((wrench[:3], hand.most[0]), (wrench[3:], hand.most[1])):
-            size = float(np.linalg.norm(part))
-            if size > most:
-                part *= most / size
-        return wrench
+
+def _given(vectors: list[np.ndarray | None]) -> tuple[np.ndarray, np.ndarray]:
+    """Vectors (k, 3), 0 for those that are None, and which are not, (k, 1)."""
+    return np.array([np.zeros(3) if v is None else v for v in vectors]), np.array([[v is not None] for v in vectors])
+
+
+def _limited(vectors: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Vectors (k, 3), those longer than most (k,) shortened to it."""
+    length = np.linalg.norm(vectors, axis=1)
+    share = np.divide(most, length, out=np.ones_like(length), where=length > most)
+    return share[:, None] * vectors
 
 
 def _aim(hand: Hand, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Origin, orientation, velocity of the origin and spin of the pose wished for."""
     still = np.zeros(3)
-    if len(hand.times) == 1 or time <= hand.times[0]:
+    if time <= hand.times[0]:
         return hand.positions[0], hand.orientations[0], still, still
     if time >= hand.times[-1]:
         return hand.positions[-1], hand.orientations[-1], still, still

@@ -31,7 +31,7 @@ from rigidimpulse.forces.force import (
     no_links,
 )
 from rigidimpulse.forces.mass_flow import BurningForces
-from rigidimpulse.rotation import rotate_inverse
+from rigidimpulse.rotation import cross, rotate_inverse
 from rigidimpulse.world import World
 
 
@@ -118,7 +118,7 @@ class ThrusterForces(BurningForces):
         burns = (at.time[i] >= self._start[rows]) & (at.time[i] < self._end[rows])
         force = np.einsum("ijk,ik->ij", at.rotation[i], self._along[rows] * (self._thrust[rows] * burns)[:, None])
         arm = np.einsum("ijk,ik->ij", at.rotation[i], self._point[rows])
-        return np.hstack([force, np.cross(arm, force)])
+        return np.hstack([force, cross(arm, force)])
 
     def burnt(self, times: np.ndarray) -> np.ndarray:
         """Propellant used."""

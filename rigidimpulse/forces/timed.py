@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rigidimpulse.forces.force import ForceTable, Instant, no_links
+from rigidimpulse.rotation import cross
 
 
 class TimedForces(ForceTable):
@@ -37,7 +38,7 @@ class TimedForces(ForceTable):
         wrench[:, :3] = self._strength(at.time[i], rows)
         if self._turns:
             arm = np.einsum("ijk,ik->ij", at.rotation[i], self._points[rows])
-            wrench[:, 3:] = np.cross(arm, wrench[:, :3])
+            wrench[:, 3:] = cross(arm, wrench[:, :3])
         return wrench
 
     def longest_steps(self) -> np.ndarray:

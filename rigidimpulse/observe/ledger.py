@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.rotation import rotate, rotate_inverse
+from rigidimpulse.rotation import cross, rotate, rotate_inverse
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def make_ledger(times, position, orientation, velocity, angular_velocity, mass, 
     kinetic = 0.5 * (mass * (velocity**2).sum(-1) + (spin_body * angular_body).sum(-1))
     potential = -(mass[:, :, None] * steady_acceleration * position).sum(-1)
     momentum = (mass[:, :, None] * velocity).sum(1)
-    angular = (rotate(orientation, angular_body) + np.cross(position, mass[:, :, None] * velocity)).sum(1)
+    angular = (rotate(orientation, angular_body) + cross(position, mass[:, :, None] * velocity)).sum(1)
     dissipated: dict[str, np.ndarray] = {}
     for cause in sorted({c for _, c, _ in log.energy}):
         stamps = np.array([t for t, c, _ in log.energy if c == cause])
