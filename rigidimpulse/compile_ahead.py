@@ -129,7 +129,6 @@ def _move_sweep_and_solve(context) -> None:
     start_courses(context)
     context.recorder.start(state.course)
     bring_all(state.course, np.array([1]), 0.0, now, state.rotation, context.acceleration, context.angular_acceleration)
-    context.bring(1, 0.0)
     take(state.course, 1, 0.0, now, *np.zeros((4, 3)), FREE)
     window = Window(context, 1.0 / 60.0)
     window.find_pairs()

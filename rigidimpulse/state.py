@@ -14,7 +14,7 @@ from rigidimpulse.constrain.heap import Heaps, why_no_heaps
 from rigidimpulse.constrain.jointed import JointState
 from rigidimpulse.constrain.qp import row_solver
 from rigidimpulse.detect.groups import NO_FORCE
-from rigidimpulse.detect.touching import bring
+from rigidimpulse.detect.touching import bring_all
 from rigidimpulse.geometry import Geometry
 from rigidimpulse.integrate.course import Course, make_course, pose_at
 from rigidimpulse.observe.contact_log import ContactLog
@@ -126,7 +126,7 @@ class StepContext:
     def bring(self, i: int, time: float) -> None:
         """Bring body i to `time` on its course."""
         state = self.state
-        bring(state.course, i, time, state.now, state.rotation, self.acceleration, self.angular_acceleration)
+        bring_all(state.course, np.array([i]), time, state.now, state.rotation, self.acceleration, self.angular_acceleration)
         note_arrival(self, [i])
 
     def pose_matrix(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.copying import copy_vector
 
 SIZE = 6
 TINY = 1e-300
@@ -60,7 +61,7 @@ def plan_elimination(first, second, n):
         size = start[k]
         if size + n > later.shape[0]:
             wider = np.empty(2 * later.shape[0] + n, np.int64)
-            wider[:size] = later[:size]
+            copy_vector(later, wider[:size])
             later = wider
         for i in range(n):
             if joined[pick, i] and not gone[i]:

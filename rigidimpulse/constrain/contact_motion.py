@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.copying import copy_vector
 from rigidimpulse.detect.features import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND
 
@@ -113,7 +114,7 @@ def _cylinder_core(geometry, p, rotation, normal, direction):
     if 1.0 - abs(along) < ALIGNED:
         return 0.0, FACE
     if abs(along) < ALIGNED:
-        direction[:] = axis
+        copy_vector(axis, direction)
         return geometry.radius[p], LINE
     _cross(axis, normal, direction)
     size = sqrt(_dot(direction, direction))

@@ -19,6 +19,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.softness import response
+from rigidimpulse.copying import copy_vector
 
 # Gaps that count as closed, and those that a slack limit may overrun, relative to the error at which joints are closed.
 REACHED = 100.0
@@ -49,7 +50,7 @@ def is_reached(joints, k, value, allowed):
 @jit
 def _remainder(line, basis, held, out):
     """The part of line (12,) across the first `held` vectors of basis, into out; returns its square."""
-    out[:] = line
+    copy_vector(line, out)
     for _ in range(2):
         for b in range(held):
             along = 0.0

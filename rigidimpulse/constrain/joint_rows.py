@@ -35,6 +35,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.rows import BOUNDED, FREE, write_body, write_row
+from rigidimpulse.copying import copy_vector
 from rigidimpulse.rotation import from_columns
 
 ALONG, RADIUS, DISTANCE, ABOUT, TWIST, SWING, ANGLE, ACROSS = 0, 3, 6, 7, 10, 13, 16, 17
@@ -168,7 +169,7 @@ def _angular(code, e, f, near, direction):
     if code >= ACROSS:
         return _across(turn, e, (code - ACROSS) // 3, (code - ACROSS) % 3, direction)
     if code == ANGLE:
-        direction[:] = e[:, 0]
+        copy_vector(e[:, 0], direction)
         x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
         return atan2(_along_axes(e, x, y, z, direction), turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
     k = (code - ABOUT) % 3
@@ -176,7 +177,7 @@ def _angular(code, e, f, near, direction):
         return _about(turn, e, k, direction)
     after, last = (k + 1) % 3, (k + 2) % 3
     if code >= SWING:
-        direction[:] = e[:, after]
+        copy_vector(e[:, after], direction)
         across = np.zeros(3)
         across[after], across[last] = -turn[last, k], turn[after, k]
         return atan2(_along_axes(e, across[0], across[1], across[2], direction), turn[k, k])
@@ -207,7 +208,8 @@ def joint_values(joints, which, position, rotation, angle, value):
     for j in which:
         _carry(joints, j, 0, position, rotation, pa, e)
         _carry(joints, j, 1, position, rotation, pb, f)
-        d[:] = pb - pa
+        for c in range(3):
+            d[c] = pb[c] - pa[c]
         for k in range(joints.first[j], joints.first[j + 1]):
             value[i] = _measure(joints.coordinate[k], d, e, f, angle[k], direction) - joints.target[k]
             i += 1
@@ -237,7 +239,8 @@ def joint_rows(joints, which, bodies, rotation, number, angle, rows, start, valu
     for j in which:
         _carry(joints, j, 0, bodies.position, rotation, pa, e)
         _carry(joints, j, 1, bodies.position, rotation, pb, f)
-        d[:] = pb - pa
+        for c in range(3):
+            d[c] = pb[c] - pa[c]
         a, b = joints.body_a[j], joints.body_b[j]
         for k in range(joints.first[j], joints.first[j + 1]):
             code, way = joints.coordinate[k], direction[i]

@@ -24,6 +24,7 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.block_lu import factor, plan_elimination, solve_factored
 from rigidimpulse.constrain.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMENT, multiply, multiply_transposed
+from rigidimpulse.copying import copy_matrix, copy_vector
 
 MAX_OUTER = 60
 MAX_INNER = 60
@@ -200,7 +201,7 @@ def _newton(rows, elimination, base, q, r, frozen, p, target):
         if _speed(rows, residual, line) <= target:
             return True
         _assemble(rows, slope, elimination.slot, blocks, n)
-        step[:] = residual
+        copy_matrix(residual, step)
         factor(elimination, blocks, pivots)
         solve_factored(elimination, blocks, pivots, step)
         # |F| carries the round-off of u divided by k; its step does not.
@@ -217,7 +218,7 @@ def _newton(rows, elimination, base, q, r, frozen, p, target):
             scale *= 0.5
         if not improved:
             return _speed(rows, step, line) <= 1e4 * target
-        change[:] = trial
+        copy_matrix(trial, change)
         if is_last:
             return True
         size = trial_size
@@ -270,13 +271,13 @@ def solve_newton(rows, n, target):
             free_k *= 30.0
             k = min(30.0 * k, 1.0)
             continue
-        q[:] = trial
+        copy_vector(trial, q)
         _velocities(rows, q, y, u)
         reached = natural_residual(rows, u, q, weight)
         now = _largest(q)
         if reached < best and (largest == 0.0 or reached * now <= best * largest):
             best, largest = reached, now
-            rows.impulse[:] = q
+            copy_vector(q, rows.impulse)
         if reached > 0.5 * previous and k <= REGULARISATION_LEAST:
             stagnant += 1
         idle = idle + 1 if reached > 0.9 * previous else 0

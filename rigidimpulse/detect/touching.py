@@ -105,9 +105,8 @@ def near_pairs(course, time, pairs, margin, radius, bodies, seen, near):
 @jit
 def bring_gyroscopic(members, bodies, rotation, inertia, angular_acceleration):
     """Angular accelerations of torque-free bodies at their present spins."""
-    zero = np.zeros(3)
     for i in members:
-        gyroscopic_acceleration(rotation[i], inertia[i], bodies.angular_velocity[i], zero, angular_acceleration[i])
+        gyroscopic_acceleration(rotation[i], inertia[i], bodies.angular_velocity[i], (0.0, 0.0, 0.0), angular_acceleration[i])
 
 
 @jit

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.copying import copy_matrix
 from rigidimpulse.detect.features import cross, row
 from rigidimpulse.flexible.contact_terms import add_to_ends, miss
 
@@ -50,8 +51,9 @@ def apply_matrix(first, column, block, free, rigid, contacts, no_aim, D, z, out)
 def diagonal_inverses(diagonal, block, rigid, contacts, D, node_inverse, rigid_inverse):
     """Write the inverses (n, 3, 3) and (r, 6, 6) of the blocks on the diagonal."""
     for i in range(diagonal.shape[0]):
-        node_inverse[i] = block[diagonal[i]]
-    rigid_inverse[:] = rigid
+        copy_matrix(block[diagonal[i]], node_inverse[i])
+    for i in range(rigid.shape[0]):
+        copy_matrix(rigid[i], rigid_inverse[i])
     lever = np.zeros((3, 6))
     for k in range(3):
         lever[k, k] = 1.0
@@ -118,7 +120,7 @@ def conjugate_gradients(first, column, block, free, rigid, contacts, no_aim, D, 
     z[:] = 0.0
     s, p, image = np.empty_like(r), np.empty_like(r), np.empty_like(r)
     _precondition(node_inverse, rigid_inverse, free, r, s)
-    p[:] = s
+    copy_matrix(s, p)
     size = _inner(r, s)
     goal = accuracy * accuracy * size
     for count in range(most):
@@ -128,7 +130,7 @@ def conjugate_gradients(first, column, block, free, rigid, contacts, no_aim, D, 
         bend = _inner(p, image)
         if bend <= 0.0:  # a direction of negative curvature: what is there so far goes downhill (Steihaug 1983)
             if count == 0:
-                z[:] = p
+                copy_matrix(p, z)
             return count
         step = size / bend
         for i in range(r.shape[0]):

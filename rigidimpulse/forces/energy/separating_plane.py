@@ -19,6 +19,7 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.copying import copy_matrix, copy_vector
 
 ROUNDS = 80
 CONVERGED = 1e-15
@@ -125,10 +126,10 @@ def best_plane(a, radius_a, b, radius_b, n, d):
         lower = trial_energy < energy
         if lower or (size <= 1e-9 and np.abs(trial_g).sum() < np.abs(g).sum()):
             energy = trial_energy
-            n[:] = trial
+            copy_vector(trial, n)
             d += s[2]
-            g[:] = trial_g
-            H[:] = other
+            copy_vector(trial_g, g)
+            copy_matrix(other, H)
             shift *= 0.1
         else:
             if size <= CONVERGED * 10.0:
