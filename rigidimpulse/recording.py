@@ -159,7 +159,13 @@ class Recording:
 
         A row has body_a, body_b (indices), the point (3,) m where the sub-step began, the normal (3,) from a to b, and the force
         (3,) N on b; that on a is the opposite. Impulses at impacts are not in it, moments of rolling friction neither.
+
+        Raises:
+            IndexError: there is no such frame.
+
         """
+        if not -len(self.times) <= frame < len(self.times):
+            raise IndexError(f"frame {frame} of a run of {len(self.times)} frames")
         time = self.times[frame]
         return self.contacts[(self.contacts["start"] <= time) & (time < self.contacts["end"])]
 

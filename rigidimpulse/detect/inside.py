@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.features import inner
-from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
+from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry, build_geometry, compile_shape
+from rigidimpulse.shape import Shape
 
 _EPSILON = 2.0**-53
 _PLANE_BOUND = (3.0 + 16.0 * _EPSILON) * _EPSILON  # Shewchuk's bounds of the error of the two determinants
@@ -33,18 +34,25 @@ _ON_SURFACE = 2
 _STACK_SIZE = 128  # a tree of leaves holding at least one triangle is less deep
 
 
-def contains(geometry: Geometry, shape: int, points: ArrayLike) -> np.ndarray:
+def contains(shape: Shape, points: ArrayLike) -> np.ndarray:
     """Say which points lie inside a shape or on its surface.
 
     Args:
-        geometry: the compiled shapes.
-        shape: index of the shape; several primitives count as their union, open meshes contain nothing.
+        shape: any shape; parts of a compound count as their union, open meshes contain nothing.
         points: (k, 3) m, in the frame of the shape.
 
     Returns:
         (k,) bool.
 
+    Raises:
+        SceneError: the shape has no valid surface (see `Shape.check`).
+
     """
+    return points_inside(build_geometry([compile_shape(shape, np.zeros(3), np.eye(3))]), 0, points)
+
+
+def points_inside(geometry: Geometry, shape: int, points: ArrayLike) -> np.ndarray:
+    """The same, (k,) bool, for the shape of an index of compiled ones, in its own frame."""
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
     inside = np.zeros(len(points), dtype=np.bool_)
     points_in_shape(geometry, shape, points, inside)

@@ -22,7 +22,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.inside import contains
+from rigidimpulse.detect.inside import points_inside
 from rigidimpulse.detect.manifold import pair_gap
 from rigidimpulse.errors import SceneError
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, Primitive, build_geometry
@@ -204,8 +204,8 @@ class Narrowphase:
         if not (len(solid_a.parts) and len(solid_b.parts)) or apart >= max(solid_a.reach, solid_b.reach):
             return False
         return bool(
-            contains(self.geometry, a, solid_b.parts @ R.T + t).any()
-            or contains(self.geometry, b, (solid_a.parts - t) @ R).any()
+            points_inside(self.geometry, a, solid_b.parts @ R.T + t).any()
+            or points_inside(self.geometry, b, (solid_a.parts - t) @ R).any()
         )
 
 

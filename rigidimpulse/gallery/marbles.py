@@ -21,7 +21,6 @@ from rigidimpulse.body import Body
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.inside import contains
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.geometry import build_geometry, compile_shape
 from rigidimpulse.material import Material
 from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
@@ -56,8 +55,7 @@ def scene() -> Scene:
     rng = np.random.default_rng(1)
     for name, solid in solids().items():
         points = _lattice(name)
-        geometry = build_geometry([compile_shape(solid, np.zeros(3), np.eye(3))])
-        for k in np.flatnonzero(contains(geometry, 0, points)):
+        for k in np.flatnonzero(contains(solid, points)):
             velocity = [*rng.normal(scale=NUDGE, size=2), 0.0]
             scene.add(Body(f"{name} {k}", marble, position=PLACES[name] + points[k], velocity=velocity, material=glass))
     return scene

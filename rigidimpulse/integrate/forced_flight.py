@@ -39,7 +39,10 @@ class ForcedFlight:
         """In where a force varies."""
         if not world.force_tables:
             return Skip("no force varies")
-        return Bound(integrate_forced, "steps of order 4, as long as their error allows; impacts are exact on them")
+        if world.accuracy.integrator != "exact":
+            return Bound(integrate_forced, f"{world.accuracy.integrator}: steps of the accuracy's length, whatever their error")
+        impacts = "; impacts are exact on them" if world.can_collide else ""
+        return Bound(integrate_forced, f"steps of order 4, as long as their error allows{impacts}")
 
 
 def note_free(context, _window, group: Group) -> None:

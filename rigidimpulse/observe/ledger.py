@@ -19,8 +19,8 @@ class Ledger:
         potential: (f,) J, of gravity and constant forces, zero at the world's origin.
         momentum: (f, 3) kg m/s.
         angular_momentum: (f, 3) kg m2/s about the world's origin.
-        dissipated: by cause ("impact", "contact", "capture", "lift", "heap", "penalty"), (f,) J taken from the bodies until each frame; a
-            negative value is energy fed in (a moving support, a lift out of the contact margin).
+        dissipated: by cause ("impact", "contact", "capture", "lift", "joints", "guard", "heap", each force by its name, ...), (f,) J taken
+            from the bodies until each frame; a negative value is energy fed in (a moving support, a lift out of the contact margin).
 
     """
 

@@ -47,6 +47,8 @@ def test_table_bears_itself_and_its_load_at_every_frame() -> None:
         centre = (20 * run.center_of_mass("table")[frame] + 5 * run.center_of_mass("load")[frame]) / 25
         moment = np.cross(under["point"] - centre, under["force"]).sum(0)
         np.testing.assert_allclose(moment, 0, atol=1e-8 * 25 * G)
+    with pytest.raises(IndexError, match=f"frame {len(run.times)} of a run of {len(run.times)} frames"):
+        run.contacts_at(len(run.times))
 
 
 def test_stack_bears_what_is_above() -> None:

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from rigidimpulse.detect.inside import contains, plane_orientation, point_in_convex, space_orientation
+import rigidimpulse as ri
+from rigidimpulse.detect.inside import plane_orientation, point_in_convex, points_inside, space_orientation
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
 
 SPOT = Path(__file__).parents[2] / "assets" / "meshes" / "spot.obj"
@@ -91,12 +92,12 @@ def test_lattice_points_in_line_with_vertices_and_edges(cells):
         truth |= np.all((grid >= np.array(cell)) & (grid <= np.array(cell) + 1.0), axis=1)
     geometry = geometry_of(Primitive(ROUND, vertices=vertices, faces=faces))
     assert geometry.closed[0]
-    assert np.array_equal(contains(geometry, 0, grid), truth)
+    assert np.array_equal(points_inside(geometry, 0, grid), truth)
     # the same lattice off the dyadic numbers: points strictly between lattice planes keep their truth
     scale = 0.1
     geometry = geometry_of(Primitive(ROUND, vertices=vertices * scale, faces=faces))
     clear = np.all(np.abs(grid - np.round(grid)) > 0.1, axis=1) | ~truth & np.any((grid < -0.1) | (grid > 3.1), axis=1)
-    assert np.array_equal(contains(geometry, 0, grid[clear] * scale), truth[clear])
+    assert np.array_equal(points_inside(geometry, 0, grid[clear] * scale), truth[clear])
 
 
 @pytest.mark.parametrize("name", ["torus", "star", "capsule", "spot"])
@@ -118,7 +119,7 @@ def test_random_points_against_the_winding_number(name):
     points = np.random.default_rng(7).uniform(low - 0.05, high + 0.05, (1_000, 3))
     winding = winding_number(mesh.triangles, points)
     assert np.all(np.abs(winding - np.round(winding)) < 1e-6)
-    inside = contains(geometry, 0, points)
+    inside = points_inside(geometry, 0, points)
     assert np.array_equal(inside, np.round(winding) == 1)
     assert 20 < inside.sum() < 980
 
@@ -138,7 +139,7 @@ def test_rays_through_vertices_and_edges(make):
     winding = winding_number(mesh.triangles, points)
     clear = np.abs(winding - np.round(winding)) < 1e-6
     assert clear.mean() > 0.95
-    inside = contains(geometry_of(mesh_primitive(mesh)), 0, points[clear])
+    inside = points_inside(geometry_of(mesh_primitive(mesh)), 0, points[clear])
     assert np.array_equal(inside, np.round(winding[clear]) == 1)
 
 
@@ -147,8 +148,8 @@ def test_vertices_and_exact_midpoints_lie_on_the_surface():
     vertices = np.round(np.array(mesh.vertices) * 2**20) / 2**20
     geometry = geometry_of(Primitive(ROUND, vertices=vertices, faces=np.array(mesh.faces)))
     edges = mesh.edges_unique
-    assert contains(geometry, 0, vertices).all()
-    assert contains(geometry, 0, 0.5 * (vertices[edges[:, 0]] + vertices[edges[:, 1]])).all()
+    assert points_inside(geometry, 0, vertices).all()
+    assert points_inside(geometry, 0, 0.5 * (vertices[edges[:, 0]] + vertices[edges[:, 1]])).all()
 
 
 def test_convex_hull_behind_all_planes():
@@ -159,7 +160,7 @@ def test_convex_hull_behind_all_planes():
     planes = np.einsum("tj,ktj->kt", hull.face_normals, points[:, None] - hull.triangles[None, :, 0])
     truth = np.all(planes <= 0.0, axis=1)
     assert np.array_equal([point_in_convex(geometry, 0, tuple(point)) for point in points], truth)
-    assert np.array_equal(contains(geometry, 0, points), truth)
+    assert np.array_equal(points_inside(geometry, 0, points), truth)
     assert 100 < truth.sum() < 1_900
 
 
@@ -197,38 +198,49 @@ def test_curved_primitives_and_unions():
     truths = [in_sphere, in_capsule, in_cylinder, in_half_space]
     primitives = [sphere, capsule, cylinder, half_space]
     for primitive, truth in zip(primitives, truths, strict=True):
-        assert np.array_equal(contains(geometry_of(primitive), 0, points), truth)
+        assert np.array_equal(points_inside(geometry_of(primitive), 0, points), truth)
         assert truth.any() and not truth.all()
-    assert np.array_equal(contains(geometry_of(*primitives), 0, points), np.any(truths, axis=0))
+    assert np.array_equal(points_inside(geometry_of(*primitives), 0, points), np.any(truths, axis=0))
 
 
 def test_open_meshes_hold_nothing_and_overlapping_parts_do_not_cancel():
     vertices, faces = lattice_solid([(0, 0, 0)])
     centre = [[0.5, 0.5, 0.5], [1.25, 0.5, 0.5]]
-    assert not contains(geometry_of(Primitive(ROUND, vertices=vertices, faces=faces[:-1])), 0, centre).any()
+    assert not points_inside(geometry_of(Primitive(ROUND, vertices=vertices, faces=faces[:-1])), 0, centre).any()
     both = Primitive(
         ROUND,
         vertices=np.concatenate([vertices, vertices + [0.25, 0, 0]]),
         faces=np.concatenate([faces, faces + len(vertices)]),
     )
-    assert contains(geometry_of(both), 0, [*centre, [0.1, 0.5, 0.5]])[[0, 2]].all()
+    assert points_inside(geometry_of(both), 0, [*centre, [0.1, 0.5, 0.5]])[[0, 2]].all()
     hollow = Primitive(
         ROUND,
         vertices=np.concatenate([4.0 * vertices, vertices + 1.0]),
         faces=np.concatenate([faces, faces[:, ::-1] + len(vertices)]),
     )
-    assert np.array_equal(contains(geometry_of(hollow), 0, [[1.5, 1.5, 1.5], [0.5, 0.5, 0.5]]), [False, True])
+    assert np.array_equal(points_inside(geometry_of(hollow), 0, [[1.5, 1.5, 1.5], [0.5, 0.5, 0.5]]), [False, True])
 
 
 def test_cost_grows_with_the_depth_of_the_tree_only():
     mesh = trimesh.creation.icosphere(subdivisions=5)  # 20,480 triangles
     geometry = geometry_of(mesh_primitive(mesh))
     points = np.random.default_rng(17).uniform(-1.0, 1.0, (2_000, 3))
-    contains(geometry, 0, points[:1])
+    points_inside(geometry, 0, points[:1])
     start = time.perf_counter()
-    inside = contains(geometry, 0, points)
+    inside = points_inside(geometry, 0, points)
     assert time.perf_counter() - start < 2_000 * 100e-6  # all triangles of one point take more than 200 us
     assert np.array_equal(
         inside[np.abs(np.linalg.norm(points, axis=1) - 1.0) > 1e-2],
         (np.linalg.norm(points, axis=1) < 1.0)[np.abs(np.linalg.norm(points, axis=1) - 1.0) > 1e-2],
     )
+
+
+def test_points_in_shapes_as_a_user_asks():
+    ring = ri.Shape.from_trimesh(trimesh.creation.torus(1.0, 0.25))
+    assert np.array_equal(ri.contains(ring, [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.3]]), [True, False, False])
+    # Far from the origin: the frame is the shape's own, not that of its centre of mass.
+    upright = (1.0, 0.0, 0.0, 0.0)
+    parts = [(ri.Shape.box((1.0, 1.0, 1.0)), (5.0, 0.0, 0.0), upright), (ri.Shape.sphere(0.5), (7.0, 0.0, 0.0), upright)]
+    assert np.array_equal(ri.contains(ri.Shape.compound(parts), [[5.4, 0.4, 0.4], [7.4, 0.4, 0.4], [0.0, 0.0, 0.0]]), [True, False, False])
+    with pytest.raises(ri.SceneError):
+        ri.contains(ri.Shape.sphere(-1.0), [[0.0, 0.0, 0.0]])

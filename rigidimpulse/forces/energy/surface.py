@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.body import vector
-from rigidimpulse.detect.inside import contains
+from rigidimpulse.detect.inside import points_inside
 from rigidimpulse.detect.manifold import pair_gap
 from rigidimpulse.errors import SceneError
 from rigidimpulse.forces.energy.term import Expansion, Poses, body_index, body_point, levers, positive
@@ -91,7 +91,7 @@ def _distance(geometry: Geometry, p: np.ndarray) -> tuple[float, np.ndarray]:
     """Return the signed distance of a point p (3,) m from shape 0, and the way (3,) m to it from the nearest place of the surface."""
     out = np.zeros(7)
     pair_gap(geometry, 1, p, np.eye(3), 0, np.zeros(3), np.eye(3), np.inf, out)
-    if not contains(geometry, 0, p[None])[0]:
+    if not points_inside(geometry, 0, p[None])[0]:
         away = p - out[3:6]
         return float(np.linalg.norm(away)), away
     away = -_way_out_of_cylinder(geometry, p) if geometry.kind[0] == CYLINDER else p - out[3:6]
