@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numba
@@ -89,17 +90,28 @@ class _PartCompiler(Compiler):
         super().__init__(typing_context, target_context, library, *arguments)
 
 
+KERNELS: list[Kernel] = []
+"""All kernels of the modules that have been imported."""
+
+
 class Kernel:
     """A compiled function: an entry where Python calls it, and a part of other kernels where they do.
 
     Most kernels are only ever parts. Parts have no wrapper for Python and are not written to the cache (whatever calls
     them is, with the part inside), which saves much of the time of a first run.
+
+    Attributes:
+        calls: how often Python called it.
+        seconds: how long that took, but for `preparing`, s: the first call for each set of types, in which it is compiled or loaded.
+
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         """Nothing is compiled before the first call."""
         update_wrapper(self, function)
         self.py_func = function
+        self.calls, self.seconds, self.preparing = 0, 0.0, 0.0
+        KERNELS.append(self)
         self.part = _njit(no_cpython_wrapper=True, pipeline_class=_PartCompiler, **_OPTIONS)(function)
 
     @cached_property
@@ -111,7 +123,16 @@ class Kernel:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python."""
-        return self.entry(*arguments)
+        entry = self.entry
+        known, start = len(entry.overloads), perf_counter()
+        result = entry(*arguments)
+        spent = perf_counter() - start
+        self.calls += 1
+        if len(entry.overloads) == known:
+            self.seconds += spent
+        else:
+            self.preparing += spent
+        return result
 
 
 @typeof_impl.register(Kernel)

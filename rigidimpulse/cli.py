@@ -74,6 +74,7 @@ def run_options(command: Callable) -> Callable:
     """Add the options of commands that simulate."""
     for option in (
         click.option("--view", is_flag=True, help="Open the result in the browser."),
+        click.option("--profile", is_flag=True, help="Print where the time went, by stage and by kernel."),
         click.option("--fps", type=float, help="Frames per second; changes what is recorded, never what happens."),
         click.option("--duration", type=float, help="Time to simulate, s."),
         click.option("--accuracy", help="preview, standard or exact."),
@@ -86,7 +87,7 @@ def run_options(command: Callable) -> Callable:
 @click.argument("name", required=False)
 @click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html or .npz.")
 @run_options
-def demo(name: str | None, output: tuple[str, ...], view: bool, **settings: Any) -> None:
+def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:
     """Run a gallery scene and its checks; without NAME, list the scenes."""
     from rigidimpulse import gallery
 
@@ -100,7 +101,7 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, **settings: Any)
     entry = gallery.load(name)
     job = _job_of(entry)._replace(**_given(settings))
     click.echo(f"{entry.name}: {entry.description}")
-    run = _run(job, output)
+    run = _run(job, output, profile)
     passed = True
     if job.duration == entry.duration:
         passed = _print_checks(entry.check(run))
@@ -145,10 +146,10 @@ def hardcases(names: tuple[str, ...], output: str, limit: float) -> None:
 @click.argument("scene")
 @click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html or .npz.")
 @run_options
-def simulate(scene: str, output: tuple[str, ...], view: bool, **settings: Any) -> None:
+def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:
     """Simulate SCENE and write the recording."""
     job = _find_job(scene)._replace(**_given(settings))
-    _hand_over(_run(job, output), output, view)
+    _hand_over(_run(job, output, profile), output, view)
 
 
 @main.command()
@@ -250,7 +251,7 @@ def _scene_function(path: Path) -> Callable[[], Scene]:
     return make
 
 
-def _run(job: Job, output: Sequence[str]) -> Recording:
+def _run(job: Job, output: Sequence[str], profile: bool = False) -> Recording:
     """Simulate with a progress bar and print the summary; names of outputs are looked at first."""
     from rigidimpulse.errors import SceneError
 
@@ -280,6 +281,8 @@ def _run(job: Job, output: Sequence[str]) -> Recording:
     impacts = f"{num_impacts} {'impact' if num_impacts == 1 else 'impacts'}"
     click.echo(f"{job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s")
     click.echo(f"status: {run.status.message}")
+    if profile and run.profile is not None:
+        click.echo(run.profile.table())
     return run
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rigidimpulse.observe.events import Event
     from rigidimpulse.observe.impulses import Impulses
     from rigidimpulse.observe.ledger import Ledger
+    from rigidimpulse.observe.profile import Profile
     from rigidimpulse.plan import Plan
     from rigidimpulse.scene import Scene
 
@@ -64,6 +65,7 @@ class Recording:
             observe.contacts.CONTACT_DTYPE); stretches that no frame sees are left out. `contacts_at`, `contact_force` by frame.
         by_cause: impulses by body and cause, see `impulses`; None in a loaded recording.
         nets: frames of flexible bodies, see `net`.
+        profile: where the time of the run went, by stage and by kernel; `profile.table()` for people.
 
     """
 
@@ -83,6 +85,7 @@ class Recording:
     contacts: np.ndarray = field(default_factory=lambda: np.zeros(0, CONTACT_DTYPE))
     by_cause: Impulses | None = None
     nets: list[FlexibleTrack] = field(default_factory=list)
+    profile: Profile | None = None
 
     def index(self, name: str) -> int:
         """Index of a body.

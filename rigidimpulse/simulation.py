@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +31,7 @@ from rigidimpulse.integrate.prescribed import KeyframePaths
 from rigidimpulse.observe.events import EventLog
 from rigidimpulse.observe.impulses import Impulses
 from rigidimpulse.observe.ledger import make_ledger
+from rigidimpulse.observe.profile import Stopwatch
 from rigidimpulse.observe.recorder import Recorder
 from rigidimpulse.plan import Plan
 from rigidimpulse.recording import Recording, Status
@@ -77,6 +79,7 @@ def simulate(
             or cannot be out.
 
     """
+    stopwatch = Stopwatch()
     times = frame_times(duration, fps)
     left_out = chosen_out(scene, accuracy, effects)
     world = compile_scene(scene, accuracy, frozenset(left_out))
@@ -108,7 +111,8 @@ def simulate(
         context.heaps.close(context, context.state.time)
         plan.tell(HeapForces.name, context.heaps.summary())
     recorder.finish(context.state.course)
-    return make_recording(context, plan, times, duration)
+    run = make_recording(context, plan, times, duration)
+    return replace(run, profile=stopwatch.read(plan))
 
 
 def frame_times(duration: float, fps: float) -> np.ndarray:

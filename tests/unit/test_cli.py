@@ -97,8 +97,9 @@ def test_checks_are_left_out_where_the_duration_is_another():
 
 def test_simulate_runs_a_scene_file(scene_file, tmp_path):
     out = tmp_path / "folder" / "ball.npz"
-    result = call("simulate", scene_file, "-o", out, "--duration", 1, "--fps", 100, "--accuracy", "preview")
+    result = call("simulate", scene_file, "-o", out, "--duration", 1, "--fps", 100, "--accuracy", "preview", "--profile")
     assert result.exit_code == 0, result.output
+    assert "sweep" in result.stdout and "loading or compiling kernels" in result.stdout
     recording = ri.load_recording(out)
     # Free fall until the first impact at sqrt(2 h / g) = 0.319 s, h = 0.5 m: z = 1 - g t^2 / 2 but for rounding.
     early = recording.times < 0.3
