@@ -101,7 +101,7 @@ class Kernel:
     them is, with the part inside), which saves much of the time of a first run.
 
     Attributes:
-        calls: how often Python called it.
+        name: module and function. calls: how often Python called it.
         seconds: how long that took, but for `preparing`, s: the first call for each set of types, in which it is compiled or loaded.
 
     """
@@ -110,6 +110,7 @@ class Kernel:
         """Nothing is compiled before the first call."""
         update_wrapper(self, function)
         self.py_func = function
+        self.name = f"{function.__module__.removeprefix('rigidimpulse.')}.{function.__name__}"
         self.calls, self.seconds, self.preparing = 0, 0.0, 0.0
         KERNELS.append(self)
         self.part = _njit(no_cpython_wrapper=True, pipeline_class=_PartCompiler, **_OPTIONS)(function)

@@ -70,10 +70,9 @@ class Stopwatch:
             calls, spent, prepared = self._before.get(kernel, (0, 0.0, 0.0))
             preparing += kernel.preparing - prepared
             if kernel.calls > calls and kernel.seconds > spent:
-                name = f"{kernel.__module__.removeprefix('rigidimpulse.')}.{kernel.__name__}"
-                kernels[name] = KernelTime(kernel.calls - calls, kernel.seconds - spent)
+                kernels[kernel.name] = KernelTime(kernel.calls - calls, kernel.seconds - spent)
         seconds = perf_counter() - self._start
-        stages = dict.fromkeys(STAGES, 0.0)
+        stages: dict[str, float] = dict.fromkeys(STAGES, 0.0)
         for line in plan.lines:
             stages[line.stage] += line.seconds
         stages = {stage: spent for stage, spent in stages.items() if spent > 0.0}
