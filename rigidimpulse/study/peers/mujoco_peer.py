@@ -24,8 +24,9 @@ mujoco: Any = import_module("mujoco")
 STEPS_A_CONTACT = 10
 DULL = 0.01
 """Restitution below which a contact is dull."""
-ITERATIONS = 100
 TOLERANCE = 1e-12
+"""Of the solver, where there are at most MANY bodies; crowds have its defaults, which cost less."""
+MANY = 50
 PLANE = 100.0
 """m, half of what is drawn of a plane; it is endless."""
 
@@ -38,8 +39,9 @@ class MujocoPeer:
         spec = mujoco.MjSpec()
         spec.option.timestep, spec.option.gravity = step, gravity
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-        spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-        spec.option.iterations, spec.option.tolerance, spec.option.impratio = ITERATIONS, TOLERANCE, 10.0
+        if len(bodies) <= MANY:
+            spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+            spec.option.tolerance, spec.option.impratio = TOLERANCE, 10.0
         for body in bodies:
             _add_body(spec, body, step)
         for joint in joints:
