@@ -20,6 +20,7 @@ from rigidimpulse.detect.overlap import resolve_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.detect.window import Window
 from rigidimpulse.errors import SceneError, unknown_name
+from rigidimpulse.events.effect import GO_ON, STEP, EventKernel
 from rigidimpulse.forces.constant import ConstantForces
 from rigidimpulse.forces.gravity import FreeRotation, Gravity, SteadyLoad
 from rigidimpulse.forces.kinds import bind_forces, force_kinds
@@ -36,11 +37,12 @@ from rigidimpulse.recording import Recording, Status
 from rigidimpulse.respond.response import ImpactResponse
 from rigidimpulse.scene import Scene
 from rigidimpulse.state import StepContext
-from rigidimpulse.step import react, step
+from rigidimpulse.step import go_on, react, step
 from rigidimpulse.sweep.strategy import ImpactTime
 from rigidimpulse.world import World, compile_scene
 
 if TYPE_CHECKING:
+    from rigidimpulse.events.run import EventRun
     from rigidimpulse.forces.force_log import ForceWork
 
 logger = logging.getLogger("rigidimpulse")
@@ -67,7 +69,7 @@ def simulate(
         accuracy: "preview", "standard", "exact" or an `Accuracy`.
         effects: effects, by their names in `run.plan.explain()`, that are to be in (True) or out (False) whatever the scene calls for. The
             status says where one is out that the scene calls for.
-        progress: called after every step with the simulated time in s.
+        progress: called with the simulated time in s after every step, or after many in which nothing but impacts of balls happened.
 
     Returns:
         The recording, with round(duration * fps) + 1 frames; the first is the initial state.
@@ -98,9 +100,10 @@ def simulate(
     resolve_overlaps(context)
     # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
     paths = KeyframePaths(world)
+    flight = make_flight(context, plan)
     for end in (float(duration), max(float(duration), float(times[-1]))):
         if plan.steps or context.forces is not None:
-            run_steps(context, plan, paths, end, progress)
+            run_steps(context, plan, paths, flight, end, progress)
         else:
             paths.start_segments(context, end)
     finish_sub_steps(context, plan, context.state.time)
@@ -133,7 +136,9 @@ def chosen_out(scene: Scene, accuracy: str | Accuracy, effects: Mapping[str, boo
     for name in effects:
         if name not in lines:
             raise unknown_name("effect", name, lines)
-    return {name: lines[name].reason for name, wanted in effects.items() if not wanted and lines[name].included}
+    out = {name: lines[name].reason for name, wanted in effects.items() if not wanted and lines[name].included}
+    out.pop(EventKernel.name, None)  # it changes no result
+    return out
 
 
 def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
@@ -154,6 +159,7 @@ def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
         ContactForces(),
         HeapForces(accuracy.contact_solver),
         ImpactTime(accuracy.impact_time),
+        EventKernel(),
         ExactFlight(),
         ForcedFlight(),
     ]
@@ -172,18 +178,38 @@ def start_courses(context: StepContext) -> None:
         begin(course, i)
 
 
-def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, end: float, progress) -> None:
-    """Step to the end; steps end on the grid of the accuracy's step and at keyframes."""
+def make_flight(context: StepContext, plan: Plan) -> EventRun | None:
+    """The event kernel, made ready, where the plan has it in."""
+    if not any(line.included for line in plan.lines if line.name == EventKernel.name):
+        return None
+    from rigidimpulse.events.run import EventRun
+
+    return EventRun(context)
+
+
+def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, flight: EventRun | None, end: float, progress) -> None:
+    """Step to the end; steps end on the grid of the accuracy's step and at keyframes.
+
+    The event kernel, if there is one, takes all steps in one in which nothing but simple impacts happens.
+    """
     size = context.world.accuracy.step
     while context.state.time < end:
-        now = context.state.time
-        paths.start_segments(context, now)
+        begin = context.state.time
+        paths.start_segments(context, begin)
         if context.nets is None and not np.any(context.state.course.mode != FIXED):
-            context.state.time = min(paths.next_key(now), end)
+            context.state.time = min(paths.next_key(begin), end)
             continue
-        index = math.floor(now / size + 1e-9) + 1
-        until = min(index * size, paths.next_key(now), end)
-        step(context, plan, until if context.nets is None else context.nets.advance(context, until))
+        stop = min(paths.next_key(begin), end)
+        how = STEP
+        if flight is not None and flight.may_fly():
+            with plan.clock(EventKernel.name):
+                how, step_begin, until = flight.fly(stop)
+            if how == GO_ON:
+                go_on(context, plan, step_begin, until)
+        if how == STEP:
+            index = math.floor(context.state.time / size + 1e-9) + 1
+            until = min(index * size, stop)
+            step(context, plan, until if context.nets is None else context.nets.advance(context, until))
         if progress is not None:
             progress(context.state.time)
 

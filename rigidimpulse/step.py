@@ -20,15 +20,28 @@ def step(context, plan, end: float) -> None:
     window = Window(context, end)
     plan.run("detect", context, window)
     react(context, plan, window, context.state.time, window.active_bodies())
+    _run_window(context, plan, window)
+
+
+def go_on(context, plan, begin: float, end: float) -> None:
+    """Advance all courses to the `end` of a step from the middle of it, where the event kernel stopped; begin: of the step. Both in s."""
+    window = Window(context, end)
+    plan.run("detect", context, window)
+    window.recall(begin)
+    _run_window(context, plan, window)
+
+
+def _run_window(context, plan, window: Window) -> None:
+    """From contact to contact, to the end of the window."""
     while True:
         plan.run("sweep", context, window)
         time = window.next_time()
-        if time >= end:
+        if time >= window.end:
             break
         bodies = window.bodies_at(time)
         window.count_contacts(time)
         react(context, plan, window, time, bodies)
-    context.state.time = end
+    context.state.time = window.end
 
 
 def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> None:

@@ -68,6 +68,18 @@ class Window:
             count = overlapping_pairs(box_min, box_max, self._moves, pairs)
         self._append(pairs[:count, 0], pairs[:count, 1], self.begin)
 
+    def recall(self, begin: float) -> None:
+        """Let pairs be as if the window had begun at `begin`, where the step did [s], all bodies having flown freely since.
+
+        A pair is swept from the last change of course of its bodies; when it was last in contact is known from its rebound.
+        """
+        course = self.context.state.course
+        self.start[:] = np.maximum(np.maximum(course.start[self.a], course.start[self.b]), begin)
+        for p, pair in enumerate(zip(self.a.tolist(), self.b.tolist(), strict=True)):
+            last = self.context.state.rebounds.get(pair)
+            if last is not None and last[0] >= begin:
+                self.since[p] = last[0]
+
     def touching(self, time: float, bodies: np.ndarray) -> tuple[list[Group], np.ndarray]:
         """Groups of touching bodies that the given ones belong to at `time`, and all bodies looked at."""
         groups, reached = touching_groups(self.context, self, time, bodies)
@@ -134,10 +146,15 @@ class Window:
         return np.flatnonzero(moves & ~self.inside)
 
     def bodies_at(self, time: float) -> np.ndarray:
-        """Bodies that come to contact or are called at `time`."""
+        """Movable bodies that come to contact, and bodies that are called, at `time`.
+
+        Not what they come to contact with, if it does not move: whoever else touches a floor has nothing to do with them.
+        """
         hit = self.time <= time
-        mark = self.wake <= time
+        mark = np.zeros(len(self.wake), bool)
         mark[self.a[hit]] = mark[self.b[hit]] = True
+        mark &= self.context.world.dynamic
+        mark |= self.wake <= time
         return mark.nonzero()[0]
 
     def find(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -1,0 +1,114 @@
+"""Balls in free flight, from impact to impact.
+
+A window of many steps holds, for every body and plane and for every pair whose boxes overlap, the time of its contact
+(`table`). The earliest one is taken, its bodies rebound (`impact`), and only what they may meet is timed anew: an impact
+costs as much as its bodies have neighbours, and log n. Times follow from the courses alone, so the length of the window
+changes nothing; it is chosen such that bodies have a few neighbours.
+
+As soon as something is not simple the kernel ends, at the very instant, and the loop in Python goes on (`step`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimpulse._jit import jit
+from rigidimpulse.events.effect import ARRIVED, GO_ON, NO_ROOM, STEP
+from rigidimpulse.events.impact import simple_impact
+from rigidimpulse.events.layout import AT_BOUNDARY, AT_ONCE
+from rigidimpulse.events.table import fill_table, renew, touches_more
+from rigidimpulse.integrate.course import FIXED
+
+LONGEST = 4096
+"""Steps in a window at most."""
+FEW, MANY = 1.0, 4.0
+"""Pairs a body below which windows grow, above which they shrink."""
+
+
+class Clock(NamedTuple):
+    """Where a flight is."""
+
+    now: float  # s
+    end: float  # s, of the window
+    number: int  # of the next boundary after now
+    at_boundary: bool
+
+
+@jit
+def _next_number(time, number, step):
+    """Number of the first boundary after `time`, from `number` on."""
+    number = max(number, np.int64(time / step))
+    while number * step <= time:
+        number += 1
+    return number
+
+
+@jit
+def _rebound(fixed, motion, table, book, rebounds, p, clock, time):
+    """Deal with entry p, a contact, at `time`; returns False where that is not simple."""
+    a, b = min(table.first[p], table.second[p]), max(table.first[p], table.second[p])
+    for i, j in ((a, b), (b, a)):
+        if fixed.dynamic[i] and touches_more(fixed, motion.course, table, i, j, time):
+            return False
+    return simple_impact(fixed, motion, book, rebounds, a, b, time)
+
+
+@jit
+def _has_room(book, rebounds):
+    """Whether one more impact can be kept."""
+    return book.count[0] < len(book.energy) and 2 * rebounds.used[0] < len(rebounds.key)
+
+
+@jit
+def _fly_window(fixed, motion, table, book, rebounds, clock):
+    """Go through the events of a window; returns how it ends and the clock then."""
+    course = motion.course
+    while table.queue.size[0] > 0:
+        p = table.queue.heap[0]
+        time, leaves = table.queue.key[p], table.leaves[p]
+        if leaves == AT_ONCE:
+            return GO_ON, clock
+        if leaves == AT_BOUNDARY:
+            return STEP, Clock(time, clock.end, _next_number(time, clock.number, fixed.step), True)
+        if not _has_room(book, rebounds):
+            return NO_ROOM, clock
+        clock = Clock(time, clock.end, _next_number(time, clock.number, fixed.step), False)
+        if not _rebound(fixed, motion, table, book, rebounds, p, clock, time):
+            return GO_ON, clock
+        a, b = table.first[p], table.second[p]
+        for i in (a, b):
+            if fixed.dynamic[i] and not renew(fixed, course, table, i, clock):
+                return NO_ROOM, clock
+    return ARRIVED, Clock(clock.end, clock.end, _next_number(clock.end, clock.number, fixed.step), True)
+
+
+@jit
+def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window):
+    """Carry all bodies from `now` towards `end` [s].
+
+    now, end: s; at_boundary: whether `now` is one; window: steps of the first window.
+
+    Returns how the flight ends, the time reached, whether that is a boundary, number of the next one, and steps of the next window.
+    """
+    course = motion.course
+    clock = Clock(now, now, _next_number(now, np.int64(0), fixed.step), at_boundary)
+    moving = 0
+    for i in range(len(fixed.kind)):
+        moving += course.mode[i] != FIXED
+    how = ARRIVED
+    while how == ARRIVED and clock.now < end:
+        first = clock.number
+        clock = Clock(clock.now, min((first + window - 1) * fixed.step, end), first, clock.at_boundary)
+        if not fill_table(fixed, course, table, clock):
+            return NO_ROOM, clock.now, clock.at_boundary, clock.number, window
+        pairs = table.count[0] - len(fixed.kind)
+        how, clock = _fly_window(fixed, motion, table, book, rebounds, clock)
+        if how == ARRIVED and pairs <= FEW * moving:
+            window = min(2 * window, LONGEST)
+        elif how == ARRIVED and pairs > MANY * moving:
+            window = max(window // 2, 1)
+        elif how == STEP or how == GO_ON:
+            window = min(window, 2 * (clock.number - first) + 1)
+    return how, clock.now, clock.at_boundary, clock.number, window
