@@ -18,6 +18,7 @@ from rigidimpulse._jit import jit
 from rigidimpulse.events.effect import ARRIVED, GO_ON, NO_ROOM, STEP
 from rigidimpulse.events.impact import simple_impact
 from rigidimpulse.events.layout import AT_BOUNDARY, AT_ONCE
+from rigidimpulse.events.paths import write_path, write_planes
 from rigidimpulse.events.table import fill_table, renew, touches_more
 from rigidimpulse.integrate.course import FIXED
 
@@ -30,6 +31,7 @@ FEW, MANY = 1.0, 4.0
 class Clock(NamedTuple):
     """Where a flight is."""
 
+    step: float  # s, between boundaries
     now: float  # s
     end: float  # s, of the window
     number: int  # of the next boundary after now
@@ -46,11 +48,11 @@ def _next_number(time, number, step):
 
 
 @jit
-def _rebound(fixed, motion, table, book, rebounds, p, clock, time):
+def _rebound(fixed, motion, table, book, rebounds, p, time):
     """Deal with entry p, a contact, at `time`; returns False where that is not simple."""
     a, b = min(table.first[p], table.second[p]), max(table.first[p], table.second[p])
     for i, j in ((a, b), (b, a)):
-        if fixed.dynamic[i] and touches_more(fixed, motion.course, table, i, j, time):
+        if fixed.dynamic[i] and touches_more(table, i, j, time):
             return False
     return simple_impact(fixed, motion, book, rebounds, a, b, time)
 
@@ -64,24 +66,26 @@ def _has_room(book, rebounds):
 @jit
 def _fly_window(fixed, motion, table, book, rebounds, clock):
     """Go through the events of a window; returns how it ends and the clock then."""
-    course = motion.course
     while table.queue.size[0] > 0:
         p = table.queue.heap[0]
         time, leaves = table.queue.key[p], table.leaves[p]
         if leaves == AT_ONCE:
             return GO_ON, clock
         if leaves == AT_BOUNDARY:
-            return STEP, Clock(time, clock.end, _next_number(time, clock.number, fixed.step), True)
+            return STEP, Clock(clock.step, time, clock.end, _next_number(time, clock.number, clock.step), True)
         if not _has_room(book, rebounds):
             return NO_ROOM, clock
-        clock = Clock(time, clock.end, _next_number(time, clock.number, fixed.step), False)
-        if not _rebound(fixed, motion, table, book, rebounds, p, clock, time):
+        clock = Clock(clock.step, time, clock.end, _next_number(time, clock.number, clock.step), False)
+        if not _rebound(fixed, motion, table, book, rebounds, p, time):
             return GO_ON, clock
         a, b = table.first[p], table.second[p]
         for i in (a, b):
-            if fixed.dynamic[i] and not renew(fixed, course, table, i, clock):
+            if fixed.dynamic[i]:
+                write_path(fixed, motion.course, table.paths, i)
+        for i in (a, b):
+            if fixed.dynamic[i] and not renew(fixed, table, i, clock):
                 return NO_ROOM, clock
-    return ARRIVED, Clock(clock.end, clock.end, _next_number(clock.end, clock.number, fixed.step), True)
+    return ARRIVED, Clock(clock.step, clock.end, clock.end, _next_number(clock.end, clock.number, clock.step), True)
 
 
 @jit
@@ -93,15 +97,17 @@ def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window):
     Returns how the flight ends, the time reached, whether that is a boundary, number of the next one, and steps of the next window.
     """
     course = motion.course
-    clock = Clock(now, now, _next_number(now, np.int64(0), fixed.step), at_boundary)
+    clock = Clock(fixed.step, now, now, _next_number(now, np.int64(0), fixed.step), at_boundary)
     moving = 0
     for i in range(len(fixed.kind)):
+        write_path(fixed, course, table.paths, i)
         moving += course.mode[i] != FIXED
+    write_planes(fixed, course, table.planes)
     how = ARRIVED
     while how == ARRIVED and clock.now < end:
         first = clock.number
-        clock = Clock(clock.now, min((first + window - 1) * fixed.step, end), first, clock.at_boundary)
-        if not fill_table(fixed, course, table, clock):
+        clock = Clock(fixed.step, clock.now, min((first + window - 1) * fixed.step, end), first, clock.at_boundary)
+        if not fill_table(fixed, table, clock):
             return NO_ROOM, clock.now, clock.at_boundary, clock.number, window
         pairs = table.count[0] - len(fixed.kind)
         how, clock = _fly_window(fixed, motion, table, book, rebounds, clock)

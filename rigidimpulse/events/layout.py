@@ -35,8 +35,6 @@ class Fixed(NamedTuple):
     coefficients: np.ndarray  # (k, k, 4) of two materials
     apart: np.ndarray  # (p,) keys a n + b of pairs that do not touch each other, ascending
     planes: np.ndarray  # (q,) the bodies that are planes
-    normal: np.ndarray  # (q, 3) of the planes, world
-    level: np.ndarray  # (q,) m, normal . x on the plane
     static_min: np.ndarray  # (n, 3) m, boxes of bodies that stand
     static_max: np.ndarray
     law: int  # of restitution
@@ -58,6 +56,8 @@ class Table(NamedTuple):
 
     queue: Queue
     tree: BoxTree
+    paths: np.ndarray  # (n, PATH_SIZE), planes (q, PLANE_SIZE), see `paths`
+    planes: np.ndarray
     low: np.ndarray  # (n, 3) m, boxes of the paths to the end of the window
     high: np.ndarray
     first: np.ndarray  # (k,) bodies of the entries, first < second for pairs

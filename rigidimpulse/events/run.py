@@ -10,11 +10,11 @@ from rigidimpulse.events.effect import ARRIVED, NO_ROOM, kinds
 from rigidimpulse.events.flight import fly
 from rigidimpulse.events.impact import remember
 from rigidimpulse.events.layout import PLANE, Book, Fixed, Motion, Rebounds, Table, make_rebounds
+from rigidimpulse.events.paths import PATH_SIZE, PLANE_SIZE
 from rigidimpulse.events.queue import make_queue
 from rigidimpulse.events.tree import make_tree
 from rigidimpulse.observe.events import ROW_LENGTH
 from rigidimpulse.respond.restitution import LAWS
-from rigidimpulse.rotation import rotate
 
 ROOM = 256
 """Impacts, pairs and rebounds that there is room for at first; doubled where it does not do."""
@@ -30,14 +30,11 @@ class EventRun:
         world = context.world
         kind = kinds(world)
         planes = np.flatnonzero(kind == PLANE)
-        frame = world.geometry.frame[world.geometry.shape_first[world.shape_of_body[planes]]].reshape(-1, 7)
-        normal = np.ascontiguousarray(rotate(world.orientation[planes], frame[:, :3]))
         self._context, self._pause, self._waits, self._window = context, 0, 0, 1
         self._fixed = Fixed(
             world.geometry, context.detector.sweep_scratch, world.shape_of_body, kind, world.dynamic, world.bound_radius, world.size,
             world.contact_gap, world.steady_acceleration, world.mass, world.inertia, world.material_of_body, world.coefficients,
-            world.apart, planes, normal, frame[:, 3] + (normal * world.position[planes]).sum(1), world.static_min, world.static_max,
-            LAWS[world.accuracy.restitution], world.accuracy.step,
+            world.apart, planes, world.static_min, world.static_max, LAWS[world.accuracy.restitution], world.accuracy.step,
         )  # fmt: skip
         state = context.state
         self._motion = Motion(state.course, state.now, state.rotation, context.acceleration, context.angular_acceleration)
@@ -50,7 +47,8 @@ class EventRun:
         capacity = n + self._pairs
         ends = np.zeros((2, capacity), np.int64)
         return Table(
-            make_queue(capacity), make_tree(n), context.box_min, context.box_max, *ends, np.zeros(capacity, np.int8),
+            make_queue(capacity), make_tree(n), np.zeros((n, PATH_SIZE)), np.zeros((len(self._fixed.planes), PLANE_SIZE)),
+            context.box_min, context.box_max, *ends, np.zeros(capacity, np.int8),
             np.full(2 * capacity, -1, np.int64), np.full(n, -1, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64),
             np.zeros(2, np.int64),
         )  # fmt: skip

@@ -12,157 +12,98 @@ Boundaries at which a pair is near are found by steps that its gap, g > margin, 
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import inf
 
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.groups import MARGIN
-from rigidimpulse.detect.pair_table import path_box
 from rigidimpulse.events.layout import AT_BOUNDARY, AT_ONCE, CONTACT, OTHER, PLANE
+from rigidimpulse.events.paths import (
+    BODY,
+    DYNAMIC,
+    KIND,
+    MOVES,
+    contact_time,
+    gap_at,
+    last_apart,
+    near_boundary,
+    near_gap,
+    swept_box,
+)
 from rigidimpulse.events.queue import clear, schedule
 from rigidimpulse.events.tree import build_tree, overlapping, replace_box
-from rigidimpulse.integrate.course import FIXED, place_at
-from rigidimpulse.sweep.ball_time import ball_time
 
-_WIDER = 1.01
-"""How much farther away than the margin counts as near."""
+_NO_PLANE = np.int64(-1)
+_EACH_ONCE, _FRESH = np.int64(0), np.int64(1)
 
 
 @jit
-def near_gap(fixed, a, b):
-    """Gap up to which the loop in Python looks at a pair, m."""
-    return _WIDER * MARGIN * fixed.contact_gap * min(fixed.size[a], fixed.size[b])
-
-
-@jit
-def gap_at(fixed, course, i, other, plane, time):
-    """Gap of the bounding spheres of bodies i and `other`, or of that of i and plane number `plane` if that is not -1, m."""
-    x, y = np.empty(3), np.empty(3)
-    place_at(course, i, time, x)
-    if plane >= 0:
-        n = fixed.normal[plane]
-        return n[0] * x[0] + n[1] * x[1] + n[2] * x[2] - fixed.level[plane] - fixed.radius[i]
-    place_at(course, other, time, y)
-    square = (y[0] - x[0]) ** 2 + (y[1] - x[1]) ** 2 + (y[2] - x[2]) ** 2
-    return sqrt(square) - fixed.radius[i] - fixed.radius[other]
-
-
-@jit
-def _fastest(fixed, course, i, other, plane, time, end):
-    """Bound of the speed at which that gap changes until `end`, m/s."""
-    speed = bend = along = pull = 0.0
-    for k in range(3):
-        v = course.velocity[i, k] + (time - course.start[i]) * course.acceleration[i, k] if course.mode[i] != FIXED else 0.0
-        a = course.acceleration[i, k] if course.mode[i] != FIXED else 0.0
-        if plane >= 0:
-            along += v * fixed.normal[plane, k]
-            pull += a * fixed.normal[plane, k]
-        elif course.mode[other] != FIXED:
-            v -= course.velocity[other, k] + (time - course.start[other]) * course.acceleration[other, k]
-            a -= course.acceleration[other, k]
-        speed += v * v
-        bend += a * a
-    return abs(along) + abs(pull) * (end - time) if plane >= 0 else sqrt(speed) + sqrt(bend) * (end - time)
-
-
-@jit
-def _near_boundary(fixed, course, i, other, plane, near, number, limit, clock):
-    """The first boundary, from number `number` up to the time `limit`, at which a gap is at most `near`; inf if there is none."""
-    fastest = _fastest(fixed, course, i, other, plane, clock.now, clock.end)
-    while True:
-        time = min(number * fixed.step, clock.end)
-        if time > limit:
-            return inf
-        left = gap_at(fixed, course, i, other, plane, time) - near
-        if left <= 0.0:
-            return time
-        if left >= fastest * (limit - time):
-            return inf
-        number = max(number + 1, np.int64((time + left / fastest) / fixed.step))
-
-
-@jit
-def _last_apart(fixed, course, i, other, plane, near, clock):
-    """The last boundary, or now, before which bounding spheres are surely not near; inf if not until the end of the window."""
-    fastest = _fastest(fixed, course, i, other, plane, clock.now, clock.end)
-    time = clock.now
-    while True:
-        left = gap_at(fixed, course, i, other, plane, time) - near
-        if left <= 0.0:
-            return time
-        if left >= fastest * (clock.end - time):
-            return inf
-        boundary = np.int64((time + left / fastest) / fixed.step) * fixed.step
-        if boundary <= time:
-            return time
-        time = boundary
-
-
-@jit
-def meeting(fixed, course, i, other, plane, clock):
+def meeting(paths, planes, i, other, plane, clock):
     """Time and kind of the next event of a pair, of which `other` is a plane if `plane` is its number and not -1."""
-    near, at_once = near_gap(fixed, i, other), AT_BOUNDARY if clock.at_boundary else AT_ONCE
-    if course.mode[i] == FIXED and course.mode[other] == FIXED:
+    near, at_once = near_gap(paths, i, other), AT_BOUNDARY if clock.at_boundary else AT_ONCE
+    if paths[i, MOVES] == 0.0 and paths[other, MOVES] == 0.0:
         return inf, CONTACT
-    if fixed.kind[i] == OTHER or fixed.kind[other] == OTHER:
-        time = _last_apart(fixed, course, i, other, plane, near, clock)
+    if paths[i, KIND] == OTHER or paths[other, KIND] == OTHER:
+        time = last_apart(paths, planes, i, other, plane, near, clock)
         return time, at_once if time == clock.now else AT_BOUNDARY
-    a, b = min(i, other), max(i, other)
-    time = ball_time(
-        fixed.geometry.frame, course, fixed.scratch, a, b, fixed.shape_of_body[a], fixed.shape_of_body[b], clock.now
-    )
-    if time != time or (clock.at_boundary and gap_at(fixed, course, i, other, plane, clock.now) <= near):
+    time = contact_time(paths, planes, i, other, plane, clock.now)
+    if time != time or (clock.at_boundary and gap_at(paths, planes, i, other, plane, clock.now) <= near):
         return clock.now, at_once
-    boundary = _near_boundary(fixed, course, i, other, plane, near, clock.number, min(time, clock.end), clock)
+    boundary = near_boundary(paths, planes, i, other, plane, near, time, clock)
     if boundary < inf:
         return boundary, AT_BOUNDARY
     return (time if time < clock.end else inf), CONTACT
 
 
 @jit
-def _time_wall(fixed, course, table, i, clock):
-    """Time the entry of body i: the plane that it meets first."""
-    best, kind = inf, CONTACT
-    for plane in range(len(fixed.planes)):
-        if not (fixed.dynamic[i] or fixed.dynamic[fixed.planes[plane]]):
-            continue
-        if _is_apart(fixed, i, fixed.planes[plane]):
-            continue
-        time, leaves = meeting(fixed, course, i, fixed.planes[plane], plane, clock)
-        if time < best or (time == best and leaves != CONTACT):
-            best, kind = time, leaves
-            table.first[i], table.second[i] = i, fixed.planes[plane]
-    table.leaves[i] = kind
-    schedule(table.queue, i, best, i)
-
-
-@jit
-def _time_pair(fixed, course, table, p, clock):
-    """Time the entry of a pair."""
-    a, b = table.first[p], table.second[p]
-    time, table.leaves[p] = meeting(fixed, course, a, b, np.int64(-1), clock)
-    schedule(table.queue, p, time, a if fixed.dynamic[a] else b)
-
-
-@jit
-def _is_apart(fixed, i, j):
+def _is_apart(apart, num_bodies, i, j):
     """Whether two bodies do not touch each other by order."""
-    if len(fixed.apart) == 0:
+    if len(apart) == 0:
         return False
-    key = min(i, j) * len(fixed.kind) + max(i, j)
-    low, high = 0, len(fixed.apart)
+    key = min(i, j) * num_bodies + max(i, j)
+    low, high = 0, len(apart)
     while low < high:
         middle = (low + high) // 2
-        if fixed.apart[middle] < key:
+        if apart[middle] < key:
             low = middle + 1
         else:
             high = middle
-    return low < len(fixed.apart) and fixed.apart[low] == key
+    return low < len(apart) and apart[low] == key
 
 
 @jit
-def _add_pair(fixed, course, table, i, j, clock):
+def _first_plane(paths, planes, apart, i, clock):
+    """The plane that body i meets first, as its number, time and kind of the event."""
+    best, kind, number = inf, CONTACT, _NO_PLANE
+    for plane in range(len(planes)):
+        other = np.int64(planes[plane, BODY])
+        if paths[i, DYNAMIC] == 0.0 or _is_apart(apart, len(paths), i, other):
+            continue
+        time, leaves = meeting(paths, planes, i, other, plane, clock)
+        if time < best or (time == best and leaves != CONTACT):
+            best, kind, number = time, leaves, plane
+    return number, best, kind
+
+
+@jit
+def _time_wall(fixed, table, i, clock):
+    """Time the entry of body i: the plane that it meets first."""
+    plane, time, table.leaves[i] = _first_plane(table.paths, table.planes, fixed.apart, i, clock)
+    if plane >= 0:
+        table.first[i], table.second[i] = i, fixed.planes[plane]
+    schedule(table.queue, i, time, i)
+
+
+@jit
+def _time_pair(table, p, clock):
+    """Time the entry of a pair."""
+    a, b = table.first[p], table.second[p]
+    time, table.leaves[p] = meeting(table.paths, table.planes, a, b, _NO_PLANE, clock)
+    schedule(table.queue, p, time, a if table.paths[a, DYNAMIC] > 0.0 else b)
+
+
+@jit
+def _add_pair(table, i, j, clock):
     """Add an entry for two bodies; returns False if there is no room."""
     p = table.count[0]
     if p == len(table.first):
@@ -173,80 +114,81 @@ def _add_pair(fixed, course, table, i, j, clock):
         table.after[2 * p + side] = table.head[body]
         table.head[body] = 2 * p + side
     table.count[0] = p + 1
-    _time_pair(fixed, course, table, p, clock)
+    _time_pair(table, p, clock)
     return True
 
 
 @jit
-def _meets(fixed, course, i, j):
-    """Whether i, which moves, and j may ever touch."""
-    return (fixed.dynamic[i] or fixed.dynamic[j]) and not _is_apart(fixed, i, j)
-
-
-@jit
-def fill_table(fixed, course, table, clock):
-    """Find who may meet until the end of the window, and when; returns False if there is no room for all pairs."""
-    n = len(fixed.kind)
-    clear(table.queue)
-    table.count[0] = n
-    table.head[:] = -1
-    bodies, count = np.empty(n, np.int64), 0
-    for i in range(n):
-        if fixed.kind[i] == PLANE:
+def _add_pairs(fixed, table, i, which, clock):
+    """Add entries for i, which moves, and whom it may meet: _FRESH, pairs without one, or _EACH_ONCE; False for want of room."""
+    paths, n = table.paths, len(table.paths)
+    reached = overlapping(table.tree, i, table.low, table.high, table.found)
+    for k in range(reached):
+        j = table.found[k]
+        if table.mark[j] == table.count[1] if which == _FRESH else (j < i and paths[j, MOVES] > 0.0):
             continue
-        bodies[count] = i
-        count += 1
-        if course.mode[i] == FIXED and not fixed.dynamic[i]:
-            table.low[i], table.high[i] = fixed.static_min[i], fixed.static_max[i]
-        else:
-            path_box(course, i, clock.now, clock.end, fixed.radius[i] + near_gap(fixed, i, i), table.low, table.high)
-    build_tree(table.tree, table.low, table.high, bodies[:count])
-    for at in range(count):
-        i = bodies[at]
-        if course.mode[i] == FIXED:
-            continue
-        _time_wall(fixed, course, table, i, clock)
-        reached = overlapping(table.tree, i, table.low, table.high, table.found)
-        for k in range(reached):
-            j = table.found[k]
-            if (j > i or course.mode[j] == FIXED) and _meets(fixed, course, i, j) and not _add_pair(fixed, course, table, i, j, clock):
+        if (paths[i, DYNAMIC] > 0.0 or paths[j, DYNAMIC] > 0.0) and not _is_apart(fixed.apart, n, i, j):
+            if not _add_pair(table, i, j, clock):
                 return False
     return True
 
 
 @jit
-def renew(fixed, course, table, i, clock):
-    """Body i has a new course: time its entries anew and add those of bodies that it may now meet; returns False if there is no room."""
-    path_box(course, i, clock.now, clock.end, fixed.radius[i] + near_gap(fixed, i, i), table.low, table.high)
+def fill_table(fixed, table, clock):
+    """Find who may meet until the end of the window, and when; returns False if there is no room for all pairs."""
+    paths, n = table.paths, len(table.paths)
+    clear(table.queue)
+    table.count[0] = n
+    table.head[:] = -1
+    bodies, count = np.empty(n, np.int64), 0
+    for i in range(n):
+        if paths[i, KIND] == PLANE:
+            continue
+        bodies[count] = i
+        count += 1
+        if paths[i, MOVES] == 0.0 and paths[i, DYNAMIC] == 0.0:
+            table.low[i], table.high[i] = fixed.static_min[i], fixed.static_max[i]
+        else:
+            swept_box(paths, i, clock, table.low, table.high)
+    build_tree(table.tree, table.low, table.high, bodies[:count])
+    for at in range(count):
+        i = bodies[at]
+        if paths[i, MOVES] > 0.0:
+            _time_wall(fixed, table, i, clock)
+            if not _add_pairs(fixed, table, i, _EACH_ONCE, clock):
+                return False
+    return True
+
+
+@jit
+def renew(fixed, table, i, clock):
+    """Body i has a new path: time its entries anew and add those of bodies that it may now meet; returns False if there is no room."""
+    swept_box(table.paths, i, clock, table.low, table.high)
     replace_box(table.tree, i, table.low, table.high)
     table.count[1] += 1
     mark, entry = table.count[1], table.head[i]
     while entry >= 0:
         p = entry // 2
         table.mark[table.first[p]] = table.mark[table.second[p]] = mark
-        _time_pair(fixed, course, table, p, clock)
+        _time_pair(table, p, clock)
         entry = table.after[entry]
-    _time_wall(fixed, course, table, i, clock)
-    reached = overlapping(table.tree, i, table.low, table.high, table.found)
-    for k in range(reached):
-        j = table.found[k]
-        if table.mark[j] != mark and _meets(fixed, course, i, j) and not _add_pair(fixed, course, table, i, j, clock):
-            return False
-    return True
+    _time_wall(fixed, table, i, clock)
+    return _add_pairs(fixed, table, i, _FRESH, clock)
 
 
 @jit
-def touches_more(fixed, course, table, i, partner, time):
+def touches_more(table, i, partner, time):
     """Whether body i is near another one than its partner."""
-    for plane in range(len(fixed.planes)):
-        other = fixed.planes[plane]
-        if other != partner and gap_at(fixed, course, i, other, plane, time) <= near_gap(fixed, i, other):
+    paths, planes = table.paths, table.planes
+    for plane in range(len(planes)):
+        other = np.int64(planes[plane, BODY])
+        if other != partner and gap_at(paths, planes, i, other, plane, time) <= near_gap(paths, i, other):
             return True
     entry = table.head[i]
     while entry >= 0:
         p = entry // 2
         other = table.second[p] if table.first[p] == i else table.first[p]
-        if other != partner and gap_at(fixed, course, i, other, np.int64(-1), time) <= near_gap(fixed, i, other):
+        if other != partner and gap_at(paths, planes, i, other, _NO_PLANE, time) <= near_gap(paths, i, other):
             return True
         entry = table.after[entry]
     return False

@@ -52,21 +52,16 @@ def is_closed_form(course, scratch, a, b, shape_a, shape_b, touch):
 
 
 @jit
-def _plane_time(frame, course, scratch, a, b, shape_a, shape_b, x, v, acceleration, slack, still):
-    """Seconds until a ball and a plane meet, as `_balls_time`."""
-    plane_a = scratch.plane[shape_a] >= 0
-    i, other, sign = (a, shape_b, 1.0) if plane_a else (b, shape_a, -1.0)
-    p = scratch.plane[shape_a] if plane_a else scratch.plane[shape_b]
-    q = course.orientation
-    n = rotated(q[i, 0], q[i, 1], q[i, 2], q[i, 3], sign * frame[p, 0], sign * frame[p, 1], sign * frame[p, 2])
-    gap, closing = dot(n, x) - (frame[p, 3] + scratch.reach[other]), -dot(n, v)
+def plane_time(normal, level, x, v, acceleration, slack, still):
+    """Seconds until a ball with its centre at `level` along the normal meets a plane, as `balls_time`."""
+    gap, closing = dot(normal, x) - level, -dot(normal, v)
     if gap <= slack and abs(closing) <= still:
         return nan
-    return safe_until(gap, closing, -dot(n, acceleration), inf)
+    return safe_until(gap, closing, -dot(normal, acceleration), inf)
 
 
 @jit
-def _balls_time(x, v, acceleration, reach, slack, still):
+def balls_time(x, v, acceleration, reach, slack, still):
     """Seconds until two balls meet, inf if they do not; nan where they touch and hover, or no root is found."""
     distance, approach = length(x), -dot(x, v)
     if distance - reach <= slack and abs(approach) <= still * distance:
@@ -88,6 +83,19 @@ def _balls_time(x, v, acceleration, reach, slack, still):
 
 
 @jit
+def until_contact(x, v, acceleration, reach, size, speed, normal, level):
+    """Seconds until a pair meets whose relative flight is x, v, acceleration; as `balls_time`.
+
+    reach: m, sum of the radii; size, speed: sums of the distances from the origin, m, and of the speeds, m/s; normal: that of a plane
+    from a to b, zeros for two balls; level: m, of the plane along its own normal.
+    """
+    slack, still = _ROUND_OFF * (size + reach), _APPROACH * speed
+    if normal[0] != 0.0 or normal[1] != 0.0 or normal[2] != 0.0:
+        return plane_time(normal, level + reach, x, v, acceleration, slack, still)
+    return balls_time(x, v, acceleration, reach, slack, still)
+
+
+@jit
 def ball_time(frame, course, scratch, a, b, shape_a, shape_b, start):
     """Time from `start` on at which a pair of `is_closed_form` meets, inf if it never does; nan where the guard must look.
 
@@ -99,15 +107,17 @@ def ball_time(frame, course, scratch, a, b, shape_a, shape_b, start):
         return nan
     size = length(row(course.position, a)) + length(row(course.position, b))
     speed = length(row(course.velocity, a)) + length(row(course.velocity, b))
-    if scratch.plane[shape_a] >= 0 or scratch.plane[shape_b] >= 0:
-        other = shape_b if scratch.plane[shape_a] >= 0 else shape_a
-        slack = _ROUND_OFF * (size + scratch.reach[other])
-        s = _plane_time(frame, course, scratch, a, b, shape_a, shape_b, x, v, acceleration, slack, _APPROACH * speed)
+    plane_a, plane_b = scratch.plane[shape_a] >= 0, scratch.plane[shape_b] >= 0
+    reach, normal, level = 0.0, (0.0, 0.0, 0.0), 0.0
+    if plane_a or plane_b:
+        i, p, sign = (a, scratch.plane[shape_a], 1.0) if plane_a else (b, scratch.plane[shape_b], -1.0)
+        q = course.orientation
+        n = rotated(q[i, 0], q[i, 1], q[i, 2], q[i, 3], frame[p, 0], frame[p, 1], frame[p, 2])
+        normal, level, reach = scaled(n, sign), frame[p, 3], scratch.reach[shape_b if plane_a else shape_a]
     else:
         reach = scratch.reach[shape_a] + scratch.reach[shape_b]
-        s = _balls_time(x, v, acceleration, reach, _ROUND_OFF * (size + reach), _APPROACH * speed)
+    s = until_contact(x, v, acceleration, reach, size, speed, normal, level)
     return s if s != s or s == inf else max(since + s, start)
-
 
 
 @jit

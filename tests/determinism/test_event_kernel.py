@@ -24,7 +24,8 @@ def box_of_planes(scene: ri.Scene, half: tuple[float, float, float], material: r
         for sign in (-1.0, 1.0):
             normal = np.zeros(3)
             normal[axis] = -sign
-            scene.add(ri.Body(f"wall {axis} {sign:+.0f}", ri.Shape.half_space(tuple(normal), -half[axis]), motion="static", material=material))
+            wall = ri.Shape.half_space(tuple(normal), -half[axis])
+            scene.add(ri.Body(f"wall {axis} {sign:+.0f}", wall, motion="static", material=material))
 
 
 def scatter(scene: ri.Scene, count: int, half: float, radius: float, material: ri.Material, speed: float, height: float = 0.0) -> None:
@@ -155,6 +156,8 @@ def test_gallery_scenes_agree(name: str) -> None:
     assert_same(entry.scene, min(entry.duration, 3.0), entry.fps, entry.accuracy)
 
 
-@pytest.mark.parametrize("settings", [{"step": 1 / 240}, {"impact_time": "conservative"}, {"response": "simultaneous", "restitution": "poisson"}])
+@pytest.mark.parametrize(
+    "settings", [{"step": 1 / 240}, {"impact_time": "conservative"}, {"response": "simultaneous", "restitution": "poisson"}]
+)
 def test_settings_agree(settings: dict) -> None:
     assert_same(rough_gas, 1.0, 24.0, ri.Accuracy(**settings))
