@@ -256,8 +256,10 @@ def impulses_by_cause(context: StepContext, times: np.ndarray, impacts: np.ndarr
 def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration: float) -> Recording:
     """Body-frame poses, impacts and ledger from what the recorder holds."""
     world, recorder = context.world, context.recorder
-    position, orientation = np.empty_like(recorder.position), np.empty_like(recorder.orientation)
-    for i in range(world.num_bodies):
+    # Where the body frame is the principal frame there is nothing to turn (0 is added since turning makes 0 of -0).
+    position, orientation = recorder.position.copy(), recorder.orientation + 0.0
+    turned = np.any(world.offset != 0.0, axis=1) | np.any(world.turn != [1.0, 0.0, 0.0, 0.0], axis=1)
+    for i in np.flatnonzero(turned).tolist():
         position[:, i], orientation[:, i] = world.body_pose(i, recorder.position[:, i], recorder.orientation[:, i])
     impacts = context.log.impacts.table()
     close_stretches(context)

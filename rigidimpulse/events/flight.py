@@ -20,7 +20,7 @@ from rigidimpulse.events.impact import simple_impact
 from rigidimpulse.events.layout import AT_BOUNDARY, AT_ONCE
 from rigidimpulse.events.paths import write_path, write_planes
 from rigidimpulse.events.table import fill_table, renew, touches_more
-from rigidimpulse.integrate.course import FIXED
+from rigidimpulse.integrate.course import FIXED, state_at
 
 LONGEST = 4096
 """Steps in a window at most."""
@@ -89,6 +89,23 @@ def _fly_window(fixed, motion, table, book, rebounds, clock):
 
 
 @jit
+def _write_frames(course, book, time):
+    """Write the frames of all bodies before `time`, frame by frame: that is the order in which they lie in memory."""
+    first, last = book.written.min(), np.int64(0)
+    while last < len(book.times) and book.times[last] < time:
+        last += 1
+    for f in range(first, last):
+        for i in range(len(book.written)):
+            if book.written[i] <= f:
+                state_at(
+                    course, i, book.times[f], book.position[f, i], book.orientation[f, i], book.velocity[f, i],
+                    book.angular_velocity[f, i],
+                )  # fmt: skip
+    for i in range(len(book.written)):
+        book.written[i] = max(book.written[i], last)
+
+
+@jit
 def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window):
     """Carry all bodies from `now` towards `end` [s].
 
@@ -111,6 +128,7 @@ def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window):
             return NO_ROOM, clock.now, clock.at_boundary, clock.number, window
         pairs = table.count[0] - len(fixed.kind)
         how, clock = _fly_window(fixed, motion, table, book, rebounds, clock)
+        _write_frames(course, book, clock.now)
         if how == ARRIVED and pairs <= FEW * moving:
             window = min(2 * window, LONGEST)
         elif how == ARRIVED and pairs > MANY * moving:
