@@ -16,11 +16,12 @@ from rigidimpulse.constrain.contact_forces import ContactForces
 from rigidimpulse.constrain.heap import HeapForces
 from rigidimpulse.constrain.jointed import reaction_table
 from rigidimpulse.constrain.kinds import Friction, JointRows, RollingFriction
+from rigidimpulse.detect.broadphase import bound_planes
 from rigidimpulse.detect.overlap import resolve_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.detect.window import Window
 from rigidimpulse.errors import SceneError, unknown_name
-from rigidimpulse.events.effect import GO_ON, STEP, EventKernel
+from rigidimpulse.events.effect import ARRIVED, GO_ON, STEP, EventKernel
 from rigidimpulse.forces.constant import ConstantForces
 from rigidimpulse.forces.gravity import FreeRotation, Gravity, SteadyLoad
 from rigidimpulse.forces.kinds import bind_forces, force_kinds
@@ -88,6 +89,7 @@ def simulate(
         logger.warning("compiling kernels for the first run on this machine, once: this takes about half a minute")
         if world.can_collide:
             compile_kernels(world)
+    bound_planes(world)
     plan = make_plan(world, effects)
     recorder = Recorder(times, world.num_bodies)
     log = EventLog()
@@ -202,16 +204,28 @@ def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, flight: Ev
         stop = min(paths.next_key(begin), end)
         how = STEP
         if flight is not None and flight.may_fly():
-            with plan.clock(EventKernel.name):
-                how, step_begin, until = flight.fly(stop)
-            if how == GO_ON:
-                go_on(context, plan, step_begin, until)
+            how = fly(context, plan, flight, stop)
         if how == STEP:
             index = math.floor(context.state.time / size + 1e-9) + 1
             until = min(index * size, stop)
             step(context, plan, until if context.nets is None else context.nets.advance(context, until))
         if progress is not None:
             progress(context.state.time)
+
+
+def fly(context: StepContext, plan: Plan, flight: EventRun, stop: float) -> int:
+    """Let the event kernel take the scene towards `stop` [s], and the loop in Python take over where it cannot; returns how that ends."""
+    begin = context.state.time
+    with plan.clock(EventKernel.name):
+        how, step_begin, until = flight.fly(stop)
+    while how == GO_ON:
+        go_on(context, plan, step_begin, until, may_leave=context.state.time > begin)
+        if context.state.time >= until:
+            return ARRIVED
+        begin = context.state.time
+        with plan.clock(EventKernel.name):
+            how, step_begin, until = flight.fly(stop, at_boundary=False)
+    return how
 
 
 def finish_sub_steps(context: StepContext, plan: Plan, end: float) -> None:

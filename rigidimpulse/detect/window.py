@@ -80,6 +80,19 @@ class Window:
             if last is not None and last[0] >= begin:
                 self.since[p] = last[0]
 
+    def is_plain(self, time: float) -> bool:
+        """Whether nothing in the window asks to be remembered: no body held or called, no pair met more than once or without an impulse."""
+        state = self.context.state
+        return not (
+            state.under_contact.any()
+            or self.wake.min() < np.inf
+            or self.inside.any()
+            or self.tries.any()
+            or self.repeats.any()
+            or (self.touch > self.least).any()
+            or (self.time <= time).any()
+        )
+
     def touching(self, time: float, bodies: np.ndarray) -> tuple[list[Group], np.ndarray]:
         """Groups of touching bodies that the given ones belong to at `time`, and all bodies looked at."""
         groups, reached = touching_groups(self.context, self, time, bodies)

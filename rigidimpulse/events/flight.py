@@ -32,6 +32,7 @@ class Clock(NamedTuple):
     """Where a flight is."""
 
     step: float  # s, between boundaries
+    live: float  # gap, relative to the held one, up to which contacts act; inf where even farther ones may
     now: float  # s
     end: float  # s, of the window
     number: int  # of the next boundary after now
@@ -72,10 +73,10 @@ def _fly_window(fixed, motion, table, book, rebounds, clock):
         if leaves == AT_ONCE:
             return GO_ON, clock
         if leaves == AT_BOUNDARY:
-            return STEP, Clock(clock.step, time, clock.end, _next_number(time, clock.number, clock.step), True)
+            return STEP, Clock(clock.step, clock.live, time, clock.end, _next_number(time, clock.number, clock.step), True)
         if not _has_room(book, rebounds):
             return NO_ROOM, clock
-        clock = Clock(clock.step, time, clock.end, _next_number(time, clock.number, clock.step), False)
+        clock = Clock(clock.step, clock.live, time, clock.end, _next_number(time, clock.number, clock.step), False)
         if not _rebound(fixed, motion, table, book, rebounds, p, time):
             return GO_ON, clock
         a, b = table.first[p], table.second[p]
@@ -85,7 +86,7 @@ def _fly_window(fixed, motion, table, book, rebounds, clock):
         for i in (a, b):
             if fixed.dynamic[i] and not renew(fixed, table, i, clock):
                 return NO_ROOM, clock
-    return ARRIVED, Clock(clock.step, clock.end, clock.end, _next_number(clock.end, clock.number, clock.step), True)
+    return ARRIVED, Clock(clock.step, clock.live, clock.end, clock.end, _next_number(clock.end, clock.number, clock.step), True)
 
 
 @jit
@@ -106,15 +107,15 @@ def _write_frames(course, book, time):
 
 
 @jit
-def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window):
+def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window, live):
     """Carry all bodies from `now` towards `end` [s].
 
-    now, end: s; at_boundary: whether `now` is one; window: steps of the first window.
+    now, end: s; at_boundary: whether `now` is one; window: steps of the first window; live: see `Clock`.
 
     Returns how the flight ends, the time reached, whether that is a boundary, number of the next one, and steps of the next window.
     """
     course = motion.course
-    clock = Clock(fixed.step, now, now, _next_number(now, np.int64(0), fixed.step), at_boundary)
+    clock = Clock(fixed.step, live, now, now, _next_number(now, np.int64(0), fixed.step), at_boundary)
     moving = 0
     for i in range(len(fixed.kind)):
         write_path(fixed, course, table.paths, i)
@@ -123,7 +124,7 @@ def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window):
     how = ARRIVED
     while how == ARRIVED and clock.now < end:
         first = clock.number
-        clock = Clock(fixed.step, clock.now, min((first + window - 1) * fixed.step, end), first, clock.at_boundary)
+        clock = Clock(fixed.step, live, clock.now, min((first + window - 1) * fixed.step, end), first, clock.at_boundary)
         if not fill_table(fixed, table, clock):
             return NO_ROOM, clock.now, clock.at_boundary, clock.number, window
         pairs = table.count[0] - len(fixed.kind)
@@ -133,6 +134,6 @@ def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window):
             window = min(2 * window, LONGEST)
         elif how == ARRIVED and pairs > MANY * moving:
             window = max(window // 2, 1)
-        elif how == STEP or how == GO_ON:
-            window = min(window, 2 * (clock.number - first) + 1)
+        elif (how == STEP or how == GO_ON) and clock.number <= first + 1:
+            window = max(window // 2, 1)
     return how, clock.now, clock.at_boundary, clock.number, window

@@ -62,6 +62,14 @@ def remember(rebounds, key, time, speed, count):
 
 
 @jit
+def copy_rebounds(source, target):
+    """Put all rebounds into a larger, empty table."""
+    for at in range(len(source.key)):
+        if source.key[at] >= 0:
+            remember(target, source.key[at], source.time[at], source.speed[at], source.count[at])
+
+
+@jit
 def _contact(fixed, motion, book, a, b, margin):
     """Write the contact of two balls, or of a ball and a plane, within the margin, as `manifold.pair_contacts` does."""
     geometry, now, rotation = fixed.geometry, motion.now, motion.rotation

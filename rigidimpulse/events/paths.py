@@ -6,13 +6,14 @@ kernel one by one, which takes longer than to work with them.
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 
 import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.features import along, dot, subtract
 from rigidimpulse.detect.groups import MARGIN
+from rigidimpulse.events.layout import OTHER
 from rigidimpulse.integrate.course import FIXED
 from rigidimpulse.rotation import rotated
 from rigidimpulse.sweep.ball_time import until_contact
@@ -25,6 +26,8 @@ NORMAL, LEVEL, HEIGHT, BODY, PLANE_SIZE = np.array([0, 3, 4, 5, 6])
 """Columns of the planes (q, PLANE_SIZE): normal in the world, level along it from the body's centre and from the origin, and the body."""
 _WIDER = 1.01
 """How much farther away than the margin counts as near."""
+_CURVED = 1e-9
+"""Part of speeds, and of accelerations on curved paths, that rounding may take."""
 
 
 @jit
@@ -123,14 +126,34 @@ def _fastest(paths, planes, i, other, plane, time, end):
 
 
 @jit
+def is_passing(paths, planes, i, other, plane, time, gap, live):
+    """Whether the loop in Python would do nothing for two balls, or a ball and a plane, that are near at `time`.
+
+    That is so where they are farther apart than contacts in action, live (relative to the held gap), and approach or part faster than
+    what would be held: twice sqrt(2 a delta), with more than all accelerations that may press them.
+    """
+    delta = min(paths[i, GAP], paths[other, GAP])
+    if paths[i, KIND] == OTHER or paths[other, KIND] == OTHER or not gap > live * delta:
+        return False
+    a, b = min(i, other), max(i, other)
+    x, v, _ = _relative(paths, a, b, time)
+    n = _three(planes, plane, NORMAL) if plane >= 0 else scaled(x, 1.0 / length(x))
+    speed, fast = abs(dot(n, v)), length(v)
+    pull = length(_three(paths, i, PULL)) + length(_three(paths, other, PULL)) + _CURVED * fast * fast / paths[i, RADIUS]
+    return speed > 2.0 * sqrt(2.0 * pull * delta) + _CURVED * fast
+
+
+@jit
 def _march(paths, planes, i, other, plane, near, number, last, clock):
-    """The first boundary from number `number` to `last` at which a gap is at most `near`; inf if there is none."""
+    """The first boundary from number `number` to `last` at which a gap is at most `near` and the loop may act; inf if there is none."""
     fastest = _fastest(paths, planes, i, other, plane, clock.now, clock.end)
     while number <= last:
         time = number * clock.step
         left = gap_at(paths, planes, i, other, plane, time) - near
         if left <= 0.0:
-            return time
+            if not is_passing(paths, planes, i, other, plane, time, left + near, clock.live):
+                return time
+            left = 0.0
         if left >= fastest * (last * clock.step - time):
             return inf
         number = max(number + 1, np.int64((time + left / fastest) / clock.step))

@@ -6,9 +6,10 @@ import numpy as np
 
 from rigidimpulse.detect.groups import empty_contacts
 from rigidimpulse.detect.manifold import SCRATCH_ROWS
-from rigidimpulse.events.effect import ARRIVED, NO_ROOM, kinds
+from rigidimpulse.detect.pair_table import NEAR, ROUND_OFF
+from rigidimpulse.events.effect import NO_ROOM, STEP, kinds
 from rigidimpulse.events.flight import fly
-from rigidimpulse.events.impact import remember
+from rigidimpulse.events.impact import copy_rebounds, remember
 from rigidimpulse.events.layout import PLANE, Book, Fixed, Motion, Rebounds, Table, make_rebounds
 from rigidimpulse.events.paths import PATH_SIZE, PLANE_SIZE
 from rigidimpulse.events.queue import make_queue
@@ -18,6 +19,10 @@ from rigidimpulse.respond.restitution import LAWS
 
 ROOM = 256
 """Impacts, pairs and rebounds that there is room for at first; doubled where it does not do."""
+FIRST_WINDOW = 16
+"""Steps in the first window."""
+LIVE = 2.0
+"""How much farther away contacts are left to the loop in Python than it takes them for touching."""
 LONGEST_PAUSE = 16
 """Steps at most in which the kernel is not tried, after steps that were not simple."""
 
@@ -30,7 +35,7 @@ class EventRun:
         world = context.world
         kind = kinds(world)
         planes = np.flatnonzero(kind == PLANE)
-        self._context, self._pause, self._waits, self._window = context, 0, 0, 1
+        self._context, self._pause, self._waits, self._window = context, 0, 0, FIRST_WINDOW
         self._fixed = Fixed(
             world.geometry, context.detector.sweep_scratch, world.shape_of_body, kind, world.dynamic, world.bound_radius, world.size,
             world.contact_gap, world.steady_acceleration, world.mass, world.inertia, world.material_of_body, world.coefficients,
@@ -41,6 +46,9 @@ class EventRun:
         self._pairs, self._rows = ROOM + world.num_bodies, ROOM
         self._table, self._book = self._make_table(), self._make_book()
         self._rebounds, self._known = make_rebounds(2 * ROOM), 0
+        self._step_begin = 0.0
+        gap = world.contact_gap
+        self._live = LIVE * (NEAR + ROUND_OFF + 2.0 * world.accuracy.tolerance / gap)
 
     def _make_table(self) -> Table:
         context, n = self._context, self._context.world.num_bodies
@@ -66,28 +74,31 @@ class EventRun:
         waits, self._waits = self._waits > 0, max(self._waits - 1, 0)
         return not waits and not self._context.state.under_contact.any() and self._context.nets is None
 
-    def fly(self, end: float) -> tuple[int, float, float]:
-        """Carry the scene from a boundary of steps towards `end` [s] as far as what happens is simple.
+    def fly(self, end: float, at_boundary: bool = True) -> tuple[int, float, float]:
+        """Carry the scene from a boundary of steps, or from the middle of one, towards `end` [s] as far as what happens is simple.
 
-        Returns how the flight ends (see `flight`), and where the step begins and ends in which it does, s.
+        Returns how the flight ends (see `effect`), and where the step begins and ends in which it does, s.
         """
         context = self._context
         self._learn()
         begin = now = context.state.time
-        how, at_boundary, number = NO_ROOM, True, 0
+        if at_boundary:
+            self._step_begin = begin
+        how, number = NO_ROOM, 0
         while how == NO_ROOM:
             how, now, at_boundary, number, self._window = fly(
-                self._fixed, self._motion, self._table, self._book, self._rebounds, now, end, at_boundary, self._window
+                self._fixed, self._motion, self._table, self._book, self._rebounds, now, end, at_boundary, self._window,
+                self._live,
             )
             self._keep_impacts()
             if how == NO_ROOM:
                 self._make_room()
         context.state.time = now
-        if how != ARRIVED:
+        if how == STEP:
             self._pause = 0 if now > begin else min(2 * self._pause + 1, LONGEST_PAUSE)
             self._waits = self._pause
         step = self._fixed.step
-        return how, max(begin, (number - 1) * step), min(number * step, end)
+        return how, max(self._step_begin, (number - 1) * step), min(number * step, end)
 
     def _learn(self) -> None:
         """Take over the rebounds since the last flight."""
@@ -97,6 +108,8 @@ class EventRun:
             if 2 * self._rebounds.used[0] >= len(self._rebounds.key):
                 self._grow_rebounds()
             remember(self._rebounds, a * self._context.world.num_bodies + b, *known[a, b])
+            if known[a, b][2] > 0:
+                self._live = np.inf  # what came back fast may be dealt with before it touches
         self._known = rows.count
 
     def _keep_impacts(self) -> None:
@@ -126,7 +139,5 @@ class EventRun:
 
     def _grow_rebounds(self) -> None:
         old: Rebounds = self._rebounds
-        self._rebounds = make_rebounds(2 * len(old.key))
-        for at in np.flatnonzero(old.key >= 0).tolist():
-            remember(self._rebounds, int(old.key[at]), float(old.time[at]), float(old.speed[at]), int(old.count[at]))
-
+        self._rebounds = make_rebounds(4 * len(old.key))
+        copy_rebounds(old, self._rebounds)

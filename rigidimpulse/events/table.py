@@ -25,6 +25,7 @@ from rigidimpulse.events.paths import (
     MOVES,
     contact_time,
     gap_at,
+    is_passing,
     last_apart,
     near_boundary,
     near_gap,
@@ -47,8 +48,12 @@ def meeting(paths, planes, i, other, plane, clock):
         time = last_apart(paths, planes, i, other, plane, near, clock)
         return time, at_once if time == clock.now else AT_BOUNDARY
     time = contact_time(paths, planes, i, other, plane, clock.now)
-    if time != time or (clock.at_boundary and gap_at(paths, planes, i, other, plane, clock.now) <= near):
+    if time != time:
         return clock.now, at_once
+    if clock.at_boundary:
+        gap = gap_at(paths, planes, i, other, plane, clock.now)
+        if gap <= near and not is_passing(paths, planes, i, other, plane, clock.now, gap, clock.live):
+            return clock.now, AT_BOUNDARY
     boundary = near_boundary(paths, planes, i, other, plane, near, time, clock)
     if boundary < inf:
         return boundary, AT_BOUNDARY

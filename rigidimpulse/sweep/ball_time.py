@@ -31,7 +31,7 @@ from rigidimpulse.sweep.guard_tree import row
 
 _ROUND_OFF = TOLERANCES.round_off
 _APPROACH = TOLERANCES.approach
-DEEPEST = 1e-12
+DEEPEST = 1e-10
 """Gap below 0 that counts as round-off, relative to the radius of a ball."""
 _NEWTON_ERROR = 10.0
 """Round-offs that may be left of the gap where Newton's method ends."""
