@@ -18,7 +18,7 @@ from rigidimpulse._jit import jit
 from rigidimpulse.events.effect import ARRIVED, GO_ON, NO_ROOM, STEP
 from rigidimpulse.events.impact import simple_impact
 from rigidimpulse.events.layout import AT_BOUNDARY, AT_ONCE
-from rigidimpulse.events.paths import write_path, write_planes
+from rigidimpulse.events.paths import place_planes, write_path
 from rigidimpulse.events.table import fill_table, renew, touches_more
 from rigidimpulse.integrate.course import FIXED, state_at
 
@@ -26,6 +26,9 @@ LONGEST = 4096
 """Steps in a window at most."""
 FEW, MANY = 1.0, 4.0
 """Pairs a body below which windows grow, above which they shrink."""
+
+
+_NO_PLANE = np.int64(-1)
 
 
 class Clock(NamedTuple):
@@ -55,7 +58,8 @@ def _rebound(fixed, motion, table, book, rebounds, p, time):
     for i, j in ((a, b), (b, a)):
         if fixed.dynamic[i] and touches_more(table, i, j, time):
             return False
-    return simple_impact(fixed, motion, book, rebounds, a, b, time)
+    plane = table.plane[p] if p < len(table.paths) else _NO_PLANE
+    return simple_impact(fixed, motion, book, rebounds, table.paths, table.planes, a, b, plane, time)
 
 
 @jit
@@ -82,9 +86,9 @@ def _fly_window(fixed, motion, table, book, rebounds, clock):
         a, b = table.first[p], table.second[p]
         for i in (a, b):
             if fixed.dynamic[i]:
-                write_path(fixed, motion.course, table.paths, i)
+                write_path(motion.course, table.paths, i)
         for i in (a, b):
-            if fixed.dynamic[i] and not renew(fixed, table, i, clock):
+            if fixed.dynamic[i] and not renew(fixed.apart, table, i, clock):
                 return NO_ROOM, clock
     return ARRIVED, Clock(clock.step, clock.live, clock.end, clock.end, _next_number(clock.end, clock.number, clock.step), True)
 
@@ -117,17 +121,17 @@ def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window, liv
     course = motion.course
     clock = Clock(fixed.step, live, now, now, _next_number(now, np.int64(0), fixed.step), at_boundary)
     moving = 0
-    for i in range(len(fixed.kind)):
-        write_path(fixed, course, table.paths, i)
+    for i in range(len(table.paths)):
+        write_path(course, table.paths, i)
         moving += course.mode[i] != FIXED
-    write_planes(fixed, course, table.planes)
+    place_planes(course, table.planes)
     how = ARRIVED
     while how == ARRIVED and clock.now < end:
         first = clock.number
         clock = Clock(fixed.step, live, clock.now, min((first + window - 1) * fixed.step, end), first, clock.at_boundary)
         if not fill_table(fixed, table, clock):
             return NO_ROOM, clock.now, clock.at_boundary, clock.number, window
-        pairs = table.count[0] - len(fixed.kind)
+        pairs = table.count[0] - len(table.paths)
         how, clock = _fly_window(fixed, motion, table, book, rebounds, clock)
         _write_frames(course, book, clock.now)
         if how == ARRIVED and pairs <= FEW * moving:

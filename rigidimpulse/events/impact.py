@@ -18,20 +18,21 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.closed_form import round_half_space_contacts, sphere_sphere_contact
-from rigidimpulse.detect.features import moved, relative_pose, row
+from rigidimpulse.detect.closed_form import plane_in_frame
+from rigidimpulse.detect.features import along, dot, moved, relative_pose, turned
 from rigidimpulse.detect.groups import MARGIN
-from rigidimpulse.detect.manifold import _rows_to_world
-from rigidimpulse.detect.touching import _point_acceleration, bring, fill_contacts
+from rigidimpulse.detect.touching import _point_acceleration, bring
 from rigidimpulse.detect.window import INSTANT
 from rigidimpulse.events.layout import PLANE
-from rigidimpulse.integrate.course import FIXED, FREE, take
+from rigidimpulse.events.paths import GAP, KIND, MOVES, RADIUS
+from rigidimpulse.integrate.course import FREE, take
 from rigidimpulse.observe.energy import _kinetic
 from rigidimpulse.observe.events import write_impacts
 from rigidimpulse.observe.recorder import sample_path
 from rigidimpulse.respond.impulse import relative_velocity, resolve_contact, speed_scale
 from rigidimpulse.respond.response import SLOW
 from rigidimpulse.sweep.ball_time import DEEPEST
+from rigidimpulse.sweep.bound import scaled
 
 _APPROACH = TOLERANCES.approach
 _CLEAR = 2.0
@@ -70,33 +71,45 @@ def copy_rebounds(source, target):
 
 
 @jit
-def _contact(fixed, motion, book, a, b, margin):
-    """Write the contact of two balls, or of a ball and a plane, within the margin, as `manifold.pair_contacts` does."""
-    geometry, now, rotation = fixed.geometry, motion.now, motion.rotation
-    shape_a, shape_b = fixed.shape_of_body[a], fixed.shape_of_body[b]
-    p, q = geometry.shape_first[shape_a], geometry.shape_first[shape_b]
+def _contact(fixed, motion, contacts, paths, planes, a, b, plane, margin):
+    """Write the contact of two balls, or of a ball and a plane, within the margin; returns whether there is one.
+
+    These are the operations of `manifold.pair_contacts` and `touching.fill_contacts`, for balls, whose centres are at 0.
+    """
+    now, rotation, centre = motion.now, motion.rotation, (0.0, 0.0, 0.0)
     r, t = np.empty((3, 3)), np.empty(3)
-    swapped = geometry.kind[q] > geometry.kind[p]
-    i, j = (b, a) if swapped else (a, b)
-    relative_pose(rotation[i], now.position[i], rotation[j], now.position[j], r, t)
-    if fixed.kind[a] == PLANE or fixed.kind[b] == PLANE:
-        ball, plane = (q, p) if swapped else (p, q)
-        count = round_half_space_contacts(geometry, ball, plane, r, t, margin, book.walk, book.real, book.integer, _NONE)
+    first, second = (b, a) if plane >= 0 and paths[a, KIND] == PLANE else (a, b)
+    relative_pose(rotation[first], now.position[first], rotation[second], now.position[second], r, t)
+    radius = paths[first, RADIUS]
+    if plane >= 0:
+        up, offset = plane_in_frame(planes, plane, r, t)
+        height = dot(centre, up) - offset
+        normal, gap = scaled(up, -1.0), height - radius
+        point_first, point_second = along(centre, -radius, up), along(centre, -height, up)
     else:
-        v, w = geometry.vertex_first[p], geometry.vertex_first[q]
-        count = sphere_sphere_contact(
-            row(geometry.vertex, v), geometry.radius[p], v, moved(r, t, row(geometry.vertex, w)), geometry.radius[q], w, margin,
-            book.real, book.integer, _NONE,
-        )  # fmt: skip
-    if count == 1:
-        _rows_to_world(book.real, book.integer, _NONE, count, rotation[i], now.position[i], swapped)
-        book.integer[0, 0], book.integer[0, 1] = a, b
-        fill_contacts(now, book.real, book.integer, np.zeros(1, np.int64), fixed.material, fixed.coefficients, book.contacts)
-    return count == 1
+        between = moved(r, t, centre)
+        distance = sqrt(dot(between, between))
+        normal = (between[0] / distance, between[1] / distance, between[2] / distance)
+        gap = distance - radius - paths[second, RADIUS]
+        point_first, point_second = along(centre, radius, normal), along(between, -paths[second, RADIUS], normal)
+    if not gap <= margin:
+        return False
+    x, axes = now.position[first], rotation[first]
+    point_a, point_b = moved(axes, x, point_first), moved(axes, x, point_second)
+    normal = turned(axes, normal)
+    if first == b:
+        point_a, point_b, normal = point_b, point_a, scaled(normal, -1.0)
+    for k in range(3):
+        contacts.arm_a[0, k], contacts.arm_b[0, k] = point_a[k] - now.position[a, k], point_b[k] - now.position[b, k]
+        contacts.normal[0, k] = normal[k]
+    pair = fixed.coefficients[fixed.material[a], fixed.material[b]]
+    contacts.body_a[0], contacts.body_b[0], contacts.gap[0], contacts.restitution[0] = a, b, gap, pair[0]
+    contacts.static_friction[0], contacts.dynamic_friction[0], contacts.tangential_restitution[0] = pair[1], pair[2], pair[3]
+    return True
 
 
 @jit
-def _slow(fixed, motion, contacts, delta):
+def _slow(fixed, motion, contacts, radius, delta):
     """A speed of approach [m/s] that is surely more than what would be held or counts as none."""
     a, b, n = contacts.body_a[0], contacts.body_b[0], contacts.normal[0]
     press = _point_acceleration(motion.acceleration, motion.angular_acceleration, a, contacts.arm_a[0], n)
@@ -106,7 +119,7 @@ def _slow(fixed, motion, contacts, delta):
             pull = fixed.steady[i]
             press = max(press, sqrt(pull[0] ** 2 + pull[1] ** 2 + pull[2] ** 2))
     scale = speed_scale(motion.now, contacts)
-    press = max(press, 0.0) + _ROUND_OFF * scale * scale / min(fixed.radius[a], fixed.radius[b])
+    press = max(press, 0.0) + _ROUND_OFF * scale * scale / radius
     return _CLEAR * sqrt(2.0 * press * delta) * (1.0 + SLOW) + _CLEAR * _APPROACH * scale
 
 
@@ -147,32 +160,35 @@ def _members(fixed, book, a, b):
 
 
 @jit
-def _bounces(fixed, motion, book, rebounds, key, a, b, time, delta):
-    """Bring both bodies to `time` and tell whether their contact is a simple impact."""
-    course, now = motion.course, motion.now
-    for i in (a, b):
-        if fixed.dynamic[i] and course.mode[i] == FIXED:
-            return False
-        bring(course, i, time, now, motion.rotation, motion.acceleration, motion.angular_acceleration)
+def _comes_back(rebounds, key, time, delta, instant):
+    """Whether a pair rebounded so lately, or so often after less than its held gap delta, that the loop counts it."""
     last = place_of(rebounds, key)
-    if rebounds.key[last] == key:
-        since = time - rebounds.time[last]
-        if rebounds.count[last] > 0 or since * rebounds.speed[last] < _CLEAR * delta or since <= _CLEAR * INSTANT * fixed.step:
-            return False
-    return _contact(fixed, motion, book, a, b, MARGIN * delta) and book.contacts.gap[0] >= -0.5 * DEEPEST * min(
-        fixed.radius[a], fixed.radius[b]
-    )
+    if rebounds.key[last] != key:
+        return False
+    since = time - rebounds.time[last]
+    return rebounds.count[last] > 0 or since * rebounds.speed[last] < _CLEAR * delta or since <= _CLEAR * instant
 
 
 @jit
-def simple_impact(fixed, motion, book, rebounds, a, b, time):
-    """Let bodies a < b, which come to touch at `time` [s], rebound; returns False, with nothing changed, where that is not simple."""
-    delta = fixed.contact_gap * min(fixed.size[a], fixed.size[b])
-    key = a * len(fixed.kind) + b
-    if not _bounces(fixed, motion, book, rebounds, key, a, b, time, delta):
+def simple_impact(fixed, motion, book, rebounds, paths, planes, a, b, plane, time):
+    """Let bodies a < b, which come to touch at `time` [s], rebound; returns False, with nothing changed, where that is not simple.
+
+    plane: the number of the one that is a plane, or -1.
+    """
+    delta, radius = min(paths[a, GAP], paths[b, GAP]), min(paths[a, RADIUS], paths[b, RADIUS])
+    key = a * len(paths) + b
+    if _comes_back(rebounds, key, time, delta, INSTANT * fixed.step):
+        return False
+    for i in (a, b):
+        if fixed.dynamic[i] and paths[i, MOVES] == 0.0:
+            return False
+        bring(motion.course, i, time, motion.now, motion.rotation, motion.acceleration, motion.angular_acceleration)
+    if not _contact(fixed, motion, book.contacts, paths, planes, a, b, plane, MARGIN * delta):
+        return False
+    if book.contacts.gap[0] < -0.5 * DEEPEST * radius:
         return False
     now, contacts, u = motion.now, book.contacts, np.empty(3)
-    approach, slow = relative_velocity(now, contacts, _NONE, u), _slow(fixed, motion, contacts, delta)
+    approach, slow = relative_velocity(now, contacts, _NONE, u), _slow(fixed, motion, contacts, radius, delta)
     e = contacts.restitution[0]
     if not (-approach > slow and -e * approach > slow):
         return False

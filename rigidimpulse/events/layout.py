@@ -8,33 +8,23 @@ import numpy as np
 
 from rigidimpulse.events.queue import Queue
 from rigidimpulse.events.tree import BoxTree
-from rigidimpulse.geometry import Geometry
 from rigidimpulse.integrate.course import Course
 from rigidimpulse.respond.impulse import BodyState, Contacts
-from rigidimpulse.sweep.guard import SweepScratch
 
 BALL, PLANE, OTHER = (np.int64(kind) for kind in range(3))
 """Kinds of bodies: one sphere about its centre of mass; one half space that stands; anything else."""
 
 
 class Fixed(NamedTuple):
-    """What does not change in a run."""
+    """What does not change in a run. (Few arrays: each costs every kernel that gets them time to compile.)"""
 
-    geometry: Geometry
-    scratch: SweepScratch
-    shape_of_body: np.ndarray  # (n,)
-    kind: np.ndarray  # (n,) BALL, PLANE, OTHER
     dynamic: np.ndarray  # (n,) bool
-    radius: np.ndarray  # (n,) m, bounding radius about the centre of mass
-    size: np.ndarray  # (n,) m, largest extent
-    contact_gap: float  # held gap, relative to the size of the smaller body
     steady: np.ndarray  # (n, 3) m/s2, of gravity and constant forces
     mass: np.ndarray  # (n,) kg
     inertia: np.ndarray  # (n, 3) kg m2, principal
     material: np.ndarray  # (n,)
     coefficients: np.ndarray  # (k, k, 4) of two materials
     apart: np.ndarray  # (p,) keys a n + b of pairs that do not touch each other, ascending
-    planes: np.ndarray  # (q,) the bodies that are planes
     static_min: np.ndarray  # (n, 3) m, boxes of bodies that stand
     static_max: np.ndarray
     law: int  # of restitution
@@ -62,6 +52,7 @@ class Table(NamedTuple):
     high: np.ndarray
     first: np.ndarray  # (k,) bodies of the entries, first < second for pairs
     second: np.ndarray
+    plane: np.ndarray  # (n,) number of the plane that each body meets first
     leaves: np.ndarray  # (k,) int8: CONTACT, or where the loop in Python takes over: AT_BOUNDARY, AT_ONCE
     after: np.ndarray  # (2 k,) next entry in the list of the first and of the second body, times 2, plus 1 where it is its second; -1: none
     head: np.ndarray  # (n,) where the list of each body starts
@@ -86,9 +77,6 @@ class Book(NamedTuple):
     energy: np.ndarray  # (r,) J, change of kinetic energy of each impact
     count: np.ndarray  # (1,) impacts written
     contacts: Contacts  # of one contact
-    real: np.ndarray  # (1, 10)
-    integer: np.ndarray  # (1, 5)
-    walk: np.ndarray  # scratch of a walk through a tree
     log: np.ndarray  # (1, 7)
     members: np.ndarray  # (2,)
 

@@ -19,11 +19,12 @@ from rigidimpulse.rotation import rotated
 from rigidimpulse.sweep.ball_time import until_contact
 from rigidimpulse.sweep.bound import length, scaled
 
-START, PLACE, VELOCITY, PULL, RADIUS, GAP, KIND, MOVES, DYNAMIC, PATH_SIZE = np.array([0, 1, 4, 7, 10, 11, 12, 13, 14, 15])
-"""Columns of the paths (n, PATH_SIZE): start of the course; place, velocity and acceleration there; bounding radius; held gap of the body
-alone; kind; 1 where the course is one that moves; 1 for movable bodies."""
-NORMAL, LEVEL, HEIGHT, BODY, PLANE_SIZE = np.array([0, 3, 4, 5, 6])
-"""Columns of the planes (q, PLANE_SIZE): normal in the world, level along it from the body's centre and from the origin, and the body."""
+START, PLACE, VELOCITY, PULL, MOVES, RADIUS, GAP, KIND, DYNAMIC, PATH_SIZE = np.array([0, 1, 4, 7, 10, 11, 12, 13, 14, 15])
+"""Columns of the paths (n, PATH_SIZE): start of the course; place, velocity and acceleration there; 1 where the course moves. From RADIUS
+on constants: bounding radius, held gap of the body alone, kind, 1 for movable bodies."""
+LEVEL, NORMAL, HEIGHT, BODY, PLANE_SIZE = np.array([3, 4, 7, 8, 9])
+"""Columns of the planes (q, PLANE_SIZE): normal in the body's frame, level along it from the body's centre; normal in the world, level
+along it from the origin; the body."""
 _WIDER = 1.01
 """How much farther away than the margin counts as near."""
 _CURVED = 1e-9
@@ -31,26 +32,23 @@ _CURVED = 1e-9
 
 
 @jit
-def write_path(fixed, course, paths, i):
-    """Write the row of body i from its course."""
+def write_path(course, paths, i):
+    """Write the row of body i from its course, but for its constants."""
     row = paths[i]
-    row[START] = course.start[i]
+    row[START], row[MOVES] = course.start[i], course.mode[i] != FIXED
     for k in range(3):
         row[PLACE + k], row[VELOCITY + k], row[PULL + k] = course.position[i, k], course.velocity[i, k], course.acceleration[i, k]
-    row[RADIUS], row[GAP], row[KIND] = fixed.radius[i], fixed.contact_gap * fixed.size[i], fixed.kind[i]
-    row[MOVES], row[DYNAMIC] = course.mode[i] != FIXED, fixed.dynamic[i]
 
 
 @jit
-def write_planes(fixed, course, planes):
-    """Write the rows of the planes."""
-    for p in range(len(fixed.planes)):
-        i = fixed.planes[p]
-        frame, q, x = fixed.geometry.frame[fixed.geometry.shape_first[fixed.shape_of_body[i]]], course.orientation[i], course.position[i]
-        n = rotated(q[0], q[1], q[2], q[3], frame[0], frame[1], frame[2])
-        planes[p, NORMAL], planes[p, NORMAL + 1], planes[p, NORMAL + 2] = n
-        planes[p, LEVEL], planes[p, BODY] = frame[3], i
-        planes[p, HEIGHT] = frame[3] + n[0] * x[0] + n[1] * x[1] + n[2] * x[2]
+def place_planes(course, planes):
+    """Write normals and levels of the planes in the world."""
+    for p in range(len(planes)):
+        row, i = planes[p], np.int64(planes[p, BODY])
+        q, x = course.orientation[i], course.position[i]
+        n = rotated(q[0], q[1], q[2], q[3], row[0], row[1], row[2])
+        row[NORMAL], row[NORMAL + 1], row[NORMAL + 2] = n
+        row[HEIGHT] = row[LEVEL] + n[0] * x[0] + n[1] * x[1] + n[2] * x[2]
 
 
 @jit

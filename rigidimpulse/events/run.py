@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.detect.groups import empty_contacts
-from rigidimpulse.detect.manifold import SCRATCH_ROWS
 from rigidimpulse.detect.pair_table import NEAR, ROUND_OFF
 from rigidimpulse.events.effect import NO_ROOM, STEP, kinds
 from rigidimpulse.events.flight import fly
 from rigidimpulse.events.impact import copy_rebounds, remember
 from rigidimpulse.events.layout import PLANE, Book, Fixed, Motion, Rebounds, Table, make_rebounds
-from rigidimpulse.events.paths import PATH_SIZE, PLANE_SIZE
+from rigidimpulse.events.paths import BODY, DYNAMIC, GAP, KIND, LEVEL, PATH_SIZE, PLANE_SIZE, RADIUS
 from rigidimpulse.events.queue import make_queue
 from rigidimpulse.events.tree import make_tree
 from rigidimpulse.observe.events import ROW_LENGTH
@@ -33,14 +32,12 @@ class EventRun:
     def __init__(self, context) -> None:
         """context: of the run, with the first courses."""
         world = context.world
-        kind = kinds(world)
-        planes = np.flatnonzero(kind == PLANE)
         self._context, self._pause, self._waits, self._window = context, 0, 0, FIRST_WINDOW
         self._fixed = Fixed(
-            world.geometry, context.detector.sweep_scratch, world.shape_of_body, kind, world.dynamic, world.bound_radius, world.size,
-            world.contact_gap, world.steady_acceleration, world.mass, world.inertia, world.material_of_body, world.coefficients,
-            world.apart, planes, world.static_min, world.static_max, LAWS[world.accuracy.restitution], world.accuracy.step,
+            world.dynamic, world.steady_acceleration, world.mass, world.inertia, world.material_of_body, world.coefficients,
+            world.apart, world.static_min, world.static_max, LAWS[world.accuracy.restitution], world.accuracy.step,
         )  # fmt: skip
+        self._paths, self._planes = _constants(world)
         state = context.state
         self._motion = Motion(state.course, state.now, state.rotation, context.acceleration, context.angular_acceleration)
         self._pairs, self._rows = ROOM + world.num_bodies, ROOM
@@ -55,8 +52,8 @@ class EventRun:
         capacity = n + self._pairs
         ends = np.zeros((2, capacity), np.int64)
         return Table(
-            make_queue(capacity), make_tree(n), np.zeros((n, PATH_SIZE)), np.zeros((len(self._fixed.planes), PLANE_SIZE)),
-            context.box_min, context.box_max, *ends, np.zeros(capacity, np.int8),
+            make_queue(capacity), make_tree(n), self._paths, self._planes,
+            context.box_min, context.box_max, *ends, np.full(n, -1, np.int64), np.zeros(capacity, np.int8),
             np.full(2 * capacity, -1, np.int64), np.full(n, -1, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64),
             np.zeros(2, np.int64),
         )  # fmt: skip
@@ -65,8 +62,8 @@ class EventRun:
         recorder = self._context.recorder
         return Book(
             recorder.times, recorder.written, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
-            np.empty((self._rows, ROW_LENGTH)), np.empty(self._rows), np.zeros(1, np.int64), empty_contacts(1), np.empty((1, 10)),
-            np.empty((1, 5), np.int64), np.empty((SCRATCH_ROWS, 2), np.int64), np.empty((1, 7)), np.empty(2, np.int64),
+            np.empty((self._rows, ROW_LENGTH)), np.empty(self._rows), np.zeros(1, np.int64), empty_contacts(1),
+            np.empty((1, 7)), np.empty(2, np.int64),
         )  # fmt: skip
 
     def may_fly(self) -> bool:
@@ -141,3 +138,15 @@ class EventRun:
         old: Rebounds = self._rebounds
         self._rebounds = make_rebounds(4 * len(old.key))
         copy_rebounds(old, self._rebounds)
+
+
+def _constants(world) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of paths (n, PATH_SIZE) and planes (q, PLANE_SIZE) with what never changes."""
+    kind = kinds(world)
+    paths, which = np.zeros((world.num_bodies, PATH_SIZE)), np.flatnonzero(kind == PLANE)
+    paths[:, RADIUS], paths[:, GAP] = world.bound_radius, world.contact_gap * world.size
+    paths[:, KIND], paths[:, DYNAMIC] = kind, world.dynamic
+    planes = np.zeros((len(which), PLANE_SIZE))
+    planes[:, : LEVEL + 1] = world.geometry.frame[world.geometry.shape_first[world.shape_of_body[which]], : LEVEL + 1]
+    planes[:, BODY] = which
+    return paths, planes

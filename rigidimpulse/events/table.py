@@ -91,11 +91,12 @@ def _first_plane(paths, planes, apart, i, clock):
 
 
 @jit
-def _time_wall(fixed, table, i, clock):
+def _time_wall(apart, table, i, clock):
     """Time the entry of body i: the plane that it meets first."""
-    plane, time, table.leaves[i] = _first_plane(table.paths, table.planes, fixed.apart, i, clock)
+    plane, time, table.leaves[i] = _first_plane(table.paths, table.planes, apart, i, clock)
     if plane >= 0:
-        table.first[i], table.second[i] = i, fixed.planes[plane]
+        table.first[i], table.second[i] = i, np.int64(table.planes[plane, BODY])
+        table.plane[i] = plane
     schedule(table.queue, i, time, i)
 
 
@@ -124,7 +125,7 @@ def _add_pair(table, i, j, clock):
 
 
 @jit
-def _add_pairs(fixed, table, i, which, clock):
+def _add_pairs(apart, table, i, which, clock):
     """Add entries for i, which moves, and whom it may meet: _FRESH, pairs without one, or _EACH_ONCE; False for want of room."""
     paths, n = table.paths, len(table.paths)
     reached = overlapping(table.tree, i, table.low, table.high, table.found)
@@ -132,7 +133,7 @@ def _add_pairs(fixed, table, i, which, clock):
         j = table.found[k]
         if table.mark[j] == table.count[1] if which == _FRESH else (j < i and paths[j, MOVES] > 0.0):
             continue
-        if (paths[i, DYNAMIC] > 0.0 or paths[j, DYNAMIC] > 0.0) and not _is_apart(fixed.apart, n, i, j):
+        if (paths[i, DYNAMIC] > 0.0 or paths[j, DYNAMIC] > 0.0) and not _is_apart(apart, n, i, j):
             if not _add_pair(table, i, j, clock):
                 return False
     return True
@@ -159,14 +160,14 @@ def fill_table(fixed, table, clock):
     for at in range(count):
         i = bodies[at]
         if paths[i, MOVES] > 0.0:
-            _time_wall(fixed, table, i, clock)
-            if not _add_pairs(fixed, table, i, _EACH_ONCE, clock):
+            _time_wall(fixed.apart, table, i, clock)
+            if not _add_pairs(fixed.apart, table, i, _EACH_ONCE, clock):
                 return False
     return True
 
 
 @jit
-def renew(fixed, table, i, clock):
+def renew(apart, table, i, clock):
     """Body i has a new path: time its entries anew and add those of bodies that it may now meet; returns False if there is no room."""
     swept_box(table.paths, i, clock, table.low, table.high)
     replace_box(table.tree, i, table.low, table.high)
@@ -177,8 +178,8 @@ def renew(fixed, table, i, clock):
         table.mark[table.first[p]] = table.mark[table.second[p]] = mark
         _time_pair(table, p, clock)
         entry = table.after[entry]
-    _time_wall(fixed, table, i, clock)
-    return _add_pairs(fixed, table, i, _FRESH, clock)
+    _time_wall(apart, table, i, clock)
+    return _add_pairs(apart, table, i, _FRESH, clock)
 
 
 @jit
