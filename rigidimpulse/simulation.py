@@ -85,12 +85,12 @@ def simulate(
     world = compile_scene(scene, accuracy, frozenset(left_out))
     if len(times) * world.num_bodies > MOST_POSES:
         raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
+    bound_planes(world)
+    plan = make_plan(world, effects)
     if not kernels_are_cached():
         logger.warning("compiling kernels for the first run on this machine, once: this takes about half a minute")
         if world.can_collide:
-            compile_kernels(world)
-    bound_planes(world)
-    plan = make_plan(world, effects)
+            compile_kernels(world, has_events(plan))
     recorder = Recorder(times, world.num_bodies)
     log = EventLog()
     for name, reason in left_out.items():
@@ -180,9 +180,14 @@ def start_courses(context: StepContext) -> None:
         begin(course, i)
 
 
+def has_events(plan: Plan) -> bool:
+    """Whether the plan has the event kernel in."""
+    return any(line.included for line in plan.lines if line.name == EventKernel.name)
+
+
 def make_flight(context: StepContext, plan: Plan) -> EventRun | None:
     """The event kernel, made ready, where the plan has it in."""
-    if not any(line.included for line in plan.lines if line.name == EventKernel.name):
+    if not has_events(plan):
         return None
     from rigidimpulse.events.run import EventRun
 

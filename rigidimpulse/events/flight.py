@@ -19,7 +19,7 @@ from rigidimpulse.events.effect import ARRIVED, GO_ON, NO_ROOM, STEP
 from rigidimpulse.events.impact import simple_impact
 from rigidimpulse.events.layout import AT_BOUNDARY, AT_ONCE
 from rigidimpulse.events.paths import place_planes, write_path
-from rigidimpulse.events.table import fill_table, renew, touches_more
+from rigidimpulse.events.table import fill_table, renew, time_waiting, touches_more
 from rigidimpulse.integrate.course import FIXED, state_at
 
 LONGEST = 4096
@@ -71,7 +71,10 @@ def _has_room(book, rebounds):
 @jit
 def _fly_window(fixed, motion, table, book, rebounds, clock):
     """Go through the events of a window; returns how it ends and the clock then."""
-    while table.queue.size[0] > 0:
+    while True:
+        time_waiting(fixed.apart, table, clock)
+        if table.queue.size[0] == 0:
+            break
         p = table.queue.heap[0]
         time, leaves = table.queue.key[p], table.leaves[p]
         if leaves == AT_ONCE:

@@ -58,7 +58,8 @@ class Table(NamedTuple):
     head: np.ndarray  # (n,) where the list of each body starts
     mark: np.ndarray  # (n,) last search that found the body
     found: np.ndarray  # (n,) scratch of searches
-    count: np.ndarray  # (2,) entries in use, searches made
+    waiting: np.ndarray  # (2 k,) entries to be timed
+    count: np.ndarray  # (3,) entries in use, searches made, entries that wait
 
 
 CONTACT, AT_BOUNDARY, AT_ONCE = (np.int8(kind) for kind in range(3))

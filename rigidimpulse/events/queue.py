@@ -26,8 +26,8 @@ class Queue(NamedTuple):
 
 def make_queue(capacity: int) -> Queue:
     """Make an empty queue for entries 0 ... capacity - 1."""
-    integers = np.zeros((2, capacity), np.int64)
-    return Queue(np.full(capacity, np.inf), *integers, np.full(capacity, -1, np.int64), np.zeros(1, np.int64))
+    owner, heap = np.zeros((2, capacity), np.int64)
+    return Queue(np.full(capacity, np.inf), owner, heap, np.full(capacity, -1, np.int64), np.zeros(1, np.int64))
 
 
 @jit

@@ -50,12 +50,12 @@ class EventRun:
     def _make_table(self) -> Table:
         context, n = self._context, self._context.world.num_bodies
         capacity = n + self._pairs
-        ends = np.zeros((2, capacity), np.int64)
+        first, second = np.zeros((2, capacity), np.int64)
         return Table(
             make_queue(capacity), make_tree(n), self._paths, self._planes,
-            context.box_min, context.box_max, *ends, np.full(n, -1, np.int64), np.zeros(capacity, np.int8),
+            context.box_min, context.box_max, first, second, np.full(n, -1, np.int64), np.zeros(capacity, np.int8),
             np.full(2 * capacity, -1, np.int64), np.full(n, -1, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64),
-            np.zeros(2, np.int64),
+            np.zeros(2 * capacity, np.int64), np.zeros(3, np.int64),
         )  # fmt: skip
 
     def _make_book(self) -> Book:

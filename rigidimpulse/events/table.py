@@ -77,39 +77,39 @@ def _is_apart(apart, num_bodies, i, j):
 
 
 @jit
-def _first_plane(paths, planes, apart, i, clock):
-    """The plane that body i meets first, as its number, time and kind of the event."""
-    best, kind, number = inf, CONTACT, _NO_PLANE
-    for plane in range(len(planes)):
-        other = np.int64(planes[plane, BODY])
-        if paths[i, DYNAMIC] == 0.0 or _is_apart(apart, len(paths), i, other):
-            continue
-        time, leaves = meeting(paths, planes, i, other, plane, clock)
-        if time < best or (time == best and leaves != CONTACT):
-            best, kind, number = time, leaves, plane
-    return number, best, kind
+def time_waiting(apart, table, clock):
+    """Time the entries that wait for it: that of a body and the plane that it meets first, or that of a pair."""
+    paths, planes, n = table.paths, table.planes, len(table.paths)
+    for w in range(table.count[2]):
+        p = table.waiting[w]
+        i = p if p < n else table.first[p]
+        best, kind = inf, CONTACT
+        for number in range(len(planes) if p < n else 1):
+            plane = np.int64(number) if p < n else _NO_PLANE
+            other = np.int64(planes[number, BODY]) if p < n else table.second[p]
+            if p < n and (paths[i, DYNAMIC] == 0.0 or _is_apart(apart, n, i, other)):
+                continue
+            time, leaves = meeting(paths, planes, i, other, plane, clock)
+            if time < best or (time == best and leaves != CONTACT):
+                best, kind = time, leaves
+                table.second[p] = other
+                if p < n:
+                    table.plane[i] = plane
+        table.leaves[p] = kind
+        schedule(table.queue, p, best, i if paths[i, DYNAMIC] > 0.0 else table.second[p])
+    table.count[2] = 0
 
 
 @jit
-def _time_wall(apart, table, i, clock):
-    """Time the entry of body i: the plane that it meets first."""
-    plane, time, table.leaves[i] = _first_plane(table.paths, table.planes, apart, i, clock)
-    if plane >= 0:
-        table.first[i], table.second[i] = i, np.int64(table.planes[plane, BODY])
-        table.plane[i] = plane
-    schedule(table.queue, i, time, i)
+def _wait(table, p):
+    """Let an entry wait to be timed; it may do so twice."""
+    if table.count[2] < len(table.waiting):
+        table.waiting[table.count[2]] = p
+        table.count[2] += 1
 
 
 @jit
-def _time_pair(table, p, clock):
-    """Time the entry of a pair."""
-    a, b = table.first[p], table.second[p]
-    time, table.leaves[p] = meeting(table.paths, table.planes, a, b, _NO_PLANE, clock)
-    schedule(table.queue, p, time, a if table.paths[a, DYNAMIC] > 0.0 else b)
-
-
-@jit
-def _add_pair(table, i, j, clock):
+def _add_pair(table, i, j):
     """Add an entry for two bodies; returns False if there is no room."""
     p = table.count[0]
     if p == len(table.first):
@@ -120,12 +120,12 @@ def _add_pair(table, i, j, clock):
         table.after[2 * p + side] = table.head[body]
         table.head[body] = 2 * p + side
     table.count[0] = p + 1
-    _time_pair(table, p, clock)
+    _wait(table, p)
     return True
 
 
 @jit
-def _add_pairs(apart, table, i, which, clock):
+def _add_pairs(apart, table, i, which):
     """Add entries for i, which moves, and whom it may meet: _FRESH, pairs without one, or _EACH_ONCE; False for want of room."""
     paths, n = table.paths, len(table.paths)
     reached = overlapping(table.tree, i, table.low, table.high, table.found)
@@ -134,17 +134,17 @@ def _add_pairs(apart, table, i, which, clock):
         if table.mark[j] == table.count[1] if which == _FRESH else (j < i and paths[j, MOVES] > 0.0):
             continue
         if (paths[i, DYNAMIC] > 0.0 or paths[j, DYNAMIC] > 0.0) and not _is_apart(apart, n, i, j):
-            if not _add_pair(table, i, j, clock):
+            if not _add_pair(table, i, j):
                 return False
     return True
 
 
 @jit
 def fill_table(fixed, table, clock):
-    """Find who may meet until the end of the window, and when; returns False if there is no room for all pairs."""
+    """Find who may meet until the end of the window; returns False if there is no room for all pairs."""
     paths, n = table.paths, len(table.paths)
     clear(table.queue)
-    table.count[0] = n
+    table.count[0], table.count[2] = n, 0
     table.head[:] = -1
     bodies, count = np.empty(n, np.int64), 0
     for i in range(n):
@@ -160,15 +160,16 @@ def fill_table(fixed, table, clock):
     for at in range(count):
         i = bodies[at]
         if paths[i, MOVES] > 0.0:
-            _time_wall(fixed.apart, table, i, clock)
-            if not _add_pairs(fixed.apart, table, i, _EACH_ONCE, clock):
+            table.first[i] = i
+            _wait(table, i)
+            if not _add_pairs(fixed.apart, table, i, _EACH_ONCE):
                 return False
     return True
 
 
 @jit
 def renew(apart, table, i, clock):
-    """Body i has a new path: time its entries anew and add those of bodies that it may now meet; returns False if there is no room."""
+    """Body i has a new path: let its entries, and those of bodies that it may now meet, wait; returns False if there is no room."""
     swept_box(table.paths, i, clock, table.low, table.high)
     replace_box(table.tree, i, table.low, table.high)
     table.count[1] += 1
@@ -176,10 +177,11 @@ def renew(apart, table, i, clock):
     while entry >= 0:
         p = entry // 2
         table.mark[table.first[p]] = table.mark[table.second[p]] = mark
-        _time_pair(table, p, clock)
+        _wait(table, p)
         entry = table.after[entry]
-    _time_wall(apart, table, i, clock)
-    return _add_pairs(apart, table, i, _FRESH, clock)
+    table.first[i] = i
+    _wait(table, i)
+    return _add_pairs(apart, table, i, _FRESH)
 
 
 @jit
