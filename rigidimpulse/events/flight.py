@@ -24,7 +24,7 @@ from rigidimpulse.integrate.course import FIXED, state_at
 
 LONGEST = 4096
 """Steps in a window at most."""
-FEW, MANY = 1.0, 4.0
+FEW, MANY = 1.5, 6.0
 """Pairs a body below which windows grow, above which they shrink."""
 
 
@@ -114,26 +114,28 @@ def _write_frames(course, book, time):
 
 
 @jit
-def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window, live):
+def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window, live, window_end):
     """Carry all bodies from `now` towards `end` [s].
 
-    now, end: s; at_boundary: whether `now` is one; window: steps of the first window; live: see `Clock`.
+    now, end: s; at_boundary: whether `now` is one; window: steps of the first window; live: see `Clock`; window_end: s, of the window to
+    go on with, which a flight left for want of room for impacts, or a time before `now` to begin a new one.
 
-    Returns how the flight ends, the time reached, whether that is a boundary, number of the next one, and steps of the next window.
+    Returns how the flight ends, the time reached, whether that is a boundary, number of the next one, steps of the next window, and
+    the end of the present one.
     """
-    course = motion.course
-    clock = Clock(fixed.step, live, now, now, _next_number(now, np.int64(0), fixed.step), at_boundary)
+    course, how = motion.course, ARRIVED
+    clock = Clock(fixed.step, live, now, window_end, _next_number(now, np.int64(0), fixed.step), at_boundary)
     moving = 0
     for i in range(len(table.paths)):
         write_path(course, table.paths, i)
         moving += course.mode[i] != FIXED
     place_planes(course, table.planes)
-    how = ARRIVED
     while how == ARRIVED and clock.now < end:
         first = clock.number
-        clock = Clock(fixed.step, live, clock.now, min((first + window - 1) * fixed.step, end), first, clock.at_boundary)
-        if not fill_table(fixed, table, clock):
-            return NO_ROOM, clock.now, clock.at_boundary, clock.number, window
+        if clock.end <= clock.now:
+            clock = Clock(fixed.step, live, clock.now, min((first + window - 1) * fixed.step, end), first, clock.at_boundary)
+            if not fill_table(fixed, table, clock):
+                return NO_ROOM, clock.now, clock.at_boundary, clock.number, window, clock.end
         pairs = table.count[0] - len(table.paths)
         how, clock = _fly_window(fixed, motion, table, book, rebounds, clock)
         _write_frames(course, book, clock.now)
@@ -143,4 +145,4 @@ def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window, liv
             window = max(window // 2, 1)
         elif (how == STEP or how == GO_ON) and clock.number <= first + 1:
             window = max(window // 2, 1)
-    return how, clock.now, clock.at_boundary, clock.number, window
+    return how, clock.now, clock.at_boundary, clock.number, window, clock.end

@@ -18,6 +18,8 @@ from rigidimpulse.respond.restitution import LAWS
 
 ROOM = 256
 """Impacts, pairs and rebounds that there is room for at first; doubled where it does not do."""
+MOST_ROWS = 2**14
+"""Impacts at most that are handed over at once."""
 FIRST_WINDOW = 16
 """Steps in the first window."""
 LIVE = 2.0
@@ -81,15 +83,15 @@ class EventRun:
         begin = now = context.state.time
         if at_boundary:
             self._step_begin = begin
-        how, number = NO_ROOM, 0
+        how, number, window_end = NO_ROOM, 0, -1.0
         while how == NO_ROOM:
-            how, now, at_boundary, number, self._window = fly(
+            how, now, at_boundary, number, self._window, window_end = fly(
                 self._fixed, self._motion, self._table, self._book, self._rebounds, now, end, at_boundary, self._window,
-                self._live,
+                self._live, window_end,
             )
             self._keep_impacts()
-            if how == NO_ROOM:
-                self._make_room()
+            if how == NO_ROOM and self._make_room():
+                window_end = -1.0
         context.state.time = now
         if how == STEP:
             self._pause = 0 if now > begin else min(2 * self._pause + 1, LONGEST_PAUSE)
@@ -123,16 +125,18 @@ class EventRun:
         context.state.rebounds.update((pair, (t, speed, 0)) for pair, t, speed in zip(pairs, times, speeds, strict=True))
         self._book.count[0] = 0
 
-    def _make_room(self) -> None:
-        """Double the tables that are full."""
+    def _make_room(self) -> bool:
+        """Make the table that is full larger; returns whether that is the one of events, which then has to be filled again."""
         if 2 * self._rebounds.used[0] >= len(self._rebounds.key):
             self._grow_rebounds()
         elif self._table.count[0] >= len(self._table.first):
             self._pairs *= 2
             self._table = self._make_table()
+            return True
         else:
-            self._rows = min(2 * self._rows, 2**16)
+            self._rows = min(2 * self._rows, MOST_ROWS)
             self._book = self._make_book()
+        return False
 
     def _grow_rebounds(self) -> None:
         old: Rebounds = self._rebounds
