@@ -109,7 +109,8 @@ class Window:
         keep = world.may_collide(a, b) & ~self._is_shut(a, b)
         if keep.any():
             fresh = new_pairs(world, a[keep], b[keep], start)
-            self._take(Pairs(*(np.concatenate(both) for both in zip(self.pairs, fresh, strict=True))))
+            both = zip(self.pairs, fresh, strict=True)
+            self._take(Pairs(*map(np.concatenate, both)) if len(self.a) else fresh)
 
     def change_course(self, body: int, time: float) -> None:
         """The body took a new course at `time`: sweep its pairs again, and add those it may now reach."""

@@ -96,12 +96,12 @@ def pool_break() -> ri.Scene:
 def spots() -> ri.Scene:
     """Return two cows in a narrow box without gravity, elastic: they hit each other and the walls again and again."""
     scene = ri.Scene(gravity=(0.0, 0.0, 0.0))
-    add_walls(scene, (1.2, 1.0, 1.0), SMOOTH)
+    add_walls(scene, (1.0, 0.7, 0.7), SMOOTH)
     cow = ri.Shape.from_file(asset_path("spot.obj"), scale=0.5)
-    for k, speed in enumerate((2.0, -2.0)):
+    for k, speed in enumerate((6.0, -6.0)):
         scene.add(
             ri.Body(
-                f"cow {k}", cow, position=(0.55 * (2 * k - 1), 0.05 * k, 0.0), velocity=(speed, 0.3 * k, 0.1),
+                f"cow {k}", cow, position=(0.5 * (2 * k - 1), 0.05 * k, 0.0), velocity=(speed, 2.0 * k, 1.0),
                 angular_velocity=(0.5, 1.0 - k, 0.3), mass=10.0, material=SMOOTH,
             )
         )  # fmt: skip
