@@ -1,7 +1,8 @@
 """The first run on a machine: compile kernels on two cores.
 
 Numba compiles one kernel at a time in a process. So a second process compiles one half of what a run with contacts needs (motion,
-sweep, the solver of rows) into the cache on disk, while the first one compiles the other half, and then waits for it.
+sweep, the solver of rows) into the cache on disk, while the first one compiles the other half, and then waits for it. Where the plan has
+the event kernel in, a third one compiles that.
 """
 
 from __future__ import annotations
@@ -9,20 +10,29 @@ from __future__ import annotations
 import gc
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import numpy as np
 
-CYLINDERS = "cylinders"
+CYLINDERS, EVENTS = "cylinders", "events"
 
 
-def compile_kernels(world) -> None:
-    """Compile what a run of a world with contacts needs. Should the second process fail, its half is compiled when used."""
+def compile_kernels(world, with_events: bool) -> None:
+    """Compile what a run of a world with contacts needs. Should another process fail, its part is compiled when used."""
     shapes = [CYLINDERS] if world.cylinders is not None else []
-    command = [sys.executable, "-m", "rigidimpulse.compile_ahead", *shapes]
+    with ExitStack() as processes:
+        processes.enter_context(_process(*shapes))
+        if with_events:
+            processes.enter_context(_process(EVENTS))
+        with _without_garbage_collection():
+            _respond_and_detect(_box_on_floor(bool(shapes)))
+
+
+def _process(*arguments: str) -> subprocess.Popen:
+    """Start this module as a program."""
     quiet = subprocess.DEVNULL
-    with subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet), _without_garbage_collection():
-        _respond_and_detect(_box_on_floor(bool(shapes)))
+    command = [sys.executable, "-m", "rigidimpulse.compile_ahead", *arguments]
+    return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
 
 
 @contextmanager
@@ -138,6 +148,27 @@ def _move_sweep_and_solve(context) -> None:
     bisection.sweep(context.detector, state.course, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
 
 
+def _fly() -> None:
+    """The event kernel."""
+    from rigidimpulse.body import Body
+    from rigidimpulse.events.run import EventRun
+    from rigidimpulse.observe.events import EventLog
+    from rigidimpulse.observe.recorder import Recorder
+    from rigidimpulse.scene import Scene
+    from rigidimpulse.shape import Shape
+    from rigidimpulse.simulation import start_courses
+    from rigidimpulse.state import StepContext
+    from rigidimpulse.world import compile_scene
+
+    scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static"), Body("ball", Shape.sphere(1.0), position=(0, 0, 9))])
+    context = StepContext(compile_scene(scene), Recorder(np.zeros(1), 2), EventLog())
+    start_courses(context)
+    EventRun(context).fly(1.0)
+
+
 if __name__ == "__main__":
     with _without_garbage_collection():
+        if EVENTS in sys.argv[1:]:
+            _fly()
+            sys.exit()
         _move_sweep_and_solve(_box_on_floor(CYLINDERS in sys.argv[1:]))

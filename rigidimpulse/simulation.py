@@ -17,10 +17,12 @@ from rigidimpulse.constrain.contact_forces import ContactForces
 from rigidimpulse.constrain.heap import HeapForces
 from rigidimpulse.constrain.jointed import reaction_table
 from rigidimpulse.constrain.kinds import Friction, JointRows, RollingFriction
+from rigidimpulse.detect.broadphase import bound_planes
 from rigidimpulse.detect.overlap import resolve_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.detect.window import Window
 from rigidimpulse.errors import SceneError, unknown_name
+from rigidimpulse.events.effect import ARRIVED, GO_ON, STEP, EventKernel
 from rigidimpulse.forces.constant import ConstantForces
 from rigidimpulse.forces.gravity import FreeRotation, Gravity, SteadyLoad
 from rigidimpulse.forces.kinds import bind_forces, force_kinds
@@ -38,11 +40,12 @@ from rigidimpulse.recording import Recording, Status
 from rigidimpulse.respond.response import ImpactResponse
 from rigidimpulse.scene import Scene
 from rigidimpulse.state import StepContext
-from rigidimpulse.step import react, step
+from rigidimpulse.step import go_on, react, step
 from rigidimpulse.sweep.strategy import ImpactTime
 from rigidimpulse.world import World, compile_scene
 
 if TYPE_CHECKING:
+    from rigidimpulse.events.run import EventRun
     from rigidimpulse.forces.force_log import ForceWork
 
 logger = logging.getLogger("rigidimpulse")
@@ -69,7 +72,7 @@ def simulate(
         accuracy: "preview", "standard", "exact" or an `Accuracy`.
         effects: effects, by their names in `run.plan.explain()`, that are to be in (True) or out (False) whatever the scene calls for. The
             status says where one is out that the scene calls for.
-        progress: called after every step with the simulated time in s.
+        progress: called with the simulated time in s after every step, or after many in which nothing but impacts of balls happened.
 
     Returns:
         The recording, with round(duration * fps) + 1 frames; the first is the initial state.
@@ -85,11 +88,12 @@ def simulate(
     world = compile_scene(scene, accuracy, frozenset(left_out))
     if len(times) * world.num_bodies > MOST_POSES:
         raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
+    bound_planes(world)
+    plan = make_plan(world, effects)
     if not kernels_are_cached():
         logger.warning("compiling kernels for the first run on this machine, once: this takes about half a minute")
         if world.can_collide:
-            compile_kernels(world)
-    plan = make_plan(world, effects)
+            compile_kernels(world, has_events(plan))
     recorder = Recorder(times, world.num_bodies)
     log = EventLog()
     for name, reason in left_out.items():
@@ -101,9 +105,10 @@ def simulate(
     resolve_overlaps(context)
     # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
     paths = KeyframePaths(world)
+    flight = make_flight(context, plan)
     for end in (float(duration), max(float(duration), float(times[-1]))):
         if plan.steps or context.forces is not None:
-            run_steps(context, plan, paths, end, progress)
+            run_steps(context, plan, paths, flight, end, progress)
         else:
             paths.start_segments(context, end)
     finish_sub_steps(context, plan, context.state.time)
@@ -137,7 +142,9 @@ def chosen_out(scene: Scene, accuracy: str | Accuracy, effects: Mapping[str, boo
     for name in effects:
         if name not in lines:
             raise unknown_name("effect", name, lines)
-    return {name: lines[name].reason for name, wanted in effects.items() if not wanted and lines[name].included}
+    out = {name: lines[name].reason for name, wanted in effects.items() if not wanted and lines[name].included}
+    out.pop(EventKernel.name, None)  # it changes no result
+    return out
 
 
 def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
@@ -158,6 +165,7 @@ def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
         ContactForces(),
         HeapForces(accuracy.contact_solver),
         ImpactTime(accuracy.impact_time),
+        EventKernel(),
         ExactFlight(),
         ForcedFlight(),
     ]
@@ -176,20 +184,57 @@ def start_courses(context: StepContext) -> None:
         begin(course, i)
 
 
-def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, end: float, progress) -> None:
-    """Step to the end; steps end on the grid of the accuracy's step and at keyframes."""
+def has_events(plan: Plan) -> bool:
+    """Whether the plan has the event kernel in."""
+    return any(line.included for line in plan.lines if line.name == EventKernel.name)
+
+
+def make_flight(context: StepContext, plan: Plan) -> EventRun | None:
+    """The event kernel, made ready, where the plan has it in."""
+    if not has_events(plan):
+        return None
+    from rigidimpulse.events.run import EventRun
+
+    return EventRun(context)
+
+
+def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, flight: EventRun | None, end: float, progress) -> None:
+    """Step to the end; steps end on the grid of the accuracy's step and at keyframes.
+
+    The event kernel, if there is one, takes all steps in one in which nothing but simple impacts happens.
+    """
     size = context.world.accuracy.step
     while context.state.time < end:
-        now = context.state.time
-        paths.start_segments(context, now)
+        begin = context.state.time
+        paths.start_segments(context, begin)
         if context.nets is None and not np.any(context.state.course.mode != FIXED):
-            context.state.time = min(paths.next_key(now), end)
+            context.state.time = min(paths.next_key(begin), end)
             continue
-        index = math.floor(now / size + 1e-9) + 1
-        until = min(index * size, paths.next_key(now), end)
-        step(context, plan, until if context.nets is None else context.nets.advance(context, until))
+        stop = min(paths.next_key(begin), end)
+        how = STEP
+        if flight is not None and flight.may_fly():
+            how = fly(context, plan, flight, stop)
+        if how == STEP:
+            index = math.floor(context.state.time / size + 1e-9) + 1
+            until = min(index * size, stop)
+            step(context, plan, until if context.nets is None else context.nets.advance(context, until))
         if progress is not None:
             progress(context.state.time)
+
+
+def fly(context: StepContext, plan: Plan, flight: EventRun, stop: float) -> int:
+    """Let the event kernel take the scene towards `stop` [s], and the loop in Python take over where it cannot; returns how that ends."""
+    begin = context.state.time
+    with plan.clock(EventKernel.name):
+        how, step_begin, until = flight.fly(stop)
+    while how == GO_ON:
+        go_on(context, plan, step_begin, until, may_leave=context.state.time > begin)
+        if context.state.time >= until:
+            return ARRIVED
+        begin = context.state.time
+        with plan.clock(EventKernel.name):
+            how, step_begin, until = flight.fly(stop, at_boundary=False)
+    return how
 
 
 def finish_sub_steps(context: StepContext, plan: Plan, end: float) -> None:
@@ -234,8 +279,10 @@ def impulses_by_cause(context: StepContext, times: np.ndarray, impacts: np.ndarr
 def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration: float) -> Recording:
     """Body-frame poses, impacts and ledger from what the recorder holds."""
     world, recorder = context.world, context.recorder
-    position, orientation = np.empty_like(recorder.position), np.empty_like(recorder.orientation)
-    for i in range(world.num_bodies):
+    # Where the body frame is the principal frame there is nothing to turn (0 is added since turning makes 0 of -0).
+    position, orientation = recorder.position.copy(), recorder.orientation + 0.0
+    turned = np.any(world.offset != 0.0, axis=1) | np.any(world.turn != [1.0, 0.0, 0.0, 0.0], axis=1)
+    for i in np.flatnonzero(turned).tolist():
         position[:, i], orientation[:, i] = world.body_pose(i, recorder.position[:, i], recorder.orientation[:, i])
     impacts = context.log.impacts.table()
     close_stretches(context)

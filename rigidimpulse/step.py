@@ -20,15 +20,34 @@ def step(context, plan, end: float) -> None:
     window = Window(context, end)
     plan.run("detect", context, window)
     react(context, plan, window, context.state.time, window.active_bodies())
+    _run_window(context, plan, window, may_leave=False)
+
+
+def go_on(context, plan, begin: float, end: float, may_leave: bool) -> None:
+    """Advance all courses to the `end` of a step from the middle of it, where the event kernel stopped; begin: of the step. Both in s.
+
+    may_leave: whether to end earlier, at an instant from which on all bodies fly freely again.
+    """
+    window = Window(context, end)
+    plan.run("detect", context, window)
+    window.recall(begin)
+    _run_window(context, plan, window, may_leave)
+
+
+def _run_window(context, plan, window: Window, may_leave: bool) -> None:
+    """From contact to contact, to the end of the window, or until no pair of it has a past if it may be left."""
     while True:
         plan.run("sweep", context, window)
         time = window.next_time()
-        if time >= end:
+        if time >= window.end:
             break
         bodies = window.bodies_at(time)
         window.count_contacts(time)
         react(context, plan, window, time, bodies)
-    context.state.time = end
+        if may_leave and window.is_plain(time):
+            context.state.time = time
+            return
+    context.state.time = window.end
 
 
 def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> None:

@@ -76,10 +76,13 @@ EFFECTS = {
     "contact detection": (
         "flight", 'scene.add(ri.Body("b", ri.Shape.box(1), position=(0, 0, -9)))', ["rigidimpulse.detect.broadphase", "rigidimpulse.sweep"]
     ),
+    "event kernel": (
+        "ground", 'scene.add(ri.Body("c", ri.Shape.sphere(0.1), position=(9, 9, 2), material=rough))', ["rigidimpulse.events"]
+    ),
     "gyroscopic term": ("balls", 'scene.add(ri.Body("d", ri.Shape.box((1, 2, 3)), position=(9, 9, 9)))', []),
 }
 """Name in the plan: the plain scene, what calls for the effect, modules whose kernels are the effect's."""
-KERNELS = {"springs", "joints", "rolling friction", "heaps", "contact forces", "contact detection"}
+KERNELS = {"springs", "joints", "rolling friction", "heaps", "contact forces", "contact detection", "event kernel"}
 """Effects with kernels of their own."""
 ASKED_FOR = ("rigidimpulse.forces.", "rigidimpulse.flexible")
 """Modules that are imported where a scene asks for them only, but for those of forces that do not vary."""

@@ -149,7 +149,10 @@ def touching_groups(context, window, time: float, bodies: np.ndarray) -> tuple[l
         frontier = (mark & world.dynamic & ~reached).nonzero()[0]
     if not reals:
         return [], frontier
-    groups = _components(context, window, time, reached, np.concatenate(reals), np.concatenate(integers))
+    integer = np.concatenate(integers)
+    groups = []
+    if len(integer) or context.joints is not None or context.forces is not None:
+        groups = _components(context, window, time, reached, np.concatenate(reals), integer)
     _end_sub_steps(context, groups, time, reached.nonzero()[0])
     return groups, reached.nonzero()[0]
 
@@ -205,7 +208,7 @@ def _components(context, window, time: float, reached, real: np.ndarray, integer
     for o in owners:
         tied = forced[owner_of_forced == o]
         groups.append(make_group(context, window, time, real, integer, owner == o, joints[owner_of_joint == o], tied))
-    if len(free := forced[~np.isin(owner_of_forced, owners)]):
+    if len(forced) and len(free := forced[~np.isin(owner_of_forced, owners)]):
         groups.append(_free_group(context, time, free))
     return groups
 

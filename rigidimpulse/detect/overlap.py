@@ -27,7 +27,7 @@ from rigidimpulse.constrain.rows import BOUNDED, make_rows
 from rigidimpulse.detect.narrowphase import Narrowphase, Separation
 from rigidimpulse.detect.window import Window
 from rigidimpulse.integrate.course import begin
-from rigidimpulse.rotation import to_matrix
+from rigidimpulse.rotation import rotate, to_matrix
 
 DEPTH = 1e-5
 DIRECTIONS = np.vstack([np.eye(3), -np.eye(3)])
@@ -38,6 +38,8 @@ EQUAL = 1e-7
 """Ways that differ by less, relative to the size of the smaller body, are equal."""
 SOFTNESS = 1e-8
 """Softness of a demand, relative to its inverse mass: demands that contradict each other end in a compromise."""
+SURE = 1.0 + 1e-9
+"""Distance of bounding spheres, relative to their radii, beyond which bodies are apart whatever rounding does."""
 STALLED = 5
 """Rounds without a lesser overlap after which there is no room."""
 
@@ -133,8 +135,23 @@ class _Search:
         """Pairs that overlap."""
         window = Window(self.context, self.context.state.time)
         window.find_pairs()
-        pairs = zip(window.a.tolist(), window.b.tolist(), strict=True)
+        near = ~self._surely_apart(window.a, window.b)
+        pairs = zip(window.a[near].tolist(), window.b[near].tolist(), strict=True)
         return {pair for pair in pairs if self._overlaps(*pair)}
+
+    def _surely_apart(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Which pairs have bounding spheres apart, or one apart from the half space that is all of the other body."""
+        world, geometry = self.world, self.world.geometry
+        apart = np.linalg.norm(self.position[b] - self.position[a], axis=1) > SURE * (world.bound_radius[a] + world.bound_radius[b])
+        first = geometry.shape_first[world.shape_of_body]
+        plane = world.half_space & (geometry.shape_first[world.shape_of_body + 1] == first + 1)
+        for half, other in ((a, b), (b, a)):
+            which = np.flatnonzero(plane[half] & np.isfinite(world.bound_radius[other]))
+            i, j = half[which], other[which]
+            frame = geometry.frame[first[i]]
+            height = (rotate(world.orientation[i], frame[:, :3]) * (self.position[j] - self.position[i])).sum(axis=1) - frame[:, 3]
+            apart[which] |= height > SURE * world.bound_radius[j]
+        return apart
 
     def _overlaps(self, a: int, b: int) -> bool:
         world = self.world

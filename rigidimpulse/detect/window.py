@@ -68,6 +68,31 @@ class Window:
             count = overlapping_pairs(box_min, box_max, self._moves, pairs)
         self._append(pairs[:count, 0], pairs[:count, 1], self.begin)
 
+    def recall(self, begin: float) -> None:
+        """Let pairs be as if the window had begun at `begin`, where the step did [s], all bodies having flown freely since.
+
+        A pair is swept from the last change of course of its bodies; when it was last in contact is known from its rebound.
+        """
+        course = self.context.state.course
+        self.start[:] = np.maximum(np.maximum(course.start[self.a], course.start[self.b]), begin)
+        for p, pair in enumerate(zip(self.a.tolist(), self.b.tolist(), strict=True)):
+            last = self.context.state.rebounds.get(pair)
+            if last is not None and last[0] >= begin:
+                self.since[p] = last[0]
+
+    def is_plain(self, time: float) -> bool:
+        """Whether nothing in the window asks to be remembered: no body held or called, no pair met more than once or without an impulse."""
+        state = self.context.state
+        return not (
+            state.under_contact.any()
+            or self.wake.min() < np.inf
+            or self.inside.any()
+            or self.tries.any()
+            or self.repeats.any()
+            or (self.touch > self.least).any()
+            or (self.time <= time).any()
+        )
+
     def touching(self, time: float, bodies: np.ndarray) -> tuple[list[Group], np.ndarray]:
         """Groups of touching bodies that the given ones belong to at `time`, and all bodies looked at."""
         groups, reached = touching_groups(self.context, self, time, bodies)
@@ -84,7 +109,8 @@ class Window:
         keep = world.may_collide(a, b) & ~self._is_shut(a, b)
         if keep.any():
             fresh = new_pairs(world, a[keep], b[keep], start)
-            self._take(Pairs(*(np.concatenate(both) for both in zip(self.pairs, fresh, strict=True))))
+            both = zip(self.pairs, fresh, strict=True)
+            self._take(Pairs(*map(np.concatenate, both)) if len(self.a) else fresh)
 
     def change_course(self, body: int, time: float) -> None:
         """The body took a new course at `time`: sweep its pairs again, and add those it may now reach."""
@@ -134,10 +160,15 @@ class Window:
         return np.flatnonzero(moves & ~self.inside)
 
     def bodies_at(self, time: float) -> np.ndarray:
-        """Bodies that come to contact or are called at `time`."""
+        """Movable bodies that come to contact, and bodies that are called, at `time`.
+
+        Not what they come to contact with, if it does not move: whoever else touches a floor has nothing to do with them.
+        """
         hit = self.time <= time
-        mark = self.wake <= time
+        mark = np.zeros(len(self.wake), bool)
         mark[self.a[hit]] = mark[self.b[hit]] = True
+        mark &= self.context.world.dynamic
+        mark |= self.wake <= time
         return mark.nonzero()[0]
 
     def find(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -58,6 +58,13 @@ class ImpactRows:
         write_impacts(time, contacts, position, log, count, self.rows, self.count)
         self.count += count
 
+    def extend(self, rows: np.ndarray) -> None:
+        """Keep impacts (k, ROW_LENGTH) that are written already."""
+        while self.count + len(rows) > len(self.rows):
+            self.rows = np.concatenate([self.rows, np.empty_like(self.rows)])
+        self.rows[self.count : self.count + len(rows)] = rows
+        self.count += len(rows)
+
     def table(self) -> np.ndarray:
         """All impacts in order of time, `IMPACT_DTYPE`."""
         rows, column = self.rows[: self.count], 0

@@ -14,7 +14,8 @@ from rigidimpulse.integrate.course import state_at
 
 
 @jit
-def _sample(course, i, times, first, last, position, orientation, velocity, angular_velocity):
+def sample_path(course, i, times, first, last, position, orientation, velocity, angular_velocity):
+    """Write frames first ... last - 1 of body i on its present course; times (f,) s, the others (f, n, ...)."""
     for f in range(first, last):
         state_at(course, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
 
@@ -63,7 +64,7 @@ class Recorder:
     def _write(self, course, i: int, last: int) -> None:
         first = int(self.written[i])
         if last > first:
-            _sample(
+            sample_path(
                 course, i, self.times, first, last, self.position, self.orientation, self.velocity, self.angular_velocity
             )
             self.written[i] = last

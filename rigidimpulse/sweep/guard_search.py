@@ -5,6 +5,8 @@ Each step asks the bounding spheres, then the shapes (`guard`). If the shapes li
 rounding until the end), slide or leave are let go: they may come closer by the slack for rounding, so that neither
 lasting contact nor a rebound is taken for an impact. Surfaces that cross are in contact however they move.
 
+Balls, and balls and planes that stand, have their time in closed form (`ball_time`), but where they hover.
+
 With `ahead`, the time at which the limiting features come down to `touch` is found by bisection
 (`guard_witness`); the steps then only have to confirm that nothing is earlier. Without it, they are repeated until
 they are there (conservative advancement).
@@ -16,6 +18,7 @@ from math import inf
 
 from rigidimpulse._jit import jit
 from rigidimpulse.integrate.course import FIXED
+from rigidimpulse.sweep.ball_time import ball_time, is_closed_form, write_ball_witness
 from rigidimpulse.sweep.bound import MOTION_SIZE, length, motion_bound, stop_turning
 from rigidimpulse.sweep.guard import safe_time
 from rigidimpulse.sweep.guard_flight import plane_safe_until, relative_flight, rounding_slack, spheres_safe_until
@@ -98,6 +101,14 @@ def first_contacts(
     for k in range(pairs_a.shape[0]):
         a, b = pairs_a[k], pairs_b[k]
         shape_a, shape_b = shape_of_body[a], shape_of_body[b]
+        if is_closed_form(course, scratch, a, b, shape_a, shape_b, touch[k]):
+            t = ball_time(geometry.frame, course, scratch, a, b, shape_a, shape_b, start[k])
+            if t == t:
+                result.time[k], result.status[k], result.queries[k] = t if t < end else inf, SEPARATE, 1
+                if t < end:
+                    result.status[k] = IMPACT if t > start[k] else TOUCHING
+                    write_ball_witness(geometry.frame, course, scratch, a, b, shape_a, shape_b, t, result.witness[k])
+                continue
         slack = rounding_slack(course, scratch.reach, a, b, shape_a, shape_b, end)
         above = max(tolerance[k], slack)
         t, target, trial, floor = start[k], end, end - start[k], touch[k]
