@@ -186,9 +186,9 @@ class Heaps:
         return (speed * h <= FAST * self.stepper.inner[bodies]) & (spin * world.accuracy.step <= SPIN)
 
     def _near(self, context, member: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray]:
-        members = np.flatnonzero(member)
-        widen = self.stepper.widening(context, members, ahead)
-        return self.stepper.near_pairs(context.state.now.position, members, widen, np.flatnonzero(~member & ~self._excluded(context)))
+        other = ~member & ~self._excluded(context)
+        self.stepper.find_pairs(context, np.flatnonzero(member), np.flatnonzero(other), ahead)
+        return self.stepper.near(context, member, other, ahead)
 
     def _excluded(self, context) -> np.ndarray:
         """Movable bodies under way that are no members: they are swept."""
@@ -226,8 +226,9 @@ class Heaps:
             return chosen
         self._set_up(context, np.flatnonzero(begins), window.begin, window.end - window.begin)
         stepper = self.stepper
-        level = support_levels(stepper.bodies, stepper.pairs, stepper.table.rows, TALL)
-        tall = np.unique(root[stepper.body[level == TALL + 1]])
+        level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
+        tall = np.unique(root[stepper.order[level[: len(root)] == TALL + 1]])
+        tall = tall[tall >= 0]
         refused.update(dict.fromkeys(tall.tolist(), "tall"))
         return chosen & ~np.isin(root, tall)
 

@@ -1,0 +1,269 @@
+"""Narrow phase of heaps, with memory: what a pair's contacts were, and how its bodies lay to each other when they were found.
+
+Let m bound how far points of the pair have moved past each other since: m = |dp| + 2 r |dq|, p and q the pose of one body in the axes of
+the other, the carrier, and r its reach. Then a pair that was s apart is at least s - m apart, and is left alone while that
+is more than the margin within which contacts are looked for; contacts of touching ones are used again while m is below SAME of
+the smaller inner radius (their points are fixed in the bodies, so separations are exact, and the normal in the carrier).
+
+The margin is what the pair may come in the step, so that contacts are known before they close.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from rigidimpulse._jit import jit
+from rigidimpulse.constrain.heap_boxes import axis_normal, box_axis, edge_contact
+from rigidimpulse.constrain.heap_polyhedra import MOST_CORNERS, face_contacts, face_like, half_space_contacts
+from rigidimpulse.constrain.heap_rows import (
+    CORE_A,
+    CORE_B,
+    DYNAMIC_FRICTION,
+    FRICTION,
+    IMPULSE,
+    MEMBER,
+    OUTSIDE,
+    RESTITUTION,
+    ROUND_A,
+    ROUND_B,
+    ROW_SIZE,
+    SEPARATION,
+    SKIN,
+    STATIC_FRICTION,
+    closing_speed,
+    turned,
+    turned_back,
+)
+from rigidimpulse.rotation import product
+
+BOXES, WALL, GENERAL = 0, 1, 2
+"""Kinds of pairs: two boxes, a half space and a convex polyhedron, all others."""
+AHEAD, FARTHEST = 0.08, 2.0
+"""Contacts are looked for at least and at most that many inner radii away."""
+SAME, SAME_GENERAL = 2e-3, 0.02
+"""Part of the inner radius that touching pairs may move past each other until they are looked at again."""
+NEAR = 0.2
+"""Inner radii within which an old contact hands its impulse to a new one of other features."""
+POINTS = 4
+"""Contacts of two convex polyhedra."""
+
+
+@jit
+def in_play(bodies, a, b):
+    """Whether a pair is stepped."""
+    return bodies.part[a] != OUTSIDE and bodies.part[b] != OUTSIDE and (bodies.part[a] == MEMBER or bodies.part[b] == MEMBER)
+
+
+@jit
+def classify(pairs, bodies, shapes):
+    """Fill what follows from the bodies of all pairs."""
+    for p in range(pairs.first.shape[0]):
+        a, b = pairs.first[p], pairs.second[p]
+        s, t = bodies.shape[a], bodies.shape[b]
+        pairs.carrier[p] = bodies.reach[a] <= bodies.reach[b]
+        pairs.round[p] = (bodies.reach[a] if pairs.carrier[p] else bodies.reach[b]) == 0.0
+        solid_s, solid_t = shapes.face_first[s] < shapes.face_first[s + 1], shapes.face_first[t] < shapes.face_first[t + 1]
+        wall_s, wall_t = np.any(shapes.wall[s] != 0.0), np.any(shapes.wall[t] != 0.0)
+        pairs.kind[p] = GENERAL
+        if shapes.half[s, 0] > 0.0 and shapes.half[t, 0] > 0.0:
+            pairs.kind[p] = BOXES
+        elif (solid_s and wall_t) or (wall_s and solid_t):
+            pairs.kind[p] = WALL
+
+
+@jit
+def margin_of(bodies, pairs, p, ahead):
+    """How far away contacts of a pair are looked for, m: as far as it comes in `ahead` s, within bounds."""
+    a, b = pairs.first[p], pairs.second[p]
+    size = min(bodies.inner[a], bodies.inner[b])
+    speed = closing_speed(bodies, pairs, p)
+    return min(bodies.skin[a], bodies.skin[b]) + min(max(speed * ahead, AHEAD * size), FARTHEST * size)
+
+
+@jit
+def _relative_pose(bodies, pairs, p):
+    """The pose of the other body in the axes of the carrier."""
+    a, b = pairs.first[p], pairs.second[p]
+    carrier, other = (b, a) if pairs.carrier[p] else (a, b)
+    x, y = bodies.position[carrier], bodies.position[other]
+    q, o = bodies.orientation[carrier], bodies.orientation[other]
+    place = turned_back(bodies.rotation[carrier], y[0] - x[0], y[1] - x[1], y[2] - x[2])
+    return place, product(q[0], -q[1], -q[2], -q[3], o[0], o[1], o[2], o[3])
+
+
+@jit
+def _motion(pairs, p, reach, place, turn):
+    """m: how far points of a pair have moved past each other at most since contacts were looked for."""
+    seen = pairs.seen[p]
+    d = (place[0] - seen[0]) ** 2 + (place[1] - seen[1]) ** 2 + (place[2] - seen[2]) ** 2
+    if pairs.round[p]:
+        return sqrt(d)
+    same = turn[0] * seen[3] + turn[1] * seen[4] + turn[2] * seen[5] + turn[3] * seen[6]
+    # |q - q'|^2 of unit quaternions, of which the one and its negative are the same rotation.
+    return sqrt(d) + 2.0 * reach * sqrt(max(2.0 - 2.0 * abs(same), 0.0))
+
+
+@jit
+def note_seen(bodies, pairs, p):
+    """Remember how the bodies of a pair lie to each other now."""
+    place, turn = _relative_pose(bodies, pairs, p)
+    pairs.seen[p, 0], pairs.seen[p, 1], pairs.seen[p, 2] = place
+    pairs.seen[p, 3], pairs.seen[p, 4], pairs.seen[p, 5], pairs.seen[p, 6] = turn
+    pairs.known[p] = True
+
+
+@jit
+def _is_known(bodies, pairs, p, margin):
+    """Whether what is known of a pair still holds."""
+    if not pairs.known[p]:
+        return False
+    a, b = pairs.first[p], pairs.second[p]
+    place, turn = _relative_pose(bodies, pairs, p)
+    motion = _motion(pairs, p, bodies.reach[a if pairs.carrier[p] else b], place, turn)
+    if pairs.count[p] > 0:
+        part = SAME_GENERAL if pairs.kind[p] == GENERAL else SAME
+        return motion <= part * min(bodies.inner[a], bodies.inner[b])
+    return pairs.apart[p] - motion > margin
+
+
+@jit
+def write_row(bodies, pairs, p, real, round_a, round_b, factor_a, factor_b, coefficients, row):
+    """A new row, without impulse, of the contact `real` (10,), with places relative to the first body.
+
+    factor_a, factor_b: lengths of the bodies as the contact was found, parts of their true ones. Returns the separation.
+    """
+    a, b = pairs.first[p], pairs.second[p]
+    nx, ny, nz = real[6], real[7], real[8]
+    dx = bodies.position[b, 0] - bodies.position[a, 0]
+    dy = bodies.position[b, 1] - bodies.position[a, 1]
+    dz = bodies.position[b, 2] - bodies.position[a, 2]
+    ax, ay, az = real[0] / factor_a - round_a * nx, real[1] / factor_a - round_a * ny, real[2] / factor_a - round_a * nz
+    bx, by, bz = (real[3] - dx) / factor_b, (real[4] - dy) / factor_b, (real[5] - dz) / factor_b
+    bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz
+    row[:] = 0.0
+    row[0], row[1], row[2] = turned_back(bodies.rotation[b if pairs.carrier[p] else a], nx, ny, nz)
+    row[CORE_A], row[CORE_A + 1], row[CORE_A + 2] = turned_back(bodies.rotation[a], ax, ay, az)
+    row[CORE_B], row[CORE_B + 1], row[CORE_B + 2] = turned_back(bodies.rotation[b], bx, by, bz)
+    row[ROUND_A], row[ROUND_B] = round_a, round_b
+    row[RESTITUTION], row[STATIC_FRICTION], row[DYNAMIC_FRICTION] = coefficients[0], coefficients[1], coefficients[2]
+    row[SKIN] = min(bodies.skin[a], bodies.skin[b])
+    apart = nx * (dx + (bx - ax)) + ny * (dy + (by - ay)) + nz * (dz + (bz - az))
+    row[SEPARATION] = apart - (round_a + round_b) - row[SKIN]
+    return row[SEPARATION]
+
+
+@jit
+def hand_over(old_rows, old_ids, old, old_end, rows, ids, new, new_end, near):
+    """Give new rows the impulses of the old ones of the same features, else of one nearby with much the same normal."""
+    taken = np.zeros(old_end - old, np.bool_)
+    for nearby in range(2):
+        for c in range(new, new_end):
+            if rows[c, IMPULSE] > 0.0:
+                continue
+            for o in range(old, old_end):
+                if taken[o - old] or old_rows[o, IMPULSE] == 0.0:
+                    continue
+                cosine = rows[c, 0] * old_rows[o, 0] + rows[c, 1] * old_rows[o, 1] + rows[c, 2] * old_rows[o, 2]
+                same = ids[c, 0] == old_ids[o, 0] and ids[c, 1] == old_ids[o, 1] and ids[c, 2] == old_ids[o, 2]
+                if nearby == 1:
+                    x, y = rows[c, CORE_A] - old_rows[o, CORE_A], rows[c, CORE_A + 1] - old_rows[o, CORE_A + 1]
+                    z = rows[c, CORE_A + 2] - old_rows[o, CORE_A + 2]
+                    same = x * x + y * y + z * z < near * near
+                if not same or cosine < 0.9:
+                    continue
+                taken[o - old] = True
+                rows[c, IMPULSE] = old_rows[o, IMPULSE]
+                for k in range(FRICTION, FRICTION + 3):
+                    rows[c, k] = old_rows[o, k]
+                break
+
+
+@jit
+def _find(shapes, bodies, a, b, kind, margin, origin, between, c, polygon, numbers, real, ids):
+    """Contacts of a pair that is no general one, relative to the first body; returns their number and a bound of the gap."""
+    s, t = bodies.shape[a], bodies.shape[b]
+    r, q = bodies.rotation[a], bodies.rotation[b]
+    dx, dy, dz = between[0], between[1], between[2]
+    if kind == WALL:
+        wall_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
+        w, m, sign = (shapes.wall[s], r, 1.0) if wall_is_a else (shapes.wall[t], q, -1.0)
+        nx, ny, nz = turned(m, w[0], w[1], w[2])
+        offset = w[3] - sign * (nx * dx + ny * dy + nz * dz)
+        solid, o = (t, q) if wall_is_a else (s, r)
+        count, least = half_space_contacts(shapes, solid, o, nx, ny, nz, offset, margin, sign, polygon, numbers, real, ids)
+        if wall_is_a:
+            for k in range(count):
+                for i in range(3):
+                    real[k, i] += between[i]
+                    real[k, 3 + i] += between[i]
+        return count, least
+    gap, axis = box_axis(shapes.half[s], shapes.half[t], r, q, dx, dy, dz, margin, c)
+    if gap > margin:
+        return np.int64(0), gap
+    if axis >= 6:
+        return edge_contact(shapes.half[s], shapes.half[t], r, dx, dy, dz, axis, gap, c, real, ids), gap
+    nx, ny, nz = axis_normal(axis, r, q, dx, dy, dz)
+    if axis < 3:
+        face = face_like(shapes, s, r, nx, ny, nz)
+        count = face_contacts(shapes, s, r, origin, face, t, q, between, margin, 1.0, polygon, numbers, real, ids)
+    else:
+        face = face_like(shapes, t, q, -nx, -ny, -nz)
+        count = face_contacts(shapes, t, q, between, face, s, r, origin, margin, -1.0, polygon, numbers, real, ids)
+    return count, gap
+
+
+@jit
+def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, stale, margins):
+    """Look at all pairs in play; contacts of general ones are left to be found.
+
+    used: rows of the pool in use; ahead: s; coefficients (k, k, 4) of two materials. Writes the places of general pairs that must be
+    looked at to stale (k,) and their margins, m. Returns rows used, -1 where the pool is too small (then call it again), and their number.
+    """
+    real, found = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
+    polygon, numbers = np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64)
+    old, old_ids = np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64)
+    origin, between, c = np.zeros(3), np.empty(3), np.empty((3, 3))
+    waiting = 0
+    for p in range(pairs.first.shape[0]):
+        a, b = pairs.first[p], pairs.second[p]
+        if not in_play(bodies, a, b):
+            continue
+        margin = margin_of(bodies, pairs, p, ahead)
+        square = 0.0
+        for k in range(3):
+            between[k] = bodies.position[b, k] - bodies.position[a, k]
+            square += between[k] * between[k]
+        far = bodies.radius[a] + bodies.radius[b] + margin
+        if square > far * far:
+            pairs.known[p] = pairs.known[p] and pairs.count[p] == 0
+            pairs.count[p] = 0
+            continue
+        if _is_known(bodies, pairs, p, margin):
+            continue
+        if pairs.kind[p] == GENERAL:
+            stale[waiting], margins[waiting] = p, margin
+            waiting += 1
+            continue
+        count, gap = _find(shapes, bodies, a, b, pairs.kind[p], margin, origin, between, c, polygon, numbers, real, found)
+        if count > pairs.room[p]:
+            if used + POINTS > rows.shape[0]:
+                return np.int64(-1), waiting
+            before = pairs.start[p]
+            pairs.start[p], pairs.room[p] = used, POINTS
+            for k in range(pairs.count[p]):
+                rows[used + k, :], ids[used + k, :] = rows[before + k], ids[before + k]
+            used += POINTS
+        start, kept = pairs.start[p], pairs.count[p]
+        for k in range(kept):
+            old[k, :], old_ids[k, :] = rows[start + k], ids[start + k]
+        pair = coefficients[bodies.material[a], bodies.material[b]]
+        for k in range(count):
+            write_row(bodies, pairs, p, real[k], 0.0, 0.0, 1.0, 1.0, pair, rows[start + k])
+            ids[start + k, :] = found[k]
+        hand_over(old, old_ids, np.int64(0), kept, rows, ids, start, start + count, NEAR * min(bodies.inner[a], bodies.inner[b]))
+        pairs.count[p] = count
+        pairs.apart[p] = max(gap, 0.0) if count == 0 else 0.0
+        note_seen(bodies, pairs, p)
+    return used, waiting
