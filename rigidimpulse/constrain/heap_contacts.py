@@ -13,7 +13,7 @@ from rigidimpulse._jit import jit
 from rigidimpulse.constrain.contact_motion import only_primitive, side_radius
 from rigidimpulse.constrain.heap_narrow import NEAR, hand_over, note_seen, write_row
 from rigidimpulse.constrain.heap_overlap import FLUSH, deepest_normal, gap_along, overlap_contacts, support
-from rigidimpulse.constrain.heap_rows import CORE_A, CORE_B, ROUND_A, ROUND_B, SEPARATION, SKIN, turned
+from rigidimpulse.constrain.heap_rows import CORE_A, CORE_B, ROUND_A, ROUND_B, SKIN, turned
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.manifold import reduce_contacts
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
@@ -108,12 +108,12 @@ def shrunk_geometry(geometry: Geometry, dynamic_shapes: np.ndarray) -> tuple[Geo
 def _contradicts(bodies, pairs, p, rows, new, new_end):
     """Whether the new contacts of a pair cannot be: there are none though an old one is closed, or a normal has turned round."""
     a, b = pairs.first[p], pairs.second[p]
-    carrier = bodies.rotation[b if pairs.carrier[p] else a]
+    carrier = b if pairs.carrier[p] else a
     for o in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
         row = rows[o]
-        nx, ny, nz = turned(carrier, row[0], row[1], row[2])
-        ax, ay, az = turned(bodies.rotation[a], row[CORE_A], row[CORE_A + 1], row[CORE_A + 2])
-        bx, by, bz = turned(bodies.rotation[b], row[CORE_B], row[CORE_B + 1], row[CORE_B + 2])
+        nx, ny, nz = turned(bodies.rotation, carrier, row[0], row[1], row[2])
+        ax, ay, az = turned(bodies.rotation, a, row[CORE_A], row[CORE_A + 1], row[CORE_A + 2])
+        bx, by, bz = turned(bodies.rotation, b, row[CORE_B], row[CORE_B + 1], row[CORE_B + 2])
         gap = (
             (bodies.position[b, 0] - bodies.position[a, 0] + bx - ax) * nx
             + (bodies.position[b, 1] - bodies.position[a, 1] + by - ay) * ny

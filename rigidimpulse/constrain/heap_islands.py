@@ -66,7 +66,7 @@ def support_levels(bodies, pairs, rows, tall):
         for p in range(pairs.first.shape[0]):
             a, b = pairs.first[p], pairs.second[p]
             closed = False
-            if in_play(bodies, a, b):
+            if in_play(bodies.part, a, b):
                 for c in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
                     closed = closed or rows[c, SEPARATION] <= rows[c, SKIN]
             if not closed:

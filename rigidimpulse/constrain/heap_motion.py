@@ -21,14 +21,14 @@ def _set_orientation(bodies, i, x, y, z):
 @jit
 def _turn_freely(bodies, i, h):
     """Turn body i of unlike moments by its spin over h, keeping its angular momentum."""
-    r, moments, v = bodies.rotation[i], bodies.inertia[i], 8 * i + 3
-    x0, x1, x2 = turned_back(r, bodies.velocity[v], bodies.velocity[v + 1], bodies.velocity[v + 2])
+    moments, v = bodies.inertia[i], 8 * i + 3
+    x0, x1, x2 = turned_back(bodies.rotation, i, bodies.velocity[v], bodies.velocity[v + 1], bodies.velocity[v + 2])
     l0, l1, l2 = moments[0] * x0, moments[1] * x1, moments[2] * x2
     d0 = 0.5 * h * (x2 * l1 - x1 * l2) / moments[0]
     d1 = 0.5 * h * (x0 * l2 - x2 * l0) / moments[1]
     d2 = 0.5 * h * (x1 * l0 - x0 * l1) / moments[2]
-    lx, ly, lz = turned(r, l0, l1, l2)
-    wx, wy, wz = turned(r, x0 + d0, x1 + d1, x2 + d2)
+    lx, ly, lz = turned(bodies.rotation, i, l0, l1, l2)
+    wx, wy, wz = turned(bodies.rotation, i, x0 + d0, x1 + d1, x2 + d2)
     _set_orientation(bodies, i, h * wx, h * wy, h * wz)
     set_inverse_inertia(bodies, i)
     m = bodies.mass[8 * i : 8 * i + 6]
@@ -97,7 +97,7 @@ def energies(bodies, masses, pull):
             continue
         o = 8 * i
         v = bodies.velocity
-        x, y, z = turned_back(bodies.rotation[i], v[o + 3], v[o + 4], v[o + 5])
+        x, y, z = turned_back(bodies.rotation, i, v[o + 3], v[o + 4], v[o + 5])
         moments = bodies.inertia[i]
         own = 0.5 * masses[i] * (v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2])
         own += 0.5 * (moments[0] * x * x + moments[1] * y * y + moments[2] * z * z)

@@ -51,9 +51,9 @@ POINTS = 4
 
 
 @jit
-def in_play(bodies, a, b):
+def in_play(part, a, b):
     """Whether a pair is stepped."""
-    return bodies.part[a] != OUTSIDE and bodies.part[b] != OUTSIDE and (bodies.part[a] == MEMBER or bodies.part[b] == MEMBER)
+    return part[a] != OUTSIDE and part[b] != OUTSIDE and (part[a] == MEMBER or part[b] == MEMBER)
 
 
 @jit
@@ -74,33 +74,23 @@ def classify(pairs, bodies, shapes):
 
 
 @jit
-def margin_of(bodies, pairs, p, ahead):
-    """How far away contacts of a pair are looked for, m: as far as it comes in `ahead` s, within bounds."""
-    a, b = pairs.first[p], pairs.second[p]
-    size = min(bodies.inner[a], bodies.inner[b])
-    speed = closing_speed(bodies, pairs, p)
-    return min(bodies.skin[a], bodies.skin[b]) + min(max(speed * ahead, AHEAD * size), FARTHEST * size)
-
-
-@jit
-def _relative_pose(bodies, pairs, p):
+def _relative_pose(position, orientation, rotation, carrier, other):
     """The pose of the other body in the axes of the carrier."""
-    a, b = pairs.first[p], pairs.second[p]
-    carrier, other = (b, a) if pairs.carrier[p] else (a, b)
-    x, y = bodies.position[carrier], bodies.position[other]
-    q, o = bodies.orientation[carrier], bodies.orientation[other]
-    place = turned_back(bodies.rotation[carrier], y[0] - x[0], y[1] - x[1], y[2] - x[2])
-    return place, product(q[0], -q[1], -q[2], -q[3], o[0], o[1], o[2], o[3])
+    x, q = position, orientation
+    dx, dy, dz = x[other, 0] - x[carrier, 0], x[other, 1] - x[carrier, 1], x[other, 2] - x[carrier, 2]
+    turn = product(
+        q[carrier, 0], -q[carrier, 1], -q[carrier, 2], -q[carrier, 3], q[other, 0], q[other, 1], q[other, 2], q[other, 3]
+    )
+    return turned_back(rotation, carrier, dx, dy, dz), turn
 
 
 @jit
-def _motion(pairs, p, reach, place, turn):
+def _motion(seen, p, is_round, reach, place, turn):
     """m: how far points of a pair have moved past each other at most since contacts were looked for."""
-    seen = pairs.seen[p]
-    d = (place[0] - seen[0]) ** 2 + (place[1] - seen[1]) ** 2 + (place[2] - seen[2]) ** 2
-    if pairs.round[p]:
+    d = (place[0] - seen[p, 0]) ** 2 + (place[1] - seen[p, 1]) ** 2 + (place[2] - seen[p, 2]) ** 2
+    if is_round:
         return sqrt(d)
-    same = turn[0] * seen[3] + turn[1] * seen[4] + turn[2] * seen[5] + turn[3] * seen[6]
+    same = turn[0] * seen[p, 3] + turn[1] * seen[p, 4] + turn[2] * seen[p, 5] + turn[3] * seen[p, 6]
     # |q - q'|^2 of unit quaternions, of which the one and its negative are the same rotation.
     return sqrt(d) + 2.0 * reach * sqrt(max(2.0 - 2.0 * abs(same), 0.0))
 
@@ -108,24 +98,48 @@ def _motion(pairs, p, reach, place, turn):
 @jit
 def note_seen(bodies, pairs, p):
     """Remember how the bodies of a pair lie to each other now."""
-    place, turn = _relative_pose(bodies, pairs, p)
+    a, b = pairs.first[p], pairs.second[p]
+    carrier, other = (b, a) if pairs.carrier[p] else (a, b)
+    place, turn = _relative_pose(bodies.position, bodies.orientation, bodies.rotation, carrier, other)
     pairs.seen[p, 0], pairs.seen[p, 1], pairs.seen[p, 2] = place
     pairs.seen[p, 3], pairs.seen[p, 4], pairs.seen[p, 5], pairs.seen[p, 6] = turn
     pairs.known[p] = True
 
 
 @jit
-def _is_known(bodies, pairs, p, margin):
-    """Whether what is known of a pair still holds."""
-    if not pairs.known[p]:
-        return False
-    a, b = pairs.first[p], pairs.second[p]
-    place, turn = _relative_pose(bodies, pairs, p)
-    motion = _motion(pairs, p, bodies.reach[a if pairs.carrier[p] else b], place, turn)
-    if pairs.count[p] > 0:
-        part = SAME_GENERAL if pairs.kind[p] == GENERAL else SAME
-        return motion <= part * min(bodies.inner[a], bodies.inner[b])
-    return pairs.apart[p] - motion > margin
+def review(bodies, pairs, ahead, places, margins):
+    """Write the pairs in play whose contacts must be looked for, and their margins, m: how far they come in `ahead` s, within bounds.
+
+    Pairs that are too far apart lose their contacts. Returns the number of places (k,) and margins (k,) written.
+    """
+    part, position, orientation, rotation, velocity = bodies.part, bodies.position, bodies.orientation, bodies.rotation, bodies.velocity
+    inner, skin, radius, reach = bodies.inner, bodies.skin, bodies.radius, bodies.reach
+    seen, known, count, apart = pairs.seen, pairs.known, pairs.count, pairs.apart
+    number = 0
+    for p in range(pairs.first.shape[0]):
+        a, b, is_second = pairs.first[p], pairs.second[p], pairs.carrier[p]
+        if not in_play(part, a, b):
+            continue
+        size = min(inner[a], inner[b])
+        speed = closing_speed(position, velocity, reach, a, b, is_second)
+        margin = min(skin[a], skin[b]) + min(max(speed * ahead, AHEAD * size), FARTHEST * size)
+        far = radius[a] + radius[b] + margin
+        dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
+        if dx * dx + dy * dy + dz * dz > far * far:
+            known[p] = known[p] and count[p] == 0
+            count[p] = 0
+            continue
+        if known[p]:
+            carrier, other = (b, a) if is_second else (a, b)
+            place, turn = _relative_pose(position, orientation, rotation, carrier, other)
+            motion = _motion(seen, p, pairs.round[p], reach[other], place, turn)
+            if count[p] == 0 and apart[p] - motion > margin:
+                continue
+            if count[p] > 0 and motion <= (SAME_GENERAL if pairs.kind[p] == GENERAL else SAME) * size:
+                continue
+        places[number], margins[number] = p, margin
+        number += 1
+    return number
 
 
 @jit
@@ -143,9 +157,9 @@ def write_row(bodies, pairs, p, real, round_a, round_b, factor_a, factor_b, coef
     bx, by, bz = (real[3] - dx) / factor_b, (real[4] - dy) / factor_b, (real[5] - dz) / factor_b
     bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz
     row[:] = 0.0
-    row[0], row[1], row[2] = turned_back(bodies.rotation[b if pairs.carrier[p] else a], nx, ny, nz)
-    row[CORE_A], row[CORE_A + 1], row[CORE_A + 2] = turned_back(bodies.rotation[a], ax, ay, az)
-    row[CORE_B], row[CORE_B + 1], row[CORE_B + 2] = turned_back(bodies.rotation[b], bx, by, bz)
+    row[0], row[1], row[2] = turned_back(bodies.rotation, b if pairs.carrier[p] else a, nx, ny, nz)
+    row[CORE_A], row[CORE_A + 1], row[CORE_A + 2] = turned_back(bodies.rotation, a, ax, ay, az)
+    row[CORE_B], row[CORE_B + 1], row[CORE_B + 2] = turned_back(bodies.rotation, b, bx, by, bz)
     row[ROUND_A], row[ROUND_B] = round_a, round_b
     row[RESTITUTION], row[STATIC_FRICTION], row[DYNAMIC_FRICTION] = coefficients[0], coefficients[1], coefficients[2]
     row[SKIN] = min(bodies.skin[a], bodies.skin[b])
@@ -183,86 +197,75 @@ def hand_over(old_rows, old_ids, old, old_end, rows, ids, new, new_end, near):
 @jit
 def _find(shapes, bodies, a, b, kind, margin, origin, between, c, polygon, numbers, real, ids):
     """Contacts of a pair that is no general one, relative to the first body; returns their number and a bound of the gap."""
-    s, t = bodies.shape[a], bodies.shape[b]
-    r, q = bodies.rotation[a], bodies.rotation[b]
+    s, t, r = bodies.shape[a], bodies.shape[b], bodies.rotation
     dx, dy, dz = between[0], between[1], between[2]
     if kind == WALL:
         wall_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
-        w, m, sign = (shapes.wall[s], r, 1.0) if wall_is_a else (shapes.wall[t], q, -1.0)
-        nx, ny, nz = turned(m, w[0], w[1], w[2])
-        offset = w[3] - sign * (nx * dx + ny * dy + nz * dz)
-        solid, o = (t, q) if wall_is_a else (s, r)
-        count, least = half_space_contacts(shapes, solid, o, nx, ny, nz, offset, margin, sign, polygon, numbers, real, ids)
+        wall, w, i, sign = shapes.wall, s if wall_is_a else t, a if wall_is_a else b, 1.0 if wall_is_a else -1.0
+        nx, ny, nz = turned(r, i, wall[w, 0], wall[w, 1], wall[w, 2])
+        offset = wall[w, 3] - sign * (nx * dx + ny * dy + nz * dz)
+        solid, j = (t, b) if wall_is_a else (s, a)
+        count, least = half_space_contacts(shapes, solid, r, j, nx, ny, nz, offset, margin, sign, polygon, numbers, real, ids)
         if wall_is_a:
             for k in range(count):
                 for i in range(3):
                     real[k, i] += between[i]
                     real[k, 3 + i] += between[i]
         return count, least
-    gap, axis = box_axis(shapes.half[s], shapes.half[t], r, q, dx, dy, dz, margin, c)
+    gap, axis = box_axis(shapes.half, s, t, r, a, b, dx, dy, dz, margin, c)
     if gap > margin:
         return np.int64(0), gap
     if axis >= 6:
-        return edge_contact(shapes.half[s], shapes.half[t], r, dx, dy, dz, axis, gap, c, real, ids), gap
-    nx, ny, nz = axis_normal(axis, r, q, dx, dy, dz)
+        return edge_contact(shapes.half, s, t, r, a, dx, dy, dz, axis, gap, c, real, ids), gap
+    nx, ny, nz = axis_normal(axis, r, a, b, dx, dy, dz)
     if axis < 3:
-        face = face_like(shapes, s, r, nx, ny, nz)
-        count = face_contacts(shapes, s, r, origin, face, t, q, between, margin, 1.0, polygon, numbers, real, ids)
+        face = face_like(shapes, s, r, a, nx, ny, nz)
+        count = face_contacts(shapes, r, s, a, origin, face, t, b, between, margin, 1.0, polygon, numbers, real, ids)
     else:
-        face = face_like(shapes, t, q, -nx, -ny, -nz)
-        count = face_contacts(shapes, t, q, between, face, s, r, origin, margin, -1.0, polygon, numbers, real, ids)
+        face = face_like(shapes, t, r, b, -nx, -ny, -nz)
+        count = face_contacts(shapes, r, t, b, between, face, s, a, origin, margin, -1.0, polygon, numbers, real, ids)
     return count, gap
 
 
 @jit
-def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, stale, margins):
-    """Look at all pairs in play; contacts of general ones are left to be found.
+def look(shapes, bodies, pairs, rows, ids, used, coefficients, places, margins, number, general):
+    """Find the contacts of `number` pairs at `places`, but for general ones, whose places among these are written to general (k,).
 
-    used: rows of the pool in use; ahead: s; coefficients (k, k, 4) of two materials. Writes the places of general pairs that must be
-    looked at to stale (k,) and their margins, m. Returns rows used, -1 where the pool is too small (then call it again), and their number.
+    used: rows of the pool in use; coefficients (k, k, 4) of two materials; margins (k,) m. Returns the rows used, -1 where the pool is
+    too small (then call it again), and how many general ones there are.
     """
     real, found = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
     polygon, numbers = np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64)
     old, old_ids = np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64)
     origin, between, c = np.zeros(3), np.empty(3), np.empty((3, 3))
     waiting = 0
-    for p in range(pairs.first.shape[0]):
-        a, b = pairs.first[p], pairs.second[p]
-        if not in_play(bodies, a, b):
-            continue
-        margin = margin_of(bodies, pairs, p, ahead)
-        square = 0.0
-        for k in range(3):
-            between[k] = bodies.position[b, k] - bodies.position[a, k]
-            square += between[k] * between[k]
-        far = bodies.radius[a] + bodies.radius[b] + margin
-        if square > far * far:
-            pairs.known[p] = pairs.known[p] and pairs.count[p] == 0
-            pairs.count[p] = 0
-            continue
-        if _is_known(bodies, pairs, p, margin):
-            continue
+    for k in range(number):
+        p, margin = places[k], margins[k]
         if pairs.kind[p] == GENERAL:
-            stale[waiting], margins[waiting] = p, margin
+            general[waiting] = k
             waiting += 1
             continue
+        a, b = pairs.first[p], pairs.second[p]
+        for i in range(3):
+            between[i] = bodies.position[b, i] - bodies.position[a, i]
         count, gap = _find(shapes, bodies, a, b, pairs.kind[p], margin, origin, between, c, polygon, numbers, real, found)
         if count > pairs.room[p]:
             if used + POINTS > rows.shape[0]:
                 return np.int64(-1), waiting
             before = pairs.start[p]
             pairs.start[p], pairs.room[p] = used, POINTS
-            for k in range(pairs.count[p]):
-                rows[used + k, :], ids[used + k, :] = rows[before + k], ids[before + k]
+            for i in range(pairs.count[p]):
+                rows[used + i, :], ids[used + i, :] = rows[before + i], ids[before + i]
             used += POINTS
         start, kept = pairs.start[p], pairs.count[p]
-        for k in range(kept):
-            old[k, :], old_ids[k, :] = rows[start + k], ids[start + k]
+        for i in range(kept):
+            old[i, :], old_ids[i, :] = rows[start + i], ids[start + i]
         pair = coefficients[bodies.material[a], bodies.material[b]]
-        for k in range(count):
-            write_row(bodies, pairs, p, real[k], 0.0, 0.0, 1.0, 1.0, pair, rows[start + k])
-            ids[start + k, :] = found[k]
-        hand_over(old, old_ids, np.int64(0), kept, rows, ids, start, start + count, NEAR * min(bodies.inner[a], bodies.inner[b]))
+        for i in range(count):
+            write_row(bodies, pairs, p, real[i], 0.0, 0.0, 1.0, 1.0, pair, rows[start + i])
+            ids[start + i, :] = found[i]
+        if count > 0 and kept > 0:
+            hand_over(old, old_ids, np.int64(0), kept, rows, ids, start, start + count, NEAR * min(bodies.inner[a], bodies.inner[b]))
         pairs.count[p] = count
         pairs.apart[p] = max(gap, 0.0) if count == 0 else 0.0
         note_seen(bodies, pairs, p)

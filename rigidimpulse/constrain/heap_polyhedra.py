@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.heap_rows import turned
+from rigidimpulse.constrain.heap_rows import turned, turned_back
 from rigidimpulse.geometry import HALF_SPACE, Geometry
 
 EDGE_WINS = 2e-3
@@ -97,11 +97,9 @@ def _loop(flat: list[int], geometry: Geometry, low: int) -> list[int]:
 
 
 @jit
-def face_like(shapes, s, r, nx, ny, nz):
-    """The face of shape s turned by r whose normal is most like n."""
-    a = r[0, 0] * nx + r[1, 0] * ny + r[2, 0] * nz
-    b = r[0, 1] * nx + r[1, 1] * ny + r[2, 1] * nz
-    c = r[0, 2] * nx + r[1, 2] * ny + r[2, 2] * nz
+def face_like(shapes, s, r, i, nx, ny, nz):
+    """The face of shape s turned by r[i] whose normal is most like n."""
+    a, b, c = turned_back(r, i, nx, ny, nz)
     best, face = -inf, shapes.face_first[s]
     for f in range(shapes.face_first[s], shapes.face_first[s + 1]):
         cosine = a * shapes.plane[f, 0] + b * shapes.plane[f, 1] + c * shapes.plane[f, 2]
@@ -150,7 +148,8 @@ def four_of(points, height, count, chosen):
     if distance == 0.0:
         return np.int64(1)
     chosen[1] = farthest
-    ex, ey, ez = points[farthest, 0] - points[deepest, 0], points[farthest, 1] - points[deepest, 1], points[farthest, 2] - points[deepest, 2]
+    ex, ey = points[farthest, 0] - points[deepest, 0], points[farthest, 1] - points[deepest, 1]
+    ez = points[farthest, 2] - points[deepest, 2]
     # Twice the area of the triangle that a point makes with the first two, signed by a first one that has any.
     mx, my, mz, least = 0.0, 0.0, 0.0, 1e-9 * distance
     high, low, most, lowest = -1, -1, least, -least
@@ -176,27 +175,27 @@ def four_of(points, height, count, chosen):
 
 
 @jit
-def face_contacts(shapes, s, r, x, face, t, q, y, margin, sign, polygon, ids, real, out_ids):
-    """Contacts of a face of shape s at (x, r) with the polygon of shape t at (y, q) that faces it; returns their number.
+def face_contacts(shapes, r, s, i, x, face, t, j, y, margin, sign, polygon, ids, real, out_ids):
+    """Contacts of a face of shape s at (x, r[i]) with the polygon of shape t at (y, r[j]) that faces it; returns their number.
 
     sign: 1 where the face is a's, else -1; positions are relative to a.
     """
     spare, spare_ids = np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64)
     height, chosen = np.empty(MOST_CORNERS), np.empty(4, np.int64)
-    nx, ny, nz = turned(r, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
-    other = face_like(shapes, t, q, -nx, -ny, -nz)
+    nx, ny, nz = turned(r, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
+    other = face_like(shapes, t, r, j, -nx, -ny, -nz)
     count = np.int64(0)
     for k in range(shapes.loop_first[other], min(shapes.loop_first[other + 1], shapes.loop_first[other] + MOST_CORNERS)):
         v = shapes.loop[k]
-        vx, vy, vz = turned(q, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
+        vx, vy, vz = turned(r, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
         polygon[count, 0], polygon[count, 1], polygon[count, 2] = vx + (y[0] - x[0]), vy + (y[1] - x[1]), vz + (y[2] - x[2])
         ids[count] = v
         count += 1
     first, last = shapes.loop_first[face], shapes.loop_first[face + 1]
     for k in range(first, last):
         v, w = shapes.loop[k], shapes.loop[k + 1 if k + 1 < last else first]
-        ax, ay, az = turned(r, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
-        bx, by, bz = turned(r, shapes.corner[w, 0], shapes.corner[w, 1], shapes.corner[w, 2])
+        ax, ay, az = turned(r, i, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
+        bx, by, bz = turned(r, i, shapes.corner[w, 0], shapes.corner[w, 1], shapes.corner[w, 2])
         ex, ey, ez = bx - ax, by - ay, bz - az
         px, py, pz = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
         count = _cut(polygon, ids, count, spare, spare_ids, px, py, pz, px * ax + py * ay + pz * az, k - first)
@@ -214,26 +213,26 @@ def face_contacts(shapes, s, r, x, face, t, q, y, margin, sign, polygon, ids, re
     for c in range(number):
         k = chosen[c]
         gap = height[k]
-        for i in range(3):
-            n = nx if i == 0 else (ny if i == 1 else nz)
-            p = polygon[k, i] + x[i]
-            real[c, at_a + i], real[c, at_b + i] = p - gap * n, p
-            real[c, 6 + i] = sign * n
+        for m in range(3):
+            n = nx if m == 0 else (ny if m == 1 else nz)
+            p = polygon[k, m] + x[m]
+            real[c, at_a + m], real[c, at_b + m] = p - gap * n, p
+            real[c, 6 + m] = sign * n
         real[c, 9] = gap
         out_ids[c, 0], out_ids[c, 1], out_ids[c, 2] = face, other, ids[k]
     return number
 
 
 @jit
-def half_space_contacts(shapes, s, r, nx, ny, nz, offset, margin, sign, polygon, ids, real, out_ids):
-    """Contacts of the solid n.x <= offset (relative to the shape's position) with shape s turned by r; their number and the gap.
+def half_space_contacts(shapes, s, r, j, nx, ny, nz, offset, margin, sign, polygon, ids, real, out_ids):
+    """Contacts of the solid n.x <= offset (relative to the shape's position) with shape s turned by r[j]; their number and the gap.
 
     sign: 1 where the half space is a, else -1; points are relative to the shape's position.
     """
     height, chosen = np.empty(MOST_CORNERS), np.empty(4, np.int64)
     count, least = 0, inf
     for v in range(shapes.corner_first[s], shapes.corner_first[s + 1]):
-        x, y, z = turned(r, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
+        x, y, z = turned(r, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
         gap = nx * x + ny * y + nz * z - offset
         least = min(least, gap)
         if gap <= margin and count < MOST_CORNERS:

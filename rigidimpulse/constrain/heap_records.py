@@ -46,7 +46,7 @@ BETWEEN = 40
 """How points push each other along n: 01, 02, 03, 12, 13, 23."""
 POINT, POINT_SIZE = 46, 6
 X, Y, GAP, MASS, PRESS, LEVER = 0, 1, 2, 3, 4, 5
-"""First field of the points, and fields of each: place, m; gap less the skin, m; effective mass, 0 for no point; impulse; distance from O."""
+"""First field of the points, and fields of each: place, m; gap less the skin, m; effective mass, 0 for none; impulse; distance from O."""
 FIELDS = POINT + 4 * POINT_SIZE
 POINTS = 4
 COLOURS = 62
@@ -84,11 +84,11 @@ def empty_patches(m: int) -> Patches:
 def list_patches(bodies, pairs, rows, patches):
     """Write the patches of all pairs in play; returns their number, minus the number needed where there is no room."""
     m = 0
-    room = patches.pair.shape[0]
+    room, part = patches.pair.shape[0], bodies.part
     taken = np.zeros(64, np.bool_)
     for p in range(pairs.first.shape[0]):
         count = min(pairs.count[p], 64)
-        if count == 0 or not in_play(bodies, pairs.first[p], pairs.second[p]):
+        if count == 0 or not in_play(part, pairs.first[p], pairs.second[p]):
             continue
         start = pairs.start[p]
         taken[:count] = False
@@ -97,13 +97,12 @@ def list_patches(bodies, pairs, rows, patches):
                 continue
             size = 0
             for d in range(c, count):
-                cosine = (
-                    rows[start + c, 0] * rows[start + d, 0] + rows[start + c, 1] * rows[start + d, 1] + rows[start + c, 2] * rows[start + d, 2]
-                )
+                i, j = start + c, start + d
+                cosine = rows[i, 0] * rows[j, 0] + rows[i, 1] * rows[j, 1] + rows[i, 2] * rows[j, 2]
                 if size < POINTS and not taken[d] and (d == c or cosine > ONE_WALL):
                     taken[d] = True
                     if m < room:
-                        patches.row[m, size] = start + d
+                        patches.row[m, size] = j
                     size += 1
             if m < room:
                 patches.pair[m], patches.size[m] = p, size
@@ -176,15 +175,15 @@ def tangents(nx, ny, nz):
 
 
 @jit
-def point_of(bodies, row, a, b, nx, ny, nz, share):
-    """Where the impulses of a row act, from the centre of a, and the gap less the skin, m."""
-    ax, ay, az = turned(bodies.rotation[a], row[CORE_A], row[CORE_A + 1], row[CORE_A + 2])
-    bx, by, bz = turned(bodies.rotation[b], row[CORE_B], row[CORE_B + 1], row[CORE_B + 2])
-    bx += bodies.position[b, 0] - bodies.position[a, 0]
-    by += bodies.position[b, 1] - bodies.position[a, 1]
-    bz += bodies.position[b, 2] - bodies.position[a, 2]
-    s, t = row[ROUND_A], row[ROUND_B]
-    gap = nx * (bx - ax) + ny * (by - ay) + nz * (bz - az) - (s + t) - row[SKIN]
+def point_of(position, rotation, rows, r, a, b, nx, ny, nz, share):
+    """Where the impulses of row r act, from the centre of a, and the gap less the skin, m."""
+    ax, ay, az = turned(rotation, a, rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2])
+    bx, by, bz = turned(rotation, b, rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2])
+    bx += position[b, 0] - position[a, 0]
+    by += position[b, 1] - position[a, 1]
+    bz += position[b, 2] - position[a, 2]
+    s, t = rows[r, ROUND_A], rows[r, ROUND_B]
+    gap = nx * (bx - ax) + ny * (by - ay) + nz * (bz - az) - (s + t) - rows[r, SKIN]
     rest = 1.0 - share
     x = share * (ax + s * nx) + rest * (bx - t * nx)
     y = share * (ay + s * ny) + rest * (by - t * ny)
@@ -192,44 +191,38 @@ def point_of(bodies, row, a, b, nx, ny, nz, share):
 
 
 @jit
-def share_of(bodies, a, b):
+def share_of(mass, a, b):
     """Impulses act at one point, so that no torque is left over: mid-way, or on the surface of what can move, so that it rolls."""
-    if bodies.mass[8 * a + INVERSE_MASS] == 0.0:
+    if mass[8 * a + INVERSE_MASS] == 0.0:
         return 0.0
-    return 0.5 if bodies.mass[8 * b + INVERSE_MASS] > 0.0 else 1.0
+    return 0.5 if mass[8 * b + INVERSE_MASS] > 0.0 else 1.0
 
 
 @jit
-def normal_of(bodies, pairs, p, row):
-    """The world normal of a row; that of two rounded surfaces runs between their centres."""
-    a, b = pairs.first[p], pairs.second[p]
-    if row[ROUND_A] > 0.0 and row[ROUND_B] > 0.0:
-        ax, ay, az = turned(bodies.rotation[a], row[CORE_A], row[CORE_A + 1], row[CORE_A + 2])
-        bx, by, bz = turned(bodies.rotation[b], row[CORE_B], row[CORE_B + 1], row[CORE_B + 2])
-        x = bodies.position[b, 0] + bx - bodies.position[a, 0] - ax
-        y = bodies.position[b, 1] + by - bodies.position[a, 1] - ay
-        z = bodies.position[b, 2] + bz - bodies.position[a, 2] - az
+def normal_of(position, rotation, rows, r, a, b, carrier):
+    """The world normal of row r of bodies a and b; that of two rounded surfaces runs between their centres."""
+    if rows[r, ROUND_A] > 0.0 and rows[r, ROUND_B] > 0.0:
+        ax, ay, az = turned(rotation, a, rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2])
+        bx, by, bz = turned(rotation, b, rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2])
+        x = position[b, 0] + bx - position[a, 0] - ax
+        y = position[b, 1] + by - position[a, 1] - ay
+        z = position[b, 2] + bz - position[a, 2] - az
         length = sqrt(x * x + y * y + z * z)
         if length > 0.0:
             return x / length, y / length, z / length
-    return turned(bodies.rotation[b if pairs.carrier[p] else a], row[0], row[1], row[2])
+    return turned(rotation, b if carrier else a, rows[r, 0], rows[r, 1], rows[r, 2])
 
 
 @jit
-def fill_patch(bodies, pairs, patches, m, rows, record, o, width):
-    """Axes, arms, points and impulses of patch m into the record, from o on."""
-    p = patches.pair[m]
-    a, b = pairs.first[p], pairs.second[p]
-    count = patches.size[m]
-    row = rows[patches.row[m, 0]]
-    n = normal_of(bodies, pairs, p, row)
-    nx, ny, nz = n
+def fill_patch(position, rotation, a, b, carrier, share, patch_row, m, count, rows, record, o, width):
+    """Axes, arms, points and impulses of patch m, of bodies a and b, into the record, from o on; patch_row (m, 4)."""
+    r = patch_row[m, 0]
+    nx, ny, nz = normal_of(position, rotation, rows, r, a, b, carrier)
     ux, uy, uz, vx, vy, vz = tangents(nx, ny, nz)
-    share = share_of(bodies, a, b)
     mx, my, mz = 0.0, 0.0, 0.0
     for c in range(count):
-        x, y, z, gap = point_of(bodies, rows[patches.row[m, c]], a, b, nx, ny, nz, share)
-        rows[patches.row[m, c], SEPARATION] = gap
+        x, y, z, gap = point_of(position, rotation, rows, patch_row[m, c], a, b, nx, ny, nz, share)
+        rows[patch_row[m, c], SEPARATION] = gap
         g = o + (POINT + POINT_SIZE * c) * width
         record[g + X * width] = ux * x + uy * y + uz * z
         record[g + Y * width] = vx * x + vy * y + vz * z
@@ -245,24 +238,24 @@ def fill_patch(bodies, pairs, patches, m, rows, record, o, width):
                 record[g + k * width] = 0.0
             record[g + GAP * width] = 1.0
             continue
-        line = rows[patches.row[m, c]]
+        q = patch_row[m, c]
         x, y = record[g + X * width] - ox, record[g + Y * width] - oy
         record[g + X * width], record[g + Y * width] = x, y
-        record[g + MASS * width], record[g + PRESS * width] = 1.0, line[IMPULSE]
+        record[g + MASS * width], record[g + PRESS * width] = 1.0, rows[q, IMPULSE]
         record[g + LEVER * width] = sqrt(x * x + y * y)
-        px, py, pz = line[FRICTION], line[FRICTION + 1], line[FRICTION + 2]
+        px, py, pz = rows[q, FRICTION], rows[q, FRICTION + 1], rows[q, FRICTION + 2]
         fx, fy, fz = fx + px, fy + py, fz + pz
         twist += x * (vx * px + vy * py + vz * pz) - y * (ux * px + uy * py + uz * pz)
-    for k in range(3):
-        record[o + (NORMAL + k) * width] = n[k]
-        record[o + (ARM_A + k) * width] = mx if k == 0 else (my if k == 1 else mz)
-        between = bodies.position[b, k] - bodies.position[a, k]
-        record[o + (ARM_B + k) * width] = record[o + (ARM_A + k) * width] - between
+    record[o + NORMAL * width], record[o + (NORMAL + 1) * width], record[o + (NORMAL + 2) * width] = nx, ny, nz
+    record[o + ARM_A * width], record[o + (ARM_A + 1) * width], record[o + (ARM_A + 2) * width] = mx, my, mz
+    record[o + ARM_B * width] = mx - (position[b, 0] - position[a, 0])
+    record[o + (ARM_B + 1) * width] = my - (position[b, 1] - position[a, 1])
+    record[o + (ARM_B + 2) * width] = mz - (position[b, 2] - position[a, 2])
     record[o + TANGENT_1 * width], record[o + (TANGENT_1 + 1) * width], record[o + (TANGENT_1 + 2) * width] = ux, uy, uz
     record[o + TANGENT_2 * width], record[o + (TANGENT_2 + 1) * width], record[o + (TANGENT_2 + 2) * width] = vx, vy, vz
-    record[o + SHARE * width], record[o + RADIUS_A * width], record[o + RADIUS_B * width] = share, row[ROUND_A], row[ROUND_B]
-    record[o + MU_STATIC * width], record[o + MU_DYNAMIC * width] = row[STATIC_FRICTION], row[DYNAMIC_FRICTION]
-    record[o + DEPTH * width] = row[SKIN]
+    record[o + SHARE * width], record[o + RADIUS_A * width], record[o + RADIUS_B * width] = share, rows[r, ROUND_A], rows[r, ROUND_B]
+    record[o + MU_STATIC * width], record[o + MU_DYNAMIC * width] = rows[r, STATIC_FRICTION], rows[r, DYNAMIC_FRICTION]
+    record[o + DEPTH * width] = rows[r, SKIN]
     record[o + PUSH_1 * width], record[o + PUSH_2 * width] = ux * fx + uy * fy + uz * fz, vx * fx + vy * fy + vz * fz
     record[o + TWIST * width] = twist
 
@@ -285,7 +278,12 @@ def fill_batches(width, bodies, pairs, patches, count, rows, batches, number):
                 batches.record[o + k * width] = 0.0
     for m in range(count):
         s = patches.slot[m]
-        fill_patch(bodies, pairs, patches, m, rows, batches.record, (s // width) * FIELDS * width + s % width, width)
+        a, b, carrier = batches.first[s], batches.second[s], pairs.carrier[patches.pair[m]]
+        o = (s // width) * FIELDS * width + s % width
+        share = share_of(bodies.mass, a, b)
+        fill_patch(
+            bodies.position, bodies.rotation, a, b, carrier, share, patches.row, m, patches.size[m], rows, batches.record, o, width
+        )
 
 
 @jit
@@ -301,10 +299,10 @@ def keep_impulses(width, patches, count, rows, batches):
         turn = twist / square if square > 0.0 else 0.0
         share = 1.0 / patches.size[m]
         for c in range(patches.size[m]):
-            row, g = rows[patches.row[m, c]], o + (POINT + POINT_SIZE * c) * width
-            row[IMPULSE] = record[g + PRESS * width]
+            r, g = patches.row[m, c], o + (POINT + POINT_SIZE * c) * width
+            rows[r, IMPULSE] = record[g + PRESS * width]
             along_1 = share * f1 - turn * record[g + Y * width]
             along_2 = share * f2 + turn * record[g + X * width]
             for k in range(3):
-                row[FRICTION + k] = along_1 * record[o + (TANGENT_1 + k) * width] + along_2 * record[o + (TANGENT_2 + k) * width]
+                rows[r, FRICTION + k] = along_1 * record[o + (TANGENT_1 + k) * width] + along_2 * record[o + (TANGENT_2 + k) * width]
 

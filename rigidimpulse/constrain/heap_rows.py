@@ -10,12 +10,16 @@ the step began), mass (inverse inertia xx, xy, xz, yy, yz, zz in world axes, and
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.rotation import quaternion_to_matrix
+
+# Kernels that are called for each pair or point get arrays one by one, and indices: a tuple of twenty arrays is passed word by word,
+# and a view is counted, which costs more than what is computed.
 
 NORMAL, CORE_A, CORE_B, ROUND_A, ROUND_B = 0, 3, 6, 9, 10
 """Offsets in a row: unit normal from first to second in the axes of the pair's carrier; body-fixed points, in the axes of their
@@ -106,37 +110,34 @@ def load_bodies(bodies, order, now, acceleration, inv_mass, part):
 
 
 @jit
-def turned(r, x, y, z):
-    """The vector (x, y, z) turned by the matrix r."""
+def turned(rotation, i, x, y, z):
+    """The vector (x, y, z) turned by the matrix rotation[i]."""
     return (
-        r[0, 0] * x + r[0, 1] * y + r[0, 2] * z,
-        r[1, 0] * x + r[1, 1] * y + r[1, 2] * z,
-        r[2, 0] * x + r[2, 1] * y + r[2, 2] * z,
+        rotation[i, 0, 0] * x + rotation[i, 0, 1] * y + rotation[i, 0, 2] * z,
+        rotation[i, 1, 0] * x + rotation[i, 1, 1] * y + rotation[i, 1, 2] * z,
+        rotation[i, 2, 0] * x + rotation[i, 2, 1] * y + rotation[i, 2, 2] * z,
     )
 
 
 @jit
-def turned_back(r, x, y, z):
-    """The vector (x, y, z) turned by the transpose of the matrix r."""
+def turned_back(rotation, i, x, y, z):
+    """The vector (x, y, z) turned by the transpose of the matrix rotation[i]."""
     return (
-        r[0, 0] * x + r[1, 0] * y + r[2, 0] * z,
-        r[0, 1] * x + r[1, 1] * y + r[2, 1] * z,
-        r[0, 2] * x + r[1, 2] * y + r[2, 2] * z,
+        rotation[i, 0, 0] * x + rotation[i, 1, 0] * y + rotation[i, 2, 0] * z,
+        rotation[i, 0, 1] * x + rotation[i, 1, 1] * y + rotation[i, 2, 1] * z,
+        rotation[i, 0, 2] * x + rotation[i, 1, 2] * y + rotation[i, 2, 2] * z,
     )
 
 
 @jit
-def closing_speed(bodies, pairs, p):
-    """How fast the points of a pair move past each other at most, m/s, seen from the carrier."""
-    a, b = pairs.first[p], pairs.second[p]
-    v, i, j = bodies.velocity, 8 * a, 8 * b
-    spin, other = (j, a) if pairs.carrier[p] else (i, b)
-    dx = bodies.position[b, 0] - bodies.position[a, 0]
-    dy = bodies.position[b, 1] - bodies.position[a, 1]
-    dz = bodies.position[b, 2] - bodies.position[a, 2]
+def closing_speed(position, velocity, reach, a, b, carrier):
+    """How fast the points of bodies a and b move past each other at most, m/s, seen from the carrier (b where it is true)."""
+    v, i, j = velocity, 8 * a, 8 * b
+    spin, other = (j, a) if carrier else (i, b)
+    dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
     x = v[j] - v[i] - (v[spin + 4] * dz - v[spin + 5] * dy)
     y = v[j + 1] - v[i + 1] - (v[spin + 5] * dx - v[spin + 3] * dz)
     z = v[j + 2] - v[i + 2] - (v[spin + 3] * dy - v[spin + 4] * dx)
     wx, wy, wz = v[j + 3] - v[i + 3], v[j + 4] - v[i + 4], v[j + 5] - v[i + 5]
-    turn = np.sqrt(wx * wx + wy * wy + wz * wz)
-    return np.sqrt(x * x + y * y + z * z) + (bodies.reach[other] * turn if turn > 0.0 else 0.0)
+    turn = sqrt(wx * wx + wy * wy + wz * wz)
+    return sqrt(x * x + y * y + z * z) + (reach[other] * turn if turn > 0.0 else 0.0)

@@ -185,13 +185,13 @@ def _turn_balls(width, bodies, pairs, patches, chosen, rows, record):
         p, s = patches.pair[m], patches.slot[m]
         a, b = pairs.first[p], pairs.second[p]
         o = (s // width) * FIELDS * width + s % width
-        row, share = rows[patches.row[m, 0]], record[o + SHARE * width]
+        r, share = patches.row[m, 0], record[o + SHARE * width]
         f1, f2 = record[o + PUSH_1 * width], record[o + PUSH_2 * width]
         t, u = _vector(record, o + TANGENT_1 * width, width), _vector(record, o + TANGENT_2 * width, width)
         f = (f1 * t[0] + f2 * u[0], f1 * t[1] + f2 * u[1], f1 * t[2] + f2 * u[2])
-        n = normal_of(bodies, pairs, p, row)
+        n = normal_of(bodies.position, bodies.rotation, rows, r, a, b, pairs.carrier[p])
         ux, uy, uz, vx, vy, vz = tangents(n[0], n[1], n[2])
-        x, y, z, gap = point_of(bodies, row, a, b, n[0], n[1], n[2], share)
+        x, y, z, gap = point_of(bodies.position, bodies.rotation, rows, r, a, b, n[0], n[1], n[2], share)
         record[o + PUSH_1 * width] = ux * f[0] + uy * f[1] + uz * f[2]
         record[o + PUSH_2 * width] = vx * f[0] + vy * f[1] + vz * f[2]
         arm, t, u = (x, y, z), (ux, uy, uz), (vx, vy, vz)

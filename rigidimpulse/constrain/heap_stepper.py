@@ -17,7 +17,7 @@ from rigidimpulse.constrain.heap_contacts import (
 )
 from rigidimpulse.constrain.heap_cover import Cover
 from rigidimpulse.constrain.heap_motion import energies, slow_down
-from rigidimpulse.constrain.heap_narrow import classify, look
+from rigidimpulse.constrain.heap_narrow import classify, look, review
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
 from rigidimpulse.constrain.heap_records import (
     FIELDS,
@@ -93,6 +93,8 @@ class HeapStepper:
         self._batches = Batches(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64))
         self._begins = np.zeros(256, np.int64)
         self._part = np.zeros(n, np.int64)
+        self._places = self._general = np.zeros(0, np.int64)
+        self._margins = np.zeros(0)
 
     def _make_bodies(self) -> HeapBodies:
         """Rows of all bodies by rank, and one of none."""
@@ -143,19 +145,25 @@ class HeapStepper:
     def _look(self, context) -> None:
         """Look at the contacts of all pairs in play."""
         table, world = self.table, self.world
-        k = len(table.pairs.first)
-        stale, margins = np.empty(k, np.int64), np.empty(k)
+        if len(table.pairs.first) > len(self._places):
+            self._places, self._general = np.zeros((2, 2 * len(table.pairs.first)), np.int64)
+            self._margins = np.zeros(len(self._places))
+        number = review(self.bodies, table.pairs, self.ahead, self._places, self._margins)
         while True:
             used, waiting = look(
-                self.shapes, self.bodies, table.pairs, table.rows, table.ids, table.used, self.ahead, world.coefficients, stale, margins
-            )
+                self.shapes, self.bodies, table.pairs, table.rows, table.ids, table.used, world.coefficients, self._places, self._margins,
+                number, self._general,
+            )  # fmt: skip
             if used >= 0:
                 break
             table.make_room(len(table.rows))
         table.used = used
-        if not waiting:
-            return
-        places, margin, pairs = stale[:waiting], margins[:waiting], table.pairs
+        if waiting:
+            self._look_at_general(context, self._places[self._general[:waiting]], self._margins[self._general[:waiting]])
+
+    def _look_at_general(self, context, places: np.ndarray, margin: np.ndarray) -> None:
+        """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `detect`."""
+        table, world, pairs = self.table, self.world, self.table.pairs
         first, second = pairs.first[places], pairs.second[places]
         shown = FARTHER * margin + self._taken_off[first] + self._taken_off[second]
         now, rotation = context.state.now, context.state.rotation
@@ -168,7 +176,7 @@ class HeapStepper:
                 break
             context.grow_contacts(-found)
         # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
-        table.make_room(found + MOST_SUNK * waiting + 1)
+        table.make_room(found + MOST_SUNK * len(places) + 1)
         table.used = store_contacts(
             world.geometry, self.bodies, pairs, places, margin, self._convex, self._factor, world.coefficients, context.contact_real,
             context.contact_int, found, self.order, table.rows, table.ids, table.used,
