@@ -106,10 +106,12 @@ def refusals(
         return out
     for r in np.flatnonzero((size > 0) & (size < np.where(was_heap, KEPT, MANY))).tolist():
         out[r] = "few bodies"
+    begins = ~was_heap[owner]
+    if not begins.any():
+        return out
     coefficient = world.coefficients[world.material_of_body[a], world.material_of_body[b], 0]
     both = world.dynamic[a] & world.dynamic[b]
     heavy = np.maximum(world.mass[a], world.mass[b]) > RATIO * np.minimum(world.mass[a], world.mass[b])
-    begins = ~was_heap[owner]
     for r in np.unique(owner[begins & (coefficient > REBOUND)]).tolist():
         out.setdefault(r, "restitution")
     for r in np.unique(owner[begins & both & heavy]).tolist():

@@ -112,10 +112,10 @@ class HeapStepper:
             gravity=np.zeros((n + 1, 3)), velocity=aligned(n + 1), before=aligned(n + 1), moved=aligned(n + 1), mass=aligned(n + 1),
         )  # fmt: skip
 
-    def sub_step(self, context, members: np.ndarray) -> float:
+    def sub_step(self, members: np.ndarray) -> float:
         """Length of a sub-step, s: short enough for the load of a column, so that it scales with the size of bodies."""
-        strength = float(np.linalg.norm(context.acceleration[members], axis=1).max())
-        step = context.world.accuracy.step
+        strength = float(self.world.steady_strength[members].max())
+        step = self.world.accuracy.step
         pieces = LEAST_SUB_STEPS
         if strength > 0.0:
             h = 2.0 * math.pi * FREQUENCY * math.sqrt(PRESSED * float(self.skin[members].min()) / (COLUMN * strength))
@@ -202,16 +202,16 @@ class HeapStepper:
         fill_batches(width, bodies, table.pairs, self._patches, count, table.rows, self._batches, number)
         return number
 
-    def step(self, context, time: float, end: float) -> Outcome:
+    def step(self, time: float, end: float) -> Outcome:
         """Step what `set_up` put before the kernels from `time` to `end`."""
         bodies, members, table, width = self.bodies, self.members, self.table, self.lanes.width
         length = end - time
-        sub_steps = max(math.ceil(length / self.sub_step(context, members) - 1e-9), 1)
+        sub_steps = max(math.ceil(length / self.sub_step(members) - 1e-9), 1)
         h = length / sub_steps
         _, before = energies(bodies, self._masses, self._pull)
         number = self._fill()
         lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
-        strength = float(np.linalg.norm(context.acceleration[members], axis=1).max())
+        strength = float(self.world.steady_strength[members].max())
         balls, rebounds, supports = special_patches(
             width, bodies, table.pairs, self._patches, self._count, table.rows, self._batches, strength, lists, target
         )
