@@ -78,10 +78,12 @@ def _mark_slow(bodies, inner, farthest, fastest, member):
 
 
 @jit
-def _most_stray(bodies, members, reach, skin):
-    """Largest w sqrt(r / (4 skin)) of the members, 1/s."""
+def _most_stray(bodies, members, pressed, reach, skin):
+    """Largest w sqrt(r / (4 skin)) of the members that contacts act on, 1/s."""
     most = 0.0
     for i in members:
+        if not pressed[i]:
+            continue
         spin = 0.0
         for c in range(3):
             spin += bodies.angular_velocity[i, c] ** 2
@@ -428,10 +430,11 @@ class Heaps:
     def _end_of(self, context, window, time: float, members: np.ndarray) -> float:
         """When the courses of members end: before the step does where straight ways would stray from those of turning bodies.
 
-        A point at r from the centre strays by r (w h)^2 / 8 in h s; half of the skin is allowed, within MOST_PIECES a step.
+        The centre of a body that rolls over a point at r strays by r (w h)^2 / 8 in h s; half of the skin is allowed, within
+        MOST_PIECES a step.
         """
         stepper, step = self.stepper, context.world.accuracy.step
-        stray = _most_stray(context.state.now, members, stepper.reach, stepper.skin)
+        stray = _most_stray(context.state.now, members, stepper.pressed, stepper.reach, stepper.skin)
         pieces = min(max(math.ceil(stray * step), 1), MOST_PIECES)
         left = max(math.ceil((window.end - time) * pieces / step - 1e-6), 1)
         return window.end if left == 1 else time + (window.end - time) / left

@@ -13,20 +13,20 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.broadphase import overlapping_pairs
 
-SLACK = 0.25
-"""Inner radii of slack that every body gets."""
+SLACK = 0.1
+"""Inner radii of slack that every body gets beside what it needs."""
 WINDOWS = 3.0
 """Lengths of time ahead for whose motion bodies get slack, too."""
 
 
 @jit
-def _needs(position, velocity, acceleration, least, i, ahead):
-    """How far (m) body i may come in `ahead` s, and a little more."""
+def _way(velocity, acceleration, i, ahead):
+    """How far (m) body i may come in `ahead` s."""
     speed, pull = 0.0, 0.0
     for k in range(3):
         speed += velocity[i, k] ** 2
         pull += acceleration[i, k] ** 2
-    return least[i] + ahead * (sqrt(speed) + ahead * sqrt(pull))
+    return ahead * (sqrt(speed) + ahead * sqrt(pull))
 
 
 @jit
@@ -38,7 +38,7 @@ def _left_cover(members, now, acceleration, least, ahead, covered, centre, slack
         away = 0.0
         for k in range(3):
             away += (now.position[i, k] - centre[i, k]) ** 2
-        if sqrt(away) + _needs(now.position, now.velocity, acceleration, least, i, ahead) > slack[i]:
+        if sqrt(away) + least[i] + _way(now.velocity, acceleration, i, ahead) > slack[i]:
             return True
     return False
 
@@ -54,8 +54,7 @@ def _boxes(order, now, acceleration, least, ahead, world_min, world_max, moves, 
         if not moves[i]:
             low[r], high[r] = world_min[i], world_max[i]
             continue
-        own = min(inner[i], radius[i])
-        slack[i] = WINDOWS * _needs(now.position, now.velocity, acceleration, least, i, ahead) + SLACK * (own if own < np.inf else 0.0)
+        slack[i] = least[i] + WINDOWS * _way(now.velocity, acceleration, i, ahead) + SLACK * min(inner[i], radius[i])
         for k in range(3):
             centre[i, k] = now.position[i, k]
             low[r, k] = now.position[i, k] - radius[i] - slack[i]
@@ -86,22 +85,23 @@ def near_pairs(order, pairs, now, acceleration, least, ahead, world_min, world_m
 
     member, other: (n,) bool; out (k, 2). Others stay where they are, or nearly so.
     """
-    count = 0
+    reach, x, count = radius.copy(), now.position, 0
+    for i in range(radius.shape[0]):
+        if member[i]:
+            reach[i] += least[i] + _way(now.velocity, acceleration, i, ahead)
     for p in range(pairs.first.shape[0]):
         i, j = order[pairs.first[p]], order[pairs.second[p]]
         if not ((member[i] and (member[j] or other[j])) or (member[j] and other[i])):
             continue
-        reach_i = _needs(now.position, now.velocity, acceleration, least, i, ahead) if member[i] else 0.0
-        reach_j = _needs(now.position, now.velocity, acceleration, least, j, ahead) if member[j] else 0.0
-        reach, away, apart = radius[i] + radius[j] + reach_i + reach_j, 0.0, False
-        for k in range(3):
-            away += (now.position[i, k] - now.position[j, k]) ** 2
-            low_i = now.position[i, k] - radius[i] - reach_i if moves[i] else world_min[i, k]
-            high_i = now.position[i, k] + radius[i] + reach_i if moves[i] else world_max[i, k]
-            low_j = now.position[j, k] - radius[j] - reach_j if moves[j] else world_min[j, k]
-            high_j = now.position[j, k] + radius[j] + reach_j if moves[j] else world_max[j, k]
-            apart = apart or low_i > high_j or low_j > high_i
-        if apart or (moves[i] and moves[j] and away > reach * reach):
+        apart = False
+        if moves[i] and moves[j]:
+            dx, dy, dz = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], x[i, 2] - x[j, 2]
+            apart = dx * dx + dy * dy + dz * dz > (reach[i] + reach[j]) ** 2
+        else:
+            m, f = (i, j) if moves[i] else (j, i)
+            for k in range(3):
+                apart = apart or x[m, k] - reach[m] > world_max[f, k] or x[m, k] + reach[m] < world_min[f, k]
+        if apart:
             continue
         out[count, 0], out[count, 1] = i, j
         count += 1

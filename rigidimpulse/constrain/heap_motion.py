@@ -89,6 +89,17 @@ def finish(bodies):
 
 
 @jit
+def note_pressed(bodies, order, pressed):
+    """Mark the members, in pressed (n,) by index, that contacts acted on in the last sub-step; order (n,) indices by rank."""
+    for i in range(order.shape[0]):
+        if bodies.part[i] == MEMBER:
+            acted = False
+            for k in range(8 * i, 8 * i + 6):
+                acted = acted or bodies.velocity[k] != bodies.before[k]
+            pressed[order[i]] = acted
+
+
+@jit
 def energies(bodies, masses, pull):
     """Kinetic energy, and that energy with the potential of a steady pull (n, 3) m/s2, of the members, J; masses (n,) kg."""
     kinetic, total = 0.0, 0.0

@@ -16,7 +16,7 @@ from rigidimpulse.constrain.heap_contacts import (
     store_contacts,
 )
 from rigidimpulse.constrain.heap_cover import Cover
-from rigidimpulse.constrain.heap_motion import energies, slow_down
+from rigidimpulse.constrain.heap_motion import energies, note_pressed, slow_down
 from rigidimpulse.constrain.heap_narrow import classify, look, review
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
 from rigidimpulse.constrain.heap_records import (
@@ -61,7 +61,7 @@ class HeapStepper:
     Attributes:
         order: (n,) bodies by their places at the start of the run; rank: (n,) place of each in it.
         inner: (n,) m, distance from the centre of mass to the nearest face; inf for what cannot be moved. skin: (n,) m.
-        bodies: by rank. table: pairs and contact points.
+        bodies: by rank. table: pairs and contact points. pressed: (n,) bool, contacts acted on the body when it was last stepped.
 
     """
 
@@ -93,6 +93,7 @@ class HeapStepper:
         self._batches = Batches(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64))
         self._begins = np.zeros(256, np.int64)
         self._part = np.zeros(n, np.int64)
+        self.pressed = np.zeros(n, bool)
         self._places = self._general = np.zeros(0, np.int64)
         self._margins = np.zeros(0)
 
@@ -219,6 +220,7 @@ class HeapStepper:
             self.lanes, bodies, table.pairs, self._patches, self._batches, number, table.rows, lists, balls, rebounds, supports, target,
             sub_steps, h, softness(h),
         )  # fmt: skip
+        note_pressed(bodies, self.order, self.pressed)
         keep_impulses(width, self._patches, self._count, table.rows, self._batches)
         kinetic, after = energies(bodies, self._masses, self._pull)
         # What the step gained beyond the work of moving supports is taken off the speeds.
