@@ -410,7 +410,7 @@ class Heaps:
             mine = members[self.label[members] == label]
             self._ends[label] = end
             self._began[label] = group.time, mine, mechanical_energy(context.state.now, world, mine)
-        self._outcome = self.stepper.step(group.time, end)
+        self._outcome = self.stepper.step(context, group.time, end)
         self._outcome_end = end
         if end < window.end:
             window.wake[members] = end

@@ -157,15 +157,14 @@ def _shrunk_by(geometry, bodies, factor, a, b, p, q, n):
 
 
 @jit
-def _write(geometry, bodies, pairs, p, real, factor_a, factor_b, coefficients, row):
-    """A new row of the contact `real` (10,), with places in the world; returns its separation."""
-    a, b = pairs.first[p], pairs.second[p]
-    round_a = side_radius(geometry, only_primitive(geometry, bodies.shape[a]), bodies.rotation[a], real[6:9])
-    round_b = side_radius(geometry, only_primitive(geometry, bodies.shape[b]), bodies.rotation[b], real[6:9])
+def _write(geometry, bodies, a, b, carrier, real, c, factor_a, factor_b, coefficients, rows, r):
+    """A new row r of the contact real[c] (10,) of bodies a and b, with places in the world; returns its separation."""
+    round_a = side_radius(geometry, only_primitive(geometry, bodies.shape[a]), bodies.rotation[a], real[c, 6:9])
+    round_b = side_radius(geometry, only_primitive(geometry, bodies.shape[b]), bodies.rotation[b], real[c, 6:9])
     for k in range(3):
-        real[k] -= bodies.position[a, k]
-        real[3 + k] -= bodies.position[a, k]
-    return write_row(bodies, pairs, p, real, round_a, round_b, factor_a, factor_b, coefficients, row)
+        real[c, k] -= bodies.position[a, k]
+        real[c, 3 + k] -= bodies.position[a, k]
+    return write_row(bodies, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b, coefficients, rows, r)
 
 
 @jit
@@ -188,14 +187,14 @@ def store_contacts(
         last = reduce_contacts(real, integer, first, c, PER_NORMAL)
         new = used
         size = min(bodies.inner[a], bodies.inner[b])
-        pair = coefficients[bodies.material[a], bodies.material[b]]
+        carrier = pairs.carrier[p]
         sunk = _sunk(geometry, bodies, convex, factor, a, b, real, first, last, FLUSH * size, deep, deep_ids)
         for s in range(sunk if sunk > 0 else last - first):
             if sunk > 0:
-                separation = _write(geometry, bodies, pairs, p, deep[s], 1.0, 1.0, pair, rows[used])
+                separation = _write(geometry, bodies, a, b, carrier, deep, s, 1.0, 1.0, coefficients, rows, used)
                 ids[used] = deep_ids[s]
             else:
-                separation = _write(geometry, bodies, pairs, p, real[first + s], factor[a], factor[b], pair, rows[used])
+                separation = _write(geometry, bodies, a, b, carrier, real, first + s, factor[a], factor[b], coefficients, rows, used)
                 ids[used] = integer[first + s, 2:]
             if separation <= margins[k]:
                 used += 1

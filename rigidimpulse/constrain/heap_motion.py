@@ -81,11 +81,13 @@ def move(bodies, h):
 
 @jit
 def finish(bodies):
-    """Orientations at the end of a step of those that have not been turned in its sub-steps."""
+    """Orientations at the end of a step of those that have not been turned in its sub-steps; what has moved counts from here on."""
     for i in range(bodies.part.shape[0]):
         if bodies.part[i] != OUTSIDE and (bodies.part[i] != MEMBER or bodies.alike[i]):
             o = 8 * i + 3
             _set_orientation(bodies, i, bodies.moved[o], bodies.moved[o + 1], bodies.moved[o + 2])
+        for k in range(8 * i, 8 * i + 6):
+            bodies.moved[k] = 0.0
 
 
 @jit

@@ -16,7 +16,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.heap_boxes import axis_normal, box_axis, edge_contact
-from rigidimpulse.constrain.heap_polyhedra import MOST_CORNERS, face_contacts, face_like, half_space_contacts
+from rigidimpulse.constrain.heap_polyhedra import face_contacts, face_like, half_space_contacts, make_scratch
 from rigidimpulse.constrain.heap_rows import (
     CORE_A,
     CORE_B,
@@ -107,6 +107,18 @@ def note_seen(bodies, pairs, p):
 
 
 @jit
+def most_motion(bodies, pairs, ahead):
+    """How far, in inner radii, pairs in play that have contacts come past each other in `ahead` s, at most."""
+    part, count, most = bodies.part, pairs.count, 0.0
+    for p in range(pairs.first.shape[0]):
+        a, b = pairs.first[p], pairs.second[p]
+        if count[p] > 0 and in_play(part, a, b):
+            speed = closing_speed(bodies.position, bodies.velocity, bodies.reach, a, b, pairs.carrier[p])
+            most = max(most, ahead * speed / min(bodies.inner[a], bodies.inner[b]))
+    return most
+
+
+@jit
 def review(bodies, pairs, ahead, places, margins):
     """Write the pairs in play whose contacts must be looked for, and their margins, m: how far they come in `ahead` s, within bounds.
 
@@ -143,29 +155,30 @@ def review(bodies, pairs, ahead, places, margins):
 
 
 @jit
-def write_row(bodies, pairs, p, real, round_a, round_b, factor_a, factor_b, coefficients, row):
-    """A new row, without impulse, of the contact `real` (10,), with places relative to the first body.
+def write_row(bodies, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b, coefficients, rows, r):
+    """A new row r, without impulse, of the contact real[c] (10,) of bodies a and b, with places relative to a; carrier: whether it is b.
 
     factor_a, factor_b: lengths of the bodies as the contact was found, parts of their true ones. Returns the separation.
     """
-    a, b = pairs.first[p], pairs.second[p]
-    nx, ny, nz = real[6], real[7], real[8]
+    nx, ny, nz = real[c, 6], real[c, 7], real[c, 8]
     dx = bodies.position[b, 0] - bodies.position[a, 0]
     dy = bodies.position[b, 1] - bodies.position[a, 1]
     dz = bodies.position[b, 2] - bodies.position[a, 2]
-    ax, ay, az = real[0] / factor_a - round_a * nx, real[1] / factor_a - round_a * ny, real[2] / factor_a - round_a * nz
-    bx, by, bz = (real[3] - dx) / factor_b, (real[4] - dy) / factor_b, (real[5] - dz) / factor_b
+    ax, ay, az = real[c, 0] / factor_a - round_a * nx, real[c, 1] / factor_a - round_a * ny, real[c, 2] / factor_a - round_a * nz
+    bx, by, bz = (real[c, 3] - dx) / factor_b, (real[c, 4] - dy) / factor_b, (real[c, 5] - dz) / factor_b
     bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz
-    row[:] = 0.0
-    row[0], row[1], row[2] = turned_back(bodies.rotation, b if pairs.carrier[p] else a, nx, ny, nz)
-    row[CORE_A], row[CORE_A + 1], row[CORE_A + 2] = turned_back(bodies.rotation, a, ax, ay, az)
-    row[CORE_B], row[CORE_B + 1], row[CORE_B + 2] = turned_back(bodies.rotation, b, bx, by, bz)
-    row[ROUND_A], row[ROUND_B] = round_a, round_b
-    row[RESTITUTION], row[STATIC_FRICTION], row[DYNAMIC_FRICTION] = coefficients[0], coefficients[1], coefficients[2]
-    row[SKIN] = min(bodies.skin[a], bodies.skin[b])
+    m, t = bodies.material[a], bodies.material[b]
+    for k in range(ROW_SIZE):
+        rows[r, k] = 0.0
+    rows[r, 0], rows[r, 1], rows[r, 2] = turned_back(bodies.rotation, b if carrier else a, nx, ny, nz)
+    rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2] = turned_back(bodies.rotation, a, ax, ay, az)
+    rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2] = turned_back(bodies.rotation, b, bx, by, bz)
+    rows[r, ROUND_A], rows[r, ROUND_B] = round_a, round_b
+    rows[r, RESTITUTION], rows[r, STATIC_FRICTION] = coefficients[m, t, 0], coefficients[m, t, 1]
+    rows[r, DYNAMIC_FRICTION], rows[r, SKIN] = coefficients[m, t, 2], min(bodies.skin[a], bodies.skin[b])
     apart = nx * (dx + (bx - ax)) + ny * (dy + (by - ay)) + nz * (dz + (bz - az))
-    row[SEPARATION] = apart - (round_a + round_b) - row[SKIN]
-    return row[SEPARATION]
+    rows[r, SEPARATION] = apart - (round_a + round_b) - rows[r, SKIN]
+    return rows[r, SEPARATION]
 
 
 @jit
@@ -195,9 +208,9 @@ def hand_over(old_rows, old_ids, old, old_end, rows, ids, new, new_end, near):
 
 
 @jit
-def _find(shapes, bodies, a, b, kind, margin, origin, between, c, polygon, numbers, real, ids):
+def _find(shapes, bodies, a, b, kind, margin, ahead, origin, between, c, scratch, real, ids):
     """Contacts of a pair that is no general one, relative to the first body; returns their number and a bound of the gap."""
-    s, t, r = bodies.shape[a], bodies.shape[b], bodies.rotation
+    s, t, r, v = bodies.shape[a], bodies.shape[b], bodies.rotation, bodies.velocity
     dx, dy, dz = between[0], between[1], between[2]
     if kind == WALL:
         wall_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
@@ -205,7 +218,7 @@ def _find(shapes, bodies, a, b, kind, margin, origin, between, c, polygon, numbe
         nx, ny, nz = turned(r, i, wall[w, 0], wall[w, 1], wall[w, 2])
         offset = wall[w, 3] - sign * (nx * dx + ny * dy + nz * dz)
         solid, j = (t, b) if wall_is_a else (s, a)
-        count, least = half_space_contacts(shapes, solid, r, j, nx, ny, nz, offset, margin, sign, polygon, numbers, real, ids)
+        count, least = half_space_contacts(shapes, solid, r, j, nx, ny, nz, offset, margin, sign, scratch, real, ids)
         if wall_is_a:
             for k in range(count):
                 for i in range(3):
@@ -220,22 +233,22 @@ def _find(shapes, bodies, a, b, kind, margin, origin, between, c, polygon, numbe
     nx, ny, nz = axis_normal(axis, r, a, b, dx, dy, dz)
     if axis < 3:
         face = face_like(shapes, s, r, a, nx, ny, nz)
-        count = face_contacts(shapes, r, s, a, origin, face, t, b, between, margin, 1.0, polygon, numbers, real, ids)
+        count = face_contacts(shapes, v, r, s, a, origin, face, t, b, between, margin, ahead, 1.0, scratch, real, ids)
     else:
         face = face_like(shapes, t, r, b, -nx, -ny, -nz)
-        count = face_contacts(shapes, r, t, b, between, face, s, a, origin, margin, -1.0, polygon, numbers, real, ids)
+        count = face_contacts(shapes, v, r, t, b, between, face, s, a, origin, margin, ahead, -1.0, scratch, real, ids)
     return count, gap
 
 
 @jit
-def look(shapes, bodies, pairs, rows, ids, used, coefficients, places, margins, number, general):
+def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, places, margins, number, general):
     """Find the contacts of `number` pairs at `places`, but for general ones, whose places among these are written to general (k,).
 
-    used: rows of the pool in use; coefficients (k, k, 4) of two materials; margins (k,) m. Returns the rows used, -1 where the pool is
-    too small (then call it again), and how many general ones there are.
+    used: rows of the pool in use; ahead: length of the step, s; coefficients (k, k, 4) of two materials; margins (k,) m. Returns the
+    rows used, -1 where the pool is too small (then call it again), and how many general ones there are.
     """
     real, found = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
-    polygon, numbers = np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64)
+    scratch = make_scratch()
     old, old_ids = np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64)
     origin, between, c = np.zeros(3), np.empty(3), np.empty((3, 3))
     waiting = 0
@@ -248,22 +261,28 @@ def look(shapes, bodies, pairs, rows, ids, used, coefficients, places, margins, 
         a, b = pairs.first[p], pairs.second[p]
         for i in range(3):
             between[i] = bodies.position[b, i] - bodies.position[a, i]
-        count, gap = _find(shapes, bodies, a, b, pairs.kind[p], margin, origin, between, c, polygon, numbers, real, found)
+        count, gap = _find(shapes, bodies, a, b, pairs.kind[p], margin, ahead, origin, between, c, scratch, real, found)
         if count > pairs.room[p]:
             if used + POINTS > rows.shape[0]:
                 return np.int64(-1), waiting
             before = pairs.start[p]
             pairs.start[p], pairs.room[p] = used, POINTS
             for i in range(pairs.count[p]):
-                rows[used + i, :], ids[used + i, :] = rows[before + i], ids[before + i]
+                for j in range(ROW_SIZE):
+                    rows[used + i, j] = rows[before + i, j]
+                for j in range(3):
+                    ids[used + i, j] = ids[before + i, j]
             used += POINTS
         start, kept = pairs.start[p], pairs.count[p]
         for i in range(kept):
-            old[i, :], old_ids[i, :] = rows[start + i], ids[start + i]
-        pair = coefficients[bodies.material[a], bodies.material[b]]
+            for j in range(ROW_SIZE):
+                old[i, j] = rows[start + i, j]
+            for j in range(3):
+                old_ids[i, j] = ids[start + i, j]
         for i in range(count):
-            write_row(bodies, pairs, p, real[i], 0.0, 0.0, 1.0, 1.0, pair, rows[start + i])
-            ids[start + i, :] = found[i]
+            write_row(bodies, a, b, pairs.carrier[p], real, i, 0.0, 0.0, 1.0, 1.0, coefficients, rows, start + i)
+            for j in range(3):
+                ids[start + i, j] = found[i, j]
         if count > 0 and kept > 0:
             hand_over(old, old_ids, np.int64(0), kept, rows, ids, start, start + count, NEAR * min(bodies.inner[a], bodies.inner[b]))
         pairs.count[p] = count

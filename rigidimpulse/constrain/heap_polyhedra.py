@@ -28,6 +28,27 @@ FROM_EDGE = 1 << 20
 """Added to the numbers of corners that clipping made."""
 
 
+class Scratch(NamedTuple):
+    """What contacts are worked out in."""
+
+    polygon: np.ndarray  # (MOST_CORNERS, 3) m
+    ids: np.ndarray  # (MOST_CORNERS,)
+    spare: np.ndarray  # (MOST_CORNERS, 3)
+    spare_ids: np.ndarray  # (MOST_CORNERS,)
+    ways: np.ndarray  # (MOST_CORNERS, 3) m
+    height: np.ndarray  # (MOST_CORNERS,) m
+    chosen: np.ndarray  # (4,)
+
+
+@jit
+def make_scratch():
+    """Room for one pair."""
+    return Scratch(
+        np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64), np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64),
+        np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS), np.empty(4, np.int64),
+    )  # fmt: skip
+
+
 class Polyhedra(NamedTuple):
     """Faces of the s shapes that are convex polyhedra around their centre of mass, F in all, with L corners."""
 
@@ -175,13 +196,25 @@ def four_of(points, height, count, chosen):
 
 
 @jit
-def face_contacts(shapes, r, s, i, x, face, t, j, y, margin, sign, polygon, ids, real, out_ids):
+def _coming(polygon, count, velocity, i, x, j, y, ahead, ways):
+    """How far (m) each corner, moving with body j at y, comes in `ahead` s as seen from body i at x, into ways (count, 3)."""
+    a, b = 8 * i, 8 * j
+    for k in range(count):
+        rx, ry, rz = polygon[k, 0] - x[0], polygon[k, 1] - x[1], polygon[k, 2] - x[2]
+        sx, sy, sz = polygon[k, 0] - y[0], polygon[k, 1] - y[1], polygon[k, 2] - y[2]
+        wx, wy, wz, ox, oy, oz = velocity[a + 3], velocity[a + 4], velocity[a + 5], velocity[b + 3], velocity[b + 4], velocity[b + 5]
+        ways[k, 0] = ahead * (velocity[b] - velocity[a] + (oy * sz - oz * sy) - (wy * rz - wz * ry))
+        ways[k, 1] = ahead * (velocity[b + 1] - velocity[a + 1] + (oz * sx - ox * sz) - (wz * rx - wx * rz))
+        ways[k, 2] = ahead * (velocity[b + 2] - velocity[a + 2] + (ox * sy - oy * sx) - (wx * ry - wy * rx))
+
+
+@jit
+def face_contacts(shapes, velocity, r, s, i, x, face, t, j, y, margin, ahead, sign, scratch, real, out_ids):
     """Contacts of a face of shape s at (x, r[i]) with the polygon of shape t at (y, r[j]) that faces it; returns their number.
 
-    sign: 1 where the face is a's, else -1; positions are relative to a.
+    sign: 1 where the face is a's, else -1; positions are relative to a. What is beside the face and comes over it in `ahead` s counts.
     """
-    spare, spare_ids = np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64)
-    height, chosen = np.empty(MOST_CORNERS), np.empty(4, np.int64)
+    polygon, ids, spare, spare_ids, ways, height, chosen = scratch
     nx, ny, nz = turned(r, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
     other = face_like(shapes, t, r, j, -nx, -ny, -nz)
     count = np.int64(0)
@@ -191,14 +224,18 @@ def face_contacts(shapes, r, s, i, x, face, t, j, y, margin, sign, polygon, ids,
         polygon[count, 0], polygon[count, 1], polygon[count, 2] = vx + (y[0] - x[0]), vy + (y[1] - x[1]), vz + (y[2] - x[2])
         ids[count] = v
         count += 1
-    first, last = shapes.loop_first[face], shapes.loop_first[face + 1]
+    _coming(polygon, count, velocity, i, x, j, y, ahead, ways)
+    first, last, corners = shapes.loop_first[face], shapes.loop_first[face + 1], count
     for k in range(first, last):
         v, w = shapes.loop[k], shapes.loop[k + 1 if k + 1 < last else first]
         ax, ay, az = turned(r, i, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
         bx, by, bz = turned(r, i, shapes.corner[w, 0], shapes.corner[w, 1], shapes.corner[w, 2])
         ex, ey, ez = bx - ax, by - ay, bz - az
         px, py, pz = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
-        count = _cut(polygon, ids, count, spare, spare_ids, px, py, pz, px * ax + py * ay + pz * az, k - first)
+        offset, nearer = px * ax + py * ay + pz * az, 0.0
+        for c in range(corners):
+            nearer = max(nearer, -(px * ways[c, 0] + py * ways[c, 1] + pz * ways[c, 2]))
+        count = _cut(polygon, ids, count, spare, spare_ids, px, py, pz, offset + nearer, k - first)
     kept = 0
     for k in range(count):
         gap = nx * polygon[k, 0] + ny * polygon[k, 1] + nz * polygon[k, 2] - shapes.plane[face, 3]
@@ -224,12 +261,12 @@ def face_contacts(shapes, r, s, i, x, face, t, j, y, margin, sign, polygon, ids,
 
 
 @jit
-def half_space_contacts(shapes, s, r, j, nx, ny, nz, offset, margin, sign, polygon, ids, real, out_ids):
+def half_space_contacts(shapes, s, r, j, nx, ny, nz, offset, margin, sign, scratch, real, out_ids):
     """Contacts of the solid n.x <= offset (relative to the shape's position) with shape s turned by r[j]; their number and the gap.
 
     sign: 1 where the half space is a, else -1; points are relative to the shape's position.
     """
-    height, chosen = np.empty(MOST_CORNERS), np.empty(4, np.int64)
+    polygon, ids, height, chosen = scratch.polygon, scratch.ids, scratch.height, scratch.chosen
     count, least = 0, inf
     for v in range(shapes.corner_first[s], shapes.corner_first[s + 1]):
         x, y, z = turned(r, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.heap_narrow import in_play
+from rigidimpulse.constrain.heap_narrow import GENERAL, in_play
 from rigidimpulse.constrain.heap_rows import (
     CORE_A,
     CORE_B,
@@ -71,6 +71,7 @@ class Batches(NamedTuple):
     record: np.ndarray  # (FIELDS b W,)
     first: np.ndarray  # (b W,) body a of each lane
     second: np.ndarray  # (b W,)
+    patch: np.ndarray  # (b W,) patch of each lane, -1 for none
     points: np.ndarray  # (b,) most points of a lane
 
 
@@ -91,6 +92,13 @@ def list_patches(bodies, pairs, rows, patches):
         if count == 0 or not in_play(part, pairs.first[p], pairs.second[p]):
             continue
         start = pairs.start[p]
+        if pairs.kind[p] != GENERAL:
+            if m < room:
+                patches.pair[m], patches.size[m] = p, count
+                for c in range(count):
+                    patches.row[m, c] = start + c
+            m += 1
+            continue
         taken[:count] = False
         for c in range(count):
             if taken[c]:
@@ -262,36 +270,39 @@ def fill_patch(position, rotation, a, b, carrier, share, patch_row, m, count, ro
 
 @jit
 def fill_batches(width, bodies, pairs, patches, count, rows, batches, number):
-    """Records of `count` patches in `number` batches, but for what `prepare` adds."""
+    """Records of `count` patches in `number` batches, but for what `prepare` adds: lane after lane, as they lie in memory."""
     idle = bodies.part.shape[0] - 1
-    batches.first[: number * width] = idle
-    batches.second[: number * width] = idle
-    batches.points[:number] = 0
+    batches.patch[: number * width] = -1
     for m in range(count):
-        s = patches.slot[m]
-        batches.first[s], batches.second[s] = pairs.first[patches.pair[m]], pairs.second[patches.pair[m]]
-        batches.points[s // width] = max(batches.points[s // width], patches.size[m])
+        batches.patch[patches.slot[m]] = m
     for s in range(number * width):
-        if batches.first[s] == idle:
-            o = (s // width) * FIELDS * width + s % width
-            for k in range(FIELDS):
-                batches.record[o + k * width] = 0.0
-    for m in range(count):
-        s = patches.slot[m]
-        a, b, carrier = batches.first[s], batches.second[s], pairs.carrier[patches.pair[m]]
-        o = (s // width) * FIELDS * width + s % width
+        m, k = batches.patch[s], s // width
+        o = k * FIELDS * width + s % width
+        if s == k * width:
+            batches.points[k] = 0
+        if m < 0:
+            batches.first[s] = batches.second[s] = idle
+            for f in range(FIELDS):
+                batches.record[o + f * width] = 0.0
+            continue
+        p = patches.pair[m]
+        a, b = pairs.first[p], pairs.second[p]
+        batches.first[s], batches.second[s] = a, b
+        batches.points[k] = max(batches.points[k], patches.size[m])
         share = share_of(bodies.mass, a, b)
         fill_patch(
-            bodies.position, bodies.rotation, a, b, carrier, share, patches.row, m, patches.size[m], rows, batches.record, o, width
+            bodies.position, bodies.rotation, a, b, pairs.carrier[p], share, patches.row, m, patches.size[m], rows, batches.record, o, width
         )
 
 
 @jit
-def keep_impulses(width, patches, count, rows, batches):
-    """Put the impulses of `count` patches back to their rows: friction as forces at the points with the same sum and twist."""
+def keep_impulses(width, patches, rows, batches, number):
+    """Put the impulses of `number` batches back to their rows: friction as forces at the points with the same sum and twist."""
     record = batches.record
-    for m in range(count):
-        s = patches.slot[m]
+    for s in range(number * width):
+        m = batches.patch[s]
+        if m < 0:
+            continue
         o = (s // width) * FIELDS * width + s % width
         f1, f2, twist, square = record[o + PUSH_1 * width], record[o + PUSH_2 * width], record[o + TWIST * width], 0.0
         for c in range(patches.size[m]):

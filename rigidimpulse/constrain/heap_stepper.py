@@ -17,7 +17,7 @@ from rigidimpulse.constrain.heap_contacts import (
 )
 from rigidimpulse.constrain.heap_cover import Cover
 from rigidimpulse.constrain.heap_motion import energies, note_pressed, slow_down
-from rigidimpulse.constrain.heap_narrow import classify, look, review
+from rigidimpulse.constrain.heap_narrow import classify, look, most_motion, review
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
 from rigidimpulse.constrain.heap_records import (
     FIELDS,
@@ -41,6 +41,8 @@ COLUMN = 20.0
 PRESSED = 0.25
 LEAST_SUB_STEPS, MOST_SUB_STEPS = 16, 256
 """Sub-steps in a whole step."""
+MOTION, MOST_PARTS = 0.1, 4
+"""Inner radii that touching bodies may come past each other until contacts are looked at again; how often at most in a step."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -90,7 +92,7 @@ class HeapStepper:
         self.cover = Cover(world, self.order, self.inner, least)
         self.lanes = machine_lanes()
         self._patches, self._count = empty_patches(64), 0
-        self._batches = Batches(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64))
+        self._batches = Batches(np.zeros(0), *np.zeros((4, 0), np.int64))
         self._begins = np.zeros(256, np.int64)
         self._part = np.zeros(n, np.int64)
         self.pressed = np.zeros(n, bool)
@@ -137,10 +139,13 @@ class HeapStepper:
     def set_up(self, context, members: np.ndarray, supports: np.ndarray, ahead: float) -> None:
         """Put members and what they may touch before the kernels at the present instant, with their contacts."""
         self.find_pairs(context, members, supports, ahead)
-        self.members, self.ahead = members, ahead
+        self.members = members
         self._part[:] = OUTSIDE
         self._part[supports], self._part[members] = SUPPORT, MEMBER
         load_bodies(self.bodies, self.order, context.state.now, context.acceleration, self.world.inv_mass, self._part)
+        motion = most_motion(self.bodies, self.table.pairs, ahead)
+        self._parts = min(max(math.ceil(motion / MOTION), 1), MOST_PARTS)
+        self.ahead = ahead / self._parts
         self._look(context)
 
     def _look(self, context) -> None:
@@ -152,8 +157,8 @@ class HeapStepper:
         number = review(self.bodies, table.pairs, self.ahead, self._places, self._margins)
         while True:
             used, waiting = look(
-                self.shapes, self.bodies, table.pairs, table.rows, table.ids, table.used, world.coefficients, self._places, self._margins,
-                number, self._general,
+                self.shapes, self.bodies, table.pairs, table.rows, table.ids, table.used, self.ahead, world.coefficients, self._places,
+                self._margins, number, self._general,
             )  # fmt: skip
             if used >= 0:
                 break
@@ -167,7 +172,13 @@ class HeapStepper:
         table, world, pairs = self.table, self.world, self.table.pairs
         first, second = pairs.first[places], pairs.second[places]
         shown = FARTHER * margin + self._taken_off[first] + self._taken_off[second]
-        now, rotation = context.state.now, context.state.rotation
+        n, now, rotation = world.num_bodies, context.state.now, context.state.rotation.copy()
+        # In the course of a step bodies are elsewhere than at its start.
+        now = now._replace(position=now.position.copy(), orientation=now.orientation.copy())
+        mine = self.bodies.part[:n] != OUTSIDE
+        at = self.order[mine]
+        now.position[at], now.orientation[at] = self.bodies.position[:n][mine], self.bodies.orientation[:n][mine]
+        rotation[at] = self.bodies.rotation[:n][mine]
         while True:
             found = contacts_of_pairs(
                 self.geometry, world.shape_of_body, now, rotation, self.order[first], self.order[second], shown, context.scratch_pairs,
@@ -198,30 +209,25 @@ class HeapStepper:
         if number > len(self._batches.points):
             room = 2 * number
             record = aligned((FIELDS * room * width + ROW - 1) // ROW)
-            lanes = np.zeros((2, room * width), np.int64)
-            self._batches = Batches(record, lanes[0], lanes[1], np.zeros(room, np.int64))
+            self._batches = Batches(record, *np.zeros((3, room * width), np.int64), np.zeros(room, np.int64))
         fill_batches(width, bodies, table.pairs, self._patches, count, table.rows, self._batches, number)
         return number
 
-    def step(self, time: float, end: float) -> Outcome:
+    def step(self, context, time: float, end: float) -> Outcome:
         """Step what `set_up` put before the kernels from `time` to `end`."""
-        bodies, members, table, width = self.bodies, self.members, self.table, self.lanes.width
+        bodies, members = self.bodies, self.members
         length = end - time
         sub_steps = max(math.ceil(length / self.sub_step(members) - 1e-9), 1)
         h = length / sub_steps
         _, before = energies(bodies, self._masses, self._pull)
-        number = self._fill()
-        lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
-        strength = float(self.world.steady_strength[members].max())
-        balls, rebounds, supports = special_patches(
-            width, bodies, table.pairs, self._patches, self._count, table.rows, self._batches, strength, lists, target
-        )
-        work = advance(
-            self.lanes, bodies, table.pairs, self._patches, self._batches, number, table.rows, lists, balls, rebounds, supports, target,
-            sub_steps, h, softness(h),
-        )  # fmt: skip
+        work, done = 0.0, 0
+        for part in range(self._parts):
+            if part:
+                self._look(context)
+            some = (part + 1) * sub_steps // self._parts - done
+            work += self._advance(some, h)
+            done += some
         note_pressed(bodies, self.order, self.pressed)
-        keep_impulses(width, self._patches, self._count, table.rows, self._batches)
         kinetic, after = energies(bodies, self._masses, self._pull)
         # What the step gained beyond the work of moving supports is taken off the speeds.
         gained = after - before - work
@@ -229,3 +235,19 @@ class HeapStepper:
             slow_down(bodies, math.sqrt(max(1.0 - gained / kinetic, 0.0)))
         at = self.rank[members]
         return Outcome(members, bodies.position[at], bodies.orientation[at], bodies.velocity.reshape(-1, ROW)[at, :6])
+
+    def _advance(self, sub_steps: int, h: float) -> float:
+        """Sub-steps of h s with the contacts as they are known; returns the work of moving supports, J."""
+        bodies, table, width = self.bodies, self.table, self.lanes.width
+        number = self._fill()
+        lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
+        strength = float(self.world.steady_strength[self.members].max())
+        balls, rebounds, supports = special_patches(
+            width, bodies, table.pairs, self._patches, self._count, table.rows, self._batches, strength, lists, target
+        )
+        work = advance(
+            self.lanes, bodies, table.pairs, self._patches, self._batches, number, table.rows, lists, balls, rebounds, supports, target,
+            sub_steps, h, softness(h),
+        )  # fmt: skip
+        keep_impulses(width, self._patches, table.rows, self._batches, number)
+        return work
