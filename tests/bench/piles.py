@@ -2,8 +2,9 @@
 
 The pile that engines are compared on: boxes of 0.5 m and 1 kg, mu = 0.5, e = 0, turned and thrown at random above a box-walled
 container, 300 steps of 1/60 s; and the same of convex hulls of 32 vertices. Times are CPU times of whole steps of the loop, recording
-included, of the steps in which anything moves: a pile that has come to rest costs nothing. Gaps are measured by separating axes from the recorded
-poses, apart from the solver: the largest of s(n) = min n.b - max n.a over the normals of faces and the cross products of edges.
+included, of the steps in which anything moves: a pile that has come to rest costs nothing. Gaps are measured by separating axes
+from the recorded poses, apart from the solver: the largest of s(n) = min n.b - max n.a over the normals of faces and the cross
+products of edges.
 With --save the lines go to tests/bench/<machine>/piles.csv.
 """
 
@@ -140,7 +141,7 @@ def _gap(solid_a, r_a, solid_b, r_b, between: np.ndarray) -> float:
 def measure(name: str) -> Line:
     """Run a pile and measure it."""
     number, hulls = PILES[name]
-    ri.simulate(pile(64, hulls), 4.0 / FPS)
+    ri.simulate(pile(64, hulls), 1.0)
     scene, ends = pile(number, hulls), []
     run = ri.simulate(scene, STEPS / FPS, FPS, progress=lambda _time: ends.append(process_time()))
     taken = 1e3 * np.diff(ends)
@@ -165,7 +166,8 @@ def main() -> None:
         line = measure(name)
         lines.append(line)
         print(
-            f"{line.what:12} moves for {line.steps} steps  median {line.median:7.2f} ms a step  last {LAST} {line.last:7.2f}  peak {line.peak:7.1f}  "
+            f"{line.what:12} moves for {line.steps} steps  median {line.median:7.2f} ms a step  last {LAST} {line.last:7.2f}  "
+            f"peak {line.peak:7.1f}  "
             f"depth at the end {line.largest_depth:.2f} mm, mean {line.mean_depth:.2f}, on the way {line.largest_depth_ever:.2f}  "
             f"{line.state_hash}",
             flush=True,
