@@ -19,12 +19,12 @@ from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.constrain.heap_islands import FAST, SPIN, TALL, islands, refusals, support_levels
 from rigidimpulse.constrain.heap_stepper import HeapStepper, Outcome
 from rigidimpulse.detect.groups import Group, empty_contacts
-from rigidimpulse.detect.touching import bring_all, contacts_of_pairs
+from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, world_inverse_inertia
 from rigidimpulse.integrate.course import FIXED, FREE, STEPPED, begin, state_at
 from rigidimpulse.integrate.flight import book_contact_work
 from rigidimpulse.observe.energy import mechanical_energy
 from rigidimpulse.plan import Bound, Skip
-from rigidimpulse.rotation import product
+from rigidimpulse.rotation import product, quaternion_to_matrix
 
 CALM, PLAY, REST = 0.05, 0.5, 3.0
 LEAVING = 0.1
@@ -36,15 +36,86 @@ TOUCHES = 5.0
 
 
 @jit
-def _arrive(course, members, time):
-    """End the courses of members at `time`: from there on they fly freely."""
-    x, q, v, w = np.empty(3), np.empty(4), np.empty(3), np.empty(3)
+def _arrive(course, members, time, steady, bodies, rotation, acceleration, angular_acceleration):
+    """End the courses of members at `time`, bring them there, and let them go straight on; steady (n, 3) m/s2 is what pulls them."""
     for i in members:
-        state_at(course, i, time, x, q, v, w)
-        course.start[i], course.mode[i] = time, FREE
-        course.position[i], course.orientation[i] = x, q
-        course.velocity[i], course.angular_velocity[i] = v, w
+        state_at(course, i, time, bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i])
+        quaternion_to_matrix(bodies.orientation[i], rotation[i])
+        world_inverse_inertia(rotation[i], course.inertia[i], bodies.inv_inertia[i])
+        course.start[i], course.stepped[i, 12] = time, 1.0
+        for c in range(4):
+            course.orientation[i, c] = bodies.orientation[i, c]
+        for c in range(3):
+            course.position[i, c] = bodies.position[i, c]
+            course.velocity[i, c] = course.stepped[i, c] = bodies.velocity[i, c]
+            course.angular_velocity[i, c] = course.stepped[i, 3 + c] = bodies.angular_velocity[i, c]
+            course.stepped[i, 6 + c] = course.stepped[i, 9 + c] = 0.0
+            acceleration[i, c], angular_acceleration[i, c] = steady[i, c], 0.0
         begin(course, i)
+
+
+@jit
+def _let_fly(course, members, steady):
+    """Let members that have arrived fly freely from where they are."""
+    for i in members:
+        course.mode[i] = FREE
+        for c in range(3):
+            course.acceleration[i, c] = steady[i, c]
+        begin(course, i)
+
+
+@jit
+def _mark_slow(bodies, inner, farthest, fastest, member):
+    """Unmark members (n,) that move farther than `farthest` 1/s of their inner radius, or spin faster than `fastest` rad/s."""
+    for i in range(member.shape[0]):
+        if not member[i]:
+            continue
+        speed, spin = 0.0, 0.0
+        for c in range(3):
+            speed += bodies.velocity[i, c] ** 2
+            spin += bodies.angular_velocity[i, c] ** 2
+        member[i] = np.sqrt(speed) <= farthest * inner[i] and np.sqrt(spin) <= fastest
+
+
+@jit
+def _most_stray(bodies, members, pressed, reach, skin):
+    """Largest w sqrt(r / (4 skin)) of the members that contacts act on, 1/s."""
+    most = 0.0
+    for i in members:
+        if not pressed[i]:
+            continue
+        spin = 0.0
+        for c in range(3):
+            spin += bodies.angular_velocity[i, c] ** 2
+        most = max(most, np.sqrt(spin * reach[i] / (4.0 * skin[i])))
+    return most
+
+
+@jit
+def _count_calm(members, position, orientation, velocity, strength, inner, skin, length, stood, calm):
+    """Add `length` s to the calm of members (k,) that have hardly moved from where they stood (n, 7); start anew that of the others."""
+    for k in range(members.shape[0]):
+        i = members[k]
+        moved, turned, speed, spin = 0.0, 0.0, 0.0, 0.0
+        for c in range(3):
+            moved += (position[k, c] - stood[i, c]) ** 2
+            speed += velocity[k, c] ** 2
+            spin += velocity[k, 3 + c] ** 2
+        for c in range(4):
+            turned += (orientation[k, c] - stood[i, 3 + c]) ** 2
+        play = PLAY * skin[i]
+        if (
+            np.sqrt(moved) <= play
+            and 2.0 * inner[i] * np.sqrt(turned) <= play
+            and np.sqrt(speed) + inner[i] * np.sqrt(spin) <= CALM * np.sqrt(strength[i] * inner[i])
+        ):
+            calm[i] += length
+            continue
+        calm[i] = 0.0
+        for c in range(3):
+            stood[i, c] = position[k, c]
+        for c in range(4):
+            stood[i, 3 + c] = orientation[k, c]
 
 
 @jit
@@ -127,6 +198,7 @@ class Heaps:
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.calm = np.zeros(world.num_bodies)
         self._stood = np.full((world.num_bodies, 7), np.inf)
+        self._taken = np.zeros(world.num_bodies, bool)
         self._auto = world.accuracy.contact_solver == "auto"
         self._jointed = np.zeros(world.num_bodies, bool)
         self._ends: dict[int, float] = {}
@@ -148,17 +220,27 @@ class Heaps:
     def gather(self, context, window) -> None:
         """Choose the heaps of the step: `window.inside` marks their bodies."""
         world, course, time = context.world, context.state.course, window.begin
-        self._end_courses(context, np.flatnonzero(course.mode == STEPPED), time)
+        ended = course.mode == STEPPED
+        self._end_courses(context, np.flatnonzero(ended), time)
+        chosen = self._choose(context, window, ended) if window.end > time else np.zeros_like(ended)
+        left = np.flatnonzero(ended & ~chosen & (course.mode == STEPPED))
+        _let_fly(course, left, world.steady_acceleration)
+        self._taken &= chosen
+        window.inside |= chosen
+
+    def _choose(self, context, window, brought: np.ndarray) -> np.ndarray:
+        """Which bodies (n,) bool are stepped; those `brought` are at the begin of the window already."""
+        world, course, time = context.world, context.state.course, window.begin
         member = world.dynamic & (course.mode != FIXED)
-        if not member.any() or not window.end > time:
-            return
+        if not member.any():
+            return member
         ahead = window.end - time
-        everybody = np.arange(world.num_bodies)
         bring_all(
-            course, everybody, time, context.state.now, context.state.rotation, context.acceleration, context.angular_acceleration
-        )
+            course, np.flatnonzero(~brought), time, context.state.now, context.state.rotation, context.acceleration,
+            context.angular_acceleration,
+        )  # fmt: skip
         context.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
-        member &= self._slow(context, everybody)
+        self._leave_out_fast(context, member)
         a, b = self._near(context, member, ahead)
         while True:
             woken = self._touched(context, member, a, b)
@@ -169,26 +251,23 @@ class Heaps:
         root = islands(world.num_bodies, a, b, member)
         root[~member] = -1
         refused = refusals(world, root, self.label >= 0, self._jointed, a, b, self._auto)
-        chosen = member & ~np.isin(root, np.array(sorted(refused), np.int64))
+        chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         chosen = self._low(context, window, chosen, root, refused)
         for reason in refused.values():
             self._refused[reason] = self._refused.get(reason, 0) + 1
         self.label[member & ~chosen] = -1
         self._settle(context, chosen, root, a, b, time)
-        window.inside |= chosen
+        return chosen
 
-    def _slow(self, context, bodies: np.ndarray) -> np.ndarray:
-        """Which bodies are slow enough for sub-steps."""
-        world, now = context.world, context.state.now
-        h = self.stepper.sub_step(context, np.flatnonzero(world.dynamic))
-        speed = np.linalg.norm(now.velocity[bodies], axis=1)
-        spin = np.linalg.norm(now.angular_velocity[bodies], axis=1)
-        return (speed * h <= FAST * self.stepper.inner[bodies]) & (spin * world.accuracy.step <= SPIN)
+    def _leave_out_fast(self, context, member: np.ndarray) -> None:
+        """Unmark those that are too fast for sub-steps."""
+        h = self.stepper.sub_step(np.flatnonzero(context.world.dynamic))
+        _mark_slow(context.state.now, self.stepper.inner, FAST / h, SPIN / context.world.accuracy.step, member)
 
     def _near(self, context, member: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray]:
-        members = np.flatnonzero(member)
-        widen = self.stepper.widening(context, members, ahead)
-        return self.stepper.near_pairs(context.state.now.position, members, widen, np.flatnonzero(~member & ~self._excluded(context)))
+        other = ~member & ~self._excluded(context)
+        self.stepper.find_pairs(context, np.flatnonzero(member), np.flatnonzero(other), ahead)
+        return self.stepper.near(context, member, other, ahead)
 
     def _excluded(self, context) -> np.ndarray:
         """Movable bodies under way that are no members: they are swept."""
@@ -226,8 +305,9 @@ class Heaps:
             return chosen
         self._set_up(context, np.flatnonzero(begins), window.begin, window.end - window.begin)
         stepper = self.stepper
-        level = support_levels(stepper.bodies, stepper.pairs, stepper.table.rows, TALL)
-        tall = np.unique(root[stepper.body[level == TALL + 1]])
+        level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
+        tall = np.unique(root[stepper.order[level[: len(root)] == TALL + 1]])
+        tall = tall[tall >= 0]
         refused.update(dict.fromkeys(tall.tolist(), "tall"))
         return chosen & ~np.isin(root, tall)
 
@@ -252,14 +332,15 @@ class Heaps:
             self.calm[members] = 0.0
 
     def _end_courses(self, context, members: np.ndarray, time: float) -> None:
-        """Bring members to `time` and let them fly from there; book what the step took of their energy."""
+        """Bring members to `time`, the end of their courses; book what the step took of their energy."""
         if not len(members):
             return
         state, world = context.state, context.world
         context.recorder.flush_all(state.course, members, time)
-        _arrive(state.course, members, time)
-        state.course.acceleration[members] = world.steady_acceleration[members]
-        bring_all(state.course, members, time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
+        _arrive(
+            state.course, members, time, world.steady_acceleration, state.now, state.rotation, context.acceleration,
+            context.angular_acceleration,
+        )  # fmt: skip
         for label in np.unique(self.label[members]).tolist():
             self._book(context, label, time)
 
@@ -271,49 +352,58 @@ class Heaps:
 
     def close(self, context, time: float) -> None:
         """Book what the steps under way take until `time`, the end of the run."""
-        self._end_courses(context, np.flatnonzero(context.state.course.mode == STEPPED), time)
+        members = np.flatnonzero(context.state.course.mode == STEPPED)
+        self._end_courses(context, members, time)
+        _let_fly(context.state.course, members, context.world.steady_acceleration)
 
     def join(self, context, window, time: float, groups: list[Group]) -> list[Group]:
         """The groups at `time` with the heaps that they touch; at the start of a step all of its heaps."""
-        state, first = context.state, not window.heaps_begun
+        first = not window.heaps_begun
         window.heaps_begun = True
         hit = [group for group in groups if np.any(self.label[group.members] >= 0)]
-        due = [label for label, end in self._ends.items() if end <= time]
-        members = np.flatnonzero(window.inside & (np.isin(self.label, due) | first))
+        members = np.flatnonzero(window.inside) if first else self._due(window, time)
         if len(members) and not hit:
-            hit = [_bare_group(time, members, context)]
-            groups = groups + hit
+            bare = _bare_group(time)
+            self._bring_in(context, bare, members)
+            return [*groups, bare]
         for group in hit:
             labels = self.label[group.members]
             members = np.union1d(members, np.flatnonzero(np.isin(self.label, labels[labels >= 0])))
-            away = np.setdiff1d(members, group.members)
-            stepped = members[state.course.mode[members] == STEPPED]
-            self._end_courses(context, stepped[state.course.start[stepped] < time], time)
-            bring_all(
-                state.course, away, time, state.now, state.rotation, context.acceleration, context.angular_acceleration
-            )
-            group.heap = members
-            group.members = np.union1d(group.members, members)
-            group.velocity = state.now.velocity[group.members].copy()
-            group.angular_velocity = state.now.angular_velocity[group.members].copy()
+            self._bring_in(context, group, members)
         return groups
+
+    def _due(self, window, time: float) -> np.ndarray:
+        """Members of heaps whose courses end at `time`."""
+        due = [label for label, end in self._ends.items() if end <= time]
+        return np.flatnonzero(window.inside & np.isin(self.label, due)) if due else np.zeros(0, np.int64)
+
+    def _bring_in(self, context, group: Group, members: np.ndarray) -> None:
+        """Let the members be the heap of a group; bring them to its time. (Those that it does not touch are no members of the group.)"""
+        state, time = context.state, group.time
+        stepped = state.course.mode[members] == STEPPED
+        self._end_courses(context, members[stepped & (state.course.start[members] < time)], time)
+        away = np.setdiff1d(members[~stepped], group.members)
+        bring_all(state.course, away, time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
+        context.acceleration[away] = context.world.steady_acceleration[away]
+        group.heap = members
 
     def step(self, context, window, group: Group) -> None:
         """Step the heap of a group from its time to the end of the window, with what touches it and is slow."""
-        world = context.world
-        stays = self._slow(context, group.members) | ~self._leaves(context, group)
-        near = group.members[stays & ~self._jointed[group.members]]
-        assert group.heap is not None
-        members = np.union1d(group.heap, near)
-        label = int(self.label[group.heap].max())
-        self.label[np.setdiff1d(members, group.heap)] = label
-        group.heap = members
-        window.inside[members] = True
-        context.wrench[group.members] = 0.0
-        for i in members[context.state.under_contact[members]].tolist():
-            note_arrival(context, [i])
-            book_contact_work(context, i, group.time)
-            context.state.under_contact[i] = False
+        world, members = context.world, group.heap
+        assert members is not None
+        if len(group.members):
+            stays = np.zeros(world.num_bodies, bool)
+            stays[group.members] = True
+            self._leave_out_fast(context, stays)
+            stays[group.members] |= ~self._leaves(context, group)
+            near = group.members[stays[group.members] & ~self._jointed[group.members]]
+            label = int(self.label[members].max())
+            self.label[np.setdiff1d(near, members)] = label
+            group.heap = members = np.union1d(members, near)
+            window.inside[members] = True
+            context.wrench[group.members] = 0.0
+        fresh = members[~self._taken[members]]
+        self._take_in(context, fresh, group.time)
         end = self._end_of(context, window, group.time, members)
         self._set_up(context, members, group.time, end - group.time)
         for label in np.unique(self.label[members]).tolist():
@@ -327,14 +417,24 @@ class Heaps:
         self._steps += 1
         self._most = max(self._most, len(members))
 
+    def _take_in(self, context, fresh: np.ndarray, time: float) -> None:
+        """What exact contact did to bodies ends where they come to a heap."""
+        self._taken[fresh] = True
+        context.wrench[fresh] = 0.0
+        context.contact_log.close(fresh.tolist(), time)
+        for i in fresh[context.state.under_contact[fresh]].tolist():
+            note_arrival(context, [i])
+            book_contact_work(context, i, time)
+            context.state.under_contact[i] = False
+
     def _end_of(self, context, window, time: float, members: np.ndarray) -> float:
         """When the courses of members end: before the step does where straight ways would stray from those of turning bodies.
 
-        A point at r from the centre strays by r (w h)^2 / 8 in h s; half of the skin is allowed, within MOST_PIECES a step.
+        The centre of a body that rolls over a point at r strays by r (w h)^2 / 8 in h s; half of the skin is allowed, within
+        MOST_PIECES a step.
         """
         stepper, step = self.stepper, context.world.accuracy.step
-        spin = np.linalg.norm(context.state.now.angular_velocity[members], axis=1)
-        stray = float((spin * np.sqrt(stepper.reach[members] / (4.0 * stepper.skin[members]))).max())
+        stray = _most_stray(context.state.now, members, stepper.pressed, stepper.reach, stepper.skin)
         pieces = min(max(math.ceil(stray * step), 1), MOST_PIECES)
         left = max(math.ceil((window.end - time) * pieces / step - 1e-6), 1)
         return window.end if left == 1 else time + (window.end - time) / left
@@ -349,8 +449,10 @@ class Heaps:
 
     def _set_up(self, context, members: np.ndarray, time: float, ahead: float) -> None:
         """Put members, in their order, and the immovable bodies near them before the solver."""
-        world, order = context.world, self.stepper.rank
-        members = members[np.argsort(order[members], kind="stable")]
+        world, order = context.world, self.stepper.order
+        marked = np.zeros(world.num_bodies, bool)
+        marked[members] = True
+        members = order[marked[order]]
         fixed = np.flatnonzero(~world.dynamic)
         moving = fixed[world.moving[fixed]]
         bring_all(
@@ -372,23 +474,18 @@ class Heaps:
 
     def _note_calm(self, context, out: Outcome, length: float) -> None:
         """For how long each member has hardly moved from where it was."""
-        members, stepper = out.members, self.stepper
-        strength, inner = np.linalg.norm(context.acceleration[members], axis=1), stepper.inner[members]
-        play = PLAY * stepper.skin[members]
-        moved = np.linalg.norm(out.position - self._stood[members, :3], axis=1)
-        turned = 2.0 * np.linalg.norm(out.orientation - self._stood[members, 3:], axis=1)
-        speed = np.linalg.norm(out.velocity[:, :3], axis=1) + inner * np.linalg.norm(out.velocity[:, 3:], axis=1)
-        calm = (moved <= play) & (inner * turned <= play) & (speed <= CALM * np.sqrt(strength * inner))
-        self.calm[members] = np.where(calm, self.calm[members] + length, 0.0)
-        left = members[~calm]
-        self._stood[left] = np.hstack([out.position, out.orientation])[~calm]
+        stepper = self.stepper
+        _count_calm(
+            out.members, out.position, out.orientation, out.velocity, context.world.steady_strength, stepper.inner, stepper.skin, length,
+            self._stood, self.calm,
+        )  # fmt: skip
 
 
-def _bare_group(time: float, members: np.ndarray, context) -> Group:
-    """A group of bodies without contacts of the exact kind."""
-    now, none = context.state.now, np.zeros(0, np.int64)
+def _bare_group(time: float) -> Group:
+    """A group without contacts of the exact kind."""
+    none = np.zeros(0, np.int64)
     return Group(
-        time=time, members=members, pairs=none, contacts=empty_contacts(0), place=none, kinds=none,
+        time=time, members=none, pairs=none, contacts=empty_contacts(0), place=none, kinds=none,
         features=np.zeros((0, 2), np.int64), keys=[], delta=np.zeros(0), approach=np.zeros(0), rest_speed=np.zeros(0),
-        live=np.zeros(0, bool), velocity=now.velocity[members].copy(), angular_velocity=now.angular_velocity[members].copy(),
+        live=np.zeros(0, bool), velocity=np.zeros((0, 3)), angular_velocity=np.zeros((0, 3)),
     )  # fmt: skip

@@ -1,56 +1,31 @@
-"""Contacts of heaps: pairs that are near, their manifolds as rows, kept while the bodies hardly move past each other.
+"""Contacts of heaps that the kernels of `detect` find: of all pairs but those that `heap_narrow` knows by itself.
 
-Manifolds come from the kernels of `detect`, which want bodies apart. So that soft contacts may sink in, convex bodies are
-shown to them shrunk about their centre of mass by `shrunk` of all lengths: normals stay the same, and points are put
-back to where they are on the true body. Other bodies are shown as they are; where they overlap, the contacts they had
-before they did are kept.
-
-A pair is looked at again when it has moved so far that it may have other contacts: separate ones when they may have come
-within the skin, touching ones after a slide of SLIDE of the smaller body's inner radius or a turn of TURN.
+Those kernels want bodies apart. So that soft contacts may sink in, convex bodies are shown to them shrunk about their centre of
+mass by `shrunk` of all lengths: normals stay the same, and points are put back to where they are on the true body. Other bodies
+are shown as they are; where they overlap, the contacts they had before they did are kept.
 """
 
 from __future__ import annotations
-
-from math import sqrt
 
 import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.contact_motion import only_primitive, side_radius
+from rigidimpulse.constrain.heap_narrow import NEAR, hand_over, note_seen, write_row
 from rigidimpulse.constrain.heap_overlap import FLUSH, deepest_normal, gap_along, overlap_contacts, support
-from rigidimpulse.constrain.heap_rows import (
-    APPROACH,
-    CORE_A,
-    CORE_B,
-    DYNAMIC_FRICTION,
-    FRICTION,
-    IMPULSE,
-    MASS_N,
-    RESTITUTION,
-    ROUND_A,
-    ROUND_B,
-    SEPARATION,
-    SKIN,
-    STATIC_FRICTION,
-    pair_speeds,
-    turned_row,
-)
+from rigidimpulse.constrain.heap_rows import CORE_A, CORE_B, ROUND_A, ROUND_B, SKIN, turned
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.manifold import reduce_contacts
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
 
 SHRINK = 1.5 * TOLERANCES.skin
 """Part of their lengths by which convex bodies are shrunk for the contact kernels."""
-SLIDE, TURN = 0.04, 0.03
-"""Part of the inner radius, and rad, after which touching pairs are looked at again."""
-AHEAD, FARTHEST = 0.2, 1.0
-"""Contacts are looked for at least and at most that many inner radii away."""
 MOST_SUNK = 8
 """Contacts of a pair of bodies that sank into each other, at most."""
-POINTS = np.int64(4)
+PER_NORMAL = np.int64(4)
 """Contacts kept of one normal, beside the deepest."""
-NEAR = 0.2
-"""Inner radii within which an old contact hands its impulse to a new one of other features."""
+FARTHER = 1.5
+"""Margins within which contacts are looked for, so that a pair without any is known to be apart for a while."""
 
 
 def inner_radii(geometry: Geometry) -> np.ndarray:
@@ -130,93 +105,19 @@ def shrunk_geometry(geometry: Geometry, dynamic_shapes: np.ndarray) -> tuple[Geo
 
 
 @jit
-def margins(bodies, pairs, places, inner, skin, ahead, out):
-    """How far away contacts of the pairs at `places` are looked for, (k,) m: as far as they come in `ahead` s, within bounds."""
-    for k in range(places.shape[0]):
-        p = places[k]
-        speed, _ = pair_speeds(bodies, pairs, p)
-        size = min(inner[pairs.first[p]], inner[pairs.second[p]])
-        out[k] = min(skin[pairs.first[p]], skin[pairs.second[p]]) + min(max(speed * ahead, AHEAD * size), FARTHEST * size)
-
-
-@jit
-def _write(geometry, shape, coefficients, bodies, factor, skin, a, b, real, row):
-    """A new row of the contact `real` (10,) of bodies a and b, without impulse, and its separation."""
-    n = real[6:9]
-    ra, rb = bodies.rotation[a], bodies.rotation[b]
-    round_a = side_radius(geometry, only_primitive(geometry, shape[a]), ra, n)
-    round_b = side_radius(geometry, only_primitive(geometry, shape[b]), rb, n)
-    arm_a, arm_b = np.empty(3), np.empty(3)
-    row[:] = 0.0
-    separation = 0.0
-    for k in range(3):
-        arm_a[k] = (real[k] - bodies.position[a, k]) / factor[a] - round_a * n[k]
-        arm_b[k] = (real[3 + k] - bodies.position[b, k]) / factor[b] + round_b * n[k]
-        row[k] = n[k]
-        separation += n[k] * ((bodies.position[b, k] - bodies.position[a, k]) + (arm_b[k] - arm_a[k]))
-    for k in range(3):
-        row[CORE_A + k] = ra[0, k] * arm_a[0] + ra[1, k] * arm_a[1] + ra[2, k] * arm_a[2]
-        row[CORE_B + k] = rb[0, k] * arm_b[0] + rb[1, k] * arm_b[1] + rb[2, k] * arm_b[2]
-    row[ROUND_A], row[ROUND_B] = round_a, round_b
-    row[RESTITUTION], row[STATIC_FRICTION], row[DYNAMIC_FRICTION] = coefficients[0], coefficients[1], coefficients[2]
-    row[SKIN] = min(skin[a], skin[b])
-    row[SEPARATION] = separation - (round_a + round_b) - row[SKIN]
-
-
-@jit
-def _approach(bodies, a, b, row):
-    """u.n of a new row, m/s."""
-    va, vb = bodies.velocity[a], bodies.velocity[b]
-    xa, ya, za = turned_row(bodies.rotation[a], row, CORE_A)
-    xb, yb, zb = turned_row(bodies.rotation[b], row, CORE_B)
-    x = (vb[0] + vb[4] * zb - vb[5] * yb) - (va[0] + va[4] * za - va[5] * ya)
-    y = (vb[1] + vb[5] * xb - vb[3] * zb) - (va[1] + va[5] * xa - va[3] * za)
-    z = (vb[2] + vb[3] * yb - vb[4] * xb) - (va[2] + va[3] * ya - va[4] * xa)
-    return x * row[0] + y * row[1] + z * row[2]
-
-
-@jit
-def _hand_over(rows, ids, old, old_end, new, new_end, near):
-    """Give new rows the impulses of the old ones of the same features, else of one nearby with much the same normal."""
-    taken = np.zeros(old_end - old, np.bool_)
-    for nearby in range(2):
-        for c in range(new, new_end):
-            if rows[c, IMPULSE] > 0.0:
-                continue
-            for o in range(old, old_end):
-                if taken[o - old]:
-                    continue
-                cosine = rows[c, 0] * rows[o, 0] + rows[c, 1] * rows[o, 1] + rows[c, 2] * rows[o, 2]
-                same = ids[c, 0] == ids[o, 0] and ids[c, 1] == ids[o, 1] and ids[c, 2] == ids[o, 2]
-                if nearby == 1:
-                    x, y = rows[c, CORE_A] - rows[o, CORE_A], rows[c, CORE_A + 1] - rows[o, CORE_A + 1]
-                    z = rows[c, CORE_A + 2] - rows[o, CORE_A + 2]
-                    same = x * x + y * y + z * z < near * near
-                if not same or cosine < 0.9:
-                    continue
-                taken[o - old] = True
-                rows[c, APPROACH] = rows[o, APPROACH]
-                rows[c, IMPULSE] = rows[o, IMPULSE]
-                along = 0.0
-                for k in range(3):
-                    along += rows[o, FRICTION + k] * rows[c, k]
-                for k in range(3):
-                    rows[c, FRICTION + k] = rows[o, FRICTION + k] - along * rows[c, k]
-                break
-
-
-@jit
 def _contradicts(bodies, pairs, p, rows, new, new_end):
     """Whether the new contacts of a pair cannot be: there are none though an old one is closed, or a normal has turned round."""
     a, b = pairs.first[p], pairs.second[p]
+    carrier = b if pairs.carrier[p] else a
     for o in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
         row = rows[o]
-        ax, ay, az = turned_row(bodies.rotation[a], row, CORE_A)
-        bx, by, bz = turned_row(bodies.rotation[b], row, CORE_B)
+        nx, ny, nz = turned(bodies.rotation, carrier, row[0], row[1], row[2])
+        ax, ay, az = turned(bodies.rotation, a, row[CORE_A], row[CORE_A + 1], row[CORE_A + 2])
+        bx, by, bz = turned(bodies.rotation, b, row[CORE_B], row[CORE_B + 1], row[CORE_B + 2])
         gap = (
-            (bodies.position[b, 0] - bodies.position[a, 0] + bx - ax) * row[0]
-            + (bodies.position[b, 1] - bodies.position[a, 1] + by - ay) * row[1]
-            + (bodies.position[b, 2] - bodies.position[a, 2] + bz - az) * row[2]
+            (bodies.position[b, 0] - bodies.position[a, 0] + bx - ax) * nx
+            + (bodies.position[b, 1] - bodies.position[a, 1] + by - ay) * ny
+            + (bodies.position[b, 2] - bodies.position[a, 2] + bz - az) * nz
         ) - (row[ROUND_A] + row[ROUND_B])
         if new == new_end and gap < row[SKIN]:
             return True
@@ -229,11 +130,11 @@ def _contradicts(bodies, pairs, p, rows, new, new_end):
 
 
 @jit
-def _sunk(geometry, shape, bodies, convex, factor, a, b, real, first, last, flush, deep, deep_ids):
+def _sunk(geometry, bodies, convex, factor, a, b, real, first, last, flush, deep, deep_ids):
     """Contacts into deep (cap, 10), deep_ids (cap, 3) of convex bodies that the kernels found no sound contact for; their number."""
     if not (convex[a] and convex[b]) or factor[a] * factor[b] == 1.0:
         return 0
-    p, q = geometry.shape_first[shape[a]], geometry.shape_first[shape[b]]
+    p, q = geometry.shape_first[bodies.shape[a]], geometry.shape_first[bodies.shape[b]]
     bearing = np.empty(3)
     for s in range(first, last):
         # Along a sound contact's normal the shrunk bodies are apart.
@@ -256,53 +157,53 @@ def _shrunk_by(geometry, bodies, factor, a, b, p, q, n):
 
 
 @jit
+def _write(geometry, bodies, a, b, carrier, real, c, factor_a, factor_b, coefficients, rows, r):
+    """A new row r of the contact real[c] (10,) of bodies a and b, with places in the world; returns its separation."""
+    round_a = side_radius(geometry, only_primitive(geometry, bodies.shape[a]), bodies.rotation[a], real[c, 6:9])
+    round_b = side_radius(geometry, only_primitive(geometry, bodies.shape[b]), bodies.rotation[b], real[c, 6:9])
+    for k in range(3):
+        real[c, k] -= bodies.position[a, k]
+        real[c, 3 + k] -= bodies.position[a, k]
+    return write_row(bodies, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b, coefficients, rows, r)
+
+
+@jit
 def store_contacts(
-    geometry, shape, material, coefficients, convex, bodies, pairs, places, margin, radius, inner, skin, factor, real, integer, count, body,
-    rows, ids, used,
-):  # fmt: skip
+    geometry, bodies, pairs, places, margins, convex, factor, coefficients, real, integer, count, order, rows, ids, used
+):
     """Put the contacts found for the pairs at `places` into rows from `used` on, with the impulses of those they replace.
 
-    real, integer: `count` contacts in the order of the places, `integer[:, :2]` as in the scene, `body` (l,) their indices there;
-    shape, material, convex (polyhedra), radius (about the centre of mass), inner, skin, factor by body number. Returns the rows used.
+    real, integer: `count` contacts in the order of the places, `integer[:, :2]` by indices of the scene, order (n,) indices by rank;
+    convex (polyhedra) and factor (n,) by rank; margins (k,) m. Returns the rows used.
     """
     c = np.int64(0)
-    deep, deep_ids, one = np.empty((MOST_SUNK, 10)), np.empty((MOST_SUNK, 3), np.int64), np.ones(factor.shape[0])
+    deep, deep_ids = np.empty((MOST_SUNK, 10)), np.empty((MOST_SUNK, 3), np.int64)
     for k in range(places.shape[0]):
         p = places[k]
         a, b = pairs.first[p], pairs.second[p]
         first = c
-        while c < count and integer[c, 0] == body[a] and integer[c, 1] == body[b]:
+        while c < count and integer[c, 0] == order[a] and integer[c, 1] == order[b]:
             c += 1
-        last = reduce_contacts(real, integer, first, c, POINTS)
+        last = reduce_contacts(real, integer, first, c, PER_NORMAL)
         new = used
-        size = min(inner[a], inner[b])
-        nearest = margin[k]
-        sunk = _sunk(geometry, shape, bodies, convex, factor, a, b, real, first, last, FLUSH * size, deep, deep_ids)
+        size = min(bodies.inner[a], bodies.inner[b])
+        carrier = pairs.carrier[p]
+        sunk = _sunk(geometry, bodies, convex, factor, a, b, real, first, last, FLUSH * size, deep, deep_ids)
         for s in range(sunk if sunk > 0 else last - first):
             if sunk > 0:
-                _write(geometry, shape, coefficients[material[a], material[b]], bodies, one, skin, a, b, deep[s], rows[used])
+                separation = _write(geometry, bodies, a, b, carrier, deep, s, 1.0, 1.0, coefficients, rows, used)
                 ids[used] = deep_ids[s]
             else:
-                at = first + s
-                _write(geometry, shape, coefficients[material[a], material[b]], bodies, factor, skin, a, b, real[at], rows[used])
-                ids[used] = integer[at, 2:]
-            rows[used, APPROACH] = _approach(bodies, a, b, rows[used])
-            if rows[used, SEPARATION] <= margin[k]:
-                nearest = min(nearest, rows[used, SEPARATION] + rows[used, SKIN])
+                separation = _write(geometry, bodies, a, b, carrier, real, first + s, factor[a], factor[b], coefficients, rows, used)
+                ids[used] = integer[first + s, 2:]
+            if separation <= margins[k]:
                 used += 1
         if sunk == 0 and _contradicts(bodies, pairs, p, rows, new, used):
             used = new
-            for o in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
-                rows[o, MASS_N] = 0.0
         else:
-            _hand_over(rows, ids, pairs.start[p], pairs.start[p] + pairs.count[p], new, used, NEAR * size)
-            pairs.start[p], pairs.count[p] = new, used - new
-        allowed = margin[k] - min(skin[a], skin[b])
-        if pairs.count[p] == 0:
-            between = bodies.position[b] - bodies.position[a]
-            apart = sqrt(between[0] ** 2 + between[1] ** 2 + between[2] ** 2) - radius[a] - radius[b] - min(skin[a], skin[b])
-            pairs.slide[p] = max(allowed, apart)
-        else:
-            pairs.slide[p] = min(allowed, max(SLIDE * size, nearest))
-        pairs.turn[p] = TURN
+            old = pairs.start[p]
+            hand_over(rows, ids, old, old + pairs.count[p], rows, ids, new, used, NEAR * size)
+            pairs.start[p], pairs.count[p], pairs.room[p] = new, used - new, used - new
+        pairs.apart[p] = FARTHER * margins[k] if pairs.count[p] == 0 and sunk == 0 and last == first else 0.0
+        note_seen(bodies, pairs, p)
     return used

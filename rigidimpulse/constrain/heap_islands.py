@@ -18,7 +18,8 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.heap_rows import SEPARATION, SKIN
+from rigidimpulse.constrain.heap_narrow import in_play
+from rigidimpulse.constrain.heap_rows import SEPARATION, SKIN, SUPPORT
 
 MANY, KEPT = 60, 30
 RATIO, REBOUND, TALL = 30.0, 0.5, 12
@@ -50,25 +51,26 @@ def islands(number, first, second, movable):
 
 @jit
 def support_levels(bodies, pairs, rows, tall):
-    """How many bodies each one is above what cannot be moved, by closed contacts, (l,): at most tall + 1; 0 for immovable ones.
+    """How many bodies each one is above what cannot be moved, by closed contacts, (n+1,): at most tall + 1; 0 for immovable ones.
 
-    Bodies without support have tall + 2.
+    Bodies without support, and those that play no part, have tall + 2.
     """
-    number = bodies.mass.shape[0]
+    number = bodies.part.shape[0]
     level = np.full(number, tall + 2, np.int64)
     for i in range(number):
-        if bodies.mass[i, 0] == 0.0:
+        if bodies.part[i] == SUPPORT:
             level[i] = 0
     changed = True
     while changed:
         changed = False
         for p in range(pairs.first.shape[0]):
+            a, b = pairs.first[p], pairs.second[p]
             closed = False
-            for c in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
-                closed = closed or rows[c, SEPARATION] <= rows[c, SKIN]
+            if in_play(bodies.part, a, b):
+                for c in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
+                    closed = closed or rows[c, SEPARATION] <= rows[c, SKIN]
             if not closed:
                 continue
-            a, b = pairs.first[p], pairs.second[p]
             low, high = (a, b) if level[a] < level[b] else (b, a)
             reached = min(level[low] + 1, tall + 1)
             if level[low] <= tall + 1 and reached < level[high]:
@@ -104,10 +106,12 @@ def refusals(
         return out
     for r in np.flatnonzero((size > 0) & (size < np.where(was_heap, KEPT, MANY))).tolist():
         out[r] = "few bodies"
+    begins = ~was_heap[owner]
+    if not begins.any():
+        return out
     coefficient = world.coefficients[world.material_of_body[a], world.material_of_body[b], 0]
     both = world.dynamic[a] & world.dynamic[b]
     heavy = np.maximum(world.mass[a], world.mass[b]) > RATIO * np.minimum(world.mass[a], world.mass[b])
-    begins = ~was_heap[owner]
     for r in np.unique(owner[begins & (coefficient > REBOUND)]).tolist():
         out.setdefault(r, "restitution")
     for r in np.unique(owner[begins & both & heavy]).tolist():

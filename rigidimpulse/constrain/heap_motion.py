@@ -3,62 +3,128 @@
 from math import sqrt
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.heap_rows import set_pose
-from rigidimpulse.rotation import exponential, product
+from rigidimpulse.constrain.heap_rows import MEMBER, OUTSIDE, set_inverse_inertia, turned, turned_back
+from rigidimpulse.rotation import exponential, product, quaternion_to_matrix
+
+
+@jit
+def _set_orientation(bodies, i, x, y, z):
+    """Turn body i by the vector (x, y, z), rad."""
+    q = bodies.orientation[i]
+    t0, t1, t2, t3 = exponential(x, y, z)
+    q0, q1, q2, q3 = product(t0, t1, t2, t3, q[0], q[1], q[2], q[3])
+    size = sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+    q[0], q[1], q[2], q[3] = q0 / size, q1 / size, q2 / size, q3 / size
+    quaternion_to_matrix(q, bodies.rotation[i])
 
 
 @jit
 def _turn_freely(bodies, i, h):
-    """Turn body i by its spin over h, keeping its angular momentum."""
-    r, moments, v = bodies.rotation[i], bodies.inertia[i], bodies.velocity[i]
-    wx, wy, wz = v[3], v[4], v[5]
-    q = bodies.orientation[i]
-    if bodies.mass[i, 0] > 0.0 and not (moments[0] == moments[1] == moments[2]):
-        x0 = r[0, 0] * wx + r[1, 0] * wy + r[2, 0] * wz
-        x1 = r[0, 1] * wx + r[1, 1] * wy + r[2, 1] * wz
-        x2 = r[0, 2] * wx + r[1, 2] * wy + r[2, 2] * wz
-        l0, l1, l2 = moments[0] * x0, moments[1] * x1, moments[2] * x2
-        d0 = 0.5 * h * (x2 * l1 - x1 * l2) / moments[0]
-        d1 = 0.5 * h * (x0 * l2 - x2 * l0) / moments[1]
-        d2 = 0.5 * h * (x1 * l0 - x0 * l1) / moments[2]
-        lx = r[0, 0] * l0 + r[0, 1] * l1 + r[0, 2] * l2
-        ly = r[1, 0] * l0 + r[1, 1] * l1 + r[1, 2] * l2
-        lz = r[2, 0] * l0 + r[2, 1] * l1 + r[2, 2] * l2
-        wx += r[0, 0] * d0 + r[0, 1] * d1 + r[0, 2] * d2
-        wy += r[1, 0] * d0 + r[1, 1] * d1 + r[1, 2] * d2
-        wz += r[2, 0] * d0 + r[2, 1] * d1 + r[2, 2] * d2
-        t0, t1, t2, t3 = exponential(h * wx, h * wy, h * wz)
-        q[0], q[1], q[2], q[3] = product(t0, t1, t2, t3, q[0], q[1], q[2], q[3])
-        set_pose(bodies, i)
-        m = bodies.mass[i]
-        v[3] = m[1] * lx + m[2] * ly + m[3] * lz
-        v[4] = m[2] * lx + m[4] * ly + m[5] * lz
-        v[5] = m[3] * lx + m[5] * ly + m[6] * lz
-        return
-    t0, t1, t2, t3 = exponential(h * wx, h * wy, h * wz)
-    q[0], q[1], q[2], q[3] = product(t0, t1, t2, t3, q[0], q[1], q[2], q[3])
-    set_pose(bodies, i)
-
-
-@jit
-def move(bodies, h):
-    """Move all bodies by their velocities over h s; those that no contact pushed, on their parabola."""
-    for i in range(bodies.mass.shape[0]):
-        v, x = bodies.velocity[i], bodies.position[i]
-        back = 0.5 * h * h if bodies.loose[i] else 0.0
-        for k in range(3):
-            x[k] += h * v[k] - back * bodies.gravity[i, k]
-        speed = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-        spin = sqrt(v[3] * v[3] + v[4] * v[4] + v[5] * v[5])
-        bodies.path[i] -= h * speed
-        if spin > 0.0:
-            _turn_freely(bodies, i, h)
+    """Turn body i of unlike moments by its spin over h, keeping its angular momentum."""
+    moments, v = bodies.inertia[i], 8 * i + 3
+    x0, x1, x2 = turned_back(bodies.rotation, i, bodies.velocity[v], bodies.velocity[v + 1], bodies.velocity[v + 2])
+    l0, l1, l2 = moments[0] * x0, moments[1] * x1, moments[2] * x2
+    d0 = 0.5 * h * (x2 * l1 - x1 * l2) / moments[0]
+    d1 = 0.5 * h * (x0 * l2 - x2 * l0) / moments[1]
+    d2 = 0.5 * h * (x1 * l0 - x0 * l1) / moments[2]
+    lx, ly, lz = turned(bodies.rotation, i, l0, l1, l2)
+    wx, wy, wz = turned(bodies.rotation, i, x0 + d0, x1 + d1, x2 + d2)
+    _set_orientation(bodies, i, h * wx, h * wy, h * wz)
+    set_inverse_inertia(bodies, i)
+    m = bodies.mass[8 * i : 8 * i + 6]
+    bodies.velocity[v] = m[0] * lx + m[1] * ly + m[2] * lz
+    bodies.velocity[v + 1] = m[1] * lx + m[3] * ly + m[4] * lz
+    bodies.velocity[v + 2] = m[2] * lx + m[4] * ly + m[5] * lz
+    return wx, wy, wz
 
 
 @jit
 def kick(bodies, h):
     """Let gravity act over h s."""
-    for i in range(bodies.mass.shape[0]):
-        bodies.loose[i] = bodies.mass[i, 0] > 0.0
+    v, before = bodies.velocity, bodies.before
+    for i in range(bodies.part.shape[0]):
+        if bodies.part[i] != MEMBER:
+            continue
+        o = 8 * i
         for k in range(3):
-            bodies.velocity[i, k] += h * bodies.gravity[i, k]
+            v[o + k] += h * bodies.gravity[i, k]
+        for k in range(6):
+            before[o + k] = v[o + k]
+
+
+@jit
+def move(bodies, h):
+    """Move all bodies by their velocities over h s; those that no contact pushed, on their parabola."""
+    v, before, moved = bodies.velocity, bodies.before, bodies.moved
+    for i in range(bodies.part.shape[0]):
+        if bodies.part[i] == OUTSIDE:
+            continue
+        o = 8 * i
+        member = bodies.part[i] == MEMBER
+        loose = member
+        for k in range(6):
+            loose = loose and v[o + k] == before[o + k]
+        back = 0.5 * h * h if loose else 0.0
+        for k in range(3):
+            step = h * v[o + k] - back * bodies.gravity[i, k]
+            bodies.position[i, k] += step
+            moved[o + k] += step
+        wx, wy, wz = v[o + 3], v[o + 4], v[o + 5]
+        if wx == 0.0 and wy == 0.0 and wz == 0.0:
+            continue
+        if member and not bodies.alike[i]:
+            wx, wy, wz = _turn_freely(bodies, i, h)
+        moved[o + 3] += h * wx
+        moved[o + 4] += h * wy
+        moved[o + 5] += h * wz
+
+
+@jit
+def finish(bodies):
+    """Orientations at the end of a step of those that have not been turned in its sub-steps; what has moved counts from here on."""
+    for i in range(bodies.part.shape[0]):
+        if bodies.part[i] != OUTSIDE and (bodies.part[i] != MEMBER or bodies.alike[i]):
+            o = 8 * i + 3
+            _set_orientation(bodies, i, bodies.moved[o], bodies.moved[o + 1], bodies.moved[o + 2])
+        for k in range(8 * i, 8 * i + 6):
+            bodies.moved[k] = 0.0
+
+
+@jit
+def note_pressed(bodies, order, pressed):
+    """Mark the members, in pressed (n,) by index, that contacts acted on in the last sub-step; order (n,) indices by rank."""
+    for i in range(order.shape[0]):
+        if bodies.part[i] == MEMBER:
+            acted = False
+            for k in range(8 * i, 8 * i + 6):
+                acted = acted or bodies.velocity[k] != bodies.before[k]
+            pressed[order[i]] = acted
+
+
+@jit
+def energies(bodies, masses, pull):
+    """Kinetic energy, and that energy with the potential of a steady pull (n, 3) m/s2, of the members, J; masses (n,) kg."""
+    kinetic, total = 0.0, 0.0
+    for i in range(masses.shape[0]):
+        if bodies.part[i] != MEMBER:
+            continue
+        o = 8 * i
+        v = bodies.velocity
+        x, y, z = turned_back(bodies.rotation, i, v[o + 3], v[o + 4], v[o + 5])
+        moments = bodies.inertia[i]
+        own = 0.5 * masses[i] * (v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2])
+        own += 0.5 * (moments[0] * x * x + moments[1] * y * y + moments[2] * z * z)
+        kinetic += own
+        total += own
+        for k in range(3):
+            total -= masses[i] * pull[i, k] * bodies.position[i, k]
+    return kinetic, total
+
+
+@jit
+def slow_down(bodies, factor):
+    """Multiply the speeds of the members."""
+    for i in range(bodies.part.shape[0]):
+        if bodies.part[i] == MEMBER:
+            for k in range(8 * i, 8 * i + 6):
+                bodies.velocity[k] *= factor

@@ -1,42 +1,60 @@
-"""What the solver of heaps works on: bodies, pairs and contact rows, in one order that does not depend on indices.
+"""What the kernels of heaps work on: bodies, pairs and contact points, kept from step to step.
 
-Bodies of a heap are numbered in the order of their places at the start of the run, and of a pair the first is the one
-with the lower number, so that scenes whose bodies were added in another order give the same bits. The contacts of pair
-p are the rows [start[p], start[p] + count[p]) of a pool of rows.
+Bodies are numbered in the order of their places at the start of the run (their rank), and of a pair the first is the one of lower
+number, so that scenes whose bodies were added in another order give the same bits. Pair p has the contact points
+[start[p], start[p] + count[p]) of a pool of rows.
+
+What changes in a sub-step lies in rows of 8 doubles, see `lanes`: velocity (v, w), moved (displacement and rotation vector since
+the step began), mass (inverse inertia xx, xy, xz, yy, yz, zz in world axes, and 1/m).
 """
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.touching import world_inverse_inertia
 from rigidimpulse.rotation import quaternion_to_matrix
 
-NORMAL, ARM_A, ARM_B, CORE_A, CORE_B, ROUND_A, ROUND_B = 0, 3, 6, 9, 12, 15, 16
-"""Offsets in a row: unit normal from first to second; world arms to the contact points; body-fixed points, in the axes
-of their bodies, and the radii of the rounded surfaces around them, m."""
-MASS_N, MASS_T, IMPULSE, FRICTION, STATIC_FRICTION, DYNAMIC_FRICTION, RESTITUTION = 17, 18, 19, 20, 23, 24, 25
-"""Offsets in a row: effective masses, kg; normal impulse, N s; friction impulse (3), N s; coefficients."""
-APPROACH, SEPARATION, SKIN, ROW_SIZE = 26, 27, 28, 29
-"""Offsets in a row: u.n when it was first seen in the step, m/s, 0 after a rebound; gap less the skin, m; skin, m."""
+# Kernels that are called for each pair or point get arrays one by one, and indices: a tuple of twenty arrays is passed word by word,
+# and a view is counted, which costs more than what is computed.
+
+NORMAL, CORE_A, CORE_B, ROUND_A, ROUND_B = 0, 3, 6, 9, 10
+"""Offsets in a row: unit normal from first to second in the axes of the pair's carrier; body-fixed points, in the axes of their
+bodies, and the radii of the rounded surfaces around them, m."""
+IMPULSE, FRICTION, STATIC_FRICTION, DYNAMIC_FRICTION, RESTITUTION = 11, 12, 15, 16, 17
+"""Offsets in a row: normal impulse, N s; friction impulse (3), N s, world; coefficients."""
+SKIN, SEPARATION, ROW_SIZE = 18, 19, 20
+"""Offsets in a row: skin, m; gap less the skin at the start of the step, m."""
+
+OUTSIDE, MEMBER, SUPPORT = 0, 1, 2
+"""Parts that a body may play in a step: none, stepped, immovable and near."""
+INVERSE_MASS = 6
+"""Place of 1/m in a row of `mass`."""
 
 
 class HeapBodies(NamedTuple):
-    """l bodies of heaps and what they touch; those that cannot be moved have no inverse mass."""
+    """n bodies by rank, and one more row that is no body, for lanes that have nothing to do."""
 
-    position: np.ndarray  # (l, 3) m
-    orientation: np.ndarray  # (l, 4)
-    rotation: np.ndarray  # (l, 3, 3)
-    velocity: np.ndarray  # (l, 6) m/s and rad/s, world
-    mass: np.ndarray  # (l, 7) 1/m, and the inverse inertia in world axes: xx, xy, xz, yy, yz, zz
-    inertia: np.ndarray  # (l, 3) principal
-    gravity: np.ndarray  # (l, 3) m/s2
-    reach: np.ndarray  # (l,) m, radius about the centre of mass; 0 for balls about it and for half spaces
-    path: np.ndarray  # (l,) m, how far its centre may still come until it may meet bodies that are not in its pairs
-    loose: np.ndarray  # (l,) bool, no contact pushed it in this sub-step
+    shape: np.ndarray  # (n+1,)
+    material: np.ndarray  # (n+1,)
+    inertia: np.ndarray  # (n+1, 3) principal
+    alike: np.ndarray  # (n+1,) bool, all moments equal: the inverse inertia does not turn
+    inner: np.ndarray  # (n+1,) m, distance from the centre of mass to the nearest face; inf for what cannot be moved
+    skin: np.ndarray  # (n+1,) m, gap at which contacts are held
+    reach: np.ndarray  # (n+1,) m, radius about the centre of mass, 0 for balls, inf for half spaces
+    radius: np.ndarray  # (n+1,) m, of the sphere about the centre of mass that holds the body
+    part: np.ndarray  # (n+1,) OUTSIDE, MEMBER or SUPPORT
+    position: np.ndarray  # (n+1, 3) m
+    orientation: np.ndarray  # (n+1, 4)
+    rotation: np.ndarray  # (n+1, 3, 3)
+    gravity: np.ndarray  # (n+1, 3) m/s2
+    velocity: np.ndarray  # (8 (n+1),) m/s and rad/s, world
+    before: np.ndarray  # (8 (n+1),) the same before contacts acted in the sub-step
+    moved: np.ndarray  # (8 (n+1),) m and rad
+    mass: np.ndarray  # (8 (n+1),)
 
 
 class HeapPairs(NamedTuple):
@@ -44,57 +62,82 @@ class HeapPairs(NamedTuple):
 
     first: np.ndarray  # (k,) number of a body
     second: np.ndarray  # (k,)
-    carrier: np.ndarray  # (k,) bool, relative motion is seen from the second body
-    round: np.ndarray  # (k,) bool, one of the two is a ball: its turning changes no contact
+    carrier: np.ndarray  # (k,) bool, relative motion is seen from the second body, the one of larger reach
+    round: np.ndarray  # (k,) bool, the body that is not the carrier is a ball: its turning changes no contact
+    kind: np.ndarray  # (k,) how contacts are found, see `heap_contacts`
     start: np.ndarray  # (k,) first row
     count: np.ndarray  # (k,) rows
-    slide: np.ndarray  # (k,) m, how far the points of the pair may move past each other until it is looked at again
-    turn: np.ndarray  # (k,) rad, the same for the rotation of a pair with rows
+    room: np.ndarray  # (k,) rows that are the pair's own
+    known: np.ndarray  # (k,) bool, `seen` and `apart` hold
+    apart: np.ndarray  # (k,) m, the gap was at least that; 0 for a pair that has rows
+    seen: np.ndarray  # (k, 7) pose of the other body in the axes of the carrier when contacts were looked for: m, and quaternion
 
 
 @jit
-def set_pose(bodies, i):
-    """Fill rotation and inverse inertia of body i from its orientation."""
-    inverse = np.empty((3, 3))
-    quaternion_to_matrix(bodies.orientation[i], bodies.rotation[i])
-    if bodies.mass[i, 0] > 0.0:
-        world_inverse_inertia(bodies.rotation[i], bodies.inertia[i], inverse)
-        m = bodies.mass[i]
-        m[1], m[2], m[3] = inverse[0, 0], inverse[0, 1], inverse[0, 2]
-        m[4], m[5], m[6] = inverse[1, 1], inverse[1, 2], inverse[2, 2]
+def set_inverse_inertia(bodies, i):
+    """Fill the row of `mass` of body i for its rotation."""
+    r, moments, m = bodies.rotation[i], bodies.inertia[i], 8 * i
+    a, b, c = 1.0 / moments[0], 1.0 / moments[1], 1.0 / moments[2]
+    bodies.mass[m] = a * r[0, 0] * r[0, 0] + b * r[0, 1] * r[0, 1] + c * r[0, 2] * r[0, 2]
+    bodies.mass[m + 1] = a * r[0, 0] * r[1, 0] + b * r[0, 1] * r[1, 1] + c * r[0, 2] * r[1, 2]
+    bodies.mass[m + 2] = a * r[0, 0] * r[2, 0] + b * r[0, 1] * r[2, 1] + c * r[0, 2] * r[2, 2]
+    bodies.mass[m + 3] = a * r[1, 0] * r[1, 0] + b * r[1, 1] * r[1, 1] + c * r[1, 2] * r[1, 2]
+    bodies.mass[m + 4] = a * r[1, 0] * r[2, 0] + b * r[1, 1] * r[2, 1] + c * r[1, 2] * r[2, 2]
+    bodies.mass[m + 5] = a * r[2, 0] * r[2, 0] + b * r[2, 1] * r[2, 1] + c * r[2, 2] * r[2, 2]
 
 
 @jit
-def set_poses(bodies):
-    """Fill rotations and inverse inertias of all bodies."""
-    for i in range(bodies.mass.shape[0]):
-        set_pose(bodies, i)
+def load_bodies(bodies, order, now, acceleration, inv_mass, part):
+    """Put the bodies that play a part (n,) by index, at the present instant, before the kernels; order (n,) index by rank."""
+    for k in range(order.shape[0]):
+        i = order[k]
+        bodies.part[k] = part[i]
+        if part[i] == OUTSIDE:
+            continue
+        for c in range(3):
+            bodies.position[k, c] = now.position[i, c]
+            bodies.velocity[8 * k + c] = now.velocity[i, c]
+            bodies.velocity[8 * k + 3 + c] = now.angular_velocity[i, c]
+            bodies.gravity[k, c] = acceleration[i, c] if part[i] == MEMBER else 0.0
+        for c in range(4):
+            bodies.orientation[k, c] = now.orientation[i, c]
+        for c in range(6):
+            bodies.moved[8 * k + c] = 0.0
+        quaternion_to_matrix(bodies.orientation[k], bodies.rotation[k])
+        bodies.mass[8 * k + INVERSE_MASS] = inv_mass[i]
+        if part[i] == MEMBER:
+            set_inverse_inertia(bodies, k)
 
 
 @jit
-def turned_row(r, row, at):
-    """The vector row[at:at + 3] turned by the matrix r."""
-    x, y, z = row[at], row[at + 1], row[at + 2]
+def turned(rotation, i, x, y, z):
+    """The vector (x, y, z) turned by the matrix rotation[i]."""
     return (
-        r[0, 0] * x + r[0, 1] * y + r[0, 2] * z,
-        r[1, 0] * x + r[1, 1] * y + r[1, 2] * z,
-        r[2, 0] * x + r[2, 1] * y + r[2, 2] * z,
+        rotation[i, 0, 0] * x + rotation[i, 0, 1] * y + rotation[i, 0, 2] * z,
+        rotation[i, 1, 0] * x + rotation[i, 1, 1] * y + rotation[i, 1, 2] * z,
+        rotation[i, 2, 0] * x + rotation[i, 2, 1] * y + rotation[i, 2, 2] * z,
     )
 
 
 @jit
-def pair_speeds(bodies, pairs, p):
-    """How fast the points of a pair move past each other at most [m/s], and how fast it turns [rad/s]."""
-    a, b = pairs.first[p], pairs.second[p]
-    va, vb = bodies.velocity[a], bodies.velocity[b]
-    spin = vb if pairs.carrier[p] else va
-    dx = bodies.position[b, 0] - bodies.position[a, 0]
-    dy = bodies.position[b, 1] - bodies.position[a, 1]
-    dz = bodies.position[b, 2] - bodies.position[a, 2]
-    x = vb[0] - va[0] - (spin[4] * dz - spin[5] * dy)
-    y = vb[1] - va[1] - (spin[5] * dx - spin[3] * dz)
-    z = vb[2] - va[2] - (spin[3] * dy - spin[4] * dx)
-    wx, wy, wz = vb[3] - va[3], vb[4] - va[4], vb[5] - va[5]
-    turn = np.sqrt(wx * wx + wy * wy + wz * wz)
-    reach = bodies.reach[a] if pairs.carrier[p] else bodies.reach[b]
-    return np.sqrt(x * x + y * y + z * z) + reach * turn, 0.0 if pairs.round[p] else turn
+def turned_back(rotation, i, x, y, z):
+    """The vector (x, y, z) turned by the transpose of the matrix rotation[i]."""
+    return (
+        rotation[i, 0, 0] * x + rotation[i, 1, 0] * y + rotation[i, 2, 0] * z,
+        rotation[i, 0, 1] * x + rotation[i, 1, 1] * y + rotation[i, 2, 1] * z,
+        rotation[i, 0, 2] * x + rotation[i, 1, 2] * y + rotation[i, 2, 2] * z,
+    )
+
+
+@jit
+def closing_speed(position, velocity, reach, a, b, carrier):
+    """How fast the points of bodies a and b move past each other at most, m/s, seen from the carrier (b where it is true)."""
+    v, i, j = velocity, 8 * a, 8 * b
+    spin, other = (j, a) if carrier else (i, b)
+    dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
+    x = v[j] - v[i] - (v[spin + 4] * dz - v[spin + 5] * dy)
+    y = v[j + 1] - v[i + 1] - (v[spin + 5] * dx - v[spin + 3] * dz)
+    z = v[j + 2] - v[i + 2] - (v[spin + 3] * dy - v[spin + 4] * dx)
+    wx, wy, wz = v[j + 3] - v[i + 3], v[j + 4] - v[i + 4], v[j + 5] - v[i + 5]
+    turn = sqrt(wx * wx + wy * wy + wz * wz)
+    return sqrt(x * x + y * y + z * z) + (reach[other] * turn if turn > 0.0 else 0.0)

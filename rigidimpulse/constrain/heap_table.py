@@ -1,56 +1,83 @@
-"""The pairs and contact rows of all heaps, kept from step to step; see `heap_rows` for what the solver reads."""
+"""The pairs and contact points of all heaps, kept from step to step; see `heap_rows` for what the kernels read."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.constrain.heap_rows import ROW_SIZE
+from rigidimpulse._jit import jit
+from rigidimpulse.constrain.heap_rows import ROW_SIZE, HeapPairs
 
 FIRST_ROWS = 1024
 
 
+def empty_pairs(k: int) -> HeapPairs:
+    """Pairs (k,) of which nothing is known."""
+
+    def numbers() -> np.ndarray:
+        return np.zeros(k, np.int64)
+
+    return HeapPairs(
+        first=numbers(), second=numbers(), carrier=np.zeros(k, bool), round=np.zeros(k, bool), kind=numbers(), start=numbers(),
+        count=numbers(), room=numbers(), known=np.zeros(k, bool), apart=np.zeros(k), seen=np.zeros((k, 7)),
+    )  # fmt: skip
+
+
+@jit
+def _carry_over(old, new):
+    """Give new pairs what is known of the same old ones; both ascend."""
+    o = 0
+    for p in range(new.first.shape[0]):
+        a, b = new.first[p], new.second[p]
+        while o < old.first.shape[0] and (old.first[o] < a or (old.first[o] == a and old.second[o] < b)):
+            o += 1
+        if o < old.first.shape[0] and old.first[o] == a and old.second[o] == b:
+            new.start[p], new.count[p], new.room[p] = old.start[o], old.count[o], old.room[o]
+            new.known[p], new.apart[p] = old.known[o], old.apart[o]
+            new.seen[p, :] = old.seen[o]
+
+
+@jit
+def _pack(pairs, rows, ids, new_rows, new_ids):
+    """Put the rows of all pairs one after the other; returns their number."""
+    used = 0
+    for p in range(pairs.first.shape[0]):
+        count = pairs.count[p]
+        for c in range(count):
+            new_rows[used + c, :] = rows[pairs.start[p] + c]
+            new_ids[used + c, :] = ids[pairs.start[p] + c]
+        pairs.start[p], pairs.room[p] = used, count
+        used += count
+    return used
+
+
 class HeapTable:
-    """Pairs by key and their rows in a pool.
+    """Pairs and their rows in a pool.
 
     Attributes:
-        key: (k,) ascending: number of the first body times the number of bodies plus that of the second.
-        start, count: (k,) rows of each pair. slide, turn: (k,), see `HeapPairs`.
+        pairs: ascending by first, then second.
         rows: (P, ROW_SIZE) and ids: (P, 3) kind and features of each. used: rows in use.
 
     """
 
     def __init__(self) -> None:
         """Nothing."""
-        self.key = np.zeros(0, np.int64)
-        self.start, self.count = np.zeros(0, np.int64), np.zeros(0, np.int64)
-        self.slide, self.turn = np.zeros(0), np.zeros(0)
+        self.pairs = empty_pairs(0)
         self.rows, self.ids = np.zeros((FIRST_ROWS, ROW_SIZE)), np.zeros((FIRST_ROWS, 3), np.int64)
         self.used = 0
 
-    def replace(self, mine: np.ndarray, key: np.ndarray) -> None:
-        """Put the pairs `key` (ascending) in the place of those marked in `mine` (k,); known ones keep what they have."""
-        every = np.union1d(self.key[~mine], key)
-        if len(self.key) and len(every):
-            at = np.minimum(np.searchsorted(self.key, every), len(self.key) - 1)
-            known = self.key[at] == every
-        else:
-            at, known = np.zeros(len(every), np.int64), np.zeros(len(every), bool)
-        for name, new in (("start", 0), ("count", 0), ("slide", 0.0), ("turn", 0.0)):
-            old = getattr(self, name)
-            fresh = np.full(len(every), new, old.dtype)
-            fresh[known] = old[at[known]]
-            setattr(self, name, fresh)
-        self.key = every
+    def replace(self, first: np.ndarray, second: np.ndarray) -> None:
+        """Let these (ascending) be the pairs; known ones keep what they have."""
+        fresh = empty_pairs(len(first))
+        fresh.first[:], fresh.second[:] = first, second
+        _carry_over(self.pairs, fresh)
+        self.pairs = fresh
 
     def make_room(self, needed: int) -> None:
         """Room for `needed` more rows; all rows may move."""
         if self.used + needed <= len(self.rows):
             return
-        total = int(self.count.sum())
-        first = np.concatenate([np.zeros(1, np.int64), np.cumsum(self.count)])[:-1]
-        at = np.repeat(self.start - first, self.count) + np.arange(total)
+        total = int(self.pairs.count.sum())
         capacity = max(len(self.rows), 2 * (total + needed))
         rows, ids = np.zeros((capacity, ROW_SIZE)), np.zeros((capacity, 3), np.int64)
-        rows[:total], ids[:total] = self.rows[at], self.ids[at]
-        self.rows, self.ids, self.used = rows, ids, total
-        self.start = first
+        self.used = _pack(self.pairs, self.rows, self.ids, rows, ids)
+        self.rows, self.ids = rows, ids

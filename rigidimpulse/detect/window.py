@@ -55,6 +55,8 @@ class Window:
         """Broad phase: the pairs whose boxes overlap in the step."""
         context = self.context
         world, course = context.world, context.state.course
+        if self.inside.any() and not np.any(world.dynamic & ~self.inside):
+            return
         box_min, box_max = context.box_min, context.box_max
         box_min[:], box_max[:] = world.static_min, world.static_max
         members = np.flatnonzero(self._moves)

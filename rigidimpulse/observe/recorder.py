@@ -20,6 +20,14 @@ def sample_path(course, i, times, first, last, position, orientation, velocity, 
         state_at(course, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
 
 
+@jit
+def _sample_all(course, bodies, times, last, written, position, orientation, velocity, angular_velocity):
+    for i in bodies:
+        if written[i] < last:
+            _sample(course, i, times, written[i], last, position, orientation, velocity, angular_velocity)
+            written[i] = last
+
+
 class Recorder:
     """Frames of n bodies in the principal frame: position (f, n, 3), orientation (f, n, 4), velocities (f, n, 3)."""
 
@@ -53,8 +61,9 @@ class Recorder:
     def flush_all(self, course, bodies: np.ndarray, time: float) -> None:
         """Write the frames of all these bodies before `time`, as `flush` does."""
         last = int(np.searchsorted(self.times, time, side="left"))
-        for i in bodies[self.written[bodies] < last].tolist():
-            self._write(course, i, last)
+        _sample_all(
+            course, bodies, self.times, last, self.written, self.position, self.orientation, self.velocity, self.angular_velocity
+        )
 
     def finish(self, course) -> None:
         """Write what is left of all bodies."""

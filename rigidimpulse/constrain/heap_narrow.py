@@ -1,0 +1,291 @@
+"""Narrow phase of heaps, with memory: what a pair's contacts were, and how its bodies lay to each other when they were found.
+
+Let m bound how far points of the pair have moved past each other since: m = |dp| + 2 r |dq|, p and q the pose of one body in the axes of
+the other, the carrier, and r its reach. Then a pair that was s apart is at least s - m apart, and is left alone while that
+is more than the margin within which contacts are looked for; contacts of touching ones are used again while m is below SAME of
+the smaller inner radius (their points are fixed in the bodies, so separations are exact, and the normal in the carrier).
+
+The margin is what the pair may come in the step, so that contacts are known before they close.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from rigidimpulse._jit import jit
+from rigidimpulse.constrain.heap_boxes import axis_normal, box_axis, edge_contact
+from rigidimpulse.constrain.heap_polyhedra import face_contacts, face_like, half_space_contacts, make_scratch
+from rigidimpulse.constrain.heap_rows import (
+    CORE_A,
+    CORE_B,
+    DYNAMIC_FRICTION,
+    FRICTION,
+    IMPULSE,
+    MEMBER,
+    OUTSIDE,
+    RESTITUTION,
+    ROUND_A,
+    ROUND_B,
+    ROW_SIZE,
+    SEPARATION,
+    SKIN,
+    STATIC_FRICTION,
+    closing_speed,
+    turned,
+    turned_back,
+)
+from rigidimpulse.rotation import product
+
+BOXES, WALL, GENERAL = 0, 1, 2
+"""Kinds of pairs: two boxes, a half space and a convex polyhedron, all others."""
+AHEAD, FARTHEST = 0.08, 2.0
+"""Contacts are looked for at least and at most that many inner radii away."""
+SAME, SAME_GENERAL = 2e-3, 0.02
+"""Part of the inner radius that touching pairs may move past each other until they are looked at again."""
+NEAR = 0.2
+"""Inner radii within which an old contact hands its impulse to a new one of other features."""
+POINTS = 4
+"""Contacts of two convex polyhedra."""
+
+
+@jit
+def in_play(part, a, b):
+    """Whether a pair is stepped."""
+    return part[a] != OUTSIDE and part[b] != OUTSIDE and (part[a] == MEMBER or part[b] == MEMBER)
+
+
+@jit
+def classify(pairs, bodies, shapes):
+    """Fill what follows from the bodies of all pairs."""
+    for p in range(pairs.first.shape[0]):
+        a, b = pairs.first[p], pairs.second[p]
+        s, t = bodies.shape[a], bodies.shape[b]
+        pairs.carrier[p] = bodies.reach[a] <= bodies.reach[b]
+        pairs.round[p] = (bodies.reach[a] if pairs.carrier[p] else bodies.reach[b]) == 0.0
+        solid_s, solid_t = shapes.face_first[s] < shapes.face_first[s + 1], shapes.face_first[t] < shapes.face_first[t + 1]
+        wall_s, wall_t = np.any(shapes.wall[s] != 0.0), np.any(shapes.wall[t] != 0.0)
+        pairs.kind[p] = GENERAL
+        if shapes.half[s, 0] > 0.0 and shapes.half[t, 0] > 0.0:
+            pairs.kind[p] = BOXES
+        elif (solid_s and wall_t) or (wall_s and solid_t):
+            pairs.kind[p] = WALL
+
+
+@jit
+def _relative_pose(position, orientation, rotation, carrier, other):
+    """The pose of the other body in the axes of the carrier."""
+    x, q = position, orientation
+    dx, dy, dz = x[other, 0] - x[carrier, 0], x[other, 1] - x[carrier, 1], x[other, 2] - x[carrier, 2]
+    turn = product(
+        q[carrier, 0], -q[carrier, 1], -q[carrier, 2], -q[carrier, 3], q[other, 0], q[other, 1], q[other, 2], q[other, 3]
+    )
+    return turned_back(rotation, carrier, dx, dy, dz), turn
+
+
+@jit
+def _motion(seen, p, is_round, reach, place, turn):
+    """m: how far points of a pair have moved past each other at most since contacts were looked for."""
+    d = (place[0] - seen[p, 0]) ** 2 + (place[1] - seen[p, 1]) ** 2 + (place[2] - seen[p, 2]) ** 2
+    if is_round:
+        return sqrt(d)
+    same = turn[0] * seen[p, 3] + turn[1] * seen[p, 4] + turn[2] * seen[p, 5] + turn[3] * seen[p, 6]
+    # |q - q'|^2 of unit quaternions, of which the one and its negative are the same rotation.
+    return sqrt(d) + 2.0 * reach * sqrt(max(2.0 - 2.0 * abs(same), 0.0))
+
+
+@jit
+def note_seen(bodies, pairs, p):
+    """Remember how the bodies of a pair lie to each other now."""
+    a, b = pairs.first[p], pairs.second[p]
+    carrier, other = (b, a) if pairs.carrier[p] else (a, b)
+    place, turn = _relative_pose(bodies.position, bodies.orientation, bodies.rotation, carrier, other)
+    pairs.seen[p, 0], pairs.seen[p, 1], pairs.seen[p, 2] = place
+    pairs.seen[p, 3], pairs.seen[p, 4], pairs.seen[p, 5], pairs.seen[p, 6] = turn
+    pairs.known[p] = True
+
+
+@jit
+def most_motion(bodies, pairs, ahead):
+    """How far, in inner radii, pairs in play that have contacts come past each other in `ahead` s, at most."""
+    part, count, most = bodies.part, pairs.count, 0.0
+    for p in range(pairs.first.shape[0]):
+        a, b = pairs.first[p], pairs.second[p]
+        if count[p] > 0 and in_play(part, a, b):
+            speed = closing_speed(bodies.position, bodies.velocity, bodies.reach, a, b, pairs.carrier[p])
+            most = max(most, ahead * speed / min(bodies.inner[a], bodies.inner[b]))
+    return most
+
+
+@jit
+def review(bodies, pairs, ahead, places, margins):
+    """Write the pairs in play whose contacts must be looked for, and their margins, m: how far they come in `ahead` s, within bounds.
+
+    Pairs that are too far apart lose their contacts. Returns the number of places (k,) and margins (k,) written.
+    """
+    part, position, orientation, rotation, velocity = bodies.part, bodies.position, bodies.orientation, bodies.rotation, bodies.velocity
+    inner, skin, radius, reach = bodies.inner, bodies.skin, bodies.radius, bodies.reach
+    seen, known, count, apart = pairs.seen, pairs.known, pairs.count, pairs.apart
+    number = 0
+    for p in range(pairs.first.shape[0]):
+        a, b, is_second = pairs.first[p], pairs.second[p], pairs.carrier[p]
+        if not in_play(part, a, b):
+            continue
+        size = min(inner[a], inner[b])
+        speed = closing_speed(position, velocity, reach, a, b, is_second)
+        margin = min(skin[a], skin[b]) + min(max(speed * ahead, AHEAD * size), FARTHEST * size)
+        far = radius[a] + radius[b] + margin
+        dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
+        if dx * dx + dy * dy + dz * dz > far * far:
+            known[p] = known[p] and count[p] == 0
+            count[p] = 0
+            continue
+        if known[p]:
+            carrier, other = (b, a) if is_second else (a, b)
+            place, turn = _relative_pose(position, orientation, rotation, carrier, other)
+            motion = _motion(seen, p, pairs.round[p], reach[other], place, turn)
+            if count[p] == 0 and apart[p] - motion > margin:
+                continue
+            if count[p] > 0 and motion <= (SAME_GENERAL if pairs.kind[p] == GENERAL else SAME) * size:
+                continue
+        places[number], margins[number] = p, margin
+        number += 1
+    return number
+
+
+@jit
+def write_row(bodies, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b, coefficients, rows, r):
+    """A new row r, without impulse, of the contact real[c] (10,) of bodies a and b, with places relative to a; carrier: whether it is b.
+
+    factor_a, factor_b: lengths of the bodies as the contact was found, parts of their true ones. Returns the separation.
+    """
+    nx, ny, nz = real[c, 6], real[c, 7], real[c, 8]
+    dx = bodies.position[b, 0] - bodies.position[a, 0]
+    dy = bodies.position[b, 1] - bodies.position[a, 1]
+    dz = bodies.position[b, 2] - bodies.position[a, 2]
+    ax, ay, az = real[c, 0] / factor_a - round_a * nx, real[c, 1] / factor_a - round_a * ny, real[c, 2] / factor_a - round_a * nz
+    bx, by, bz = (real[c, 3] - dx) / factor_b, (real[c, 4] - dy) / factor_b, (real[c, 5] - dz) / factor_b
+    bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz
+    m, t = bodies.material[a], bodies.material[b]
+    for k in range(ROW_SIZE):
+        rows[r, k] = 0.0
+    rows[r, 0], rows[r, 1], rows[r, 2] = turned_back(bodies.rotation, b if carrier else a, nx, ny, nz)
+    rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2] = turned_back(bodies.rotation, a, ax, ay, az)
+    rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2] = turned_back(bodies.rotation, b, bx, by, bz)
+    rows[r, ROUND_A], rows[r, ROUND_B] = round_a, round_b
+    rows[r, RESTITUTION], rows[r, STATIC_FRICTION] = coefficients[m, t, 0], coefficients[m, t, 1]
+    rows[r, DYNAMIC_FRICTION], rows[r, SKIN] = coefficients[m, t, 2], min(bodies.skin[a], bodies.skin[b])
+    apart = nx * (dx + (bx - ax)) + ny * (dy + (by - ay)) + nz * (dz + (bz - az))
+    rows[r, SEPARATION] = apart - (round_a + round_b) - rows[r, SKIN]
+    return rows[r, SEPARATION]
+
+
+@jit
+def hand_over(old_rows, old_ids, old, old_end, rows, ids, new, new_end, near):
+    """Give new rows the impulses of the old ones of the same features, else of one nearby with much the same normal."""
+    taken = np.zeros(old_end - old, np.bool_)
+    for nearby in range(2):
+        for c in range(new, new_end):
+            if rows[c, IMPULSE] > 0.0:
+                continue
+            for o in range(old, old_end):
+                if taken[o - old] or old_rows[o, IMPULSE] == 0.0:
+                    continue
+                cosine = rows[c, 0] * old_rows[o, 0] + rows[c, 1] * old_rows[o, 1] + rows[c, 2] * old_rows[o, 2]
+                same = ids[c, 0] == old_ids[o, 0] and ids[c, 1] == old_ids[o, 1] and ids[c, 2] == old_ids[o, 2]
+                if nearby == 1:
+                    x, y = rows[c, CORE_A] - old_rows[o, CORE_A], rows[c, CORE_A + 1] - old_rows[o, CORE_A + 1]
+                    z = rows[c, CORE_A + 2] - old_rows[o, CORE_A + 2]
+                    same = x * x + y * y + z * z < near * near
+                if not same or cosine < 0.9:
+                    continue
+                taken[o - old] = True
+                rows[c, IMPULSE] = old_rows[o, IMPULSE]
+                for k in range(FRICTION, FRICTION + 3):
+                    rows[c, k] = old_rows[o, k]
+                break
+
+
+@jit
+def _find(shapes, bodies, a, b, kind, margin, ahead, origin, between, c, scratch, real, ids):
+    """Contacts of a pair that is no general one, relative to the first body; returns their number and a bound of the gap."""
+    s, t, r, v = bodies.shape[a], bodies.shape[b], bodies.rotation, bodies.velocity
+    dx, dy, dz = between[0], between[1], between[2]
+    if kind == WALL:
+        wall_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
+        wall, w, i, sign = shapes.wall, s if wall_is_a else t, a if wall_is_a else b, 1.0 if wall_is_a else -1.0
+        nx, ny, nz = turned(r, i, wall[w, 0], wall[w, 1], wall[w, 2])
+        offset = wall[w, 3] - sign * (nx * dx + ny * dy + nz * dz)
+        solid, j = (t, b) if wall_is_a else (s, a)
+        count, least = half_space_contacts(shapes, solid, r, j, nx, ny, nz, offset, margin, sign, scratch, real, ids)
+        if wall_is_a:
+            for k in range(count):
+                for i in range(3):
+                    real[k, i] += between[i]
+                    real[k, 3 + i] += between[i]
+        return count, least
+    gap, axis = box_axis(shapes.half, s, t, r, a, b, dx, dy, dz, margin, c)
+    if gap > margin:
+        return np.int64(0), gap
+    if axis >= 6:
+        return edge_contact(shapes.half, s, t, r, a, dx, dy, dz, axis, gap, c, real, ids), gap
+    nx, ny, nz = axis_normal(axis, r, a, b, dx, dy, dz)
+    if axis < 3:
+        face = face_like(shapes, s, r, a, nx, ny, nz)
+        count = face_contacts(shapes, v, r, s, a, origin, face, t, b, between, margin, ahead, 1.0, scratch, real, ids)
+    else:
+        face = face_like(shapes, t, r, b, -nx, -ny, -nz)
+        count = face_contacts(shapes, v, r, t, b, between, face, s, a, origin, margin, ahead, -1.0, scratch, real, ids)
+    return count, gap
+
+
+@jit
+def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, places, margins, number, general):
+    """Find the contacts of `number` pairs at `places`, but for general ones, whose places among these are written to general (k,).
+
+    used: rows of the pool in use; ahead: length of the step, s; coefficients (k, k, 4) of two materials; margins (k,) m. Returns the
+    rows used, -1 where the pool is too small (then call it again), and how many general ones there are.
+    """
+    real, found = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
+    scratch = make_scratch()
+    old, old_ids = np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64)
+    origin, between, c = np.zeros(3), np.empty(3), np.empty((3, 3))
+    waiting = 0
+    for k in range(number):
+        p, margin = places[k], margins[k]
+        if pairs.kind[p] == GENERAL:
+            general[waiting] = k
+            waiting += 1
+            continue
+        a, b = pairs.first[p], pairs.second[p]
+        for i in range(3):
+            between[i] = bodies.position[b, i] - bodies.position[a, i]
+        count, gap = _find(shapes, bodies, a, b, pairs.kind[p], margin, ahead, origin, between, c, scratch, real, found)
+        if count > pairs.room[p]:
+            if used + POINTS > rows.shape[0]:
+                return np.int64(-1), waiting
+            before = pairs.start[p]
+            pairs.start[p], pairs.room[p] = used, POINTS
+            for i in range(pairs.count[p]):
+                for j in range(ROW_SIZE):
+                    rows[used + i, j] = rows[before + i, j]
+                for j in range(3):
+                    ids[used + i, j] = ids[before + i, j]
+            used += POINTS
+        start, kept = pairs.start[p], pairs.count[p]
+        for i in range(kept):
+            for j in range(ROW_SIZE):
+                old[i, j] = rows[start + i, j]
+            for j in range(3):
+                old_ids[i, j] = ids[start + i, j]
+        for i in range(count):
+            write_row(bodies, a, b, pairs.carrier[p], real, i, 0.0, 0.0, 1.0, 1.0, coefficients, rows, start + i)
+            for j in range(3):
+                ids[start + i, j] = found[i, j]
+        if count > 0 and kept > 0:
+            hand_over(old, old_ids, np.int64(0), kept, rows, ids, start, start + count, NEAR * min(bodies.inner[a], bodies.inner[b]))
+        pairs.count[p] = count
+        pairs.apart[p] = max(gap, 0.0) if count == 0 else 0.0
+        note_seen(bodies, pairs, p)
+    return used, waiting

@@ -1,0 +1,291 @@
+"""Contacts of convex polyhedra that are near or a little inside each other: separating axis, clipping, four points.
+
+The gap of two convex bodies along a unit normal n from a to b is  s(n) = min_b n.x - max_a n.x.  Its largest value over the normals
+of faces and the cross products of edges (the separating axes; Gottschalk, Lin and Manocha 1996) is the gap where a face or two edges
+are nearest, at most the gap elsewhere, and minus the depth of bodies inside each other. Where a face has it, the polygon of
+the other body that faces it most squarely is cut by its sides (Sutherland and Hodgman 1974), and of the points within
+the margin four stay: the deepest, the one farthest from it, and the ones farthest from their line on either side. Where two
+edges have it by more than EDGE_WINS of the smaller inner radius, their closest points are the contact.
+
+Contacts are written as (x, y, z on a, x, y, z on b, normal, gap) in world axes relative to the position of a.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimpulse._jit import jit
+from rigidimpulse.constrain.heap_rows import turned, turned_back
+from rigidimpulse.geometry import HALF_SPACE, Geometry
+
+EDGE_WINS = 2e-3
+MOST_CORNERS = 64
+"""Corners of a polygon that is cut."""
+FROM_EDGE = 1 << 20
+"""Added to the numbers of corners that clipping made."""
+
+
+class Scratch(NamedTuple):
+    """What contacts are worked out in."""
+
+    polygon: np.ndarray  # (MOST_CORNERS, 3) m
+    ids: np.ndarray  # (MOST_CORNERS,)
+    spare: np.ndarray  # (MOST_CORNERS, 3)
+    spare_ids: np.ndarray  # (MOST_CORNERS,)
+    ways: np.ndarray  # (MOST_CORNERS, 3) m
+    height: np.ndarray  # (MOST_CORNERS,) m
+    chosen: np.ndarray  # (4,)
+
+
+@jit
+def make_scratch():
+    """Room for one pair."""
+    return Scratch(
+        np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64), np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64),
+        np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS), np.empty(4, np.int64),
+    )  # fmt: skip
+
+
+class Polyhedra(NamedTuple):
+    """Faces of the s shapes that are convex polyhedra around their centre of mass, F in all, with L corners."""
+
+    half: np.ndarray  # (s, 3) m, half the sides of boxes along the axes, 0 for others
+    corner_first: np.ndarray  # (s+1,)
+    corner: np.ndarray  # (V, 3) m
+    face_first: np.ndarray  # (s+1,)
+    plane: np.ndarray  # (F, 4) unit outward normal and offset, m
+    loop_first: np.ndarray  # (F+1,)
+    loop: np.ndarray  # (L,) corners of each face, counter-clockwise seen from outside
+    wall: np.ndarray  # (s, 4) unit normal and offset of shapes that are one half space, 0 for others
+
+
+def make_polyhedra(geometry: Geometry, convex: np.ndarray) -> Polyhedra:
+    """Tables of the shapes that are `convex` (s,) bool; the others have no faces."""
+    half, wall = np.zeros((len(convex), 3)), np.zeros((len(convex), 4))
+    planes: list[np.ndarray] = []
+    loops: list[list[int]] = []
+    corners: list[np.ndarray] = []
+    firsts: tuple[list[int], ...] = ([0], [0])
+    for s, is_convex in enumerate(convex):
+        p = int(geometry.shape_first[s])
+        if geometry.shape_first[s + 1] == p + 1 and geometry.kind[p] == HALF_SPACE:
+            wall[s] = geometry.frame[p, :4]
+        if is_convex:
+            low = int(geometry.vertex_first[p])
+            vertex = geometry.vertex[low : geometry.vertex_first[p + 1]]
+            before = sum(map(len, corners))
+            for normal, loop in _faces(geometry, p):
+                planes.append(np.append(normal, (vertex[loop] @ normal).max()))
+                loops.append([before + v for v in loop])
+            corners.append(vertex)
+            size = vertex.max(0)
+            if len(vertex) == 8 and np.allclose(np.abs(vertex), size, rtol=1e-12, atol=0.0):
+                half[s] = size
+        for first, number in zip(firsts, (sum(map(len, corners)), len(planes)), strict=True):
+            first.append(number)
+    return Polyhedra(
+        half=half, corner_first=np.array(firsts[0]), corner=np.concatenate([*corners, np.zeros((0, 3))]), face_first=np.array(firsts[1]),
+        plane=np.array(planes).reshape(-1, 4), loop_first=np.cumsum([0, *map(len, loops)]),
+        loop=np.array([v for loop in loops for v in loop], np.int64), wall=wall,
+    )  # fmt: skip
+
+
+def _faces(geometry: Geometry, p: int) -> list[tuple[np.ndarray, list[int]]]:
+    """Unit normals and corners, counted from the primitive's first vertex, of the faces of a convex primitive."""
+    low = int(geometry.vertex_first[p])
+    left, out = list(range(int(geometry.triangle_first[p]), int(geometry.triangle_first[p + 1]))), []
+    while left:
+        normal = geometry.triangle_normal[left[0]]
+        flat = [t for t in left if float(geometry.triangle_normal[t] @ normal) > 1.0 - 1e-10]
+        left = [t for t in left if t not in flat]
+        out.append((normal, _loop(flat, geometry, low)))
+    return out
+
+
+def _loop(flat: list[int], geometry: Geometry, low: int) -> list[int]:
+    """Corners of the polygon that triangles of one plane make, in order."""
+    halves = {(int(t[k]) - low, int(t[(k + 1) % 3]) - low) for t in geometry.triangle[flat] for k in range(3)}
+    following = {tail: head for tail, head in halves if (head, tail) not in halves}
+    start = min(following)
+    loop, v = [start], following[start]
+    while v != start:
+        loop.append(v)
+        v = following[v]
+    return loop
+
+
+@jit
+def face_like(shapes, s, r, i, nx, ny, nz):
+    """The face of shape s turned by r[i] whose normal is most like n."""
+    a, b, c = turned_back(r, i, nx, ny, nz)
+    best, face = -inf, shapes.face_first[s]
+    for f in range(shapes.face_first[s], shapes.face_first[s + 1]):
+        cosine = a * shapes.plane[f, 0] + b * shapes.plane[f, 1] + c * shapes.plane[f, 2]
+        if cosine > best:
+            best, face = cosine, f
+    return face
+
+
+@jit
+def _cut(polygon, ids, count, spare, spare_ids, px, py, pz, offset, side):
+    """Keep the part of the polygon with p.x <= offset; returns its number of corners."""
+    kept = np.int64(0)
+    for k in range(count):
+        j = k - 1 if k > 0 else count - 1
+        x0, y0, z0 = polygon[j, 0], polygon[j, 1], polygon[j, 2]
+        x1, y1, z1 = polygon[k, 0], polygon[k, 1], polygon[k, 2]
+        before, after = px * x0 + py * y0 + pz * z0 - offset, px * x1 + py * y1 + pz * z1 - offset
+        if (before > 0.0) != (after > 0.0) and kept < MOST_CORNERS:
+            t = before / (before - after)
+            spare[kept, 0], spare[kept, 1], spare[kept, 2] = x0 + t * (x1 - x0), y0 + t * (y1 - y0), z0 + t * (z1 - z0)
+            spare_ids[kept] = FROM_EDGE * (side + 1) + (ids[j] if before > 0.0 else ids[k]) % FROM_EDGE
+            kept += 1
+        if after <= 0.0 and kept < MOST_CORNERS:
+            spare[kept, 0], spare[kept, 1], spare[kept, 2] = x1, y1, z1
+            spare_ids[kept] = ids[k]
+            kept += 1
+    for k in range(kept):
+        polygon[k, 0], polygon[k, 1], polygon[k, 2] = spare[k, 0], spare[k, 1], spare[k, 2]
+        ids[k] = spare_ids[k]
+    return kept
+
+
+@jit
+def four_of(points, height, count, chosen):
+    """Write the places of the points (count, 3) that carry all the others' load to chosen (4,); returns their number."""
+    deepest = 0
+    for k in range(1, count):
+        if height[k] < height[deepest]:
+            deepest = k
+    farthest, distance = deepest, 0.0
+    for k in range(count):
+        d = (points[k, 0] - points[deepest, 0]) ** 2 + (points[k, 1] - points[deepest, 1]) ** 2 + (points[k, 2] - points[deepest, 2]) ** 2
+        if d > distance:
+            farthest, distance = k, d
+    chosen[0] = deepest
+    if distance == 0.0:
+        return np.int64(1)
+    chosen[1] = farthest
+    ex, ey = points[farthest, 0] - points[deepest, 0], points[farthest, 1] - points[deepest, 1]
+    ez = points[farthest, 2] - points[deepest, 2]
+    # Twice the area of the triangle that a point makes with the first two, signed by a first one that has any.
+    mx, my, mz, least = 0.0, 0.0, 0.0, 1e-9 * distance
+    high, low, most, lowest = -1, -1, least, -least
+    for k in range(count):
+        x, y, z = points[k, 0] - points[deepest, 0], points[k, 1] - points[deepest, 1], points[k, 2] - points[deepest, 2]
+        cx, cy, cz = ey * z - ez * y, ez * x - ex * z, ex * y - ey * x
+        area = sqrt(cx * cx + cy * cy + cz * cz)
+        if area <= least:
+            continue
+        if mx == 0.0 and my == 0.0 and mz == 0.0:
+            mx, my, mz = cx / area, cy / area, cz / area
+        signed = mx * cx + my * cy + mz * cz
+        if signed > most:
+            high, most = k, signed
+        elif signed < lowest:
+            low, lowest = k, signed
+    number = np.int64(2)
+    for k in (high, low):
+        if k >= 0:
+            chosen[number] = k
+            number += 1
+    return number
+
+
+@jit
+def _coming(polygon, count, velocity, i, x, j, y, ahead, ways):
+    """How far (m) each corner, moving with body j at y, comes in `ahead` s as seen from body i at x, into ways (count, 3)."""
+    a, b = 8 * i, 8 * j
+    for k in range(count):
+        rx, ry, rz = polygon[k, 0] - x[0], polygon[k, 1] - x[1], polygon[k, 2] - x[2]
+        sx, sy, sz = polygon[k, 0] - y[0], polygon[k, 1] - y[1], polygon[k, 2] - y[2]
+        wx, wy, wz, ox, oy, oz = velocity[a + 3], velocity[a + 4], velocity[a + 5], velocity[b + 3], velocity[b + 4], velocity[b + 5]
+        ways[k, 0] = ahead * (velocity[b] - velocity[a] + (oy * sz - oz * sy) - (wy * rz - wz * ry))
+        ways[k, 1] = ahead * (velocity[b + 1] - velocity[a + 1] + (oz * sx - ox * sz) - (wz * rx - wx * rz))
+        ways[k, 2] = ahead * (velocity[b + 2] - velocity[a + 2] + (ox * sy - oy * sx) - (wx * ry - wy * rx))
+
+
+@jit
+def face_contacts(shapes, velocity, r, s, i, x, face, t, j, y, margin, ahead, sign, scratch, real, out_ids):
+    """Contacts of a face of shape s at (x, r[i]) with the polygon of shape t at (y, r[j]) that faces it; returns their number.
+
+    sign: 1 where the face is a's, else -1; positions are relative to a. What is beside the face and comes over it in `ahead` s counts.
+    """
+    polygon, ids, spare, spare_ids, ways, height, chosen = scratch
+    nx, ny, nz = turned(r, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
+    other = face_like(shapes, t, r, j, -nx, -ny, -nz)
+    count = np.int64(0)
+    for k in range(shapes.loop_first[other], min(shapes.loop_first[other + 1], shapes.loop_first[other] + MOST_CORNERS)):
+        v = shapes.loop[k]
+        vx, vy, vz = turned(r, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
+        polygon[count, 0], polygon[count, 1], polygon[count, 2] = vx + (y[0] - x[0]), vy + (y[1] - x[1]), vz + (y[2] - x[2])
+        ids[count] = v
+        count += 1
+    _coming(polygon, count, velocity, i, x, j, y, ahead, ways)
+    first, last, corners = shapes.loop_first[face], shapes.loop_first[face + 1], count
+    for k in range(first, last):
+        v, w = shapes.loop[k], shapes.loop[k + 1 if k + 1 < last else first]
+        ax, ay, az = turned(r, i, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
+        bx, by, bz = turned(r, i, shapes.corner[w, 0], shapes.corner[w, 1], shapes.corner[w, 2])
+        ex, ey, ez = bx - ax, by - ay, bz - az
+        px, py, pz = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
+        offset, nearer = px * ax + py * ay + pz * az, 0.0
+        for c in range(corners):
+            nearer = max(nearer, -(px * ways[c, 0] + py * ways[c, 1] + pz * ways[c, 2]))
+        count = _cut(polygon, ids, count, spare, spare_ids, px, py, pz, offset + nearer, k - first)
+    kept = 0
+    for k in range(count):
+        gap = nx * polygon[k, 0] + ny * polygon[k, 1] + nz * polygon[k, 2] - shapes.plane[face, 3]
+        if gap <= margin:
+            polygon[kept, 0], polygon[kept, 1], polygon[kept, 2] = polygon[k, 0], polygon[k, 1], polygon[k, 2]
+            height[kept], ids[kept] = gap, ids[k]
+            kept += 1
+    if kept == 0:
+        return np.int64(0)
+    number = four_of(polygon, height, kept, chosen)
+    at_a, at_b = (3, 0) if sign < 0.0 else (0, 3)
+    for c in range(number):
+        k = chosen[c]
+        gap = height[k]
+        for m in range(3):
+            n = nx if m == 0 else (ny if m == 1 else nz)
+            p = polygon[k, m] + x[m]
+            real[c, at_a + m], real[c, at_b + m] = p - gap * n, p
+            real[c, 6 + m] = sign * n
+        real[c, 9] = gap
+        out_ids[c, 0], out_ids[c, 1], out_ids[c, 2] = face, other, ids[k]
+    return number
+
+
+@jit
+def half_space_contacts(shapes, s, r, j, nx, ny, nz, offset, margin, sign, scratch, real, out_ids):
+    """Contacts of the solid n.x <= offset (relative to the shape's position) with shape s turned by r[j]; their number and the gap.
+
+    sign: 1 where the half space is a, else -1; points are relative to the shape's position.
+    """
+    polygon, ids, height, chosen = scratch.polygon, scratch.ids, scratch.height, scratch.chosen
+    count, least = 0, inf
+    for v in range(shapes.corner_first[s], shapes.corner_first[s + 1]):
+        x, y, z = turned(r, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
+        gap = nx * x + ny * y + nz * z - offset
+        least = min(least, gap)
+        if gap <= margin and count < MOST_CORNERS:
+            polygon[count, 0], polygon[count, 1], polygon[count, 2] = x, y, z
+            height[count], ids[count] = gap, v
+            count += 1
+    if count == 0:
+        return np.int64(0), least
+    number = four_of(polygon, height, count, chosen)
+    on_plane, on_shape = (0, 3) if sign > 0.0 else (3, 0)
+    for c in range(number):
+        k = chosen[c]
+        for i in range(3):
+            n = nx if i == 0 else (ny if i == 1 else nz)
+            real[c, on_plane + i], real[c, on_shape + i] = polygon[k, i] - height[k] * n, polygon[k, i]
+            real[c, 6 + i] = sign * n
+        real[c, 9] = height[k]
+        out_ids[c, 0], out_ids[c, 1], out_ids[c, 2] = -1, -1, ids[k]
+    return number, least
