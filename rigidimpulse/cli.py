@@ -143,6 +143,24 @@ def hardcases(names: tuple[str, ...], output: str, limit: float) -> None:
 
 
 @main.command()
+@click.option("--scaling", is_flag=True, required=True, help="Time scenes of 10 to 20,000 bodies.")
+@click.option("--most", type=int, default=20_000, show_default=True, help="Bodies of the largest scene.")
+def study(scaling: bool, most: int) -> None:
+    """Measure how the cost of impacts and of steps grows with the number of bodies: exponents p of cost ~ n^p."""
+    from rigidimpulse.study.scaling import SCENES, exponent, measure_scaling, sizes
+
+    for kind in SCENES:
+        rows = [("bodies", "s in all", f"{SCENES[kind].unit}s", f"us a {SCENES[kind].unit}", "")]
+        points = []
+        for point in measure_scaling(kind, sizes(kind, most)):
+            points.append(point)
+            rows.append((f"{point.number:,}", f"{point.seconds:.2f}", f"{point.count:,}", f"{1e6 * point.cost:.1f}", ""))
+        click.echo(f"{kind}: {SCENES[kind].description}")
+        _print_table(rows, right=(0, 1, 2, 3))
+        click.echo(f"exponent of the cost a {SCENES[kind].unit}{SCENES[kind].note}: {exponent(points):+.2f}")
+
+
+@main.command()
 @click.argument("scene")
 @click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html or .npz.")
 @run_options

@@ -13,6 +13,7 @@ from rigidimpulse.detect.broadphase import overlapping_pairs
 from rigidimpulse.detect.groups import MARGIN, Group, touching_groups
 from rigidimpulse.detect.pair_table import MAX_REPEATS, Pairs, new_pairs, path_boxes, renew_pairs
 from rigidimpulse.integrate.course import FIXED
+from rigidimpulse.sweep.ball_time import is_closed_form
 
 STUCK_STEP = 1e-3
 """Part of delta by which the gap of contact is lowered after a contact without consequence."""
@@ -85,14 +86,26 @@ class Window:
     def is_plain(self, time: float) -> bool:
         """Whether nothing in the window asks to be remembered: no body held or called, no pair met more than once or without an impulse."""
         state = self.context.state
+        lowered = np.flatnonzero(self.touch != self.least)
+        if len(lowered) and not self._is_closed_form(lowered):
+            return False
         return not (
             state.under_contact.any()
             or self.wake.min() < np.inf
             or self.inside.any()
             or self.tries.any()
             or self.repeats.any()
-            or (self.touch > self.least).any()
             or (self.time <= time).any()
+        )
+
+    def _is_closed_form(self, places: np.ndarray) -> bool:
+        """Whether pairs are balls, or balls and planes that stand, that were in contact at gap 0: that leaves no trace in their times."""
+        detector, course = self.context.detector, self.context.state.course
+        return all(
+            is_closed_form(
+                course, detector.sweep_scratch, a, b, detector.shape_of_body[a], detector.shape_of_body[b], self.touch[p]
+            )
+            for p, a, b in zip(places, self.a[places], self.b[places], strict=True)
         )
 
     def touching(self, time: float, bodies: np.ndarray) -> tuple[list[Group], np.ndarray]:

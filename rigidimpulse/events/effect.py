@@ -29,7 +29,7 @@ class EventKernel:
         reason = why_not(world)
         if reason:
             return Skip(reason)
-        count = int(np.count_nonzero(world.ball & world.dynamic))
+        count = int(np.count_nonzero((kinds(world) == BALL) & world.dynamic))
         return Bound(None, f"impacts of {count} balls with each other and with planes, as long as nothing lasting touches")
 
 
@@ -63,4 +63,5 @@ def kinds(world) -> np.ndarray:
     first = geometry.shape_first[shape]
     plane = (geometry.kind[first] == HALF_SPACE) & (geometry.shape_first[shape + 1] == first + 1) & ~world.moving & ~world.dynamic
     driven = np.array([body.keyframes is not None for body in world.scene.bodies], bool)
-    return np.where(world.ball, BALL, np.where(plane & ~driven, PLANE, OTHER))
+    ball = world.ball & np.all(world.inertia == world.inertia[:, :1], axis=1)
+    return np.where(ball, BALL, np.where(plane & ~driven, PLANE, OTHER))

@@ -18,9 +18,10 @@ from rigidimpulse._jit import jit
 from rigidimpulse.events.effect import ARRIVED, GO_ON, NO_ROOM, STEP
 from rigidimpulse.events.impact import simple_impact
 from rigidimpulse.events.layout import AT_BOUNDARY, AT_ONCE
+from rigidimpulse.events.motion import write_frames
 from rigidimpulse.events.paths import place_planes, write_path
 from rigidimpulse.events.table import fill_table, renew, time_waiting, touches_more
-from rigidimpulse.integrate.course import FIXED, state_at
+from rigidimpulse.integrate.course import FIXED
 
 LONGEST = 4096
 """Steps in a window at most."""
@@ -28,7 +29,7 @@ FEW, MANY = 1.5, 6.0
 """Pairs a body below which windows grow, above which they shrink."""
 
 
-_NO_PLANE = np.int64(-1)
+_NO_PLANE, _FIRST = np.int64(-1), np.int64(0)
 
 
 class Clock(NamedTuple):
@@ -97,23 +98,6 @@ def _fly_window(fixed, motion, table, book, rebounds, clock):
 
 
 @jit
-def _write_frames(course, book, time):
-    """Write the frames of all bodies before `time`, frame by frame: that is the order in which they lie in memory."""
-    first, last = book.written.min(), np.int64(0)
-    while last < len(book.times) and book.times[last] < time:
-        last += 1
-    for f in range(first, last):
-        for i in range(len(book.written)):
-            if book.written[i] <= f:
-                state_at(
-                    course, i, book.times[f], book.position[f, i], book.orientation[f, i], book.velocity[f, i],
-                    book.angular_velocity[f, i],
-                )  # fmt: skip
-    for i in range(len(book.written)):
-        book.written[i] = max(book.written[i], last)
-
-
-@jit
 def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window, live, window_end):
     """Carry all bodies from `now` towards `end` [s].
 
@@ -138,7 +122,7 @@ def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window, liv
                 return NO_ROOM, clock.now, clock.at_boundary, clock.number, window, clock.end
         pairs = table.count[0] - len(table.paths)
         how, clock = _fly_window(fixed, motion, table, book, rebounds, clock)
-        _write_frames(course, book, clock.now)
+        write_frames(course, book, _FIRST, len(table.paths), clock.now)
         if how == ARRIVED and pairs <= FEW * moving:
             window = min(2 * window, LONGEST)
         elif how == ARRIVED and pairs > MANY * moving:

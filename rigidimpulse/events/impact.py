@@ -21,14 +21,12 @@ from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.closed_form import plane_in_frame
 from rigidimpulse.detect.features import along, dot, moved, relative_pose, turned
 from rigidimpulse.detect.groups import MARGIN
-from rigidimpulse.detect.touching import _point_acceleration, bring
 from rigidimpulse.detect.window import INSTANT
 from rigidimpulse.events.layout import PLANE
+from rigidimpulse.events.motion import bring_ball, take_free_course, write_frames
 from rigidimpulse.events.paths import GAP, KIND, MOVES, RADIUS
-from rigidimpulse.integrate.course import FREE, take
 from rigidimpulse.observe.energy import _kinetic
 from rigidimpulse.observe.events import write_impacts
-from rigidimpulse.observe.recorder import sample_path
 from rigidimpulse.respond.impulse import relative_velocity, resolve_contact, speed_scale
 from rigidimpulse.respond.response import SLOW
 from rigidimpulse.sweep.ball_time import DEEPEST
@@ -39,7 +37,7 @@ _CLEAR = 2.0
 """How many times faster than what would be held a simple impact is."""
 _ROUND_OFF = 1e-9
 """Part of the acceleration on a curved path that rounding may add to what presses a contact."""
-_FREE, _NONE, _ONE = np.int64(FREE), np.int64(0), np.int64(1)
+_NONE, _ONE = np.int64(0), np.int64(1)
 
 
 @jit
@@ -112,8 +110,9 @@ def _contact(fixed, motion, contacts, paths, planes, a, b, plane, margin):
 def _slow(fixed, motion, contacts, radius, delta):
     """A speed of approach [m/s] that is surely more than what would be held or counts as none."""
     a, b, n = contacts.body_a[0], contacts.body_b[0], contacts.normal[0]
-    press = _point_acceleration(motion.acceleration, motion.angular_acceleration, a, contacts.arm_a[0], n)
-    press -= _point_acceleration(motion.acceleration, motion.angular_acceleration, b, contacts.arm_b[0], n)
+    press = 0.0
+    for k in range(3):
+        press += n[k] * (motion.course.acceleration[a, k] - motion.course.acceleration[b, k])
     if not (fixed.dynamic[a] and fixed.dynamic[b]):
         for i in (a, b):
             pull = fixed.steady[i]
@@ -121,21 +120,6 @@ def _slow(fixed, motion, contacts, radius, delta):
     scale = speed_scale(motion.now, contacts)
     press = max(press, 0.0) + _ROUND_OFF * scale * scale / radius
     return _CLEAR * sqrt(2.0 * press * delta) * (1.0 + SLOW) + _CLEAR * _APPROACH * scale
-
-
-@jit
-def _depart(fixed, motion, book, i, time):
-    """Body i takes a free course at `time`; its frames before are written."""
-    first = last = book.written[i]
-    while last < len(book.times) and book.times[last] < time:
-        last += 1
-    if last > first:
-        sample_path(
-            motion.course, i, book.times, first, last, book.position, book.orientation, book.velocity, book.angular_velocity
-        )
-        book.written[i] = last
-    none = np.zeros(3)
-    take(motion.course, i, time, motion.now, fixed.steady[i], none, none, none, _FREE)
 
 
 @jit
@@ -182,7 +166,7 @@ def simple_impact(fixed, motion, book, rebounds, paths, planes, a, b, plane, tim
     for i in (a, b):
         if fixed.dynamic[i] and paths[i, MOVES] == 0.0:
             return False
-        bring(motion.course, i, time, motion.now, motion.rotation, motion.acceleration, motion.angular_acceleration)
+        bring_ball(motion, i, time)
     if not _contact(fixed, motion, book.contacts, paths, planes, a, b, plane, MARGIN * delta):
         return False
     if book.contacts.gap[0] < -0.5 * DEEPEST * radius:
@@ -209,5 +193,6 @@ def simple_impact(fixed, motion, book, rebounds, paths, planes, a, b, plane, tim
     book.count[0] = at + 1
     remember(rebounds, key, time, book.log[0, 6], _NONE)
     for i in members:
-        _depart(fixed, motion, book, i, time)
+        write_frames(motion.course, book, i, i + 1, time)
+        take_free_course(motion, i, time, fixed.steady[i])
     return True

@@ -12,7 +12,7 @@ from rigidimpulse.integrate.course import Course
 from rigidimpulse.respond.impulse import BodyState, Contacts
 
 BALL, PLANE, OTHER = (np.int64(kind) for kind in range(3))
-"""Kinds of bodies: one sphere about its centre of mass; one half space that stands; anything else."""
+"""Kinds of bodies: one sphere about its centre of mass, with equal moments of inertia; one half space that stands; anything else."""
 
 
 class Fixed(NamedTuple):
@@ -37,8 +37,6 @@ class Motion(NamedTuple):
     course: Course
     now: BodyState
     rotation: np.ndarray  # (n, 3, 3)
-    acceleration: np.ndarray  # (n, 3) m/s2
-    angular_acceleration: np.ndarray  # (n, 3) rad/s2
 
 
 class Table(NamedTuple):

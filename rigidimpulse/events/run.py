@@ -41,7 +41,7 @@ class EventRun:
         )  # fmt: skip
         self._paths, self._planes = _constants(world)
         state = context.state
-        self._motion = Motion(state.course, state.now, state.rotation, context.acceleration, context.angular_acceleration)
+        self._motion = Motion(state.course, state.now, state.rotation)
         self._pairs, self._rows = ROOM + world.num_bodies, ROOM
         self._table, self._book = self._make_table(), self._make_book()
         self._rebounds, self._known = make_rebounds(2 * ROOM), 0
