@@ -24,7 +24,7 @@ def sample_path(course, i, times, first, last, position, orientation, velocity, 
 def _sample_all(course, bodies, times, last, written, position, orientation, velocity, angular_velocity):
     for i in bodies:
         if written[i] < last:
-            _sample(course, i, times, written[i], last, position, orientation, velocity, angular_velocity)
+            sample_path(course, i, times, written[i], last, position, orientation, velocity, angular_velocity)
             written[i] = last
 
 
