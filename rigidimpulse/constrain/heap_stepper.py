@@ -41,7 +41,7 @@ COLUMN = 20.0
 PRESSED = 0.25
 LEAST_SUB_STEPS, MOST_SUB_STEPS = 16, 256
 """Sub-steps in a whole step."""
-MOTION, MOST_PARTS = 0.1, 4
+MOTION, MOST_PARTS = 0.05, 8
 """Inner radii that touching bodies may come past each other until contacts are looked at again; how often at most in a step."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
@@ -209,7 +209,8 @@ class HeapStepper:
         if number > len(self._batches.points):
             room = 2 * number
             record = aligned((FIELDS * room * width + ROW - 1) // ROW)
-            self._batches = Batches(record, *np.zeros((3, room * width), np.int64), np.zeros(room, np.int64))
+            first, second, patch = np.zeros((3, room * width), np.int64)
+            self._batches = Batches(record, first, second, patch, np.zeros(room, np.int64))
         fill_batches(width, bodies, table.pairs, self._patches, count, table.rows, self._batches, number)
         return number
 
