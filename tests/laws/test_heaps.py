@@ -212,7 +212,7 @@ def box_depth(x: np.ndarray, r: np.ndarray, half: float) -> float:
 
 def test_boxes_hardly_sink_into_each_other_on_the_way():
     # A fall at up to 7 m/s, 10 rad/s: contacts are looked at up to eight times a step, so soft contact eats its skin (2 mm) and at worst as
-    # much again (measured: nothing inside). Looked at once a step boxes are 15 mm inside each other, without contacts ahead of time 0.1 m.
+    # much again (measured: 1 mm inside). Looked at once a step boxes are 15 mm inside each other, without contacts ahead of time 0.1 m.
     from rigidimpulse.gallery.pile import pile
     from rigidimpulse.rotation import to_matrix
 
