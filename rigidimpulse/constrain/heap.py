@@ -14,136 +14,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse._jit import jit
 from rigidimpulse.constrain.energy_guard import note_arrival
+from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_fly, mark_slow, most_stray
 from rigidimpulse.constrain.heap_islands import FAST, SPIN, TALL, islands, refusals, support_levels
 from rigidimpulse.constrain.heap_stepper import HeapStepper, Outcome
 from rigidimpulse.detect.groups import Group, empty_contacts
-from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, world_inverse_inertia
-from rigidimpulse.integrate.course import FIXED, FREE, STEPPED, begin, state_at
+from rigidimpulse.detect.touching import bring_all, contacts_of_pairs
+from rigidimpulse.integrate.course import FIXED, STEPPED
 from rigidimpulse.integrate.flight import book_contact_work
 from rigidimpulse.observe.energy import mechanical_energy
 from rigidimpulse.plan import Bound, Skip
-from rigidimpulse.rotation import product, quaternion_to_matrix
 
-CALM, PLAY, REST = 0.05, 0.5, 3.0
+REST = 3.0
+"""For how long members must have been calm, in sqrt(r / g), see `heap_courses`."""
 LEAVING = 0.1
 """Part of its speed at which a fast body must leave a heap that it has hit to be no part of it."""
 MOST_PIECES = 4
 """Parts of a step at most, between which a heap's courses begin anew."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the heap that comes near it."""
-
-
-@jit
-def _arrive(course, members, time, steady, bodies, rotation, acceleration, angular_acceleration):
-    """End the courses of members at `time`, bring them there, and let them go straight on; steady (n, 3) m/s2 is what pulls them."""
-    for i in members:
-        state_at(course, i, time, bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i])
-        quaternion_to_matrix(bodies.orientation[i], rotation[i])
-        world_inverse_inertia(rotation[i], course.inertia[i], bodies.inv_inertia[i])
-        course.start[i], course.stepped[i, 12] = time, 1.0
-        for c in range(4):
-            course.orientation[i, c] = bodies.orientation[i, c]
-        for c in range(3):
-            course.position[i, c] = bodies.position[i, c]
-            course.velocity[i, c] = course.stepped[i, c] = bodies.velocity[i, c]
-            course.angular_velocity[i, c] = course.stepped[i, 3 + c] = bodies.angular_velocity[i, c]
-            course.stepped[i, 6 + c] = course.stepped[i, 9 + c] = 0.0
-            acceleration[i, c], angular_acceleration[i, c] = steady[i, c], 0.0
-        begin(course, i)
-
-
-@jit
-def _let_fly(course, members, steady):
-    """Let members that have arrived fly freely from where they are."""
-    for i in members:
-        course.mode[i] = FREE
-        for c in range(3):
-            course.acceleration[i, c] = steady[i, c]
-        begin(course, i)
-
-
-@jit
-def _mark_slow(bodies, inner, farthest, fastest, member):
-    """Unmark members (n,) that move farther than `farthest` 1/s of their inner radius, or spin faster than `fastest` rad/s."""
-    for i in range(member.shape[0]):
-        if not member[i]:
-            continue
-        speed, spin = 0.0, 0.0
-        for c in range(3):
-            speed += bodies.velocity[i, c] ** 2
-            spin += bodies.angular_velocity[i, c] ** 2
-        member[i] = np.sqrt(speed) <= farthest * inner[i] and np.sqrt(spin) <= fastest
-
-
-@jit
-def _most_stray(bodies, members, pressed, reach, skin):
-    """Largest w sqrt(r / (4 skin)) of the members that contacts act on, 1/s."""
-    most = 0.0
-    for i in members:
-        if not pressed[i]:
-            continue
-        spin = 0.0
-        for c in range(3):
-            spin += bodies.angular_velocity[i, c] ** 2
-        most = max(most, np.sqrt(spin * reach[i] / (4.0 * skin[i])))
-    return most
-
-
-@jit
-def _count_calm(members, position, orientation, velocity, strength, inner, skin, length, stood, calm):
-    """Add `length` s to the calm of members (k,) that have hardly moved from where they stood (n, 7); start anew that of the others."""
-    for k in range(members.shape[0]):
-        i = members[k]
-        moved, turned, speed, spin = 0.0, 0.0, 0.0, 0.0
-        for c in range(3):
-            moved += (position[k, c] - stood[i, c]) ** 2
-            speed += velocity[k, c] ** 2
-            spin += velocity[k, 3 + c] ** 2
-        for c in range(4):
-            turned += (orientation[k, c] - stood[i, 3 + c]) ** 2
-        play = PLAY * skin[i]
-        if (
-            np.sqrt(moved) <= play
-            and 2.0 * inner[i] * np.sqrt(turned) <= play
-            and np.sqrt(speed) + inner[i] * np.sqrt(spin) <= CALM * np.sqrt(strength[i] * inner[i])
-        ):
-            calm[i] += length
-            continue
-        calm[i] = 0.0
-        for c in range(3):
-            stood[i, c] = position[k, c]
-        for c in range(4):
-            stood[i, 3 + c] = orientation[k, c]
-
-
-@jit
-def _depart(course, members, time, length, bodies, position, orientation, velocity):
-    """Courses from the present poses to the given ones (k, 3), (k, 4), where the velocities are (k, 6)."""
-    for k in range(members.shape[0]):
-        i = members[k]
-        a, b = bodies.orientation[i], orientation[k]
-        q0, q1, q2, q3 = product(b[0], b[1], b[2], b[3], a[0], -a[1], -a[2], -a[3])
-        if q0 < 0.0:
-            q0, q1, q2, q3 = -q0, -q1, -q2, -q3
-        sine = np.sqrt(q1 * q1 + q2 * q2 + q3 * q3)
-        factor = 2.0 * np.arctan2(sine, q0) / (sine * length) if sine > 0.0 else 0.0
-        course.start[i], course.mode[i] = time, STEPPED
-        course.angular_velocity[i, 0] = factor * q1
-        course.angular_velocity[i, 1] = factor * q2
-        course.angular_velocity[i, 2] = factor * q3
-        for c in range(3):
-            course.position[i, c] = bodies.position[i, c]
-            course.velocity[i, c] = (position[k, c] - bodies.position[i, c]) / length
-            course.acceleration[i, c] = course.torque[i, c] = 0.0
-            course.stepped[i, c], course.stepped[i, 3 + c] = bodies.velocity[i, c], bodies.angular_velocity[i, c]
-            course.stepped[i, 6 + c] = velocity[k, c] - bodies.velocity[i, c]
-            course.stepped[i, 9 + c] = velocity[k, 3 + c] - bodies.angular_velocity[i, c]
-        for c in range(4):
-            course.orientation[i, c] = a[c]
-        course.stepped[i, 12] = length
-        begin(course, i)
 
 
 @dataclass(frozen=True)
@@ -224,7 +113,7 @@ class Heaps:
         self._end_courses(context, np.flatnonzero(ended), time)
         chosen = self._choose(context, window, ended) if window.end > time else np.zeros_like(ended)
         left = np.flatnonzero(ended & ~chosen & (course.mode == STEPPED))
-        _let_fly(course, left, world.steady_acceleration)
+        let_fly(course, left, world.steady_acceleration)
         self._taken &= chosen
         window.inside |= chosen
 
@@ -262,7 +151,7 @@ class Heaps:
     def _leave_out_fast(self, context, member: np.ndarray) -> None:
         """Unmark those that are too fast for sub-steps."""
         h = self.stepper.sub_step(np.flatnonzero(context.world.dynamic))
-        _mark_slow(context.state.now, self.stepper.inner, FAST / h, SPIN / context.world.accuracy.step, member)
+        mark_slow(context.state.now, self.stepper.inner, FAST / h, SPIN / context.world.accuracy.step, member)
 
     def _near(self, context, member: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray]:
         other = ~member & ~self._excluded(context)
@@ -337,7 +226,7 @@ class Heaps:
             return
         state, world = context.state, context.world
         context.recorder.flush_all(state.course, members, time)
-        _arrive(
+        arrive(
             state.course, members, time, world.steady_acceleration, state.now, state.rotation, context.acceleration,
             context.angular_acceleration,
         )  # fmt: skip
@@ -354,7 +243,7 @@ class Heaps:
         """Book what the steps under way take until `time`, the end of the run."""
         members = np.flatnonzero(context.state.course.mode == STEPPED)
         self._end_courses(context, members, time)
-        _let_fly(context.state.course, members, context.world.steady_acceleration)
+        let_fly(context.state.course, members, context.world.steady_acceleration)
 
     def join(self, context, window, time: float, groups: list[Group]) -> list[Group]:
         """The groups at `time` with the heaps that they touch; at the start of a step all of its heaps."""
@@ -434,7 +323,7 @@ class Heaps:
         MOST_PIECES a step.
         """
         stepper, step = self.stepper, context.world.accuracy.step
-        stray = _most_stray(context.state.now, members, stepper.pressed, stepper.reach, stepper.skin)
+        stray = most_stray(context.state.now, members, stepper.pressed, stepper.reach, stepper.skin)
         pieces = min(max(math.ceil(stray * step), 1), MOST_PIECES)
         left = max(math.ceil((window.end - time) * pieces / step - 1e-6), 1)
         return window.end if left == 1 else time + (window.end - time) / left
@@ -467,7 +356,7 @@ class Heaps:
         assert out is not None
         length = self._outcome_end - time
         context.recorder.flush_all(state.course, out.members, time)
-        _depart(state.course, out.members, time, length, state.now, out.position, out.orientation, out.velocity)
+        depart(state.course, out.members, time, length, state.now, out.position, out.orientation, out.velocity)
         state.correction[out.members] = 0.0
         self._note_calm(context, out, length)
         window.change_courses(out.members, time)
@@ -475,7 +364,7 @@ class Heaps:
     def _note_calm(self, context, out: Outcome, length: float) -> None:
         """For how long each member has hardly moved from where it was."""
         stepper = self.stepper
-        _count_calm(
+        count_calm(
             out.members, out.position, out.orientation, out.velocity, context.world.steady_strength, stepper.inner, stepper.skin, length,
             self._stood, self.calm,
         )  # fmt: skip

@@ -40,7 +40,7 @@ from rigidimpulse.rotation import product
 
 BOXES, WALL, GENERAL = 0, 1, 2
 """Kinds of pairs: two boxes, a half space and a convex polyhedron, all others."""
-AHEAD, FARTHEST = 0.08, 2.0
+AHEAD, FARTHEST = 0.12, 2.0
 """Contacts are looked for at least and at most that many inner radii away."""
 SAME, SAME_GENERAL = 2e-3, 0.02
 """Part of the inner radius that touching pairs may move past each other until they are looked at again."""

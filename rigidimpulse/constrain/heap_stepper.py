@@ -41,8 +41,8 @@ COLUMN = 20.0
 PRESSED = 0.25
 LEAST_SUB_STEPS, MOST_SUB_STEPS = 16, 256
 """Sub-steps in a whole step."""
-MOTION, MOST_PARTS = 0.1, 4
-"""Inner radii that touching bodies may come past each other until contacts are looked at again; how often at most in a step."""
+MOTION, LEAST_SUB_STEPS_BETWEEN = 0.05, 2
+"""Inner radii that touching bodies may come past each other until contacts are looked at again; sub-steps from look to look."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -144,7 +144,8 @@ class HeapStepper:
         self._part[supports], self._part[members] = SUPPORT, MEMBER
         load_bodies(self.bodies, self.order, context.state.now, context.acceleration, self.world.inv_mass, self._part)
         motion = most_motion(self.bodies, self.table.pairs, ahead)
-        self._parts = min(max(math.ceil(motion / MOTION), 1), MOST_PARTS)
+        most = max(math.ceil(ahead / self.sub_step(members) - 1e-9) // LEAST_SUB_STEPS_BETWEEN, 1)
+        self._parts = min(max(math.ceil(motion / MOTION), 1), most)
         self.ahead = ahead / self._parts
         self._look(context)
 
@@ -209,7 +210,8 @@ class HeapStepper:
         if number > len(self._batches.points):
             room = 2 * number
             record = aligned((FIELDS * room * width + ROW - 1) // ROW)
-            self._batches = Batches(record, *np.zeros((3, room * width), np.int64), np.zeros(room, np.int64))
+            first, second, patch = np.zeros((3, room * width), np.int64)
+            self._batches = Batches(record, first, second, patch, np.zeros(room, np.int64))
         fill_batches(width, bodies, table.pairs, self._patches, count, table.rows, self._batches, number)
         return number
 

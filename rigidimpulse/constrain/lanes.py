@@ -12,20 +12,22 @@ from __future__ import annotations
 
 import operator
 from functools import cache
+from typing import Any
 
 import llvmlite.binding
 import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import extending, types
 from numba.core import cgutils
 from numba.core.imputils import lower_constant
-from numba.extending import NativeValue, intrinsic, lower_builtin, models, register_model, type_callable, typeof_impl, unbox
+from numba.extending import NativeValue, lower_builtin, models, register_model, type_callable, typeof_impl, unbox
 
 ROW = 8
 """Doubles in a row."""
 LINE = 64
 """Bytes in a line of the cache."""
 
+intrinsic: Any = extending.intrinsic
 _DOUBLE, _INDEX, _SHORT = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
 
 

@@ -108,14 +108,14 @@ def spots() -> ri.Scene:
     return scene
 
 
-def measure(what: str, make, duration: float, fps: float = 60.0, repeats: int = REPEATS) -> Line:
-    """Run a scene several times; all of `simulate` counts, compilation of the scene included."""
+def measure(what: str, make, duration: float, fps: float = 60.0, loop_only: bool = False, repeats: int = REPEATS) -> Line:
+    """Run a scene several times; all of `simulate` counts, compilation of the scene included, or the stages of the loop only."""
     least, runs = math.inf, []
     for _ in range(repeats):
         scene = make()
         start = perf_counter()
         runs.append(ri.simulate(scene, duration, fps))
-        least = min(least, perf_counter() - start)
+        least = min(least, sum(line.seconds for line in runs[-1].plan.lines) if loop_only else perf_counter() - start)
     if len({run.state_hash() for run in runs}) > 1:
         raise SystemExit(f"{what}: runs differ")
     run = runs[0]
@@ -154,23 +154,18 @@ def memory_of(count: int) -> float:
 
 
 def scaling() -> list[Line]:
-    """Measure gases of all sizes and print exponents of the cost per impact.
-
-    What a run costs before its first impact is measured by a run of no length and taken off.
-    """
+    """Measure gases of all sizes and print exponents of the cost per impact; only the stages of the loop count."""
     lines: list[Line] = []
     for count in SIZES:
-        still = measure(f"gas of {count}, 0 s", lambda n=count: gas(n), 0.0, 1.0, repeats=2)
-        line = measure(f"gas of {count}", lambda n=count: gas(n), max(SCALING_TIME, SCALING_COLLISIONS / count), 1e-3, repeats=2)
-        seconds = line.seconds - still.seconds
-        lines.append(line._replace(seconds=seconds, rate=line.impacts / seconds))
-        print(f"  {1e6 * seconds / line.impacts:.1f} us an impact", flush=True)
+        duration = max(SCALING_TIME, SCALING_COLLISIONS / count)
+        lines.append(measure(f"gas of {count}", lambda n=count: gas(n), duration, 1e-3, loop_only=True))
+        print(f"  {1e6 * lines[-1].seconds / lines[-1].impacts:.1f} us an impact", flush=True)
     for first, second in itertools.pairwise(lines):
         exponent = math.log(first.rate / second.rate) / math.log(size_of(second) / size_of(first))
         print(f"{first.what} to {second.what}: exponent {exponent:+.3f}")
     low, high = (next(line for line in lines if size_of(line) == size) for size in (100, 10_000))
     print(f"100 to 10,000: exponent {math.log(low.rate / high.rate) / math.log(100.0):+.3f}")
-    print(f"memory of a run: {memory_of(10_000):.0f} bytes a body")
+    print(f"memory of a run: {memory_of(5000):.0f} bytes a body")
     return lines
 
 

@@ -100,10 +100,10 @@ def depths(scene: ri.Scene, run: ri.Recording, frame: int) -> np.ndarray:
 
 
 def _near(x: np.ndarray, reach: np.ndarray, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     movable, fixed = np.flatnonzero(moves), np.flatnonzero(~moves)
-    pairs = cKDTree(x[movable]).query_pairs(2.0 * reach[movable].max(), output_type="ndarray")
+    pairs = KDTree(x[movable]).query_pairs(2.0 * reach[movable].max(), output_type="ndarray")
     a, b = movable[pairs[:, 0]], movable[pairs[:, 1]]
     keep = np.linalg.norm(x[b] - x[a], axis=1) < reach[a] + reach[b]
     with_fixed = np.array(list(itertools.product(fixed, movable)))
@@ -141,7 +141,7 @@ def _gap(solid_a, r_a, solid_b, r_b, between: np.ndarray) -> float:
 def measure(name: str) -> Line:
     """Run a pile and measure it."""
     number, hulls = PILES[name]
-    ri.simulate(pile(64, hulls), 1.0)
+    ri.simulate(pile(64, hulls), 4.0)
     scene, ends = pile(number, hulls), []
     run = ri.simulate(scene, STEPS / FPS, FPS, progress=lambda _time: ends.append(process_time()))
     taken = 1e3 * np.diff(ends)

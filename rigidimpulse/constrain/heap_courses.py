@@ -1,0 +1,122 @@
+"""Courses of the members of heaps: how they end, begin, and for how long bodies have been calm (kernels)."""
+
+import numpy as np
+
+from rigidimpulse._jit import jit
+from rigidimpulse.detect.touching import world_inverse_inertia
+from rigidimpulse.integrate.course import FREE, STEPPED, begin, state_at
+from rigidimpulse.rotation import product, quaternion_to_matrix
+
+CALM, PLAY = 0.05, 0.5
+"""Speed, in sqrt(g r), and motion, in skins, below which a body is calm."""
+
+
+@jit
+def arrive(course, members, time, steady, bodies, rotation, acceleration, angular_acceleration):
+    """End the courses of members at `time`, bring them there, and let them go straight on; steady (n, 3) m/s2 is what pulls them."""
+    for i in members:
+        state_at(course, i, time, bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i])
+        quaternion_to_matrix(bodies.orientation[i], rotation[i])
+        world_inverse_inertia(rotation[i], course.inertia[i], bodies.inv_inertia[i])
+        course.start[i], course.stepped[i, 12] = time, 1.0
+        for c in range(4):
+            course.orientation[i, c] = bodies.orientation[i, c]
+        for c in range(3):
+            course.position[i, c] = bodies.position[i, c]
+            course.velocity[i, c] = course.stepped[i, c] = bodies.velocity[i, c]
+            course.angular_velocity[i, c] = course.stepped[i, 3 + c] = bodies.angular_velocity[i, c]
+            course.stepped[i, 6 + c] = course.stepped[i, 9 + c] = 0.0
+            acceleration[i, c], angular_acceleration[i, c] = steady[i, c], 0.0
+        begin(course, i)
+
+
+@jit
+def let_fly(course, members, steady):
+    """Let members that have arrived fly freely from where they are."""
+    for i in members:
+        course.mode[i] = FREE
+        for c in range(3):
+            course.acceleration[i, c] = steady[i, c]
+        begin(course, i)
+
+
+@jit
+def mark_slow(bodies, inner, farthest, fastest, member):
+    """Unmark members (n,) that move farther than `farthest` 1/s of their inner radius, or spin faster than `fastest` rad/s."""
+    for i in range(member.shape[0]):
+        if not member[i]:
+            continue
+        speed, spin = 0.0, 0.0
+        for c in range(3):
+            speed += bodies.velocity[i, c] ** 2
+            spin += bodies.angular_velocity[i, c] ** 2
+        member[i] = np.sqrt(speed) <= farthest * inner[i] and np.sqrt(spin) <= fastest
+
+
+@jit
+def most_stray(bodies, members, pressed, reach, skin):
+    """Largest w sqrt(r / (4 skin)) of the members that contacts act on, 1/s."""
+    most = 0.0
+    for i in members:
+        if not pressed[i]:
+            continue
+        spin = 0.0
+        for c in range(3):
+            spin += bodies.angular_velocity[i, c] ** 2
+        most = max(most, np.sqrt(spin * reach[i] / (4.0 * skin[i])))
+    return most
+
+
+@jit
+def count_calm(members, position, orientation, velocity, strength, inner, skin, length, stood, calm):
+    """Add `length` s to the calm of members (k,) that have hardly moved from where they stood (n, 7); start anew that of the others."""
+    for k in range(members.shape[0]):
+        i = members[k]
+        moved, turned, speed, spin = 0.0, 0.0, 0.0, 0.0
+        for c in range(3):
+            moved += (position[k, c] - stood[i, c]) ** 2
+            speed += velocity[k, c] ** 2
+            spin += velocity[k, 3 + c] ** 2
+        for c in range(4):
+            turned += (orientation[k, c] - stood[i, 3 + c]) ** 2
+        play = PLAY * skin[i]
+        if (
+            np.sqrt(moved) <= play
+            and 2.0 * inner[i] * np.sqrt(turned) <= play
+            and np.sqrt(speed) + inner[i] * np.sqrt(spin) <= CALM * np.sqrt(strength[i] * inner[i])
+        ):
+            calm[i] += length
+            continue
+        calm[i] = 0.0
+        for c in range(3):
+            stood[i, c] = position[k, c]
+        for c in range(4):
+            stood[i, 3 + c] = orientation[k, c]
+
+
+@jit
+def depart(course, members, time, length, bodies, position, orientation, velocity):
+    """Courses from the present poses to the given ones (k, 3), (k, 4), where the velocities are (k, 6)."""
+    for k in range(members.shape[0]):
+        i = members[k]
+        a, b = bodies.orientation[i], orientation[k]
+        q0, q1, q2, q3 = product(b[0], b[1], b[2], b[3], a[0], -a[1], -a[2], -a[3])
+        if q0 < 0.0:
+            q0, q1, q2, q3 = -q0, -q1, -q2, -q3
+        sine = np.sqrt(q1 * q1 + q2 * q2 + q3 * q3)
+        factor = 2.0 * np.arctan2(sine, q0) / (sine * length) if sine > 0.0 else 0.0
+        course.start[i], course.mode[i] = time, STEPPED
+        course.angular_velocity[i, 0] = factor * q1
+        course.angular_velocity[i, 1] = factor * q2
+        course.angular_velocity[i, 2] = factor * q3
+        for c in range(3):
+            course.position[i, c] = bodies.position[i, c]
+            course.velocity[i, c] = (position[k, c] - bodies.position[i, c]) / length
+            course.acceleration[i, c] = course.torque[i, c] = 0.0
+            course.stepped[i, c], course.stepped[i, 3 + c] = bodies.velocity[i, c], bodies.angular_velocity[i, c]
+            course.stepped[i, 6 + c] = velocity[k, c] - bodies.velocity[i, c]
+            course.stepped[i, 9 + c] = velocity[k, 3 + c] - bodies.angular_velocity[i, c]
+        for c in range(4):
+            course.orientation[i, c] = a[c]
+        course.stepped[i, 12] = length
+        begin(course, i)
