@@ -2,7 +2,8 @@
 
 An impact of a gas concerns two bodies, so its cost should not depend on how many others fly elsewhere: exponent 0 of the cost per impact. A
 step of a heap looks after all bodies: exponent 1 of the cost per step. Exponents are slopes of log(cost) over log(n) by least squares from
-FEWEST bodies on. What a run costs before it starts (checking and compiling the scene) is taken off, measured by a run of no length.
+FEWEST bodies on. The cost of impacts is the time of the stages of the loop (`Recording.profile`); what a run costs before it starts is not
+in it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from rigidimpulse.body import Body
 from rigidimpulse.errors import SceneError
 from rigidimpulse.gallery.pile import pile
 from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
+from rigidimpulse.plan import STAGES
 from rigidimpulse.scene import Scene
 from rigidimpulse.shape import Shape
 from rigidimpulse.simulation import simulate
@@ -72,17 +73,10 @@ def gas(number: int) -> Scene:
 
 
 def _gas_point(number: int) -> Point:
-    scene = gas(number)
-    before = _seconds(scene, 0.0)[0]
-    seconds, run = _seconds(scene, max(4.0, BALL_SECONDS / number))
-    count = len(run.impacts)
-    return Point(number, seconds, count, (seconds - before) / count)
-
-
-def _seconds(scene: Scene, duration: float) -> tuple[float, Recording]:
-    start = perf_counter()
-    run = simulate(scene, duration, fps=1.0)
-    return perf_counter() - start, run
+    run = simulate(gas(number), max(4.0, BALL_SECONDS / number), fps=1.0)
+    profile, count = run.profile, len(run.impacts)
+    assert profile is not None
+    return Point(number, profile.seconds, count, sum(profile.stages[stage] for stage in STAGES if stage in profile.stages) / count)
 
 
 def _heap_point(number: int) -> Point:

@@ -1,17 +1,15 @@
-"""How fast impacts are: `python tests/bench/impacts.py [scene ...] [--save]`, or `... scaling [--save]`.
+"""How fast impacts are: `python tests/bench/impacts.py [scene ...] [--save]`.
 
-Benchmarks, not tests: run them on a machine that does nothing else. Scenes are `gas` (`gas:300` for 300 balls), `bounce`, `break` and
-`spots`; without any, all of them with `gas:1000`. Each line has the state hash, so that times are compared only between runs that
-computed the same. Warm: kernels are compiled, the least of several runs counts. `scaling` runs gases of 10 to 20,000 balls and prints
-the exponent p of cost per impact = c n^p between the sizes. With --save the lines go to tests/bench/<machine>/impacts.csv or
-impacts_scaling.csv.
+Benchmarks, not tests: run them on a machine that does nothing else. Scenes are `gas` (`gas:300` for 300 balls), `bounce`, `break`, `spots`
+and `memory`; without any, all of them with `gas:1000`. Each line has the state hash, so that times are compared only between runs that
+computed the same. Warm: kernels are compiled, the least of several runs counts. How cost grows with the number of balls is measured by
+`rigidimpulse study --scaling`. With --save the lines go to tests/bench/<machine>/impacts.csv.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
-import itertools
 import math
 import sys
 import tracemalloc
@@ -24,13 +22,9 @@ from bench_scenes import machine
 
 import rigidimpulse as ri
 from rigidimpulse.gallery import asset_path
+from rigidimpulse.study.scaling import gas
 
 SMOOTH = ri.Material(restitution=1.0, static_friction=0.0, dynamic_friction=0.0)
-FILLED = 0.05
-"""Part of the box that the balls of a gas fill."""
-SIZES = (10, 30, 100, 300, 1000, 3000, 10_000, 20_000)
-SCALING_TIME, SCALING_COLLISIONS = 4.0, 6000.0
-"""Least duration of a run of the scaling mode, s, and its least duration times the number of balls, s."""
 REPEATS = 3
 
 
@@ -53,21 +47,6 @@ def add_walls(scene: ri.Scene, half: tuple[float, float, float], material: ri.Ma
             normal[axis] = -sign
             wall = ri.Shape.half_space(tuple(normal), -half[axis])
             scene.add(ri.Body(f"wall {axis} {sign:+.0f}", wall, motion="static", material=material))
-
-
-def gas(count: int) -> ri.Scene:
-    """Return balls of 0.5 m and 1 kg in a closed box, elastic and smooth, without gravity; speeds of a normal distribution of 1 m/s."""
-    rng, radius = np.random.default_rng(0), 0.5
-    side = (count * 4.0 / 3.0 * math.pi * radius**3 / FILLED) ** (1.0 / 3.0)
-    scene = ri.Scene(gravity=(0.0, 0.0, 0.0))
-    add_walls(scene, (0.5 * side,) * 3, SMOOTH)
-    rows = math.ceil(count ** (1.0 / 3.0) - 1e-9)
-    ticks = (np.arange(rows) + 0.5) * (side - 2.0 * radius) / rows - 0.5 * side + radius
-    places = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
-    ball = ri.Shape.sphere(radius)
-    for k, place in enumerate(places[rng.permutation(len(places))[:count]]):
-        scene.add(ri.Body(f"ball {k}", ball, position=tuple(place), velocity=tuple(rng.normal(size=3)), mass=1.0, material=SMOOTH))
-    return scene
 
 
 def bounce(count: int = 49) -> ri.Scene:
@@ -140,7 +119,7 @@ def scene_line(name: str) -> Line:
         return measure("break of 15, 20 s", pool_break, 20.0)
     if kind == "spots":
         return measure("spot on spot, 10 s", spots, 10.0)
-    raise SystemExit(f"{name}: give gas:COUNT, bounce, break, spots or scaling")
+    raise SystemExit(f"{name}: give gas:COUNT, bounce, break, spots or memory")
 
 
 def memory_of(count: int) -> float:
@@ -153,41 +132,22 @@ def memory_of(count: int) -> float:
     return peak / count
 
 
-def scaling() -> list[Line]:
-    """Measure gases of all sizes and print exponents of the cost per impact; only the stages of the loop count."""
-    lines: list[Line] = []
-    for count in SIZES:
-        duration = max(SCALING_TIME, SCALING_COLLISIONS / count)
-        lines.append(measure(f"gas of {count}", lambda n=count: gas(n), duration, 1e-3, loop_only=True))
-        print(f"  {1e6 * lines[-1].seconds / lines[-1].impacts:.1f} us an impact", flush=True)
-    for first, second in itertools.pairwise(lines):
-        exponent = math.log(first.rate / second.rate) / math.log(size_of(second) / size_of(first))
-        print(f"{first.what} to {second.what}: exponent {exponent:+.3f}")
-    low, high = (next(line for line in lines if size_of(line) == size) for size in (100, 10_000))
-    print(f"100 to 10,000: exponent {math.log(low.rate / high.rate) / math.log(100.0):+.3f}")
-    print(f"memory of a run: {memory_of(5000):.0f} bytes a body")
-    return lines
-
-
-def size_of(line: Line) -> int:
-    """Return the number of balls of a line."""
-    return int(line.what.split()[2])
-
-
 def main() -> int:
     """Measure, print, save if asked to."""
     parser = argparse.ArgumentParser(description="How fast impacts are.")
-    parser.add_argument("scenes", nargs="*", help="gas:COUNT, bounce, break, spots, or scaling alone")
-    parser.add_argument("--save", action="store_true", help="write tests/bench/<machine>/impacts.csv or impacts_scaling.csv")
+    parser.add_argument("scenes", nargs="*", help="gas:COUNT, bounce, break, spots, memory")
+    parser.add_argument("--save", action="store_true", help="write tests/bench/<machine>/impacts.csv")
     arguments = parser.parse_args()
     print(machine())
     ri.simulate(gas(20), 1.0)
-    is_scaling = arguments.scenes == ["scaling"]
-    lines = scaling() if is_scaling else [scene_line(name) for name in arguments.scenes or ("gas:1000", "bounce", "break", "spots")]
+    names = arguments.scenes or ("gas:1000", "bounce", "break", "spots", "memory")
+    lines = [scene_line(name) for name in names if name != "memory"]
+    if "memory" in names:
+        print(f"memory of a run: {memory_of(10_000):.0f} bytes a body")
     if arguments.save:
         folder = Path(__file__).parent / machine()
         folder.mkdir(exist_ok=True)
-        target = folder / ("impacts_scaling.csv" if is_scaling else "impacts.csv")
+        target = folder / "impacts.csv"
         with target.open("w", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(Line._fields)
