@@ -157,7 +157,7 @@ def study(scaling: bool, most: int) -> None:
             rows.append((f"{point.number:,}", f"{point.seconds:.2f}", f"{point.count:,}", f"{1e6 * point.cost:.1f}", ""))
         click.echo(f"{kind}: {SCENES[kind].description}")
         _print_table(rows, right=(0, 1, 2, 3))
-        click.echo(f"exponent of the cost a {SCENES[kind].unit}{SCENES[kind].note}: {exponent(points):+.2f}")
+        click.echo(f"exponent of the cost a {SCENES[kind].unit}: {exponent(points):+.2f}")
 
 
 @main.command()

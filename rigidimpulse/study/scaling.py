@@ -2,15 +2,13 @@
 
 An impact of a gas concerns two bodies, so its cost should not depend on how many others fly elsewhere: exponent 0 of the cost per impact. A
 step of a heap looks after all bodies: exponent 1 of the cost per step. Exponents are slopes of log(cost) over log(n) by least squares from
-FEWEST bodies on. The cost of impacts is the time of the stages of the loop (`Recording.profile`); what a run costs before it starts is not
-in it.
+FEWEST bodies on. Costs are times of the stages of the loop (`Recording.profile`); what a run costs before it starts is not in them.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +18,7 @@ from rigidimpulse.errors import SceneError
 from rigidimpulse.gallery.pile import pile
 from rigidimpulse.material import Material
 from rigidimpulse.plan import STAGES
+from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
 from rigidimpulse.shape import Shape
 from rigidimpulse.simulation import simulate
@@ -31,8 +30,7 @@ FILLED = 0.05
 BALL_SECONDS = 6_000.0
 """Duration of a run of gas times the number of balls, s, and of 4 s at least."""
 HEAPED, LAYERS = 2.0, 10
-"""s until boxes have heaped up, and layers they fall in."""
-HEAP_STEPS = 30
+"""s in which boxes fall and heap up, and layers they fall in."""
 
 
 class Point(NamedTuple):
@@ -45,11 +43,10 @@ class Point(NamedTuple):
 
 
 class Scaling(NamedTuple):
-    """A kind of scene: what it is, what is counted, a word on the cost, and how a size is measured."""
+    """A kind of scene: what it is, what is counted, and how a size is measured."""
 
     description: str
     unit: str
-    note: str
     measure: Callable[[int], Point]
 
 
@@ -74,22 +71,25 @@ def gas(number: int) -> Scene:
 
 def _gas_point(number: int) -> Point:
     run = simulate(gas(number), max(4.0, BALL_SECONDS / number), fps=1.0)
-    profile, count = run.profile, len(run.impacts)
+    return _point(number, run, len(run.impacts))
+
+
+def _point(number: int, run: Recording, count: int) -> Point:
+    """A size whose loop did `count` things."""
+    profile = run.profile
     assert profile is not None
     return Point(number, profile.seconds, count, sum(profile.stages[stage] for stage in STAGES if stage in profile.stages) / count)
 
 
 def _heap_point(number: int) -> Point:
-    ends: list[float] = []
-    start = perf_counter()
-    simulate(pile(number, LAYERS), HEAPED, progress=lambda _time: ends.append(perf_counter()))
-    steps = np.diff(ends)[-HEAP_STEPS:]
-    return Point(number, perf_counter() - start, len(ends), float(np.median(steps)))
+    steps: list[float] = []
+    run = simulate(pile(number, LAYERS), HEAPED, fps=1.0, progress=steps.append)
+    return _point(number, run, len(steps))
 
 
 SCENES = {
-    "gas": Scaling("elastic balls in a box", "impact", "", _gas_point),
-    "heap": Scaling("boxes that have fallen into a pit", "step", f" once they have heaped up, median of {HEAP_STEPS}", _heap_point),
+    "gas": Scaling("elastic balls in a box", "impact", _gas_point),
+    "heap": Scaling("boxes that fall into a pit and heap up", "step", _heap_point),
 }
 
 
