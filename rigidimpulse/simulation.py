@@ -17,7 +17,6 @@ from rigidimpulse.constrain.contact_forces import ContactForces
 from rigidimpulse.constrain.heap import HeapForces
 from rigidimpulse.constrain.jointed import reaction_table
 from rigidimpulse.constrain.kinds import Friction, JointRows, RollingFriction
-from rigidimpulse.detect.broadphase import bound_planes
 from rigidimpulse.detect.overlap import resolve_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.detect.window import Window
@@ -88,12 +87,8 @@ def simulate(
     world = compile_scene(scene, accuracy, frozenset(left_out))
     if len(times) * world.num_bodies > MOST_POSES:
         raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
-    bound_planes(world)
     plan = make_plan(world, effects)
-    if not kernels_are_cached():
-        logger.warning("compiling kernels for the first run on this machine, once: this takes about half a minute")
-        if world.can_collide:
-            compile_kernels(world, has_events(plan))
+    prepare_kernels(world, plan)
     recorder = Recorder(times, world.num_bodies)
     log = EventLog()
     for name, reason in left_out.items():
@@ -118,6 +113,14 @@ def simulate(
     recorder.finish(context.state.course)
     run = make_recording(context, plan, times, duration)
     return replace(run, profile=stopwatch.read(plan))
+
+
+def prepare_kernels(world: World, plan: Plan) -> None:
+    """Say so and compile on several cores what the plan needs, where this machine has never run these sources."""
+    if not kernels_are_cached():
+        logger.warning("compiling kernels for the first run on this machine, once: this takes about half a minute")
+        if world.can_collide:
+            compile_kernels(world, has_events(plan))
 
 
 def frame_times(duration: float, fps: float) -> np.ndarray:

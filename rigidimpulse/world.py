@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidimpulse.accuracy import Accuracy, resolve_accuracy
+from rigidimpulse.body import Body
 from rigidimpulse.constrain.joint import Joint, compile_joints
 from rigidimpulse.constrain.joint_rows import Joints
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.errors import SceneError
 from rigidimpulse.forces.constant import ConstantForce, push_of_forces
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
-from rigidimpulse.mass import body_mass
+from rigidimpulse.mass import BodyMass, body_mass
 from rigidimpulse.material import combine, combine_rolling
 from rigidimpulse.rotation import conjugate, from_matrix, multiply, rotate
 from rigidimpulse.scene import Scene, validate
@@ -179,28 +180,17 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
     joints = [effect for effect in scene.effects if isinstance(effect, Joint) and "joints" not in left_out]
     dynamic = np.array([body.motion == "dynamic" for body in bodies], bool)
     moving = np.array([body.motion == "kinematic" and _is_driven(body) for body in bodies], bool)
-    offset = np.array([m.center_of_mass for m in masses], float).reshape(-1, 3)
-    axes = [m.axes for m in masses]
-    turn = np.array([from_matrix(a) for a in axes], float).reshape(-1, 4)
+    offset, turn, position, principal = _start(bodies, masses)
     shapes, shape_of_body = _compile_shapes(bodies, masses)
     geometry = build_geometry(shapes)
-    origin = np.array([body.position for body in bodies], float).reshape(-1, 3)
-    orientation = np.array([body.unit_orientation() for body in bodies], float).reshape(-1, 4)
-    principal = multiply(orientation, turn)
-    position = origin + rotate(orientation, offset)
     size, radius = _extents(geometry, shape_of_body)
     low, high = _world_boxes(geometry, shape_of_body, position, principal)
     material_of_body, coefficients, rolling = _materials(bodies)
     mass = np.array([m.mass for m in masses], float)
     inv_mass = np.where(dynamic, 1.0 / mass, 0.0)
-    factor = np.array([body.gravity_factor for body in bodies], float)
-    if "gravity" in left_out:
-        factor[:] = 0.0
     if "friction" in left_out:
         coefficients[:, :, 1:3] = 0.0
-    gravity = factor[:, None] * np.asarray(scene.gravity, float) * dynamic[:, None]
-    steady = [] if "constant forces" in left_out else _steady_forces(scene)
-    push = push_of_forces(steady, [body.name for body in bodies], inv_mass)
+    gravity, push = _steady_pull(scene, inv_mass, left_out)
     world = World(
         scene=scene,
         accuracy=resolve_accuracy(accuracy),
@@ -244,6 +234,15 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
     return world
 
 
+def _start(bodies: list[Body], masses: list[BodyMass]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Centres of mass and principal axes in the body frames, and where these are in the world at the start; see `World`."""
+    offset = np.array([m.center_of_mass for m in masses], float).reshape(-1, 3)
+    turn = np.array([from_matrix(m.axes) for m in masses], float).reshape(-1, 4)
+    origin = np.array([body.position for body in bodies], float).reshape(-1, 3)
+    orientation = np.array([body.unit_orientation() for body in bodies], float).reshape(-1, 4)
+    return offset, turn, origin + rotate(orientation, offset), multiply(orientation, turn)
+
+
 def _refuse_fixed_steps(accuracy: Accuracy) -> None:
     """Raise a SceneError for an integrator of fixed steps, of a scene in which forces vary not at all or not alone."""
     if accuracy.integrator != "exact":
@@ -252,6 +251,14 @@ def _refuse_fixed_steps(accuracy: Accuracy) -> None:
             "use integrator='exact', or response='penalty' without joints",
             "accuracy",
         )
+
+
+def _steady_pull(scene: Scene, inv_mass: np.ndarray, left_out: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations (n, 3) by gravity and by constant forces."""
+    factor = np.array([0.0 if "gravity" in left_out else body.gravity_factor for body in scene.bodies], float)
+    gravity = factor[:, None] * np.asarray(scene.gravity, float) * (inv_mass > 0.0)[:, None]
+    steady = [] if "constant forces" in left_out else _steady_forces(scene)
+    return gravity, push_of_forces(steady, [body.name for body in scene.bodies], inv_mass)
 
 
 def _steady_forces(scene: Scene) -> list[ConstantForce]:
@@ -335,12 +342,24 @@ def _world_boxes(geometry, shape_of_body, position, orientation) -> tuple[np.nda
     for i, shape in enumerate(shape_of_body):
         for p in _primitives(geometry, int(shape)):
             if geometry.kind[p] == HALF_SPACE:
-                low[i], high[i] = -np.inf, np.inf
+                low[i], high[i] = _plane_box(geometry.frame[p], position[i], orientation[i])
+                if len(_primitives(geometry, int(shape))) > 1:
+                    low[i], high[i] = -np.inf, np.inf
                 break
             points, r = _primitive_points(geometry, p)
             placed = rotate(orientation[i], points) + position[i]
             low[i] = np.minimum(low[i], placed.min(0) - r)
             high[i] = np.maximum(high[i], placed.max(0) + r)
+    return low, high
+
+
+def _plane_box(frame: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Box of a half space; it ends at the plane if that lies across an axis of the world, or every body would be paired with every wall."""
+    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    normal = rotate(orientation, frame[:3])
+    if np.count_nonzero(normal) == 1 and np.abs(normal).max() == 1.0:
+        axis = int(np.argmax(np.abs(normal)))
+        (high if normal[axis] > 0.0 else low)[axis] = position[axis] + normal[axis] * frame[3]
     return low, high
 
 

@@ -88,7 +88,7 @@ class HeapStepper:
         self.bodies = self._make_bodies()
         self._masses, self._pull = world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order])
         self.table = HeapTable()
-        least = np.where(world.dynamic, CLEAR * np.where(world.dynamic, self.inner, 0.0), 0.0)
+        least = CLEAR * np.where(world.dynamic, self.inner, 0.0)
         self.cover = Cover(world, self.order, self.inner, least)
         self.lanes = machine_lanes()
         self._patches, self._count = empty_patches(64), 0

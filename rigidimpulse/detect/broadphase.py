@@ -17,30 +17,11 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.features import inner
-from rigidimpulse.rotation import rotate
 
 FEW = 64
 """Number of bodies up to which all pairs are tested directly."""
 STRIP_WIDTH = 2.0
 """Width of a strip in mean box lengths."""
-
-
-def bound_planes(world) -> None:
-    """Give static half spaces along an axis of the world a box that ends at their plane: `world.static_min`, `static_max` change.
-
-    Without it every body would be paired with every wall.
-    """
-    geometry, shape = world.geometry, world.shape_of_body
-    first = geometry.shape_first[shape]
-    single = world.half_space & (geometry.shape_first[shape + 1] == first + 1) & ~world.dynamic & ~world.moving
-    for i in np.flatnonzero(single).tolist():
-        if world.scene.bodies[i].keyframes is not None:
-            continue
-        normal, level = rotate(world.orientation[i], geometry.frame[first[i], :3]), float(geometry.frame[first[i], 3])
-        axis = int(np.argmax(np.abs(normal)))
-        if abs(normal[axis]) == 1.0 and np.count_nonzero(normal) == 1:
-            box = world.static_max if normal[axis] > 0.0 else world.static_min
-            box[i, axis] = world.position[i, axis] + normal[axis] * level
 
 
 @inner

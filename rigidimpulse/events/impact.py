@@ -25,7 +25,7 @@ from rigidimpulse.detect.window import INSTANT
 from rigidimpulse.events.layout import PLANE
 from rigidimpulse.events.motion import bring_ball, take_free_course, write_frames
 from rigidimpulse.events.paths import GAP, KIND, MOVES, RADIUS
-from rigidimpulse.observe.energy import _kinetic
+from rigidimpulse.observe.energy import kinetic_of
 from rigidimpulse.observe.events import write_impacts
 from rigidimpulse.respond.impulse import relative_velocity, resolve_contact, speed_scale
 from rigidimpulse.respond.response import SLOW
@@ -180,7 +180,7 @@ def simple_impact(fixed, motion, book, rebounds, paths, planes, a, b, plane, tim
     before = np.empty((2, 6))
     for m in range(len(members)):
         before[m, :3], before[m, 3:] = now.velocity[members[m]], now.angular_velocity[members[m]]
-    energy = _kinetic(now.velocity, now.angular_velocity, now.orientation, fixed.mass, fixed.inertia, members)
+    energy = kinetic_of(now.velocity, now.angular_velocity, now.orientation, fixed.mass, fixed.inertia, members)
     resolve_contact(now, contacts, _NONE, e, fixed.law, book.log, _NONE)
     if not book.log[0, 6] > slow:
         return False
@@ -189,7 +189,7 @@ def simple_impact(fixed, motion, book, rebounds, paths, planes, a, b, plane, tim
             return False
     at = book.count[0]
     write_impacts(time, contacts, now.position, book.log, _ONE, book.rows, at)
-    book.energy[at] = _kinetic(now.velocity, now.angular_velocity, now.orientation, fixed.mass, fixed.inertia, members) - energy
+    book.energy[at] = kinetic_of(now.velocity, now.angular_velocity, now.orientation, fixed.mass, fixed.inertia, members) - energy
     book.count[0] = at + 1
     remember(rebounds, key, time, book.log[0, 6], _NONE)
     for i in members:

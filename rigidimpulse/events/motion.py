@@ -11,14 +11,14 @@ import numpy as np
 from rigidimpulse._jit import jit
 from rigidimpulse.detect.touching import world_inverse_inertia
 from rigidimpulse.integrate.course import FIXED, FREE, JERK
-from rigidimpulse.integrate.free_top import _BASE, _KIND, _RATE, FIXED_AXIS, REST, keep_axis
+from rigidimpulse.integrate.free_top import BASE, FIXED_AXIS, KIND, RATE, REST, keep_axis
 from rigidimpulse.rotation import exponential, product, quaternion_to_matrix
 
 
 @jit
 def keeps_axis(course, i):
     """Whether body i stands, or turns about a fixed axis."""
-    return course.mode[i] == FIXED or course.top[i, _KIND] <= FIXED_AXIS
+    return course.mode[i] == FIXED or course.top[i, KIND] <= FIXED_AXIS
 
 
 @jit
@@ -37,11 +37,11 @@ def write_state(course, i, t, x_out, q_out, v_out, w_out):
             q_out[k] = course.orientation[i, k]
         return
     c = course.top[i]
-    q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
-    if c[_KIND] == REST:
+    q0, q1, q2, q3 = c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3]
+    if c[KIND] == REST:
         w_out[0] = w_out[1] = w_out[2] = 0.0
     else:
-        wx, wy, wz = c[_RATE], c[_RATE + 1], c[_RATE + 2]
+        wx, wy, wz = c[RATE], c[RATE + 1], c[RATE + 2]
         e0, e1, e2, e3 = exponential(s * wx, s * wy, s * wz)
         q0, q1, q2, q3 = product(e0, e1, e2, e3, q0, q1, q2, q3)
         w_out[0], w_out[1], w_out[2] = wx, wy, wz

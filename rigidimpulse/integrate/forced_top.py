@@ -26,9 +26,9 @@ ORDER = 18
 """order of the series: a higher one costs more at the start and less beyond the first segment, which grows with it"""
 FORCED_AXIS, FORCED = 4.0, 5.0  # kinds of rotation, after those of free_top
 
-_KIND = 0
-_BASE = 1  # (4,) orientation at the start
-_RATE = 5  # (3,) world angular velocity at the start (axis)
+KIND = 0
+BASE = 1  # (4,) orientation at the start
+RATE = 5  # (3,) world angular velocity at the start (axis)
 _ACCELERATION = 8  # (3,) world angular acceleration at the start (axis)
 _JERK = 11  # (3,) its rate (axis)
 
@@ -214,7 +214,7 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out):
     q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
     norm = 1.0 / math.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
     q0, q1, q2, q3 = norm * q0, norm * q1, norm * q2, norm * q3
-    c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = q0, q1, q2, q3
+    c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3] = q0, q1, q2, q3
     ux, uy, uz, growth, bx, by, bz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if has_rate:
         ux, uy, uz, growth = _direction(torque_rate[0], torque_rate[1], torque_rate[2])
@@ -228,14 +228,14 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out):
     wx, wy, wz = rotated(q0, -q1, -q2, -q3, vx, vy, vz)
     ax, ay, az = magnitude * ex / i1, magnitude * ey / i2, magnitude * ez / i3
     if _parallel(ex, ey, ez, ax, ay, az) and _parallel(ex, ey, ez, wx, wy, wz) and _parallel(ex, ey, ez, bx, by, bz):
-        c[_KIND] = FORCED_AXIS
+        c[KIND] = FORCED_AXIS
         ax, ay, az = rotated(q0, q1, q2, q3, ax, ay, az)
         bx, by, bz = rotated(q0, q1, q2, q3, bx, by, bz)
-        c[_RATE], c[_RATE + 1], c[_RATE + 2] = vx, vy, vz
+        c[RATE], c[RATE + 1], c[RATE + 2] = vx, vy, vz
         c[_ACCELERATION], c[_ACCELERATION + 1], c[_ACCELERATION + 2] = ax, ay, az
         c[_JERK], c[_JERK + 1], c[_JERK + 2] = bx, by, bz
     else:
-        c[_KIND] = FORCED
+        c[KIND] = FORCED
         c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2] = i1, i2, i3
         c[_TORQUE], c[_TORQUE_RATE] = magnitude, growth
         _start_series(c, wx, wy, wz, ex, ey, ez, ux, uy, uz)
@@ -252,9 +252,9 @@ def _last_segment(constants, t):
         h = c[SEGMENT]
         t -= h
         g0, g1, g2, g3, wx, wy, wz, ex, ey, ez, fx, fy, fz = _advance(c, h)
-        q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
+        q0, q1, q2, q3 = c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3]
         q0, q1, q2, q3 = product(q0, q1, q2, q3, g0, g1, g2, g3)
-        c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = q0, q1, q2, q3
+        c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3] = q0, q1, q2, q3
         ux, uy, uz, growth = 0.0, 0.0, 0.0, c[_TORQUE_RATE]
         if growth != 0.0:
             cosine, sine = c[_RATE_ALONG] / growth, c[_RATE_ACROSS] / growth
@@ -274,16 +274,16 @@ def rotation(constants, t):
     NaN if the body turns so fast, for so long, that it would take more than _MOST_SEGMENTS.
     """
     c = constants
-    if c[_KIND] < FORCED_AXIS:
+    if c[KIND] < FORCED_AXIS:
         return free_top.rotation(c, t)
-    if c[_KIND] == FORCED:
+    if c[KIND] == FORCED:
         if t > c[SEGMENT]:
             c, t = _last_segment(c, t)
         g0, g1, g2, g3, wx, wy, wz, _, _, _, _, _, _ = _advance(c, t)
-        q0, q1, q2, q3 = product(c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], g0, g1, g2, g3)
+        q0, q1, q2, q3 = product(c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3], g0, g1, g2, g3)
         wx, wy, wz = rotated(q0, q1, q2, q3, wx, wy, wz)
         return q0, q1, q2, q3, wx, wy, wz
-    wx, wy, wz = c[_RATE], c[_RATE + 1], c[_RATE + 2]
+    wx, wy, wz = c[RATE], c[RATE + 1], c[RATE + 2]
     ax, ay, az = c[_ACCELERATION], c[_ACCELERATION + 1], c[_ACCELERATION + 2]
     bx, by, bz = c[_JERK], c[_JERK + 1], c[_JERK + 2]
     h = 0.5 * t
@@ -293,7 +293,7 @@ def rotation(constants, t):
         mx, my, mz = ax + third * bx, ay + third * by, az + third * bz
         ax, ay, az = ax + h * bx, ay + h * by, az + h * bz
     e0, e1, e2, e3 = exponential(t * (wx + h * mx), t * (wy + h * my), t * (wz + h * mz))
-    q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
+    q0, q1, q2, q3 = c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3]
     q0, q1, q2, q3 = product(e0, e1, e2, e3, q0, q1, q2, q3)
     return q0, q1, q2, q3, wx + t * ax, wy + t * ay, wz + t * az
 

@@ -33,9 +33,9 @@ from rigidimpulse.rotation import exponential, product, rotated
 
 # Kinds of rotation, and places in the row of constants.
 REST, FIXED_AXIS, SYMMETRIC, ASYMMETRIC = 0.0, 1.0, 2.0, 3.0
-_KIND = 0
-_BASE = 1  # (4,) orientation at the start; asymmetric: from the frame of L to the world
-_RATE = 5  # (3,) world angular velocity (fixed axis), precession L / I (symmetric)
+KIND = 0
+BASE = 1  # (4,) orientation at the start; asymmetric: from the frame of L to the world
+RATE = 5  # (3,) world angular velocity (fixed axis), precession L / I (symmetric)
 _SPIN = 8  # (3,) turning in the body (symmetric)
 _START_RATE = 11  # (3,) world angular velocity at the start (symmetric)
 
@@ -292,10 +292,10 @@ def _prepare_asymmetric(inertia, low, middle, high, c):
     c[_FRAME], c[_FRAME + 1], c[_FRAME + 2], c[_FRAME + 3] = e0, e1, e2, e3
     g0, g1, g2, g3, _, _, _ = _asymmetric_frame(c, 0.0)
     e0, e1, e2, e3 = product(e0, e1, e2, e3, g0, -g1, -g2, -g3)
-    q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
+    q0, q1, q2, q3 = c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3]
     q0, q1, q2, q3 = product(q0, q1, q2, q3, e0, e1, e2, e3)
-    c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = q0, q1, q2, q3
-    c[_KIND] = ASYMMETRIC
+    c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3] = q0, q1, q2, q3
+    c[KIND] = ASYMMETRIC
 
 
 @jit
@@ -307,11 +307,11 @@ def _prepare_symmetric(axis, excess, c):
     along = c[_SPIN + axis] * excess
     c[_SPIN], c[_SPIN + 1], c[_SPIN + 2] = 0.0, 0.0, 0.0
     c[_SPIN + axis] = -along
-    x, y, z = rotated(c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3], c[_SPIN], c[_SPIN + 1], c[_SPIN + 2])
-    wx, wy, wz = c[_RATE], c[_RATE + 1], c[_RATE + 2]
+    x, y, z = rotated(c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3], c[_SPIN], c[_SPIN + 1], c[_SPIN + 2])
+    wx, wy, wz = c[RATE], c[RATE + 1], c[RATE + 2]
     c[_START_RATE], c[_START_RATE + 1], c[_START_RATE + 2] = wx, wy, wz
-    c[_RATE], c[_RATE + 1], c[_RATE + 2] = wx - x, wy - y, wz - z
-    c[_KIND] = SYMMETRIC
+    c[RATE], c[RATE + 1], c[RATE + 2] = wx - x, wy - y, wz - z
+    c[KIND] = SYMMETRIC
 
 
 @jit
@@ -320,14 +320,14 @@ def keep_axis(q, w_world, constants_out):
     c = constants_out
     q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
     wx, wy, wz = w_world[0], w_world[1], w_world[2]
-    c[_RATE], c[_RATE + 1], c[_RATE + 2] = wx, wy, wz
-    c[_KIND] = REST
+    c[RATE], c[RATE + 1], c[RATE + 2] = wx, wy, wz
+    c[KIND] = REST
     if wx != 0.0 or wy != 0.0 or wz != 0.0:
         # Only a body that turns is normalised: one at rest keeps the very bits of its orientation.
-        c[_KIND] = FIXED_AXIS
+        c[KIND] = FIXED_AXIS
         norm = math.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
         q0, q1, q2, q3 = q0 / norm, q1 / norm, q2 / norm, q3 / norm
-    c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3] = q0, q1, q2, q3
+    c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3] = q0, q1, q2, q3
 
 
 @jit
@@ -338,7 +338,7 @@ def prepare(inertia, q, w_world, constants_out):
     """
     c = constants_out
     keep_axis(q, w_world, c)
-    spin = max(abs(c[_RATE]), abs(c[_RATE + 1]), abs(c[_RATE + 2]))
+    spin = max(abs(c[RATE]), abs(c[RATE + 1]), abs(c[RATE + 2]))
     low = high = np.int64(0)  # a plain 0 would compile what is called below a second time
     for k in range(1, 3):
         if inertia[k] < inertia[low]:
@@ -350,7 +350,7 @@ def prepare(inertia, q, w_world, constants_out):
     if spin < _SLOW or inertia[high] - inertia[low] <= equal:
         return
     c[_SPIN], c[_SPIN + 1], c[_SPIN + 2] = rotated(
-        c[_BASE], -c[_BASE + 1], -c[_BASE + 2], -c[_BASE + 3], c[_RATE], c[_RATE + 1], c[_RATE + 2]
+        c[BASE], -c[BASE + 1], -c[BASE + 2], -c[BASE + 3], c[RATE], c[RATE + 1], c[RATE + 2]
     )
     i_low, i_middle, i_high = inertia[low], inertia[middle], inertia[high]
     if i_high - i_middle <= equal:
@@ -368,20 +368,20 @@ def prepare(inertia, q, w_world, constants_out):
 def rotation(constants, t):
     """Quaternion and world angular velocity t seconds after the start, as seven numbers."""
     c = constants
-    q0, q1, q2, q3 = c[_BASE], c[_BASE + 1], c[_BASE + 2], c[_BASE + 3]
-    if c[_KIND] == REST:
+    q0, q1, q2, q3 = c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3]
+    if c[KIND] == REST:
         return q0, q1, q2, q3, 0.0, 0.0, 0.0
-    if c[_KIND] == ASYMMETRIC:
+    if c[KIND] == ASYMMETRIC:
         g0, g1, g2, g3, wx, wy, wz = _asymmetric_frame(c, t)
         q0, q1, q2, q3 = product(q0, q1, q2, q3, g0, g1, g2, g3)
         wx, wy, wz = rotated(q0, q1, q2, q3, wx, wy, wz)
         s0, s1, s2, s3 = c[_FRAME], c[_FRAME + 1], c[_FRAME + 2], c[_FRAME + 3]
         s1, s2, s3 = -s1, -s2, -s3
     else:
-        wx, wy, wz = c[_RATE], c[_RATE + 1], c[_RATE + 2]
+        wx, wy, wz = c[RATE], c[RATE + 1], c[RATE + 2]
         e0, e1, e2, e3 = exponential(t * wx, t * wy, t * wz)
         q0, q1, q2, q3 = product(e0, e1, e2, e3, q0, q1, q2, q3)
-        if c[_KIND] == FIXED_AXIS:
+        if c[KIND] == FIXED_AXIS:
             return q0, q1, q2, q3, wx, wy, wz
         wx, wy, wz = c[_START_RATE], c[_START_RATE + 1], c[_START_RATE + 2]
         wx, wy, wz = rotated(e0, e1, e2, e3, wx, wy, wz)

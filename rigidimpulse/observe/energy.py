@@ -6,7 +6,8 @@ from rigidimpulse._jit import jit
 
 
 @jit
-def _kinetic(velocity, angular_velocity, orientation, mass, inertia, members):
+def kinetic_of(velocity, angular_velocity, orientation, mass, inertia, members):
+    """Kinetic energy of the members [J]; columns (n, ...) of all bodies."""
     total = 0.0
     for i in members:
         v, w, q = velocity[i], angular_velocity[i], orientation[i]
@@ -24,7 +25,7 @@ def _kinetic(velocity, angular_velocity, orientation, mass, inertia, members):
 
 def kinetic_energy(bodies, world, members: np.ndarray) -> float:
     """Kinetic energy of the members [J]."""
-    return _kinetic(
+    return kinetic_of(
         bodies.velocity, bodies.angular_velocity, bodies.orientation, world.mass, world.inertia, members
     )
 

@@ -88,6 +88,15 @@ def _record(result, k, time, status, queries, work):
 
 
 @jit
+def _record_ball(frame, course, scratch, a, b, shape_a, shape_b, t, start, end, result, k):
+    """Write row k of the answer for a pair that meets at t [s]."""
+    result.time[k], result.status[k], result.queries[k] = t if t < end else inf, SEPARATE, 1
+    if t < end:
+        result.status[k] = IMPACT if t > start else TOUCHING
+        write_ball_witness(frame, course, scratch, a, b, shape_a, shape_b, t, result.witness[k])
+
+
+@jit
 def first_contacts(
     geometry, course, scratch, shape_of_body, pairs_a, pairs_b, start, end, touch, tolerance, ahead, max_queries, cylinders, result
 ):
@@ -104,10 +113,7 @@ def first_contacts(
         if is_closed_form(course, scratch, a, b, shape_a, shape_b, touch[k]):
             t = ball_time(geometry.frame, course, scratch, a, b, shape_a, shape_b, start[k])
             if t == t:
-                result.time[k], result.status[k], result.queries[k] = t if t < end else inf, SEPARATE, 1
-                if t < end:
-                    result.status[k] = IMPACT if t > start[k] else TOUCHING
-                    write_ball_witness(geometry.frame, course, scratch, a, b, shape_a, shape_b, t, result.witness[k])
+                _record_ball(geometry.frame, course, scratch, a, b, shape_a, shape_b, t, start[k], end, result, k)
                 continue
         slack = rounding_slack(course, scratch.reach, a, b, shape_a, shape_b, end)
         above = max(tolerance[k], slack)
