@@ -1,9 +1,9 @@
 """How the error of whole runs falls with the step, strategy by strategy, as the rows of a study show it.
 
-After the fact: an impact is seen at the end of its step, late by up to h: order 1. By the tangent from the start of the step: |gap''| t^2 / 2 c
-with t <= h: order 2. By bisection: no step in it at all, only the tolerance. Two dozen capsules that fall and spin, so that impacts lie anywhere
-in their steps; the median error of a first impact follows the law, and a slope over four halvings is known to some 0.15. (The largest does
-not: a tip that moves away at the start of its step has no tangent to go down, and is found a step later.)
+After the fact: an impact is seen at the end of its step, late by up to h: order 1. By the tangent from the start of the step:
+|gap''| t^2 / 2 c with t <= h: order 2. By bisection: no step in it at all, only the tolerance. Two dozen capsules that fall and spin, so
+that impacts lie anywhere in their steps; the median error of a first impact follows the law, and a slope over four halvings is known to
+some 0.15. (The largest does not: a tip that moves away at the start of its step has no tangent to go down, and is found a step later.)
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ def batons() -> ri.Scene:
         turn = random.normal(size=4)
         scene.add(
             ri.Body(
-                f"baton {k}", ri.Shape.capsule(0.07, 0.6), position=(0, 2.0 * k, random.uniform(1.0, 2.0)), orientation=turn / np.linalg.norm(turn),
-                velocity=(0, 0, random.uniform(-4, -2)), angular_velocity=random.normal(0, 6, 3), material=ri.Material(restitution=0.2),
+                f"baton {k}", ri.Shape.capsule(0.07, 0.6), position=(0, 2.0 * k, random.uniform(1.0, 2.0)),
+                orientation=turn / np.linalg.norm(turn), velocity=(0, 0, random.uniform(-4, -2)), angular_velocity=random.normal(0, 6, 3),
+                material=ri.Material(restitution=0.2),
             )
         )  # fmt: skip
     return scene

@@ -175,6 +175,34 @@ def test_mistakes_in_scene_files_are_named(tmp_path, text, words):
     assert not (tmp_path / "run.npz").exists()
 
 
+def test_study_of_a_scene_prints_a_table_and_writes_its_files(scene_file, tmp_path):
+    arguments = ("study", scene_file, "--duration", 0.5, "--budget", 20, "-o", tmp_path / "out")
+    result = call(*arguments)
+    assert result.exit_code == 0, result.output
+    assert "falling_ball, 0.5 s; reference: self-converged, until 0.5 s" in result.stdout
+    assert "standard" in result.stdout and "bisection, step 1/30" in result.stdout
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"study.csv", "study.png", "study.html"}
+    table = (tmp_path / "out" / "study.csv").read_text()
+    assert call(*arguments).exit_code == 0
+    # Gone on with: what was there is there to the last digit.
+    assert (tmp_path / "out" / "study.csv").read_text().startswith(table)
+
+
+def test_study_wants_one_thing():
+    for arguments in ((), ("bounce", "--scaling")):
+        result = call("study", *arguments)
+        assert result.exit_code == BAD_SCENE and "SCENE, or --scaling" in result.stderr
+
+
+def test_accuracy_by_wish_on_the_command_line(scene_file, tmp_path):
+    result = call("simulate", scene_file, "--duration", 0.5, "--within", 1e-3, "-o", tmp_path / "run.npz")
+    assert result.exit_code == 0, result.output
+    assert "chose step" in result.stdout and "estimated error" in result.stdout
+    assert call("simulate", scene_file, "--duration", 0.1, "--per-frame", 10, "-o", tmp_path / "run.npz").exit_code == 0
+    both = call("simulate", scene_file, "--within", 1e-3, "--accuracy", "exact", "-o", tmp_path / "run.npz")
+    assert both.exit_code == BAD_SCENE and "give one of them" in both.stderr
+
+
 def test_study_prints_exponents_of_cost():
     result = call("study", "--scaling", "--most", 300)
     assert result.exit_code == 0, result.output
