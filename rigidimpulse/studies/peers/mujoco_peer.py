@@ -1,8 +1,9 @@
 """MuJoCo: generalised coordinates, soft convex contact, meshes as their convex hulls.
 
 Contacts are springs and dampers with the stiffness of ten steps a half wave and the damping ratio that restitution e asks for,
-z = -ln e / sqrt(pi^2 + ln^2 e): the direct form of `solref`. Dull contacts have the stiffest form that stays stable, a time constant of two
-steps.
+z = -ln e / sqrt(pi^2 + ln^2 e): the direct form of `solref`. Contacts end when their force does, which makes e larger, and ten steps are
+coarse, which makes it smaller: it rebounds with 1.002, 0.798, 0.507 and 0.249 where 1, 0.8, 0.5 and 0.2 are asked for. Dull contacts have
+the stiffest form that stays stable, a time constant of two steps.
 """
 
 from __future__ import annotations
