@@ -49,6 +49,7 @@ _HOMES = {
     "StayNear": "forces.energy.path",
     "Thruster": "forces.thruster",
     "Velocity": "forces.energy.path",
+    "compare": "study.compare",
     "compile_scene": "world",
     "contains": "detect.inside",
     "load_recording": "recording",
