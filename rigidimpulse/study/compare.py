@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rigidimpulse.accuracy import PRESETS
 from rigidimpulse.errors import SceneError, unknown_name
 from rigidimpulse.recording import Recording
 from rigidimpulse.study.deviation import Deviation, deviation
@@ -119,9 +120,9 @@ class Comparison:
         if not self.horizon:
             lines = [line[:-1] for line in lines]
         widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
-        cells = ([line[0].ljust(widths[0])] + [cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True)] for line in lines)
+        aligned = ([line[0].ljust(widths[0]), *map(str.rjust, line[1:], widths[1:])] for line in lines)
         title = f"largest differences between {self.labels[0]} and {self.labels[1]}"
-        return "\n".join([title, *("  ".join(line).rstrip() for line in cells)])
+        return "\n".join([title, *("  ".join(line) for line in aligned)])
 
     def export(self, path: str | os.PathLike[str]) -> Path:
         """Write a page that plays run a, run b as ghosts in it, and a plot of how far they are apart: one .html file.
@@ -132,8 +133,7 @@ class Comparison:
 
         """
         path = Path(path)
-        if path.suffix != ".html":
-            raise SceneError(f"cannot write the comparison to {path.name!r}", "use a name that ends in .html")
+        _check_page(path)
         page = self._page()
         return self.run_a._write(path, lambda target: target.write_text(page, encoding="utf-8"))
 
@@ -199,18 +199,63 @@ def compare(
     return Comparison(run_a, run_b, (first, second), {k: float(v) for k, v in (horizon or {}).items()}, apart, distances)
 
 
+def check_words(words: Sequence[str], output: str | None = None) -> None:
+    """Look at what a command is to compare, and where it is to write the page, before anything is run.
+
+    Raises:
+        SceneError: a word is neither a recording nor an accuracy; the output is no page.
+
+    """
+    for word in words:
+        if word not in PRESETS and not is_recording(word):
+            remedy = f"give a recording, a file that ends in .npz, or an accuracy: {', '.join(PRESETS)}"
+            raise SceneError(f"cannot compare {word!r}", remedy)
+    if output is not None:
+        _check_page(Path(output))
+
+
+def is_recording(word: str) -> bool:
+    """Whether a word names the file of a recording."""
+    return Path(word).suffix == ".npz"
+
+
+def labels_of(words: Sequence[str]) -> tuple[str, str]:
+    """Return labels of what two words name: accuracies, and files by their names without folders and suffix."""
+    first, second = (Path(word).stem if is_recording(word) else word for word in words)
+    return (first, second) if first != second else (f"A {words[0]}", f"B {words[1]}")
+
+
+def frames_of(run: Recording) -> dict[str, float]:
+    """Return duration (s) and fps with which another run has the frames of this one, to the last bit if it can.
+
+    Raises:
+        SceneError: the recording has a single frame.
+
+    """
+    times = run.times
+    if len(times) < 2:
+        raise SceneError("a recording of one frame has no frame rate", "export a longer run")
+    rate = (len(times) - 1) / float(times[-1])
+    near = (float(f"{rate:.12g}"), rate)
+    return {"duration": float(times[-1]), "fps": next((fps for fps in near if np.array_equal(np.arange(len(times)) / fps, times)), rate)}
+
+
+def _check_page(path: Path) -> None:
+    if path.suffix != ".html":
+        raise SceneError(f"cannot write the comparison to {path.name!r}", "use a name that ends in .html")
+
+
 def _two_labels(labels: Sequence[str]) -> tuple[str, str]:
-    if isinstance(labels, str) or len(labels) != 2 or not all(isinstance(label, str) and label for label in labels) or labels[0] == labels[1]:
+    if isinstance(labels, str) or len(labels) != 2 or len({label for label in labels if isinstance(label, str) and label}) != 2:
         raise SceneError(f"labels are {labels!r}", "give two different texts, such as ('preview', 'exact')")
     return labels[0], labels[1]
 
 
 def _net_distances(a: Recording, b: Recording) -> dict[str, np.ndarray]:
     """Largest distance of the vertices, (f,) m, by flexible body; infinite where a vertex is not finite."""
-    shapes_a, shapes_b = ({track.name: track.vertices.shape[1] for track in run.nets} for run in (a, b))
-    if list(shapes_a.items()) != list(shapes_b.items()):
-        one, other = (", ".join(f"{name} of {count} vertices" for name, count in shapes.items()) or "none" for shapes in (shapes_a, shapes_b))
-        raise SceneError(f"one run has the flexible bodies {one}, the other {other}", "compare runs of one scene")
+    in_a, in_b = (", ".join(f"{track.name} of {track.vertices.shape[1]} vertices" for track in run.nets) or "none" for run in (a, b))
+    if in_a != in_b:
+        raise SceneError(f"one run has the flexible bodies {in_a}, the other {in_b}", "compare runs of one scene")
     distances = {}
     for track, other in zip(a.nets, b.nets, strict=True):
         distance = np.linalg.norm(track.vertices - other.vertices, axis=2).max(axis=1)
