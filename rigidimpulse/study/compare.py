@@ -61,11 +61,12 @@ class Comparison:
 
     @cached_property
     def names(self) -> list[str]:
-        """The bodies that are compared: those that are not static, then flexible ones."""
+        """The bodies that are compared: those that are not static (without a scene: that move), then flexible ones."""
         scene = self.run_a.scene
         if scene is None:
-            moves = (np.ptp(self.run_a.positions, axis=0) > 0.0) | (np.ptp(self.run_b.positions, axis=0) > 0.0)
-            chosen = [name for name, moved in zip(self.run_a.names, moves.any(axis=1), strict=True) if moved]
+            poses = [np.concatenate([run.positions, run.orientations], axis=2) for run in (self.run_a, self.run_b)]
+            moves = (np.concatenate(poses) != poses[0][0]).any(axis=(0, 2))
+            chosen = [name for name, moved in zip(self.run_a.names, moves, strict=True) if moved]
         else:
             chosen = [body.name for body in scene.bodies if body.motion != "static"]
         return chosen + list(self.net_distance)
@@ -236,7 +237,7 @@ def frames_of(run: Recording) -> dict[str, float]:
     if len(times) < 2:
         raise SceneError("a recording of one frame has no frame rate", "export a longer run")
     rate = (len(times) - 1) / float(times[-1])
-    near = (float(f"{rate:.12g}"), rate)
+    near = [float(f"{rate:.12g}"), *(rate + np.arange(-4, 5) * np.spacing(rate)).tolist()]
     return {"duration": float(times[-1]), "fps": next((fps for fps in near if np.array_equal(np.arange(len(times)) / fps, times)), rate)}
 
 

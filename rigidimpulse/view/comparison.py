@@ -58,7 +58,7 @@ def comparison_contents(comparison: Comparison) -> tuple[dict[str, Any], list[tu
         "labels": list(comparison.labels),
         "ghosts": ghosts,
         "nets": [{"name": name, "key": drawn[name]["key"]} for name in net_names],
-        "horizon": {name: time for name, time in comparison.horizon.items() if np.isfinite(time)},
+        "horizon": {name: max(time, float(times[0]) - 1.0) for name, time in comparison.horizon.items() if time < np.inf},
     }
     manifest["summary"] = _summary(comparison)
     for values in ("distance", "angle"):

@@ -179,7 +179,8 @@ class ComparisonPanel {
     element("angle").textContent = withUnit(angle, "rad");
     element("angle").hidden = this.ghosts.turns.size === 0 || (focus !== null && !this.ghosts.turns.has(focus)); // nets have none
     element("legend").style.setProperty("--line", colour);
-    element("trust").textContent = until < Infinity ? `${time > until ? "beyond" : "within"} the horizon, ${Number(until.toPrecision(4))} s` : "";
+    element("trust").textContent = until === Infinity ? "" :
+      `${time > until ? "beyond" : "within"} the horizon, ${Number(Math.max(until, this.transport.start).toPrecision(4))} s`;
     element("legend").classList.toggle("beyond", time > until);
     this.viewer.set_dirty();
   }
