@@ -2,6 +2,7 @@
    A body under the pointer, or the one last clicked at, is shown by itself. Bodies beyond their horizon lose colour. */
 
 const FADED = 0.72; // of the colour that a body beyond its horizon has lost
+const SEEN = 0.2; // pixels that a ghost must be away from its body to be drawn: outlines on top of each other would flicker
 const MARGIN = 1.05; // about the action, above the panel
 const CLICK = 4; // pixels that a pointer may move in a click
 
@@ -15,13 +16,13 @@ class Bodies {
       if (compared.has(name)) {
         const node = viewer.scene_tree.find([group, key]).object, meshes = [];
         node.traverse((part) => { if (part.isMesh) { meshes.push(part); } });
-        this.entries.set(name, {node, meshes, ghost: ghosts.nodes.get(name), own: meshes.map((mesh) => mesh.material.color.clone())});
-        this.entries.get(name).colour = surface.color;
+        const own = meshes.map((mesh) => mesh.material.color.clone());
+        this.entries.set(name, {node, meshes, own, ghost: ghosts.nodes.get(name), colour: surface.color});
       }
     }
     for (const [name, {node, ghost}] of this.entries) {
-      for (const root of [node, ghost]) {
-        root.traverse((part) => { if (part.isMesh) { this.meshes.push({part, name, root}); } });
+      for (const [root, folder] of [[node, node.parent], [ghost, ghosts.folder]]) {
+        root.traverse((part) => { if (part.isMesh) { this.meshes.push({part, name, isSeen: () => root.visible && folder.visible}); } });
       }
     }
     this.beyond = new Set();
@@ -41,15 +42,12 @@ class Bodies {
   }
 
   /* Name of the body in sight at a point of the window, or null. */
-  at(x, y, camera, folder) {
+  at(x, y, camera) {
     const ray = new THREE.Raycaster();
     ray.setFromCamera(new THREE.Vector2((2 * x) / window.innerWidth - 1, 1 - (2 * y) / window.innerHeight), camera);
-    const parts = this.meshes.filter(({root}) => root.visible && (folder.visible || !this.isGhost(root)));
-    const [hit] = ray.intersectObjects(parts.map(({part}) => part), false);
-    return hit ? parts.find(({part}) => part === hit.object).name : null;
+    const [hit] = ray.intersectObjects(this.meshes.filter(({isSeen}) => isSeen()).map(({part}) => part), false);
+    return hit ? this.meshes.find(({part}) => part === hit.object).name : null;
   }
-
-  isGhost(root) { return [...this.entries.values()].some(({ghost}) => ghost === root); }
 }
 
 class ComparisonPanel {
@@ -113,7 +111,7 @@ class ComparisonPanel {
   bindScene() {
     const pane = element("meshcat-pane");
     let pressed = null;
-    const find = (event) => this.bodies.at(event.clientX, event.clientY, this.viewer.camera, this.ghosts.folder);
+    const find = (event) => this.bodies.at(event.clientX, event.clientY, this.viewer.camera);
     pane.addEventListener("pointermove", (event) => {
       if (event.buttons === 0) { this.hover(find(event)); }
     });
@@ -185,6 +183,16 @@ class ComparisonPanel {
     this.viewer.set_dirty();
   }
 
+  /* Hides the ghosts that cannot be told from their bodies; with every picture. */
+  hideEqual() {
+    const {camera, controls} = this.viewer, {time, frame} = this.transport;
+    const pixel = (2 * Math.tan((camera.fov * Math.PI) / 360) * camera.position.distanceTo(controls.target)) / window.innerHeight;
+    for (const [name, {node, ghost}] of this.bodies.entries) {
+      const [distance, angle] = this.plot.at(name, frame, time);
+      ghost.visible = !node.visible || distance + angle * this.stage.framing.body_radius > SEEN * pixel;
+    }
+  }
+
   /* Puts the label of the body in focus above it; with every picture. */
   placeLabel() {
     const label = element("label"), entry = this.bodies.entries.get(this.focus);
@@ -212,6 +220,7 @@ expose = (viewer, stage, transport, impacts, nets) => {
     panel.show();
   };
   viewer.render = () => {
+    panel.hideEqual();
     panel.placeLabel();
     render();
   };

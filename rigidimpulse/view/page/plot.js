@@ -24,13 +24,11 @@ function largestOf(values, numFrames) {
 
 class Plot {
   constructor(canvas, times, names, distance, angle, horizon) {
-    Object.assign(this, {canvas, times, names, horizon});
-    const count = times.length, part = (values, name) => {
-      const k = names.indexOf(name);
-      return values.subarray(k * count, (k + 1) * count);
-    };
+    Object.assign(this, {canvas, times, horizon});
+    const count = times.length, part = (values, k) => values.subarray(k * count, (k + 1) * count);
     const all = {distance: largestOf(distance, count), angle: largestOf(angle, count)};
-    this.of = (name) => (name === null ? all : {distance: part(distance, name), angle: part(angle, name)});
+    const own = new Map(names.map((name, k) => [name, {distance: part(distance, k), angle: part(angle, k)}]));
+    this.of = (name) => (name === null ? all : own.get(name));
     this.first = Math.min(...Object.values(horizon), Infinity);
     const positive = (values) => [...values].filter((value) => value > 0), both = [...positive(all.distance), ...positive(all.angle)];
     const seen = all.distance.some((value) => value > 0) ? positive(all.distance) : both; // angles of round-off would stretch the scale
