@@ -1,7 +1,7 @@
 /* The page of two runs: run A as on its own page, run B as ghosts, and below them the plot of how far they are apart.
    A body under the pointer, or the one last clicked at, is shown by itself. Bodies beyond their horizon lose colour. */
 
-const FADED = 0.72; // of the colour that a body beyond its horizon has lost
+const FADED = 0.6; // of the colour that a body beyond its horizon has lost
 const SEEN = 0.2; // pixels that a ghost must be away from its body to be drawn: outlines on top of each other would flicker
 const MARGIN = 1.05; // about the action, above the panel
 const CLICK = 4; // pixels that a pointer may move in a click
