@@ -93,7 +93,8 @@ class ComparisonPanel {
       2: run(1, (shown) => { this.ghosts.folder.visible = shown; }),
     };
     window.addEventListener("keydown", (event) => {
-      if (!event.ctrlKey && !event.metaKey && !event.altKey && keys[event.key]) { keys[event.key](); }
+      const typing = event.target.tagName === "INPUT" && event.target.type !== "range";
+      if (!typing && !event.ctrlKey && !event.metaKey && !event.altKey && keys[event.key]) { keys[event.key](); }
     });
     element("keys").textContent += " \u00b7 1 2 runs \u00b7 click a body: its own curve";
   }
@@ -172,7 +173,7 @@ class ComparisonPanel {
     const colour = focus === null ? PLOT_INK : this.bodies.entries.get(focus).colour;
     this.plot.draw(time, frame, focus, colour);
     const [distance, angle] = this.plot.at(focus, frame, time), until = this.plot.horizonOf(focus);
-    element("who").textContent = focus ?? "largest of all bodies";
+    element("who").textContent = focus ?? (this.bodies.entries.size === 1 ? [...this.bodies.entries.keys()][0] : "largest of all bodies");
     element("distance").textContent = withUnit(distance, "m");
     element("angle").textContent = withUnit(angle, "rad");
     element("angle").hidden = this.ghosts.turns.size === 0 || (focus !== null && !this.ghosts.turns.has(focus)); // nets have none
