@@ -27,6 +27,7 @@ _HOMES = {
     "GravityPotential": "forces.energy.potential",
     "HarmonicForce": "forces.harmonic",
     "HingeJoint": "constrain.joint",
+    "InTime": "studies.wishes",
     "Keyframes": "keyframes",
     "Limit": "constrain.six_axis",
     "Material": "material",
@@ -49,13 +50,15 @@ _HOMES = {
     "StayNear": "forces.energy.path",
     "Thruster": "forces.thruster",
     "Velocity": "forces.energy.path",
-    "compare": "study.compare",
+    "Within": "studies.wishes",
+    "compare": "studies.compare",
     "compile_scene": "world",
     "contains": "detect.inside",
     "load_recording": "recording",
     "settle": "forces.energy.layout",
     "simulate": "simulation",
     "smooth_path": "forces.energy.path",
+    "study": "studies.work_precision",
 }
 
 __all__ = sorted(_HOMES)

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from rigidimpulse.gallery.record import Check, GalleryScene
     from rigidimpulse.recording import Recording
     from rigidimpulse.scene import Scene
-    from rigidimpulse.study.compare import Comparison
-    from rigidimpulse.study.hard_cases import CaseResult
+    from rigidimpulse.studies.compare import Comparison
+    from rigidimpulse.studies.hard_cases import CaseResult
+    from rigidimpulse.studies.wishes import Wish
 
 OUTPUT_SUFFIXES = (".html", ".npz")
 DEFAULT_DURATION = 4.0
@@ -58,7 +59,7 @@ class Job(NamedTuple):
     make: Callable[[], Scene]
     duration: float
     fps: float
-    accuracy: str | Accuracy
+    accuracy: str | Accuracy | Wish
     entry: GalleryScene | None
 
 
@@ -78,6 +79,8 @@ def run_options(command: Callable) -> Callable:
         click.option("--profile", is_flag=True, help="Print where the time went, by stage and by kernel."),
         click.option("--fps", type=float, help="Frames per second; changes what is recorded, never what happens."),
         click.option("--duration", type=float, help="Time to simulate, s."),
+        click.option("--per-frame", type=float, help="Instead of --accuracy: the finest setting that takes so long for a frame, s."),
+        click.option("--within", type=float, help="Instead of --accuracy: the cheapest setting whose places are right to so much, m."),
         click.option("--accuracy", help="preview, standard or exact."),
     ):
         command = option(command)
@@ -122,7 +125,7 @@ def hardcases(names: tuple[str, ...], output: str, limit: float) -> None:
     from tqdm import tqdm
 
     from rigidimpulse import gallery
-    from rigidimpulse.study.hard_cases import run_suite, write_results
+    from rigidimpulse.studies.hard_cases import run_suite, write_results
 
     chosen = names or gallery.hard_names()
     with tqdm(total=len(chosen), unit="case", disable=None, leave=False) as bar:
@@ -144,11 +147,57 @@ def hardcases(names: tuple[str, ...], output: str, limit: float) -> None:
 
 
 @main.command()
-@click.option("--scaling", is_flag=True, required=True, help="Time scenes of 10 to 20,000 bodies.")
-@click.option("--most", type=int, default=20_000, show_default=True, help="Bodies of the largest scene.")
-def study(scaling: bool, most: int) -> None:
-    """Measure how the cost of impacts and of steps grows with the number of bodies: exponents p of cost ~ n^p."""
-    from rigidimpulse.study.scaling import SCENES, exponent, measure_scaling, sizes
+@click.argument("scene", required=False)
+@click.option("-o", "--output", help="Folder for the table and the charts; a study found there is gone on with.  [default: study_SCENE]")
+@click.option("--budget", type=float, help="Time the study may take, s.  [default: 60, or 3600 with --full]")
+@click.option("--full", is_flag=True, help="All settings of every strategy.")
+@click.option("--peer", "peers", multiple=True, help="Another engine on the same chart: mujoco or pybullet; may be repeated.")
+@click.option("--duration", type=float, help="Time to simulate, s.")
+@click.option("--scaling", is_flag=True, help="Instead, time scenes of 10 to 20,000 bodies and print exponents p of cost ~ n^p.")
+@click.option("--most", type=int, default=20_000, show_default=True, help="Bodies of the largest scene of --scaling.")
+def study(scene: str | None, output: str | None, scaling: bool, most: int, **settings: Any) -> None:
+    """Measure what accuracy costs in time: run SCENE with many settings, against a reference."""
+    from rigidimpulse.errors import SceneError
+
+    if scaling == (scene is not None):
+        raise SceneError("study takes a SCENE, or --scaling", "give one of them")
+    if scene is not None:
+        _study_scene(scene, output, **settings)
+    else:
+        _study_scaling(most)
+
+
+def _study_scene(scene: str, output: str | None, budget: float | None, full: bool, peers: tuple[str, ...], duration: float | None) -> None:
+    """Print the table of a study and write its files."""
+    from tqdm import tqdm
+
+    from rigidimpulse.studies.work_precision import BUDGET, FULL_BUDGET
+    from rigidimpulse.studies.work_precision import study as run_study
+
+    job = _find_job(scene)
+    given = job.name if job.entry is not None else job.make()
+    folder = Path(output or f"study_{job.name}")
+    with tqdm(total=100, disable=None, leave=False, bar_format="{desc} {percentage:3.0f} % of the budget |{bar}|") as bar:
+
+        def progress(what: str, share: float) -> None:
+            bar.set_description(what)
+            bar.update(round(100.0 * share) - bar.n)
+
+        result = run_study(
+            given, duration or job.duration, job.fps, name=job.name, full=full, budget=budget or (FULL_BUDGET if full else BUDGET),
+            peers=peers, output=folder, progress=progress,
+        )  # fmt: skip
+    click.echo(f"{result.name}, {result.duration:g} s; reference: {result.reference.describe()}")
+    click.echo(result.table())
+    if result.left:
+        click.echo(f"no time for {len(result.left)} settings: {', '.join(result.left)}; raise --budget, and the study goes on")
+    for name in ("study.csv", "study.png", "study.html"):
+        click.echo(f"wrote {folder / name}")
+
+
+def _study_scaling(most: int) -> None:
+    """Print how the cost of impacts and of steps grows with the number of bodies."""
+    from rigidimpulse.studies.scaling import SCENES, exponent, measure_scaling, sizes
 
     for kind in SCENES:
         rows = [("bodies", "s in all", f"{SCENES[kind].unit}s", f"us a {SCENES[kind].unit}", "")]
@@ -199,7 +248,7 @@ def view(file: str, scene: str | None) -> None:
 @click.option("--duration", type=float, help="Time to run, s; default: that of a recording, else the scene's.")
 def compare(first: str, second: str, scene: str, output: str | None, view: bool, **settings: Any) -> None:
     """Say how far A and B are apart: recordings (.npz) of SCENE, or accuracies (preview, standard, exact) that it is run with."""
-    from rigidimpulse.study import compare as comparison
+    from rigidimpulse.studies import compare as comparison
 
     words, job = (first, second), _find_job(scene)
     comparison.check_words(words, output)
@@ -236,8 +285,26 @@ def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
 
 
 def _given(settings: dict[str, Any]) -> dict[str, Any]:
-    """Return the options that were given."""
-    return {name: value for name, value in settings.items() if value is not None}
+    """Return the options that were given; a wish takes the place of the accuracy.
+
+    Raises:
+        SceneError: more than one accuracy was given.
+
+    """
+    from rigidimpulse.errors import SceneError
+
+    given = {name: value for name, value in settings.items() if value is not None}
+    if len({"accuracy", "within", "per_frame"} & set(given)) > 1:
+        raise SceneError("more than one of --accuracy, --within and --per-frame", "give one of them")
+    if "within" in given:
+        from rigidimpulse.studies.wishes import Within
+
+        given["accuracy"] = Within(position=given.pop("within"))
+    if "per_frame" in given:
+        from rigidimpulse.studies.wishes import InTime
+
+        given["accuracy"] = InTime(given.pop("per_frame"))
+    return given
 
 
 def _job_of(entry: GalleryScene) -> Job:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from rigidimpulse.errors import SceneError, unknown_name
 from rigidimpulse.observe.contacts import CONTACT_DTYPE, forces_on
 
 if TYPE_CHECKING:
+    from rigidimpulse.accuracy import Accuracy
     from rigidimpulse.flexible.track import FlexibleTrack
     from rigidimpulse.observe.events import Event
     from rigidimpulse.observe.impulses import Impulses
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from rigidimpulse.observe.profile import Profile
     from rigidimpulse.plan import Plan
     from rigidimpulse.scene import Scene
+    from rigidimpulse.studies.wishes import Choice
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,15 @@ class Status:
         return Status(False, "\n".join(lines), tuple(events))
 
 
+class RunSettings(NamedTuple):
+    """What `simulate` was asked for besides the scene: see there."""
+
+    duration: float
+    fps: float
+    accuracy: Accuracy
+    effects: dict[str, bool]
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Frames of n bodies at f times.
@@ -66,6 +78,8 @@ class Recording:
         by_cause: impulses by body and cause, see `impulses`; None in a loaded recording.
         nets: frames of flexible bodies, see `net`.
         profile: where the time of the run went, by stage and by kernel; `profile.table()` for people.
+        settings: duration, fps, accuracy and chosen effects of the run; None in a loaded recording.
+        choice: how the accuracy was chosen, if it was asked for by `Within` or `InTime`.
 
     """
 
@@ -86,6 +100,26 @@ class Recording:
     by_cause: Impulses | None = None
     nets: list[FlexibleTrack] = field(default_factory=list)
     profile: Profile | None = None
+    settings: RunSettings | None = None
+    choice: Choice | None = None
+
+    @cached_property
+    def horizon(self) -> dict[str, float]:
+        """Time by body until which the run can be trusted, s: it is one of many plausible ones beyond.
+
+        Until then two runs whose settings bracket those of this run (a step and a tolerance twice as large, and half as large), started off
+        by rounding, agree with it: to the wished tolerance, where accuracy was asked for by `Within`, else to a thousandth of the body's
+        size. Dynamic bodies only; the end of the run where all agree. The two runs are made when this is first asked for.
+
+        Raises:
+            SceneError: for a recording that was loaded from a file.
+
+        """
+        if self.scene is None or self.settings is None:
+            raise SceneError("a loaded recording cannot be run again", "ask the run that simulate() returned")
+        from rigidimpulse.studies.horizon import find_horizon
+
+        return find_horizon(self)
 
     def index(self, name: str) -> int:
         """Index of a body.

@@ -35,7 +35,7 @@ from rigidimpulse.observe.ledger import make_ledger
 from rigidimpulse.observe.profile import Stopwatch
 from rigidimpulse.observe.recorder import Recorder
 from rigidimpulse.plan import Plan
-from rigidimpulse.recording import Recording, Status
+from rigidimpulse.recording import Recording, RunSettings, Status
 from rigidimpulse.respond.response import ImpactResponse
 from rigidimpulse.scene import Scene
 from rigidimpulse.state import StepContext
@@ -46,6 +46,7 @@ from rigidimpulse.world import World, compile_scene
 if TYPE_CHECKING:
     from rigidimpulse.events.run import EventRun
     from rigidimpulse.forces.force_log import ForceWork
+    from rigidimpulse.studies.wishes import Wish
 
 logger = logging.getLogger("rigidimpulse")
 
@@ -58,7 +59,7 @@ def simulate(
     duration: float,
     fps: float = 60.0,
     *,
-    accuracy: str | Accuracy = "standard",
+    accuracy: str | Accuracy | Wish = "standard",
     effects: Mapping[str, bool] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
@@ -68,7 +69,7 @@ def simulate(
         scene: what to simulate; it is not changed.
         duration: s, >= 0.
         fps: frames per second; changes what is recorded, never what happens.
-        accuracy: "preview", "standard", "exact" or an `Accuracy`.
+        accuracy: "preview", "standard", "exact" or an `Accuracy`; or a wish, `Within` or `InTime`, that chooses one by measuring the scene.
         effects: effects, by their names in `run.plan.explain()`, that are to be in (True) or out (False) whatever the scene calls for. The
             status says where one is out that the scene calls for.
         progress: called with the simulated time in s after every step, or after many in which nothing but impacts of balls happened.
@@ -81,6 +82,22 @@ def simulate(
             or cannot be out.
 
     """
+    if isinstance(accuracy, str | Accuracy):
+        return _simulate(scene, duration, fps, accuracy, effects, progress)
+    from rigidimpulse.studies.wishes import simulate_as_wished
+
+    return simulate_as_wished(scene, duration, fps, accuracy, effects, progress)
+
+
+def _simulate(
+    scene: Scene,
+    duration: float,
+    fps: float,
+    accuracy: str | Accuracy,
+    effects: Mapping[str, bool] | None,
+    progress: Callable[[float], None] | None,
+) -> Recording:
+    """See `simulate`."""
     stopwatch = Stopwatch()
     times = frame_times(duration, fps)
     left_out = chosen_out(scene, accuracy, effects)
@@ -112,7 +129,8 @@ def simulate(
         plan.tell(HeapForces.name, context.heaps.summary())
     recorder.finish(context.state.course)
     run = make_recording(context, plan, times, duration)
-    return replace(run, profile=stopwatch.read(plan))
+    settings = RunSettings(float(duration), float(fps), world.accuracy, dict(effects or {}))
+    return replace(run, profile=stopwatch.read(plan), settings=settings)
 
 
 def prepare_kernels(world: World, plan: Plan) -> None:

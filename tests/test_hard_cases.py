@@ -19,8 +19,8 @@ import rigidimpulse as ri
 from rigidimpulse import gallery
 from rigidimpulse.cli import BAD_SCENE, CHECK_FAILED, main
 from rigidimpulse.gallery.hard import FAMILIES, friction, jointed, stacks
-from rigidimpulse.study import hard_cases
-from rigidimpulse.study.hard_cases import CRASHED, HUNG, PASSED, CaseResult, run_apart, run_case, run_suite, write_results
+from rigidimpulse.studies import hard_cases
+from rigidimpulse.studies.hard_cases import CRASHED, HUNG, PASSED, CaseResult, run_apart, run_case, run_suite, write_results
 
 HOLD = (
     "house_of_cards", "heavy_dropped_1e3", "incline", "table", "bounces_to_rest", "bullet_and_paper", "bullet_and_bullet",
@@ -173,7 +173,7 @@ def test_mistakes_get_a_message(arguments, words, tmp_path):
 def test_the_page_escapes_and_shows_what_is_not_finite():
     check = {"what": "a < b", "value": None, "bound": 1.0, "passed": False, "law": "<law>", "relation": "at most"}
     result = CaseResult("name", "x & y", "family", "failed", [check], message="<status>")
-    from rigidimpulse.study.hard_page import page
+    from rigidimpulse.studies.hard_page import page
 
     text = page([result], hard_cases.machine())
     assert "a &lt; b" in text and "x &amp; y" in text and "&lt;status&gt;" in text and "<law>" not in text

@@ -19,6 +19,8 @@ __all__ = ["asset_path", "hard_names", "load", "names"]
 
 _MODULES = {
     "spot": "spot",
+    "bounce": "bounce",
+    "tumbling_box": "tumbling_box",
     "disks_in_a_box": "disks_in_a_box",
     "pool_break": "pool_break",
     "cradle_one": "cradle",
@@ -33,6 +35,7 @@ _MODULES = {
     "off_centre_disk": "off_centre_disk",
     "rifle": "rifle",
     "toss": "tosses",
+    "toss_alone": "tosses",
     "rolling": "rolling",
     "arm": "arm",
     "pile": "pile",

@@ -11,7 +11,7 @@ import numpy as np
 
 from rigidimpulse.body import Body
 from rigidimpulse.forces.spring import Spring
-from rigidimpulse.gallery.record import Check, GalleryScene, at_most
+from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most
 from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
 from rigidimpulse.shape import Shape
@@ -47,12 +47,26 @@ def scene() -> Scene:
     return scene
 
 
+def exact(times: np.ndarray) -> Exact:
+    """Return the ways of all sliders as sums of modes."""
+    ways = {f"{row}, slider {i + 1}": _sum_of_modes(row, times)[:, i] + SPACING * (i + 1) for row in STARTS for i in range(COUNT)}
+    sideways = {f"{row}, slider {i + 1}": r * ROW for r, row in enumerate(STARTS) for i in range(COUNT)}
+    level = np.zeros(len(times))
+    places = {name: np.stack([way, level + sideways[name], level], axis=1) for name, way in ways.items()}
+    return Exact(places, energy=level)
+
+
+def _sum_of_modes(row: str, times: np.ndarray) -> np.ndarray:
+    """Return the ways (f, sliders) [m] from where the sliders of a row rest."""
+    share = np.linalg.solve(MODES, STARTS[row])
+    return (share * np.cos(np.outer(times, RATES))) @ MODES.T
+
+
 def check(run: Recording) -> list[Check]:
     """Compare every slider with the sum of modes, and the energy with its start."""
     checks = []
-    for row, start in STARTS.items():
-        share = np.linalg.solve(MODES, start)
-        x = (share * np.cos(np.outer(run.times, RATES))) @ MODES.T
+    for row in STARTS:
+        x = _sum_of_modes(row, run.times)
         found = np.column_stack([run.position(f"{row}, slider {i + 1}")[:, 0] for i in range(COUNT)]) - SPACING * np.arange(1, COUNT + 1)
         checks.append(at_most(f"{row}: way, m", np.abs(found - x).max(), BOUND, "sum of normal modes"))
     assert run.ledger is not None
@@ -60,4 +74,8 @@ def check(run: Recording) -> list[Check]:
     return checks
 
 
-SCENES = (GalleryScene("coupled_springs", "Sliders on springs in their normal modes, and in all of them", scene, check, DURATION),)
+SCENES = (
+    GalleryScene(
+        "coupled_springs", "Sliders on springs in their normal modes, and in all of them", scene, check, DURATION, exact=exact
+    ),
+)

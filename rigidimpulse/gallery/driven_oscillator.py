@@ -14,7 +14,7 @@ import numpy as np
 from rigidimpulse.body import Body
 from rigidimpulse.forces.harmonic import HarmonicForce
 from rigidimpulse.forces.spring import Spring
-from rigidimpulse.gallery.record import Check, GalleryScene, at_most
+from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most
 from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
 from rigidimpulse.shape import Shape
@@ -45,6 +45,26 @@ def scene() -> Scene:
     return scene
 
 
+def exact(times: np.ndarray) -> Exact:
+    """Return the ways of all balls."""
+    ways = {name: _free_way(2.0 * math.pi * frequency, times) for name, frequency in FREE.items()}
+    ways |= {name: _driven_way(w, times) for name, w in DRIVEN.items()}
+    start = scene()
+    return Exact({name: np.asarray(start[name].position) + way[:, None] * [1.0, 0.0, 0.0] for name, way in ways.items()})
+
+
+def _free_way(w: float, t: np.ndarray) -> np.ndarray:
+    """Return the way (f,) [m] of a free ball: the integral of its velocity."""
+    return FORCE / (MASS * w) * (t - np.sin(w * t) / w)
+
+
+def _driven_way(w: float, t: np.ndarray) -> np.ndarray:
+    """Return the way (f,) [m] of a ball on a spring."""
+    if w == NATURAL:
+        return FORCE / (2.0 * MASS * w**2) * (np.sin(w * t) - w * t * np.cos(w * t))
+    return FORCE / MASS * (np.sin(w * t) - w / NATURAL * np.sin(NATURAL * t)) / (NATURAL**2 - w**2)
+
+
 def check(run: Recording) -> list[Check]:
     """Compare impulses and motions with the closed forms."""
     t, checks = run.times, []
@@ -53,14 +73,15 @@ def check(run: Recording) -> list[Check]:
         error = np.abs(MASS * run.velocity(name)[:, 0] - FORCE * (1.0 - np.cos(w * t)) / w).max()
         checks.append(at_most(f"{name}: momentum, N s", error, BOUND, "I = F_0 (1 - cos w t) / w"))
     for name, w in DRIVEN.items():
-        if w == NATURAL:
-            x = FORCE / (2.0 * MASS * w**2) * (np.sin(w * t) - w * t * np.cos(w * t))
-        else:
-            x = FORCE / MASS * (np.sin(w * t) - w / NATURAL * np.sin(NATURAL * t)) / (NATURAL**2 - w**2)
-        checks.append(at_most(f"{name}: way, m", np.abs(run.position(name)[:, 0] - x).max(), BOUND, "driven oscillator from rest"))
+        error = np.abs(run.position(name)[:, 0] - _driven_way(w, t)).max()
+        checks.append(at_most(f"{name}: way, m", error, BOUND, "driven oscillator from rest"))
     assert run.ledger is not None
     balance = run.ledger.total + sum(run.ledger.dissipated.values())
     return [*checks, at_most("ledger, J", np.ptp(balance), 1e-9, "energy is what the forces did")]
 
 
-SCENES = (GalleryScene("driven_oscillator", "Harmonic forces on free balls and on springs (dynamics notes B1)", scene, check, DURATION),)
+SCENES = (
+    GalleryScene(
+        "driven_oscillator", "Harmonic forces on free balls and on springs (dynamics notes B1)", scene, check, DURATION, exact=exact
+    ),
+)

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from typing import NamedTuple
 
+import numpy as np
+
 DIGITS = 50
 
 Plane = tuple[Decimal, Decimal]
@@ -82,6 +84,15 @@ class DisksInRectangle:
                 self._collide(event)
                 events.append(event)
         return events
+
+    def frames(self, times: np.ndarray) -> tuple[np.ndarray, list[DiskEvent]]:
+        """Return the positions (f, n, 3) [m] at rising times [s], in the plane z = 0, and the impacts until the last."""
+        events: list[DiskEvent] = []
+        positions = np.zeros((len(times), len(self.positions), 3))
+        for f, time in enumerate(times.tolist()):
+            events += self.advance(time)
+            positions[f, :, :2] = [[float(x) for x in place] for place in self.positions]
+        return positions, events
 
     def _candidates(self) -> list[DiskEvent]:
         """Return the next impact of every pair that has one, if nothing else happened before."""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from rigidimpulse.errors import SceneError
 
@@ -64,6 +66,25 @@ def figure(value: float | None) -> str:
 
 
 @dataclass(frozen=True)
+class Exact:
+    """The exact motion of a scene at f times, as far as its law tells it; or a measured one.
+
+    Attributes:
+        position: (f, 3) m of the origin, by body. orientation: (f, 4) wxyz, by body. Bodies that are not named are not told.
+        energy: (f,) J, change of the mechanical energy since the start; None where it is not told.
+        impacts: (k,) s, times of all impacts until the last of the times; None where they are not told.
+        noise: m, how far a measured motion may be off itself; 0 for a closed form.
+
+    """
+
+    position: dict[str, np.ndarray] = field(default_factory=dict)
+    orientation: dict[str, np.ndarray] = field(default_factory=dict)
+    energy: np.ndarray | None = None
+    impacts: np.ndarray | None = None
+    noise: float = 0.0
+
+
+@dataclass(frozen=True)
 class GalleryScene:
     """A named scene with its checks.
 
@@ -76,6 +97,7 @@ class GalleryScene:
         cheaper: settings that are not enough for this scene: with them at least one check fails, or the run does.
             Shows both sides of an option; None where no option is the point.
         elsewhere: what common engines reach in this scene, as measured; empty if nobody measured it.
+        exact: the motion by closed form at given times [s], where there is one.
 
     """
 
@@ -88,6 +110,7 @@ class GalleryScene:
     accuracy: str | Accuracy = "standard"
     cheaper: Accuracy | None = None
     elsewhere: str = ""
+    exact: Callable[[np.ndarray], Exact] | None = None
 
 
 def asset_path(name: str, folder: str = "meshes") -> Path:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.body import Body
-from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
+from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most, equal
 from rigidimpulse.material import Material
 from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
@@ -40,15 +40,32 @@ def scene() -> Scene:
     return scene
 
 
-def check(run: Recording) -> list[Check]:
-    """Compare with the closed form."""
+def _impact() -> tuple[float, np.ndarray, float]:
+    """Return when they meet [s], the change of v_a (3,) [m/s], and the energy lost [J]."""
     x, u = POSITION_B - POSITION_A, VELOCITY_B - VELOCITY_A
     b, a, c = x @ u, u @ u, x @ x - 4.0 * RADIUS**2
     time = (-b - np.sqrt(b * b - a * c)) / a
     normal = (x + u * time) / (2.0 * RADIUS)
     approach = u @ normal
     change = 0.5 * (1.0 + RESTITUTION) * approach * normal
-    lost = (1.0 - RESTITUTION**2) * MASS * approach**2 / 4.0
+    return float(time), change, float((1.0 - RESTITUTION**2) * MASS * approach**2 / 4.0)
+
+
+def exact(times: np.ndarray) -> Exact:
+    """Return the two straight lines before and after."""
+    time, change, lost = _impact()
+    since = np.maximum(times - time, 0.0)[:, None]
+    a = POSITION_A + VELOCITY_A * times[:, None] + change * since
+    b = POSITION_B + VELOCITY_B * times[:, None] - change * since
+    turn = np.zeros((len(times), 4))
+    turn[:, 0], turn[:, 3] = np.cos(0.5 * SPIN[2] * times), np.sin(0.5 * SPIN[2] * times)
+    met = np.array([time]) if time <= times[-1] else np.zeros(0)
+    return Exact({"a": a, "b": b}, {"a": turn}, np.where(times >= time, -lost, 0.0), met)
+
+
+def check(run: Recording) -> list[Check]:
+    """Compare with the closed form."""
+    time, change, lost = _impact()
     kinetic = run.ledger.kinetic if run.ledger else np.array([np.nan])
     law = "v' = v +- (1 + e)/2 [(v_b - v_a).n] n"
     return [
@@ -67,6 +84,6 @@ def check(run: Recording) -> list[Check]:
 
 SCENES = (
     GalleryScene(
-        "two_spheres", "Two smooth spheres meet obliquely in space (dynamics notes B13)", scene, check, DURATION
+        "two_spheres", "Two smooth spheres meet obliquely in space (dynamics notes B13)", scene, check, DURATION, exact=exact
     ),
 )

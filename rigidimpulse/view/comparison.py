@@ -19,7 +19,7 @@ from rigidimpulse.view.page import SCRIPTS, STYLES, assemble
 from rigidimpulse.view.tracks import TypedTrack, animation_message, body_tracks, quaternion_keys
 
 if TYPE_CHECKING:
-    from rigidimpulse.study.compare import Comparison
+    from rigidimpulse.studies.compare import Comparison
 
 COMPARISON_SCRIPTS = (*SCRIPTS, "ghosts.js", "plot.js", "compare.js")
 COMPARISON_STYLES = (*STYLES, "compare.css")

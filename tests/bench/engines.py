@@ -22,8 +22,8 @@ from rigidimpulse.errors import SceneError
 from rigidimpulse.rotation import from_matrix
 from rigidimpulse.scene import Scene
 from rigidimpulse.shape import Part
-from rigidimpulse.study.peers import load_peer
-from rigidimpulse.study.peers.common import PeerBody, read_scene
+from rigidimpulse.studies.peers import load_peer
+from rigidimpulse.studies.peers.common import PeerBody, read_scene
 
 WALL, DEEP = 60.0, 2.0
 """m: half of the width of the box that stands for a half space, and its half depth."""

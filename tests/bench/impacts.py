@@ -22,7 +22,7 @@ from bench_scenes import machine
 
 import rigidimpulse as ri
 from rigidimpulse.gallery import asset_path
-from rigidimpulse.study.scaling import gas
+from rigidimpulse.studies.scaling import gas
 
 SMOOTH = ri.Material(restitution=1.0, static_friction=0.0, dynamic_friction=0.0)
 REPEATS = 3

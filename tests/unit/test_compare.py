@@ -23,7 +23,7 @@ from rigidimpulse.flexible.track import FlexibleTrack
 from rigidimpulse.observe.events import IMPACT_DTYPE
 from rigidimpulse.rotation import multiply
 from rigidimpulse.simulation import frame_times
-from rigidimpulse.study.compare import frames_of, labels_of
+from rigidimpulse.studies.compare import frames_of, labels_of
 from rigidimpulse.view import render_page
 from rigidimpulse.view.comparison import COMPARISON_SCRIPTS, render_comparison
 from rigidimpulse.view.page import SCRIPTS

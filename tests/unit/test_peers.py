@@ -12,7 +12,7 @@ import trimesh
 
 import rigidimpulse as ri
 from rigidimpulse.rotation import angle_between
-from rigidimpulse.study.peers import PEERS, load_peer, run_peer
+from rigidimpulse.studies.peers import PEERS, load_peer, run_peer
 
 G, FPS, STEPS = 9.81, 60, 64
 STEP = 1.0 / (FPS * STEPS)

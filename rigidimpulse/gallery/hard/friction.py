@@ -30,7 +30,7 @@ import numpy as np
 from rigidimpulse.body import Body
 from rigidimpulse.forces.constant import ConstantForce
 from rigidimpulse.gallery.hard.parts import GRAVITY, dull, energy_never_grows, farthest, finite, floor_scene, undisturbed, weight
-from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
+from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_least, at_most
 from rigidimpulse.mass import body_mass
 from rigidimpulse.material import Material
 from rigidimpulse.recording import Recording
@@ -69,6 +69,15 @@ def incline() -> Scene:
     return scene
 
 
+def exact_incline(times: np.ndarray) -> Exact:
+    """Return the ways down the slope from where the blocks were put."""
+    down = np.array([math.cos(SLOPE), 0.0, -math.sin(SLOPE)])
+    a = GRAVITY * (math.sin(SLOPE) - math.tan(SLOPE - TENTH) * math.cos(SLOPE))
+    way = {"holds": 0.0 * times, "slides": 0.5 * a * times**2, "critical": PUSH * times}
+    start = incline()
+    return Exact({name: np.asarray(start[name].position) + way[name][:, None] * down for name in way})
+
+
 def check_incline(run: Recording) -> list[Check]:
     """Compare the ways down the slope."""
     down = np.array([math.cos(SLOPE), 0.0, -math.sin(SLOPE)])
@@ -93,6 +102,17 @@ def stopping() -> Scene:
     return scene
 
 
+def exact_stopping(times: np.ndarray) -> Exact:
+    """Return the way of the box."""
+    t = np.minimum(times, SPEED / (FRICTION * GRAVITY))
+    return Exact({"box": _along(SPEED * t - 0.5 * FRICTION * GRAVITY * t**2, 0.1)})
+
+
+def _along(way: np.ndarray, height: float) -> np.ndarray:
+    """Return places (f, 3) [m] along x at a height."""
+    return np.stack([way, np.zeros(len(way)), np.full(len(way), height)], axis=1)
+
+
 def check_stopping(run: Recording) -> list[Check]:
     """Compare with constant deceleration."""
     distance, end = SPEED**2 / (2.0 * FRICTION * GRAVITY), SPEED / (FRICTION * GRAVITY)
@@ -115,11 +135,20 @@ def sliding_to_rolling() -> Scene:
     return scene
 
 
+def exact_rolling(times: np.ndarray) -> Exact:
+    """Return the way of the ball."""
+    return Exact({"ball": _along(_way_of_ball(times), BALL)})
+
+
+def _way_of_ball(times: np.ndarray) -> np.ndarray:
+    """Return the way (f,) [m], sliding and then rolling."""
+    t = np.minimum(times, 2.0 * SPEED / (7.0 * 0.3 * GRAVITY))
+    return SPEED * t - 0.5 * 0.3 * GRAVITY * t**2 + 5.0 / 7.0 * SPEED * (times - t)
+
+
 def check_rolling(run: Recording) -> list[Check]:
     """Compare with sliding, then rolling."""
-    end = 2.0 * SPEED / (7.0 * 0.3 * GRAVITY)
-    t = np.minimum(run.times, end)
-    way = SPEED * t - 0.5 * 0.3 * GRAVITY * t**2 + 5.0 / 7.0 * SPEED * (run.times - t)
+    way = _way_of_ball(run.times)
     spin = run.angular_velocity("ball")[-1, 1] * BALL
     return [
         finite(run),
@@ -207,12 +236,14 @@ SCENES = (
     GalleryScene(
         "incline", "Blocks on a slope 0.1 degrees below, at and above the critical angle", incline, check_incline, 5.0,
         elsewhere="tan 0.49 under mu 0.5, creep in 5 s: MuJoCo 5 mm, PyBullet 2, Rapier 0.07, Jolt 0, PhysX 7, ODE 12 mm",
+        exact=exact_incline,
     ),
     GalleryScene(
         "stopping", "A box slides to a stop", stopping, check_stopping, 2.0,
         elsewhere="relative error at dt 1/60: MuJoCo 1e-2, PyBullet 1e-2, Rapier 1e-3, Jolt, PhysX and ODE 2e-2",
+        exact=exact_stopping,
     ),
-    GalleryScene("sliding_to_rolling", "A sphere slides until it rolls", sliding_to_rolling, check_rolling, 2.0),
+    GalleryScene("sliding_to_rolling", "A sphere slides until it rolls", sliding_to_rolling, check_rolling, 2.0, exact=exact_rolling),
     GalleryScene("plate_of_balls", "Twenty-five balls roll on a plate that is pushed along the floor", plate, check_plate, 3.0),
     GalleryScene("table", "A table on four legs with a load near a corner", table, check_table, 5.0),
 )  # fmt: skip

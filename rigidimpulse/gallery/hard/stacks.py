@@ -25,7 +25,7 @@ import numpy as np
 
 from rigidimpulse.body import Body
 from rigidimpulse.gallery.hard.parts import dull, energy_never_grows, farthest, finite, floor_scene, turned, undisturbed
-from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
+from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_least, at_most
 from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
 from rigidimpulse.shape import Shape
@@ -47,6 +47,12 @@ def stack(num_boxes: int) -> Scene:
     for k in range(num_boxes):
         scene.add(Body(f"box {k + 1}", Shape.box(1.0), position=(0.0, 0.0, 0.5 + k), material=material))
     return scene
+
+
+def exact_stack(num_boxes: int, times: np.ndarray) -> Exact:
+    """Return the boxes where they were put."""
+    places = {f"box {k + 1}": np.tile([0.0, 0.0, 0.5 + k], (len(times), 1)) for k in range(num_boxes)}
+    return Exact(places, {name: np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1)) for name in places})
 
 
 def check_stack(num_boxes: int, run: Recording) -> list[Check]:
@@ -165,7 +171,8 @@ TWENTY = "20 boxes, 10 s: MuJoCo 9e-11 mm, PyBullet 13, Rapier 1, Jolt 64, PhysX
 SCENES = (
     *(
         GalleryScene(
-            f"stack_{n}", f"A stack of {n} boxes stands for 30 s", partial(stack, n), partial(check_stack, n), 30.0, 30.0, elsewhere=TWENTY
+            f"stack_{n}", f"A stack of {n} boxes stands for 30 s", partial(stack, n), partial(check_stack, n), 30.0, 30.0, elsewhere=TWENTY,
+            exact=partial(exact_stack, n),
         )
         for n in (10, 30, 100)
     ),

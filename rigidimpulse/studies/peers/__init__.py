@@ -17,7 +17,7 @@ from rigidimpulse.errors import SceneError, unknown_name
 if TYPE_CHECKING:
     from rigidimpulse.recording import Recording
     from rigidimpulse.scene import Scene
-    from rigidimpulse.study.peers.common import Peer
+    from rigidimpulse.studies.peers.common import Peer
 
 PEERS = ("mujoco", "pybullet")
 
@@ -37,7 +37,7 @@ def load_peer(name: str, scene: Scene, step: float) -> Peer:
     if name not in PEERS:
         raise unknown_name("peer", name, PEERS)
     try:
-        module = importlib.import_module(f"rigidimpulse.study.peers.{name}_peer")
+        module = importlib.import_module(f"rigidimpulse.studies.peers.{name}_peer")
     except ImportError as error:
         raise SceneError(f"{name} is not installed ({error})", "pip install 'rigidimpulse[peers]'") from None
     return module.make(scene, step)

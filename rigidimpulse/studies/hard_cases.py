@@ -114,7 +114,7 @@ def run_apart(name: str, limit: float) -> CaseResult:
         answer, words = Path(folder) / "answer.json", Path(folder) / "words.txt"
         with words.open("wb") as stream:
             process = subprocess.Popen(
-                [sys.executable, "-m", "rigidimpulse.study.hard_cases", name, str(answer)],
+                [sys.executable, "-m", "rigidimpulse.studies.hard_cases", name, str(answer)],
                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=stream, start_new_session=True,
             )  # fmt: skip
             try:
@@ -224,7 +224,7 @@ def _processor() -> str:
 
 def write_results(results: Sequence[CaseResult], folder: Path, limit: float) -> tuple[Path, Path]:
     """Write hard_cases.json and hard_cases.html into a folder; return their paths."""
-    from rigidimpulse.study.hard_page import page
+    from rigidimpulse.studies.hard_page import page
 
     folder.mkdir(parents=True, exist_ok=True)
     about = machine()

@@ -17,7 +17,7 @@ from rigidimpulse.errors import SceneError
 from rigidimpulse.rotation import conjugate, cross, from_matrix, rotate
 from rigidimpulse.scene import Scene
 from rigidimpulse.shape import Part
-from rigidimpulse.study.peers.common import PeerBody, PeerJoint, read_scene
+from rigidimpulse.studies.peers.common import PeerBody, PeerJoint, read_scene
 
 mujoco: Any = import_module("mujoco")
 

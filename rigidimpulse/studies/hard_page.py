@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rigidimpulse.gallery.record import figure
 
 if TYPE_CHECKING:
-    from rigidimpulse.study.hard_cases import CaseResult
+    from rigidimpulse.studies.hard_cases import CaseResult
 
 DECADES = 15
 """Range of the bars, half on either side of the bound: powers of ten."""

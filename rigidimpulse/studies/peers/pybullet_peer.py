@@ -15,7 +15,7 @@ from rigidimpulse.errors import SceneError
 from rigidimpulse.rotation import conjugate, from_matrix, multiply, rotate
 from rigidimpulse.scene import Scene
 from rigidimpulse.shape import Part
-from rigidimpulse.study.peers.common import PeerBody, PeerJoint, read_scene
+from rigidimpulse.studies.peers.common import PeerBody, PeerJoint, read_scene
 
 ITERATIONS = 200
 RESIDUAL = 1e-12

@@ -20,7 +20,7 @@ import numpy as np
 from rigidimpulse.accuracy import PRESETS
 from rigidimpulse.errors import SceneError, unknown_name
 from rigidimpulse.recording import Recording
-from rigidimpulse.study.deviation import Deviation, deviation
+from rigidimpulse.studies.deviation import Deviation, deviation
 
 if TYPE_CHECKING:
     from rigidimpulse.view.server import Viewer

@@ -1,0 +1,142 @@
+"""Make docs/what_accuracy_costs.md and its charts from real runs: `python docs/make_what_accuracy_costs.py [SCENES] [--budget S]`.
+
+Studies are kept in docs/accuracy_costs/ (table and chart of each scene) and gone on with; the page is written from all that are there.
+Needs `pip install 'rigidimpulse[study,peers]'` and, on one core, about as long as eight budgets.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import platform
+import shutil
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import rigidimpulse as ri
+from rigidimpulse.studies.peers import PEERS
+from rigidimpulse.studies.work_precision import Study
+
+DOCS = Path(__file__).resolve().parent
+KEPT = DOCS / "accuracy_costs"
+
+
+class Topic(NamedTuple):
+    """A scene of the page: how long it is run [s], whether other engines know it, and what to say of it."""
+
+    duration: float
+    peers: bool
+    words: str
+
+
+TOPICS = {
+    "bounce": Topic(10.0, True, "A ball falls from 10 m on a floor and bounces without loss: four impacts, parabolas in between."),
+    "tumbling_box": Topic(10.0, True, "A box tumbles through the air, no impact at all: what is left is how a free body turns."),
+    "disks_in_a_box": Topic(60.0, True, "Three elastic disks, 35 impacts: an error at one is a hundred times as large two impacts on."),
+    "pool_break": Topic(5.0, True, "A cue ball breaks a rack of fifteen: forty impacts in a tenth of a second, then chaos."),
+    "stack_10": Topic(4.0, True, "Ten boxes stand on each other: nothing may move."),
+    "incline": Topic(4.0, True, "Blocks on a slope, 0.1 degrees to either side of the angle at which friction lets go, and at it."),
+    "chain_swinging": Topic(0.4, False, "A chain of 100 links swings a ball a thousand times as heavy as a link."),
+    "spot": Topic(2.0, True, "A cow of 5,856 triangles falls on a torus of 4,096. (MuJoCo has hulls for meshes, Bullet for moving ones.)"),
+    "toss_alone": Topic(81 / 148, True, "A real cube, thrown on a board and filmed; the reference is the recording."),
+}
+METHODS = {
+    "kinematic": "kinematic, step", "penalty": "penalty, step", "linear": "linear, step", "bisection": "bisection, step",
+    "after the fact": "after, step", "MuJoCo": "mujoco", "Bullet": "pybullet",
+}  # fmt: skip
+"""Columns of the table side by side: title and family."""
+ADVICE = """## What to choose
+
+- **Nothing.** The default finds impact times by bisection to 1e-13 of a body's size and flies exactly in between. Where bodies only fly
+  and hit each other that is as right as sixteen digits allow, and no cheaper setting is faster by more than a little.
+- **Lasting contact** is where accuracy is paid for: its error falls with the square of the step, its cost rises with the number of
+  steps. Ask with `accuracy=ri.Within(position=...)` instead of trying steps.
+- **"preview"** is for looking: impacts a little early, everything else the same.
+- **"linear"** is of second order in the step and costs about as much as bisection: there is no reason to use it but to see what it does.
+  **"after"** moves bodies into each other for up to a step and is of first order. **Kinematic** responses turn velocities back without
+  impulses: right for smooth balls, wrong as soon as anything spins. **Penalty** forces cost most, since springs must be stepped, and
+  their error goes away with the stiffness, not with the step.
+- **Chaos** ends every promise: look at `run.horizon` before you make the step smaller.
+- **Other engines** take a fixed step whatever happens in it, so their error is of first order in the step; a contact lasts some steps
+  there. They are made for crowds of bodies at 60 steps a second, which is where they are fast: see [speed.md](speed.md).
+"""
+
+
+def main() -> None:
+    """Run what is asked for, then write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scenes", nargs="*", default=list(TOPICS), choices=[*TOPICS, []])
+    parser.add_argument("--budget", type=float, default=60.0, help="s for a scene")
+    arguments = parser.parse_args()
+    KEPT.mkdir(exist_ok=True)
+    studies = {}
+    for name in TOPICS:
+        budget = arguments.budget if name in arguments.scenes else 1e-3
+        studies[name] = run(name, budget)
+        print(name, len(studies[name].rows), "runs;", studies[name].reference.describe())
+    page = "\n".join([HEAD, side_by_side(studies), ADVICE, *(section(name, studies[name]) for name in studies)])
+    (DOCS / "what_accuracy_costs.md").write_text(page, encoding="utf-8")
+
+
+HEAD = f"""# What accuracy costs
+
+Made by `python docs/make_what_accuracy_costs.py` from runs on {platform.machine()}, one core; how to measure a scene of your own:
+[study.md](study.md). Errors are the largest of any body at any frame; costs are CPU seconds of the loop (of the steps, in other engines).
+"""
+
+
+def run(name: str, budget: float) -> Study:
+    """Study one scene, or go on with its study."""
+    topic = TOPICS[name]
+    with tempfile.TemporaryDirectory() as folder:
+        kept = KEPT / f"{name}.csv"
+        if kept.is_file():
+            shutil.copy(kept, Path(folder) / "study.csv")
+        result = ri.study(name, topic.duration, budget=budget, peers=PEERS if topic.peers else (), output=folder)
+        shutil.copy(Path(folder) / "study.csv", kept)
+        shutil.copy(Path(folder) / "study.png", KEPT / f"{name}.png")
+    return result
+
+
+def figure(value: float) -> str:
+    """A number for a table."""
+    return "-" if math.isnan(value) else "0" if value == 0.0 else f"{value:.1e}"
+
+
+def side_by_side(studies: dict[str, Study]) -> str:
+    """Best error of each method in each scene, and what it cost."""
+    lines = ["## Side by side", "", "Least error of the place that a method reached, m, and what that cost, s.", ""]
+    lines += [f"| scene | {' | '.join(METHODS)} |", "|---" * (len(METHODS) + 1) + "|"]
+    for name, study in studies.items():
+        cells = []
+        for family in METHODS.values():
+            rows = [row for row in study.rows if row.family == family and row.ran and not math.isnan(row.whole.position)]
+            best = min(rows, key=lambda row: row.whole.position, default=None)
+            cells.append("-" if best is None else f"{figure(best.whole.position)} in {figure(best.cost)}")
+        lines.append(f"| `{name}` | {' | '.join(cells)} |")
+    return "\n".join([*lines, ""])
+
+
+def section(name: str, study: Study) -> str:
+    """What is said of one scene."""
+    rows = [row for row in study.rows if row.family == "presets"] + [row for row in study.front() if row.family != "presets"]
+    lines = [f"## `{name}`", "", TOPICS[name].words, "", f"Reference: {study.reference.describe()}.", ""]
+    lines += ["| setting | cost, s | place, m | energy | impact times, s | overlap, m |", "|---|---|---|---|---|---|"]
+    for row in rows:
+        whole = row.whole
+        numbers = [figure(value) for value in (row.cost, whole.position, whole.energy, whole.impact_time, whole.penetration)]
+        lines.append(f"| {row.name} | {' | '.join(numbers)} |")
+    found = study.advantage()
+    for peer in PEERS:
+        ratios = [ratio for row, _, ratio in found if row.family == peer]
+        if ratios:
+            span = f"{figure(min(ratios))} to {figure(max(ratios))}"
+            lines += ["", f"At equal time {span} times more accurate than {peer}, whatever its step."]
+    if study.left:
+        lines += ["", f"The budget had no time for {len(study.left)} settings."]
+    return "\n".join([*lines, "", f"![{name}](accuracy_costs/{name}.png)", ""])
+
+
+if __name__ == "__main__":
+    main()
