@@ -51,6 +51,7 @@ _HOMES = {
     "Thruster": "forces.thruster",
     "Velocity": "forces.energy.path",
     "Within": "studies.wishes",
+    "compare": "studies.compare",
     "compile_scene": "world",
     "contains": "detect.inside",
     "load_recording": "recording",

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rigidimpulse.gallery.record import Check, GalleryScene
     from rigidimpulse.recording import Recording
     from rigidimpulse.scene import Scene
+    from rigidimpulse.studies.compare import Comparison
     from rigidimpulse.studies.hard_cases import CaseResult
     from rigidimpulse.studies.wishes import Wish
 
@@ -238,6 +239,34 @@ def view(file: str, scene: str | None) -> None:
 
 
 @main.command()
+@click.argument("first", metavar="A")
+@click.argument("second", metavar="B")
+@click.option("--scene", required=True, help="SCENE that both are runs of: it has the shapes.")
+@click.option("-o", "--output", help="Write a page that plays both runs and plots how far they are apart: a name that ends in .html.")
+@click.option("--view", is_flag=True, help="Open that page in the browser.")
+@click.option("--fps", type=float, help="Frames per second of what is run; default: those of a recording, else the scene's.")
+@click.option("--duration", type=float, help="Time to run, s; default: that of a recording, else the scene's.")
+def compare(first: str, second: str, scene: str, output: str | None, view: bool, **settings: Any) -> None:
+    """Say how far A and B are apart: recordings (.npz) of SCENE, or accuracies (preview, standard, exact) that it is run with."""
+    from rigidimpulse.studies import compare as comparison
+
+    words, job = (first, second), _find_job(scene)
+    comparison.check_words(words, output)
+    recorded = {word: _recording_with_shapes(Path(word), scene) for word in words if comparison.is_recording(word)}
+    for run in recorded.values():
+        job = job._replace(**comparison.frames_of(run))
+    job = job._replace(**_given(settings))
+    runs = [recorded[word] if word in recorded else _run(job._replace(accuracy=word), ()) for word in words]
+    result = comparison.compare(runs[0], runs[1], comparison.labels_of(words))
+    click.echo(result.table())
+    if output:
+        path = result.export(output)
+        click.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
+    if view:
+        _show(result)
+
+
+@main.command()
 @click.argument("scene")
 @click.option("--duration", type=float, help="Also simulate for this time [s], to see each effect's share of the work.")
 @click.option("--accuracy", help="preview, standard or exact.")
@@ -248,7 +277,7 @@ def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
 
     job = _find_job(scene)._replace(**_given({"accuracy": accuracy, "duration": duration}))
     if duration is None:
-        plan = make_plan(compile_scene(job.make(), job.accuracy))
+        plan = make_plan(compile_scene(job.make(), accuracy or (job.entry.accuracy if job.entry is not None else "standard")))
     else:
         plan = _run(job, ()).plan
         assert plan is not None
@@ -411,7 +440,7 @@ def _hand_over(run: Recording, output: Sequence[str], view: bool) -> None:
         _show(run)
 
 
-def _show(run: Recording) -> None:
+def _show(run: Recording | Comparison) -> None:
     """Open a recording in the browser; where there is none, serve it until Ctrl-C."""
     viewer = run.show()
     if not viewer.fetched.is_set():

@@ -55,7 +55,8 @@ def assert_energy_never_grows(run: Recording, tolerance: float = PULLED) -> None
     if rise.max() > allowed:
         at = run.times[int(np.argmax(rise))]
         share = rise.max() / moved if moved > 0.0 else np.inf
-        raise AssertionError(f"energy grew by {rise.max():.3g} J until {at:.6g} s, {share:.2g} of what moves; allowed {allowed:.2g} J")
+        grown = f"energy grew by {rise.max():.3g} J until {at:.6g} s"
+        raise AssertionError(f"{grown}, {share:.2g} of what moves; allowed {allowed:.2g} J")
 
 
 def _lifts(run: Recording) -> float:

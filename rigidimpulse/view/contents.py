@@ -40,8 +40,14 @@ NET_MARGIN = 0.03
 """Margin about the vertices of a net in the picture, relative to its extent."""
 
 
-def page_contents(recording: RecordingLike) -> tuple[dict[str, Any], list[tuple[str, dict[str, Any]]]]:
+def page_contents(
+    recording: RecordingLike, other: RecordingLike | None = None
+) -> tuple[dict[str, Any], list[tuple[str, dict[str, Any]]]]:
     """Return the manifest of a recording's page and its messages, each with its kind.
+
+    Args:
+        recording: the motion.
+        other: another motion of the same bodies, which the picture must hold as well.
 
     Raises:
         ValueError: the recording has no frames, or a pose is not finite.
@@ -51,11 +57,13 @@ def page_contents(recording: RecordingLike) -> tuple[dict[str, Any], list[tuple[
     if len(times) == 0:
         raise ValueError("the recording has no frames; simulate at least one")
     bodies = list(recording.scene.bodies)
-    poses = [_finite_poses(recording, body.name) for body in bodies]
+    poses = [finite_poses(recording, body.name) for body in bodies]
     numbers, meshes = _shared_meshes(bodies)
     up = up_axis(recording.scene.gravity)
     nets = list(recording.nets)
-    framing = frame_action(_paths(bodies, poses, numbers, meshes) + [_net_path(track) for track in nets], up)
+    framed = poses if other is None else [_both(pose, finite_poses(other, body.name)) for body, pose in zip(bodies, poses, strict=True)]
+    net_paths = [_net_path(*tracks) for tracks in zip(*(run.nets for run in (recording, other) if run is not None), strict=True)]
+    framing = frame_action(_paths(bodies, framed, numbers, meshes) + net_paths, up)
     framing = replace(framing, movers=[name for name in framing.movers if name not in {track.name for track in nets}])
     entries, tracks = [], {}
     num_coloured = 0
@@ -82,8 +90,8 @@ def page_contents(recording: RecordingLike) -> tuple[dict[str, Any], list[tuple[
         "summary": _summary(sum(dynamic) + len(nets), len(recording.impacts), float(times[-1] - times[0])),
     }
     messages = [("shape", _shape_message(number, mesh)) for number, mesh in enumerate(meshes)]
-    messages.append(("times", _property_message("impacts", "times", times)))
-    messages.append(("rows", _property_message("impacts", "rows", rows)))
+    messages.append(("times", property_message("impacts", "times", times)))
+    messages.append(("rows", property_message("impacts", "rows", rows)))
     for number, track in enumerate(nets):
         messages += net_messages(track, number)
     moving = {path: body_keys for path, body_keys in tracks.items() if body_keys}
@@ -92,7 +100,12 @@ def page_contents(recording: RecordingLike) -> tuple[dict[str, Any], list[tuple[
     return manifest, messages
 
 
-def _finite_poses(recording: RecordingLike, name: str) -> tuple[np.ndarray, np.ndarray]:
+def _both(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the positions (2 f, 3) and orientations (2 f, 4) of a body in two runs, one after the other."""
+    return np.concatenate([a[0], b[0]]), np.concatenate([a[1], b[1]])
+
+
+def finite_poses(recording: RecordingLike, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return positions (f, 3) and orientations (f, 4) of a body; raise ValueError if one is not finite."""
     position = np.asarray(recording.position(name), dtype=np.float64)
     orientation = np.asarray(recording.orientation(name), dtype=np.float64)
@@ -144,11 +157,11 @@ def _paths(
     return paths
 
 
-def _net_path(track: NetLike) -> Path:
-    """Return the places of all vertices of a net in all frames, as a path."""
-    vertices = np.asarray(track.vertices, dtype=np.float64)
+def _net_path(*tracks: NetLike) -> Path:
+    """Return the places of all vertices of a net in all frames of its tracks, as a path."""
+    vertices = np.concatenate([np.asarray(track.vertices, dtype=np.float64) for track in tracks])
     margin = NET_MARGIN * float(np.linalg.norm(np.ptp(vertices[0], axis=0)))
-    return Path(track.name, vertices.reshape(-1, 3), margin, moves=True)
+    return Path(tracks[0].name, vertices.reshape(-1, 3), margin, moves=True)
 
 
 def _net_entry(track: NetLike, index: int, colour: int) -> dict[str, Any]:
@@ -209,6 +222,6 @@ def _shape_message(number: int, mesh: DisplayMesh) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _property_message(path: str, name: str, values: np.ndarray) -> dict[str, Any]:
+def property_message(path: str, name: str, values: np.ndarray) -> dict[str, Any]:
     """Return meshcat's `set_property` message that hangs a Float32Array on a node."""
     return {"type": "set_property", "path": "/" + path, "property": name, "value": pack_float32(values)}

@@ -20,6 +20,7 @@ from rigidimpulse.view.contents import page_contents
 from rigidimpulse.view.protocol import RecordingLike
 
 SCRIPTS = ("look.js", "arrows.js", "nets.js", "transport.js", "hud.js", "main.js")
+STYLES = ("page.css",)
 DEFAULT_TITLE = "rigidimpulse"
 
 
@@ -40,17 +41,27 @@ def write_html(recording: RecordingLike, path: str | os.PathLike[str], title: st
 
 def render_page(recording: RecordingLike, title: str = DEFAULT_TITLE) -> str:
     """Return the HTML page of a recording, as `write_html` writes it."""
-    manifest, messages = page_contents(recording)
+    return assemble(*page_contents(recording), title)
+
+
+def assemble(
+    manifest: dict[str, Any],
+    messages: list[tuple[str, dict[str, Any]]],
+    title: str,
+    scripts: tuple[str, ...] = SCRIPTS,
+    styles: tuple[str, ...] = STYLES,
+) -> str:
+    """Return the HTML page of a manifest and messages as in `contents`, with these files of `page/`."""
     files = resources.files("rigidimpulse.view") / "page"
     viewer = _meshcat_files()
     fields = {
         "title": html.escape(title),
-        "style": (files / "page.css").read_text(encoding="utf-8"),
+        "style": "\n".join((files / name).read_text(encoding="utf-8") for name in styles),
         "license": (viewer / "main.min.js.LICENSE.txt").read_text(encoding="utf-8").replace("--", "- -"),
         "meshcat": (viewer / "main.min.js").read_text(encoding="utf-8"),
         "commands": "\n".join(_command(kind, message) for kind, message in messages),
         "manifest": json.dumps(manifest, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"),
-        "script": "\n".join((files / name).read_text(encoding="utf-8") for name in SCRIPTS),
+        "script": "\n".join((files / name).read_text(encoding="utf-8") for name in scripts),
     }
     page = (files / "page.html").read_text(encoding="utf-8")
     # Cut the template at its fields first, so that braces in a name or in a script are never taken for a field.

@@ -41,11 +41,15 @@ def show(recording: RecordingLike, title: str = DEFAULT_TITLE, open_browser: boo
         ValueError: as `write_html`.
 
     """
+    return show_page(render_page(recording, title), open_browser)
+
+
+def show_page(page: str, open_browser: bool = True) -> Viewer:
+    """Show a page in the browser, as `show` does that of a recording, and return the viewer that serves it."""
     global _viewer
-    page = render_page(recording, title).encode("utf-8")
     if _viewer is None or _viewer.closed:
         _viewer = Viewer()
-    _viewer.put(page)
+    _viewer.put(page.encode("utf-8"))
     print(f"rigidimpulse: {_viewer.url}")
     if open_browser and webbrowser.open(_viewer.url):
         _viewer.fetched.wait(LOAD_TIMEOUT)

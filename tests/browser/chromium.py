@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -43,3 +46,39 @@ def chromium() -> Iterator[Any]:
             yield browser
         finally:
             browser.close()
+
+
+@dataclass
+class Opened:
+    """A page in the browser, and what it complained about or asked for."""
+
+    page: Any
+    errors: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    def do(self, script: str) -> Any:
+        """Return the value of a script that uses `r` for the page's rigidimpulse object."""
+        return self.page.evaluate(f"(() => {{ const r = window.rigidimpulse; return {script}; }})()")
+
+    def picture(self) -> np.ndarray:
+        """Return what the page shows without its overlay, (height, width, 3) of 0..255."""
+        from PIL import Image
+
+        self.page.evaluate("document.body.classList.add('bare')")
+        self.page.wait_for_timeout(300)
+        picture = self.page.screenshot()
+        self.page.evaluate("document.body.classList.remove('bare')")
+        return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), dtype=np.float64)
+
+
+def open_page(browser: Any, url: str, width: int = 480, height: int = 320) -> Opened:
+    """Open a page and wait until it has drawn itself."""
+    page = browser.new_page(viewport={"width": width, "height": height})
+    opened = Opened(page)
+    page.on("console", lambda message: opened.errors.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: opened.errors.append(str(error)))
+    page.on("dialog", lambda dialog: (opened.errors.append("dialog: " + dialog.message), dialog.dismiss()))
+    page.on("request", lambda request: opened.requests.append(request.url))
+    page.goto(url)
+    page.wait_for_function("window.rigidimpulse !== undefined", timeout=45_000)
+    return opened

@@ -6,14 +6,11 @@ float32: off by at most half a unit in the last place, 2^-24 of its size.
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pytest
-from chromium import chromium
+from chromium import Opened, open_page
 
 from rigidimpulse.body import Body
 from rigidimpulse.material import Material
@@ -63,49 +60,6 @@ def recording(num_frames: int = 61) -> Recording:
     return Recording(
         times, list(scene.names), position, orientation, velocities, velocities, position, impacts, scene=scene
     )
-
-
-@dataclass
-class Opened:
-    """A page in the browser, and what it complained about or asked for."""
-
-    page: Any
-    errors: list[str] = field(default_factory=list)
-    requests: list[str] = field(default_factory=list)
-
-    def do(self, script: str) -> Any:
-        """Return the value of a script that uses `r` for the page's rigidimpulse object."""
-        return self.page.evaluate(f"(() => {{ const r = window.rigidimpulse; return {script}; }})()")
-
-    def picture(self) -> np.ndarray:
-        """Return what the page shows without its overlay, (height, width, 3) of 0..255."""
-        from PIL import Image
-
-        self.page.evaluate("document.body.classList.add('bare')")
-        self.page.wait_for_timeout(300)
-        picture = self.page.screenshot()
-        self.page.evaluate("document.body.classList.remove('bare')")
-        return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), dtype=np.float64)
-
-
-def open_page(browser: Any, url: str) -> Opened:
-    """Open a page and wait until it has drawn itself."""
-    page = browser.new_page(viewport={"width": 480, "height": 320})
-    opened = Opened(page)
-    page.on("console", lambda message: opened.errors.append(message.text) if message.type == "error" else None)
-    page.on("pageerror", lambda error: opened.errors.append(str(error)))
-    page.on("dialog", lambda dialog: (opened.errors.append("dialog: " + dialog.message), dialog.dismiss()))
-    page.on("request", lambda request: opened.requests.append(request.url))
-    page.goto(url)
-    page.wait_for_function("window.rigidimpulse !== undefined", timeout=45_000)
-    return opened
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """One browser for all tests."""
-    with chromium() as started:
-        yield started
 
 
 @pytest.fixture(scope="module")
