@@ -59,7 +59,7 @@ class Accuracy(BaseModel):
 
 
 PRESETS = {
-    "preview": {"impact_time": "conservative", "tolerance": 1e-5},
+    "preview": {"impact_time": "conservative", "tolerance": 1e-7, "step": 1.0 / 30.0},
     "standard": {},
     "exact": {"step": 1.0 / 240.0, "tolerance": 1e-15, "iterations": 100000},
 }

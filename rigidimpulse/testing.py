@@ -96,7 +96,7 @@ def assert_comes_to_rest(run: Recording, by: float | None = None, speed: float =
     Args:
         run: a recording.
         by: s; the last frame if None.
-        speed: m/s (of the centre of mass), and the same over the length of 1 m for spins, that counts as rest; at rest bodies have exactly 0.
+        speed: m/s of the centre of mass, and rad/s, that count as rest; bodies at rest have exactly 0.
         bodies: names; all dynamic ones if None.
 
     """

@@ -29,7 +29,7 @@ TURN, TURN_DAMPING = 3.0, 0.1
 BALL_START, BALL_SPEED = (1.36, 0.0, 3.0), -2.0
 DURATION = 6.0
 RETURN, SLOW = 5e-4, 2e-3
-"""m, m/s: what is left of the swing, and the errors that the preview allows in contact, a tenth of the 1e-2 of the size a step."""
+"""m, m/s: what is left of the swing, and the errors that the preview allows in contact, of the order of 1e-3 of the size a step."""
 
 
 def scene() -> Scene:

@@ -26,7 +26,7 @@ from rigidimpulse.scene import Scene
 from rigidimpulse.simulation import frame_times, simulate
 from rigidimpulse.studies.deviation import agree_until, deviation
 from rigidimpulse.studies.measures import Truth, mechanical_energy, truth_of
-from rigidimpulse.studies.settings import rung
+from rigidimpulse.studies.settings import TIGHT, rung
 from rigidimpulse.world import World
 
 AGREED = 1e-9
@@ -109,10 +109,9 @@ def exact_reference(entry: GalleryScene, world: World, times: np.ndarray) -> Ref
 
 
 def converged_reference(
-    scene: Scene, world: World, duration: float, fps: float, budget: float, base: Accuracy | None = None,
-    progress: Callable[[str], None] | None = None,
+    scene: Scene, world: World, duration: float, fps: float, budget: float, tell: Callable[[str], None]
 ) -> Reference:
-    """Make a reference by self-convergence in about `budget` s; base: strategies that the rungs keep, the default ones if None."""
+    """Make a reference by self-convergence in about `budget` s; tell: called with what is being run."""
     times, start, spent = frame_times(duration, fps), perf_counter(), 0.0
     size = world.size[world.dynamic]
     if len(size) == 0:
@@ -120,11 +119,8 @@ def converged_reference(
     runs: list[Recording] = []
     note = "the finest rung of the ladder was reached"
     for level in range(FIRST_RUNG, LAST_RUNG + 1):
-        accuracy = rung(level).accuracy
-        if base is not None:
-            accuracy = base.model_copy(update={"step": accuracy.step, "tolerance": accuracy.tolerance})
-        if progress is not None:
-            progress(f"reference, step {accuracy.step:.2g} s")
+        accuracy = Accuracy(step=rung(level).accuracy.step, tolerance=TIGHT)
+        tell(f"reference, step {accuracy.step:.2g} s")
         begin = perf_counter()
         try:
             runs.append(simulate(scene, duration, fps, accuracy=accuracy))
@@ -138,16 +134,11 @@ def converged_reference(
         if perf_counter() - start + 4.0 * spent > budget and len(runs) > 1:
             note = f"time was spent at a step of {accuracy.step:.2g} s"
             break
-    finest, accuracy = runs[-1], _accuracy_of(runs[-1])
-    if progress is not None:
-        progress("reference, started off by rounding")
-    twin = simulate(perturbed(scene), duration, fps, accuracy=accuracy)
-    return _reference(world, times, finest, [runs[-2] if len(runs) > 1 else twin, twin], note)
-
-
-def _accuracy_of(run: Recording) -> Accuracy:
-    assert run.settings is not None
-    return run.settings.accuracy
+    tell("reference, started off by rounding")
+    settings = runs[-1].settings
+    assert settings is not None
+    twin = simulate(perturbed(scene), duration, fps, accuracy=settings.accuracy)
+    return _reference(world, times, runs[-1], [runs[-2] if len(runs) > 1 else twin, twin], note)
 
 
 def _distance(a: Recording, b: Recording, world: World) -> np.ndarray:

@@ -3,10 +3,10 @@
 A setting is an `Accuracy` with a name; settings of a family differ in one knob, so that the family is a line on a chart. A rung of the
 ladder has a step of
 
-    h_k = 2^(1 - k) / 60 s,    k = 0, 1, 2, ...
+    h_k = 2^(1 - k) / 60 s,    tolerance_k = max(1e-7 / 100^k, 1e-13),    k = 0, 1, 2, ...
 
-and a tolerance of impact times as small as rounding allows: it costs next to nothing (bisection pays for it with its logarithm), while
-lasting contacts and varying forces pay for short steps in full.
+Impacts are found by bisection, which pays for the tolerance with its logarithm; lasting contacts pay for short steps in full, varying forces
+for both, since their errors go with the root of the tolerance.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from rigidimpulse.accuracy import PRESETS, Accuracy
 
 COARSEST = 1.0 / 30.0
 """s, step of the lowest rung."""
-TIGHT = 1e-13
-"""Tolerance of impact times on all rungs."""
+LOOSE, TIGHT = 1e-7, 1e-13
+"""Tolerance on the lowest rung, and on all from the fourth on."""
 STEPS = tuple(COARSEST / 2**k for k in range(7))
 """s, of families that differ in their steps: 1/30 to 1/1920."""
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-13)
@@ -38,7 +38,7 @@ class Setting(NamedTuple):
 
 def rung(level: int) -> Setting:
     """The setting of a rung of the ladder, level >= 0."""
-    accuracy = Accuracy(step=COARSEST / 2**level, tolerance=TIGHT)
+    accuracy = Accuracy(step=COARSEST / 2**level, tolerance=max(LOOSE / 100.0**level, TIGHT))
     return Setting(f"bisection, step {_fraction(accuracy.step)}", "bisection, step", accuracy.step, accuracy)
 
 

@@ -194,7 +194,7 @@ def make_reference(
     """The closed form of a gallery scene, else self-convergence."""
     if entry is not None and entry.exact is not None:
         return exact_reference(entry, world, frame_times(duration, fps))
-    return converged_reference(scene, world, duration, fps, budget, progress=tell)
+    return converged_reference(scene, world, duration, fps, budget, tell)
 
 
 def _entry(scene: Scene | str) -> GalleryScene | None:
