@@ -257,7 +257,7 @@ def compare(first: str, second: str, scene: str, output: str | None, view: bool,
         job = job._replace(**comparison.frames_of(run))
     job = job._replace(**_given(settings))
     runs = [recorded[word] if word in recorded else _run(job._replace(accuracy=word), ()) for word in words]
-    result = comparison.compare(runs[0], runs[1], comparison.labels_of(words))
+    result = comparison.compare(runs[0], runs[1], comparison.labels_of(words), comparison.common_horizon(runs))
     click.echo(result.table())
     if output:
         path = result.export(output)

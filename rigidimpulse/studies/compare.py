@@ -262,3 +262,10 @@ def _net_distances(a: Recording, b: Recording) -> dict[str, np.ndarray]:
         distance = np.linalg.norm(track.vertices - other.vertices, axis=2).max(axis=1)
         distances[track.name] = np.where(np.isfinite(distance), distance, np.inf)
     return distances
+
+
+def common_horizon(runs: Sequence[Recording]) -> dict[str, float]:
+    """Horizons, s by body, before the end, of the run that can be trusted longer; recordings that were loaded have none."""
+    known = [run.horizon for run in runs if run.settings is not None]
+    longest = {name: max(horizon[name] for horizon in known) for name in (known[0] if known else ())}
+    return {name: time for name, time in longest.items() if time < runs[0].times[-1]}

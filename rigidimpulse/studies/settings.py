@@ -5,8 +5,8 @@ ladder has a step of
 
     h_k = 2^(1 - k) / 60 s,    tolerance_k = max(1e-7 / 100^k, 1e-13),    k = 0, 1, 2, ...
 
-Impacts are found by bisection, which pays for the tolerance with its logarithm; lasting contacts pay for short steps in full, varying forces
-for both, since their errors go with the root of the tolerance.
+Impacts are found by bisection, which pays for the tolerance with its logarithm; lasting contacts pay for short steps in full, forces that
+vary for both: their errors go with the root of the tolerance.
 """
 
 from __future__ import annotations
