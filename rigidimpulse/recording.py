@@ -193,14 +193,28 @@ class Recording:
             digest.update(np.ascontiguousarray(track.vertices).tobytes())
         return digest.hexdigest()
 
-    def export(self, path: str | os.PathLike) -> Path:
-        """Write the recording; the suffix says how: .npz (arrays) or .html (a page that plays it, in one file).
+    def export(self, path: str | os.PathLike, *, start_frame: float = 0.0, tolerance: float | None = None) -> Path:
+        """Write the recording; the suffix says how: .npz (arrays), .html (a page that plays it), .glb or .gltf (animated nodes).
+
+        A scene from a glTF file is written as that file with its nodes animated; any other as a node a body, Y up.
+
+        Args:
+            path: where to.
+            start_frame: of .glb and .gltf: number of the first frame, at the time start_frame / fps.
+            tolerance: of .glb and .gltf, m: leave out keys that no point of a body misses by more; None: a key a frame.
 
         Raises:
-            SceneError: for another suffix, or .html without a scene.
+            SceneError: for another suffix, an option that the format has not, or .html, .glb and .gltf without a scene.
 
         """
         path = Path(path)
+        if path.suffix in (".glb", ".gltf"):
+            self._need_scene("a glTF file")
+            from rigidimpulse.io.gltf.animate import write_motion
+
+            return self._write(path, lambda target: write_motion(self, target, start_frame, tolerance))
+        if start_frame != 0.0 or tolerance is not None:
+            raise SceneError(f"start_frame and tolerance for {path.name!r}", "give them for .glb and .gltf only")
         if path.suffix == ".npz":
             return self._write(path, self._write_npz)
         if path.suffix == ".html":
@@ -208,7 +222,7 @@ class Recording:
             from rigidimpulse.view import write_html
 
             return self._write(path, lambda target: write_html(self, target))
-        raise SceneError(f"cannot export to {path.name!r}", "use a name that ends in .npz or .html")
+        raise SceneError(f"cannot export to {path.name!r}", "use a name that ends in .npz, .html, .glb or .gltf")
 
     def show(self) -> Any:
         """Open the recording in the browser (meshcat); returns the viewer, which ends with the program.

@@ -13,7 +13,7 @@ import numpy as np
 
 from rigidimpulse.io.gltf.nodes import Hierarchy, Local
 from rigidimpulse.keyframes import Keyframes
-from rigidimpulse.rotation import multiply, quaternion_continuity, rotate
+from rigidimpulse.rotation import multiply, quaternion_continuity, to_matrix
 
 BETWEEN = 1.0 / 60.0
 MOST_KEYS = 1_000_000
@@ -130,8 +130,7 @@ class Animations:
         for k in reversed(self.hierarchy.chain(node)):
             local = self.local(k, times)
             x = x + np.einsum("tij,tj->ti", linear, local.translation)
-            axes = np.stack([rotate(local.rotation, np.eye(3)[j]) for j in range(3)], axis=2)
-            linear = linear @ (axes * local.scale)
+            linear = linear @ (to_matrix(local.rotation) * local.scale)
             q = multiply(q, local.rotation)
         return x, q, linear
 
