@@ -88,7 +88,7 @@ def run_options(command: Callable) -> Callable:
 def export_options(command: Callable) -> Callable:
     """Add the options of commands that write recordings."""
     command = click.option("--tolerance", type=float, help="Leave out keys in .glb and .gltf that no point misses by more, m.")(command)
-    return click.option("--start-frame", type=float, default=0.0, help="Number of the first frame in .glb and .gltf, such as 1001.")(command)
+    return click.option("--start-frame", type=float, default=0.0, help="Number of the first frame in .glb and .gltf: 1001.")(command)
 
 
 @main.command()

@@ -108,21 +108,27 @@ def reduced(keys: Keys, reach: float, tolerance: float) -> np.ndarray:
     the origins and `reach` times the angle, a bound for all points within `reach` [m] of the origin. tolerance: m.
     """
     times, x, q = keys
-    keep = np.zeros(len(times), bool)
-    keep[[0, -1]] = True
-    stack = [(0, len(times) - 1)]
-    while stack:
-        first, last = stack.pop()
-        if last - first < 2:
-            continue
-        s = ((times[first + 1 : last] - times[first]) / (times[last] - times[first]))[:, None]
-        turn = rotation_vector(multiply(q[last], conjugate(q[first])))
-        between = multiply(quaternion_from_rotation_vector(s * turn), q[first])
-        off = np.linalg.norm((1.0 - s) * x[first] + s * x[last] - x[first + 1 : last], axis=1)
-        off += reach * angle_between(between, q[first + 1 : last])
-        worst = int(np.argmax(off))
-        if off[worst] > tolerance:
-            middle = first + 1 + worst
-            keep[middle] = True
-            stack += [(first, middle), (middle, last)]
-    return np.flatnonzero(keep)
+    kept = np.array([0, len(times) - 1])
+    inside = np.arange(len(times))  # frames between keys where some are still off
+    while len(inside):
+        part = np.minimum(np.searchsorted(kept, inside, side="right") - 1, len(kept) - 2)
+        off = _off(times, x, q, inside, kept[part], kept[part + 1], reach)
+        first = np.flatnonzero(np.diff(part, prepend=-1))
+        worst = np.maximum.reduceat(off, first)
+        which = np.cumsum(np.diff(part, prepend=-1) > 0) - 1
+        candidates = np.flatnonzero((off == worst[which]) & (off > tolerance))
+        _, once = np.unique(which[candidates], return_index=True)
+        added = inside[candidates[once]]
+        inside = inside[worst[which] > tolerance]
+        inside = inside[~np.isin(inside, added)]
+        kept = np.union1d(kept, added)
+    return kept
+
+
+def _off(times, x, q, i, first, last, reach: float) -> np.ndarray:
+    """How far the poses i (m,) are off [m] those in between the keys first and last (m,)."""
+    h = times[last] - times[first]
+    s = np.divide(times[i] - times[first], h, out=np.zeros(len(i)), where=h > 0.0)[:, None]
+    turn = rotation_vector(multiply(q[last], conjugate(q[first])))
+    between = multiply(quaternion_from_rotation_vector(s * turn), q[first])
+    return np.linalg.norm((1.0 - s) * x[first] + s * x[last] - x[i], axis=1) + reach * angle_between(between, q[i])
