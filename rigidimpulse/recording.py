@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidimpulse.errors import SceneError, unknown_name
+from rigidimpulse.files import write_renamed
 from rigidimpulse.observe.contacts import CONTACT_DTYPE, forces_on
 
 if TYPE_CHECKING:
@@ -212,16 +213,16 @@ class Recording:
             self._need_scene("a glTF file")
             from rigidimpulse.io.gltf.animate import write_motion
 
-            return self._write(path, lambda target: write_motion(self, target, start_frame, tolerance))
+            return write_renamed(path, lambda target: write_motion(self, target, start_frame, tolerance))
         if start_frame != 0.0 or tolerance is not None:
             raise SceneError(f"start_frame and tolerance for {path.name!r}", "give them for .glb and .gltf only")
         if path.suffix == ".npz":
-            return self._write(path, self._write_npz)
+            return write_renamed(path, self._write_npz)
         if path.suffix == ".html":
             self._need_scene("an HTML page")
             from rigidimpulse.view import write_html
 
-            return self._write(path, lambda target: write_html(self, target))
+            return write_renamed(path, lambda target: write_html(self, target))
         raise SceneError(f"cannot export to {path.name!r}", "use a name that ends in .npz, .html, .glb or .gltf")
 
     def show(self) -> Any:
@@ -239,17 +240,6 @@ class Recording:
     def _need_scene(self, what: str) -> None:
         if self.scene is None:
             raise SceneError(f"{what} needs the shapes of the scene", "simulate the scene, then export or show that run")
-
-    def _write(self, path: Path, write: Any) -> Path:
-        """Write to a temporary name beside the target, then rename: nobody ever sees half a file."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-        try:
-            write(temporary)
-            temporary.replace(path)
-        finally:
-            temporary.unlink(missing_ok=True)
-        return path
 
     def _write_npz(self, path: Path) -> None:
         nets: dict[str, Any] = {}

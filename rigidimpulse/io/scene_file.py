@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from pathlib import Path
 
@@ -9,6 +10,8 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.errors import SceneError
 from rigidimpulse.scene import Scene
+
+logger = logging.getLogger("rigidimpulse")
 
 SCENE_SUFFIXES = (".glb", ".gltf")
 GLTF_GRAVITY = (0.0, -9.81, 0.0)
@@ -39,3 +42,17 @@ def load_scene(path: str | os.PathLike[str], gravity: ArrayLike | None = None, *
     from rigidimpulse.io.gltf.load import load_gltf
 
     return load_gltf(place, gravity, allow_outside)
+
+
+def write_scene(scene: Scene, path: Path) -> Path:
+    """Write a scene as a file with physics; see `Scene.export`."""
+    if path.suffix not in SCENE_SUFFIXES:
+        raise SceneError(f"cannot write a scene to {path.name!r}", f"use a name that ends in {' or '.join(SCENE_SUFFIXES)}")
+    from rigidimpulse.files import write_renamed
+    from rigidimpulse.io.gltf.write import write_physics
+
+    left_out: list[str] = []
+    written = write_renamed(path, lambda target: left_out.extend(write_physics(scene, target)))
+    for line in left_out:
+        logger.warning("%s: %s", path.name, line)
+    return written

@@ -15,11 +15,13 @@ from rigidimpulse.io.gltf.animation import Animations
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.schema import Motion
 from rigidimpulse.material import Material
-from rigidimpulse.rotation import rotate, to_matrix
+from rigidimpulse.rotation import from_matrix, rotate, to_matrix
 from rigidimpulse.shape import Shape
 
 GHOST_RADIUS = 0.05
 """m, of the sphere that stands for a body without colliders, which touches nothing."""
+DENSITY = 1000.0
+"""kg/m^3, of bodies whose mass is not given: glTF says nothing of it."""
 NOTHING = CollisionFilter(collide_with=())
 
 
@@ -133,10 +135,32 @@ class BodyMaker:
             axes = to_matrix(np.array([w, x, y, z]) / max(float(np.linalg.norm((w, x, y, z))), 1e-9))
             finite = [moments[k] if k in free else max(moments) for k in range(3)]
             values["inertia"] = axes @ np.diag(finite) @ axes.T
+        self._fill_mass(name, shape, values)
         locked = [k for k in range(3) if moments is not None and k not in free]
         if motion.mass == 0.0 or locked:
             self._hold(name, motion, shape, values, locked)
         return values
+
+    def _fill_mass(self, name: str, shape: Shape, values: dict[str, Any]) -> None:
+        """Where colliders enclose no volume, take what is not given of the mass properties from their hulls."""
+        given = [values.get(key) is not None for key in ("mass", "inertia", "center_of_mass")]
+        try:
+            if not all(given):
+                shape.solid()
+            return
+        except SceneError as error:
+            problem = error.problem
+        hulls = Shape.compound([(_hull(part.shape), part.position, from_matrix(part.rotation)) for part in shape.parts_flat()])
+        try:
+            solid = hulls.solid()
+        except SceneError as error:
+            raise error.within(f"body {name!r}") from None
+        self.notes.append(f"body {name!r} encloses no volume ({problem}): its mass properties are those of the convex hull")
+        values.setdefault("mass", DENSITY * solid.volume)
+        values.setdefault("center_of_mass", solid.centroid)
+        off = np.asarray(values["center_of_mass"]) - solid.centroid
+        moved = solid.inertia + solid.volume * (off @ off * np.eye(3) - np.outer(off, off))
+        values.setdefault("inertia", values["mass"] / solid.volume * moved)
 
     def _hold(self, name: str, motion: Motion, shape: Shape, values: dict[str, Any], locked: list[int]) -> None:
         """Lock what is infinite by a joint to the world: the centre of mass, and turns about the axes of infinite inertia."""
@@ -178,6 +202,10 @@ def _shape(pieces: list[Piece]) -> Shape:
     return Shape.compound([(piece.shape, piece.position, piece.orientation) for piece in pieces])
 
 
+def _hull(shape: Shape) -> Shape:
+    return Shape.convex_hull(shape) if shape.kind == "mesh" else shape
+
+
 def _centroid(shape: Shape) -> np.ndarray:
     try:
         return shape.solid().centroid
@@ -188,6 +216,6 @@ def _centroid(shape: Shape) -> np.ndarray:
 def _mass_of(shape: Shape) -> float:
     """A mass for a body that joints hold: any will do."""
     try:
-        return 1000.0 * shape.solid().volume
+        return DENSITY * shape.solid().volume
     except SceneError:
         return 1.0

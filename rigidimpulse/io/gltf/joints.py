@@ -25,7 +25,7 @@ def read_joints(hierarchy: Hierarchy, body_of: Callable[[int], str | None], mova
 
     """
     joints, notes = [], []
-    for node in hierarchy.order:
+    for node in sorted(hierarchy.order):
         entry = hierarchy.nodes[node].physics.joint
         if entry is None:
             continue

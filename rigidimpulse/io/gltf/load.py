@@ -27,6 +27,7 @@ from rigidimpulse.io.gltf.implicit import Shapes, placed_in_body
 from rigidimpulse.io.gltf.joints import read_joints
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.origin import Origin
+from rigidimpulse.io.gltf.own_materials import NOTE, STATIC, own_figures
 from rigidimpulse.io.gltf.plain import plain_pieces
 from rigidimpulse.io.scene_file import GLTF_GRAVITY
 from rigidimpulse.material import Material
@@ -37,8 +38,6 @@ from rigidimpulse.shape import Shape
 KNOWN = {schema.RIGID_BODIES, schema.IMPLICIT_SHAPES, "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"}
 """Extensions that are read, or that have no say in how bodies move; materials and textures are among those, too."""
 LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "EXT_lights_")
-NOTE = "rigidimpulse"
-"""Key of what our own files say of themselves in `extras`."""
 
 
 def load_gltf(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Scene:
@@ -112,7 +111,7 @@ class _Loader:
         owner = [-1] * len(self.hierarchy.nodes)
         for node in self.hierarchy.order:
             parent = self.hierarchy.parent[node]
-            moves = self.hierarchy.nodes[node].physics.motion is not None
+            moves = self.hierarchy.nodes[node].physics.motion is not None or _is_group(self.hierarchy.nodes[node])
             owner[node] = node if moves else (owner[parent] if parent >= 0 else -1)
         return owner
 
@@ -130,7 +129,7 @@ class _Loader:
         pieces: dict[int, list[Piece]] = {}
         for node in self.hierarchy.order:
             entry = self.hierarchy.nodes[node].physics
-            if entry.motion is not None:
+            if self.owner[node] == node:
                 pieces.setdefault(node, [])
             if entry.collider is None:
                 continue
@@ -160,7 +159,7 @@ class _Loader:
         nodes = self.hierarchy.nodes
         inside = {k for node in self.hierarchy.order for k in ((nodes[node].physics.trigger or schema.Trigger()).nodes or ())}
         triggers = []
-        for node in self.hierarchy.order:
+        for node in sorted(self.hierarchy.order):
             entry = nodes[node].physics.trigger
             if entry is None or node in inside:
                 continue
@@ -193,11 +192,10 @@ class _Loader:
             static = entry.dynamic_friction
         if entry.restitution > 1.0:
             self.notes.append(f"physics material {index}: restitution {entry.restitution:g} feeds energy in")
-        return Material(
-            restitution=entry.restitution, static_friction=static, dynamic_friction=entry.dynamic_friction,
-            restitution_combine=entry.restitution_combine, friction_combine=entry.friction_combine,
-            any_restitution=entry.restitution > 1.0, **_own_figures(entry.extras),
-        )  # fmt: skip
+        fields = {"restitution": entry.restitution, "static_friction": static, "dynamic_friction": entry.dynamic_friction}
+        fields |= own_figures(entry.extras, entry.restitution, static, entry.dynamic_friction)
+        combine = {"restitution_combine": entry.restitution_combine, "friction_combine": entry.friction_combine}
+        return Material(**fields, **combine, any_restitution=entry.restitution > 1.0)  # pyright: ignore[reportArgumentType]
 
     def _unknown(self) -> list[str]:
         """Extensions that are not read, and what of the file another writer of ours could not say."""
@@ -211,12 +209,10 @@ class _Loader:
         return lines + [f"not in the file: {str(line)[:200]}" for line in (left if isinstance(left, list) else [])]
 
 
-def _own_figures(extras: object) -> dict[str, float]:
-    """Density of a material in a file that we wrote."""
-    said = extras.get(NOTE) if isinstance(extras, dict) else None
-    density = said.get("density") if isinstance(said, dict) else None
-    fine = isinstance(density, int | float) and not isinstance(density, bool) and 0.0 < density <= schema.LARGEST
-    return {"density": float(density)} if fine else {}  # pyright: ignore[reportArgumentType]
+def _is_group(node: schema.Node) -> bool:
+    """Whether a node without motion is a static body of the colliders below it, in a file that we wrote."""
+    said = node.extras.get(NOTE) if isinstance(node.extras, dict) else None
+    return isinstance(said, dict) and said.get(STATIC) is True
 
 
 def _one_shape(parts: list[tuple[Shape, np.ndarray, np.ndarray]]) -> Shape:
