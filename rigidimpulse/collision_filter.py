@@ -39,7 +39,7 @@ class CollisionFilter:
             value = getattr(self, name)
             if value is None and name == "collide_with":
                 continue
-            if isinstance(value, str) or not all(isinstance(entry, str) for entry in value):
+            if not isinstance(value, list | tuple | set | frozenset) or not all(isinstance(entry, str) for entry in value):
                 raise SceneError(f"{name} is {value!r}", "give a list of names", "collision filter")
             object.__setattr__(self, name, tuple(value))
 

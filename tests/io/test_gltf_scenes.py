@@ -276,6 +276,7 @@ def test_animated_nodes_are_keyframes(tmp_path: Path) -> None:
     body = load(file, tmp_path)["block"]
     assert body.motion == "kinematic" and body.keyframes is not None
     times, positions, orientations = body.keyframes.arrays()
+    assert np.array_equal(body.position, positions[0])
     # x = p(t) + R(t) (2, 0, 0): on the way the block goes round the cart, which two keys alone would cut short.
     for t, x, angle in ((0.5, [2, 0, 0], 0.0), (1.5, [3, 2, 0], math.pi / 2)):
         k = int(np.argmin(np.abs(times - t)))

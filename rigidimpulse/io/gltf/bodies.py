@@ -105,7 +105,10 @@ class BodyMaker:
         values: dict[str, Any] = {"position": self.hierarchy.position(node).copy(), "orientation": turn, "motion": "static"}
         if motion is None or motion.is_kinematic:
             if self.animations.moves(node):
-                return {**values, "motion": "kinematic", "keyframes": self.animations.keyframes(node)}
+                keys = self.animations.keyframes(node)
+                _, places, turns = keys.arrays()
+                # Before its first key a node is where that has it.
+                return {**values, "motion": "kinematic", "position": places[0], "orientation": turns[0], "keyframes": keys}
             if motion is None:
                 return values
         elif self.animations.moves(node):

@@ -8,7 +8,7 @@
     mesh                its triangles, K applied exactly, turned inside out where K mirrors; or their hull
 
 A negative scale counts as its magnitude, but for meshes. Hulls have their points on the surface and lie inside it: by
-1.5 % of the radius for spheres, 0.2 % for rims. glTF's capsules and cylinders stand along Y, those of `Shape` along z.
+1.8 % of the radius for spheres, 0.2 % for rims. glTF's capsules and cylinders stand along Y, those of `Shape` along z.
 """
 
 from __future__ import annotations

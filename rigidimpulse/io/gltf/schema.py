@@ -91,7 +91,7 @@ class NodePhysics(Part):
 class NodeExtensions(Part):
     """Extensions of a node that are read."""
 
-    physics: NodePhysics | None = Field(None, alias=RIGID_BODIES)
+    physics: NodePhysics | None = Field(default=None, alias=RIGID_BODIES)
 
 
 class Node(Part):
@@ -221,8 +221,8 @@ class Shapes(Part):
 class Extensions(Part):
     """Extensions of the file that are read."""
 
-    physics: Physics = Field(Physics(), alias=RIGID_BODIES)
-    implicit: Shapes = Field(Shapes(), alias=IMPLICIT_SHAPES)
+    physics: Physics = Field(default=Physics(), alias=RIGID_BODIES)
+    implicit: Shapes = Field(default=Shapes(), alias=IMPLICIT_SHAPES)
 
 
 class SparseIndices(Part):
