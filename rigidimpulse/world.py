@@ -137,6 +137,11 @@ class World:
         ends = np.concatenate([self.joints.body_a, self.joints.body_b])
         return float(self.size[ends[ends >= 0]].min(initial=np.inf))
 
+    @cached_property
+    def triggers(self) -> list:
+        """Effects of the stage observe: volumes that report overlap."""
+        return [] if "triggers" in self.left_out else [effect for effect in self.scene.effects if effect.stage == "observe"]
+
     @property
     def can_collide(self) -> bool:
         """Whether any two bodies may ever come to an impact: a dynamic one and another, unless springs push them apart."""

@@ -10,7 +10,6 @@ from rigidimpulse.constrain.heap import why_no_heaps
 from rigidimpulse.constrain.heap_islands import REBOUND
 from rigidimpulse.events.layout import BALL, OTHER, PLANE
 from rigidimpulse.geometry import HALF_SPACE
-from rigidimpulse.observe.kinds import triggers_of
 from rigidimpulse.plan import Bound, Skip
 
 ARRIVED, STEP, GO_ON, NO_ROOM = 0, 1, 2, 3
@@ -46,7 +45,7 @@ def why_not(world) -> str:
         return "half spaces that move, or in parts"
     if world.joints_of_scene or world.force_tables:
         return "joints" if world.joints_of_scene else "forces vary"
-    if triggers_of(world):
+    if world.triggers:
         return "triggers are looked at after every step"
     if accuracy.impact_time not in ("bisection", "conservative") or accuracy.response == "kinematic":
         return f"{accuracy.impact_time}, {accuracy.response}"

@@ -16,22 +16,14 @@ class TriggerVolumes:
 
     def bind(self, world) -> Bound | Skip:
         """In where the scene has one."""
-        number = len(triggers_of(world))
+        number = len(world.triggers)
         return Bound(None, f"{number} looked at after every step") if number else Skip("the scene has none")
-
-
-def triggers_of(world) -> list:
-    """The triggers of a scene that are not left out."""
-    if "triggers" in world.left_out:
-        return []
-    return [effect for effect in world.scene.effects if effect.stage == "observe"]
 
 
 def bind_triggers(context, plan) -> None:
     """Give a run its triggers, if the scene has any."""
-    found = triggers_of(context.world)
-    if found:
+    if context.world.triggers:
         from rigidimpulse.observe.trigger import Triggers
 
         with plan.clock(TriggerVolumes.name):
-            context.triggers = Triggers(context, found)
+            context.triggers = Triggers(context, context.world.triggers)

@@ -150,8 +150,12 @@ class Triggers:
             thick = 0.5 * (watched.thickness + self._thickness[i])
             way = (end - low) * (self._speed(i, low, end) + self._speed(watched.body, low, end, watched.reach))
             count = int(np.clip(np.ceil(way / thick), 1, MOST_LOOKS)) if thick > 0.0 else MOST_LOOKS
+            if way == 0.0 and low <= begin:
+                return
         was, before = i in watched.inside, low
-        for time in np.linspace(low, end, count + 1).tolist():
+        # The first look is spared where the last step ended with it.
+        first = 1 if low <= begin < end else 0
+        for time in np.linspace(low, end, count + 1)[first:].tolist():
             now = self._overlaps(watched, i, time)
             if now != was:
                 self._note(watched, i, self._changed(watched, i, before, time, was), now)
