@@ -319,6 +319,7 @@ def test_skin_and_morph_at_rest(tmp_path: Path) -> None:
     # The body frame is that of its node: 100 m away from where the bone has the cube.
     assert np.allclose(scene["skinned"].shape.surface().vertices.mean(axis=0), [-100, 5, 0], atol=1e-4)
     assert np.allclose(extent(scene["morphed"].shape), [2, 1, 1], atol=1e-6)
+    assert any("'skinned'" in line and "bones" in line for line in scene.report)
 
 
 def test_plain_file(tmp_path: Path) -> None:
@@ -401,3 +402,14 @@ def test_errors_name_their_place(tmp_path: Path) -> None:
         ri.load_scene(tmp_path / "scene.fbx")
     with pytest.raises(ri.SceneError, match="check the path"):
         ri.load_scene(tmp_path / "none.glb")
+
+
+def test_the_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "gltf.md").read_text()
+    code = "\n".join(line[4:] for line in page.split("\n\n")[1].splitlines())
+    motion = {"mass": 1, "linearVelocity": [0, 3, 0], "inertiaDiagonal": [1, 1, 1]}
+    file = with_physics([{"name": "box", "extensions": physics(motion, shaped())}], [BOX])
+    file.save(tmp_path / "room.glb")
+    monkeypatch.chdir(tmp_path)
+    exec(code, {"ri": ri})
+    assert ri.load_scene("room_again.glb").names == ("box",) and (tmp_path / "room_moving.glb").is_file()

@@ -54,6 +54,8 @@ class Meshes:
         vertices = np.concatenate([vertices for vertices, _, _ in pieces])
         faces = np.concatenate([faces + start for (_, faces, _), start in zip(pieces, starts, strict=True)])
         if entry.skin is not None:
+            name = self.hierarchy.names[node]
+            self.notes.append(f"the mesh of node {name!r} is taken as its bones have it at rest, where players draw it whatever its body does")
             back = self._inverse(self.hierarchy.world[node], f"node {node}")
             vertices = vertices @ back[:3, :3].T + back[:3, 3]
         if plain:
