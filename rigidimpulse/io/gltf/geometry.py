@@ -55,7 +55,7 @@ class Meshes:
         faces = np.concatenate([faces + start for (_, faces, _), start in zip(pieces, starts, strict=True)])
         if entry.skin is not None:
             name = self.hierarchy.names[node]
-            self.notes.append(f"the mesh of node {name!r} is taken as its bones have it at rest, where players draw it whatever its body does")
+            self.notes.append(f"the mesh of node {name!r} is as its bones have it at rest; players draw it there whatever its body does")
             back = self._inverse(self.hierarchy.world[node], f"node {node}")
             vertices = vertices @ back[:3, :3].T + back[:3, 3]
         if plain:
