@@ -52,7 +52,7 @@ def test_both_sides_must_agree() -> None:
 
 
 def test_overlap_of_a_falling_ball() -> None:
-    scene = falling(collision_filter=ri.CollisionFilter(collide_with=["none"]))
+    scene = falling(collision_filter=ri.CollisionFilter(not_collide_with=["hard"]))
     scene.add(ri.Trigger("gate", ri.Shape.box((1, 1, 0.2)), position=(0, 0, 0.5)))
     scene.add(ri.Trigger("blind", ri.Shape.box(1), collision_filter=ri.CollisionFilter(collide_with=["none"])))
     run = ri.simulate(scene, 1.0)
