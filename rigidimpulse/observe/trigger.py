@@ -221,6 +221,12 @@ def _corners(shape: Shape) -> tuple[np.ndarray, np.ndarray] | None:
     return low, high
 
 
+def extent(shape: Shape) -> float:
+    """Return the longest side of the box about a shape, m; 1 m for an endless one."""
+    box = _corners(shape)
+    return 1.0 if box is None else float(np.max(box[1] - box[0]))
+
+
 def _reach(shape: Shape) -> float:
     """Radius about the origin of the frame that encloses a shape, m."""
     box = _corners(shape)

@@ -250,6 +250,8 @@ def test_what_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
     for name, value in (("start_frame", -1.0), ("tolerance", 0.0), ("tolerance", np.nan)):
         with pytest.raises(ri.SceneError, match=name):
             run.export(tmp_path / "out.glb", **{name: value})
+    with pytest.raises(ri.SceneError, match="single precision"):
+        run.export(tmp_path / "out.glb", start_frame=1e9)
     with pytest.raises(ri.SceneError, match=r"only"):
         run.export(tmp_path / "out.npz", start_frame=1)
     x[1, 0] = np.nan

@@ -264,6 +264,22 @@ def test_joint(tmp_path: Path) -> None:
     assert compile_scene(scene, "standard").apart.tolist() == [1]
 
 
+@pytest.mark.parametrize(("away", "collides"), [(0.5, False), (1.0, True)])
+def test_bodies_that_touch_at_their_joint_do_not_collide(away: float, collides: bool, tmp_path: Path) -> None:
+    """Two cubes, one on the other: a ball joint where their faces meet leaves no contact to speak of, one beside them does."""
+    joints = [{"limits": [{"linearAxes": [0, 1, 2], "min": 0, "max": 0}]}]
+    pin = physics(joint={"connectedNode": 3, "joint": 0, "enableCollision": True})
+    nodes = [
+        {"name": "low", "extensions": physics(None, shaped()), "children": [1]},
+        {"name": "pin", "translation": [away, 0.5, 0], "extensions": pin},
+        {"name": "high", "translation": [0, 1, 0], "extensions": physics({"mass": 1}, shaped()), "children": [3]},
+        {"name": "end", "translation": [away, -0.5, 0]},
+    ]
+    scene = load(with_physics(nodes, [BOX], physicsJoints=joints), tmp_path)
+    assert scene.effects[0].collide == collides
+    assert any("touch at joint 'pin'" in line for line in scene.report) != collides
+
+
 def test_animated_nodes_are_keyframes(tmp_path: Path) -> None:
     nodes = [
         {"name": "cart", "children": [1]},

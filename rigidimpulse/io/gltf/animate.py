@@ -167,6 +167,8 @@ class _Channels:
 
     def _input(self, times: np.ndarray) -> int:
         data = (times + self._shift).astype(np.float32)
+        if np.any(np.diff(data) <= 0.0):
+            raise SceneError(f"keys near {data[-1]:g} s are too close for single precision", "give a smaller start_frame or fps")
         key = data.tobytes()
         if key not in self._times:
             self._times[key] = self._accessor(data[:, None], bounds=True)

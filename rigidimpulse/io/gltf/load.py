@@ -85,8 +85,8 @@ class _Loader:
                 maker.add(node, motion, [piece])
         for thing in (*maker.bodies, *maker.joints):
             scene.add(thing)
-        movable = {body.name for body in maker.bodies if body.motion == "dynamic"}
-        joints, lines = read_joints(self.hierarchy, lambda node: maker.name_of.get(self._body_node(node)), movable)
+        bodies = {body.name: body for body in maker.bodies}
+        joints, lines = read_joints(self.hierarchy, lambda node: maker.name_of.get(self._body_node(node)), bodies)
         for thing in (*joints, *self._triggers(maker.name_of)):
             scene.add(thing)
         notes = [*self._unknown(), *self.animations.notes, *self.meshes.notes, *self.shapes.notes, *self.notes, *lines]
