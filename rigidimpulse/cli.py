@@ -87,6 +87,7 @@ def run_options(command: Callable) -> Callable:
 
 def export_options(command: Callable) -> Callable:
     """Add the options of commands that write recordings."""
+    command = click.option("--impact-keys", is_flag=True, help="Have keys at impacts between frames in .glb and .gltf, too.")(command)
     command = click.option("--tolerance", type=float, help="Leave out keys in .glb and .gltf that no point misses by more, m.")(command)
     return click.option("--start-frame", type=float, default=0.0, help="Number of the first frame in .glb and .gltf: 1001.")(command)
 
@@ -224,7 +225,7 @@ def _given(settings: dict[str, Any]) -> dict[str, Any]:
 
 def _export_settings(settings: dict[str, Any]) -> dict[str, Any]:
     """Take out and return the options of `export_options`."""
-    return {name: settings.pop(name) for name in ("start_frame", "tolerance")}
+    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys")}
 
 
 def _job_of(entry: GalleryScene) -> Job:

@@ -194,7 +194,9 @@ class Recording:
             digest.update(np.ascontiguousarray(track.vertices).tobytes())
         return digest.hexdigest()
 
-    def export(self, path: str | os.PathLike, *, start_frame: float = 0.0, tolerance: float | None = None) -> Path:
+    def export(
+        self, path: str | os.PathLike, *, start_frame: float = 0.0, tolerance: float | None = None, impact_keys: bool = False
+    ) -> Path:
         """Write the recording; the suffix says how: .npz (arrays), .html (a page that plays it), .glb or .gltf (animated nodes).
 
         A scene from a glTF file is written as that file with its nodes animated; any other as a node a body, Y up.
@@ -203,6 +205,7 @@ class Recording:
             path: where to.
             start_frame: of .glb and .gltf: number of the first frame, at the time start_frame / fps.
             tolerance: of .glb and .gltf, m: leave out keys that no point of a body misses by more; None: a key a frame.
+            impact_keys: of .glb and .gltf: have keys at the impacts between frames of bodies that fly freely before and after.
 
         Raises:
             SceneError: for another suffix, an option that the format has not, or .html, .glb and .gltf without a scene.
@@ -213,9 +216,9 @@ class Recording:
             self._need_scene("a glTF file")
             from rigidimpulse.io.gltf.animate import write_motion
 
-            return write_renamed(path, lambda target: write_motion(self, target, start_frame, tolerance))
-        if start_frame != 0.0 or tolerance is not None:
-            raise SceneError(f"start_frame and tolerance for {path.name!r}", "give them for .glb and .gltf only")
+            return write_renamed(path, lambda target: write_motion(self, target, start_frame, tolerance, impact_keys))
+        if start_frame != 0.0 or tolerance is not None or impact_keys:
+            raise SceneError(f"start_frame, tolerance or impact_keys for {path.name!r}", "give them for .glb and .gltf only")
         if path.suffix == ".npz":
             return write_renamed(path, self._write_npz)
         if path.suffix == ".html":

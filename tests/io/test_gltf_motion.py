@@ -15,6 +15,7 @@ from gltf_files import BOX, CUBE, Gltf, channels, physics, shaped, unpack, with_
 from player import Player, check_structure, rotation
 
 import rigidimpulse as ri
+from rigidimpulse.observe.events import IMPACT_DTYPE
 from rigidimpulse.recording import Recording
 from rigidimpulse.rotation import multiply
 
@@ -34,8 +35,8 @@ def recorded(scene: ri.Scene, poses: dict[str, tuple[np.ndarray, np.ndarray]], f
     for name, spin in (spins or {}).items():
         rates[:, scene.names.index(name)] = spin
     times = np.arange(frames) / fps
-    names, still = list(scene.names), np.zeros((*shape, 3))
-    return Recording(times, names, positions, orientations, still, rates, positions.copy(), np.zeros(0), scene=scene)
+    names, still, none = list(scene.names), np.zeros((*shape, 3)), np.zeros(0, IMPACT_DTYPE)
+    return Recording(times, names, positions, orientations, still, rates, positions.copy(), none, scene=scene)
 
 
 def smooth(frames: int, start: Any, turn: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
@@ -205,6 +206,32 @@ def test_left_out_keys_are_not_missed(tmp_path: Path) -> None:
     assert tolerance / 10 < worst < tolerance + SINGLE
 
 
+def test_impacts_between_frames(tmp_path: Path) -> None:
+    """A ball with e = 1 falls by h: after sqrt(2 h / g), between frames, its centre is at its radius, and not above.
+
+    The line from frame to frame stays above by up to v dt / 2 = 0.09 m here.
+    """
+    h, radius, fps = 1.0, 0.1, 24.0
+    bouncy = ri.Material(restitution=1.0, static_friction=0.0)
+    scene = ri.Scene(gravity=(0, -9.81, 0))
+    scene.add(ri.Body("floor", ri.Shape.half_space((0, 1, 0)), motion="static", material=bouncy))
+    scene.add(ri.Body("ball", ri.Shape.sphere(radius), position=(0, radius + h, 0), angular_velocity=(0, 0, 5), material=bouncy))
+    run = ri.simulate(scene, 2.0, fps)
+    assert len(run.impacts) == 2
+    found = {}
+    for name, keys in (("plain", False), ("split", True)):
+        tree, data = unpack(run.export(tmp_path / f"{name}.glb", impact_keys=keys))
+        check_structure(tree, data)
+        found[name] = channels(tree, data)["ball", "translation"]
+    times, places = found["split"]
+    assert len(times) == len(found["plain"][0]) + 2 and found["plain"][1][:, 1].min() > radius + 0.01
+    for impact in run.impacts["time"]:
+        k = int(np.argmin(np.abs(times - impact)))
+        assert abs(times[k] - impact) < 1e-6 and abs(places[k, 1] - radius) < SINGLE
+    with pytest.raises(ri.SceneError, match="only"):
+        run.export(tmp_path / "out.html", impact_keys=True)
+
+
 def test_a_thousand_bodies(tmp_path: Path) -> None:
     """240 frames of 1,000 bodies take 7.2 MB, 28 bytes a pose: three and four single numbers, and half a megabyte of names."""
     rng, frames, count = np.random.default_rng(1), 240, 1000
@@ -214,7 +241,7 @@ def test_a_thousand_bodies(tmp_path: Path) -> None:
     x = rng.normal(size=(frames, count, 3)) + [body.position for body in scene.bodies]
     still = np.zeros((frames, count, 3))
     q /= np.linalg.norm(q, axis=-1, keepdims=True)
-    run = Recording(np.arange(frames) / 24, list(scene.names), x, q, still, still, x, np.zeros(0), scene=scene)
+    run = Recording(np.arange(frames) / 24, list(scene.names), x, q, still, still, x, np.zeros(0, IMPACT_DTYPE), scene=scene)
     path = run.export(tmp_path / "out.glb")
     assert frames * count * 28 < path.stat().st_size < 8e6
     tree, _ = unpack(path)

@@ -38,13 +38,16 @@ ANIMATION = "rigidimpulse"
 """Name of the animation."""
 
 
-def write_motion(run: Recording, target: Path, start_frame: float = 0.0, tolerance: float | None = None) -> None:
+def write_motion(
+    run: Recording, target: Path, start_frame: float = 0.0, tolerance: float | None = None, impact_keys: bool = False
+) -> None:
     """Write a .glb or .gltf file of a run.
 
     Args:
         run: with its scene. target: where; the suffix says which.
         start_frame: number of the first frame: times begin at start_frame / fps.
         tolerance: m; leave out keys that no point of the body misses by more. None: a key a frame.
+        impact_keys: have keys at impacts between frames, too.
 
     Raises:
         SceneError: a figure makes no sense, a pose is not finite, or a file beside the scene is gone.
@@ -60,10 +63,10 @@ def write_motion(run: Recording, target: Path, start_frame: float = 0.0, toleran
         raise SceneError("a pose of the run is not finite", "look at run.status")
     if run.nets:
         logger.warning("flexible bodies are not written to glTF: %s", ", ".join(track.name for track in run.nets))
-    paths = {name: BodyPath(run, name) for name in run.names}
+    paths = _paths(run, scene, impact_keys)
     moving = {name: path for name, path in paths.items() if path.moves}
     reach = {body.name: _reach(body) for body in scene.bodies} if tolerance is not None else {}
-    builder, locals_ = _from_origin(scene.origin, paths, scene) if scene.origin else _from_scene(run, scene)
+    builder, locals_ = _from_origin(scene.origin, paths, scene) if scene.origin else _from_scene(paths, scene)
     shift = start_frame * float(run.times[1] - run.times[0]) if len(run.times) > 1 else 0.0
     writer = _Channels(builder, shift)
     for name, path in moving.items():
@@ -78,6 +81,19 @@ def write_motion(run: Recording, target: Path, start_frame: float = 0.0, toleran
         logger.warning("parents of uneven scale: the turn of %s is not exact in the file", ", ".join(sorted(locals_.sheared)))
     writer.close()
     builder.write(target)
+
+
+def _paths(run: Recording, scene, impact_keys: bool) -> dict[str, BodyPath]:
+    """The motion of all bodies, with the impacts of dynamic ones where they are asked for."""
+    if not impact_keys or not len(run.impacts):
+        return {name: BodyPath(run, name) for name in run.names}
+    paths = {}
+    for name in run.names:
+        i, body = run.index(name), scene[name]
+        mine = (run.impacts["body_a"] == i) | (run.impacts["body_b"] == i)
+        times = np.unique(run.impacts["time"][mine]) if body.motion == "dynamic" else np.zeros(0)
+        paths[name] = BodyPath(run, name, times, body.gravity_factor * np.asarray(scene.gravity, float))
+    return paths
 
 
 class _Locals:
@@ -239,10 +255,9 @@ def _drop_channels(tree: dict[str, Any], nodes: set[int]) -> None:
         tree["animations"] = kept
 
 
-def _from_scene(run: Recording, scene) -> tuple[Builder, _Locals]:
+def _from_scene(paths: dict[str, BodyPath], scene) -> tuple[Builder, _Locals]:
     """A file with a node and a mesh for each body, Y up."""
     builder = new_file()
-    paths = {name: BodyPath(run, name) for name in run.names}
     parents, _ = stage(builder, scene.gravity, "world")
     drawing, node_of, moving = Drawing(builder, _half(paths)), {}, 0
     for body in scene.bodies:
