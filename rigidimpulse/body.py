@@ -7,6 +7,7 @@ from dataclasses import KW_ONLY, dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigidimpulse.collision_filter import CollisionFilter
 from rigidimpulse.errors import SceneError
 from rigidimpulse.keyframes import Keyframes
 from rigidimpulse.material import Material
@@ -39,6 +40,7 @@ class Body:
         material: density and contact coefficients.
         keyframes: the path of a kinematic body.
         gravity_factor: scales the scene's gravity for this body.
+        collision_filter: which other bodies it touches; None: all.
 
     """
 
@@ -56,6 +58,7 @@ class Body:
     material: Material = DEFAULT_MATERIAL
     keyframes: Keyframes | None = None
     gravity_factor: float = 1.0
+    collision_filter: CollisionFilter | None = None
 
     def unit_orientation(self) -> np.ndarray:
         """Return the normalised orientation (4,)."""
@@ -82,6 +85,8 @@ class Body:
             )
         if not isinstance(self.material, Material):
             raise SceneError(f"material is a {type(self.material).__name__}", "give a Material")
+        if not isinstance(self.collision_filter, CollisionFilter | None):
+            raise SceneError(f"collision_filter is a {type(self.collision_filter).__name__}", "give a CollisionFilter")
         if self.motion not in MOTIONS:
             raise SceneError(f"motion is {self.motion!r}", f"give one of {', '.join(map(repr, MOTIONS))}")
         if self.keyframes is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
     from rigidimpulse.studies.hard_cases import CaseResult
     from rigidimpulse.studies.wishes import Wish
 
-OUTPUT_SUFFIXES = (".html", ".npz")
+SCENE_SUFFIXES = (".glb", ".gltf")
+OUTPUT_SUFFIXES = (".html", ".npz", ".glb", ".gltf")
 DEFAULT_DURATION = 4.0
 """s, of scenes from files."""
 DEFAULT_FPS = 60.0
@@ -68,7 +70,7 @@ class Job(NamedTuple):
 def main() -> None:
     """Rigid bodies that collide exactly: mesh scenes in, accurate motion for animation out.
 
-    SCENE is the name of a gallery scene (`rigidimpulse demo` lists them), or a file.py that defines scene().
+    SCENE is the name of a gallery scene (`rigidimpulse demo` lists them), a .glb or .gltf file, or a file.py that defines scene().
     """
 
 
@@ -87,9 +89,17 @@ def run_options(command: Callable) -> Callable:
     return command
 
 
+def export_options(command: Callable) -> Callable:
+    """Add the options of commands that write recordings."""
+    command = click.option("--impact-keys", is_flag=True, help="Have keys at impacts between frames in .glb and .gltf, too.")(command)
+    command = click.option("--tolerance", type=float, help="Leave out keys in .glb and .gltf that no point misses by more, m.")(command)
+    return click.option("--start-frame", type=float, default=0.0, help="Number of the first frame in .glb and .gltf: 1001.")(command)
+
+
 @main.command()
 @click.argument("name", required=False)
-@click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html or .npz.")
+@click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html, .npz, .glb or .gltf.")
+@export_options
 @run_options
 def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:
     """Run a gallery scene and its checks; without NAME, list the scenes."""
@@ -102,7 +112,7 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, *
             for entry_name in known:
                 click.echo(f"  {entry_name.ljust(width)}  {gallery.load(entry_name).description}")
         return
-    entry = gallery.load(name)
+    entry, keys = gallery.load(name), _export_settings(settings)
     job = _job_of(entry)._replace(**_given(settings))
     click.echo(f"{entry.name}: {entry.description}")
     run = _run(job, output, profile)
@@ -111,7 +121,7 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, *
         passed = _print_checks(entry.check(run))
     else:
         click.echo(f"checks left out: they are for the scene's own duration, {entry.duration:g} s")
-    _hand_over(run, output, view)
+    _hand_over(run, output, view, keys)
     if not passed:
         sys.exit(CHECK_FAILED)
 
@@ -212,12 +222,14 @@ def _study_scaling(most: int) -> None:
 
 @main.command()
 @click.argument("scene")
-@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html or .npz.")
+@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html, .npz, .glb or .gltf.")
+@export_options
 @run_options
 def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:
     """Simulate SCENE and write the recording."""
+    keys = _export_settings(settings)
     job = _find_job(scene)._replace(**_given(settings))
-    _hand_over(_run(job, output, profile), output, view)
+    _hand_over(_run(job, output, profile), output, view, keys)
 
 
 @main.command()
@@ -307,6 +319,11 @@ def _given(settings: dict[str, Any]) -> dict[str, Any]:
     return given
 
 
+def _export_settings(settings: dict[str, Any]) -> dict[str, Any]:
+    """Take out and return the options of `export_options`."""
+    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys")}
+
+
 def _job_of(entry: GalleryScene) -> Job:
     return Job(entry.name, entry.scene, entry.duration, entry.fps, entry.accuracy, entry)
 
@@ -324,10 +341,22 @@ def _find_job(scene: str) -> Job:
     path = Path(scene)
     if path.suffix == ".py":
         return Job(path.stem, _scene_function(path), DEFAULT_DURATION, DEFAULT_FPS, "standard", None)
+    if path.suffix in SCENE_SUFFIXES:
+        return Job(path.stem, partial(_load_scene, path), DEFAULT_DURATION, DEFAULT_FPS, "standard", None)
     if path.suffix or len(path.parts) > 1:
-        known = "a gallery scene (`rigidimpulse demo` lists them), or a file.py that defines scene()"
+        known = "a gallery scene (`rigidimpulse demo` lists them), a .glb or .gltf file, or a file.py that defines scene()"
         raise SceneError(f"cannot read a scene from {scene!r}", f"supported: {known}")
     return _job_of(gallery.load(scene))
+
+
+def _load_scene(path: Path) -> Scene:
+    """Return the scene of a .glb or .gltf file; what of the file is not in it is printed."""
+    from rigidimpulse.io.scene_file import load_scene
+
+    scene = load_scene(path)
+    for line in scene.report:
+        click.echo(f"{path.name}: {line}", err=True)
+    return scene
 
 
 def _scene_function(path: Path) -> Callable[[], Scene]:
@@ -371,7 +400,7 @@ def _run(job: Job, output: Sequence[str], profile: bool = False) -> Recording:
 
     for target in output:
         if Path(target).suffix not in OUTPUT_SUFFIXES:
-            raise SceneError(f"cannot write {target!r}", f"use a name that ends in {' or '.join(OUTPUT_SUFFIXES)}")
+            raise SceneError(f"cannot write {target!r}", f"use a name that ends in {', '.join(OUTPUT_SUFFIXES)}")
     from time import perf_counter
 
     from tqdm import tqdm
@@ -431,10 +460,10 @@ def _print_table(rows: Sequence[tuple[str, ...]], right: tuple[int, ...]) -> Non
         click.echo("  ".join([*cells, row[-1]]))
 
 
-def _hand_over(run: Recording, output: Sequence[str], view: bool) -> None:
-    """Write the recording where it was asked for, and open it."""
+def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str, Any]) -> None:
+    """Write the recording where it was asked for, and open it; keys: options of animated nodes."""
     for target in output:
-        path = run.export(target)
+        path = run.export(target, **(keys if Path(target).suffix in SCENE_SUFFIXES else {}))
         click.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
     if view:
         _show(run)

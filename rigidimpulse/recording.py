@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rigidimpulse.errors import SceneError, unknown_name
+from rigidimpulse.files import write_renamed
 from rigidimpulse.observe.contacts import CONTACT_DTYPE, forces_on
 
 if TYPE_CHECKING:
@@ -227,22 +228,39 @@ class Recording:
             digest.update(np.ascontiguousarray(track.vertices).tobytes())
         return digest.hexdigest()
 
-    def export(self, path: str | os.PathLike) -> Path:
-        """Write the recording; the suffix says how: .npz (arrays) or .html (a page that plays it, in one file).
+    def export(
+        self, path: str | os.PathLike, *, start_frame: float = 0.0, tolerance: float | None = None, impact_keys: bool = False
+    ) -> Path:
+        """Write the recording; the suffix says how: .npz (arrays), .html (a page that plays it), .glb or .gltf (animated nodes).
+
+        A scene from a glTF file is written as that file with its nodes animated; any other as a node a body, Y up.
+
+        Args:
+            path: where to.
+            start_frame: of .glb and .gltf: number of the first frame, at the time start_frame / fps.
+            tolerance: of .glb and .gltf, m: leave out keys that no point of a body misses by more; None: a key a frame.
+            impact_keys: of .glb and .gltf: have keys at the impacts between frames of bodies that fly freely before and after.
 
         Raises:
-            SceneError: for another suffix, or .html without a scene.
+            SceneError: for another suffix, an option that the format has not, or .html, .glb and .gltf without a scene.
 
         """
         path = Path(path)
+        if path.suffix in (".glb", ".gltf"):
+            self._need_scene("a glTF file")
+            from rigidimpulse.io.gltf.animate import write_motion
+
+            return write_renamed(path, lambda target: write_motion(self, target, start_frame, tolerance, impact_keys))
+        if start_frame != 0.0 or tolerance is not None or impact_keys:
+            raise SceneError(f"start_frame, tolerance or impact_keys for {path.name!r}", "give them for .glb and .gltf only")
         if path.suffix == ".npz":
-            return self._write(path, self._write_npz)
+            return write_renamed(path, self._write_npz)
         if path.suffix == ".html":
             self._need_scene("an HTML page")
             from rigidimpulse.view import write_html
 
-            return self._write(path, lambda target: write_html(self, target))
-        raise SceneError(f"cannot export to {path.name!r}", "use a name that ends in .npz or .html")
+            return write_renamed(path, lambda target: write_html(self, target))
+        raise SceneError(f"cannot export to {path.name!r}", "use a name that ends in .npz, .html, .glb or .gltf")
 
     def show(self) -> Any:
         """Open the recording in the browser (meshcat); returns the viewer, which ends with the program.
@@ -259,17 +277,6 @@ class Recording:
     def _need_scene(self, what: str) -> None:
         if self.scene is None:
             raise SceneError(f"{what} needs the shapes of the scene", "simulate the scene, then export or show that run")
-
-    def _write(self, path: Path, write: Any) -> Path:
-        """Write to a temporary name beside the target, then rename: nobody ever sees half a file."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-        try:
-            write(temporary)
-            temporary.replace(path)
-        finally:
-            temporary.unlink(missing_ok=True)
-        return path
 
     def _write_npz(self, path: Path) -> None:
         nets: dict[str, Any] = {}

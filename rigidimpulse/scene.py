@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
@@ -12,12 +14,16 @@ from rigidimpulse.conventions import STANDARD_GRAVITY
 from rigidimpulse.errors import SceneError, unknown_name
 from rigidimpulse.mass import body_mass
 
+if TYPE_CHECKING:
+    from rigidimpulse.io.gltf.origin import Origin
+
 
 class Scene:
     """Bodies and what acts on them. Plain data: nothing is computed before it is simulated.
 
     Attributes:
         gravity: (3,) m/s^2, world frame.
+        origin: what is kept of the file that the scene was read from; None for one that was not.
 
     """
 
@@ -31,6 +37,7 @@ class Scene:
         self.gravity = gravity
         self._bodies: dict[str, Body] = {}
         self._effects: list[Any] = []
+        self.origin: Origin | None = None
         for body in bodies:
             self.add(body)
 
@@ -68,6 +75,28 @@ class Scene:
     def names(self) -> tuple[str, ...]:
         """The names of the bodies, in the order they were added."""
         return tuple(self._bodies)
+
+    @property
+    def report(self) -> tuple[str, ...]:
+        """What of the file that the scene was read from is not in it, or not as it is written there; a line each."""
+        return () if self.origin is None else self.origin.report
+
+    def export(self, path: str | os.PathLike[str]) -> Path:
+        """Write the scene as a .glb or .gltf file with physics (KHR_physics_rigid_bodies), which `load_scene` reads.
+
+        What the format cannot say (most forces, flexible bodies, rolling friction) is left out: each thing is logged as a
+        warning and listed in the file.
+
+        Returns:
+            The path.
+
+        Raises:
+            SceneError: for another suffix, or a scene that is not valid.
+
+        """
+        from rigidimpulse.io.scene_file import write_scene
+
+        return write_scene(self, Path(path))
 
     def __getitem__(self, name: str) -> Body:
         """Return the body of a name; a `SceneError` lists the names there are."""

@@ -31,6 +31,7 @@ from rigidimpulse.integrate.forced_flight import ForcedFlight, VaryingLoad
 from rigidimpulse.integrate.prescribed import KeyframePaths
 from rigidimpulse.observe.events import EventLog
 from rigidimpulse.observe.impulses import Impulses
+from rigidimpulse.observe.kinds import TriggerVolumes, bind_triggers
 from rigidimpulse.observe.ledger import make_ledger
 from rigidimpulse.observe.profile import Stopwatch
 from rigidimpulse.observe.recorder import Recorder
@@ -115,11 +116,12 @@ def _simulate(
     start_courses(context)
     recorder.start(context.state.course)
     resolve_overlaps(context)
+    bind_triggers(context, plan)
     # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
     paths = KeyframePaths(world)
     flight = make_flight(context, plan)
     for end in (float(duration), max(float(duration), float(times[-1]))):
-        if plan.steps or context.forces is not None:
+        if plan.steps or context.forces is not None or context.triggers is not None:
             run_steps(context, plan, paths, flight, end, progress)
         else:
             paths.start_segments(context, end)
@@ -189,6 +191,7 @@ def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
         EventKernel(),
         ExactFlight(),
         ForcedFlight(),
+        TriggerVolumes(),
     ]
     return Plan(world, effects, chosen)
 
@@ -239,6 +242,9 @@ def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, flight: Ev
             index = math.floor(context.state.time / size + 1e-9) + 1
             until = min(index * size, stop)
             step(context, plan, until if context.nets is None else context.nets.advance(context, until))
+        if context.triggers is not None:
+            with plan.clock(TriggerVolumes.name):
+                context.triggers.look(begin, context.state.time)
         if progress is not None:
             progress(context.state.time)
 

@@ -29,6 +29,7 @@ from rigidimpulse.world import World
 if TYPE_CHECKING:
     from rigidimpulse.flexible.in_run import RunningNets
     from rigidimpulse.forces.varying import VaryingForces
+    from rigidimpulse.observe.trigger import Triggers
 
 CONTACT_CAPACITY = 1024
 PAIR_CAPACITY = 4096
@@ -121,6 +122,7 @@ class StepContext:
         self.joints = JointState(world) if world.joints_of_scene else None
         self.forces: VaryingForces | None = None
         self.nets: RunningNets | None = None
+        self.triggers: Triggers | None = None
         self.heaps = None if why_no_heaps(world) else Heaps(world)
 
     def bring(self, i: int, time: float) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from rigidimpulse.accuracy import Accuracy, resolve_accuracy
 from rigidimpulse.body import Body
+from rigidimpulse.collision_filter import pairs_filtered
 from rigidimpulse.constrain.joint import Joint, compile_joints
 from rigidimpulse.constrain.joint_rows import Joints
 from rigidimpulse.conventions import TOLERANCES
@@ -45,7 +46,7 @@ class World:
         flat: (n,) bool, has faces or rims that must not touch those of another at gap 0.
         half_space, ball: (n,) bool, the shape is half spaces only; one sphere about the centre of mass.
         touch_gap: gap at which faces and rims meet, as a fraction of the smaller body's size.
-        apart: (p,) pairs a * n + b, a < b, that do not touch each other since a joint joins them.
+        apart: (p,) pairs a * n + b, a < b, ascending, that do not touch each other by a joint or by their collision filters.
         joints_of_scene: the joints as written. left_out: names of effects that the caller leaves out.
         contact_gap: gap at which lasting contacts are held, as a fraction of the smaller body's size.
 
@@ -136,6 +137,11 @@ class World:
         ends = np.concatenate([self.joints.body_a, self.joints.body_b])
         return float(self.size[ends[ends >= 0]].min(initial=np.inf))
 
+    @cached_property
+    def triggers(self) -> list:
+        """Effects of the stage observe: volumes that report overlap."""
+        return [] if "triggers" in self.left_out else [effect for effect in self.scene.effects if effect.stage == "observe"]
+
     @property
     def can_collide(self) -> bool:
         """Whether any two bodies may ever come to an impact: a dynamic one and another, unless springs push them apart."""
@@ -154,7 +160,13 @@ class World:
     def may_collide(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Which pairs take part in contact at all: at least one of the bodies is dynamic."""
         may = (self.dynamic[a] | self.dynamic[b]) & self.can_collide
-        return may & ~np.isin(a * self.num_bodies + b, self.apart) if len(self.apart) else may
+        return may & ~self.is_apart(a, b) if len(self.apart) else may
+
+    def is_apart(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Which pairs a < b are among those that do not touch each other by order."""
+        key = a * self.num_bodies + b
+        place = np.searchsorted(self.apart, key)
+        return (self.apart[np.minimum(place, len(self.apart) - 1)] == key) if len(self.apart) else np.zeros(np.shape(key), bool)
 
     def least_touch(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Gap at which contact of new pairs is declared, m: 0 where normals are well defined at gap 0."""
@@ -224,7 +236,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         ball=np.array([_is_ball(geometry, k) for k in shape_of_body], bool),
         contact_gap=TOLERANCES.contact_gap,
         touch_gap=TOLERANCES.touch_gap,
-        apart=_pairs_apart(joints, [body.name for body in bodies]),
+        apart=_pairs_apart(joints, bodies, dynamic),
         joints_of_scene=joints,
         left_out=left_out,
     )
@@ -268,14 +280,16 @@ def _steady_forces(scene: Scene) -> list[ConstantForce]:
     return [force for force in forces if force.point is None and force.body not in losing]
 
 
-def _pairs_apart(joints: list[Joint], names: list[str]) -> np.ndarray:
-    """Keys of the pairs of bodies that are joined and do not touch each other."""
+def _pairs_apart(joints: list[Joint], bodies: list[Body], dynamic: np.ndarray) -> np.ndarray:
+    """Keys, ascending, of the pairs of bodies that do not touch each other, since they are joined or by their filters."""
+    names = [body.name for body in bodies]
     pairs = {
         tuple(sorted((names.index(joint.a), names.index(joint.b))))
         for joint in joints
         if joint.a in names and joint.b in names and not joint.collide
     }
-    return np.array(sorted(a * len(names) + b for a, b in pairs), np.int64)
+    joined = np.array(sorted(a * len(names) + b for a, b in pairs), np.int64)
+    return np.union1d(joined, pairs_filtered((body.collision_filter for body in bodies), dynamic))
 
 
 def _is_driven(body) -> bool:

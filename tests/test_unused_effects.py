@@ -79,12 +79,13 @@ EFFECTS = {
     "event kernel": (
         "ground", 'scene.add(ri.Body("c", ri.Shape.sphere(0.1), position=(9, 9, 2), material=rough))', ["rigidimpulse.events"]
     ),
+    "triggers": ("flight", 'scene.add(ri.Trigger("gate", ri.Shape.box(1), position=(0, 0, 2)))', ["rigidimpulse.observe.trigger"]),
     "gyroscopic term": ("balls", 'scene.add(ri.Body("d", ri.Shape.box((1, 2, 3)), position=(9, 9, 9)))', []),
 }
 """Name in the plan: the plain scene, what calls for the effect, modules whose kernels are the effect's."""
 KERNELS = {"springs", "joints", "rolling friction", "heaps", "contact forces", "contact detection", "event kernel"}
 """Effects with kernels of their own."""
-ASKED_FOR = ("rigidimpulse.forces.", "rigidimpulse.flexible")
+ASKED_FOR = ("rigidimpulse.forces.", "rigidimpulse.flexible", "rigidimpulse.io", "rigidimpulse.observe.trigger")
 """Modules that are imported where a scene asks for them only, but for those of forces that do not vary."""
 ALWAYS = {"rigidimpulse.forces.gravity", "rigidimpulse.forces.constant", "rigidimpulse.forces.kinds"}
 OPTIONAL = {"clarabel", "meshcat", "mujoco", "pybullet", "dask", "h5py", "pxr", "matplotlib", "playwright"}

@@ -45,6 +45,8 @@ def why_not(world) -> str:
         return "half spaces that move, or in parts"
     if world.joints_of_scene or world.force_tables:
         return "joints" if world.joints_of_scene else "forces vary"
+    if world.triggers:
+        return "triggers are looked at after every step"
     if accuracy.impact_time not in ("bisection", "conservative") or accuracy.response == "kinematic":
         return f"{accuracy.impact_time}, {accuracy.response}"
     return "" if why_no_heaps(world) or _all_rebound(world) else "bodies may heap up"

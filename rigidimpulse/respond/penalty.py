@@ -141,7 +141,7 @@ class PenaltyForces(ForceTable):
         self._geometry = solid_geometry(world.shapes) if world.cylinders is not None else world.geometry
         self._axes = inward_axes(self._geometry)
         a, b = np.triu_indices(world.num_bodies, 1)
-        touch = (world.dynamic[a] | world.dynamic[b]) & ~np.isin(a * world.num_bodies + b, world.apart)
+        touch = (world.dynamic[a] | world.dynamic[b]) & ~world.is_apart(a, b)
         self._pairs = np.stack([a[touch], b[touch]], axis=1)
         self.stiffness = _stiffness(world, self._pairs)
         given = world.accuracy.penalty_damping

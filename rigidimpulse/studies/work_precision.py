@@ -67,8 +67,12 @@ class Study:
     left: list[str] = field(default_factory=list)
 
     def front(self, error: str = "position") -> list[Row]:
-        """Own rows that no other own row beats in both cost and error, cheapest first; error: a field of `Errors`."""
-        rows = [row for row in self.rows if row.ran and not row.is_peer and not math.isnan(getattr(row.whole, error))]
+        """Own rows that no other own row beats in both cost and error, cheapest first; error: a field of `Errors`.
+
+        Of settings with the very same motion the first counts, since their costs differ by chance.
+        """
+        own = [row for row in self.rows if row.ran and not row.is_peer and not row.same_as]
+        rows = [row for row in own if not math.isnan(getattr(row.whole, error))]
         rows.sort(key=lambda row: (row.cost, getattr(row.whole, error)))
         out: list[Row] = []
         for row in rows:

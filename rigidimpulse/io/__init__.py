@@ -1,0 +1,1 @@
+"""Scenes from files and motion to files. Nothing here is imported before it is used."""

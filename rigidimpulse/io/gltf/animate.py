@@ -1,0 +1,283 @@
+"""Motion into a glTF file: the file that the scene came from with its nodes animated, or one node a body.
+
+A node of a body has the world pose (x, Q) of the body at each key and the world matrix M_p of its parent then; its own
+translation and rotation are those with
+
+    x = x_p + M_p t,        Q K = M_p R S
+
+with K and S, its scales at rest. Where a parent with uneven scale would shear the body there is no such R: the nearest is
+written, and logged. Only what moves has keys; channels that the file has for nodes of bodies are replaced.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigidimpulse.errors import SceneError
+from rigidimpulse.io.gltf.container import Builder
+from rigidimpulse.io.gltf.draw import Drawing, new_file, node_pose, stage
+from rigidimpulse.io.gltf.keys import Keys, reduced
+from rigidimpulse.io.gltf.keys import Path as BodyPath
+from rigidimpulse.io.gltf.nodes import Hierarchy
+from rigidimpulse.io.gltf.origin import Origin
+from rigidimpulse.rotation import conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
+
+if TYPE_CHECKING:
+    from rigidimpulse.recording import Recording
+
+logger = logging.getLogger("rigidimpulse")
+
+EVEN = 1e-6
+"""Unevenness of the scale of parents, relative, that is none."""
+ANIMATION = "rigidimpulse"
+"""Name of the animation."""
+
+
+def write_motion(
+    run: Recording, target: Path, start_frame: float = 0.0, tolerance: float | None = None, impact_keys: bool = False
+) -> None:
+    """Write a .glb or .gltf file of a run.
+
+    Args:
+        run: with its scene. target: where; the suffix says which.
+        start_frame: number of the first frame: times begin at start_frame / fps.
+        tolerance: m; leave out keys that no point of the body misses by more. None: a key a frame.
+        impact_keys: have keys at impacts between frames, too.
+
+    Raises:
+        SceneError: a figure makes no sense, a pose is not finite, or a file beside the scene is gone.
+
+    """
+    scene = run.scene
+    assert scene is not None
+    if not (math.isfinite(start_frame) and start_frame >= 0.0):
+        raise SceneError(f"start_frame = {start_frame!r}", "give the number of a frame, >= 0")
+    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise SceneError(f"tolerance = {tolerance!r}", "give a length in m, > 0, or None for a key a frame")
+    if not (np.isfinite(run.positions).all() and np.isfinite(run.orientations).all()):
+        raise SceneError("a pose of the run is not finite", "look at run.status")
+    if run.nets:
+        logger.warning("flexible bodies are not written to glTF: %s", ", ".join(track.name for track in run.nets))
+    paths = _paths(run, scene, impact_keys)
+    moving = {name: path for name, path in paths.items() if path.moves}
+    reach = {body.name: _reach(body) for body in scene.bodies} if tolerance is not None else {}
+    builder, locals_ = _from_origin(scene.origin, paths, scene) if scene.origin else _from_scene(paths, scene)
+    shift = start_frame * float(run.times[1] - run.times[0]) if len(run.times) > 1 else 0.0
+    writer = _Channels(builder, shift)
+    for name, path in moving.items():
+        if name not in locals_.node_of:
+            continue
+        keys = path.at(path.key_times())
+        if tolerance is not None:
+            places = reduced(keys, reach[name], tolerance)
+            keys = Keys(keys.times[places], keys.positions[places], keys.orientations[places])
+        writer.add(locals_.node_of[name], locals_.of(name, keys))
+    if locals_.sheared:
+        logger.warning("parents of uneven scale: the turn of %s is not exact in the file", ", ".join(sorted(locals_.sheared)))
+    writer.close()
+    builder.write(target)
+
+
+def _paths(run: Recording, scene, impact_keys: bool) -> dict[str, BodyPath]:
+    """The motion of all bodies, with the impacts of dynamic ones where they are asked for."""
+    if not impact_keys or not len(run.impacts):
+        return {name: BodyPath(run, name) for name in run.names}
+    paths = {}
+    for name in run.names:
+        i, body = run.index(name), scene[name]
+        mine = (run.impacts["body_a"] == i) | (run.impacts["body_b"] == i)
+        times = np.unique(run.impacts["time"][mine]) if body.motion == "dynamic" else np.zeros(0)
+        paths[name] = BodyPath(run, name, times, body.gravity_factor * np.asarray(scene.gravity, float))
+    return paths
+
+
+class _Locals:
+    """Nodes of bodies, and their transforms against their parents."""
+
+    def __init__(self, node_of: dict[str, int], paths: dict[str, BodyPath], origin: Origin | None) -> None:
+        self.node_of, self._paths, self._origin = node_of, paths, origin
+        self.sheared: set[str] = set()
+        self._name_of = {node: name for name, node in node_of.items()}
+
+    def of(self, name: str, keys: Keys) -> Keys:
+        """Keys of a body as its node has them."""
+        node = self.node_of[name]
+        if self._origin is None or node >= len(self._origin.animations.hierarchy.nodes):
+            return keys
+        hierarchy = self._origin.animations.hierarchy
+        parent = hierarchy.parent[node]
+        if parent < 0:
+            return keys
+        x, matrix = self._world(parent, keys.times)
+        position = np.linalg.solve(matrix, (keys.positions - x)[:, :, None])[:, :, 0]
+        return Keys(keys.times, position, quaternion_continuity(self._turn(name, node, keys, matrix, hierarchy)))
+
+    def _turn(self, name: str, node: int, keys: Keys, matrix: np.ndarray, hierarchy: Hierarchy) -> np.ndarray:
+        """Rotations (k, 4) of a node below parents with world matrices (k, 3, 3)."""
+        local = hierarchy.local[node]
+        scale = np.cbrt(np.abs(np.linalg.det(matrix)))[:, None, None]
+        fixed = np.abs(matrix - matrix[0]).max() <= EVEN * float(scale[0, 0, 0])
+        even = np.abs(matrix[0] / scale[0] @ (matrix[0] / scale[0]).T - np.eye(3)).max() <= EVEN
+        if fixed and even and np.linalg.det(matrix[0]) > 0.0 and not self._is_mirrored(node, hierarchy):
+            return multiply(conjugate(from_matrix(matrix[0] / scale[0])), keys.orientations)
+        stretch = to_matrix(hierarchy.turn[node]).T @ hierarchy.world[node, :3, :3]
+        own = np.linalg.solve(matrix, to_matrix(keys.orientations) @ stretch) / local.scale
+        u, _, v = np.linalg.svd(own)
+        nearest = u @ v
+        if np.abs(nearest - own).max() > EVEN * 10.0:
+            self.sheared.add(name)
+        return from_matrix(nearest)
+
+    def _is_mirrored(self, node: int, hierarchy: Hierarchy) -> bool:
+        """Whether a scale above a node is negative."""
+        return any(np.any(hierarchy.local[k].scale < 0.0) for k in hierarchy.chain(node)[1:])
+
+    def _world(self, node: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Origin (k, 3) and linear part of the world matrix (k, 3, 3) of a node at times."""
+        assert self._origin is not None
+        animations = self._origin.animations
+        hierarchy = animations.hierarchy
+        name = self._name_of.get(node)
+        if name is not None and self._paths[name].moves:
+            path = self._paths[name].at(times)
+            stretch = to_matrix(hierarchy.turn[node]).T @ hierarchy.world[node, :3, :3]
+            return path.positions, to_matrix(path.orientations) @ stretch
+        above = hierarchy.chain(node)
+        if not any(self._name_of.get(k) in self._paths for k in above) and not animations.moves(node):
+            shape = (len(times), 1, 1)
+            return np.tile(hierarchy.position(node), (len(times), 1)), np.tile(hierarchy.world[node, :3, :3], shape)
+        local = animations.local(node, times)
+        matrix = to_matrix(local.rotation) * local.scale
+        if hierarchy.parent[node] < 0:
+            return local.translation, matrix
+        x, linear = self._world(hierarchy.parent[node], times)
+        return x + np.einsum("kij,kj->ki", linear, local.translation), linear @ matrix
+
+
+class _Channels:
+    """Channels of one animation, all values in one buffer view."""
+
+    def __init__(self, builder: Builder, shift: float) -> None:
+        self._builder, self._shift = builder, shift
+        self._channels: list[dict[str, Any]] = []
+        self._samplers: list[dict[str, Any]] = []
+        self._data: list[bytes] = []
+        self._length = 0
+        self._times: dict[bytes, int] = {}
+        self._values: list[dict[str, Any]] = []
+
+    def add(self, node: int, keys: Keys) -> None:
+        """Add the channels of a node; only what changes has one."""
+        for path, values in (("translation", keys.positions), ("rotation", keys.orientations[:, [1, 2, 3, 0]])):
+            if np.any(values != values[0]):
+                sampler = {"input": self._input(keys.times), "output": self._accessor(values)}
+                self._samplers.append(sampler)
+                self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})
+                entry = self._builder.tree["nodes"][node]
+                _use_parts(entry)
+
+    def _input(self, times: np.ndarray) -> int:
+        data = (times + self._shift).astype(np.float32)
+        if np.any(np.diff(data) <= 0.0):
+            raise SceneError(f"keys near {data[-1]:g} s are too close for single precision", "give a smaller start_frame or fps")
+        key = data.tobytes()
+        if key not in self._times:
+            self._times[key] = self._accessor(data[:, None], bounds=True)
+        return self._times[key]
+
+    def _accessor(self, values: np.ndarray, bounds: bool = False) -> int:
+        data = values.astype(np.float32)
+        if data.shape[1] == 4:
+            # Rounded to single precision and made unit again, so that players need not.
+            data = (data / np.linalg.norm(data.astype(float), axis=1, keepdims=True)).astype(np.float32)
+        entry: dict[str, Any] = {"byteOffset": self._length, "componentType": 5126, "count": len(data)}
+        entry["type"] = "SCALAR" if data.shape[1] == 1 else f"VEC{data.shape[1]}"
+        if bounds:
+            entry |= {"min": [float(data.min())], "max": [float(data.max())]}
+        self._data.append(data.tobytes())
+        self._length += data.nbytes
+        self._values.append(entry)
+        return self._builder.add("accessors", entry)
+
+    def close(self) -> None:
+        """Put the animation into the file."""
+        if not self._channels:
+            return
+        view = self._builder.view(b"".join(self._data))
+        for entry in self._values:
+            entry["bufferView"] = view
+        self._builder.add("animations", {"name": ANIMATION, "channels": self._channels, "samplers": self._samplers})
+
+
+def _use_parts(entry: dict[str, Any]) -> None:
+    """Let a node have translation, rotation and scale for a matrix: animated ones must."""
+    if "matrix" in entry:
+        matrix = np.array(entry.pop("matrix"), float).reshape(4, 4).T
+        scale = np.linalg.norm(matrix[:3, :3], axis=0)
+        if np.linalg.det(matrix[:3, :3]) < 0.0:
+            scale[0] = -scale[0]
+        entry |= {"translation": matrix[:3, 3].tolist(), "scale": scale.tolist()}
+        entry["rotation"] = from_matrix(matrix[:3, :3] / scale)[[1, 2, 3, 0]].tolist()
+
+
+def _from_origin(origin: Origin, paths: dict[str, BodyPath], scene) -> tuple[Builder, _Locals]:
+    """The file of the scene; bodies that were added since have nodes of their own."""
+    builder = origin.builder()
+    node_of = {name: node for name, node in origin.node_of.items() if name in paths}
+    fresh = [body for body in scene.bodies if body.name not in origin.node_of and body.name not in origin.parts]
+    if fresh:
+        drawing = Drawing(builder, _half(paths))
+        scenes = builder.tree.setdefault("scenes", [{"nodes": list(origin.animations.hierarchy.roots)}])
+        for number, body in enumerate(fresh):
+            pose = node_pose(paths[body.name].positions[0], paths[body.name].orientations[0])
+            node_of[body.name] = builder.add("nodes", {"name": body.name, "mesh": drawing.mesh(body, number), **pose})
+            scenes[builder.tree.get("scene", 0)].setdefault("nodes", []).append(node_of[body.name])
+    _drop_channels(builder.tree, {node_of[name] for name, path in paths.items() if name in node_of and path.moves})
+    return builder, _Locals(node_of, paths, origin)
+
+
+def _drop_channels(tree: dict[str, Any], nodes: set[int]) -> None:
+    """Leave out the channels that move the nodes, and animations without channels."""
+    kept = []
+    for animation in tree.pop("animations", []):
+        animation["channels"] = [
+            channel for channel in animation["channels"]
+            if channel["target"].get("node") not in nodes or channel["target"]["path"] not in ("translation", "rotation")
+        ]  # fmt: skip
+        if animation["channels"]:
+            kept.append(animation)
+    if kept:
+        tree["animations"] = kept
+
+
+def _from_scene(paths: dict[str, BodyPath], scene) -> tuple[Builder, _Locals]:
+    """A file with a node and a mesh for each body, Y up."""
+    builder = new_file()
+    parents, _ = stage(builder, scene.gravity, "world")
+    drawing, node_of, moving = Drawing(builder, _half(paths)), {}, 0
+    for body in scene.bodies:
+        path = paths[body.name]
+        entry = {"name": body.name, "mesh": drawing.mesh(body, moving), **node_pose(path.positions[0], path.orientations[0])}
+        moving += body.motion != "static"
+        node_of[body.name] = builder.add("nodes", entry)
+        parents.append(node_of[body.name])
+    return builder, _Locals(node_of, paths, None)
+
+
+def _half(paths: dict[str, BodyPath]) -> float:
+    """Half the side of a square that the whole motion takes place above, m."""
+    places = np.concatenate([path.positions for path in paths.values()])
+    return 2.0 * float(np.abs(places).max(initial=0.0))
+
+
+def _reach(body) -> float:
+    """Radius about the origin of a body that holds all its points, m; 0 for half spaces."""
+    from rigidimpulse.view.display import display_mesh
+
+    drawn = display_mesh(body.shape, 16)
+    return 0.0 if drawn is None else float(np.linalg.norm(drawn.vertices, axis=1).max())

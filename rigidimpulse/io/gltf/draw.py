@@ -1,0 +1,117 @@
+"""Bodies as meshes of a glTF file: what is seen of scenes that come from no file. Half spaces are squares."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rigidimpulse.body import Body
+from rigidimpulse.io.gltf.container import Builder
+from rigidimpulse.rotation import from_matrix
+from rigidimpulse.shape import Shape
+from rigidimpulse.view.camera import stage_rotation, up_axis
+from rigidimpulse.view.display import display_mesh, display_planes
+from rigidimpulse.view.materials import PALETTE, surface
+
+SEGMENTS = 32
+"""Corners of a full turn of round shapes."""
+VERTICES, INDICES = 34962, 34963
+LEAST_SQUARE = 5.0
+"""m, least half side of the square that stands for a half space."""
+
+
+def new_file() -> Builder:
+    """Return an empty file with one scene."""
+    return Builder({"asset": {"version": "2.0", "generator": "rigidimpulse"}, "scene": 0, "scenes": [{"nodes": []}], "nodes": []})
+
+
+def stage(builder: Builder, gravity: Any, name: str) -> tuple[list[int], np.ndarray]:
+    """Return the list that takes the nodes of bodies, and the quaternion wxyz that turns the scene Y up.
+
+    Where that is a turn the list is the children of a root node with it, of that name.
+    """
+    turn = from_matrix(stage_rotation(up_axis(gravity)))
+    roots = builder.tree["scenes"][0]["nodes"]
+    if np.abs(turn[1:]).max() < 1e-12:
+        return roots, np.array([1.0, 0.0, 0.0, 0.0])
+    children: list[int] = []
+    roots.append(builder.add("nodes", {"name": name, "rotation": turn[[1, 2, 3, 0]].tolist(), "children": children}))
+    return children, turn
+
+
+def node_pose(position: np.ndarray, orientation: np.ndarray) -> dict[str, Any]:
+    """Return translation and rotation of a node, where they are not those of its parent."""
+    pose: dict[str, Any] = {}
+    if np.any(position):
+        pose["translation"] = np.asarray(position, float).tolist()
+    if np.any(orientation[1:]):
+        pose["rotation"] = np.asarray(orientation, float)[[1, 2, 3, 0]].tolist()
+    return pose
+
+
+class Drawing:
+    """Meshes of shapes in a file; equal shapes share their vertices."""
+
+    def __init__(self, builder: Builder, half: float) -> None:
+        """half: m, half side of squares for half spaces."""
+        self.builder, self.half = builder, max(half, LEAST_SQUARE)
+        self._geometry: dict[Any, dict[str, Any]] = {}
+        self._meshes: dict[Any, int] = {}
+        self._paints: dict[str, int] = {}
+
+    def mesh(self, body: Body, index: int, shape: Shape | None = None) -> int:
+        """Return the mesh of a body, or of a part of its shape, in the colour of the moving body `index`."""
+        shape = body.shape if shape is None else shape
+        paint = surface(index % len(PALETTE), body)
+        key = (_key(shape), str(paint))
+        if key not in self._meshes:
+            primitive = {**self._primitive(shape), "material": self._paint(paint)}
+            self._meshes[key] = self.builder.add("meshes", {"primitives": [primitive]})
+        return self._meshes[key]
+
+    def _primitive(self, shape: Shape) -> dict[str, Any]:
+        key = _key(shape)
+        if key not in self._geometry:
+            pieces = [_square(normal, offset, self.half) for normal, offset in display_planes(shape)]
+            drawn = display_mesh(shape, SEGMENTS)
+            if drawn is not None:
+                pieces.append((drawn.vertices, drawn.normals, drawn.faces))
+            starts = np.cumsum([0] + [len(piece[0]) for piece in pieces[:-1]])
+            vertices, normals = (np.concatenate([piece[k] for piece in pieces]) for k in range(2))
+            faces = np.concatenate([piece[2] + start for piece, start in zip(pieces, starts, strict=True)])
+            normals = normals.astype(np.float32).astype(float)
+            builder = self.builder
+            attributes = {
+                "POSITION": builder.array(vertices, "VEC3", bounds=True, target=VERTICES),
+                "NORMAL": builder.array(normals / np.linalg.norm(normals, axis=1, keepdims=True), "VEC3", target=VERTICES),
+            }
+            index = builder.array(faces.ravel().astype(np.uint32), "SCALAR", target=INDICES)
+            self._geometry[key] = {"attributes": attributes, "indices": index}
+        return self._geometry[key]
+
+    def _paint(self, paint: dict[str, Any]) -> int:
+        key = str(paint)
+        if key not in self._paints:
+            shade = np.array([int(paint["color"][k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+            linear = np.where(shade <= 0.04045, shade / 12.92, ((shade + 0.055) / 1.055) ** 2.4)
+            finish = {"baseColorFactor": [*linear.tolist(), 1.0]}
+            finish |= {"metallicFactor": paint["metalness"], "roughnessFactor": paint["roughness"]}
+            self._paints[key] = self.builder.add("materials", {"pbrMetallicRoughness": finish, "doubleSided": True})
+        return self._paints[key]
+
+
+def _key(shape: Shape) -> Any:
+    """What is equal for shapes that look alike: figures of primitives, else the object itself."""
+    if shape.kind in ("sphere", "capsule", "cylinder"):
+        return (shape.kind, shape.radius, shape.height)
+    return (shape.kind, *np.asarray(shape.size).tolist()) if shape.kind == "box" else id(shape)
+
+
+def _square(normal: np.ndarray, offset: float, half: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices, normals and faces of a square in a plane."""
+    across = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    across /= np.linalg.norm(across)
+    along = np.cross(normal, across)
+    corners = [offset * normal + half * (a * across + b * along) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return np.array(corners), np.tile(normal, (4, 1)), np.array([[0, 1, 2], [0, 2, 3]])

@@ -1,0 +1,117 @@
+"""Joints of a glTF file as `SixAxisJoint`s.
+
+The node with the joint has frame a, the connected node frame b: axes and limits are those of a, translation is that of b
+against a. Each frame moves with the body that its node belongs to; a node of no body is the world.
+
+Bodies whose surfaces meet where a joint holds them together touch there for ever: a contact that the joint says already, at
+a point where no force of it can be told from the joint's. Such bodies do not collide, also with enableCollision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from rigidimpulse.body import Body
+from rigidimpulse.constrain.six_axis import AXES, Drive, Limit, SixAxisJoint
+from rigidimpulse.detect.narrowphase import Narrowphase
+from rigidimpulse.geometry import compile_shape
+from rigidimpulse.io.gltf import schema
+from rigidimpulse.io.gltf.nodes import Hierarchy
+from rigidimpulse.observe.trigger import extent
+from rigidimpulse.rotation import to_matrix
+from rigidimpulse.shape import Shape
+
+NEAR = 1e-3
+"""Distance of a joint from a surface, relative to the size of the body, at which it is on it: figures of files are rounded."""
+
+
+def read_joints(
+    hierarchy: Hierarchy, body_of: Callable[[int], str | None], bodies: Mapping[str, Body]
+) -> tuple[list[SixAxisJoint], list[str]]:
+    """Return the joints of a file, and lines about what is left out of them.
+
+    Args:
+        hierarchy: the nodes. body_of: name of the body that a node belongs to. bodies: by name.
+
+    Raises:
+        SceneError: an index that is wrong; bounds that are none are refused when the scene is compiled.
+
+    """
+    joints, notes = [], []
+    for node in sorted(hierarchy.order):
+        entry = hierarchy.nodes[node].physics.joint
+        if entry is None:
+            continue
+        hierarchy.file.entry(hierarchy.nodes, entry.connected_node, "node")
+        name = hierarchy.names[node] if hierarchy.nodes[node].name else f"joint of node {node}"
+        a, b = body_of(node), body_of(entry.connected_node)
+        joint = hierarchy.file.entry(hierarchy.file.document.extensions.physics.physics_joints, entry.joint, "joint")
+        if a == b or not any(bodies[k].motion == "dynamic" for k in (a, b) if k is not None):
+            notes.append(f"joint at node {name!r} joins nothing that moves ({a!r} and {b!r}): left out")
+            continue
+        limits = [_limit(limit, name, notes) for limit in joint.limits]
+        drives = [_drive(drive, name, notes) for drive in joint.drives]
+        frames = [to_matrix(hierarchy.turn[k]).T for k in (node, entry.connected_node)]
+        limits = [limit for limit in limits if limit is not None]
+        collide = entry.enable_collision
+        if collide and a is not None and b is not None and _holds_place(limits):
+            collide = not all(_is_on(bodies[k], hierarchy.position(node)) for k in (a, b))
+            if not collide:
+                notes.append(f"bodies {a!r} and {b!r} touch at joint {name!r} itself: they do not collide")
+        joints.append(SixAxisJoint(
+            a, b, anchor=hierarchy.position(node), axes=frames[0], anchor_b=hierarchy.position(entry.connected_node), axes_b=frames[1],
+            limits=limits, drives=[drive for drive in drives if drive is not None], name=name, collide=collide,
+        ))  # fmt: skip
+    return joints, notes
+
+
+def _holds_place(limits: list[Limit]) -> bool:
+    """Whether limits lock all translations, hard."""
+    locked = "".join(limit.translation for limit in limits if limit.lower == limit.upper == 0.0 and limit.stiffness is None)
+    return set(locked) == set(AXES)
+
+
+def _is_on(body: Body, point: np.ndarray) -> bool:
+    """Whether a point (3,) of the world lies in a body or on it."""
+    probe = Shape.sphere(NEAR * extent(body.shape))
+    shapes = [compile_shape(shape, np.zeros(3), np.eye(3)) for shape in (body.shape, probe)]
+    pose = np.asarray(body.position, float), body.unit_orientation()
+    return bool(Narrowphase(shapes).overlap(0, pose, 1, (point, np.array([1.0, 0.0, 0.0, 0.0]))))
+
+
+def _letters(axes: list[int] | None) -> str:
+    return "".join(AXES[k] for k in sorted(set(axes or ())))
+
+
+def _limit(limit: schema.Limit, name: str, notes: list[str]) -> Limit | None:
+    where = f"a limit of joint {name!r}"
+    if (limit.linear_axes is None) == (limit.angular_axes is None):
+        notes.append(f"{where} names not one of linear and angular axes: left out")
+        return None
+    if limit.min is None and limit.max is None:
+        notes.append(f"{where} has neither min nor max: left out")
+        return None
+    damping = limit.damping
+    if limit.stiffness is None and damping:
+        notes.append(f"{where} has damping but no stiffness: it is hard")
+        damping = 0.0
+    axes = _letters(limit.linear_axes), _letters(limit.angular_axes)
+    return Limit(*axes, lower=limit.min, upper=limit.max, stiffness=limit.stiffness, damping=damping)
+
+
+def _drive(drive: schema.Drive, name: str, notes: list[str]) -> Drive | None:
+    where = f"a drive of joint {name!r}"
+    if drive.type not in ("linear", "angular") or drive.mode not in ("force", "acceleration"):
+        notes.append(f"{where} is of type {drive.type[:40]!r}, mode {drive.mode[:40]!r}: left out")
+        return None
+    if not (drive.stiffness or drive.damping) or drive.max_force == 0.0:
+        notes.append(f"{where} has no strength: left out")
+        return None
+    axis, linear = AXES[drive.axis], drive.type == "linear"
+    bound = {} if drive.max_force is None else {"max_force": drive.max_force}
+    return Drive(
+        drive.velocity_target, drive.position_target, stiffness=drive.stiffness, damping=drive.damping, mode=drive.mode,
+        translation=axis if linear else "", rotation="" if linear else axis, **bound,
+    )  # fmt: skip

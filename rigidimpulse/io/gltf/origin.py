@@ -1,0 +1,51 @@
+"""What a scene keeps of the glTF file that it was read from, so that motion can be written into that file."""
+
+from __future__ import annotations
+
+import copy
+import mimetypes
+from dataclasses import dataclass
+from typing import Any
+
+from rigidimpulse.io.gltf.animation import Animations
+from rigidimpulse.io.gltf.container import Builder
+
+
+@dataclass(frozen=True)
+class Origin:
+    """A glTF file and what became of it.
+
+    Attributes:
+        animations: the hierarchy and the animated nodes; its file is the one read.
+        node_of: node of each body, by name. parts: names of bodies that are welded to another and have no node.
+        report: lines about what is not in the scene, or not as the file says.
+
+    """
+
+    animations: Animations
+    node_of: dict[str, int]
+    parts: frozenset[str]
+    report: tuple[str, ...]
+
+    def builder(self) -> Builder:
+        """Return a copy of the file to write into: all bytes and images in buffer 0."""
+        file = self.animations.hierarchy.file
+        tree: dict[str, Any] = copy.deepcopy(file.raw)
+        starts, data = [], bytearray()
+        for index in range(len(file.document.buffers)):
+            data += b"\0" * (-len(data) % 4)
+            starts.append(len(data))
+            data += file.buffer(index)
+        for view in tree.get("bufferViews", []):
+            view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
+            view["buffer"] = 0
+        tree.pop("buffers", None)
+        builder = Builder(tree, bytes(data))
+        for index, image in enumerate(tree.get("images", [])):
+            uri = image.get("uri") if isinstance(image, dict) else None
+            if isinstance(uri, str):
+                kind = uri[5:].split(";")[0] if uri.startswith("data:") else mimetypes.guess_type(uri)[0]
+                image["bufferView"] = builder.view(file.bytes_at(uri, f"image {index}"))
+                image["mimeType"] = kind or "image/png"
+                del image["uri"]
+        return builder

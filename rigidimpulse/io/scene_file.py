@@ -1,0 +1,58 @@
+"""Scenes from files, by suffix."""
+
+from __future__ import annotations
+
+import logging
+import os
+from pathlib import Path
+
+from numpy.typing import ArrayLike
+
+from rigidimpulse.errors import SceneError
+from rigidimpulse.scene import Scene
+
+logger = logging.getLogger("rigidimpulse")
+
+SCENE_SUFFIXES = (".glb", ".gltf")
+GLTF_GRAVITY = (0.0, -9.81, 0.0)
+"""m/s^2, of scenes that say nothing else: glTF is Y up."""
+
+
+def load_scene(path: str | os.PathLike[str], gravity: ArrayLike | None = None, *, allow_outside: bool = False) -> Scene:
+    """Read a scene from a .glb or .gltf file (glTF 2.0 with KHR_physics_rigid_bodies and KHR_implicit_shapes).
+
+    Bodies have the names of their nodes, "node3" for one without. Metres, kilograms and Y up stay as they are. A file
+    without physics is taken as it looks: every node with a mesh is a body, see docs/gltf.md.
+
+    Args:
+        path: the file.
+        gravity: (3,) m/s^2; by default what the file says of it, else (0, -9.81, 0).
+        allow_outside: let buffers lie outside the folder of the file.
+
+    Returns:
+        The scene; `scene.report` lists, line by line, what of the file is not in it or not as it is written there.
+
+    Raises:
+        SceneError: no such file, another kind of file, or a broken one; names the file, the part and the remedy.
+
+    """
+    place = Path(path)
+    if place.suffix.lower() not in SCENE_SUFFIXES:
+        raise SceneError(f"cannot read a scene from {place.name!r}", f"give a file that ends in {' or '.join(SCENE_SUFFIXES)}")
+    from rigidimpulse.io.gltf.load import load_gltf
+
+    return load_gltf(place, gravity, allow_outside)
+
+
+def write_scene(scene: Scene, path: Path) -> Path:
+    """Write a scene as a file with physics; see `Scene.export`."""
+    if path.suffix not in SCENE_SUFFIXES:
+        raise SceneError(f"cannot write a scene to {path.name!r}", f"use a name that ends in {' or '.join(SCENE_SUFFIXES)}")
+    from rigidimpulse.files import write_renamed
+    from rigidimpulse.io.gltf.write import write_physics
+
+    left_out: list[str] = []
+    written = write_renamed(path, lambda target: left_out.extend(write_physics(scene, target)))
+    for line in left_out:
+        logger.warning("%s: %s", path.name, line)
+    return written
