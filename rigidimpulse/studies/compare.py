@@ -19,6 +19,7 @@ import numpy as np
 
 from rigidimpulse.accuracy import PRESETS
 from rigidimpulse.errors import SceneError, unknown_name
+from rigidimpulse.files import write_renamed
 from rigidimpulse.recording import Recording
 from rigidimpulse.studies.deviation import Deviation, deviation
 
@@ -136,7 +137,7 @@ class Comparison:
         path = Path(path)
         _check_page(path)
         page = self._page()
-        return self.run_a._write(path, lambda target: target.write_text(page, encoding="utf-8"))
+        return write_renamed(path, lambda target: target.write_text(page, encoding="utf-8"))
 
     def show(self, open_browser: bool = True) -> Viewer:
         """Open the page of `export` in the browser; returns the viewer, which ends with the program.

@@ -15,12 +15,14 @@ import os
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
 
 import numpy as np
 
 from rigidimpulse.errors import SceneError
+from rigidimpulse.files import write_renamed
 from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.plan import STAGES
 from rigidimpulse.recording import Recording
@@ -177,8 +179,8 @@ def study(
     if output is not None:
         from rigidimpulse.studies.charts import write_html, write_png
 
-        write_png(out, Path(output) / "study.png")
-        write_html(out, Path(output) / "study.html")
+        write_renamed(Path(output) / "study.png", partial(write_png, out))
+        write_renamed(Path(output) / "study.html", partial(write_html, out))
     return out
 
 
