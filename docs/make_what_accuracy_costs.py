@@ -1,7 +1,7 @@
-"""Make docs/what_accuracy_costs.md and its charts from real runs: `python docs/make_what_accuracy_costs.py [SCENES] [--budget S]`.
+"""Make docs/what_accuracy_costs.md and its charts from real runs: `python docs/make_what_accuracy_costs.py [--budget S]`.
 
-Studies are kept in docs/accuracy_costs/ (table and chart of each scene) and gone on with; the page is written from all that are there.
-Needs `pip install 'rigidimpulse[study,peers]'` and, on one core, about as long as eight budgets.
+Table and chart of each scene go to docs/accuracy_costs/. Needs `pip install 'rigidimpulse[study,peers]'` and about as long as nine
+budgets, on a core of its own.
 """
 
 from __future__ import annotations
@@ -66,14 +66,12 @@ ADVICE = """## What to choose
 def main() -> None:
     """Run what is asked for, then write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scenes", nargs="*", default=list(TOPICS), choices=[*TOPICS, []])
     parser.add_argument("--budget", type=float, default=60.0, help="s for a scene")
     arguments = parser.parse_args()
     KEPT.mkdir(exist_ok=True)
     studies = {}
     for name in TOPICS:
-        budget = arguments.budget if name in arguments.scenes else 1e-3
-        studies[name] = run(name, budget)
+        studies[name] = run(name, arguments.budget)
         print(name, len(studies[name].rows), "runs;", studies[name].reference.describe())
     page = "\n".join([HEAD, side_by_side(studies), ADVICE, *(section(name, studies[name]) for name in studies)])
     (DOCS / "what_accuracy_costs.md").write_text(page, encoding="utf-8")
@@ -90,11 +88,9 @@ def run(name: str, budget: float) -> Study:
     """Study one scene, or go on with its study."""
     topic = TOPICS[name]
     with tempfile.TemporaryDirectory() as folder:
-        kept = KEPT / f"{name}.csv"
-        if kept.is_file():
-            shutil.copy(kept, Path(folder) / "study.csv")
+        # Studies are made anew, or the table would be one of several days.
         result = ri.study(name, topic.duration, budget=budget, peers=PEERS if topic.peers else (), output=folder)
-        shutil.copy(Path(folder) / "study.csv", kept)
+        shutil.copy(Path(folder) / "study.csv", KEPT / f"{name}.csv")
         shutil.copy(Path(folder) / "study.png", KEPT / f"{name}.png")
     return result
 

@@ -29,6 +29,8 @@ STAGE_COLOURS = ("#4878a8", "#d1662f", "#8d5fb0", "#b23a48", "#3b8a5a", "#a5812c
 INK, FRONT = "#22262b", "#111111"
 LEAST = float(np.finfo(float).eps)
 """Error that stands for zero."""
+CHEAPEST = 1e-5
+"""s: cost that stands for none. A scene in which nothing can happen has no loop."""
 GUIDES = (1, 2)
 """Orders of the guides."""
 NEAR = 2.0
@@ -100,6 +102,11 @@ def _colour(family: str, number: int) -> str:
     return PEER_COLOURS.get(family, PALETTE[number % len(PALETTE)])
 
 
+def _cost(row: Row) -> float:
+    """What is drawn of a cost."""
+    return max(row.cost, CHEAPEST)
+
+
 def _drawn(row: Row, error: str, floor: float) -> float:
     return max(getattr(row.whole, error), floor)
 
@@ -113,7 +120,7 @@ def _floor(study: Any, error: str) -> float:
 def _draw_families(chart: Any, study: Any) -> None:
     floor, number = _floor(study, "position"), 0
     for family, rows in _families(study, "position").items():
-        cost, error = [row.cost for row in rows], [_drawn(row, "position", floor) for row in rows]
+        cost, error = [_cost(row) for row in rows], [_drawn(row, "position", floor) for row in rows]
         if family == "presets":
             chart.plot(cost, error, "*", markersize=15, color=FRONT, markeredgecolor="white", label="presets", zorder=5)
             for (where, height), label in _labels(rows, error):
@@ -125,7 +132,7 @@ def _draw_families(chart: Any, study: Any) -> None:
     front = study.front()
     if front:
         chart.step(
-            [row.cost for row in front], [_drawn(row, "position", floor) for row in front], where="post", color=FRONT, linewidth=4,
+            [_cost(row) for row in front], [_drawn(row, "position", floor) for row in front], where="post", color=FRONT, linewidth=4,
             alpha=0.25, label="front", zorder=2,
         )  # fmt: skip
     chart.axhspan(floor / 10.0, floor, color="#eef0f3", zorder=0)
@@ -138,11 +145,11 @@ def _labels(rows: list[Row], heights: list[float]) -> list[tuple[tuple[float, fl
     groups: list[list[tuple[Row, float]]] = []
     for row, height in sorted(zip(rows, heights, strict=True), key=lambda pair: pair[0].cost):
         last = groups[-1][-1] if groups else None
-        if last is not None and row.cost < NEAR * last[0].cost and abs(math.log10(height / last[1])) < 0.3:
+        if last is not None and _cost(row) < NEAR * _cost(last[0]) and abs(math.log10(height / last[1])) < 0.3:
             groups[-1].append((row, height))
         else:
             groups.append([(row, height)])
-    return [((group[-1][0].cost, group[-1][1]), ", ".join(row.name for row, _ in group)) for group in groups]
+    return [((_cost(group[-1][0]), group[-1][1]), ", ".join(row.name for row, _ in group)) for group in groups]
 
 
 def _draw_guides(chart: Any, study: Any) -> None:
@@ -150,7 +157,7 @@ def _draw_guides(chart: Any, study: Any) -> None:
     rows = [row for row in study.rows if row.ran and math.isfinite(row.whole.position)]
     if not rows:
         return
-    cost = np.array([row.cost for row in rows])
+    cost = np.array([_cost(row) for row in rows])
     start, top = float(np.sqrt(cost.min() * cost.max())), max(_drawn(row, "position", LEAST) for row in rows)
     along = start * np.array([1.0, 10.0])
     for order in GUIDES:
@@ -216,13 +223,13 @@ def _traces(plotly: Any, study: Any, error: str) -> list[Any]:
     front = study.front(error)
     if front:
         traces.append(plotly.Scatter(
-            x=[row.cost for row in front], y=[_drawn(row, error, floor) for row in front], name="front", mode="lines", hoverinfo="skip",
+            x=[_cost(row) for row in front], y=[_drawn(row, error, floor) for row in front], name="front", mode="lines", hoverinfo="skip",
             line={"color": FRONT, "width": 8, "shape": "hv"}, opacity=0.2,
         ))  # fmt: skip
     for family, rows in _families(study, error).items():
         star = family == "presets"
         traces.append(plotly.Scatter(
-            x=[row.cost for row in rows], y=[_drawn(row, error, floor) for row in rows], name=family, text=[_told(row) for row in rows],
+            x=[_cost(row) for row in rows], y=[_drawn(row, error, floor) for row in rows], name=family, text=[_told(row) for row in rows],
             hovertemplate="%{text}<extra></extra>", mode="markers" if star else "lines+markers",
             line={"color": FRONT if star else _colour(family, number), "dash": "dash" if rows[0].is_peer else "solid"},
             marker={"size": 15 if star else 8, "symbol": "star" if star else "square" if rows[0].is_peer else "circle"},

@@ -1,13 +1,21 @@
-"""Rows of a study on disk, written as they come: a study that was stopped goes on where it was.
+"""Rows of a study on disk, written as they come, and its reference: a study that was stopped goes on where it was.
 
-The first line names the fingerprint of what was studied; a file with another one is not gone on with but put aside.
+The first line names the fingerprint of what was studied; a file with another one is not gone on with but put aside. The reference is kept
+since another one, made in another time, would be another scale for the rows to come.
 """
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from rigidimpulse.files import write_renamed
+from rigidimpulse.studies.measures import Truth
+from rigidimpulse.studies.reference import Reference
 from rigidimpulse.studies.row import COLUMNS, Row
 
 MARK = "# study "
@@ -48,3 +56,40 @@ class KeptRows:
         if self._path is not None:
             with self._path.open("a", encoding="utf-8", newline="") as file:
                 csv.writer(file).writerow(row.cells())
+
+
+def kept_reference(path: Path | None, fingerprint: str, make: Callable[[], Reference]) -> Reference:
+    """The reference in a file of this study, or a new one, which is written there; None: it is only made."""
+    if path is not None and path.is_file():
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                if str(data["fingerprint"]) == fingerprint:
+                    return _read(data)
+        except (OSError, KeyError, ValueError):
+            pass  # cut off while it was written: made again
+    reference = make()
+    if path is not None:
+        write_renamed(path, lambda target: np.savez_compressed(target, **_arrays(reference, fingerprint)))
+    return reference
+
+
+def _arrays(reference: Reference, fingerprint: str) -> dict[str, Any]:
+    arrays: dict[str, Any] = {
+        "fingerprint": np.array(fingerprint), "kind": np.array(reference.kind), "note": np.array(reference.note),
+        "names": np.array(list(reference.horizon), dtype=str), "horizon": np.array(list(reference.horizon.values())),
+        "uncertainty": np.array(reference.uncertainty),
+    }  # fmt: skip
+    truth = reference.truth
+    if truth is not None:
+        told = {"times": truth.times, "position": truth.position, "orientation": truth.orientation, "scale": np.array(truth.scale)}
+        arrays.update(told, **{name: value for name in ("energy", "impacts") if (value := getattr(truth, name)) is not None})
+    return arrays
+
+
+def _read(data) -> Reference:
+    truth = None
+    if "times" in data:
+        energy, impacts = (data[name] if name in data else None for name in ("energy", "impacts"))
+        truth = Truth(data["times"], data["position"], data["orientation"], energy, float(data["scale"]), impacts)
+    horizon = dict(zip(data["names"].tolist(), data["horizon"].tolist(), strict=True))
+    return Reference(str(data["kind"]), str(data["note"]), truth, horizon, float(data["uncertainty"]))

@@ -29,7 +29,7 @@ from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
 from rigidimpulse.simulation import frame_times, simulate
 from rigidimpulse.studies.fingerprint import fingerprint
-from rigidimpulse.studies.kept import KeptRows
+from rigidimpulse.studies.kept import KeptRows, kept_reference
 from rigidimpulse.studies.measures import Errors, Truth, measure, penetration
 from rigidimpulse.studies.peers import run_peer
 from rigidimpulse.studies.reference import NONE, Reference, converged_reference, exact_reference
@@ -151,10 +151,14 @@ def study(
     tell = progress or (lambda what, share: None)
     world = compile_scene(made)
     tell("reference", 0.0)
-    reference = make_reference(made, entry, world, length, fps, REFERENCE_SHARE * budget, lambda what: tell(what, 0.0))
+    mark = fingerprint(made, length, fps, first)
+    reference = kept_reference(
+        None if output is None else Path(output) / "reference.npz", mark,
+        lambda: make_reference(made, entry, world, length, fps, REFERENCE_SHARE * budget, lambda what: tell(what, 0.0)),
+    )  # fmt: skip
     out = Study(name or (entry.name if entry is not None else "scene"), length, reference)
     desk = _Desk(world, made, reference, length, fps, first, start, budget)
-    kept = KeptRows(None if output is None else Path(output) / "study.csv", fingerprint(made, length, fps, first))
+    kept = KeptRows(None if output is None else Path(output) / "study.csv", mark)
     jobs: list[tuple[Setting, Callable[[], Row]]] = [(each, lambda each=each: desk.run(each)) for each in settings or grid(full)]
     for peer in peers:
         jobs += [(_peer_setting(peer, k, fps), lambda peer=peer, k=k: desk.run_peer(peer, k)) for k in PEER_STEPS]

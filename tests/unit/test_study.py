@@ -145,8 +145,11 @@ def test_nothing_beats_the_front(points: list[tuple[float, float]]) -> None:
 
 
 def test_a_study_goes_on_where_it_was(tmp_path) -> None:
-    first = ri.study("bounce", settings=PRESETS[:2], output=tmp_path)
-    again = ri.study("bounce", settings=PRESETS, output=tmp_path)
+    first = ri.study(dropped(), 1.0, settings=PRESETS[:2], output=tmp_path)
+    again = ri.study(dropped(), 1.0, settings=PRESETS, output=tmp_path, budget=600.0)
+    # The reference is the old one, though there was more time for it now.
+    assert again.reference.describe() == first.reference.describe() and again.reference.horizon == first.reference.horizon
+    assert np.array_equal(again.reference.truth.position, first.reference.truth.position, equal_nan=True)
     # The very same times: the rows were read, not run.
     assert [row.cost for row in again.rows[:2]] == [row.cost for row in first.rows]
     assert len(again.rows) == 3
