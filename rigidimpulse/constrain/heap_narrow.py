@@ -18,6 +18,7 @@ from rigidimpulse._jit import jit
 from rigidimpulse.constrain.heap_boxes import axis_normal, box_axis, edge_contact
 from rigidimpulse.constrain.heap_polyhedra import face_contacts, face_like, half_space_contacts, make_scratch
 from rigidimpulse.constrain.heap_rows import (
+    CARRIER,
     CORE_A,
     CORE_B,
     DYNAMIC_FRICTION,
@@ -173,7 +174,7 @@ def write_row(bodies, a, b, carrier, real, c, round_a, round_b, factor_a, factor
     rows[r, 0], rows[r, 1], rows[r, 2] = turned_back(bodies.rotation, b if carrier else a, nx, ny, nz)
     rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2] = turned_back(bodies.rotation, a, ax, ay, az)
     rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2] = turned_back(bodies.rotation, b, bx, by, bz)
-    rows[r, ROUND_A], rows[r, ROUND_B] = round_a, round_b
+    rows[r, ROUND_A], rows[r, ROUND_B], rows[r, CARRIER] = round_a, round_b, 1.0 if carrier else 0.0
     rows[r, RESTITUTION], rows[r, STATIC_FRICTION] = coefficients[m, t, 0], coefficients[m, t, 1]
     rows[r, DYNAMIC_FRICTION], rows[r, SKIN] = coefficients[m, t, 2], min(bodies.skin[a], bodies.skin[b])
     apart = nx * (dx + (bx - ax)) + ny * (dy + (by - ay)) + nz * (dz + (bz - az))

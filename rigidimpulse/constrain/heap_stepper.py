@@ -16,6 +16,7 @@ from rigidimpulse.constrain.heap_contacts import (
     store_contacts,
 )
 from rigidimpulse.constrain.heap_cover import Cover
+from rigidimpulse.constrain.heap_fill import fill, keep_impulses, place_bodies
 from rigidimpulse.constrain.heap_motion import energies, note_pressed, slow_down
 from rigidimpulse.constrain.heap_narrow import classify, look, most_motion, review
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
@@ -25,9 +26,8 @@ from rigidimpulse.constrain.heap_records import (
     Batches,
     colour_patches,
     empty_patches,
-    fill_batches,
-    keep_impulses,
     list_patches,
+    place_patches,
 )
 from rigidimpulse.constrain.heap_rows import MEMBER, OUTSIDE, SUPPORT, HeapBodies, load_bodies
 from rigidimpulse.constrain.heap_solver import FREQUENCY, advance, softness, special_patches
@@ -94,6 +94,7 @@ class HeapStepper:
         self._patches, self._count = empty_patches(64), 0
         self._batches = Batches(np.zeros(0), *np.zeros((4, 0), np.int64))
         self._begins = np.zeros(256, np.int64)
+        self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
         self.pressed = np.zeros(n, bool)
         self._places = self._general = np.zeros(0, np.int64)
@@ -195,8 +196,8 @@ class HeapStepper:
             context.contact_int, found, self.order, table.rows, table.ids, table.used,
         )  # fmt: skip
 
-    def _fill(self) -> int:
-        """Make patches, colours and records; returns the number of batches."""
+    def _fill(self, h: float) -> int:
+        """Make patches, colours and records for sub-steps of h s; returns the number of batches."""
         bodies, table, width = self.bodies, self.table, self.lanes.width
         count = list_patches(bodies, table.pairs, table.rows, self._patches)
         if count < 0:
@@ -210,9 +211,11 @@ class HeapStepper:
         if number > len(self._batches.points):
             room = 2 * number
             record = aligned((FIELDS * room * width + ROW - 1) // ROW)
-            first, second, patch = np.zeros((3, room * width), np.int64)
-            self._batches = Batches(record, first, second, patch, np.zeros(room, np.int64))
-        fill_batches(width, bodies, table.pairs, self._patches, count, table.rows, self._batches, number)
+            first, second = np.zeros((2, room * width), np.int64)
+            self._batches = Batches(record, first, second, np.zeros(POINTS * room * width, np.int64), np.zeros(room, np.int64))
+        place_patches(width, bodies, table.pairs, self._patches, count, self._batches, number)
+        place_bodies(bodies, self._places_of_bodies)
+        fill(self.lanes, self._batches, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
         return number
 
     def step(self, context, time: float, end: float) -> Outcome:
@@ -241,7 +244,7 @@ class HeapStepper:
     def _advance(self, sub_steps: int, h: float) -> float:
         """Sub-steps of h s with the contacts as they are known; returns the work of moving supports, J."""
         bodies, table, width = self.bodies, self.table, self.lanes.width
-        number = self._fill()
+        number = self._fill(h)
         lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
         strength = float(self.world.steady_strength[self.members].max())
         balls, rebounds, supports = special_patches(
@@ -249,7 +252,7 @@ class HeapStepper:
         )
         work = advance(
             self.lanes, bodies, table.pairs, self._patches, self._batches, number, table.rows, lists, balls, rebounds, supports, target,
-            sub_steps, h, softness(h),
+            sub_steps, h,
         )  # fmt: skip
-        keep_impulses(width, self._patches, table.rows, self._batches, number)
+        keep_impulses(self.lanes, self._batches, number, table.lines)
         return work
