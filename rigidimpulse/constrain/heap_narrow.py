@@ -120,7 +120,7 @@ def most_motion(bodies, pairs, ahead):
 
 
 @jit
-def review(bodies, pairs, ahead, places, margins):
+def review(bodies, pairs, ahead, between, places, margins):
     """Write the pairs in play whose contacts must be looked for, and their margins, m: how far they come in `ahead` s, within bounds.
 
     Pairs that are too far apart lose their contacts. Returns the number of places (k,) and margins (k,) written.
@@ -148,7 +148,8 @@ def review(bodies, pairs, ahead, places, margins):
             motion = _motion(seen, p, pairs.round[p], reach[other], place, turn)
             if count[p] == 0 and apart[p] - motion > margin:
                 continue
-            if count[p] > 0 and motion <= (SAME_GENERAL if pairs.kind[p] == GENERAL else SAME) * size:
+            same = SAME_GENERAL if pairs.kind[p] == GENERAL else SAME
+            if count[p] > 0 and (motion <= same * size or (between > 0.0 and motion + speed * ahead <= between * size)):
                 continue
         places[number], margins[number] = p, margin
         number += 1

@@ -148,15 +148,15 @@ class HeapStepper:
         most = max(math.ceil(ahead / self.sub_step(members) - 1e-9) // LEAST_SUB_STEPS_BETWEEN, 1)
         self._parts = min(max(math.ceil(motion / MOTION), 1), most)
         self.ahead = ahead / self._parts
-        self._look(context)
+        self._look(context, 0.0)
 
-    def _look(self, context) -> None:
+    def _look(self, context, between: float) -> None:
         """Look at the contacts of all pairs in play."""
         table, world = self.table, self.world
         if len(table.pairs.first) > len(self._places):
             self._places, self._general = np.zeros((2, 2 * len(table.pairs.first)), np.int64)
             self._margins = np.zeros(len(self._places))
-        number = review(self.bodies, table.pairs, self.ahead, self._places, self._margins)
+        number = review(self.bodies, table.pairs, self.ahead, between, self._places, self._margins)
         while True:
             used, waiting = look(
                 self.shapes, self.bodies, table.pairs, table.rows, table.ids, table.used, self.ahead, world.coefficients, self._places,
@@ -228,7 +228,7 @@ class HeapStepper:
         work, done = 0.0, 0
         for part in range(self._parts):
             if part:
-                self._look(context)
+                self._look(context, MOTION)
             some = (part + 1) * sub_steps // self._parts - done
             work += self._advance(some, h)
             done += some
