@@ -68,6 +68,40 @@ def most_stray(bodies, members, pressed, reach, skin):
 
 
 @jit
+def stirred(first, second, member, restless, bodies, mass, strength, inner):
+    """Mark (n,) restless members, and calm ones that such a one may move, over pairs (k,) that may meet.
+
+    A body of mass m at a speed v that runs into calm ones of mass m_0 sets at most k = m v / (m_0 u) of them going faster than u: behind
+    that many bodies nothing moves on by more than what calm bodies may. u = CALM sqrt(g r), m_0 is the least mass of a member.
+    """
+    reach, least = np.zeros(member.shape[0]), np.inf
+    for i in range(member.shape[0]):
+        if member[i]:
+            least = min(least, mass[i])
+    for i in range(member.shape[0]):
+        if restless[i]:
+            speed, spin = 0.0, 0.0
+            for c in range(3):
+                speed += bodies.velocity[i, c] ** 2
+                spin += bodies.angular_velocity[i, c] ** 2
+            size = np.sqrt(speed) + inner[i] * np.sqrt(spin)
+            reach[i] = 2.0 + mass[i] * size / (least * max(CALM * np.sqrt(strength[i] * inner[i]), 1e-300))
+    spreads = True
+    while spreads:
+        spreads = False
+        for p in range(first.shape[0]):
+            a, b = first[p], second[p]
+            if not (member[a] and member[b]):
+                continue
+            if reach[a] > reach[b]:
+                a, b = b, a
+            if reach[b] - 1.0 > reach[a]:
+                reach[a] = reach[b] - 1.0
+                spreads = spreads or reach[a] > 1.0
+    return reach >= 1.0
+
+
+@jit
 def count_calm(members, position, orientation, velocity, strength, inner, skin, length, stood, calm):
     """Add `length` s to the calm of members (k,) that have hardly moved from where they stood (n, 7); start anew that of the others."""
     for k in range(members.shape[0]):

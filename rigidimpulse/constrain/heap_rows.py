@@ -105,9 +105,11 @@ def load_bodies(bodies, order, now, acceleration, inv_mass, part):
         for c in range(6):
             bodies.moved[8 * k + c] = 0.0
         quaternion_to_matrix(bodies.orientation[k], bodies.rotation[k])
-        bodies.mass[8 * k + INVERSE_MASS] = inv_mass[i]
         if part[i] == MEMBER:
+            bodies.mass[8 * k + INVERSE_MASS] = inv_mass[i]
             set_inverse_inertia(bodies, k)
+        else:
+            bodies.mass[8 * k : 8 * k + 8] = 0.0
 
 
 @jit
