@@ -18,7 +18,7 @@ import numpy as np
 from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_fly, mark_slow, most_stray, stirred
 from rigidimpulse.constrain.heap_islands import FAST, SPIN, TALL, islands, refusals, support_levels
-from rigidimpulse.constrain.heap_stepper import HeapStepper, Outcome
+from rigidimpulse.constrain.heap_stepper import KEPT, HeapStepper, Outcome
 from rigidimpulse.detect.groups import Group, empty_contacts
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs
 from rigidimpulse.integrate.course import FIXED, STEPPED
@@ -197,7 +197,7 @@ class Heaps:
         begins &= ~np.isin(root, old)
         if not self._auto or not begins.any():
             return chosen
-        self._set_up(context, np.flatnonzero(begins), window.begin, window.end - window.begin)
+        self._set_up(context, np.flatnonzero(begins), window.begin, window.end - window.begin, 0.0)
         stepper = self.stepper
         level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
         tall = np.unique(root[stepper.order[level[: len(root)] == TALL + 1]])
@@ -217,6 +217,9 @@ class Heaps:
             strength = float(np.linalg.norm(context.acceleration[members], axis=1).max())
             if strength > 0.0 and r not in moving:
                 restless[members] = self.calm[members] < REST * np.sqrt(inner[members] / strength)
+        if np.array_equal(restless, chosen):
+            self.asleep[:] = False
+            return
         still = chosen & ~stirred(a, b, chosen, restless, context.state.now, world.mass, world.steady_strength, inner)
         self._stand_still(context, np.flatnonzero(still & (course.mode != FIXED)), time)
         alive = np.zeros(len(root), bool)
@@ -315,7 +318,7 @@ class Heaps:
         self._most = max(self._most, len(members))
         members = members[~self.asleep[members]]
         end = self._end_of(context, window, group.time, members)
-        self._set_up(context, members, group.time, end - group.time)
+        self._set_up(context, members, group.time, end - group.time, KEPT if group.time > window.begin else 0.0)
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
             self._ends[label] = end
@@ -355,8 +358,8 @@ class Heaps:
         speed = np.linalg.norm(context.state.now.velocity[group.members], axis=1)
         return slowest[group.members] > LEAVING * speed
 
-    def _set_up(self, context, members: np.ndarray, time: float, ahead: float) -> None:
-        """Put members, in their order, and the bodies near them that stand still before the solver."""
+    def _set_up(self, context, members: np.ndarray, time: float, ahead: float, between: float) -> None:
+        """Put members, in their order, and the bodies near them that stand still before the solver; between: see `review`."""
         world, order = context.world, self.stepper.order
         marked = np.zeros(world.num_bodies, bool)
         marked[members] = True
@@ -367,7 +370,7 @@ class Heaps:
             context.state.course, moving, time, context.state.now, context.state.rotation, context.acceleration,
             context.angular_acceleration,
         )  # fmt: skip
-        self.stepper.set_up(context, members, fixed, ahead)
+        self.stepper.set_up(context, members, fixed, ahead, between)
 
     def take_courses(self, context, window, group: Group) -> None:
         """Give the members of a group's heap the courses that the solver found."""

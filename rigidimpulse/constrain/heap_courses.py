@@ -3,7 +3,6 @@
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.touching import world_inverse_inertia
 from rigidimpulse.integrate.course import FREE, STEPPED, begin, state_at
 from rigidimpulse.rotation import product, quaternion_to_matrix
 
@@ -16,8 +15,12 @@ def arrive(course, members, time, steady, bodies, rotation, acceleration, angula
     """End the courses of members at `time`, bring them there, and let them go straight on; steady (n, 3) m/s2 is what pulls them."""
     for i in members:
         state_at(course, i, time, bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i])
-        quaternion_to_matrix(bodies.orientation[i], rotation[i])
-        world_inverse_inertia(rotation[i], course.inertia[i], bodies.inv_inertia[i])
+        r = rotation[i]
+        quaternion_to_matrix(bodies.orientation[i], r)
+        x, y, z = 1.0 / course.inertia[i, 0], 1.0 / course.inertia[i, 1], 1.0 / course.inertia[i, 2]
+        for c in range(3):
+            for d in range(3):
+                bodies.inv_inertia[i, c, d] = x * r[c, 0] * r[d, 0] + y * r[c, 1] * r[d, 1] + z * r[c, 2] * r[d, 2]
         course.start[i], course.stepped[i, 12] = time, 1.0
         for c in range(4):
             course.orientation[i, c] = bodies.orientation[i, c]

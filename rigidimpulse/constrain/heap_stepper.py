@@ -42,7 +42,9 @@ PRESSED = 0.25
 LEAST_SUB_STEPS, MOST_SUB_STEPS = 16, 256
 """Sub-steps in a whole step."""
 MOTION, LEAST_SUB_STEPS_BETWEEN = 0.05, 2
-"""Inner radii that touching bodies may come past each other until contacts are looked at again; sub-steps from look to look."""
+"""Inner radii that touching bodies may come past each other until contacts are looked for again; sub-steps from look to look."""
+KEPT = 0.01
+"""Inner radii that a pair may come past each other with the contacts it has, in the middle of a step."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -96,6 +98,7 @@ class HeapStepper:
         self._begins = np.zeros(256, np.int64)
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
+        self._special = bool(world.moving.any() or world.ball.any() or world.coefficients[:, :, 0].any())
         self.pressed = np.zeros(n, bool)
         self._places = self._general = np.zeros(0, np.int64)
         self._margins = np.zeros(0)
@@ -137,8 +140,8 @@ class HeapStepper:
         """Pairs (a, b), a of lower rank, of members with each other and with others, (n,) bool each, that may meet in `ahead` s."""
         return self.cover.near(self.table.pairs, context.state.now, context.acceleration, member, other, ahead)
 
-    def set_up(self, context, members: np.ndarray, supports: np.ndarray, ahead: float) -> None:
-        """Put members and what they may touch before the kernels at the present instant, with their contacts."""
+    def set_up(self, context, members: np.ndarray, supports: np.ndarray, ahead: float, between: float = 0.0) -> None:
+        """Put members and what they may touch before the kernels at the present instant, with their contacts; between: see `review`."""
         self.find_pairs(context, members, supports, ahead)
         self.members = members
         self._part[:] = OUTSIDE
@@ -148,10 +151,10 @@ class HeapStepper:
         most = max(math.ceil(ahead / self.sub_step(members) - 1e-9) // LEAST_SUB_STEPS_BETWEEN, 1)
         self._parts = min(max(math.ceil(motion / MOTION), 1), most)
         self.ahead = ahead / self._parts
-        self._look(context, 0.0)
+        self._look(context, between)
 
     def _look(self, context, between: float) -> None:
-        """Look at the contacts of all pairs in play."""
+        """Look at the contacts of all pairs in play; between: see `review`."""
         table, world = self.table, self.world
         if len(table.pairs.first) > len(self._places):
             self._places, self._general = np.zeros((2, 2 * len(table.pairs.first)), np.int64)
@@ -228,7 +231,7 @@ class HeapStepper:
         work, done = 0.0, 0
         for part in range(self._parts):
             if part:
-                self._look(context, MOTION)
+                self._look(context, KEPT)
             some = (part + 1) * sub_steps // self._parts - done
             work += self._advance(some, h)
             done += some
@@ -246,10 +249,12 @@ class HeapStepper:
         bodies, table, width = self.bodies, self.table, self.lanes.width
         number = self._fill(h)
         lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
-        strength = float(self.world.steady_strength[self.members].max())
-        balls, rebounds, supports = special_patches(
-            width, bodies, table.pairs, self._patches, self._count, table.rows, self._batches, strength, lists, target
-        )
+        balls = rebounds = supports = 0
+        if self._special:
+            strength = float(self.world.steady_strength[self.members].max())
+            balls, rebounds, supports = special_patches(
+                width, bodies, table.pairs, self._patches, self._count, table.rows, self._batches, strength, lists, target
+            )
         work = advance(
             self.lanes, bodies, table.pairs, self._patches, self._batches, number, table.rows, lists, balls, rebounds, supports, target,
             sub_steps, h,
