@@ -125,19 +125,20 @@ def _facing(k, c, of_b, y, m, sign, polygon):
 
 @jit
 def _reach(velocity, r, i, j, y, m, sign, ahead, polygon, reach):
-    """How far corners of box j beside a face of box i come over its four sides, +m', -m', +m'', -m'', in `ahead` s, into reach (4,)."""
+    """How far corners of box j beside a face of box i come over its four sides, +m', -m', +m'', -m'', in `ahead` s, into reach (4, 0)."""
     a, b, u, v = 8 * i, 8 * j, (m + 1) % 3, (m + 2) % 3
     x = turned_back(r, i, velocity[b] - velocity[a], velocity[b + 1] - velocity[a + 1], velocity[b + 2] - velocity[a + 2])
     w = turned_back(r, i, velocity[a + 3], velocity[a + 4], velocity[a + 5])
     o = turned_back(r, i, velocity[b + 3], velocity[b + 4], velocity[b + 5])
-    reach[:] = 0.0
+    for side in range(4):
+        reach[side, 0] = 0.0
     for k in range(4):
         pu, pv, pm = polygon[k, 0], polygon[k, 1], sign * polygon[k, 2]
         su, sv, sm = pu - y[u], pv - y[v], pm - y[m]
         along_u = ahead * (x[u] + (o[v] * sm - o[m] * sv) - (w[v] * pm - w[m] * pv))
         along_v = ahead * (x[v] + (o[m] * su - o[u] * sm) - (w[m] * pu - w[u] * pm))
-        reach[0], reach[1] = max(reach[0], -along_u), max(reach[1], along_u)
-        reach[2], reach[3] = max(reach[2], -along_v), max(reach[3], along_v)
+        reach[0, 0], reach[1, 0] = max(reach[0, 0], -along_u), max(reach[1, 0], along_u)
+        reach[2, 0], reach[3, 0] = max(reach[2, 0], -along_v), max(reach[3, 0], along_v)
 
 
 @jit
@@ -146,7 +147,7 @@ def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c
 
     What is beside the face and comes over it in `ahead` s counts. between: from a to b; places are written relative to a.
     """
-    polygon, ids, spare, spare_ids, reach, height, chosen = scratch
+    polygon, ids, spare, spare_ids, ways, height, chosen = scratch
     of_b = axis >= 3
     i, j, m, own, other = (b, a, axis - 3, t, s) if of_b else (a, b, axis, s, t)
     turn = -1.0 if of_b else 1.0
@@ -155,10 +156,10 @@ def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c
     code = _facing((half[other, 0], half[other, 1], half[other, 2]), c, of_b, y, m, sign, polygon)
     for k in range(4):
         ids[k] = k
-    _reach(velocity, r, i, j, y, m, sign, ahead, polygon, reach)
+    _reach(velocity, r, i, j, y, m, sign, ahead, polygon, ways)
     count, u, v = np.int64(4), (m + 1) % 3, (m + 2) % 3
     for side in range(4):
-        limit = half[own, u if side < 2 else v] + reach[side]
+        limit = half[own, u if side < 2 else v] + ways[side, 0]
         count = _cut_side(polygon, ids, count, spare, spare_ids, side // 2, 1.0 if side % 2 == 0 else -1.0, limit, side)
     kept = np.int64(0)
     for k in range(count):

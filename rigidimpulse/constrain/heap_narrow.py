@@ -16,6 +16,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.heap_boxes import box_axis, edge_contact, face_contacts
+from rigidimpulse.constrain.heap_hulls import hull_contacts, make_simplex
 from rigidimpulse.constrain.heap_polyhedra import half_space_contacts, make_scratch
 from rigidimpulse.constrain.heap_rows import (
     CARRIER,
@@ -39,8 +40,10 @@ from rigidimpulse.constrain.heap_rows import (
 )
 from rigidimpulse.rotation import product
 
-BOXES, WALL, GENERAL = 0, 1, 2
-"""Kinds of pairs: two boxes, a half space and a convex polyhedron, all others."""
+BOXES, WALL, GENERAL, HULLS = 0, 1, 2, 3
+"""Kinds of pairs: two boxes, a half space and a convex polyhedron, all others, two convex polyhedra."""
+MOST_HULL_CORNERS = 256
+"""Corners of a polyhedron that are all asked for the farthest one."""
 AHEAD, FARTHEST = 0.12, 2.0
 """Contacts are looked for at least and at most that many inner radii away."""
 SAME, SAME_GENERAL = 2e-3, 0.02
@@ -72,6 +75,14 @@ def classify(pairs, bodies, shapes):
             pairs.kind[p] = BOXES
         elif (solid_s and wall_t) or (wall_s and solid_t):
             pairs.kind[p] = WALL
+        elif solid_s and solid_t and max(_corners(shapes, s), _corners(shapes, t)) <= MOST_HULL_CORNERS:
+            pairs.kind[p] = HULLS
+
+
+@jit
+def _corners(shapes, s):
+    """Number of corners of shape s."""
+    return shapes.corner_first[s + 1] - shapes.corner_first[s]
 
 
 @jit
@@ -248,7 +259,7 @@ def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, places, ma
     rows used, -1 where the pool is too small (then call it again), and how many general ones there are.
     """
     real, found = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
-    scratch, work = make_scratch(), np.empty((3, 3))
+    scratch, work, simplex, origin = make_scratch(), np.empty((3, 3)), make_simplex(), np.zeros(3)
     position, rotation, velocity, shape = bodies.position, bodies.rotation, bodies.velocity, bodies.shape
     old, old_ids = np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64)
     between, c = np.empty(3), np.empty((3, 3))
@@ -265,6 +276,11 @@ def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, places, ma
         s, t = shape[a], shape[b]
         if pairs.kind[p] == WALL:
             count, gap = _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, found)
+        elif pairs.kind[p] == HULLS:
+            size = min(bodies.inner[a], bodies.inner[b])
+            count, gap = hull_contacts(
+                shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, scratch, real, found
+            )
         else:
             count, gap = _of_boxes(shapes.half, velocity, rotation, a, b, s, t, between, margin, ahead, c, work, scratch, real, found)
         if count > pairs.room[p]:

@@ -35,7 +35,7 @@ class Scratch(NamedTuple):
     ids: np.ndarray  # (MOST_CORNERS,)
     spare: np.ndarray  # (MOST_CORNERS, 3)
     spare_ids: np.ndarray  # (MOST_CORNERS,)
-    reach: np.ndarray  # (4,) m
+    ways: np.ndarray  # (MOST_CORNERS, 3) m
     height: np.ndarray  # (MOST_CORNERS,) m
     chosen: np.ndarray  # (4,)
 
@@ -45,7 +45,7 @@ def make_scratch():
     """Room for one pair."""
     return Scratch(
         np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64), np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64),
-        np.empty(4), np.empty(MOST_CORNERS), np.empty(4, np.int64),
+        np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS), np.empty(4, np.int64),
     )  # fmt: skip
 
 
