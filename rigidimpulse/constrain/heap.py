@@ -17,7 +17,7 @@ import numpy as np
 
 from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_fly, mark_slow, most_stray, stirred
-from rigidimpulse.constrain.heap_islands import FAST, SPIN, TALL, islands, refusals, support_levels
+from rigidimpulse.constrain.heap_islands import FAST, MANY, SPIN, TALL, islands, refusals, support_levels
 from rigidimpulse.constrain.heap_stepper import KEPT, HeapStepper, Outcome
 from rigidimpulse.detect.groups import Group, empty_contacts
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs
@@ -52,8 +52,6 @@ class HeapForces:
 
 def why_no_heaps(world) -> str:
     """Why a scene cannot have heaps; empty where it can."""
-    from rigidimpulse.constrain.heap_islands import MANY
-
     solver = world.accuracy.contact_solver
     if solver not in ("auto", "substepped"):
         return f"contact_solver is {solver!r}"

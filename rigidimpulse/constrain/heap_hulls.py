@@ -29,8 +29,8 @@ CLOSE = 1e-12
 """Part of |v|^2 that is round-off."""
 SECOND_WINS = 1e-6
 """Part of the inner radius by which a face of b must have the larger gap."""
-CLOSEST, CODE = -3, 4096
-"""First id of the contact of closest points; corners in a code of features."""
+CLOSEST, CORNER, CODE = -3, -4, 4096
+"""First id of the contact of closest points, and of that of a corner and a plane; corners in a code of features."""
 
 
 class Simplex(NamedTuple):
@@ -290,7 +290,25 @@ def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size,
     else:
         other = _face_at(shapes, t, corner_b, rotation, b, s, a, face_a)
         found = clip_faces(shapes, velocity, rotation, s, a, origin, face_a, t, b, between, other, margin, ahead, 1.0, scratch, real, ids)
+    if found == 0 and max(gap_a, gap_b) <= margin:
+        # The face that looks at it lies wholly beside it.
+        face, corner, i, j = (face_b, corner_a, b, a) if gap_b > gap_a else (face_a, corner_b, a, b)
+        found = _corner_contact(shapes, rotation, face, corner, i, j, i == a, between, max(gap_a, gap_b), real, ids)
     return found, max(gap, gap_a, gap_b)
+
+
+@jit
+def _corner_contact(shapes, rotation, face, corner, i, j, of_a, between, gap, real, ids):
+    """The contact of a corner of body j at `gap` from the plane of a face of body i; of_a: whether i is the first; returns 1."""
+    n = turned(rotation, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
+    p = turned(rotation, j, shapes.corner[corner, 0], shapes.corner[corner, 1], shapes.corner[corner, 2])
+    on_i, on_j, sign = (0, 3, 1.0) if of_a else (3, 0, -1.0)
+    for k in range(3):
+        place = p[k] + (between[k] if of_a else 0.0)
+        real[0, on_i + k], real[0, on_j + k], real[0, 6 + k] = place - gap * n[k], place, sign * n[k]
+    real[0, 9] = gap
+    ids[0, 0], ids[0, 1], ids[0, 2] = CORNER, face, corner
+    return np.int64(1)
 
 
 @jit
