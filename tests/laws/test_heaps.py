@@ -279,9 +279,14 @@ def test_calm_part_of_a_heap_stands_still_while_a_ball_rolls_on_it():
 
 
 def test_calm_boxes_are_no_wall_to_one_that_slides_into_them():
-    # The pusher slides 4.75 m and comes with v = sqrt(64 - 2 mu g 4.75) = 4.2 m/s; without rebound all four go on with v / 4, and for
-    # (v / 4)^2 / (2 mu g) = 0.11 m, less what the pushed ones rub and turn in the blow. Were the calm ones held, the last would not move.
-    pusher = ri.Body("pusher", ri.Shape.box(0.5), position=(-5.25, 0.0, 0.252), velocity=(8.0, 0, 0), material=ROUGH)
-    run = ri.simulate(row_of_boxes(3, pusher), 2.0, accuracy=HEAPS)
-    way = (64.0 - GRAVITY * 4.75) / 16.0 / GRAVITY
-    assert run.position("box 2")[-1, 0] - run.position("box 2")[40, 0] == pytest.approx(way, rel=0.2)
+    # A ball rolls on the far end, so that the row is a heap of which the near part stands still. A pusher of five boxes' mass slides 11 m
+    # and comes at 1.2 s with v = sqrt(144 - 2 mu g 11) = 6 m/s; without rebound it goes on with all twelve at u = 5 v / 17, for
+    # u^2 / (2 mu g) = 0.32 m. The blow runs through the gaps of the row and takes some of it. Were calm boxes held,
+    # the sixth would not move.
+    spin, places = (0, 0.4, 0), ((5.2, 0.0, 0.606), (-11.5, 0.0, 0.252))
+    ball = ri.Body("ball", ri.Shape.sphere(0.1), position=places[0], velocity=(0.04, 0, 0), angular_velocity=spin, material=ROUGH)
+    pusher = ri.Body("pusher", ri.Shape.box(0.5), position=places[1], velocity=(12.0, 0, 0), mass=625.0, material=ROUGH)
+    run = ri.simulate(row_of_boxes(12, ball, pusher), 3.0, accuracy=HEAPS)
+    np.testing.assert_array_equal(run.velocities[60, run.index("box 5")], 0.0)
+    way = (5.0 / 17.0) ** 2 * (144.0 - GRAVITY * 11.0) / GRAVITY
+    assert run.position("box 5")[-1, 0] - run.position("box 5")[60, 0] == pytest.approx(way, rel=0.4)
