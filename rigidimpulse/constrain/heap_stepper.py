@@ -167,7 +167,7 @@ class HeapStepper:
             )  # fmt: skip
             if used >= 0:
                 break
-            table.make_room(len(table.rows))
+            table.make_room(len(table.rows) // 4)
         table.used = used
         if waiting:
             self._look_at_general(context, self._places[self._general[:waiting]], self._margins[self._general[:waiting]])
@@ -212,7 +212,7 @@ class HeapStepper:
             self._begins = np.zeros(1 - 2 * colours, np.int64)
             number, colours = colour_patches(width, bodies, table.pairs, self._patches, count, self._begins)
         if number > len(self._batches.points):
-            room = 2 * number
+            room = number + number // 4
             record = aligned((FIELDS * room * width + ROW - 1) // ROW)
             first, second = np.zeros((2, room * width), np.int64)
             self._batches = Batches(record, first, second, np.zeros(POINTS * room * width, np.int64), np.zeros(room, np.int64))

@@ -85,7 +85,7 @@ class HeapTable:
         if self.used + needed <= len(self.rows):
             return
         total = int(self.pairs.count.sum())
-        capacity = max(len(self.rows), 2 * (total + needed))
+        capacity = max(len(self.rows), 1 + total + 2 * needed)
         lines, rows, ids = _make_pool(capacity)
         self.used = _pack(self.pairs, self.rows, self.ids, rows, ids)
         self.lines, self.rows, self.ids = lines, rows, ids
