@@ -3,8 +3,9 @@
 At the start of a step islands are chosen (`heap_islands`); their bodies get courses (mode STEPPED) that end in the poses
 which the solver found for the end of the step. Pairs inside a heap are not swept; pairs of a member and any other body are,
 and at their contact the impulse is found exactly and the heap is stepped anew from there, the other body with it if it is slow
-enough. Contacts are held at a gap, the skin. A heap whose members all stay within PLAY skins of one place and below
-CALM sqrt(g r) for REST sqrt(r / g) s (r: inner radius) stands still, to the bit, until something touches it.
+enough. Contacts are held at a gap, the skin. A member that stays within PLAY skins of one place and below CALM sqrt(g r) for
+REST sqrt(r / g) s (r: inner radius) is calm. Calm members that no restless one stirs (`stirred`) stand still, to the bit, and bear
+the others; a heap whose members are all calm stands still until something touches it.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.constrain.energy_guard import note_arrival
-from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_fly, mark_slow, most_stray
-from rigidimpulse.constrain.heap_islands import FAST, SPIN, TALL, islands, refusals, support_levels
-from rigidimpulse.constrain.heap_stepper import HeapStepper, Outcome
+from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_fly, mark_slow, most_stray, stirred
+from rigidimpulse.constrain.heap_islands import FAST, MANY, SPIN, TALL, islands, refusals, support_levels
+from rigidimpulse.constrain.heap_stepper import KEPT, HeapStepper, Outcome
 from rigidimpulse.detect.groups import Group, empty_contacts
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs
 from rigidimpulse.integrate.course import FIXED, STEPPED
@@ -26,7 +27,7 @@ from rigidimpulse.observe.energy import mechanical_energy
 from rigidimpulse.plan import Bound, Skip
 
 REST = 3.0
-"""For how long members must have been calm, in sqrt(r / g), see `heap_courses`."""
+"""For how long members must have hardly moved to be calm, in sqrt(r / g), see `heap_courses`."""
 LEAVING = 0.1
 """Part of its speed at which a fast body must leave a heap that it has hit to be no part of it."""
 MOST_PIECES = 4
@@ -51,8 +52,6 @@ class HeapForces:
 
 def why_no_heaps(world) -> str:
     """Why a scene cannot have heaps; empty where it can."""
-    from rigidimpulse.constrain.heap_islands import MANY
-
     solver = world.accuracy.contact_solver
     if solver not in ("auto", "substepped"):
         return f"contact_solver is {solver!r}"
@@ -77,6 +76,7 @@ class Heaps:
     Attributes:
         label: (n,) the heap that a body belongs to, -1 for none; heaps at rest keep theirs.
         calm: (n,) s, for how long a member has hardly moved.
+        asleep: (n,) bool, members that stand still while others of their heap move.
         stepper: the solver and its contacts.
 
     """
@@ -86,6 +86,7 @@ class Heaps:
         self.stepper = HeapStepper(world)
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.calm = np.zeros(world.num_bodies)
+        self.asleep = np.zeros(world.num_bodies, bool)
         self._stood = np.full((world.num_bodies, 7), np.inf)
         self._taken = np.zeros(world.num_bodies, bool)
         self._auto = world.accuracy.contact_solver == "auto"
@@ -114,18 +115,20 @@ class Heaps:
         chosen = self._choose(context, window, ended) if window.end > time else np.zeros_like(ended)
         left = np.flatnonzero(ended & ~chosen & (course.mode == STEPPED))
         let_fly(course, left, world.steady_acceleration)
+        self.calm[left] = 0.0
         self._taken &= chosen
+        self.asleep &= chosen
         window.inside |= chosen
 
     def _choose(self, context, window, brought: np.ndarray) -> np.ndarray:
         """Which bodies (n,) bool are stepped; those `brought` are at the begin of the window already."""
         world, course, time = context.world, context.state.course, window.begin
-        member = world.dynamic & (course.mode != FIXED)
+        member = world.dynamic & ((course.mode != FIXED) | self.asleep)
         if not member.any():
             return member
         ahead = window.end - time
         bring_all(
-            course, np.flatnonzero(~brought), time, context.state.now, context.state.rotation, context.acceleration,
+            course, np.flatnonzero(~(brought | self.asleep)), time, context.state.now, context.state.rotation, context.acceleration,
             context.angular_acceleration,
         )  # fmt: skip
         context.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
@@ -192,7 +195,7 @@ class Heaps:
         begins &= ~np.isin(root, old)
         if not self._auto or not begins.any():
             return chosen
-        self._set_up(context, np.flatnonzero(begins), window.begin, window.end - window.begin)
+        self._set_up(context, np.flatnonzero(begins), window.begin, window.end - window.begin, 0.0)
         stepper = self.stepper
         level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
         tall = np.unique(root[stepper.order[level[: len(root)] == TALL + 1]])
@@ -201,24 +204,38 @@ class Heaps:
         return chosen & ~np.isin(root, tall)
 
     def _settle(self, context, chosen: np.ndarray, root: np.ndarray, a: np.ndarray, b: np.ndarray, time: float) -> None:
-        """Label the heaps; let those that have been calm for long stand still."""
-        world, course, now = context.world, context.state.course, context.state.now
+        """Label the heaps; let those that have been calm for long stand still, and members that are far from restless ones."""
+        world, course = context.world, context.state.course
+        inner = self.stepper.inner
         moving = np.unique(root[np.where(world.moving[a], b, a)][world.moving[a] | world.moving[b]])
+        restless = chosen.copy()
         for r in np.unique(root[chosen]).tolist():
             members = np.flatnonzero(chosen & (root == r))
+            self.label[members] = r
             strength = float(np.linalg.norm(context.acceleration[members], axis=1).max())
-            enough = REST * np.sqrt(self.stepper.inner[members] / strength) if strength > 0.0 else np.inf
-            if r in moving or np.any(self.calm[members] < enough):
-                self.label[members] = r
-                continue
-            before = mechanical_energy(now, world, members)
-            context.recorder.flush_all(course, members, time)
-            now.velocity[members] = now.angular_velocity[members] = 0.0
-            course.mode[members], course.start[members] = FIXED, time
-            course.velocity[members] = course.angular_velocity[members] = 0.0
-            context.log.book(time, "heap", mechanical_energy(now, world, members) - before)
-            chosen[members] = False
-            self.calm[members] = 0.0
+            if strength > 0.0 and r not in moving:
+                restless[members] = self.calm[members] < REST * np.sqrt(inner[members] / strength)
+        if np.array_equal(restless, chosen):
+            self.asleep[:] = False
+            return
+        still = chosen & ~stirred(a, b, chosen, restless, context.state.now, world.mass, world.steady_strength, inner)
+        self._stand_still(context, np.flatnonzero(still & (course.mode != FIXED)), time)
+        alive = np.zeros(len(root), bool)
+        alive[root[restless]] = True
+        chosen &= alive[root]
+        self.asleep = still & chosen
+
+    def _stand_still(self, context, members: np.ndarray, time: float) -> None:
+        """Let members stay where they are."""
+        world, course, now = context.world, context.state.course, context.state.now
+        if not len(members):
+            return
+        before = mechanical_energy(now, world, members)
+        context.recorder.flush_all(course, members, time)
+        now.velocity[members] = now.angular_velocity[members] = 0.0
+        course.mode[members], course.start[members] = FIXED, time
+        course.velocity[members] = course.angular_velocity[members] = 0.0
+        context.log.book(time, "heap", mechanical_energy(now, world, members) - before)
 
     def _end_courses(self, context, members: np.ndarray, time: float) -> None:
         """Bring members to `time`, the end of their courses; book what the step took of their energy."""
@@ -271,7 +288,7 @@ class Heaps:
         state, time = context.state, group.time
         stepped = state.course.mode[members] == STEPPED
         self._end_courses(context, members[stepped & (state.course.start[members] < time)], time)
-        away = np.setdiff1d(members[~stepped], group.members)
+        away = np.setdiff1d(members[~(stepped | self.asleep[members])], group.members)
         bring_all(state.course, away, time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
         context.acceleration[away] = context.world.steady_acceleration[away]
         group.heap = members
@@ -291,10 +308,15 @@ class Heaps:
             group.heap = members = np.union1d(members, near)
             window.inside[members] = True
             context.wrench[group.members] = 0.0
+            self.asleep[members] = False
+            self.calm[group.members] = 0.0
         fresh = members[~self._taken[members]]
         self._take_in(context, fresh, group.time)
+        self._steps += 1
+        self._most = max(self._most, len(members))
+        members = members[~self.asleep[members]]
         end = self._end_of(context, window, group.time, members)
-        self._set_up(context, members, group.time, end - group.time)
+        self._set_up(context, members, group.time, end - group.time, KEPT if group.time > window.begin else 0.0)
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
             self._ends[label] = end
@@ -303,8 +325,6 @@ class Heaps:
         self._outcome_end = end
         if end < window.end:
             window.wake[members] = end
-        self._steps += 1
-        self._most = max(self._most, len(members))
 
     def _take_in(self, context, fresh: np.ndarray, time: float) -> None:
         """What exact contact did to bodies ends where they come to a heap."""
@@ -336,19 +356,19 @@ class Heaps:
         speed = np.linalg.norm(context.state.now.velocity[group.members], axis=1)
         return slowest[group.members] > LEAVING * speed
 
-    def _set_up(self, context, members: np.ndarray, time: float, ahead: float) -> None:
-        """Put members, in their order, and the immovable bodies near them before the solver."""
+    def _set_up(self, context, members: np.ndarray, time: float, ahead: float, between: float) -> None:
+        """Put members, in their order, and the bodies near them that stand still before the solver; between: see `review`."""
         world, order = context.world, self.stepper.order
         marked = np.zeros(world.num_bodies, bool)
         marked[members] = True
         members = order[marked[order]]
-        fixed = np.flatnonzero(~world.dynamic)
+        fixed = np.flatnonzero(~world.dynamic | self.asleep)
         moving = fixed[world.moving[fixed]]
         bring_all(
             context.state.course, moving, time, context.state.now, context.state.rotation, context.acceleration,
             context.angular_acceleration,
         )  # fmt: skip
-        self.stepper.set_up(context, members, fixed, ahead)
+        self.stepper.set_up(context, members, fixed, ahead, between)
 
     def take_courses(self, context, window, group: Group) -> None:
         """Give the members of a group's heap the courses that the solver found."""

@@ -1,4 +1,4 @@
-"""Separating axis of two boxes, and the contact of two of their edges; see `heap_polyhedra`.
+"""Separating axis of two boxes, and the contacts of their faces and edges; see `heap_polyhedra` for what is found.
 
 In the axes of a, with half sides h and k, d from centre to centre and C = R_a^T R_b, the gap along a face normal of a is
 
@@ -7,6 +7,8 @@ In the axes of a, with half sides h and k, d from centre to centre and C = R_a^T
 along one of b likewise, and along the common normal of the edges e_i of a and f_j of b, with i, i', i'' cyclic,
 
     s_ij = (|d_i'' C_i'j - d_i' C_i''j| - h_i' |C_i''j| - h_i'' |C_i'j| - k_j' |C_ij''| - k_j'' |C_ij'|) / sqrt(1 - C_ij^2).
+
+Where a face has the largest gap, the face of the other box that looks most squarely at it is cut by its sides, in the axes of its box.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from math import inf, sqrt
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.heap_polyhedra import EDGE_WINS
+from rigidimpulse.constrain.heap_polyhedra import EDGE_WINS, FROM_EDGE, four_of
 from rigidimpulse.constrain.heap_rows import turned, turned_back
 
 PARALLEL = 1e-6
@@ -69,26 +71,133 @@ def box_axis(half, s, t, r, a, b, dx, dy, dz, far, c):
 
 
 @jit
-def axis_normal(axis, r, a, b, dx, dy, dz):
-    """The unit normal of an axis that is no pair of edges, from a to b."""
-    m, i = (a, axis) if axis < 3 else (b, axis - 3)
-    x, y, z = r[m, 0, i], r[m, 1, i], r[m, 2, i]
-    return (x, y, z) if x * dx + y * dy + z * dz > 0.0 else (-x, -y, -z)
+def _cut_side(polygon, ids, count, spare, spare_ids, axis, sign, limit, side):
+    """Keep the part of the polygon where sign times the coordinate `axis` is at most `limit`; returns its number of corners."""
+    outside = False
+    for k in range(count):
+        outside = outside or sign * polygon[k, axis] > limit
+    if not outside:
+        return count
+    kept, j = np.int64(0), count - 1
+    for k in range(count):
+        before, after = sign * polygon[j, axis] - limit, sign * polygon[k, axis] - limit
+        if (before > 0.0) != (after > 0.0):
+            t = before / (before - after)
+            for m in range(3):
+                spare[kept, m] = polygon[j, m] + t * (polygon[k, m] - polygon[j, m])
+            spare_ids[kept] = FROM_EDGE * (side + 1) + (ids[j] if before > 0.0 else ids[k]) % FROM_EDGE
+            kept += 1
+        if after <= 0.0:
+            for m in range(3):
+                spare[kept, m] = polygon[k, m]
+            spare_ids[kept] = ids[k]
+            kept += 1
+        j = k
+    for k in range(kept):
+        for m in range(3):
+            polygon[k, m] = spare[k, m]
+        ids[k] = spare_ids[k]
+    return kept
 
 
 @jit
-def edge_contact(half, s, t, r, a, dx, dy, dz, axis, gap, c, real, ids):
-    """The contact of two edges of boxes, with the gap found for their axis; returns 1."""
+def _facing(k, c, of_b, y, m, sign, polygon):
+    """The face of the other box, with half sides k and centre y, that looks at the face of axis m: corners into polygon; its code.
+
+    Corners are written along axes m', m'' and as gaps less the half side of m, see `face_contacts`.
+    """
+    q, most = np.int64(0), -inf
+    for n in range(3):
+        cosine = abs(c[n, m] if of_b else c[m, n])
+        if cosine > most:
+            q, most = n, cosine
+    q1, q2 = (q + 1) % 3, (q + 2) % 3
+    side = -k[q] if sign * (c[q, m] if of_b else c[m, q]) > 0.0 else k[q]
+    for n in range(3):
+        row = (m + 1 + n) % 3
+        x, x1, x2 = (c[q, row], c[q1, row], c[q2, row]) if of_b else (c[row, q], c[row, q1], c[row, q2])
+        middle, x1, x2 = y[row] + side * x, k[q1] * x1, k[q2] * x2
+        factor = sign if n == 2 else 1.0
+        polygon[0, n], polygon[1, n] = factor * (middle + x1 + x2), factor * (middle - x1 + x2)
+        polygon[2, n], polygon[3, n] = factor * (middle - x1 - x2), factor * (middle + x1 - x2)
+    return 2 * q + np.int64(side > 0.0)
+
+
+@jit
+def _reach(velocity, r, i, j, y, m, sign, ahead, polygon, reach):
+    """How far corners of box j beside a face of box i come over its four sides, +m', -m', +m'', -m'', in `ahead` s, into reach (4, 0)."""
+    a, b, u, v = 8 * i, 8 * j, (m + 1) % 3, (m + 2) % 3
+    x = turned_back(r, i, velocity[b] - velocity[a], velocity[b + 1] - velocity[a + 1], velocity[b + 2] - velocity[a + 2])
+    w = turned_back(r, i, velocity[a + 3], velocity[a + 4], velocity[a + 5])
+    o = turned_back(r, i, velocity[b + 3], velocity[b + 4], velocity[b + 5])
+    for side in range(4):
+        reach[side, 0] = 0.0
+    for k in range(4):
+        pu, pv, pm = polygon[k, 0], polygon[k, 1], sign * polygon[k, 2]
+        su, sv, sm = pu - y[u], pv - y[v], pm - y[m]
+        along_u = ahead * (x[u] + (o[v] * sm - o[m] * sv) - (w[v] * pm - w[m] * pv))
+        along_v = ahead * (x[v] + (o[m] * su - o[u] * sm) - (w[m] * pu - w[u] * pm))
+        reach[0, 0], reach[1, 0] = max(reach[0, 0], -along_u), max(reach[1, 0], along_u)
+        reach[2, 0], reach[3, 0] = max(reach[2, 0], -along_v), max(reach[3, 0], along_v)
+
+
+@jit
+def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c, scratch, real, out_ids):
+    """Contacts of the face of `axis` (0-2 of a, 3-5 of b) with the face of the other box that looks at it; returns their number.
+
+    What is beside the face and comes over it in `ahead` s counts. between: from a to b; places are written relative to a.
+    """
+    polygon, ids, spare, spare_ids, ways, height, chosen = scratch
+    of_b = axis >= 3
+    i, j, m, own, other = (b, a, axis - 3, t, s) if of_b else (a, b, axis, s, t)
+    turn = -1.0 if of_b else 1.0
+    y = turned_back(r, i, turn * between[0], turn * between[1], turn * between[2])
+    sign = 1.0 if y[m] > 0.0 else -1.0
+    code = _facing((half[other, 0], half[other, 1], half[other, 2]), c, of_b, y, m, sign, polygon)
+    for k in range(4):
+        ids[k] = k
+    _reach(velocity, r, i, j, y, m, sign, ahead, polygon, ways)
+    count, u, v = np.int64(4), (m + 1) % 3, (m + 2) % 3
+    for side in range(4):
+        limit = half[own, u if side < 2 else v] + ways[side, 0]
+        count = _cut_side(polygon, ids, count, spare, spare_ids, side // 2, 1.0 if side % 2 == 0 else -1.0, limit, side)
+    kept = np.int64(0)
+    for k in range(count):
+        gap = polygon[k, 2] - half[own, m]
+        if gap <= margin:
+            polygon[kept, 0], polygon[kept, 1], polygon[kept, 2] = polygon[k, 0], polygon[k, 1], polygon[k, 2]
+            height[kept], ids[kept] = gap, ids[k]
+            kept += 1
+    if kept == 0:
+        return kept
+    number = four_of(polygon, height, kept, chosen)
+    at_own, at_other = (3, 0) if of_b else (0, 3)
+    for n in range(number):
+        k = chosen[n]
+        pu, pv, pm, gap = polygon[k, 0], polygon[k, 1], polygon[k, 2], height[k]
+        for row in range(3):
+            normal = sign * r[i, row, m]
+            place = r[i, row, u] * pu + r[i, row, v] * pv + normal * pm + (between[row] if of_b else 0.0)
+            real[n, at_own + row], real[n, at_other + row] = place - gap * normal, place
+            real[n, 6 + row] = turn * normal
+        real[n, 9] = gap
+        out_ids[n, 0], out_ids[n, 1], out_ids[n, 2] = 2 * axis + np.int64(sign > 0.0), code, ids[k]
+    return number
+
+
+@jit
+def edge_contact(half, s, t, r, a, dx, dy, dz, axis, gap, c, work, real, ids):
+    """The contact of two edges of boxes, with the gap found for their axis; returns 1. work: room (3, 3)."""
     i, j = (axis - 6) // 3, (axis - 6) % 3
     i1, i2 = (i + 1) % 3, (i + 2) % 3
     d = turned_back(r, a, dx, dy, dz)
-    n = np.zeros(3)
+    n, p, o = work[0], work[1], work[2]
     length = sqrt(1.0 - c[i, j] * c[i, j])
     # e_i x f_j in the axes of a.
-    n[i1], n[i2] = -c[i2, j] / length, c[i1, j] / length
+    n[i], n[i1], n[i2] = 0.0, -c[i2, j] / length, c[i1, j] / length
     if n[0] * d[0] + n[1] * d[1] + n[2] * d[2] < 0.0:
         n[i1], n[i2] = -n[i1], -n[i2]
-    p, o, code = np.zeros(3), np.empty(3), 0
+    p[i], code = 0.0, 0
     for m in (i1, i2):
         p[m] = half[s, m] if n[m] > 0.0 else -half[s, m]
         code = 2 * code + int(n[m] > 0.0)

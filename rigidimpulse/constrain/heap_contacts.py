@@ -164,7 +164,10 @@ def _write(geometry, bodies, a, b, carrier, real, c, factor_a, factor_b, coeffic
     for k in range(3):
         real[c, k] -= bodies.position[a, k]
         real[c, 3 + k] -= bodies.position[a, k]
-    return write_row(bodies, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b, coefficients, rows, r)
+    return write_row(
+        bodies.position, bodies.rotation, bodies.material, bodies.skin, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b,
+        coefficients, rows, r,
+    )  # fmt: skip
 
 
 @jit

@@ -3,7 +3,6 @@
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.detect.touching import world_inverse_inertia
 from rigidimpulse.integrate.course import FREE, STEPPED, begin, state_at
 from rigidimpulse.rotation import product, quaternion_to_matrix
 
@@ -16,8 +15,12 @@ def arrive(course, members, time, steady, bodies, rotation, acceleration, angula
     """End the courses of members at `time`, bring them there, and let them go straight on; steady (n, 3) m/s2 is what pulls them."""
     for i in members:
         state_at(course, i, time, bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i])
-        quaternion_to_matrix(bodies.orientation[i], rotation[i])
-        world_inverse_inertia(rotation[i], course.inertia[i], bodies.inv_inertia[i])
+        r = rotation[i]
+        quaternion_to_matrix(bodies.orientation[i], r)
+        x, y, z = 1.0 / course.inertia[i, 0], 1.0 / course.inertia[i, 1], 1.0 / course.inertia[i, 2]
+        for c in range(3):
+            for d in range(3):
+                bodies.inv_inertia[i, c, d] = x * r[c, 0] * r[d, 0] + y * r[c, 1] * r[d, 1] + z * r[c, 2] * r[d, 2]
         course.start[i], course.stepped[i, 12] = time, 1.0
         for c in range(4):
             course.orientation[i, c] = bodies.orientation[i, c]
@@ -65,6 +68,40 @@ def most_stray(bodies, members, pressed, reach, skin):
             spin += bodies.angular_velocity[i, c] ** 2
         most = max(most, np.sqrt(spin * reach[i] / (4.0 * skin[i])))
     return most
+
+
+@jit
+def stirred(first, second, member, restless, bodies, mass, strength, inner):
+    """Mark (n,) restless members, and calm ones that such a one may move, over pairs (k,) that may meet.
+
+    A body of mass m at a speed v that runs into calm ones of mass m_0 sets at most k = m v / (m_0 u) of them going faster than u: behind
+    that many bodies nothing moves on by more than what calm bodies may. u = CALM sqrt(g r), m_0 is the least mass of a member.
+    """
+    reach, least = np.zeros(member.shape[0]), np.inf
+    for i in range(member.shape[0]):
+        if member[i]:
+            least = min(least, mass[i])
+    for i in range(member.shape[0]):
+        if restless[i]:
+            speed, spin = 0.0, 0.0
+            for c in range(3):
+                speed += bodies.velocity[i, c] ** 2
+                spin += bodies.angular_velocity[i, c] ** 2
+            size = np.sqrt(speed) + inner[i] * np.sqrt(spin)
+            reach[i] = 2.0 + mass[i] * size / (least * max(CALM * np.sqrt(strength[i] * inner[i]), 1e-300))
+    spreads = True
+    while spreads:
+        spreads = False
+        for p in range(first.shape[0]):
+            a, b = first[p], second[p]
+            if not (member[a] and member[b]):
+                continue
+            if reach[a] > reach[b]:
+                a, b = b, a
+            if reach[b] - 1.0 > reach[a]:
+                reach[a] = reach[b] - 1.0
+                spreads = spreads or reach[a] > 1.0
+    return reach >= 1.0
 
 
 @jit

@@ -15,9 +15,11 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.heap_boxes import axis_normal, box_axis, edge_contact
-from rigidimpulse.constrain.heap_polyhedra import face_contacts, face_like, half_space_contacts, make_scratch
+from rigidimpulse.constrain.heap_boxes import box_axis, edge_contact, face_contacts
+from rigidimpulse.constrain.heap_hulls import hull_contacts, make_simplex
+from rigidimpulse.constrain.heap_polyhedra import half_space_contacts, make_scratch
 from rigidimpulse.constrain.heap_rows import (
+    CARRIER,
     CORE_A,
     CORE_B,
     DYNAMIC_FRICTION,
@@ -38,8 +40,10 @@ from rigidimpulse.constrain.heap_rows import (
 )
 from rigidimpulse.rotation import product
 
-BOXES, WALL, GENERAL = 0, 1, 2
-"""Kinds of pairs: two boxes, a half space and a convex polyhedron, all others."""
+BOXES, WALL, GENERAL, HULLS = 0, 1, 2, 3
+"""Kinds of pairs: two boxes, a half space and a convex polyhedron, all others, two convex polyhedra."""
+MOST_HULL_CORNERS = 256
+"""Corners of a polyhedron that are all asked for the farthest one."""
 AHEAD, FARTHEST = 0.12, 2.0
 """Contacts are looked for at least and at most that many inner radii away."""
 SAME, SAME_GENERAL = 2e-3, 0.02
@@ -71,6 +75,14 @@ def classify(pairs, bodies, shapes):
             pairs.kind[p] = BOXES
         elif (solid_s and wall_t) or (wall_s and solid_t):
             pairs.kind[p] = WALL
+        elif solid_s and solid_t and max(_corners(shapes, s), _corners(shapes, t)) <= MOST_HULL_CORNERS:
+            pairs.kind[p] = HULLS
+
+
+@jit
+def _corners(shapes, s):
+    """Number of corners of shape s."""
+    return shapes.corner_first[s + 1] - shapes.corner_first[s]
 
 
 @jit
@@ -119,10 +131,11 @@ def most_motion(bodies, pairs, ahead):
 
 
 @jit
-def review(bodies, pairs, ahead, places, margins):
+def review(bodies, pairs, ahead, between, places, margins):
     """Write the pairs in play whose contacts must be looked for, and their margins, m: how far they come in `ahead` s, within bounds.
 
-    Pairs that are too far apart lose their contacts. Returns the number of places (k,) and margins (k,) written.
+    between: in the middle of a step, how many inner radii pairs may have come past each other by the next look with the contacts they
+    have; 0 at its start. Pairs that are too far apart lose their contacts. Returns the number of places (k,) and margins (k,) written.
     """
     part, position, orientation, rotation, velocity = bodies.part, bodies.position, bodies.orientation, bodies.rotation, bodies.velocity
     inner, skin, radius, reach = bodies.inner, bodies.skin, bodies.radius, bodies.reach
@@ -147,7 +160,8 @@ def review(bodies, pairs, ahead, places, margins):
             motion = _motion(seen, p, pairs.round[p], reach[other], place, turn)
             if count[p] == 0 and apart[p] - motion > margin:
                 continue
-            if count[p] > 0 and motion <= (SAME_GENERAL if pairs.kind[p] == GENERAL else SAME) * size:
+            same = SAME_GENERAL if pairs.kind[p] == GENERAL else SAME
+            if count[p] > 0 and (motion <= same * size or (between > 0.0 and motion + speed * ahead <= between * size)):
                 continue
         places[number], margins[number] = p, margin
         number += 1
@@ -155,27 +169,27 @@ def review(bodies, pairs, ahead, places, margins):
 
 
 @jit
-def write_row(bodies, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b, coefficients, rows, r):
+def write_row(
+    position, rotation, material, skin, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b, coefficients, rows, r
+):
     """A new row r, without impulse, of the contact real[c] (10,) of bodies a and b, with places relative to a; carrier: whether it is b.
 
     factor_a, factor_b: lengths of the bodies as the contact was found, parts of their true ones. Returns the separation.
     """
     nx, ny, nz = real[c, 6], real[c, 7], real[c, 8]
-    dx = bodies.position[b, 0] - bodies.position[a, 0]
-    dy = bodies.position[b, 1] - bodies.position[a, 1]
-    dz = bodies.position[b, 2] - bodies.position[a, 2]
+    dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
     ax, ay, az = real[c, 0] / factor_a - round_a * nx, real[c, 1] / factor_a - round_a * ny, real[c, 2] / factor_a - round_a * nz
     bx, by, bz = (real[c, 3] - dx) / factor_b, (real[c, 4] - dy) / factor_b, (real[c, 5] - dz) / factor_b
     bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz
-    m, t = bodies.material[a], bodies.material[b]
+    m, t = material[a], material[b]
     for k in range(ROW_SIZE):
         rows[r, k] = 0.0
-    rows[r, 0], rows[r, 1], rows[r, 2] = turned_back(bodies.rotation, b if carrier else a, nx, ny, nz)
-    rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2] = turned_back(bodies.rotation, a, ax, ay, az)
-    rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2] = turned_back(bodies.rotation, b, bx, by, bz)
-    rows[r, ROUND_A], rows[r, ROUND_B] = round_a, round_b
+    rows[r, 0], rows[r, 1], rows[r, 2] = turned_back(rotation, b if carrier else a, nx, ny, nz)
+    rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2] = turned_back(rotation, a, ax, ay, az)
+    rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2] = turned_back(rotation, b, bx, by, bz)
+    rows[r, ROUND_A], rows[r, ROUND_B], rows[r, CARRIER] = round_a, round_b, 1.0 if carrier else 0.0
     rows[r, RESTITUTION], rows[r, STATIC_FRICTION] = coefficients[m, t, 0], coefficients[m, t, 1]
-    rows[r, DYNAMIC_FRICTION], rows[r, SKIN] = coefficients[m, t, 2], min(bodies.skin[a], bodies.skin[b])
+    rows[r, DYNAMIC_FRICTION], rows[r, SKIN] = coefficients[m, t, 2], min(skin[a], skin[b])
     apart = nx * (dx + (bx - ax)) + ny * (dy + (by - ay)) + nz * (dz + (bz - az))
     rows[r, SEPARATION] = apart - (round_a + round_b) - rows[r, SKIN]
     return rows[r, SEPARATION]
@@ -183,14 +197,16 @@ def write_row(bodies, a, b, carrier, real, c, round_a, round_b, factor_a, factor
 
 @jit
 def hand_over(old_rows, old_ids, old, old_end, rows, ids, new, new_end, near):
-    """Give new rows the impulses of the old ones of the same features, else of one nearby with much the same normal."""
-    taken = np.zeros(old_end - old, np.bool_)
+    """Give new rows the impulses of the old ones of the same features, else of one nearby with much the same normal.
+
+    An old one that has given its impulse has none.
+    """
     for nearby in range(2):
         for c in range(new, new_end):
             if rows[c, IMPULSE] > 0.0:
                 continue
             for o in range(old, old_end):
-                if taken[o - old] or old_rows[o, IMPULSE] == 0.0:
+                if old_rows[o, IMPULSE] == 0.0:
                     continue
                 cosine = rows[c, 0] * old_rows[o, 0] + rows[c, 1] * old_rows[o, 1] + rows[c, 2] * old_rows[o, 2]
                 same = ids[c, 0] == old_ids[o, 0] and ids[c, 1] == old_ids[o, 1] and ids[c, 2] == old_ids[o, 2]
@@ -200,44 +216,39 @@ def hand_over(old_rows, old_ids, old, old_end, rows, ids, new, new_end, near):
                     same = x * x + y * y + z * z < near * near
                 if not same or cosine < 0.9:
                     continue
-                taken[o - old] = True
-                rows[c, IMPULSE] = old_rows[o, IMPULSE]
+                rows[c, IMPULSE], old_rows[o, IMPULSE] = old_rows[o, IMPULSE], 0.0
                 for k in range(FRICTION, FRICTION + 3):
                     rows[c, k] = old_rows[o, k]
                 break
 
 
 @jit
-def _find(shapes, bodies, a, b, kind, margin, ahead, origin, between, c, scratch, real, ids):
-    """Contacts of a pair that is no general one, relative to the first body; returns their number and a bound of the gap."""
-    s, t, r, v = bodies.shape[a], bodies.shape[b], bodies.rotation, bodies.velocity
+def _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, ids):
+    """Contacts of a half space and a convex polyhedron relative to the first body; returns their number and the gap."""
+    wall_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
+    wall, w, i, sign = shapes.wall, s if wall_is_a else t, a if wall_is_a else b, 1.0 if wall_is_a else -1.0
+    nx, ny, nz = turned(rotation, i, wall[w, 0], wall[w, 1], wall[w, 2])
+    offset = wall[w, 3] - sign * (nx * between[0] + ny * between[1] + nz * between[2])
+    solid, j = (t, b) if wall_is_a else (s, a)
+    count, least = half_space_contacts(shapes, solid, rotation, j, nx, ny, nz, offset, margin, sign, scratch, real, ids)
+    if wall_is_a:
+        for k in range(count):
+            for c in range(3):
+                real[k, c] += between[c]
+                real[k, 3 + c] += between[c]
+    return count, least
+
+
+@jit
+def _of_boxes(half, velocity, rotation, a, b, s, t, between, margin, ahead, c, work, scratch, real, ids):
+    """Contacts of two boxes relative to the first body; returns their number and a bound of the gap."""
     dx, dy, dz = between[0], between[1], between[2]
-    if kind == WALL:
-        wall_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
-        wall, w, i, sign = shapes.wall, s if wall_is_a else t, a if wall_is_a else b, 1.0 if wall_is_a else -1.0
-        nx, ny, nz = turned(r, i, wall[w, 0], wall[w, 1], wall[w, 2])
-        offset = wall[w, 3] - sign * (nx * dx + ny * dy + nz * dz)
-        solid, j = (t, b) if wall_is_a else (s, a)
-        count, least = half_space_contacts(shapes, solid, r, j, nx, ny, nz, offset, margin, sign, scratch, real, ids)
-        if wall_is_a:
-            for k in range(count):
-                for i in range(3):
-                    real[k, i] += between[i]
-                    real[k, 3 + i] += between[i]
-        return count, least
-    gap, axis = box_axis(shapes.half, s, t, r, a, b, dx, dy, dz, margin, c)
+    gap, axis = box_axis(half, s, t, rotation, a, b, dx, dy, dz, margin, c)
     if gap > margin:
         return np.int64(0), gap
     if axis >= 6:
-        return edge_contact(shapes.half, s, t, r, a, dx, dy, dz, axis, gap, c, real, ids), gap
-    nx, ny, nz = axis_normal(axis, r, a, b, dx, dy, dz)
-    if axis < 3:
-        face = face_like(shapes, s, r, a, nx, ny, nz)
-        count = face_contacts(shapes, v, r, s, a, origin, face, t, b, between, margin, ahead, 1.0, scratch, real, ids)
-    else:
-        face = face_like(shapes, t, r, b, -nx, -ny, -nz)
-        count = face_contacts(shapes, v, r, t, b, between, face, s, a, origin, margin, ahead, -1.0, scratch, real, ids)
-    return count, gap
+        return edge_contact(half, s, t, rotation, a, dx, dy, dz, axis, gap, c, work, real, ids), gap
+    return face_contacts(half, velocity, rotation, a, b, s, t, between, axis, margin, ahead, c, scratch, real, ids), gap
 
 
 @jit
@@ -248,9 +259,10 @@ def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, places, ma
     rows used, -1 where the pool is too small (then call it again), and how many general ones there are.
     """
     real, found = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
-    scratch = make_scratch()
+    scratch, work, simplex, origin = make_scratch(), np.empty((3, 3)), make_simplex(), np.zeros(3)
+    position, rotation, velocity, shape = bodies.position, bodies.rotation, bodies.velocity, bodies.shape
     old, old_ids = np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64)
-    origin, between, c = np.zeros(3), np.empty(3), np.empty((3, 3))
+    between, c = np.empty(3), np.empty((3, 3))
     waiting = 0
     for k in range(number):
         p, margin = places[k], margins[k]
@@ -260,8 +272,17 @@ def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, places, ma
             continue
         a, b = pairs.first[p], pairs.second[p]
         for i in range(3):
-            between[i] = bodies.position[b, i] - bodies.position[a, i]
-        count, gap = _find(shapes, bodies, a, b, pairs.kind[p], margin, ahead, origin, between, c, scratch, real, found)
+            between[i] = position[b, i] - position[a, i]
+        s, t = shape[a], shape[b]
+        if pairs.kind[p] == WALL:
+            count, gap = _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, found)
+        elif pairs.kind[p] == HULLS:
+            size = min(bodies.inner[a], bodies.inner[b])
+            count, gap = hull_contacts(
+                shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, scratch, real, found
+            )
+        else:
+            count, gap = _of_boxes(shapes.half, velocity, rotation, a, b, s, t, between, margin, ahead, c, work, scratch, real, found)
         if count > pairs.room[p]:
             if used + POINTS > rows.shape[0]:
                 return np.int64(-1), waiting
@@ -280,7 +301,10 @@ def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, places, ma
             for j in range(3):
                 old_ids[i, j] = ids[start + i, j]
         for i in range(count):
-            write_row(bodies, a, b, pairs.carrier[p], real, i, 0.0, 0.0, 1.0, 1.0, coefficients, rows, start + i)
+            write_row(
+                position, rotation, bodies.material, bodies.skin, a, b, pairs.carrier[p], real, i, 0.0, 0.0, 1.0, 1.0, coefficients, rows,
+                start + i,
+            )  # fmt: skip
             for j in range(3):
                 ids[start + i, j] = found[i, j]
         if count > 0 and kept > 0:

@@ -18,15 +18,10 @@ from rigidimpulse.constrain.heap_narrow import GENERAL, in_play
 from rigidimpulse.constrain.heap_rows import (
     CORE_A,
     CORE_B,
-    DYNAMIC_FRICTION,
-    FRICTION,
-    IMPULSE,
     INVERSE_MASS,
     ROUND_A,
     ROUND_B,
-    SEPARATION,
     SKIN,
-    STATIC_FRICTION,
     turned,
 )
 
@@ -48,7 +43,8 @@ POINT, POINT_SIZE = 46, 6
 X, Y, GAP, MASS, PRESS, LEVER = 0, 1, 2, 3, 4, 5
 """First field of the points, and fields of each: place, m; gap less the skin, m; effective mass, 0 for none; impulse; distance from O."""
 FIELDS = POINT + 4 * POINT_SIZE
-POINTS = 4
+POINTS, LINES = 4, 3
+"""Points of a patch at most; lines of 8 of a row of the pool."""
 COLOURS = 62
 """Patches that find no colour among these have a batch each."""
 ONE_WALL = 1.0 - 1e-8
@@ -71,7 +67,7 @@ class Batches(NamedTuple):
     record: np.ndarray  # (FIELDS b W,)
     first: np.ndarray  # (b W,) body a of each lane
     second: np.ndarray  # (b W,)
-    patch: np.ndarray  # (b W,) patch of each lane, -1 for none
+    row: np.ndarray  # (4 b W,) first line in the pool of the points of each lane, point by point; 0 for none
     points: np.ndarray  # (b,) most points of a lane
 
 
@@ -199,14 +195,6 @@ def point_of(position, rotation, rows, r, a, b, nx, ny, nz, share):
 
 
 @jit
-def share_of(mass, a, b):
-    """Impulses act at one point, so that no torque is left over: mid-way, or on the surface of what can move, so that it rolls."""
-    if mass[8 * a + INVERSE_MASS] == 0.0:
-        return 0.0
-    return 0.5 if mass[8 * b + INVERSE_MASS] > 0.0 else 1.0
-
-
-@jit
 def normal_of(position, rotation, rows, r, a, b, carrier):
     """The world normal of row r of bodies a and b; that of two rounded surfaces runs between their centres."""
     if rows[r, ROUND_A] > 0.0 and rows[r, ROUND_B] > 0.0:
@@ -222,98 +210,16 @@ def normal_of(position, rotation, rows, r, a, b, carrier):
 
 
 @jit
-def fill_patch(position, rotation, a, b, carrier, share, patch_row, m, count, rows, record, o, width):
-    """Axes, arms, points and impulses of patch m, of bodies a and b, into the record, from o on; patch_row (m, 4)."""
-    r = patch_row[m, 0]
-    nx, ny, nz = normal_of(position, rotation, rows, r, a, b, carrier)
-    ux, uy, uz, vx, vy, vz = tangents(nx, ny, nz)
-    mx, my, mz = 0.0, 0.0, 0.0
-    for c in range(count):
-        x, y, z, gap = point_of(position, rotation, rows, patch_row[m, c], a, b, nx, ny, nz, share)
-        rows[patch_row[m, c], SEPARATION] = gap
-        g = o + (POINT + POINT_SIZE * c) * width
-        record[g + X * width] = ux * x + uy * y + uz * z
-        record[g + Y * width] = vx * x + vy * y + vz * z
-        record[g + GAP * width] = gap
-        mx, my, mz = mx + x, my + y, mz + z
-    mx, my, mz = mx / count, my / count, mz / count
-    ox, oy = ux * mx + uy * my + uz * mz, vx * mx + vy * my + vz * mz
-    fx, fy, fz, twist = 0.0, 0.0, 0.0, 0.0
-    for c in range(POINTS):
-        g = o + (POINT + POINT_SIZE * c) * width
-        if c >= count:
-            for k in range(POINT_SIZE):
-                record[g + k * width] = 0.0
-            record[g + GAP * width] = 1.0
-            continue
-        q = patch_row[m, c]
-        x, y = record[g + X * width] - ox, record[g + Y * width] - oy
-        record[g + X * width], record[g + Y * width] = x, y
-        record[g + MASS * width], record[g + PRESS * width] = 1.0, rows[q, IMPULSE]
-        record[g + LEVER * width] = sqrt(x * x + y * y)
-        px, py, pz = rows[q, FRICTION], rows[q, FRICTION + 1], rows[q, FRICTION + 2]
-        fx, fy, fz = fx + px, fy + py, fz + pz
-        twist += x * (vx * px + vy * py + vz * pz) - y * (ux * px + uy * py + uz * pz)
-    record[o + NORMAL * width], record[o + (NORMAL + 1) * width], record[o + (NORMAL + 2) * width] = nx, ny, nz
-    record[o + ARM_A * width], record[o + (ARM_A + 1) * width], record[o + (ARM_A + 2) * width] = mx, my, mz
-    record[o + ARM_B * width] = mx - (position[b, 0] - position[a, 0])
-    record[o + (ARM_B + 1) * width] = my - (position[b, 1] - position[a, 1])
-    record[o + (ARM_B + 2) * width] = mz - (position[b, 2] - position[a, 2])
-    record[o + TANGENT_1 * width], record[o + (TANGENT_1 + 1) * width], record[o + (TANGENT_1 + 2) * width] = ux, uy, uz
-    record[o + TANGENT_2 * width], record[o + (TANGENT_2 + 1) * width], record[o + (TANGENT_2 + 2) * width] = vx, vy, vz
-    record[o + SHARE * width], record[o + RADIUS_A * width], record[o + RADIUS_B * width] = share, rows[r, ROUND_A], rows[r, ROUND_B]
-    record[o + MU_STATIC * width], record[o + MU_DYNAMIC * width] = rows[r, STATIC_FRICTION], rows[r, DYNAMIC_FRICTION]
-    record[o + DEPTH * width] = rows[r, SKIN]
-    record[o + PUSH_1 * width], record[o + PUSH_2 * width] = ux * fx + uy * fy + uz * fz, vx * fx + vy * fy + vz * fz
-    record[o + TWIST * width] = twist
-
-
-@jit
-def fill_batches(width, bodies, pairs, patches, count, rows, batches, number):
-    """Records of `count` patches in `number` batches, but for what `prepare` adds: lane after lane, as they lie in memory."""
+def place_patches(width, bodies, pairs, patches, count, batches, number):
+    """Put `count` patches into their lanes of `number` batches."""
     idle = bodies.part.shape[0] - 1
-    batches.patch[: number * width] = -1
+    batches.first[: number * width] = batches.second[: number * width] = idle
+    batches.row[: POINTS * number * width] = 0
+    batches.points[:number] = 0
     for m in range(count):
-        batches.patch[patches.slot[m]] = m
-    for s in range(number * width):
-        m, k = batches.patch[s], s // width
-        o = k * FIELDS * width + s % width
-        if s == k * width:
-            batches.points[k] = 0
-        if m < 0:
-            batches.first[s] = batches.second[s] = idle
-            for f in range(FIELDS):
-                batches.record[o + f * width] = 0.0
-            continue
-        p = patches.pair[m]
-        a, b = pairs.first[p], pairs.second[p]
-        batches.first[s], batches.second[s] = a, b
+        p, s = patches.pair[m], patches.slot[m]
+        k, lane = s // width, s % width
+        batches.first[s], batches.second[s] = pairs.first[p], pairs.second[p]
         batches.points[k] = max(batches.points[k], patches.size[m])
-        share = share_of(bodies.mass, a, b)
-        fill_patch(
-            bodies.position, bodies.rotation, a, b, pairs.carrier[p], share, patches.row, m, patches.size[m], rows, batches.record, o, width
-        )
-
-
-@jit
-def keep_impulses(width, patches, rows, batches, number):
-    """Put the impulses of `number` batches back to their rows: friction as forces at the points with the same sum and twist."""
-    record = batches.record
-    for s in range(number * width):
-        m = batches.patch[s]
-        if m < 0:
-            continue
-        o = (s // width) * FIELDS * width + s % width
-        f1, f2, twist, square = record[o + PUSH_1 * width], record[o + PUSH_2 * width], record[o + TWIST * width], 0.0
         for c in range(patches.size[m]):
-            square += record[o + (POINT + POINT_SIZE * c + LEVER) * width] ** 2
-        turn = twist / square if square > 0.0 else 0.0
-        share = 1.0 / patches.size[m]
-        for c in range(patches.size[m]):
-            r, g = patches.row[m, c], o + (POINT + POINT_SIZE * c) * width
-            rows[r, IMPULSE] = record[g + PRESS * width]
-            along_1 = share * f1 - turn * record[g + Y * width]
-            along_2 = share * f2 + turn * record[g + X * width]
-            for k in range(3):
-                rows[r, FRICTION + k] = along_1 * record[o + (TANGENT_1 + k) * width] + along_2 * record[o + (TANGENT_2 + k) * width]
-
+            batches.row[(POINTS * k + c) * width + lane] = LINES * patches.row[m, c]

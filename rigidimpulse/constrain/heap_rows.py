@@ -21,13 +21,14 @@ from rigidimpulse.rotation import quaternion_to_matrix
 # Kernels that are called for each pair or point get arrays one by one, and indices: a tuple of twenty arrays is passed word by word,
 # and a view is counted, which costs more than what is computed.
 
-NORMAL, CORE_A, CORE_B, ROUND_A, ROUND_B = 0, 3, 6, 9, 10
+NORMAL, CORE_A, ROUND_A, ROUND_B, CORE_B = 0, 3, 6, 7, 8
 """Offsets in a row: unit normal from first to second in the axes of the pair's carrier; body-fixed points, in the axes of their
 bodies, and the radii of the rounded surfaces around them, m."""
-IMPULSE, FRICTION, STATIC_FRICTION, DYNAMIC_FRICTION, RESTITUTION = 11, 12, 15, 16, 17
-"""Offsets in a row: normal impulse, N s; friction impulse (3), N s, world; coefficients."""
-SKIN, SEPARATION, ROW_SIZE = 18, 19, 20
-"""Offsets in a row: skin, m; gap less the skin at the start of the step, m."""
+SKIN, STATIC_FRICTION, DYNAMIC_FRICTION, RESTITUTION, CARRIER = 11, 12, 13, 14, 15
+"""Offsets in a row: skin, m; coefficients; 1 where the carrier is the second body, else 0."""
+IMPULSE, FRICTION, SEPARATION, ROW_SIZE = 16, 17, 20, 24
+"""Offsets in a row: normal impulse, N s; friction impulse (3), N s, world; gap less the skin when the row was last written or read, m.
+A row is three lines of 8, the last of which the solver writes. Row 0 of a pool is none: all 0."""
 
 OUTSIDE, MEMBER, SUPPORT = 0, 1, 2
 """Parts that a body may play in a step: none, stepped, immovable and near."""
@@ -104,9 +105,11 @@ def load_bodies(bodies, order, now, acceleration, inv_mass, part):
         for c in range(6):
             bodies.moved[8 * k + c] = 0.0
         quaternion_to_matrix(bodies.orientation[k], bodies.rotation[k])
-        bodies.mass[8 * k + INVERSE_MASS] = inv_mass[i]
         if part[i] == MEMBER:
+            bodies.mass[8 * k + INVERSE_MASS] = inv_mass[i]
             set_inverse_inertia(bodies, k)
+        else:
+            bodies.mass[8 * k : 8 * k + 8] = 0.0
 
 
 @jit

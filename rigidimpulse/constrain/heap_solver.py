@@ -34,7 +34,7 @@ from math import pi, sqrt
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.heap_lanes import prepare, solve, warm_start
+from rigidimpulse.constrain.heap_lanes import solve, warm_start
 from rigidimpulse.constrain.heap_motion import finish, kick, move
 from rigidimpulse.constrain.heap_records import (
     ARM_A,
@@ -261,12 +261,11 @@ def _work_of(width, bodies, patches, chosen, batches):
 
 
 @jit
-def advance(lanes, bodies, pairs, patches, batches, number, rows, lists, balls, rebounds, supports, target, sub_steps, h, soft):
+def advance(lanes, bodies, pairs, patches, batches, number, rows, lists, balls, rebounds, supports, target, sub_steps, h):
     """All sub-steps of a step, of length h; returns the work of moving supports, J."""
     width = width_of(lanes)
     work, pressing, relaxing = 0.0, np.bool_(0), np.bool_(1)
     velocity, moved, mass = bodies.velocity, bodies.moved, bodies.mass
-    prepare(lanes, batches, number, mass, soft)
     for _ in range(sub_steps):
         kick(bodies, h)
         warm_start(lanes, batches, number, velocity, moved, mass)

@@ -16,6 +16,7 @@ from rigidimpulse.constrain.heap_contacts import (
     store_contacts,
 )
 from rigidimpulse.constrain.heap_cover import Cover
+from rigidimpulse.constrain.heap_fill import fill, keep_impulses, place_bodies
 from rigidimpulse.constrain.heap_motion import energies, note_pressed, slow_down
 from rigidimpulse.constrain.heap_narrow import classify, look, most_motion, review
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
@@ -25,9 +26,8 @@ from rigidimpulse.constrain.heap_records import (
     Batches,
     colour_patches,
     empty_patches,
-    fill_batches,
-    keep_impulses,
     list_patches,
+    place_patches,
 )
 from rigidimpulse.constrain.heap_rows import MEMBER, OUTSIDE, SUPPORT, HeapBodies, load_bodies
 from rigidimpulse.constrain.heap_solver import FREQUENCY, advance, softness, special_patches
@@ -42,7 +42,9 @@ PRESSED = 0.25
 LEAST_SUB_STEPS, MOST_SUB_STEPS = 16, 256
 """Sub-steps in a whole step."""
 MOTION, LEAST_SUB_STEPS_BETWEEN = 0.05, 2
-"""Inner radii that touching bodies may come past each other until contacts are looked at again; sub-steps from look to look."""
+"""Inner radii that touching bodies may come past each other until contacts are looked for again; sub-steps from look to look."""
+KEPT = 0.01
+"""Inner radii that a pair may come past each other with the contacts it has, in the middle of a step."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -94,7 +96,9 @@ class HeapStepper:
         self._patches, self._count = empty_patches(64), 0
         self._batches = Batches(np.zeros(0), *np.zeros((4, 0), np.int64))
         self._begins = np.zeros(256, np.int64)
+        self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
+        self._special = bool(world.moving.any() or world.ball.any() or world.coefficients[:, :, 0].any())
         self.pressed = np.zeros(n, bool)
         self._places = self._general = np.zeros(0, np.int64)
         self._margins = np.zeros(0)
@@ -136,8 +140,8 @@ class HeapStepper:
         """Pairs (a, b), a of lower rank, of members with each other and with others, (n,) bool each, that may meet in `ahead` s."""
         return self.cover.near(self.table.pairs, context.state.now, context.acceleration, member, other, ahead)
 
-    def set_up(self, context, members: np.ndarray, supports: np.ndarray, ahead: float) -> None:
-        """Put members and what they may touch before the kernels at the present instant, with their contacts."""
+    def set_up(self, context, members: np.ndarray, supports: np.ndarray, ahead: float, between: float = 0.0) -> None:
+        """Put members and what they may touch before the kernels at the present instant, with their contacts; between: see `review`."""
         self.find_pairs(context, members, supports, ahead)
         self.members = members
         self._part[:] = OUTSIDE
@@ -147,15 +151,15 @@ class HeapStepper:
         most = max(math.ceil(ahead / self.sub_step(members) - 1e-9) // LEAST_SUB_STEPS_BETWEEN, 1)
         self._parts = min(max(math.ceil(motion / MOTION), 1), most)
         self.ahead = ahead / self._parts
-        self._look(context)
+        self._look(context, between)
 
-    def _look(self, context) -> None:
-        """Look at the contacts of all pairs in play."""
+    def _look(self, context, between: float) -> None:
+        """Look at the contacts of all pairs in play; between: see `review`."""
         table, world = self.table, self.world
         if len(table.pairs.first) > len(self._places):
             self._places, self._general = np.zeros((2, 2 * len(table.pairs.first)), np.int64)
             self._margins = np.zeros(len(self._places))
-        number = review(self.bodies, table.pairs, self.ahead, self._places, self._margins)
+        number = review(self.bodies, table.pairs, self.ahead, between, self._places, self._margins)
         while True:
             used, waiting = look(
                 self.shapes, self.bodies, table.pairs, table.rows, table.ids, table.used, self.ahead, world.coefficients, self._places,
@@ -163,7 +167,7 @@ class HeapStepper:
             )  # fmt: skip
             if used >= 0:
                 break
-            table.make_room(len(table.rows))
+            table.make_room(len(table.rows) // 4)
         table.used = used
         if waiting:
             self._look_at_general(context, self._places[self._general[:waiting]], self._margins[self._general[:waiting]])
@@ -195,8 +199,8 @@ class HeapStepper:
             context.contact_int, found, self.order, table.rows, table.ids, table.used,
         )  # fmt: skip
 
-    def _fill(self) -> int:
-        """Make patches, colours and records; returns the number of batches."""
+    def _fill(self, h: float) -> int:
+        """Make patches, colours and records for sub-steps of h s; returns the number of batches."""
         bodies, table, width = self.bodies, self.table, self.lanes.width
         count = list_patches(bodies, table.pairs, table.rows, self._patches)
         if count < 0:
@@ -208,11 +212,13 @@ class HeapStepper:
             self._begins = np.zeros(1 - 2 * colours, np.int64)
             number, colours = colour_patches(width, bodies, table.pairs, self._patches, count, self._begins)
         if number > len(self._batches.points):
-            room = 2 * number
+            room = number + number // 4
             record = aligned((FIELDS * room * width + ROW - 1) // ROW)
-            first, second, patch = np.zeros((3, room * width), np.int64)
-            self._batches = Batches(record, first, second, patch, np.zeros(room, np.int64))
-        fill_batches(width, bodies, table.pairs, self._patches, count, table.rows, self._batches, number)
+            first, second = np.zeros((2, room * width), np.int64)
+            self._batches = Batches(record, first, second, np.zeros(POINTS * room * width, np.int64), np.zeros(room, np.int64))
+        place_patches(width, bodies, table.pairs, self._patches, count, self._batches, number)
+        place_bodies(bodies, self._places_of_bodies)
+        fill(self.lanes, self._batches, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
         return number
 
     def step(self, context, time: float, end: float) -> Outcome:
@@ -225,7 +231,7 @@ class HeapStepper:
         work, done = 0.0, 0
         for part in range(self._parts):
             if part:
-                self._look(context)
+                self._look(context, KEPT)
             some = (part + 1) * sub_steps // self._parts - done
             work += self._advance(some, h)
             done += some
@@ -241,15 +247,17 @@ class HeapStepper:
     def _advance(self, sub_steps: int, h: float) -> float:
         """Sub-steps of h s with the contacts as they are known; returns the work of moving supports, J."""
         bodies, table, width = self.bodies, self.table, self.lanes.width
-        number = self._fill()
+        number = self._fill(h)
         lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
-        strength = float(self.world.steady_strength[self.members].max())
-        balls, rebounds, supports = special_patches(
-            width, bodies, table.pairs, self._patches, self._count, table.rows, self._batches, strength, lists, target
-        )
+        balls = rebounds = supports = 0
+        if self._special:
+            strength = float(self.world.steady_strength[self.members].max())
+            balls, rebounds, supports = special_patches(
+                width, bodies, table.pairs, self._patches, self._count, table.rows, self._batches, strength, lists, target
+            )
         work = advance(
             self.lanes, bodies, table.pairs, self._patches, self._batches, number, table.rows, lists, balls, rebounds, supports, target,
-            sub_steps, h, softness(h),
+            sub_steps, h,
         )  # fmt: skip
-        keep_impulses(width, self._patches, table.rows, self._batches, number)
+        keep_impulses(self.lanes, self._batches, number, table.lines)
         return work

@@ -6,6 +6,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.heap_rows import ROW_SIZE, HeapPairs
+from rigidimpulse.constrain.lanes import ROW, aligned
 
 FIRST_ROWS = 1024
 
@@ -39,7 +40,7 @@ def _carry_over(old, new):
 @jit
 def _pack(pairs, rows, ids, new_rows, new_ids):
     """Put the rows of all pairs one after the other; returns their number."""
-    used = 0
+    used = 1
     for p in range(pairs.first.shape[0]):
         count = pairs.count[p]
         for c in range(count):
@@ -50,20 +51,27 @@ def _pack(pairs, rows, ids, new_rows, new_ids):
     return used
 
 
+def _make_pool(number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lines, the same as rows, and ids of a pool of so many rows."""
+    lines = aligned(number * ROW_SIZE // ROW)
+    return lines, lines.reshape(number, ROW_SIZE), np.zeros((number, 3), np.int64)
+
+
 class HeapTable:
     """Pairs and their rows in a pool.
 
     Attributes:
         pairs: ascending by first, then second.
-        rows: (P, ROW_SIZE) and ids: (P, 3) kind and features of each. used: rows in use.
+        lines: (8 m,) the pool as lines of 8, and rows: (P, ROW_SIZE), the same memory. ids: (P, 3) kind and features of each row.
+        used: rows in use; the first is none.
 
     """
 
     def __init__(self) -> None:
         """Nothing."""
         self.pairs = empty_pairs(0)
-        self.rows, self.ids = np.zeros((FIRST_ROWS, ROW_SIZE)), np.zeros((FIRST_ROWS, 3), np.int64)
-        self.used = 0
+        self.lines, self.rows, self.ids = _make_pool(FIRST_ROWS)
+        self.used = 1
 
     def replace(self, first: np.ndarray, second: np.ndarray) -> None:
         """Let these (ascending) be the pairs; known ones keep what they have."""
@@ -77,7 +85,7 @@ class HeapTable:
         if self.used + needed <= len(self.rows):
             return
         total = int(self.pairs.count.sum())
-        capacity = max(len(self.rows), 2 * (total + needed))
-        rows, ids = np.zeros((capacity, ROW_SIZE)), np.zeros((capacity, 3), np.int64)
+        capacity = max(len(self.rows), 1 + total + 2 * needed)
+        lines, rows, ids = _make_pool(capacity)
         self.used = _pack(self.pairs, self.rows, self.ids, rows, ids)
-        self.rows, self.ids = rows, ids
+        self.lines, self.rows, self.ids = lines, rows, ids
