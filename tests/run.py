@@ -1,7 +1,7 @@
 """The test suite, from a clone and Python alone: `python tests/run.py [arguments of pytest]`.
 
-Makes the environment `.venv` in the clone on the first run, and returns pytest's exit code. Two processes, each with whole files; `-n 0` for
-one. Standard library only.
+Makes the environment `.venv` in the clone on the first run, and returns pytest's exit code. Two processes, each with whole files; `-n 0`
+for one. Standard library only.
 """
 
 import subprocess
