@@ -192,11 +192,11 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
     joints = [effect for effect in scene.effects if isinstance(effect, Joint) and "joints" not in left_out]
     dynamic = np.array([body.motion == "dynamic" for body in bodies], bool)
     moving = np.array([body.motion == "kinematic" and _is_driven(body) for body in bodies], bool)
-    offset, turn, position, principal = _start(bodies, masses)
+    start = _start(bodies, masses)
     shapes, shape_of_body = _compile_shapes(bodies, masses)
     geometry = build_geometry(shapes)
     size, radius = _extents(geometry, shape_of_body)
-    low, high = _world_boxes(geometry, shape_of_body, position, principal)
+    low, high = _world_boxes(geometry, shape_of_body, start["position"], start["orientation"])
     material_of_body, coefficients, rolling = _materials(bodies)
     mass = np.array([m.mass for m in masses], float)
     inv_mass = np.where(dynamic, 1.0 / mass, 0.0)
@@ -214,12 +214,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         mass=mass,
         inv_mass=inv_mass,
         inertia=np.where(dynamic[:, None], np.array([m.moments for m in masses], float).reshape(-1, 3), 1.0),
-        offset=offset,
-        turn=turn,
-        position=position,
-        orientation=principal,
-        velocity=np.array([body.velocity for body in bodies], float).reshape(-1, 3),
-        angular_velocity=np.array([body.angular_velocity for body in bodies], float).reshape(-1, 3),
+        **start,
         gravity=gravity,
         push=push,
         steady_acceleration=gravity + push,
@@ -246,13 +241,19 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
     return world
 
 
-def _start(bodies: list[Body], masses: list[BodyMass]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Centres of mass and principal axes in the body frames, and where these are in the world at the start; see `World`."""
+def _start(bodies: list[Body], masses: list[BodyMass]) -> dict[str, np.ndarray]:
+    """Centres of mass and principal axes in the body frames, where these are and how they move at the start; see `World`."""
     offset = np.array([m.center_of_mass for m in masses], float).reshape(-1, 3)
     turn = np.array([from_matrix(m.axes) for m in masses], float).reshape(-1, 4)
     origin = np.array([body.position for body in bodies], float).reshape(-1, 3)
     orientation = np.array([body.unit_orientation() for body in bodies], float).reshape(-1, 4)
-    return offset, turn, origin + rotate(orientation, offset), multiply(orientation, turn)
+    return {
+        "offset": offset, "turn": turn,
+        "position": origin + rotate(orientation, offset),
+        "orientation": multiply(orientation, turn),
+        "velocity": np.array([body.velocity for body in bodies], float).reshape(-1, 3),
+        "angular_velocity": np.array([body.angular_velocity for body in bodies], float).reshape(-1, 3),
+    }  # fmt: skip
 
 
 def _refuse_fixed_steps(accuracy: Accuracy) -> None:

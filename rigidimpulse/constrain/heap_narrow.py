@@ -262,8 +262,7 @@ def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, places, ma
     scratch, work, simplex, origin = make_scratch(), np.empty((3, 3)), make_simplex(), np.zeros(3)
     position, rotation, velocity, shape = bodies.position, bodies.rotation, bodies.velocity, bodies.shape
     old, old_ids = np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64)
-    between, c = np.empty(3), np.empty((3, 3))
-    waiting = 0
+    between, c, waiting = np.empty(3), np.empty((3, 3)), 0
     for k in range(number):
         p, margin = places[k], margins[k]
         if pairs.kind[p] == GENERAL:

@@ -17,22 +17,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from time import perf_counter, process_time
+from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
 from rigidimpulse.errors import SceneError
 from rigidimpulse.files import write_renamed
 from rigidimpulse.gallery.record import GalleryScene
-from rigidimpulse.plan import STAGES
-from rigidimpulse.recording import Recording
 from rigidimpulse.scene import Scene
-from rigidimpulse.simulation import frame_times, simulate
+from rigidimpulse.simulation import frame_times
+from rigidimpulse.studies.desk import Desk, TimeUp, peer_setting
 from rigidimpulse.studies.fingerprint import fingerprint
 from rigidimpulse.studies.kept import KeptRows, kept_reference
-from rigidimpulse.studies.measures import Errors, Truth, measure, penetration
-from rigidimpulse.studies.peers import run_peer
-from rigidimpulse.studies.reference import NONE, Reference, converged_reference, exact_reference
+from rigidimpulse.studies.reference import Reference, converged_reference, exact_reference
 from rigidimpulse.studies.row import ERRORS, Row
 from rigidimpulse.studies.settings import Setting, grid
 from rigidimpulse.world import World, compile_scene
@@ -41,13 +39,9 @@ BUDGET, FULL_BUDGET = 60.0, 3600.0
 """s, of a study and of one of all settings."""
 REFERENCE_SHARE = 0.3
 """Of the budget, for the reference."""
-RUN_SHARE, PATIENCE = 0.1, 4.0
-"""Of the budget, and of the time of the dearest preset, that one run may take."""
 DURATION, FPS = 4.0, 60.0
 FIRST = 5
 """Impacts of the beginning."""
-SHORT, REPEATS = 0.3, 3
-"""Runs shorter than this, in s, are repeated; the median counts."""
 PEER_STEPS = (1, 2, 4, 8, 16, 64, 256)
 """Steps a frame of other engines."""
 
@@ -140,52 +134,80 @@ def study(
 
     """
     start = perf_counter()
-    entry = _entry(scene)
-    made = entry.scene() if entry is not None else scene
-    assert isinstance(made, Scene)
-    length = duration if duration is not None else entry.duration if entry is not None else DURATION
-    fps = fps if fps is not None else entry.fps if entry is not None else FPS
-    times = frame_times(length, fps)
-    if len(times) < 2:
-        raise SceneError(f"duration = {length!r}", "a study needs at least two frames")
+    topic = _topic(scene, duration, fps, name)
     tell = progress or (lambda what, share: None)
-    world = compile_scene(made)
+    world = compile_scene(topic.scene)
     tell("reference", 0.0)
-    mark = fingerprint(made, length, fps, first)
+    mark = fingerprint(topic.scene, topic.duration, topic.fps, first)
+    folder = None if output is None else Path(output)
     reference = kept_reference(
-        None if output is None else Path(output) / "reference.npz", mark,
-        lambda: make_reference(made, entry, world, length, fps, REFERENCE_SHARE * budget, lambda what: tell(what, 0.0)),
+        None if folder is None else folder / "reference.npz", mark,
+        lambda: make_reference(topic, world, REFERENCE_SHARE * budget, lambda what: tell(what, 0.0)),
     )  # fmt: skip
-    out = Study(name or (entry.name if entry is not None else "scene"), length, reference)
-    desk = _Desk(world, made, reference, length, fps, first, start, budget)
-    kept = KeptRows(None if output is None else Path(output) / "study.csv", mark)
+    out = Study(topic.name, topic.duration, reference)
+    desk = Desk(world, topic.scene, reference, topic.duration, topic.fps, first, start, budget)
     jobs: list[tuple[Setting, Callable[[], Row]]] = [(each, lambda each=each: desk.run(each)) for each in settings or grid(full)]
     for peer in peers:
-        jobs += [(_peer_setting(peer, k, fps), lambda peer=peer, k=k: desk.run_peer(peer, k)) for k in PEER_STEPS]
-    costs: dict[str, list[tuple[float, float]]] = {}
-    for setting, job in _in_turn(jobs):
-        spent = perf_counter() - start
-        row = kept.get(setting.name)
-        if row is None and spent + _expected(costs.get(setting.family, []), setting.knob) > budget:
-            out.left.append(setting.name)
-            continue
-        if row is None:
-            tell(setting.name, min(spent / budget, 1.0))
-            begin = perf_counter()
-            try:
-                row = job()
-            except _TimeUp:
-                out.left.append(setting.name)
-                continue
-            costs.setdefault(setting.family, []).append((setting.knob, perf_counter() - begin))
-            kept.add(row)
-        out.rows.append(row)
-    if output is not None:
+        jobs += [(peer_setting(peer, k, topic.fps), lambda peer=peer, k=k: desk.run_peer(peer, k)) for k in PEER_STEPS]
+    kept = KeptRows(None if folder is None else folder / "study.csv", mark)
+    _run_jobs(out, _in_turn(jobs), kept, lambda: perf_counter() - start, budget, tell)
+    if folder is not None:
         from rigidimpulse.studies.charts import write_html, write_png
 
-        write_renamed(Path(output) / "study.png", partial(write_png, out))
-        write_renamed(Path(output) / "study.html", partial(write_html, out))
+        write_renamed(folder / "study.png", partial(write_png, out))
+        write_renamed(folder / "study.html", partial(write_html, out))
     return out
+
+
+class _Topic(NamedTuple):
+    """What is studied: name, scene, its gallery record if it has one, duration in s, frames per second."""
+
+    name: str
+    scene: Scene
+    entry: GalleryScene | None
+    duration: float
+    fps: float
+
+
+def _topic(scene: Scene | str, duration: float | None, fps: float | None, name: str | None) -> _Topic:
+    """Find a scene, and what is not said of it."""
+    entry = None
+    if isinstance(scene, str):
+        from rigidimpulse import gallery
+
+        entry = gallery.load(scene)
+        scene = entry.scene()
+    elif not isinstance(scene, Scene):
+        raise SceneError(f"scene is a {type(scene).__name__}", "give a Scene, or the name of one in the gallery")
+    length = duration if duration is not None else entry.duration if entry is not None else DURATION
+    rate = fps if fps is not None else entry.fps if entry is not None else FPS
+    if len(frame_times(length, rate)) < 2:
+        raise SceneError(f"duration = {length!r}", "a study needs at least two frames")
+    return _Topic(name or (entry.name if entry is not None else "scene"), scene, entry, length, rate)
+
+
+def _run_jobs(
+    out: Study, jobs: list[tuple[Setting, Callable[[], Row]]], kept: KeptRows, spent: Callable[[], float], budget: float,
+    tell: Callable[[str, float], None],
+) -> None:
+    """Add the rows that are kept, or that the budget has time for; spent: s until now."""
+    costs: dict[str, list[tuple[float, float]]] = {}
+    for setting, job in jobs:
+        row = kept.get(setting.name)
+        if row is None:
+            begin = spent()
+            if begin + _expected(costs.get(setting.family, []), setting.knob) > budget:
+                out.left.append(setting.name)
+                continue
+            tell(setting.name, min(begin / budget, 1.0))
+            try:
+                row = job()
+            except TimeUp:
+                out.left.append(setting.name)
+                continue
+            costs.setdefault(setting.family, []).append((setting.knob, spent() - begin))
+            kept.add(row)
+        out.rows.append(row)
 
 
 def _in_turn(jobs: list[tuple[Setting, Callable[[], Row]]]) -> list[tuple[Setting, Callable[[], Row]]]:
@@ -198,128 +220,13 @@ def _in_turn(jobs: list[tuple[Setting, Callable[[], Row]]]) -> list[tuple[Settin
     return [jobs[k] for k in sorted(range(len(jobs)), key=lambda k: places[k])]
 
 
-def make_reference(
-    scene: Scene, entry: GalleryScene | None, world: World, duration: float, fps: float, budget: float, tell: Callable[[str], None]
-) -> Reference:
+def make_reference(topic: _Topic, world: World, budget: float, tell: Callable[[str], None]) -> Reference:
     """The closed form of a gallery scene, else self-convergence."""
-    if entry is not None and entry.exact is not None:
-        return exact_reference(entry, world, frame_times(duration, fps))
-    return converged_reference(scene, world, duration, fps, budget, tell)
-
-
-def _entry(scene: Scene | str) -> GalleryScene | None:
-    if isinstance(scene, str):
-        from rigidimpulse import gallery
-
-        return gallery.load(scene)
-    return None
+    if topic.entry is not None and topic.entry.exact is not None:
+        return exact_reference(topic.entry, world, frame_times(topic.duration, topic.fps))
+    return converged_reference(topic.scene, world, topic.duration, topic.fps, budget, tell)
 
 
 def _expected(known: list[tuple[float, float]], knob: float) -> float:
     """Time that a member of a family may take, s: in proportion to the steps, by the last that was run."""
     return known[-1][1] * max(known[-1][0] / knob, 1.0) if known and known[-1][0] > 1e-4 else sum(spent for _, spent in known[-1:])
-
-
-def _peer_setting(peer: str, steps: int, fps: float) -> Setting:
-    from rigidimpulse.accuracy import Accuracy
-
-    return Setting(f"{peer}, step 1/{round(fps * steps)}", peer, 1.0 / (fps * steps), Accuracy())
-
-
-class _TimeUp(Exception):
-    """A run takes longer than the budget has left."""
-
-
-class _Desk:
-    """Runs settings of one scene and measures them; a run that takes too long is given up.
-
-    Too long is a share of the budget, or some times what the dearest preset took, if that is more; and never beyond the budget.
-    """
-
-    def __init__(
-        self, world: World, scene: Scene, reference: Reference, duration: float, fps: float, first: int, start: float, budget: float
-    ) -> None:
-        self.deadline, self.patience, self.usual = start + budget, RUN_SHARE * budget, 0.0
-        self.world, self.scene, self.reference = world, scene, reference
-        self.duration, self.fps = duration, fps
-        self._first: dict[str, str] = {}
-        truth = reference.truth
-        met = truth.impacts if truth is not None else None
-        self.until = reference.until
-        # The beginning ends half-way between impact k and the next.
-        self.beginning = self.until
-        if met is not None and len(met) > first:
-            self.beginning = min(self.until, 0.5 * float(met[first - 1] + met[first]))
-
-    def run(self, setting: Setting) -> Row:
-        """Run a setting; several times if that is short."""
-        try:
-            runs = [self._simulate(setting)]
-            if _preparing(runs[0][1]) > 0.0:
-                runs = [self._simulate(setting)]
-            if runs[0][0] < SHORT:
-                runs += [self._simulate(setting) for _ in range(REPEATS - 1)]
-        except SceneError as error:
-            return _refused(setting, f"refused: {error}")
-        cost, median = sorted(runs, key=lambda made: made[0])[len(runs) // 2]
-        profile = median.profile
-        assert profile is not None
-        status = "ok" if median.status.ok else "; ".join(dict.fromkeys(e.kind for e in median.status.events if e.is_problem))
-        whole, beginning = self._errors(median)
-        return Row(
-            setting.name, setting.family, setting.knob, cost, profile.seconds - profile.preparing, whole, beginning,
-            {stage: profile.stages.get(stage, 0.0) for stage in STAGES}, self._first_of(median, setting.name), status,
-        )  # fmt: skip
-
-    def _first_of(self, run: Recording, name: str) -> str:
-        """Name of the setting that gave the same motion before; empty if this is the first."""
-        first = self._first.setdefault(run.state_hash(), name)
-        return "" if first == name else first
-
-    def _simulate(self, setting: Setting) -> tuple[float, Recording]:
-        """CPU time of the loop, s, and the run."""
-        start, cpu = perf_counter(), process_time()
-        deadline = self.deadline if setting.family == "presets" else min(self.deadline, start + max(self.patience, PATIENCE * self.usual))
-
-        def watch(_: float) -> None:
-            if perf_counter() > deadline:
-                raise _TimeUp
-
-        run = simulate(self.scene, self.duration, self.fps, accuracy=setting.accuracy, progress=watch)
-        if setting.family == "presets":
-            self.usual = max(self.usual, perf_counter() - start)
-        profile = run.profile
-        assert profile is not None
-        loop = sum(profile.stages.get(stage, 0.0) for stage in STAGES)
-        return (process_time() - cpu) * loop / profile.seconds, run
-
-    def run_peer(self, name: str, steps: int) -> Row:
-        """Run another engine with so many steps a frame."""
-        setting = _peer_setting(name, steps, self.fps)
-        try:
-            begin = perf_counter()
-            run, spent = run_peer(name, self.scene, self.duration, self.fps, steps)
-            seconds = perf_counter() - begin
-        except SceneError as error:
-            return _refused(setting, f"refused: {error}")
-        whole, beginning = self._errors(run)
-        return Row(setting.name, setting.family, setting.knob, spent, seconds, whole, beginning)
-
-    def _errors(self, run: Recording) -> tuple[Errors, Errors]:
-        deep = penetration(self.world, run)
-        truth = self.reference.truth
-        if truth is None or self.reference.kind == NONE:
-            nothing = Truth(run.times, np.full_like(run.positions, np.nan), np.full_like(run.orientations, np.nan), None, 0.0, None)
-            both = measure(self.world, run, nothing, float(run.times[-1]), deep)
-            return both, both
-        return measure(self.world, run, truth, self.until, deep), measure(self.world, run, truth, self.beginning, deep)
-
-
-def _preparing(run: Recording) -> float:
-    """Time that loading or compiling kernels took, s: some of it lies in the stages."""
-    assert run.profile is not None
-    return run.profile.preparing
-
-
-def _refused(setting: Setting, why: str) -> Row:
-    return Row(setting.name, setting.family, setting.knob, math.nan, math.nan, status=why.replace("\n", " "))
