@@ -182,7 +182,7 @@ def test_study_of_a_scene_prints_a_table_and_writes_its_files(scene_file, tmp_pa
     assert result.exit_code == 0, result.output
     assert "falling_ball, 0.5 s; reference: self-converged, until 0.5 s" in result.stdout
     assert "standard" in result.stdout and "bisection, step 1/30" in result.stdout
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"study.csv", "study.png", "study.html"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"study.csv", "study.png", "study.html", "reference.npz"}
     table = (tmp_path / "out" / "study.csv").read_text()
     assert call(*arguments).exit_code == 0
     # Gone on with: what was there is there to the last digit.
