@@ -214,7 +214,7 @@ def write_html(study: Any, path: Path) -> None:
         yaxis={"type": "log", "title": TITLES[shown_by[0]] if shown_by else "", "exponentformat": "power"},
         updatemenus=[{"buttons": buttons, "x": 1.0, "xanchor": "right", "y": 1.12}] if buttons else [],
     )  # fmt: skip
-    figure.write_html(path, include_plotlyjs=True, full_html=True, config={"displaylogo": False})
+    figure.write_html(path, include_plotlyjs=True, full_html=True, default_height="96vh", config={"displaylogo": False})
 
 
 def _traces(plotly: Any, study: Any, error: str) -> list[Any]:
