@@ -116,10 +116,10 @@ class World:
         forces = [effect for effect in self.scene.effects if effect.stage == "forces" and effect not in steady]
         classes = dict.fromkeys(type(force) for force in forces if force.kind not in self.left_out)
         tables = [c.compile([force for force in forces if type(force) is c], self) for c in classes]
-        if self.accuracy.response == "penalty" and self.dynamic.any() and self.num_bodies > 1:
-            from rigidimpulse.respond.penalty import PenaltyForces
+        if self.accuracy.response == "penalty":
+            from rigidimpulse.respond.penalty import penalty_tables
 
-            tables.append(PenaltyForces(self))
+            tables += penalty_tables(self)
         if tables:
             from rigidimpulse.forces.force import check_names
 

@@ -120,6 +120,13 @@ def push(real, integer, count, asked, bodies, stiffness, damping, ratio, frictio
             out[b, 3 + k] += r[1, m] * f[p] - r[1, p] * f[m]
 
 
+def penalty_tables(world) -> list[PenaltyForces]:
+    """The springs of a compiled scene: none where no two bodies can touch."""
+    a, b = np.triu_indices(world.num_bodies, 1)
+    touch = (world.dynamic[a] | world.dynamic[b]) & ~world.is_apart(a, b)
+    return [PenaltyForces(world, np.stack([a[touch], b[touch]], axis=1))] if touch.any() else []
+
+
 class PenaltyForces(ForceTable):
     """Springs between all bodies that may touch: a row for each dynamic body.
 
@@ -131,8 +138,8 @@ class PenaltyForces(ForceTable):
     kind = "penalty forces"
     switches = True
 
-    def __init__(self, world) -> None:
-        """Springs of a compiled scene whose response is "penalty"."""
+    def __init__(self, world, pairs: np.ndarray) -> None:
+        """Springs between pairs (p, 2), one at least, of bodies of a compiled scene whose response is "penalty"."""
         dynamic = np.flatnonzero(world.dynamic)
         self.names, self.body, self.cause = ["penalty"], dynamic, np.zeros(len(dynamic), np.int64)
         self.links = np.array([(dynamic[0], i) for i in dynamic[1:]], np.int64).reshape(-1, 2)
@@ -140,9 +147,7 @@ class PenaltyForces(ForceTable):
         self._world, self._carried = world, np.flatnonzero(~world.dynamic)
         self._geometry = solid_geometry(world.shapes) if world.cylinders is not None else world.geometry
         self._axes = inward_axes(self._geometry)
-        a, b = np.triu_indices(world.num_bodies, 1)
-        touch = (world.dynamic[a] | world.dynamic[b]) & ~world.is_apart(a, b)
-        self._pairs = np.stack([a[touch], b[touch]], axis=1)
+        self._pairs = pairs
         self.stiffness = _stiffness(world, self._pairs)
         given = world.accuracy.penalty_damping
         self._damping = -1.0 if given is None else float(given)

@@ -230,3 +230,14 @@ def test_integrators_are_refused_where_they_do_not_act() -> None:
         ri.simulate(scene, 0.1, accuracy=ri.Accuracy(integrator="runge_kutta"))
     with pytest.raises(ri.SceneError, match="penalty_stiffness"):
         penalty(penalty_stiffness=-1.0)
+
+
+def test_bodies_that_cannot_touch_have_no_springs():
+    # Two links of a chain that hangs from the world: joints leave out the contact of what they join.
+    scene = ri.Scene(gravity=(0, 0, -9.81))
+    for k in range(2):
+        scene.add(ri.Body(f"link {k}", ri.Shape.box((0.4, 0.1, 0.1)), position=(0.2 + 0.4 * k, 0, 0)))
+    scene.add(ri.HingeJoint(None, "link 0", (0, 0, 0), (0, 1, 0)))
+    scene.add(ri.HingeJoint("link 0", "link 1", (0.4, 0, 0), (0, 1, 0)))
+    pushed, hit = (ri.simulate(scene, 0.5, accuracy=ri.Accuracy(response=response)) for response in ("penalty", "sequential"))
+    assert np.array_equal(pushed.positions, hit.positions)
