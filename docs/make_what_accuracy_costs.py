@@ -122,14 +122,18 @@ def section(name: str, study: Study) -> str:
     lines += ["| setting | cost, s | place, m | energy | impact times, s | overlap, m |", "|---|---|---|---|---|---|"]
     for row in rows:
         whole = row.whole
-        numbers = [figure(value) for value in (row.cost, whole.position, whole.energy, whole.impact_time, whole.penetration)]
+        least = study.reference.uncertainty
+        place = figure(whole.position) if whole.position >= least else f"< {figure(least)}"
+        numbers = [figure(row.cost), place, *(figure(value) for value in (whole.energy, whole.impact_time, whole.penetration))]
         lines.append(f"| {row.name} | {' | '.join(numbers)} |")
     found = study.advantage()
     for peer in PEERS:
         ratios = [ratio for row, _, ratio in found if row.family == peer]
+        faster = sum(row.family == peer and row.ran for row in study.rows) - len(ratios)
         if ratios:
-            span = f"{figure(min(ratios))} to {figure(max(ratios))}"
-            lines += ["", f"At equal time {span} times more accurate than {peer}, whatever its step."]
+            lines += ["", f"At equal time {figure(min(ratios))} to {figure(max(ratios))} times as accurate as {peer}, whatever its step."]
+        if faster:
+            lines += ["", f"{peer} is faster than any run here with {faster} of its steps."]
     if study.left:
         lines += ["", f"The budget had no time for {len(study.left)} settings."]
     return "\n".join([*lines, "", f"![{name}](accuracy_costs/{name}.png)", ""])

@@ -77,14 +77,14 @@ class Study:
         return out
 
     def advantage(self, error: str = "position") -> list[tuple[Row, Row, float]]:
-        """Each row of another engine, the best own row that took no longer (the fastest one if none did), and the ratio of their errors."""
+        """Rows of other engines, the best own row that took no longer, and the ratio of their errors; but for those faster than all own."""
         out, front = [], self.front(error)
         floor = max(self.reference.uncertainty if error == "position" else 0.0, float(np.finfo(float).tiny))
         for row in self.rows:
             theirs = getattr(row.whole, error)
-            if row.is_peer and row.ran and front and not math.isnan(theirs):
-                ours = ([own for own in front if own.cost <= row.cost] or front[:1])[-1]
-                out.append((row, ours, theirs / max(getattr(ours.whole, error), floor)))
+            ours = [own for own in front if own.cost <= row.cost]
+            if row.is_peer and row.ran and ours and not math.isnan(theirs):
+                out.append((row, ours[-1], theirs / max(getattr(ours[-1].whole, error), floor)))
         return out
 
     def table(self) -> str:
