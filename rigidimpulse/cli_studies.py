@@ -71,7 +71,7 @@ def _study_scene(scene: str, output: str | None, budget: float | None, full: boo
     """Print the table of a study and write its files."""
     from tqdm import tqdm
 
-    from rigidimpulse.studies.work_precision import BUDGET, FULL_BUDGET
+    from rigidimpulse.studies.work_precision import BUDGET, FULL_BUDGET, charts_are_installed
     from rigidimpulse.studies.work_precision import study as run_study
 
     job = find_job(scene)
@@ -91,7 +91,11 @@ def _study_scene(scene: str, output: str | None, budget: float | None, full: boo
     click.echo(result.table())
     if result.left:
         click.echo(f"no time for {len(result.left)} settings: {', '.join(result.left)}; raise --budget, and the study goes on")
-    for name in ("study.csv", "study.png", "study.html"):
+    click.echo(f"wrote {folder / 'study.csv'}")
+    if not charts_are_installed():
+        click.echo("charts need matplotlib and plotly: pip install 'rigidimpulse[study]', and run this again")
+        return
+    for name in ("study.png", "study.html"):
         click.echo(f"wrote {folder / name}")
 
 

@@ -108,9 +108,9 @@ class Recording:
     def horizon(self) -> dict[str, float]:
         """Time by body until which the run can be trusted, s: it is one of many plausible ones beyond.
 
-        Until then two runs whose settings bracket those of this run (a step and a tolerance twice as large, and half as large), started off
-        by rounding, agree with it: to the wished tolerance, where accuracy was asked for by `Within`, else to a thousandth of the body's
-        size. Dynamic bodies only; the end of the run where all agree. The two runs are made when this is first asked for.
+        Until then two runs whose settings bracket those of this run (steps larger and smaller by sqrt(2), tolerances by 10), started off by
+        rounding, agree with each other: to the wished tolerance, where accuracy was asked for by `Within`, else to a thousandth of the
+        body's size. Dynamic bodies only; the last frame's time where they always agree. The two runs are made when this is first asked for.
 
         Raises:
             SceneError: for a recording that was loaded from a file.

@@ -14,7 +14,7 @@ from rigidimpulse.scene import Scene
 from rigidimpulse.simulation import simulate
 from rigidimpulse.studies.measures import Errors, Truth, measure, penetration
 from rigidimpulse.studies.peers import run_peer
-from rigidimpulse.studies.reference import NONE, Reference
+from rigidimpulse.studies.reference import Reference
 from rigidimpulse.studies.row import Row
 from rigidimpulse.studies.settings import Setting
 from rigidimpulse.world import World
@@ -114,7 +114,7 @@ class Desk:
     def _errors(self, run: Recording) -> tuple[Errors, Errors]:
         deep = penetration(self.world, run)
         truth = self.reference.truth
-        if truth is None or self.reference.kind == NONE:
+        if truth is None:
             nothing = Truth(run.times, np.full_like(run.positions, np.nan), np.full_like(run.orientations, np.nan), None, 0.0, None)
             both = measure(self.world, run, nothing, float(run.times[-1]), deep)
             return both, both

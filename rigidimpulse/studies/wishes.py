@@ -188,7 +188,7 @@ def _within(run: Callable[..., Recording], scene: Scene, duration: float, wish: 
                 break  # it will do, or it is about as good as rounding lets it be
     best = len(errors) - 1
     if not errors[best].within(wish):
-        best = int(np.argmin([error.position for error in errors[: len(errors)]]))
+        best = int(np.argmin([error.position for error in errors]))
         errors[best] = _estimate(steps[: best + 1], drift(best), runs[best])
     tries = [Try(setting, _seconds(made), error) for setting, made, error in zip(settings, runs, [*errors, UNKNOWN], strict=True)]
     how = "from a run with half the step, and one started off by rounding"

@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
@@ -126,7 +127,8 @@ def study(
         budget: s that the study may take, the reference included; settings that do not fit any more are named in `Study.left`.
         peers: other engines to run beside it, of `peers.PEERS`; they need `pip install 'rigidimpulse[peers]'`.
         first: number of impacts of the beginning that errors are told for as well.
-        output: folder for `study.csv` and the charts `study.png`, `study.html` (extra `study`); a study found there is gone on with.
+        output: folder for `study.csv` and, where the extra `study` is installed, the charts `study.png` and `study.html`; a study found
+            there is gone on with.
         progress: called with what is being run, and the share of the budget that is spent.
 
     Raises:
@@ -151,7 +153,7 @@ def study(
         jobs += [(peer_setting(peer, k, topic.fps), lambda peer=peer, k=k: desk.run_peer(peer, k)) for k in PEER_STEPS]
     kept = KeptRows(None if folder is None else folder / "study.csv", mark)
     _run_jobs(out, _in_turn(jobs), kept, lambda: perf_counter() - start, budget, tell)
-    if folder is not None:
+    if folder is not None and charts_are_installed():
         from rigidimpulse.studies.charts import write_html, write_png
 
         write_renamed(folder / "study.png", partial(write_png, out))
@@ -196,7 +198,7 @@ def _run_jobs(
         row = kept.get(setting.name)
         if row is None:
             begin = spent()
-            if begin + _expected(costs.get(setting.family, []), setting.knob) > budget:
+            if begin + _expected(costs.get(setting.family, []), setting) > budget:
                 out.left.append(setting.name)
                 continue
             tell(setting.name, min(begin / budget, 1.0))
@@ -208,6 +210,11 @@ def _run_jobs(
             costs.setdefault(setting.family, []).append((setting.knob, spent() - begin))
             kept.add(row)
         out.rows.append(row)
+
+
+def charts_are_installed() -> bool:
+    """Whether charts can be drawn: the extra `study`."""
+    return all(find_spec(name) is not None for name in ("matplotlib", "plotly"))
 
 
 def _in_turn(jobs: list[tuple[Setting, Callable[[], Row]]]) -> list[tuple[Setting, Callable[[], Row]]]:
@@ -227,6 +234,9 @@ def make_reference(topic: _Topic, world: World, budget: float, tell: Callable[[s
     return converged_reference(topic.scene, world, topic.duration, topic.fps, budget, tell)
 
 
-def _expected(known: list[tuple[float, float]], knob: float) -> float:
-    """Time that a member of a family may take, s: in proportion to the steps, by the last that was run."""
-    return known[-1][1] * max(known[-1][0] / knob, 1.0) if known and known[-1][0] > 1e-4 else sum(spent for _, spent in known[-1:])
+def _expected(known: list[tuple[float, float]], setting: Setting) -> float:
+    """Time that a member of a family may take, s, by the last (knob, s): in proportion to the steps, whatever the tolerance."""
+    if not known:
+        return 0.0
+    knob, spent = known[-1]
+    return spent if setting.family.endswith("tolerance") else spent * max(knob / setting.knob, 1.0)

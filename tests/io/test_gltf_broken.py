@@ -18,7 +18,8 @@ MOST_SECONDS = 5.0
 
 def test_the_files_are_good_before_they_are_broken(tmp_path: Path) -> None:
     for file in good_files():
-        compile_scene(ri.load_scene(file.save(tmp_path / "good.glb")))
+        scene = ri.load_scene(file.save(tmp_path / "good.glb"))
+        assert compile_scene(scene).num_bodies == len(scene.bodies) > 0
 
 
 @pytest.mark.parametrize("part", range(4))

@@ -211,3 +211,11 @@ def test_study_prints_exponents_of_cost():
     assert len([line for line in result.stdout.splitlines() if line.startswith("exponent of the cost")]) == 2
     result = call("study", "--scaling", "--most", 100)
     assert result.exit_code == BAD_SCENE and "give at least 300" in result.stderr
+
+
+def test_a_study_without_charts_says_what_they_need(scene_file, tmp_path, monkeypatch):
+    monkeypatch.setattr("rigidimpulse.studies.work_precision.find_spec", lambda name: None)
+    result = call("study", scene_file, "--duration", 0.1, "--budget", 5, "-o", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "rigidimpulse[study]" in result.stdout
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"study.csv", "reference.npz"}
