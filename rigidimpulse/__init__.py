@@ -15,6 +15,7 @@ _HOMES = {
     "Accuracy": "accuracy",
     "BallJoint": "constrain.joint",
     "Body": "body",
+    "Cache": "io.cache.keeper",
     "CollisionFilter": "collision_filter",
     "ConstantForce": "forces.constant",
     "Curvature": "forces.energy.path",

@@ -13,6 +13,7 @@ from rigidimpulse.cli_studies import compare, hardcases, study
 from rigidimpulse.jobs import (
     BAD_SCENE,
     CHECK_FAILED,
+    RECORDING_SUFFIXES,
     SCENE_SUFFIXES,
     find_job,
     given_options,
@@ -64,6 +65,7 @@ def run_options(command: Callable) -> Callable:
     """Add the options of commands that simulate."""
     for option in (
         click.option("--view", is_flag=True, help="Open the result in the browser."),
+        click.option("--cache", type=click.Path(), help="Keep the run in this .h5 file while it goes on; go on from there if it is there."),
         click.option("--profile", is_flag=True, help="Print where the time went, by stage and by kernel."),
         click.option("--fps", type=float, help="Frames per second; changes what is recorded, never what happens."),
         click.option("--duration", type=float, help="Time to simulate, s."),
@@ -87,7 +89,7 @@ def export_options(command: Callable) -> Callable:
 @click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html, .npz, .glb or .gltf.")
 @export_options
 @run_options
-def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:
+def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, cache: str | None, **settings: Any) -> None:
     """Run a gallery scene and its checks; without NAME, list the scenes."""
     from rigidimpulse import gallery
 
@@ -101,7 +103,7 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, *
     entry, keys = gallery.load(name), _export_settings(settings)
     job = job_of(entry)._replace(**given_options(settings))
     click.echo(f"{entry.name}: {entry.description}")
-    run = run_job(job, output, profile)
+    run = run_job(job, output, profile, cache)
     passed = True
     if job.duration == entry.duration:
         passed = _print_checks(entry.check(run))
@@ -117,18 +119,18 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, *
 @click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html, .npz, .glb or .gltf.")
 @export_options
 @run_options
-def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:
+def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, cache: str | None, **settings: Any) -> None:
     """Simulate SCENE and write the recording."""
     keys = _export_settings(settings)
     job = find_job(scene)._replace(**given_options(settings))
-    _hand_over(run_job(job, output, profile), output, view, keys)
+    _hand_over(run_job(job, output, profile, cache), output, view, keys)
 
 
 @main.command()
 @click.argument("file", type=click.Path())
-@click.option("--scene", help="SCENE that an .npz recording was made of: it has the motion, the scene has the shapes.")
+@click.option("--scene", help="SCENE that an .npz recording or a cache was made of: it has the motion, the scene has the shapes.")
 def view(file: str, scene: str | None) -> None:
-    """Open FILE, an .html or .npz recording, in the browser."""
+    """Open FILE, an .html or .npz recording or the .h5 cache of a run, in the browser."""
     from rigidimpulse.errors import SceneError
 
     path = Path(file)
@@ -136,10 +138,10 @@ def view(file: str, scene: str | None) -> None:
         raise SceneError(f"there is no file {file!r}", "check the path")
     if path.suffix == ".html":
         click.launch(path.resolve().as_uri())
-    elif path.suffix == ".npz":
+    elif path.suffix in RECORDING_SUFFIXES:
         show(recording_with_shapes(path, scene))
     else:
-        raise SceneError(f"cannot view {path.name!r}", "give a recording, a file that ends in .html or .npz")
+        raise SceneError(f"cannot view {path.name!r}", f"give a recording, a file that ends in .html or {' or '.join(RECORDING_SUFFIXES)}")
 
 
 @main.command()

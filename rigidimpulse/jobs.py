@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 SCENE_SUFFIXES = (".glb", ".gltf")
 OUTPUT_SUFFIXES = (".html", ".npz", ".glb", ".gltf")
+RECORDING_SUFFIXES = (".npz", ".h5", ".hdf5")
 DEFAULT_DURATION = 4.0
 """s, of scenes from files."""
 DEFAULT_FPS = 60.0
@@ -133,8 +134,8 @@ def _scene_function(path: Path) -> Callable[[], Scene]:
     return make
 
 
-def run_job(job: Job, output: Sequence[str], profile: bool = False) -> Recording:
-    """Simulate with a progress bar and print the summary; names of outputs are looked at first."""
+def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str | None = None) -> Recording:
+    """Simulate with a progress bar, kept in a cache if one is named, and print the summary; names of outputs are looked at first."""
     from rigidimpulse.errors import SceneError
 
     for target in output:
@@ -147,6 +148,8 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False) -> Recording
     from rigidimpulse.simulation import simulate as run_scene
 
     scene = job.make()
+    if cache is not None and Path(cache).exists():
+        click.echo(f"going on with what is in {cache}")
     start = perf_counter()
     # disable=None: no bar where the output is no terminal.
     with tqdm(
@@ -157,7 +160,7 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False) -> Recording
         def progress(time: float) -> None:
             bar.update(min(time, job.duration) - bar.n)
 
-        run = run_scene(scene, job.duration, job.fps, accuracy=job.accuracy, progress=progress)
+        run = run_scene(scene, job.duration, job.fps, accuracy=job.accuracy, progress=progress, cache=cache)
     seconds = perf_counter() - start
     num_impacts = len(run.impacts)
     impacts = f"{num_impacts} {'impact' if num_impacts == 1 else 'impacts'}"
@@ -185,7 +188,7 @@ def show(run: Recording | Comparison) -> None:
 
 
 def recording_with_shapes(path: Path, scene: str | None) -> Recording:
-    """Return the recording of an .npz file, with the scene that has its shapes."""
+    """Return the recording of an .npz file or a cache, with the scene that has its shapes."""
     from dataclasses import replace
 
     from rigidimpulse.errors import SceneError
@@ -193,7 +196,7 @@ def recording_with_shapes(path: Path, scene: str | None) -> Recording:
 
     if scene is None:
         remedy = "name its scene, --scene SCENE, or export the run as .html"
-        raise SceneError("an .npz recording has the motion but not the shapes", remedy, f"recording {str(path)!r}")
+        raise SceneError(f"an {path.suffix} recording has the motion but not the shapes", remedy, f"recording {str(path)!r}")
     run = load_recording(path)
     made = find_job(scene).make()
     if list(made.names) != run.names:

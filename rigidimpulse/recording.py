@@ -298,12 +298,16 @@ class Recording:
 
 
 def load_recording(path: str | os.PathLike) -> Recording:
-    """Read a recording written as .npz.
+    """Read a recording written as .npz, or the cache of a run (.h5, see `simulate`), which may still be written: its frames so far.
 
     Raises:
         SceneError: the file is missing or no recording.
 
     """
+    if Path(path).suffix in (".h5", ".hdf5"):
+        from rigidimpulse.io.cache.load import load_cache
+
+        return load_cache(Path(path))
     try:
         with np.load(path, allow_pickle=False) as data:
             return Recording(

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -25,6 +27,7 @@ from rigidimpulse.events.effect import ARRIVED, GO_ON, STEP, EventKernel
 from rigidimpulse.forces.constant import ConstantForces
 from rigidimpulse.forces.gravity import FreeRotation, Gravity, SteadyLoad
 from rigidimpulse.forces.kinds import bind_forces, force_kinds
+from rigidimpulse.frames import own_frames
 from rigidimpulse.integrate.course import FIXED, FREE, PRESCRIBED, begin
 from rigidimpulse.integrate.flight import ExactFlight
 from rigidimpulse.integrate.forced_flight import ForcedFlight, VaryingLoad
@@ -47,12 +50,15 @@ from rigidimpulse.world import World, compile_scene
 if TYPE_CHECKING:
     from rigidimpulse.events.run import EventRun
     from rigidimpulse.forces.force_log import ForceWork
+    from rigidimpulse.io.cache.keeper import Cache
     from rigidimpulse.studies.wishes import Wish
 
 logger = logging.getLogger("rigidimpulse")
 
 # Frames whose product with the number of bodies is refused as a slip of the keyboard (about 1e9 poses, 100 GB).
 MOST_POSES = 1_000_000_000
+# Steps at most between two looks at a run that somebody watches.
+WATCHED = 64
 
 
 def simulate(
@@ -63,6 +69,7 @@ def simulate(
     accuracy: str | Accuracy | Wish = "standard",
     effects: Mapping[str, bool] | None = None,
     progress: Callable[[float], None] | None = None,
+    cache: str | os.PathLike[str] | Cache | None = None,
 ) -> Recording:
     """Simulate a scene and record it. Deterministic: the same scene gives the same bits, at any frame rate.
 
@@ -74,17 +81,21 @@ def simulate(
         effects: effects, by their names in `run.plan.explain()`, that are to be in (True) or out (False) whatever the scene calls for. The
             status says where one is out that the scene calls for.
         progress: called with the simulated time in s after every step, or after many in which nothing but impacts of balls happened.
+        cache: an .h5 file that is written while the run goes on, with a checkpoint every few seconds; see `Cache`. Where the file is there
+            already the run goes on from its last checkpoint, and ends with the same bits; a finished one is read. Needs the extra `cache`.
 
     Returns:
         The recording, with round(duration * fps) + 1 frames; the first is the initial state.
 
     Raises:
         SceneError: the scene cannot be simulated as it is; names the body, the value and the remedy. Or an effect is unknown, cannot be in
-            or cannot be out.
+            or cannot be out. Or the cache is of another scene, of other settings or of another version.
 
     """
     if isinstance(accuracy, str | Accuracy):
-        return _simulate(scene, duration, fps, accuracy, effects, progress)
+        return _simulate(scene, duration, fps, accuracy, effects, progress, cache)
+    if cache is not None:
+        raise SceneError("a cache for an accuracy that is still to be chosen", "choose it first, and give run.choice.accuracy")
     from rigidimpulse.studies.wishes import simulate_as_wished
 
     return simulate_as_wished(scene, duration, fps, accuracy, effects, progress)
@@ -97,6 +108,7 @@ def _simulate(
     accuracy: str | Accuracy,
     effects: Mapping[str, bool] | None,
     progress: Callable[[float], None] | None,
+    cache: str | os.PathLike[str] | Cache | None = None,
 ) -> Recording:
     """See `simulate`."""
     stopwatch = Stopwatch()
@@ -117,22 +129,50 @@ def _simulate(
     recorder.start(context.state.course)
     resolve_overlaps(context)
     bind_triggers(context, plan)
+    running = Running(context, KeyframePaths(world), make_flight(context, plan))
+    settings = RunSettings(float(duration), float(fps), world.accuracy, dict(effects or {}))
+    if cache is None:
+        run_to_end(running, plan, duration, progress)
+        run = finish_run(running, plan, duration)
+    else:
+        from rigidimpulse.io.cache.keeper import Keeper
+
+        with closing(Keeper(cache, settings, running, plan)) as keeper:
+            run_to_end(keeper.running, plan, duration, lambda time: keeper.look(time, progress))
+            keeper.write(float(duration))
+            run = finish_run(keeper.running, plan, duration)
+            keeper.finish(run)
+    return replace(run, profile=stopwatch.read(plan), settings=settings)
+
+
+class Running(NamedTuple):
+    """A run under way: all that it changes, and what keeps its place in the keyframes and in the event kernel."""
+
+    context: StepContext
+    paths: KeyframePaths
+    flight: EventRun | None
+
+
+def run_to_end(running: Running, plan: Plan, duration: float, progress: Callable[[float], None] | None) -> None:
+    """Step to the end; a run that is under way goes on from where it is."""
+    context, paths, flight = running
     # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
-    paths = KeyframePaths(world)
-    flight = make_flight(context, plan)
-    for end in (float(duration), max(float(duration), float(times[-1]))):
+    for end in (float(duration), max(float(duration), float(context.recorder.times[-1]))):
         if plan.steps or context.forces is not None or context.triggers is not None:
             run_steps(context, plan, paths, flight, end, progress)
         else:
             paths.start_segments(context, end)
+
+
+def finish_run(running: Running, plan: Plan, duration: float) -> Recording:
+    """End what is under way at the end, and return the recording."""
+    context = running.context
     finish_sub_steps(context, plan, context.state.time)
     if context.heaps is not None:
         context.heaps.close(context, context.state.time)
         plan.tell(HeapForces.name, context.heaps.summary())
-    recorder.finish(context.state.course)
-    run = make_recording(context, plan, times, duration)
-    settings = RunSettings(float(duration), float(fps), world.accuracy, dict(effects or {}))
-    return replace(run, profile=stopwatch.read(plan), settings=settings)
+    context.recorder.finish(context.state.course)
+    return make_recording(context, plan, context.recorder.times, duration)
 
 
 def prepare_kernels(world: World, plan: Plan) -> None:
@@ -235,6 +275,8 @@ def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, flight: Ev
             context.state.time = min(paths.next_key(begin), end)
             continue
         stop = min(paths.next_key(begin), end)
+        if progress is not None:
+            stop = min(stop, (math.floor(begin / size + 1e-9) + WATCHED) * size)
         how = STEP
         if flight is not None and flight.may_fly():
             how = fly(context, plan, flight, stop)
@@ -306,11 +348,7 @@ def impulses_by_cause(context: StepContext, times: np.ndarray, impacts: np.ndarr
 def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration: float) -> Recording:
     """Body-frame poses, impacts and ledger from what the recorder holds."""
     world, recorder = context.world, context.recorder
-    # Where the body frame is the principal frame there is nothing to turn (0 is added since turning makes 0 of -0).
-    position, orientation = recorder.position.copy(), recorder.orientation + 0.0
-    turned = np.any(world.offset != 0.0, axis=1) | np.any(world.turn != [1.0, 0.0, 0.0, 0.0], axis=1)
-    for i in np.flatnonzero(turned).tolist():
-        position[:, i], orientation[:, i] = world.body_pose(i, recorder.position[:, i], recorder.orientation[:, i])
+    position, orientation = own_frames(recorder.position, recorder.orientation, world.offset, world.turn)
     impacts = context.log.impacts.table()
     close_stretches(context)
     work = None if context.forces is None else context.forces.finish(world, times, recorder)

@@ -16,10 +16,11 @@ from rigidimpulse.constrain.joint_rows import Joints
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.errors import SceneError
 from rigidimpulse.forces.constant import ConstantForce, push_of_forces
+from rigidimpulse.frames import own_pose
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
 from rigidimpulse.mass import BodyMass, body_mass
 from rigidimpulse.material import combine, combine_rolling
-from rigidimpulse.rotation import conjugate, from_matrix, multiply, rotate
+from rigidimpulse.rotation import from_matrix, multiply, rotate
 from rigidimpulse.scene import Scene, validate
 
 if TYPE_CHECKING:
@@ -175,8 +176,7 @@ class World:
 
     def body_pose(self, i: int, position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pose of the body's own origin and axes from principal-frame poses (f, 3), (f, 4)."""
-        turned = multiply(orientation, conjugate(self.turn[i]))
-        return position - rotate(turned, self.offset[i]), turned
+        return own_pose(position, orientation, self.offset[i], self.turn[i])
 
 
 def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out: frozenset[str] = frozenset()) -> World:

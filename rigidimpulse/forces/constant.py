@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
@@ -65,9 +66,14 @@ class ConstantForce:
             points.append(body_point(world, i, point))
         value = np.array(strength)
         names = named(cls.kind, [None] * len(forces), [f"constant force on {f.body}" for f in forces])
-        table = TimedForces(cls.kind, names, body, points, lambda _, rows: value[rows], f"{len(forces)} acting")
+        table = TimedForces(cls.kind, names, body, points, partial(_strength, value), f"{len(forces)} acting")
         table.is_steady = True
         return table
+
+
+def _strength(value: np.ndarray, _time: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """The same at all times, (r, 3) N."""
+    return value[rows]
 
 
 @dataclass(frozen=True)

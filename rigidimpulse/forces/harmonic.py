@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
@@ -61,10 +62,11 @@ class HarmonicForce(Force):
             point = world.position[i] if force.point is None else checked_vector(force.point, "point", "m", where)
             points.append(body_point(world, i, point))
         a, w, phi = np.array(amplitude), np.array(rate), np.array(phase)
-
-        def strength(time: np.ndarray, rows: np.ndarray) -> np.ndarray:
-            return np.sin(w[rows] * time + phi[rows])[:, None] * a[rows]
-
         names = named(cls.kind, [f.name for f in forces], [f"harmonic force on {f.body}" for f in forces])
         longest = PART_OF_PERIOD * 2.0 * np.pi / np.maximum(np.abs(w), TINY)
-        return TimedForces(cls.kind, names, body, points, strength, f"{len(forces)} acting", longest=longest)
+        return TimedForces(cls.kind, names, body, points, partial(_strength, a, w, phi), f"{len(forces)} acting", longest=longest)
+
+
+def _strength(a: np.ndarray, w: np.ndarray, phi: np.ndarray, time: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """a sin(w t + phi) of rows, (r, 3) N."""
+    return np.sin(w[rows] * time + phi[rows])[:, None] * a[rows]

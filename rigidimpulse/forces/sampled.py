@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
@@ -54,13 +55,9 @@ class SampledForce(Force):
             tables.append(_table(force.times, force.forces, where))
             point = world.position[i] if force.point is None else checked_vector(force.point, "point", "m", where)
             points.append(body_point(world, i, point))
-
-        def strength(time: np.ndarray, rows: np.ndarray) -> np.ndarray:
-            return np.array([_at(tables[r], t) for t, r in zip(time.tolist(), rows.tolist(), strict=True)]).reshape(-1, 3)
-
         names = named(cls.kind, [f.name for f in forces], [f"sampled force on {f.body}" for f in forces])
         breaks = np.unique(np.concatenate([t for t, _ in tables]))
-        return TimedForces(cls.kind, names, body, points, strength, f"{len(forces)} acting", breaks)
+        return TimedForces(cls.kind, names, body, points, partial(_strength, tables), f"{len(forces)} acting", breaks)
 
 
 def _table(times: ArrayLike, forces: ArrayLike, where: str) -> tuple[np.ndarray, np.ndarray]:
@@ -75,6 +72,11 @@ def _table(times: ArrayLike, forces: ArrayLike, where: str) -> tuple[np.ndarray,
     if np.any(np.diff(t) <= 0.0):
         raise SceneError("times do not increase", "sort the samples; give two samples of a jump times that differ", where)
     return t, f
+
+
+def _strength(tables: list[tuple[np.ndarray, np.ndarray]], time: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Forces of rows, (r, 3) N."""
+    return np.array([_at(tables[r], t) for t, r in zip(time.tolist(), rows.tolist(), strict=True)]).reshape(-1, 3)
 
 
 def _at(table: tuple[np.ndarray, np.ndarray], t: float) -> np.ndarray:

@@ -67,13 +67,17 @@ class ImpactRows:
 
     def table(self) -> np.ndarray:
         """All impacts in order of time, `IMPACT_DTYPE`."""
-        rows, column = self.rows[: self.count], 0
-        table = np.empty(self.count, IMPACT_DTYPE)
-        for name in IMPACT_DTYPE.names or ():
-            width = IMPACT_DTYPE[name].itemsize // 8
-            table[name] = rows[:, column : column + width].reshape(table[name].shape)
-            column += width
-        return table
+        return impact_table(self.rows[: self.count])
+
+
+def impact_table(rows: np.ndarray) -> np.ndarray:
+    """Rows (k, ROW_LENGTH) as `IMPACT_DTYPE`."""
+    table, column = np.empty(len(rows), IMPACT_DTYPE), 0
+    for name in IMPACT_DTYPE.names or ():
+        width = IMPACT_DTYPE[name].itemsize // 8
+        table[name] = rows[:, column : column + width].reshape(table[name].shape)
+        column += width
+    return table
 
 
 @dataclass(frozen=True)

@@ -25,11 +25,11 @@ import numpy as np
 
 from rigidimpulse.errors import SceneError
 from rigidimpulse.files import write_renamed
+from rigidimpulse.fingerprint import fingerprint
 from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.scene import Scene
 from rigidimpulse.simulation import frame_times
 from rigidimpulse.studies.desk import Desk, TimeUp, peer_setting
-from rigidimpulse.studies.fingerprint import fingerprint
 from rigidimpulse.studies.kept import KeptRows, kept_reference
 from rigidimpulse.studies.reference import Reference, converged_reference, exact_reference
 from rigidimpulse.studies.row import ERRORS, Row

@@ -1,0 +1,45 @@
+"""Recordings from caches, finished or not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from rigidimpulse.flexible.track import tracks_in
+from rigidimpulse.frames import own_frames
+from rigidimpulse.io.cache.file import Content, Header, read
+from rigidimpulse.observe.contacts import CONTACT_DTYPE
+from rigidimpulse.observe.events import impact_table
+from rigidimpulse.recording import Recording, Status
+
+
+def load_cache(path: Path) -> Recording:
+    """Return what a cache holds: all frames of a finished run, those until the last checkpoint of another.
+
+    Raises:
+        SceneError: no such file, or no cache.
+
+    """
+    header, content = read(path)
+    frames = content.frames
+    position, orientation = own_frames(frames["position"], frames["orientation"], header.offset, header.turn)
+    impacts = impact_table(content.impacts)
+    return Recording(
+        times=header.times[: len(position)],
+        names=header.names,
+        positions=position,
+        orientations=orientation,
+        velocities=frames["velocity"],
+        angular_velocities=frames["angular_velocity"],
+        centers=frames["position"],
+        impacts=impacts[impacts["time"] <= header.duration],
+        contacts=content.tables.get("contacts", np.zeros(0, CONTACT_DTYPE)),
+        status=Status(True, "loaded") if content.complete else _unfinished(header, content),
+        nets=tracks_in(content.tables) if "net0_name" in content.tables else [],
+    )
+
+
+def _unfinished(header: Header, content: Content) -> Status:
+    so_far = f"{content.time:.6g} s of {header.duration:g} s: the run was stopped, or still goes on"
+    return Status(False, f"{so_far}; simulate the scene with this cache again to go on from there")

@@ -1,0 +1,231 @@
+"""Caches: a run that is stopped at any moment goes on from its last checkpoint and ends with the very bits of one that was not."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from kept_runs import SCENES, gas, heap, run
+
+import rigidimpulse as ri
+from rigidimpulse import gallery
+from rigidimpulse.cli import BAD_SCENE, main
+from rigidimpulse.io.cache import keeper
+
+h5py = pytest.importorskip("h5py")
+DURATIONS = {"heap": 0.5, "gas": 40.0, "forces": 0.4}
+
+
+class Stopped(Exception):
+    """Raised in the middle of a run."""
+
+
+def stop_after(time):
+    """Return a `progress` that raises once the run has come so far."""
+
+    def progress(now):
+        if now >= time:
+            raise Stopped
+
+    return progress
+
+
+def same(a, b):
+    """Assert that two runs agree in every bit, ledgers and reports included."""
+    assert a.state_hash() == b.state_hash()
+    np.testing.assert_array_equal(a.ledger.kinetic, b.ledger.kinetic)
+    assert a.ledger.dissipated.keys() == b.ledger.dissipated.keys()
+    for cause, lost in a.ledger.dissipated.items():
+        np.testing.assert_array_equal(lost, b.ledger.dissipated[cause])
+    assert a.contacts.tobytes() == b.contacts.tobytes()
+    assert a.status == b.status
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_killed_runs_end_with_the_same_bits(name, tmp_path):
+    cache = tmp_path / "run.h5"
+    program = Path(__file__).with_name("kept_runs.py")
+    command = [sys.executable, str(program), name, str(DURATIONS[name]), str(cache), "1"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    kills, digest = done.stdout.split()[-2:]
+    assert int(kills) >= 2
+    assert digest == run(name, DURATIONS[name], None).state_hash()
+
+
+EFFECTS = ["spot", "pile", "cloth_on_ball", "rocket", "pendulum", "driven_oscillator", "smoothed_path", "pinned_shapes"]
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_every_effect_goes_on(name, tmp_path, monkeypatch):
+    # Each step is a checkpoint, and the run is stopped three times on its way: what a checkpoint leaves out would show.
+    monkeypatch.setattr(keeper, "DEAR", 0.0)
+    entry = gallery.load(name)
+    settings = {"duration": 0.3, "fps": entry.fps, "accuracy": entry.accuracy}
+    whole = ri.simulate(entry.scene(), **settings)
+    cache = ri.Cache(tmp_path / "run.h5", every=0.0)
+    for time in (0.06, 0.15, 0.24):
+        with pytest.raises(Stopped):
+            ri.simulate(entry.scene(), **settings, cache=cache, progress=stop_after(time))
+    same(ri.simulate(entry.scene(), **settings, cache=cache), whole)
+
+
+def test_a_finished_cache_is_read_and_not_run_again(tmp_path):
+    cache = tmp_path / "run.h5"
+    first = ri.simulate(heap(), 0.5, cache=cache)
+    looks = []
+    same(ri.simulate(heap(), 0.5, cache=cache, progress=looks.append), first)
+    assert looks == []
+    loaded = ri.load_recording(cache)
+    assert loaded.state_hash() == first.state_hash()
+    assert loaded.contacts.tobytes() == first.contacts.tobytes()
+    assert loaded.status.ok
+
+
+def test_flexible_bodies_are_in_the_cache(tmp_path):
+    entry = gallery.load("cloth_on_ball")
+    first = ri.simulate(entry.scene(), 0.1, cache=tmp_path / "run.h5")
+    loaded = ri.load_recording(tmp_path / "run.h5")
+    for track in first.nets:
+        np.testing.assert_array_equal(loaded.net(track.name)[0], track.vertices)
+
+
+def test_a_stopped_run_leaves_its_frames(tmp_path, monkeypatch):
+    monkeypatch.setattr(keeper, "DEAR", 0.0)
+    cache = ri.Cache(tmp_path / "run.h5", every=0.0)
+    with pytest.raises(Stopped):
+        ri.simulate(heap(), 0.4, 100.0, cache=cache, progress=stop_after(0.25))
+    left, whole = ri.load_recording(tmp_path / "run.h5"), ri.simulate(heap(), 0.4, 100.0)
+    assert 20 <= len(left.times) <= 26
+    frames = slice(0, len(left.times))
+    np.testing.assert_array_equal(left.positions, whole.positions[frames])
+    np.testing.assert_array_equal(left.orientations, whole.orientations[frames])
+    impacts = whole.impacts[whole.impacts["time"] <= left.times[-1]]
+    assert left.impacts[: len(impacts)].tobytes() == impacts.tobytes()
+    assert not left.status.ok
+    assert "go on from there" in left.status.message
+
+
+def test_the_older_checkpoint_does_where_the_newer_one_is_damaged(tmp_path, monkeypatch):
+    monkeypatch.setattr(keeper, "DEAR", 0.0)
+    cache = ri.Cache(tmp_path / "run.h5", every=0.0)
+    with pytest.raises(Stopped):
+        ri.simulate(heap(), 0.4, cache=cache, progress=stop_after(0.25))
+    with h5py.File(cache.path, "r+") as file:
+        newer = int(np.argmax(file["checkpoint/commits"]["number"]))
+        number = int(file["checkpoint/commits"]["number"].max())
+        file[f"checkpoint/{newer}"][100:200] = 0
+    assert number > 2
+    before = len(ri.load_recording(cache.path).times)
+    assert before >= 14
+    same(ri.simulate(heap(), 0.4, cache=cache), ri.simulate(heap(), 0.4))
+
+
+def heavier():
+    scene = heap()
+    changed = ri.Scene()
+    for body in scene.bodies:
+        changed.add(replace(body, mass=np.nextafter(3.0, 4.0)) if body.name == "box3" else body)
+    return changed
+
+
+def pushed(strength):
+    scene = ri.Scene(gravity=(0, 0, 0))
+    scene.add(ri.Body("ball", ri.Shape.sphere(0.5)))
+    scene.add(ri.ForceField(lambda time, position, velocity: strength * np.ones_like(position), bodies=["ball"]))
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("made", "other"),
+    [
+        ((heap(), 0.1, {}), (heavier(), 0.1, {})),
+        ((heap(), 0.1, {}), (heap(), 0.2, {})),
+        ((heap(), 0.1, {}), (heap(), 0.1, {"fps": 30.0})),
+        ((heap(), 0.1, {}), (heap(), 0.1, {"accuracy": "exact"})),
+        ((heap(), 0.1, {}), (heap(), 0.1, {"effects": {"friction": False}})),
+        ((pushed(1.0), 0.1, {}), (pushed(2.0), 0.1, {})),
+    ],
+)
+def test_a_cache_of_something_else_is_refused_and_kept(made, other, tmp_path):
+    cache = tmp_path / "run.h5"
+    ri.simulate(made[0], made[1], cache=cache, **made[2])
+    before = cache.read_bytes()
+    with pytest.raises(ri.SceneError, match="another scene, of other settings"):
+        ri.simulate(other[0], other[1], cache=cache, **other[2])
+    assert cache.read_bytes() == before
+
+
+def test_bad_caches_are_refused(tmp_path):
+    (tmp_path / "text.h5").write_text("no HDF5")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1.0
+    for name in ("text.h5", "other.h5"):
+        with pytest.raises(ri.SceneError, match=name):
+            ri.simulate(gas(), 0.1, cache=tmp_path / name)
+        with pytest.raises(ri.SceneError, match=name):
+            ri.load_recording(tmp_path / name)
+    with pytest.raises(ri.SceneError, match=r"ends in \.h5"):
+        ri.simulate(gas(), 0.1, cache=tmp_path / "run.npz")
+    with pytest.raises(ri.SceneError, match="every = -1"):
+        ri.simulate(gas(), 0.1, cache=ri.Cache(tmp_path / "run.h5", every=-1.0))
+    with pytest.raises(ri.SceneError, match=r"run\.choice\.accuracy"):
+        ri.simulate(gas(), 0.1, cache=tmp_path / "run.h5", accuracy=ri.Within(position=0.1))
+
+
+def test_a_cache_that_is_written_to_is_left_alone(tmp_path):
+    cache = tmp_path / "run.h5"
+    program = f"import rigidimpulse as ri; from kept_runs import heap; ri.simulate(heap(), 0.1, cache={str(cache)!r})"
+
+    def second(now):
+        other = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=Path(__file__).parent)
+        assert "another run writes to it" in other.stderr
+        assert len(ri.load_recording(cache).times) <= 7  # looking is free
+        raise Stopped
+
+    with pytest.raises(Stopped):
+        ri.simulate(heap(), 0.1, cache=cache, progress=second)
+
+
+def test_cut_off_files_are_refused_or_gone_on_with(tmp_path):
+    ri.simulate(gas(), 0.2, cache=tmp_path / "run.h5")
+    whole = (tmp_path / "run.h5").read_bytes()
+    for part in (0, 10, 500, len(whole) // 2, len(whole) - 1):
+        (tmp_path / "cut.h5").write_bytes(whole[:part])
+        with pytest.raises(ri.SceneError):
+            ri.simulate(gas(), 0.2, cache=tmp_path / "cut.h5")
+
+
+class Harmful:
+    """Pickled, it would call a function of the system."""
+
+    def __reduce__(self):
+        import os
+
+        return os.getcwd, ()
+
+
+def test_checkpoints_call_nothing_but_the_library(tmp_path):
+    from rigidimpulse.io.cache.freeze import Constants, thaw
+
+    for bad in (pickle.dumps((0, Harmful())), pickle.dumps((0, getattr)), b"", b"junk", pickle.dumps((3, None))):
+        with pytest.raises(ri.SceneError, match="checkpoint"):
+            thaw(bad, Constants([]))
+
+
+def test_the_command_line_goes_on(tmp_path):
+    cache, output = tmp_path / "run.h5", tmp_path / "run.npz"
+    command = ["simulate", "bounce", "--duration", "0.5", "--cache", str(cache), "-o", str(output)]
+    told = [CliRunner().invoke(main, command) for _ in range(2)]
+    assert [result.exit_code for result in told] == [0, 0], told[0].output
+    assert "going on with" not in told[0].output
+    assert "going on with" in told[1].output
+    refused = CliRunner().invoke(main, ["simulate", "spot", "--duration", "0.5", "--cache", str(cache), "-o", str(output)])
+    assert refused.exit_code == BAD_SCENE
+    assert "another scene" in refused.output
