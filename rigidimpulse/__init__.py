@@ -63,6 +63,7 @@ _HOMES = {
     "simulate": "simulation",
     "smooth_path": "forces.energy.path",
     "study": "studies.work_precision",
+    "wedge": "studies.wedges.wedge",
 }
 
 __all__ = sorted(_HOMES)

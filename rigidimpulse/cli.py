@@ -10,6 +10,7 @@ import click
 
 import rigidimpulse
 from rigidimpulse.cli_studies import compare, hardcases, study
+from rigidimpulse.cli_wedge import wedge
 from rigidimpulse.jobs import (
     BAD_SCENE,
     CHECK_FAILED,
@@ -185,5 +186,5 @@ def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str
         show(run)
 
 
-for command in (hardcases, study, compare):
+for command in (hardcases, study, compare, wedge):
     main.add_command(command)

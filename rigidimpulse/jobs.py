@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -34,7 +34,7 @@ class Job(NamedTuple):
     """A scene to run: name, how to make it, how long [s], frames per second, accuracy, gallery record."""
 
     name: str
-    make: Callable[[], Scene]
+    make: Callable[..., Scene]
     duration: float
     fps: float
     accuracy: str | Accuracy | Wish
@@ -125,8 +125,9 @@ def _scene_function(path: Path) -> Callable[[], Scene]:
     if not callable(function):
         raise SceneError("it defines no function scene()", "write: def scene(): ... return a Scene", where)
 
-    def make() -> Scene:
-        made = guarded(function)
+    @wraps(function)
+    def make(**arguments: Any) -> Scene:
+        made = guarded(partial(function, **arguments))
         if not isinstance(made, Scene):
             raise SceneError(f"scene() returned a {type(made).__name__}", "return a Scene", where)
         return made

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
-from rigidimpulse.rotation import quaternion_from_rotation_vector, rotate
 from rigidimpulse.fingerprint import fingerprint
+from rigidimpulse.rotation import quaternion_from_rotation_vector, rotate
 from rigidimpulse.studies.measures import penetration
 from rigidimpulse.studies.peers import PEERS
 from rigidimpulse.studies.reference import CLOSED_FORM, NONE, SELF_CONVERGED, Reference
