@@ -2,13 +2,18 @@
 
 Manifest (JSON)
     framing   see `camera.Framing`
-    bodies    name, folder (group) and key in meshcat's tree, half spaces, number of the display geometry (-1: none),
-              surface, pose of the first frame
+    bodies    name, folder (group) and key in meshcat's tree, half spaces, number of the geometry that collides (-1: none) and of the
+              one that is drawn, where it is another (rendered, else -1), faceted (collides by its faces), surface, pose of the first
+              frame, centre of mass in the body's frame
     nets      name, key in meshcat's tree, surface, and whether it is thin (cloth), of each flexible body
-    numShapes, fade (s an arrow is seen), summary (a line of text)
+    numShapes, fade (s an arrow is seen), summary (a line of text), contacts (whether
+              there are any), ledger (least range of its plot, J; null: none)
 Messages, each with its kind
     shape     a display geometry at /shapes/k, shared by all bodies of that shape
     times     frame times as a property of /impacts        rows      arrows as a property of /impacts
+    marks     impacts along the time line, see `history`, as a property of /impacts
+    contacts  rows of lasting contacts, see `history`, as a property of /contacts
+    ledger    energies and momentum, see `history`, as a property of /ledger
     motion    the animation of all bodies that move
     net, frames   faces of a flexible body, and its vertices in all frames, at /nets/k
 """
@@ -24,16 +29,20 @@ from rigidimpulse.shape import rotation_matrix
 from rigidimpulse.view.arrows import arrow_rows, fade_time, longest_arrow
 from rigidimpulse.view.camera import Path, frame_action, up_axis
 from rigidimpulse.view.display import SEGMENTS, DisplayMesh, display_mesh, display_planes
-from rigidimpulse.view.materials import net_surface, surface
+from rigidimpulse.view.history import contact_rows, energy_span, impact_marks, ledger_curves
+from rigidimpulse.view.materials import ROUND_KINDS, net_surface, surface
 from rigidimpulse.view.nets import is_closed, net_messages
 from rigidimpulse.view.protocol import NetLike, RecordingLike
-from rigidimpulse.view.tracks import animation_message, body_tracks, pack_float32, quaternion_keys
+from rigidimpulse.view.rendered import rendered_meshes
+from rigidimpulse.view.tracks import TypedTrack, animation_message, body_tracks, pack_float32, quaternion_keys
 
 MANY_SHAPES = 50
 """Number of different shapes from which round ones are drawn with `FEW_SEGMENTS`."""
 FEW_SEGMENTS = 24
 LEVEL = 0.99
 """Least cosine of the slope of a half space that is drawn as the ground and not as a wall or a ramp."""
+ROUND_OFF = 1e-9
+"""m and relative, of a centre of mass."""
 NET_COLOUR = 2
 """Colours of the palette that are left out between bodies and nets: amber blanches on level cloth."""
 NET_MARGIN = 0.03
@@ -59,28 +68,21 @@ def page_contents(
     bodies = list(recording.scene.bodies)
     poses = [finite_poses(recording, body.name) for body in bodies]
     numbers, meshes = _shared_meshes(bodies)
+    rendered, meshes = _with_rendered(recording.scene, bodies, numbers, meshes)
     up = up_axis(recording.scene.gravity)
     nets = list(recording.nets)
     framed = poses if other is None else [_both(pose, finite_poses(other, body.name)) for body, pose in zip(bodies, poses, strict=True)]
     net_paths = [_net_path(*tracks) for tracks in zip(*(run.nets for run in (recording, other) if run is not None), strict=True)]
     framing = frame_action(_paths(bodies, framed, numbers, meshes) + net_paths, up)
     framing = replace(framing, movers=[name for name in framing.movers if name not in {track.name for track in nets}])
-    entries, tracks = [], {}
-    num_coloured = 0
-    for index, body in enumerate(bodies):
-        position, orientation = poses[index]
-        planes = _plane_entries(body, orientation[0], up)
-        group, key = "ground" if planes and numbers[index] < 0 else "bodies", _path_key(index, body.name)
-        entry = {"name": body.name, "group": group, "key": key, "planes": planes, "shape": numbers[index]}
-        entry["surface"] = surface(num_coloured, body)
-        entry["position"] = position[0].tolist()
-        entry["quaternion"] = quaternion_keys(orientation[:1])[0].tolist()
-        entries.append(entry)
-        tracks[f"{group}/{key}"] = body_tracks(times, position, orientation)
-        num_coloured += body.motion != "static"
+    entries, tracks = _entries(recording, bodies, poses, numbers, rendered)
+    num_coloured = sum(body.motion != "static" for body in bodies)
     radius = float(np.linalg.norm(framing.half))
     dynamic = [body.motion == "dynamic" for body in bodies]
-    rows = arrow_rows(recording.impacts, dynamic, longest_arrow(radius, framing.body_radius))
+    longest = longest_arrow(radius, framing.body_radius)
+    rows = arrow_rows(recording.impacts, dynamic, longest)
+    contacts = contact_rows(recording.contacts, times, dynamic, up, longest)
+    curves = ledger_curves(recording.ledger)
     manifest = {
         "framing": asdict(framing),
         "bodies": entries,
@@ -88,16 +90,47 @@ def page_contents(
         "numShapes": len(meshes),
         "fade": fade_time(float(times[-1] - times[0])),
         "summary": _summary(sum(dynamic) + len(nets), len(recording.impacts), float(times[-1] - times[0])),
+        "ledger": None if curves is None else {"energySpan": energy_span(recording.ledger)},
+        "contacts": len(contacts) > 0,
     }
     messages = [("shape", _shape_message(number, mesh)) for number, mesh in enumerate(meshes)]
-    messages.append(("times", property_message("impacts", "times", times)))
-    messages.append(("rows", property_message("impacts", "rows", rows)))
+    for kind, path, name, values in (
+        ("times", "impacts", "times", times),
+        ("rows", "impacts", "rows", rows),
+        ("marks", "impacts", "marks", impact_marks(recording.impacts, times[0], times[-1])),
+        ("contacts", "contacts", "rows", contacts if len(contacts) else None),
+        ("ledger", "ledger", "curves", curves),
+    ):
+        if values is not None:
+            messages.append((kind, property_message(path, name, values)))
     for number, track in enumerate(nets):
         messages += net_messages(track, number)
     moving = {path: body_keys for path, body_keys in tracks.items() if body_keys}
     if moving:
         messages.append(("motion", animation_message(moving, float(times[-1]))))
     return manifest, messages
+
+
+def _entries(
+    recording: RecordingLike, bodies: list[Any], poses: list[tuple[np.ndarray, np.ndarray]], numbers: list[int], rendered: list[int]
+) -> tuple[list[dict[str, Any]], dict[str, list[TypedTrack]]]:
+    """Return what the manifest says of the bodies, and their tracks by path in meshcat's tree."""
+    times, up = np.asarray(recording.times, dtype=np.float64), up_axis(recording.scene.gravity)
+    entries, tracks, num_coloured = [], {}, 0
+    for index, body in enumerate(bodies):
+        position, orientation = poses[index]
+        planes = _plane_entries(body, orientation[0], up)
+        group, key = "ground" if planes and numbers[index] < 0 else "bodies", _path_key(index, body.name)
+        entry = {"name": body.name, "group": group, "key": key, "planes": planes, "shape": numbers[index]}
+        entry |= {"rendered": rendered[index], "faceted": body.shape.kind not in ROUND_KINDS}
+        entry["surface"] = surface(num_coloured, body)
+        num_coloured += body.motion != "static"
+        entry["position"] = position[0].tolist()
+        entry["quaternion"] = quaternion_keys(orientation[:1])[0].tolist()
+        entry["center"] = _center(position[0], orientation[0], recording.center_of_mass(body.name)[0])
+        entries.append(entry)
+        tracks[f"{group}/{key}"] = body_tracks(times, position, orientation)
+    return entries, tracks
 
 
 def _both(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -133,6 +166,20 @@ def _shared_meshes(bodies: list[Any]) -> tuple[list[int], list[DisplayMesh]]:
     return [number_of[key] for key in keys], meshes
 
 
+def _with_rendered(scene: Any, bodies: list[Any], numbers: list[int], meshes: list[DisplayMesh]) -> tuple[list[int], list[DisplayMesh]]:
+    """Return for each body the number of the mesh that is drawn where it is not the one that collides, else -1, and all meshes."""
+    collision = {body.name: meshes[number] for body, number in zip(bodies, numbers, strict=True) if number >= 0}
+    drawn = rendered_meshes(scene, collision)
+    place = {name: len(meshes) + k for k, name in enumerate(drawn)}
+    return [place.get(body.name, -1) for body in bodies], meshes + list(drawn.values())
+
+
+def _center(position: np.ndarray, orientation: np.ndarray, center: np.ndarray) -> list[float]:
+    """Return the centre of mass (3,) m in the frame of a body; exactly zero where it is the body's origin but for round-off."""
+    offset = rotation_matrix(orientation).T @ (center - position)
+    return np.where(np.abs(offset) > ROUND_OFF * (1.0 + np.abs(center).max()), offset, 0.0).tolist()
+
+
 def _shape_key(shape: Any) -> Any:
     """Return what is equal for shapes that look alike: figures of primitives, else the object itself."""
     if shape.kind in ("sphere", "capsule", "cylinder"):
@@ -153,7 +200,8 @@ def _paths(
             moves = body.motion != "static" and bool(
                 np.any(position != position[0]) or np.any(orientation != orientation[0])
             )
-            paths.append(Path(body.name, position, radii[number], moves))
+            surface = None if moves else position[0] + meshes[number].vertices @ rotation_matrix(orientation[0]).T
+            paths.append(Path(body.name, position, radii[number], moves, surface))
     return paths
 
 

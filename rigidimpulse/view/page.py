@@ -19,8 +19,11 @@ from typing import Any
 from rigidimpulse.view.contents import page_contents
 from rigidimpulse.view.protocol import RecordingLike
 
-SCRIPTS = ("look.js", "arrows.js", "nets.js", "transport.js", "hud.js", "main.js")
-STYLES = ("page.css",)
+SCRIPTS = (
+    "look.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "nets.js", "shapes.js", "transport.js", "plot.js", "timeline.js",
+    "panel.js", "ledger.js", "hud.js", "messages.js", "main.js",
+)  # fmt: skip
+STYLES = ("page.css", "panel.css")
 DEFAULT_TITLE = "rigidimpulse"
 
 
