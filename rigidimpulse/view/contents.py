@@ -14,7 +14,8 @@ Messages, each with its kind
     marks     impacts along the time line, see `history`, as a property of /impacts
     contacts  rows of lasting contacts, see `history`, as a property of /contacts
     ledger    energies and momentum, see `history`, as a property of /ledger
-    motion    the animation of all bodies that move
+    motion    the animation of all bodies that move; in large recordings instead
+    glb       the glTF file that `Recording.export` writes, as a property of /motion
     net, frames   faces of a flexible body, and its vertices in all frames, at /nets/k
 """
 
@@ -34,11 +35,17 @@ from rigidimpulse.view.materials import ROUND_KINDS, net_surface, surface
 from rigidimpulse.view.nets import is_closed, net_messages
 from rigidimpulse.view.protocol import NetLike, RecordingLike
 from rigidimpulse.view.rendered import rendered_meshes
-from rigidimpulse.view.tracks import TypedTrack, animation_message, body_tracks, pack_float32, quaternion_keys
+from rigidimpulse.view.tracks import animation_message, body_tracks, pack_bytes, pack_float32, quaternion_keys
 
 MANY_SHAPES = 50
-"""Number of different shapes from which round ones are drawn with `FEW_SEGMENTS`."""
+"""Number of different shapes from which round ones are drawn with `FEW_SEGMENTS` at most."""
 FEW_SEGMENTS = 24
+COARSER = (SEGMENTS, 48, 32, FEW_SEGMENTS, 20, 16)
+"""Corners of a full turn of round shapes, from which the finest is taken that `MOST_TRIANGLES` allows."""
+MOST_TRIANGLES = 250_000
+"""Triangles of all round bodies, of which each has about the square of its corners: machines without a graphics card draw a million a s."""
+MOST_KEYS = 200_000
+"""Bodies that move times frames, beyond which the motion is a glTF file: a page of 1,000 bodies then opens a second sooner."""
 LEVEL = 0.99
 """Least cosine of the slope of a half space that is drawn as the ground and not as a wall or a ramp."""
 ROUND_OFF = 1e-9
@@ -50,13 +57,14 @@ NET_MARGIN = 0.03
 
 
 def page_contents(
-    recording: RecordingLike, other: RecordingLike | None = None
+    recording: RecordingLike, other: RecordingLike | None = None, large: bool = False
 ) -> tuple[dict[str, Any], list[tuple[str, dict[str, Any]]]]:
     """Return the manifest of a recording's page and its messages, each with its kind.
 
     Args:
         recording: the motion.
         other: another motion of the same bodies, which the picture must hold as well.
+        large: have the motion as a glTF file.
 
     Raises:
         ValueError: the recording has no frames, or a pose is not finite.
@@ -75,7 +83,7 @@ def page_contents(
     net_paths = [_net_path(*tracks) for tracks in zip(*(run.nets for run in (recording, other) if run is not None), strict=True)]
     framing = frame_action(_paths(bodies, framed, numbers, meshes) + net_paths, up)
     framing = replace(framing, movers=[name for name in framing.movers if name not in {track.name for track in nets}])
-    entries, tracks = _entries(recording, bodies, poses, numbers, rendered)
+    entries = _entries(recording, bodies, poses, numbers, rendered)
     num_coloured = sum(body.motion != "static" for body in bodies)
     radius = float(np.linalg.norm(framing.half))
     dynamic = [body.motion == "dynamic" for body in bodies]
@@ -105,18 +113,15 @@ def page_contents(
             messages.append((kind, property_message(path, name, values)))
     for number, track in enumerate(nets):
         messages += net_messages(track, number)
-    moving = {path: body_keys for path, body_keys in tracks.items() if body_keys}
-    if moving:
-        messages.append(("motion", animation_message(moving, float(times[-1]))))
-    return manifest, messages
+    return manifest, messages + _motion(recording, entries, poses, large)
 
 
 def _entries(
     recording: RecordingLike, bodies: list[Any], poses: list[tuple[np.ndarray, np.ndarray]], numbers: list[int], rendered: list[int]
-) -> tuple[list[dict[str, Any]], dict[str, list[TypedTrack]]]:
-    """Return what the manifest says of the bodies, and their tracks by path in meshcat's tree."""
-    times, up = np.asarray(recording.times, dtype=np.float64), up_axis(recording.scene.gravity)
-    entries, tracks, num_coloured = [], {}, 0
+) -> list[dict[str, Any]]:
+    """Return what the manifest says of the bodies."""
+    up = up_axis(recording.scene.gravity)
+    entries, num_coloured = [], 0
     for index, body in enumerate(bodies):
         position, orientation = poses[index]
         planes = _plane_entries(body, orientation[0], up)
@@ -129,8 +134,51 @@ def _entries(
         entry["quaternion"] = quaternion_keys(orientation[:1])[0].tolist()
         entry["center"] = _center(position[0], orientation[0], recording.center_of_mass(body.name)[0])
         entries.append(entry)
-        tracks[f"{group}/{key}"] = body_tracks(times, position, orientation)
-    return entries, tracks
+    return entries
+
+
+def is_large(recording: RecordingLike) -> bool:
+    """Return whether a recording has more than `MOST_KEYS` keys: bodies that move, times frames."""
+    names = [body.name for body in recording.scene.bodies if body.motion != "static"]
+    if len(names) * len(recording.times) <= MOST_KEYS:
+        return False
+    poses = [(recording.position(name), recording.orientation(name)) for name in names]
+    return sum(any(np.any(part != part[0]) for part in pose) for pose in poses) * len(recording.times) > MOST_KEYS
+
+
+def _motion(
+    recording: RecordingLike, entries: list[dict[str, Any]], poses: list[tuple[np.ndarray, np.ndarray]], large: bool
+) -> list[tuple[str, dict[str, Any]]]:
+    """Return the message that brings the motion, if there is any."""
+    times = np.asarray(recording.times, dtype=np.float64)
+    if large:
+        return [("glb", property_message("motion", "file", glb_file(recording)))]
+    tracks = {}
+    for entry, pose in zip(entries, poses, strict=True):
+        tracks[f"{entry['group']}/{entry['key']}"] = body_tracks(times, *pose)
+    moving = {path: body_keys for path, body_keys in tracks.items() if body_keys}
+    return [("motion", animation_message(moving, float(times[-1])))] if moving else []
+
+
+def glb_file(recording: Any) -> bytes:
+    """Return the .glb file of a recording, a node a body whatever file its scene came from.
+
+    Raises:
+        SceneError: a pose is not finite.
+
+    """
+    from dataclasses import replace
+    from pathlib import Path as FilePath
+    from tempfile import TemporaryDirectory
+
+    from rigidimpulse.io.gltf.animate import write_motion
+    from rigidimpulse.scene import Scene
+
+    plain = replace(recording, scene=Scene(recording.scene.gravity, recording.scene.bodies), nets=[])
+    with TemporaryDirectory() as folder:
+        path = FilePath(folder) / "motion.glb"
+        write_motion(plain, path)
+        return path.read_bytes()
 
 
 def _both(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -155,7 +203,10 @@ def _shared_meshes(bodies: list[Any]) -> tuple[list[int], list[DisplayMesh]]:
     keys = [_shape_key(body.shape) for body in bodies]
     for key, body in zip(keys, bodies, strict=True):
         different.setdefault(key, body.shape)
-    segments = SEGMENTS if len(different) < MANY_SHAPES else FEW_SEGMENTS
+    num_round = sum(part.shape.kind in ROUND_KINDS for body in bodies for part in body.shape.parts_flat())
+    finest = SEGMENTS if len(different) < MANY_SHAPES else FEW_SEGMENTS
+    allowed = [corners for corners in COARSER if corners <= finest and num_round * corners**2 <= MOST_TRIANGLES]
+    segments = allowed[0] if allowed else COARSER[-1]
     number_of: dict[Any, int] = {}
     meshes = []
     for key, shape in different.items():
@@ -270,6 +321,7 @@ def _shape_message(number: int, mesh: DisplayMesh) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def property_message(path: str, name: str, values: np.ndarray) -> dict[str, Any]:
-    """Return meshcat's `set_property` message that hangs a Float32Array on a node."""
-    return {"type": "set_property", "path": "/" + path, "property": name, "value": pack_float32(values)}
+def property_message(path: str, name: str, values: np.ndarray | bytes) -> dict[str, Any]:
+    """Return meshcat's `set_property` message that hangs a Float32Array, or bytes as a Uint8Array, on a node."""
+    packed = pack_bytes(values) if isinstance(values, bytes) else pack_float32(values)
+    return {"type": "set_property", "path": "/" + path, "property": name, "value": packed}

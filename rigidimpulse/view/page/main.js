@@ -27,6 +27,16 @@ async function readMessages(viewer) {
   });
 }
 
+/* meshcat builds geometries from its own messages; we keep the geometries and make the meshes ourselves. */
+function takeGeometries(viewer, count) {
+  const geometries = [];
+  for (let i = 0; i < count; i++) {
+    geometries.push(viewer.scene_tree.find(["shapes", String(i), "<object>"]).object.geometry);
+  }
+  if (count > 0) { viewer.delete_path(["shapes"]); }
+  return geometries;
+}
+
 async function main() {
   const manifest = JSON.parse(element("manifest").textContent);
   const viewer = new MeshCat.Viewer(element("meshcat-pane"));
@@ -34,7 +44,8 @@ async function main() {
   const stage = new Stage(viewer, manifest);
   stage.dress();
   const send = await readMessages(viewer);
-  const geometries = await motionSource.geometries(viewer, manifest, send);
+  send((kind) => kind === "shape");
+  const geometries = takeGeometries(viewer, manifest.numShapes);
   manifest.bodies.forEach((body) => stage.addBody(body, geometries));
   motionSource.animate(viewer, stage, send);
   send(() => true);

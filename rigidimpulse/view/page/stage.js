@@ -41,7 +41,6 @@ class Stage {
   }
 
   addBody(body, geometries) {
-    const path = [body.group, body.key];
     const object = new THREE.Group();
     const seen = body.rendered >= 0 ? body.rendered : body.shape;
     if (seen >= 0) {
@@ -49,8 +48,7 @@ class Stage {
       object.add(this.meshOf.get(body.name));
     }
     for (const plane of body.planes) { object.add(this.makePlane(plane)); }
-    this.viewer.set_object(path, object);
-    const node = this.viewer.scene_tree.find(path).object;
+    const node = motionSource.place(this.viewer, body.group, body.key, object);
     node.position.fromArray(body.position);
     node.quaternion.fromArray(body.quaternion);
     this.nodes.set(body.name, node);

@@ -37,8 +37,7 @@ const TRAIL_FRAGMENT = `
 class Trails {
   constructor(viewer, stage, manifest, times) {
     Object.assign(this, {viewer, stage, times, shown: false, object: null});
-    const moving = new Set(viewer.animator.actions.map((action) => action.getRoot()));
-    this.movers = manifest.bodies.filter(({name, shape}) => shape >= 0 && motionSource.moves(viewer, stage.nodes.get(name), moving));
+    this.movers = manifest.bodies.filter(({name}) => Object.keys(motionSource.tracks(viewer, stage.nodes.get(name))).length > 0);
     this.step = Math.max(Math.ceil((this.movers.length * times.length) / TRAIL_POINTS), 1);
   }
 
