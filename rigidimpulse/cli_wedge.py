@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("scene")
-@click.option("--vary", multiple=True, required=True, metavar="NAME=VALUES", help="material.restitution=0.1:0.9:9, seed=0:15, ball.mass=1,2.")
+@click.option("--vary", multiple=True, required=True, metavar="NAME=VALUES", help="material.restitution=0.1:0.9:9, seed=0:15.")
 @click.option("-o", "--output", help="Folder for the takes; a wedge found there is gone on with.  [default: wedge_SCENE]")
 @click.option("--processes", type=click.IntRange(min=1), help="Takes at a time.  [default: one a core]")
 @click.option("--scheduler", help="Run on a Dask scheduler, tcp://HOST:PORT, or 'local' for a cluster on this machine.")

@@ -31,12 +31,16 @@ OUTLINE_DIRECTIONS = _GRID / np.linalg.norm(_GRID, axis=1, keepdims=True)
 
 @dataclass(frozen=True)
 class Path:
-    """The path of a body: positions (f, 3) of its origin in the recorded frame, and its radius about the origin, m."""
+    """The path of a body: positions (f, 3) of its origin in the recorded frame, and its radius about the origin, m.
+
+    `surface` (p, 3) m are points of a body that does not move, in the recorded frame: its outline is tighter than that of a ball.
+    """
 
     name: str
     position: np.ndarray
     radius: float
     moves: bool
+    surface: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -143,7 +147,11 @@ def _surroundings(statics: Sequence[Path], rotation: np.ndarray, outline: Sequen
     for path in statics:
         centre = rotation @ path.position[0]
         if np.all(centre - path.radius < high + reach) and np.all(centre + path.radius > low - reach):
-            points += [np.clip(centre + path.radius * out, low - reach, high + reach) for out in OUTLINE_DIRECTIONS]
+            outer = centre + path.radius * OUTLINE_DIRECTIONS
+            if path.surface is not None:
+                turned = path.surface @ rotation.T
+                outer = turned[np.argmax(turned @ OUTLINE_DIRECTIONS.T, axis=0)]
+            points += list(np.clip(outer, low - reach, high + reach))
     return points
 
 

@@ -21,7 +21,7 @@ from rigidimpulse.view.tracks import TypedTrack, animation_message, body_tracks,
 if TYPE_CHECKING:
     from rigidimpulse.studies.compare import Comparison
 
-COMPARISON_SCRIPTS = (*SCRIPTS, "ghosts.js", "plot.js", "compare.js")
+COMPARISON_SCRIPTS = (*SCRIPTS, "ghosts.js", "distance_plot.js", "compare.js")
 COMPARISON_STYLES = (*STYLES, "compare.css")
 
 
@@ -61,6 +61,8 @@ def comparison_contents(comparison: Comparison) -> tuple[dict[str, Any], list[tu
         "horizon": {name: max(time, float(times[0]) - 1.0) for name, time in comparison.horizon.items() if time < np.inf},
     }
     manifest["summary"] = _summary(comparison)
+    manifest["ledger"] = None  # the plot of the two runs is in its place
+    messages = [entry for entry in messages if entry[0] != "ledger"]
     for values in ("distance", "angle"):
         by_body = [getattr(comparison, values)(name) for name in comparison.names]
         messages.append(("apart", property_message("ghosts", values, np.array(by_body))))

@@ -2,14 +2,20 @@
 
 Manifest (JSON)
     framing   see `camera.Framing`
-    bodies    name, folder (group) and key in meshcat's tree, half spaces, number of the display geometry (-1: none),
-              surface, pose of the first frame
+    bodies    name, folder (group) and key in meshcat's tree, half spaces, number of the geometry that collides (-1: none) and of the
+              one that is drawn, where it is another (rendered, else -1), faceted (collides by its faces), surface, pose of the first
+              frame, centre of mass in the body's frame
     nets      name, key in meshcat's tree, surface, and whether it is thin (cloth), of each flexible body
-    numShapes, fade (s an arrow is seen), summary (a line of text)
+    numShapes, fade (s an arrow is seen), summary (a line of text), contacts (whether
+              there are any), ledger (least range of its plot, J; null: none)
 Messages, each with its kind
     shape     a display geometry at /shapes/k, shared by all bodies of that shape
     times     frame times as a property of /impacts        rows      arrows as a property of /impacts
-    motion    the animation of all bodies that move
+    marks     impacts along the time line, see `history`, as a property of /impacts
+    contacts  rows of lasting contacts, see `history`, as a property of /contacts
+    ledger    energies and momentum, see `history`, as a property of /ledger
+    motion    the animation of all bodies that move; in large recordings instead
+    glb       the glTF file that `Recording.export` writes, as a property of /motion
     net, frames   faces of a flexible body, and its vertices in all frames, at /nets/k
 """
 
@@ -24,16 +30,26 @@ from rigidimpulse.shape import rotation_matrix
 from rigidimpulse.view.arrows import arrow_rows, fade_time, longest_arrow
 from rigidimpulse.view.camera import Path, frame_action, up_axis
 from rigidimpulse.view.display import SEGMENTS, DisplayMesh, display_mesh, display_planes
-from rigidimpulse.view.materials import net_surface, surface
+from rigidimpulse.view.history import contact_rows, energy_span, impact_marks, ledger_curves
+from rigidimpulse.view.materials import ROUND_KINDS, net_surface, surface
 from rigidimpulse.view.nets import is_closed, net_messages
 from rigidimpulse.view.protocol import NetLike, RecordingLike
-from rigidimpulse.view.tracks import animation_message, body_tracks, pack_float32, quaternion_keys
+from rigidimpulse.view.rendered import rendered_meshes
+from rigidimpulse.view.tracks import animation_message, body_tracks, pack_bytes, pack_float32, quaternion_keys
 
 MANY_SHAPES = 50
-"""Number of different shapes from which round ones are drawn with `FEW_SEGMENTS`."""
+"""Number of different shapes from which round ones are drawn with `FEW_SEGMENTS` at most."""
 FEW_SEGMENTS = 24
+COARSER = (SEGMENTS, 48, 32, FEW_SEGMENTS, 20, 16)
+"""Corners of a full turn of round shapes, from which the finest is taken that `MOST_TRIANGLES` allows."""
+MOST_TRIANGLES = 250_000
+"""Triangles of all round bodies, of which each has about the square of its corners: machines without a graphics card draw a million a s."""
+MOST_KEYS = 200_000
+"""Bodies that move times frames, beyond which the motion is a glTF file: a page of 1,000 bodies then opens a second sooner."""
 LEVEL = 0.99
 """Least cosine of the slope of a half space that is drawn as the ground and not as a wall or a ramp."""
+ROUND_OFF = 1e-9
+"""m and relative, of a centre of mass."""
 NET_COLOUR = 2
 """Colours of the palette that are left out between bodies and nets: amber blanches on level cloth."""
 NET_MARGIN = 0.03
@@ -41,13 +57,14 @@ NET_MARGIN = 0.03
 
 
 def page_contents(
-    recording: RecordingLike, other: RecordingLike | None = None
+    recording: RecordingLike, other: RecordingLike | None = None, large: bool = False
 ) -> tuple[dict[str, Any], list[tuple[str, dict[str, Any]]]]:
     """Return the manifest of a recording's page and its messages, each with its kind.
 
     Args:
         recording: the motion.
         other: another motion of the same bodies, which the picture must hold as well.
+        large: have the motion as a glTF file.
 
     Raises:
         ValueError: the recording has no frames, or a pose is not finite.
@@ -59,28 +76,21 @@ def page_contents(
     bodies = list(recording.scene.bodies)
     poses = [finite_poses(recording, body.name) for body in bodies]
     numbers, meshes = _shared_meshes(bodies)
+    rendered, meshes = _with_rendered(recording.scene, bodies, numbers, meshes)
     up = up_axis(recording.scene.gravity)
     nets = list(recording.nets)
     framed = poses if other is None else [_both(pose, finite_poses(other, body.name)) for body, pose in zip(bodies, poses, strict=True)]
     net_paths = [_net_path(*tracks) for tracks in zip(*(run.nets for run in (recording, other) if run is not None), strict=True)]
     framing = frame_action(_paths(bodies, framed, numbers, meshes) + net_paths, up)
     framing = replace(framing, movers=[name for name in framing.movers if name not in {track.name for track in nets}])
-    entries, tracks = [], {}
-    num_coloured = 0
-    for index, body in enumerate(bodies):
-        position, orientation = poses[index]
-        planes = _plane_entries(body, orientation[0], up)
-        group, key = "ground" if planes and numbers[index] < 0 else "bodies", _path_key(index, body.name)
-        entry = {"name": body.name, "group": group, "key": key, "planes": planes, "shape": numbers[index]}
-        entry["surface"] = surface(num_coloured, body)
-        entry["position"] = position[0].tolist()
-        entry["quaternion"] = quaternion_keys(orientation[:1])[0].tolist()
-        entries.append(entry)
-        tracks[f"{group}/{key}"] = body_tracks(times, position, orientation)
-        num_coloured += body.motion != "static"
+    entries = _entries(recording, bodies, poses, numbers, rendered)
+    num_coloured = sum(body.motion != "static" for body in bodies)
     radius = float(np.linalg.norm(framing.half))
     dynamic = [body.motion == "dynamic" for body in bodies]
-    rows = arrow_rows(recording.impacts, dynamic, longest_arrow(radius, framing.body_radius))
+    longest = longest_arrow(radius, framing.body_radius)
+    rows = arrow_rows(recording.impacts, dynamic, longest)
+    contacts = contact_rows(recording.contacts, times, dynamic, up, longest)
+    curves = ledger_curves(recording.ledger)
     manifest = {
         "framing": asdict(framing),
         "bodies": entries,
@@ -88,16 +98,87 @@ def page_contents(
         "numShapes": len(meshes),
         "fade": fade_time(float(times[-1] - times[0])),
         "summary": _summary(sum(dynamic) + len(nets), len(recording.impacts), float(times[-1] - times[0])),
+        "ledger": None if curves is None else {"energySpan": energy_span(recording.ledger)},
+        "contacts": len(contacts) > 0,
     }
     messages = [("shape", _shape_message(number, mesh)) for number, mesh in enumerate(meshes)]
-    messages.append(("times", property_message("impacts", "times", times)))
-    messages.append(("rows", property_message("impacts", "rows", rows)))
+    for kind, path, name, values in (
+        ("times", "impacts", "times", times),
+        ("rows", "impacts", "rows", rows),
+        ("marks", "impacts", "marks", impact_marks(recording.impacts, times[0], times[-1])),
+        ("contacts", "contacts", "rows", contacts if len(contacts) else None),
+        ("ledger", "ledger", "curves", curves),
+    ):
+        if values is not None:
+            messages.append((kind, property_message(path, name, values)))
     for number, track in enumerate(nets):
         messages += net_messages(track, number)
+    return manifest, messages + _motion(recording, entries, poses, large)
+
+
+def _entries(
+    recording: RecordingLike, bodies: list[Any], poses: list[tuple[np.ndarray, np.ndarray]], numbers: list[int], rendered: list[int]
+) -> list[dict[str, Any]]:
+    """Return what the manifest says of the bodies."""
+    up = up_axis(recording.scene.gravity)
+    entries, num_coloured = [], 0
+    for index, body in enumerate(bodies):
+        position, orientation = poses[index]
+        planes = _plane_entries(body, orientation[0], up)
+        group, key = "ground" if planes and numbers[index] < 0 else "bodies", _path_key(index, body.name)
+        entry = {"name": body.name, "group": group, "key": key, "planes": planes, "shape": numbers[index]}
+        entry |= {"rendered": rendered[index], "faceted": body.shape.kind not in ROUND_KINDS}
+        entry["surface"] = surface(num_coloured, body)
+        num_coloured += body.motion != "static"
+        entry["position"] = position[0].tolist()
+        entry["quaternion"] = quaternion_keys(orientation[:1])[0].tolist()
+        entry["center"] = _center(position[0], orientation[0], recording.center_of_mass(body.name)[0])
+        entries.append(entry)
+    return entries
+
+
+def is_large(recording: RecordingLike) -> bool:
+    """Return whether a recording has more than `MOST_KEYS` keys: bodies that move, times frames."""
+    names = [body.name for body in recording.scene.bodies if body.motion != "static"]
+    if len(names) * len(recording.times) <= MOST_KEYS:
+        return False
+    poses = [(recording.position(name), recording.orientation(name)) for name in names]
+    return sum(any(np.any(part != part[0]) for part in pose) for pose in poses) * len(recording.times) > MOST_KEYS
+
+
+def _motion(
+    recording: RecordingLike, entries: list[dict[str, Any]], poses: list[tuple[np.ndarray, np.ndarray]], large: bool
+) -> list[tuple[str, dict[str, Any]]]:
+    """Return the message that brings the motion, if there is any."""
+    times = np.asarray(recording.times, dtype=np.float64)
+    if large:
+        return [("glb", property_message("motion", "file", glb_file(recording)))]
+    tracks = {}
+    for entry, pose in zip(entries, poses, strict=True):
+        tracks[f"{entry['group']}/{entry['key']}"] = body_tracks(times, *pose)
     moving = {path: body_keys for path, body_keys in tracks.items() if body_keys}
-    if moving:
-        messages.append(("motion", animation_message(moving, float(times[-1]))))
-    return manifest, messages
+    return [("motion", animation_message(moving, float(times[-1])))] if moving else []
+
+
+def glb_file(recording: Any) -> bytes:
+    """Return the .glb file of a recording, a node a body whatever file its scene came from.
+
+    Raises:
+        SceneError: a pose is not finite.
+
+    """
+    from dataclasses import replace
+    from pathlib import Path as FilePath
+    from tempfile import TemporaryDirectory
+
+    from rigidimpulse.io.gltf.animate import write_motion
+    from rigidimpulse.scene import Scene
+
+    plain = replace(recording, scene=Scene(recording.scene.gravity, recording.scene.bodies), nets=[])
+    with TemporaryDirectory() as folder:
+        path = FilePath(folder) / "motion.glb"
+        write_motion(plain, path)
+        return path.read_bytes()
 
 
 def _both(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -122,7 +203,10 @@ def _shared_meshes(bodies: list[Any]) -> tuple[list[int], list[DisplayMesh]]:
     keys = [_shape_key(body.shape) for body in bodies]
     for key, body in zip(keys, bodies, strict=True):
         different.setdefault(key, body.shape)
-    segments = SEGMENTS if len(different) < MANY_SHAPES else FEW_SEGMENTS
+    num_round = sum(part.shape.kind in ROUND_KINDS for body in bodies for part in body.shape.parts_flat())
+    finest = SEGMENTS if len(different) < MANY_SHAPES else FEW_SEGMENTS
+    allowed = [corners for corners in COARSER if corners <= finest and num_round * corners**2 <= MOST_TRIANGLES]
+    segments = allowed[0] if allowed else COARSER[-1]
     number_of: dict[Any, int] = {}
     meshes = []
     for key, shape in different.items():
@@ -131,6 +215,20 @@ def _shared_meshes(bodies: list[Any]) -> tuple[list[int], list[DisplayMesh]]:
         if mesh is not None:
             meshes.append(mesh)
     return [number_of[key] for key in keys], meshes
+
+
+def _with_rendered(scene: Any, bodies: list[Any], numbers: list[int], meshes: list[DisplayMesh]) -> tuple[list[int], list[DisplayMesh]]:
+    """Return for each body the number of the mesh that is drawn where it is not the one that collides, else -1, and all meshes."""
+    collision = {body.name: meshes[number] for body, number in zip(bodies, numbers, strict=True) if number >= 0}
+    drawn = rendered_meshes(scene, collision)
+    place = {name: len(meshes) + k for k, name in enumerate(drawn)}
+    return [place.get(body.name, -1) for body in bodies], meshes + list(drawn.values())
+
+
+def _center(position: np.ndarray, orientation: np.ndarray, center: np.ndarray) -> list[float]:
+    """Return the centre of mass (3,) m in the frame of a body; exactly zero where it is the body's origin but for round-off."""
+    offset = rotation_matrix(orientation).T @ (center - position)
+    return np.where(np.abs(offset) > ROUND_OFF * (1.0 + np.abs(center).max()), offset, 0.0).tolist()
 
 
 def _shape_key(shape: Any) -> Any:
@@ -153,7 +251,8 @@ def _paths(
             moves = body.motion != "static" and bool(
                 np.any(position != position[0]) or np.any(orientation != orientation[0])
             )
-            paths.append(Path(body.name, position, radii[number], moves))
+            surface = None if moves else position[0] + meshes[number].vertices @ rotation_matrix(orientation[0]).T
+            paths.append(Path(body.name, position, radii[number], moves, surface))
     return paths
 
 
@@ -222,6 +321,7 @@ def _shape_message(number: int, mesh: DisplayMesh) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def property_message(path: str, name: str, values: np.ndarray) -> dict[str, Any]:
-    """Return meshcat's `set_property` message that hangs a Float32Array on a node."""
-    return {"type": "set_property", "path": "/" + path, "property": name, "value": pack_float32(values)}
+def property_message(path: str, name: str, values: np.ndarray | bytes) -> dict[str, Any]:
+    """Return meshcat's `set_property` message that hangs a Float32Array, or bytes as a Uint8Array, on a node."""
+    packed = pack_bytes(values) if isinstance(values, bytes) else pack_float32(values)
+    return {"type": "set_property", "path": "/" + path, "property": name, "value": packed}

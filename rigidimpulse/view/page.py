@@ -16,11 +16,16 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from rigidimpulse.view.contents import page_contents
+from rigidimpulse.view.contents import is_large, page_contents
 from rigidimpulse.view.protocol import RecordingLike
 
-SCRIPTS = ("look.js", "arrows.js", "nets.js", "transport.js", "hud.js", "main.js")
-STYLES = ("page.css",)
+SCRIPTS = (
+    "look.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "nets.js", "shapes.js", "transport.js", "plot.js", "timeline.js",
+    "panel.js", "ledger.js", "hud.js", "messages.js", "main.js",
+)  # fmt: skip
+LARGE_SCRIPTS = tuple("glb.js" if name == "messages.js" else name for name in SCRIPTS)
+"""Those of a large recording, see `contents.MOST_KEYS`."""
+STYLES = ("page.css", "panel.css")
 DEFAULT_TITLE = "rigidimpulse"
 
 
@@ -41,7 +46,8 @@ def write_html(recording: RecordingLike, path: str | os.PathLike[str], title: st
 
 def render_page(recording: RecordingLike, title: str = DEFAULT_TITLE) -> str:
     """Return the HTML page of a recording, as `write_html` writes it."""
-    return assemble(*page_contents(recording), title)
+    large = is_large(recording)
+    return assemble(*page_contents(recording, large=large), title, LARGE_SCRIPTS if large else SCRIPTS)
 
 
 def assemble(

@@ -64,6 +64,20 @@ class RecordingLike(Protocol):
         """The flexible bodies."""
         ...
 
+    @property
+    def contacts(self) -> npt.NDArray[Any]:
+        """Structured array of lasting contacts: start, end, body_a, body_b, point, normal, force; may be empty."""
+        ...
+
+    @property
+    def ledger(self) -> Any:
+        """Energy and momentum at each frame, a `Ledger`; None where it is not known."""
+        ...
+
+    def center_of_mass(self, name: str, /) -> FloatArray:
+        """Centre of mass (f, 3), m, world."""
+        ...
+
     def position(self, name: str, /) -> FloatArray:
         """Body origin (f, 3), m, world."""
         ...

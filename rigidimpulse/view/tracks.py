@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-FLOAT32_EXTENSION = 0x17  # meshcat's msgpack extension code of Float32Array
+FLOAT32_EXTENSION, BYTES_EXTENSION = 0x17, 0x12  # meshcat's msgpack extension codes of Float32Array and Uint8Array
 
 
 def quaternion_keys(orientation: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:
@@ -59,6 +59,13 @@ def pack_float32(values: npt.ArrayLike) -> Any:
     import umsgpack
 
     return umsgpack.Ext(FLOAT32_EXTENSION, np.ascontiguousarray(values, dtype="<f4").tobytes())
+
+
+def pack_bytes(data: bytes) -> Any:
+    """Return bytes as the msgpack extension that the page reads as Uint8Array."""
+    import umsgpack
+
+    return umsgpack.Ext(BYTES_EXTENSION, data)
 
 
 def body_tracks(

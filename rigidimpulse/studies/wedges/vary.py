@@ -145,7 +145,7 @@ def with_parameter(scene: Scene, name: str, value: Any) -> Scene:
 def _splits(name: str) -> list[tuple[str | None, list[str]]]:
     """Ways to read a name: a field alone, or the name of a thing, which may have dots, and its field."""
     words = name.split(".")
-    return [(None, words)] + [(".".join(words[:k]), words[k:]) for k in range(1, len(words))]
+    return [(None, words), *((".".join(words[:k]), words[k:]) for k in range(1, len(words)))]
 
 
 def _is_meant(thing: Any, start: str | None, path: list[str]) -> bool:

@@ -106,7 +106,9 @@ def run_dask(jobs: Sequence[TakeJob], scheduler: str, processes: int, retries: i
         raise SceneError("a scheduler needs the library distributed", "pip install rigidimpulse[dask]") from None
     with _one_thread():
         try:
-            where: Any = LocalCluster(processes, threads_per_worker=1, dashboard_address=None) if scheduler == "local" else scheduler
+            where: Any = scheduler
+            if scheduler == "local":
+                where = LocalCluster(processes, threads_per_worker=1, dashboard_address=":0")
             client = Client(where, timeout="10s")
         except (OSError, ValueError) as error:
             raise SceneError(f"no Dask scheduler at {scheduler!r}: {error}", "give tcp://HOST:PORT, or 'local'") from None

@@ -80,15 +80,15 @@ const RING_FRAGMENT = `
   }`;
 
 /* One set of instances drawn twice: as it is, and faintly where something hides it. */
-function instancedPair(geometry, vertexShader, fragmentShader, group) {
-  const shape = new THREE.InstancedBufferAttribute(new Float32Array(3 * MOST_ARROWS), 3);
+function instancedPair(geometry, vertexShader, fragmentShader, group, most, colour) {
+  const shape = new THREE.InstancedBufferAttribute(new Float32Array(3 * most), 3);
   geometry.setAttribute("shape", shape);
   const meshes = [[THREE.LessEqualDepth, 1], [THREE.GreaterDepth, HIDDEN_OPACITY]].map(([depthFunc, strength]) => {
     const material = new THREE.ShaderMaterial({
       vertexShader, fragmentShader, depthFunc, depthWrite: false, transparent: true, toneMapped: false,
       side: THREE.DoubleSide, extensions: {derivatives: true}, polygonOffset: true, polygonOffsetFactor: -2,
-      polygonOffsetUnits: -8, uniforms: {colour: {value: new THREE.Color(ARROW_COLOUR)}, strength: {value: strength}}});
-    const mesh = new THREE.InstancedMesh(geometry, material, MOST_ARROWS);
+      polygonOffsetUnits: -8, uniforms: {colour: {value: new THREE.Color(colour)}, strength: {value: strength}}});
+    const mesh = new THREE.InstancedMesh(geometry, material, most);
     mesh.frustumCulled = false;
     mesh.renderOrder = 2;
     group.add(mesh);
@@ -115,8 +115,9 @@ class ImpactArrows {
     this.count = rows.length / ROW;
     this.visible = [];
     this.object = new THREE.Group();
-    this.rings = instancedPair(new THREE.PlaneGeometry(2, 2), RING_VERTEX, RING_FRAGMENT, this.object);
-    this.arrows = instancedPair(arrowGeometry(), ARROW_VERTEX, ARROW_FRAGMENT, this.object);
+    const pair = (geometry, vertex, fragment) => instancedPair(geometry, vertex, fragment, this.object, MOST_ARROWS, ARROW_COLOUR);
+    this.rings = pair(new THREE.PlaneGeometry(2, 2), RING_VERTEX, RING_FRAGMENT);
+    this.arrows = pair(arrowGeometry(), ARROW_VERTEX, ARROW_FRAGMENT);
   }
 
   /* First row at or after `time`. */

@@ -3,7 +3,6 @@
 
 const FADED = 0.6; // of the colour that a body beyond its horizon has lost
 const SEEN = 0.2; // pixels that a ghost must be away from its body to be drawn: outlines on top of each other would flicker
-const MARGIN = 1.05; // about the action, above the panel
 const CLICK = 4; // pixels that a pointer may move in a click
 
 /* Body names by mesh: those of run A, and of the ghosts. */
@@ -50,29 +49,23 @@ class Bodies {
   }
 }
 
-class ComparisonPanel {
+class ComparisonPanel extends Panel {
   constructor(viewer, stage, transport, manifest) {
-    Object.assign(this, {viewer, stage, transport, hovered: null, chosen: null});
+    super(viewer, stage, transport, "comparison", `<canvas id="apart" title="click to go there"></canvas>
+      <div id="legend"><div id="runs"></div><p id="who"></p><p id="distance"></p><p id="angle"></p><p id="trust"></p></div>`);
+    Object.assign(this, {hovered: null, chosen: null});
     const {labels, ghosts, nets, horizon} = manifest.comparison, {distance, angle} = viewer.scene_tree.find(["ghosts"]).object;
     this.ghosts = new Ghosts(viewer, manifest.comparison, transport.times);
     this.bodies = new Bodies(viewer, manifest, this.ghosts);
     this.build(labels);
-    this.plot = new Plot(element("apart"), transport.times, [...ghosts, ...nets].map(({name}) => name), distance, angle, horizon);
-    this.bindPlot();
+    this.plot = new DistancePlot(element("apart"), transport.times, [...ghosts, ...nets].map(({name}) => name), distance, angle, horizon);
     this.bindScene();
-    this.liftPicture();
-    window.addEventListener("resize", () => this.fit());
-    this.fit();
+    this.open([this.plot]);
   }
 
   get focus() { return this.hovered ?? this.chosen; }
 
   build(labels) {
-    const panel = document.createElement("section");
-    panel.id = "comparison";
-    panel.innerHTML = `<canvas id="apart" title="click to go there"></canvas>
-      <div id="legend"><div id="runs"></div><p id="who"></p><p id="distance"></p><p id="angle"></p><p id="trust"></p></div>`;
-    document.body.insertBefore(panel, document.querySelector("footer"));
     const label = document.createElement("div");
     label.id = "label";
     document.body.append(label);
@@ -97,16 +90,6 @@ class ComparisonPanel {
       if (!typing && !event.ctrlKey && !event.metaKey && !event.altKey && keys[event.key]) { keys[event.key](); }
     });
     element("keys").textContent += " \u00b7 1 2 runs \u00b7 click a body: its own curve";
-  }
-
-  bindPlot() {
-    const canvas = this.plot.canvas;
-    const seek = (event) => this.transport.seek(this.plot.timeAt(event.clientX - canvas.getBoundingClientRect().left));
-    canvas.addEventListener("pointerdown", (event) => {
-      canvas.setPointerCapture(event.pointerId);
-      seek(event);
-    });
-    canvas.addEventListener("pointermove", (event) => { if (event.buttons & 1) { seek(event); } });
   }
 
   bindScene() {
@@ -134,37 +117,8 @@ class ComparisonPanel {
     this.show();
   }
 
-  /* The camera looks at the action in the middle of what panel and bar leave free. */
-  liftPicture() {
-    const stage = this.stage, camera = this.viewer.camera, frame = stage.frameAction.bind(stage);
-    stage.frameAction = () => {
-      frame();
-      const target = this.viewer.controls.target, back = camera.position.clone().sub(target), distance = back.length();
-      const over = new THREE.Vector3(0, 1, 0).projectOnPlane(back.normalize()).normalize();
-      const tall = Math.tan((camera.fov * Math.PI) / 360), middle = stage.follow ? target : stage.centre;
-      const high = Math.max(...stage.framing.outline.map((point) => {
-        const from = new THREE.Vector3().fromArray(point).add(middle).sub(target);
-        return Math.abs(from.dot(over)) / (tall * (distance - from.dot(back)));
-      }));
-      const further = Math.max((MARGIN * high) / (1 - this.share), 1);
-      camera.position.copy(target).addScaledVector(back, further * distance);
-    };
-    camera.view = {enabled: true, fullWidth: 1, fullHeight: 1, offsetX: 0, offsetY: 0, width: 1, height: 1};
-  }
-
-  get share() { return Math.min(element("comparison").offsetHeight / window.innerHeight, 0.4); }
-
-  fit() {
-    const canvas = this.plot.canvas.getBoundingClientRect(), marks = element("marks").getBoundingClientRect();
-    element("legend").style.setProperty("--after", `${Math.round(canvas.right - marks.right)}px`);
-    this.plot.fit(marks.left + 8 - canvas.left, marks.right - 8 - canvas.left);
-    this.viewer.camera.view.offsetY = 0.5 * this.share;
-    this.fitted = element("marks").clientWidth;
-    this.show();
-  }
-
   show() {
-    if (element("marks").clientWidth !== this.fitted) { this.fit(); } // the clock beside the bar has grown
+    this.keepFitted();
     const {time, frame} = this.transport, focus = this.focus;
     this.ghosts.show(frame, time);
     for (const [name, until] of Object.entries(this.plot.horizon)) {
@@ -212,8 +166,8 @@ class ComparisonPanel {
 
 /* The page of one run knows nothing of a second one: this takes hold where everything of run A is there. */
 const exposeOneRun = expose;
-expose = (viewer, stage, transport, impacts, nets) => {
-  exposeOneRun(viewer, stage, transport, impacts, nets);
+expose = (viewer, stage, transport, parts) => {
+  exposeOneRun(viewer, stage, transport, parts);
   const panel = new ComparisonPanel(viewer, stage, transport, JSON.parse(element("manifest").textContent));
   const tell = transport.onTime, render = viewer.render.bind(viewer);
   transport.onTime = () => {

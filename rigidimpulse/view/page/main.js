@@ -1,17 +1,30 @@
-/* Puts the page together: meshcat's viewer, the shapes and tracks it was sent, and the manifest that names them. */
-
-const GRID_CELLS = 12; // about as many across the action
-const FIELD_OF_VIEW = 35; // degrees, up and down
-const CAMERA_MARGIN = 1.25;
-const CAMERA_DROP = 0.08; // looks below the middle by this share of the half height: the bar lies at the bottom
+/* Puts the page together: meshcat's viewer, what the page holds, and the manifest that names it. */
 
 function decode(base64) {
-  return Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+  const text = atob(base64.trim()), bytes = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; i++) { bytes[i] = text.charCodeAt(i); }
+  return bytes;
 }
 
 async function unpack(base64) {
   const stream = new Blob([decode(base64)]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/* The page's messages: returns a function that lets the viewer have those of the kinds that a test picks. */
+async function readMessages(viewer) {
+  const scripts = [...document.querySelectorAll("script.command")];
+  const messages = await Promise.all(scripts.map(async (script) => {
+    const message = await unpack(script.textContent);
+    script.textContent = ""; // it would be kept twice
+    return [script.dataset.kind, message];
+  }));
+  return (wanted) => messages.forEach((entry) => {
+    if (entry[1] !== null && wanted(entry[0])) {
+      viewer.handle_command_bytearray(entry[1]);
+      entry[1] = null;
+    }
+  });
 }
 
 /* meshcat builds geometries from its own messages; we keep the geometries and make the meshes ourselves. */
@@ -24,174 +37,76 @@ function takeGeometries(viewer, count) {
   return geometries;
 }
 
-function roundSpacing(length) {
-  const power = Math.pow(10, Math.floor(Math.log10(length)));
-  return power * [1, 2, 5, 10].find((step) => step * power >= 0.999 * length);
-}
-
-class Stage {
-  constructor(viewer, manifest) {
-    this.viewer = viewer;
-    this.framing = manifest.framing;
-    this.turn = new THREE.Quaternion().fromArray(this.framing.stage); // recorded frame to Y up
-    this.unturn = this.turn.clone().invert();
-    this.centre = new THREE.Vector3().fromArray(this.framing.centre); // Y up
-    this.radius = new THREE.Vector3().fromArray(this.framing.half).length();
-    this.nodes = new Map();
-    this.grounds = [];
-    this.surfaces = [];
-    this.follow = this.framing.follow;
-    viewer.scene.quaternion.copy(this.turn);
-    viewer.scene_tree.find(["Cameras", "default", "rotated"]).object.quaternion.copy(this.unturn);
-  }
-
-  recorded(point) { return point.clone().applyQuaternion(this.unturn); }
-
-  dress() {
-    const viewer = this.viewer;
-    dressRenderer(viewer.renderer);
-    for (const name of ["Grid", "Axes", "Lights"]) { viewer.delete_path([name]); }
-    viewer.scene_tree.find(["Background"]).on_update = () => viewer.set_dirty();
-    viewer.scene.background = null;
-    viewer.set_object(["sky"], makeSky());
-    this.light = makeKeyLight(this.turn, this.recorded(this.centre), 1.35 * this.radius);
-    viewer.set_object(["Lights", "key"], this.light);
-  }
-
-  addBody(body, geometries) {
-    const path = [body.group, body.key];
-    const object = new THREE.Group();
-    if (body.shape >= 0) {
-      const surface = makeSurface(body.surface);
-      this.surfaces.push(surface);
-      const mesh = new THREE.Mesh(geometries[body.shape], surface);
-      mesh.castShadow = true;
-      mesh.receiveShadow = true;
-      object.add(mesh);
-    }
-    for (const plane of body.planes) { object.add(this.makePlane(plane)); }
-    this.viewer.set_object(path, object);
-    const node = this.viewer.scene_tree.find(path).object;
-    node.position.fromArray(body.position);
-    node.quaternion.fromArray(body.quaternion);
-    this.nodes.set(body.name, node);
-  }
-
-  makePlane(plane) {
-    const spacing = roundSpacing((2 * this.radius) / GRID_CELLS);
-    const ground = makeGround(spacing, (plane.level ? 9 : 2.2) * this.radius, plane.level ? 1 : 0.8);
-    const normal = new THREE.Vector3().fromArray(plane.normal);
-    ground.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), normal);
-    ground.position.copy(normal).multiplyScalar(plane.offset);
-    this.grounds.push(ground);
-    return ground;
-  }
-
-  /* The nearest camera along the framing's view direction that sees the whole outline of the action, in the middle of
-     what the bar leaves free. Each round centres the picture of the outline and then steps back as far as needed. */
-  frameAction() {
-    const camera = this.viewer.camera, controls = this.viewer.controls;
-    camera.fov = FIELD_OF_VIEW;
-    const tall = Math.tan((camera.fov * Math.PI) / 360), wide = tall * (window.innerWidth / window.innerHeight);
-    const back = new THREE.Vector3().fromArray(this.framing.view);
-    const right = new THREE.Vector3(0, 1, 0).cross(back).normalize(), over = back.clone().cross(right);
-    const outline = this.framing.outline.map((point) => new THREE.Vector3().fromArray(point));
-    const target = new THREE.Vector3(), middle = (values) => (Math.min(...values) + Math.max(...values)) / 2;
-    let distance = 3 * this.radius;
-    for (let round = 0; round < 4; round++) {
-      const seen = outline.map((point) => {
-        const from = point.clone().sub(target);
-        return {across: from.dot(right), up: from.dot(over), near: from.dot(back)};
-      });
-      distance = Math.max(...seen.map(({across, up, near}) =>
-        near + CAMERA_MARGIN * Math.max(Math.abs(across) / wide, Math.abs(up) / tall)));
-      target.addScaledVector(right, distance * middle(seen.map(({across, near}) => across / (distance - near))));
-      target.addScaledVector(over, distance * middle(seen.map(({up, near}) => up / (distance - near))));
-    }
-    target.addScaledVector(over, -CAMERA_DROP * tall * distance).add(this.follow ? this.middleOfMovers() : this.centre);
-    controls.target.copy(target);
-    controls.minDistance = 0.02 * this.radius;
-    controls.maxDistance = 60 * this.radius;
-    camera.position.copy(target).addScaledVector(back, distance);
-    this.viewer.set_dirty();
-  }
-
-  middleOfMovers() {
-    const middle = new THREE.Vector3(), movers = this.framing.movers;
-    for (const name of movers) { middle.addScaledVector(this.nodes.get(name).position, 1 / movers.length); }
-    return movers.length > 0 ? middle.applyQuaternion(this.turn) : this.centre.clone();
-  }
-
-  /* Before every picture: the camera goes with the bodies if it follows; planes, light and depth range go with it. */
-  prepare() {
-    const camera = this.viewer.camera, target = this.viewer.controls.target;
-    if (this.follow) {
-      const shift = this.middleOfMovers().sub(target);
-      target.add(shift);
-      camera.position.add(shift);
-      this.light.aimAt(this.recorded(target));
-    }
-    const distance = camera.position.distanceTo(target);
-    camera.near = 0.01 * distance;
-    camera.far = 30 * (distance + this.radius);
-    for (const ground of this.grounds) {
-      const local = this.recorded(target);
-      ground.parent.worldToLocal(local.applyQuaternion(this.turn));
-      local.sub(ground.position).applyQuaternion(ground.quaternion.clone().invert());
-      ground.centreOn(local.x, local.y);
-    }
-  }
-}
-
 async function main() {
   const manifest = JSON.parse(element("manifest").textContent);
   const viewer = new MeshCat.Viewer(element("meshcat-pane"));
   viewer.gui.domElement.style.display = "none";
   const stage = new Stage(viewer, manifest);
   stage.dress();
-  const commands = [...document.querySelectorAll("script.command")];
-  const messages = await Promise.all(commands.map((script) => unpack(script.textContent)));
-  messages.filter((_, i) => commands[i].dataset.kind === "shape").forEach((m) => viewer.handle_command_bytearray(m));
+  const send = await readMessages(viewer);
+  send((kind) => kind === "shape");
   const geometries = takeGeometries(viewer, manifest.numShapes);
   manifest.bodies.forEach((body) => stage.addBody(body, geometries));
-  messages.filter((_, i) => commands[i].dataset.kind !== "shape").forEach((m) => viewer.handle_command_bytearray(m));
+  motionSource.animate(viewer, stage, send);
+  send(() => true);
 
-  const {times, rows} = viewer.scene_tree.find(["impacts"]).object;
-  const impacts = new ImpactArrows(rows, manifest.fade);
-  viewer.set_object(["impacts"], impacts.object);
-  const nets = makeNets(viewer, manifest.nets, times);
-  nets.forEach((net) => stage.surfaces.push(net.surface));
+  const {times, rows, marks} = viewer.scene_tree.find(["impacts"]).object;
+  const contactRows = viewer.scene_tree.find(["contacts"]).object.rows;
+  const parts = {
+    impacts: new ImpactArrows(rows, manifest.fade),
+    contacts: manifest.contacts ? new ContactArrows(contactRows) : null,
+    shapes: new SimulatedShapes(stage, manifest, geometries),
+    nets: makeNets(viewer, manifest.nets, times),
+  };
+  viewer.set_object(["impacts"], parts.impacts.object);
+  if (parts.contacts) { viewer.set_object(["contacts"], parts.contacts.object); }
+  parts.nets.forEach((net) => stage.surfaces.push(net.surface));
   const transport = new Transport(viewer.animator, times, () => {
-    impacts.show(transport.time);
-    nets.forEach((net) => net.show(transport.frame, transport.time));
+    parts.impacts.show(transport.time);
+    parts.contacts?.show(transport.frame);
+    parts.nets.forEach((net) => net.show(transport.frame, transport.time));
+    parts.trails.show(transport.time);
     bar.update();
+    parts.ledger?.show();
   });
-  const bar = makeBar(transport, rows);
-  startViewing(viewer, stage, transport, bar);
-  expose(viewer, stage, transport, impacts, nets);
+  parts.trails = new Trails(viewer, stage, manifest, times);
+  const bar = makeBar(transport, marks);
+  if (manifest.ledger) {
+    parts.ledger = new LedgerPanel(viewer, stage, transport, viewer.scene_tree.find(["ledger"]).object.curves,
+      manifest.ledger.energySpan);
+  }
+  startViewing(viewer, stage, transport, bar, parts);
+  expose(viewer, stage, transport, parts);
   element("summary").textContent = manifest.summary;
   transport.seek(transport.start);
   transport.play();
 }
 
-function startViewing(viewer, stage, transport, bar) {
+function startViewing(viewer, stage, transport, bar, parts) {
   const layer = (label, key, set, on = true) => ({
     label, key, on, set: (shown) => { set(shown); viewer.set_dirty(); }});
   const folder = (name) => (shown) => { viewer.scene_tree.find([name]).object.visible = shown; };
+  const {impacts, contacts, shapes, trails, ledger} = parts;
   const keys = makeLayers([
     layer("Bodies", "b", folder("bodies")),
-    layer("Impacts", "i", folder("impacts")),
+    impacts.count > 0 && layer("Impacts", "i", folder("impacts")),
+    contacts && layer("Contacts", "c", (on) => contacts.turn(on, transport.frame), false),
+    trails.movers.length > 0 && layer("Trails", "r", (on) => trails.turn(on, transport.time), false),
     layer("Ground", "g", folder("ground")),
+    shapes.differ && layer("As simulated", "s", (on) => shapes.turn(on), false),
     layer("Wireframe", "w", (on) => stage.surfaces.forEach((surface) => { surface.wireframe = on; }), false),
     layer("Track", "t", (on) => { stage.follow = on; }, stage.follow),
+    ledger && layer("Plots", "p", (on) => ledger.turn(on), ledger.shown),
     layer("More", "m", (on) => {
       viewer.gui.domElement.style.display = on ? "" : "none";
       viewer.gui.open();
     }, false),
-  ]);
+  ].filter(Boolean));
   keys.f = () => stage.frameAction();
   keys.l = bar.flipLoop;
   keys.u = () => document.body.classList.toggle("bare");
+  keys["-"] = () => bar.changeSpeed(-1);
+  keys["+"] = keys["="] = () => bar.changeSpeed(1);
   bindKeys(transport, keys);
   const render = viewer.render.bind(viewer);
   viewer.render = () => {
@@ -202,10 +117,12 @@ function startViewing(viewer, stage, transport, bar) {
 }
 
 /* For scripts and tests. */
-function expose(viewer, stage, transport, impacts, nets) {
+function expose(viewer, stage, transport, {impacts, contacts, shapes, trails, nets, ledger}) {
   window.rigidimpulse = {
     get time() { return transport.time; },
+    get frame() { return transport.frame; },
     get playing() { return transport.playing; },
+    get speed() { return transport.speed; },
     duration: transport.end - transport.start,
     play: () => transport.play(),
     pause: () => transport.pause(),
@@ -216,6 +133,10 @@ function expose(viewer, stage, transport, impacts, nets) {
     },
     vertices: (number) => [...nets[number].geometry.attributes.position.array],
     visibleArrows: () => (impacts.object.parent.visible ? impacts.visible : []),
+    contacts: () => (contacts?.shown ? contacts.visible : []),
+    trail: (name) => trails.path(name),
+    simulated: () => shapes.shown,
+    ledger,
     viewer,
   };
 }

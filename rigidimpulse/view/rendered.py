@@ -1,0 +1,97 @@
+"""Meshes that are drawn of bodies whose shape is another one: those of the file that a scene was read from.
+
+A node's vertices v, in its own space, lie in the rigid frame (x, Q) of its body at
+
+    Q^T (M v + p - x)
+
+with M and p the linear part and the origin of the node's world matrix at rest.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigidimpulse.errors import SceneError
+from rigidimpulse.view.display import DisplayMesh, shade
+
+if TYPE_CHECKING:
+    from rigidimpulse.io.gltf.geometry import Meshes
+
+ON_SHAPE = 1e-5
+"""Distance, relative to the size, up to which the vertices of a mesh are those of another."""
+FINER = 0.08
+"""The same of a finer one from its nearest vertices: a sphere of 64 segments and one of 32 are alike."""
+AREA = 0.02
+"""Relative difference of the areas of meshes that are alike."""
+
+
+def rendered_meshes(scene: Any, collision: dict[str, DisplayMesh]) -> dict[str, DisplayMesh]:
+    """Return what is drawn of bodies, in their frames, by name; bodies that look as they collide are not in it.
+
+    Args:
+        scene: of the recording.
+        collision: what the shapes of bodies look like, by name.
+
+    """
+    origin = getattr(scene, "origin", None)
+    if origin is None or not hasattr(origin, "node_of"):
+        return {}
+    from rigidimpulse.io.gltf.geometry import Meshes
+
+    hierarchy = origin.animations.hierarchy
+    meshes, bodies, drawn = Meshes(hierarchy), set(origin.node_of.values()), {}
+    for name, node in origin.node_of.items():
+        if name not in collision:
+            continue
+        pieces = _pieces(meshes, node, bodies)
+        if pieces:
+            mesh = _joined(pieces)
+            if not _alike(mesh, collision[name]):
+                drawn[name] = mesh
+    return drawn
+
+
+def _pieces(meshes: Meshes, body: int, bodies: set[int]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Vertices (v, 3) in the frame of a body and faces of all meshes at and below its node, but for those of other bodies."""
+    hierarchy, pieces, stack = meshes.hierarchy, [], [body]
+    while stack:
+        node = stack.pop()
+        stack += [child for child in hierarchy.nodes[node].children if child not in bodies]
+        try:
+            vertices, faces = meshes.of_node(node)
+        except SceneError:  # no mesh, or none that can be read: the loader has said so where it matters
+            continue
+        from rigidimpulse.rotation import to_matrix
+
+        position, rotation, stretch = hierarchy.scale_seen_from(node, body)
+        linear = to_matrix(rotation) @ stretch
+        pieces.append((vertices @ linear.T + position, faces[:, ::-1] if np.linalg.det(linear) < 0.0 else faces))
+    return pieces
+
+
+def _joined(pieces: list[tuple[np.ndarray, np.ndarray]]) -> DisplayMesh:
+    """One mesh with vertices at the same place taken together, so that its normals are smooth across seams of the file."""
+    starts = np.cumsum([0] + [len(vertices) for vertices, _ in pieces[:-1]])
+    vertices = np.concatenate([vertices for vertices, _ in pieces])
+    faces = np.concatenate([faces + start for (_, faces), start in zip(pieces, starts, strict=True)])
+    unique, index = np.unique(vertices, axis=0, return_inverse=True)
+    faces = index.reshape(-1)[faces]
+    proper = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return shade(unique, faces[proper])
+
+
+def _alike(drawn: DisplayMesh, shape: DisplayMesh) -> bool:
+    """Whether a mesh is a shape's own, perhaps with fewer triangles where that is round."""
+    from scipy.spatial import KDTree
+
+    size = float(np.ptp(shape.vertices, axis=0).max())
+    off, gap = (float(KDTree(a.vertices).query(b.vertices)[0].max()) for a, b in ((shape, drawn), (drawn, shape)))
+    return off <= ON_SHAPE * size and gap <= FINER * size and abs(_area(drawn) / _area(shape) - 1.0) <= AREA
+
+
+def _area(mesh: DisplayMesh) -> float:
+    """Area, m^2."""
+    corners = mesh.vertices[mesh.faces]
+    return 0.5 * float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
