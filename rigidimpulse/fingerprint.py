@@ -29,6 +29,13 @@ def fingerprint(scene: Scene, *more: object) -> str:
     return digest.hexdigest()[:16]
 
 
+def digest_of(value: Any) -> str:
+    """Hash of a value, such as a shape: equal for equal ones."""
+    digest = hashlib.sha256()
+    _feed(digest, value)
+    return digest.hexdigest()
+
+
 def _feed(digest: Any, value: Any, within: tuple[int, ...] = ()) -> None:
     """Add a value: numbers and texts as they are, arrays by their bytes, objects by the names and values of their fields.
 

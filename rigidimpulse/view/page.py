@@ -59,7 +59,7 @@ def assemble(
 ) -> str:
     """Return the HTML page of a manifest and messages as in `contents`, with these files of `page/`."""
     files = resources.files("rigidimpulse.view") / "page"
-    viewer = _meshcat_files()
+    viewer = viewer_files()
     fields = {
         "title": html.escape(title),
         "style": "\n".join((files / name).read_text(encoding="utf-8") for name in styles),
@@ -69,7 +69,11 @@ def assemble(
         "manifest": json.dumps(manifest, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"),
         "script": "\n".join((files / name).read_text(encoding="utf-8") for name in scripts),
     }
-    page = (files / "page.html").read_text(encoding="utf-8")
+    return fill_template((files / "page.html").read_text(encoding="utf-8"), fields)
+
+
+def fill_template(page: str, fields: dict[str, str]) -> str:
+    """Return the template with its fields, {{name}}, filled in."""
     # Cut the template at its fields first, so that braces in a name or in a script are never taken for a field.
     pieces = []
     for piece in page.split("{{"):
@@ -78,7 +82,7 @@ def assemble(
     return "".join(pieces)
 
 
-def _meshcat_files() -> Any:
+def viewer_files() -> Any:
     """Return the folder of meshcat's viewer."""
     return resources.files("meshcat") / "viewer" / "dist"
 

@@ -20,6 +20,9 @@ from rigidimpulse.studies.wedges.workers import run_dask, run_here, run_pool
 
 MEASURES = {"impacts": "", "kinetic": "J", "potential": "J", "dissipated": "J", "travel": "m", "seconds": "s"}
 """Columns of the table besides the parameters, and their units."""
+LABELS = {name: f"{unit} {name}".strip() for name, unit in MEASURES.items()} | {"seconds": "s computed"}
+MOST_FINAL = 2
+"""Bodies at most whose last place stands on the sheet."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +124,7 @@ def wedge(
             progress(take)
     result = Wedge(Path(folder), sorted(takes, key=lambda take: take.number), jobs)
     _write_table(result)
+    _write_sheet(result, Path(named).stem if named is not None else getattr(scene, "__name__", "scene"))
     return result
 
 
@@ -139,3 +143,24 @@ def _write_table(result: Wedge) -> None:
             csv.writer(file).writerows(result.rows())
 
     write_renamed(result.folder / "wedge.csv", write)
+
+
+def _write_sheet(result: Wedge, title: str) -> None:
+    """Write index.html: all takes side by side."""
+    from rigidimpulse.view.sheet import Card, write_sheet
+
+    cards = []
+    for take, job in zip(result.takes, result.jobs, strict=True):
+        done = take.outcome != FAILED
+        measures = {LABELS[name]: float(getattr(take, name)) for name in MEASURES}
+        recording = result.recording(take.number) if done else None
+        page = job.stem.with_suffix(".html").name if done else ""
+        told = (take.parameters, measures if done else {}, take.outcome, take.message, _final(take))
+        cards.append(Card(str(take.number), recording, page, *told))
+    write_renamed(result.folder / "index.html", lambda target: write_sheet(target, cards, title))
+
+
+def _final(take: Take) -> str:
+    """Where the bodies of a take end, if they are few."""
+    places = [f"{name} ends at ({', '.join(f'{x:.3g}' for x in pose[0])}) m" for name, pose in take.final.items()]
+    return "; ".join(places) if len(places) <= MOST_FINAL else ""

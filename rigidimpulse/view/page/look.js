@@ -184,3 +184,27 @@ function makeSurface(surface) {
   material.customProgramCacheKey = () => (surface.octants ? "octants" : "plain");
   return material;
 }
+
+/* Right and up of a camera that looks against `back`. */
+function acrossAndUp(back) {
+  const right = new THREE.Vector3(0, 1, 0).cross(back).normalize();
+  return {right, over: back.clone().cross(right)};
+}
+
+/* The nearest view along `back` of all points of an outline: the point in its middle, and the distance from there. tall, wide: tangents
+   of half the field of view. Each round centres the picture of the outline and then steps back as far as needed. */
+function nearestView(outline, back, tall, wide, margin, distance) {
+  const {right, over} = acrossAndUp(back), target = new THREE.Vector3();
+  const points = outline.map((point) => new THREE.Vector3().fromArray(point));
+  const middle = (values) => (Math.min(...values) + Math.max(...values)) / 2;
+  for (let round = 0; round < 4; round++) {
+    const seen = points.map((point) => {
+      const from = point.clone().sub(target);
+      return {across: from.dot(right), up: from.dot(over), near: from.dot(back)};
+    });
+    distance = Math.max(...seen.map(({across, up, near}) => near + margin * Math.max(Math.abs(across) / wide, Math.abs(up) / tall)));
+    target.addScaledVector(right, distance * middle(seen.map(({across, near}) => across / (distance - near))));
+    target.addScaledVector(over, distance * middle(seen.map(({up, near}) => up / (distance - near))));
+  }
+  return {target, distance};
+}

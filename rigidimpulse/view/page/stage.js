@@ -73,26 +73,13 @@ class Stage {
   }
 
   /* The nearest camera along the framing's view direction that sees the whole outline of the action, in the middle of
-     what the bar leaves free. Each round centres the picture of the outline and then steps back as far as needed. */
+     what the bar leaves free. */
   frameAction() {
     const camera = this.viewer.camera, controls = this.viewer.controls;
     camera.fov = FIELD_OF_VIEW;
     const tall = Math.tan((camera.fov * Math.PI) / 360), wide = tall * (window.innerWidth / window.innerHeight);
-    const back = new THREE.Vector3().fromArray(this.framing.view);
-    const right = new THREE.Vector3(0, 1, 0).cross(back).normalize(), over = back.clone().cross(right);
-    const outline = this.framing.outline.map((point) => new THREE.Vector3().fromArray(point));
-    const target = new THREE.Vector3(), middle = (values) => (Math.min(...values) + Math.max(...values)) / 2;
-    let distance = 3 * this.radius;
-    for (let round = 0; round < 4; round++) {
-      const seen = outline.map((point) => {
-        const from = point.clone().sub(target);
-        return {across: from.dot(right), up: from.dot(over), near: from.dot(back)};
-      });
-      distance = Math.max(...seen.map(({across, up, near}) =>
-        near + CAMERA_MARGIN * Math.max(Math.abs(across) / wide, Math.abs(up) / tall)));
-      target.addScaledVector(right, distance * middle(seen.map(({across, near}) => across / (distance - near))));
-      target.addScaledVector(over, distance * middle(seen.map(({up, near}) => up / (distance - near))));
-    }
+    const back = new THREE.Vector3().fromArray(this.framing.view), over = acrossAndUp(back).over;
+    const {target, distance} = nearestView(this.framing.outline, back, tall, wide, CAMERA_MARGIN, 3 * this.radius);
     target.addScaledVector(over, -CAMERA_DROP * tall * distance).add(this.follow ? this.middleOfMovers() : this.centre);
     controls.target.copy(target);
     controls.minDistance = 0.02 * this.radius;
