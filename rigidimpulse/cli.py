@@ -10,10 +10,10 @@ import click
 
 import rigidimpulse
 from rigidimpulse.cli_studies import compare, hardcases, study
+from rigidimpulse.files import ANIMATED_SUFFIXES
 from rigidimpulse.jobs import (
     BAD_SCENE,
     CHECK_FAILED,
-    SCENE_SUFFIXES,
     find_job,
     given_options,
     job_of,
@@ -77,14 +77,19 @@ def run_options(command: Callable) -> Callable:
 
 def export_options(command: Callable) -> Callable:
     """Add the options of commands that write recordings."""
-    command = click.option("--impact-keys", is_flag=True, help="Have keys at impacts between frames in .glb and .gltf, too.")(command)
-    command = click.option("--tolerance", type=float, help="Leave out keys in .glb and .gltf that no point misses by more, m.")(command)
-    return click.option("--start-frame", type=float, default=0.0, help="Number of the first frame in .glb and .gltf: 1001.")(command)
+    for option in (
+        click.option("--samples", type=int, default=1, help="Keys a frame in glTF and USD files, for motion blur."),
+        click.option("--impact-keys", is_flag=True, help="Have keys at impacts between frames in glTF and USD files, too."),
+        click.option("--tolerance", type=float, help="Leave out keys in glTF and USD files that no point misses by more, m."),
+        click.option("--start-frame", type=float, default=0.0, help="Number of the first frame in glTF and USD files: 1001."),
+    ):
+        command = option(command)
+    return command
 
 
 @main.command()
 @click.argument("name", required=False)
-@click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html, .npz, .glb or .gltf.")
+@click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html, .npz, .glb, .gltf or .usd.")
 @export_options
 @run_options
 def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:
@@ -114,7 +119,7 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, *
 
 @main.command()
 @click.argument("scene")
-@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html, .npz, .glb or .gltf.")
+@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html, .npz, .glb, .gltf or .usd.")
 @export_options
 @run_options
 def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:
@@ -162,7 +167,7 @@ def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
 
 def _export_settings(settings: dict[str, Any]) -> dict[str, Any]:
     """Take out and return the options of `export_options`."""
-    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys")}
+    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys", "samples")}
 
 
 def _print_checks(checks: Sequence[Check]) -> bool:
@@ -177,7 +182,7 @@ def _print_checks(checks: Sequence[Check]) -> bool:
 def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str, Any]) -> None:
     """Write the recording where it was asked for, and open it; keys: options of animated nodes."""
     for target in output:
-        path = run.export(target, **(keys if Path(target).suffix in SCENE_SUFFIXES else {}))
+        path = run.export(target, **(keys if Path(target).suffix in ANIMATED_SUFFIXES else {}))
         click.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
     if view:
         show(run)

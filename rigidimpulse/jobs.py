@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from rigidimpulse.files import ANIMATED_SUFFIXES
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from rigidimpulse.studies.wishes import Wish
 
 SCENE_SUFFIXES = (".glb", ".gltf")
-OUTPUT_SUFFIXES = (".html", ".npz", ".glb", ".gltf")
+OUTPUT_SUFFIXES = (".html", ".npz", *ANIMATED_SUFFIXES)
 DEFAULT_DURATION = 4.0
 """s, of scenes from files."""
 DEFAULT_FPS = 60.0
