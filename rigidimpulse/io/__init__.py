@@ -1,6 +1,7 @@
 """Scenes from files and motion to files. Nothing here is imported before it is used.
 
-scene_file  scenes by suffix       keys    times and poses of a body's animation
-motion      keys of a whole run    origin  what is kept of a file
-gltf, usd   by format
+scene_file   scenes by suffix                        pieces   colliders joined to bodies, and weighed
+motion_file  motion by suffix                        jointed  bodies that touch at a joint
+motion       keys of a whole run                     origin   what is kept of a file
+keys         times and poses of a body's animation   gltf, usd: by format
 """

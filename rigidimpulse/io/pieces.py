@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,12 +53,12 @@ def _hull(shape: Shape) -> Shape:
     return Shape.convex_hull(shape) if shape.kind == "mesh" else shape
 
 
-def fill_mass(name: str, shape: Shape, values: dict[str, Any], notes: list[str]) -> None:
+def fill_mass(name: str, shape: Shape, values: dict[str, Any], notes: list[str], density: float = DENSITY) -> None:
     """Where colliders enclose no volume, take what is not given of the mass properties from their hulls.
 
     Args:
         name: of the body. shape: its shape. values: arguments of the `Body`, which may have mass [kg], inertia [kg m^2] and
-            center_of_mass [m]; those missing are added. notes: where a line of the report goes.
+            center_of_mass [m]; those missing are added. notes: where a line of the report goes. density: kg/m^3, of a body without mass.
 
     Raises:
         SceneError: the hulls have no volume either.
@@ -76,11 +77,49 @@ def fill_mass(name: str, shape: Shape, values: dict[str, Any], notes: list[str])
     except SceneError as error:
         raise error.within(f"body {name!r}") from None
     notes.append(f"body {name!r} encloses no volume ({problem}): its mass properties are those of the convex hull")
-    values.setdefault("mass", DENSITY * solid.volume)
+    values.setdefault("mass", density * solid.volume)
     values.setdefault("center_of_mass", solid.centroid)
     off = np.asarray(values["center_of_mass"]) - solid.centroid
-    moved = solid.inertia + solid.volume * (off @ off * np.eye(3) - np.outer(off, off))
+    moved = solid.inertia + solid.volume * moved_unit(off)
     values.setdefault("inertia", values["mass"] / solid.volume * moved)
+
+
+class Weight(NamedTuple):
+    """Mass properties of a body: mass kg, center_of_mass (3,) m and inertia (3, 3) kg m^2 about it, in its frame."""
+
+    mass: float
+    center_of_mass: np.ndarray
+    inertia: np.ndarray
+
+
+def weighed(pieces: list[Piece], masses: Sequence[float | None], densities: Sequence[float]) -> Weight:
+    """Return the mass properties of pieces of unlike density.
+
+    Args:
+        pieces: colliders; of open meshes the hull counts. masses: kg, None where density says. densities: kg/m^3.
+
+    Raises:
+        SceneError: a piece has no volume.
+
+    """
+    parts = []
+    for piece, mass, density in zip(pieces, masses, densities, strict=True):
+        try:
+            solid = Shape.compound([(piece.shape, piece.position, piece.orientation)]).solid()
+        except SceneError:
+            solid = Shape.compound([(_hull(piece.shape), piece.position, piece.orientation)]).solid()
+        parts.append((density if mass is None else mass / solid.volume, solid))
+    total = sum(density * solid.volume for density, solid in parts)
+    centre = sum((density * solid.volume * solid.centroid for density, solid in parts), np.zeros(3)) / total
+    inertia = np.zeros((3, 3))
+    for density, solid in parts:
+        inertia += density * (solid.inertia + moved_unit(solid.centroid - centre) * solid.volume)
+    return Weight(total, centre, inertia)
+
+
+def moved_unit(way: np.ndarray) -> np.ndarray:
+    """Return the inertia (3, 3) that a unit of mass gains when it is moved by `way` (3,) off the axes (Steiner)."""
+    return way @ way * np.eye(3) - np.outer(way, way)
 
 
 def rim_points() -> np.ndarray:

@@ -7,14 +7,22 @@ rotation nearest to M (polar decomposition). A mirror is in K.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 
+from rigidimpulse.errors import SceneError
 from rigidimpulse.io.usd.library import Prim, Stage, Usd, UsdGeom
 from rigidimpulse.rotation import from_matrix, quaternion_continuity
 
 EVEN = 1e-6
 """Unevenness of a scale, relative, that is none."""
 ORTHOGONAL = 1e-9
+FLAT = 1e-9
+"""Determinant over the product of the lengths of columns, below which a matrix flattens space."""
+LARGEST = 1e9
+"""m, greatest number that makes sense."""
 SNAP = 1e-12
 """Entries of K nearer to 0 and 1 than this, relative to the largest, are 0 and 1: round-off of rotations."""
 
@@ -37,7 +45,15 @@ class Frames:
 
     def matrix(self, prim: Prim) -> np.ndarray:
         """World matrix (4, 4) of a prim, acting on columns, in units of the file."""
-        return np.array(self._cache.GetLocalToWorldTransform(prim)).T
+        return self._checked(self._cache, prim)
+
+    def _checked(self, cache: Any, prim: Prim) -> np.ndarray:
+        """World matrix (4, 4) of a prim by a cache; raises a `SceneError` where it is none."""
+        matrix = np.array(cache.GetLocalToWorldTransform(prim)).T
+        columns = np.linalg.norm(matrix[:3, :3], axis=0)
+        if not np.abs(matrix).max() * self.meters_per_unit <= LARGEST or not abs(np.linalg.det(matrix[:3, :3])) > FLAT * columns.prod():
+            raise SceneError("its transform is not finite, flattens space or is beyond all bounds", "correct it", f"prim {prim.GetPath()}")
+        return matrix
 
     def rigid(self, prim: Prim) -> tuple[np.ndarray, np.ndarray]:
         """Position (3,) m and rotation Q (3, 3) of a prim."""
@@ -48,6 +64,15 @@ class Frames:
         """K (3, 3) of a prim."""
         linear = self.matrix(prim)[:3, :3]
         return snapped(rotation_of(linear).T @ linear)
+
+    def prims(self) -> Iterator[Prim]:
+        """All prims that are there, those of instances too, in the order of the file."""
+        return iter(self.stage.Traverse(Usd.TraverseInstanceProxies()))
+
+    def is_animated(self, prim: Prim) -> bool:
+        """Whether a prim has transforms of its own that vary with time."""
+        xform = UsdGeom.Xformable(prim)
+        return bool(xform) and xform.TransformMightBeTimeVarying()
 
     def moves(self, prim: Prim) -> bool:
         """Whether a prim, or one above it, has transforms that vary with time."""
@@ -80,7 +105,7 @@ class Frames:
         codes = codes[np.concatenate([[True], np.diff(codes) > 1e-6 * step])]
         places, turns = np.zeros((len(codes), 3)), np.zeros((len(codes), 4))
         for k, code in enumerate(codes.tolist()):
-            matrix = np.array(UsdGeom.XformCache(Usd.TimeCode(code)).GetLocalToWorldTransform(prim)).T
+            matrix = self._checked(UsdGeom.XformCache(Usd.TimeCode(code)), prim)
             places[k], turns[k] = matrix[:3, 3] * self.meters_per_unit, from_matrix(rotation_of(matrix[:3, :3]))
         return (codes - self.start) / self.codes_per_second, places, quaternion_continuity(turns)
 
