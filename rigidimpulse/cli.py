@@ -56,8 +56,8 @@ class Commands(click.Group):
 def main() -> None:
     """Rigid bodies that collide exactly: mesh scenes in, accurate motion for animation out.
 
-    SCENE is the name of a gallery scene (`rigidimpulse demo` lists them), a .glb, .gltf or .usd file, or a file.py that defines
-    scene().
+    SCENE is the name of a gallery scene (`rigidimpulse demo` lists them), a .glb, .gltf, .usd, .urdf or .xml (MJCF) file, or a
+    file.py that defines scene().
     """
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rigidimpulse.studies.compare import Comparison
     from rigidimpulse.studies.wishes import Wish
 
-SCENE_SUFFIXES = ANIMATED_SUFFIXES
+SCENE_SUFFIXES = (*ANIMATED_SUFFIXES, ".urdf", ".xml", ".mjcf")
 OUTPUT_SUFFIXES = (".html", ".npz", *ANIMATED_SUFFIXES)
 DEFAULT_DURATION = 4.0
 """s, of scenes from files."""
@@ -85,7 +85,7 @@ def find_job(scene: str) -> Job:
     if path.suffix in SCENE_SUFFIXES:
         return Job(path.stem, partial(_load_scene, path), DEFAULT_DURATION, DEFAULT_FPS, "standard", None)
     if path.suffix or len(path.parts) > 1:
-        known = "a gallery scene (`rigidimpulse demo` lists them), a .glb, .gltf or .usd file, or a file.py that defines scene()"
+        known = "a gallery scene (`rigidimpulse demo` lists them), a .glb, .gltf, .usd, .urdf or .xml file, a file.py that defines scene()"
         raise SceneError(f"cannot read a scene from {scene!r}", f"supported: {known}")
     return job_of(gallery.load(scene))
 

@@ -15,23 +15,28 @@ logger = logging.getLogger("rigidimpulse")
 
 GLTF_SUFFIXES = (".glb", ".gltf")
 USD_SUFFIXES = (".usda", ".usdc", ".usd", ".usdz")
-SCENE_SUFFIXES = (*GLTF_SUFFIXES, *USD_SUFFIXES)
+SCENE_SUFFIXES = (*GLTF_SUFFIXES, *USD_SUFFIXES, ".urdf", ".xml", ".mjcf")
 GLTF_GRAVITY = (0.0, -9.81, 0.0)
 """m/s^2, of scenes that say nothing else: glTF is Y up."""
 
 
-def load_scene(path: str | os.PathLike[str], gravity: ArrayLike | None = None, *, allow_outside: bool = False) -> Scene:
+def load_scene(
+    path: str | os.PathLike[str], gravity: ArrayLike | None = None, *, allow_outside: bool = False, fixed_base: bool | None = None
+) -> Scene:
     """Read a scene from a file: the suffix says how.
 
     .glb, .gltf: glTF 2.0 with KHR_physics_rigid_bodies and KHR_implicit_shapes, or without physics, see docs/gltf.md.
     .usda, .usdc, .usd, .usdz: USD with UsdPhysics (extra `usd`), see docs/usd.md.
+    .urdf: robots, URDF; .xml, .mjcf: MuJoCo models, MJCF (extra `robot`), see docs/robots.md.
 
-    Bodies have the names of their nodes or prims. Units become metres, kilograms and radians; the up axis stays.
+    Bodies have the names of their nodes, prims or links. Units become metres, kilograms and radians; the up axis stays.
 
     Args:
         path: the file.
         gravity: (3,) m/s^2; by default what the file says of it, else 9.81 m/s^2 against its up axis.
-        allow_outside: let buffers of glTF files lie outside the folder of the file.
+        allow_outside: let files that a glTF file or a robot names lie outside the folder of the file.
+        fixed_base: of .urdf: whether the root link stands still; by default it does if it is called "world", or has no mass and
+            links move against it.
 
     Returns:
         The scene; `scene.report` lists, line by line, what of the file is not in it or not as it is written there.
@@ -51,6 +56,14 @@ def load_scene(path: str | os.PathLike[str], gravity: ArrayLike | None = None, *
         from rigidimpulse.io.usd.load import load_usd
 
         return load_usd(place, gravity)
+    if suffix == ".urdf":
+        from rigidimpulse.io.robots.urdf import load_urdf
+
+        return load_urdf(place, gravity, allow_outside, fixed_base)
+    if suffix in (".xml", ".mjcf"):
+        from rigidimpulse.io.robots.mjcf import load_mjcf
+
+        return load_mjcf(place, gravity, allow_outside)
     raise SceneError(f"cannot read a scene from {place.name!r}", f"give a file that ends in {', '.join(SCENE_SUFFIXES)}")
 
 
