@@ -90,7 +90,7 @@ def export_options(command: Callable) -> Callable:
 
 @main.command()
 @click.argument("name", required=False)
-@click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html, .npz, .glb, .gltf or .usd.")
+@click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html, .npz, .csv, .glb, .gltf or .usd.")
 @export_options
 @run_options
 def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:
@@ -120,7 +120,7 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, *
 
 @main.command()
 @click.argument("scene")
-@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html, .npz, .glb, .gltf or .usd.")
+@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html, .npz, .csv, .glb, .gltf or .usd.")
 @export_options
 @run_options
 def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:

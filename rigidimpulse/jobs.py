@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rigidimpulse.studies.wishes import Wish
 
 SCENE_SUFFIXES = (*ANIMATED_SUFFIXES, ".urdf", ".xml", ".mjcf")
-OUTPUT_SUFFIXES = (".html", ".npz", *ANIMATED_SUFFIXES)
+OUTPUT_SUFFIXES = (".html", ".npz", *ANIMATED_SUFFIXES, ".csv")
 DEFAULT_DURATION = 4.0
 """s, of scenes from files."""
 DEFAULT_FPS = 60.0

@@ -234,7 +234,7 @@ class Recording:
     ) -> Path:  # fmt: skip
         """Write the recording; the suffix says how.
 
-        .npz: arrays. .html: a page that plays it. .glb, .gltf: animated nodes of glTF. .usda, .usdc, .usd, .usdz: animated prims of
+        .npz: arrays. .csv: a table, one row a frame and body. .html: a page that plays it. .glb, .gltf: animated nodes of glTF. .usda, .usdc, .usd, .usdz: animated prims of
         USD (extra `usd`). A scene from a glTF or USD file is written as that file with its nodes or prims animated, into its own kind
         of file; any other as a node or prim a body. See docs/gltf.md and docs/usd.md.
 
@@ -247,7 +247,7 @@ class Recording:
             samples: of animated files: keys a frame, for motion blur; in between bodies turn evenly and fly on parabolas.
 
         Raises:
-            SceneError: for another suffix, an option that the format has not, or anything but .npz without a scene.
+            SceneError: for another suffix, an option that the format has not, or without a scene, which .npz and .csv do not need.
 
         """
         path = Path(path)
@@ -262,12 +262,16 @@ class Recording:
             raise SceneError(f"{names} for {path.name!r}", f"give them for {', '.join(ANIMATED_SUFFIXES)} only")
         if path.suffix == ".npz":
             return write_renamed(path, self._write_npz)
+        if path.suffix == ".csv":
+            from rigidimpulse.io.table import write_csv
+
+            return write_renamed(path, lambda target: write_csv(self, target))
         if path.suffix == ".html":
             self._need_scene("an HTML page")
             from rigidimpulse.view import write_html
 
             return write_renamed(path, lambda target: write_html(self, target))
-        raise SceneError(f"cannot export to {path.name!r}", f"use a name that ends in .npz, .html, {', '.join(ANIMATED_SUFFIXES)}")
+        raise SceneError(f"cannot export to {path.name!r}", f"use a name that ends in .npz, .csv, .html, {', '.join(ANIMATED_SUFFIXES)}")
 
     def show(self) -> Any:
         """Open the recording in the browser (meshcat); returns the viewer, which ends with the program.
