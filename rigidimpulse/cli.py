@@ -120,7 +120,7 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, *
 
 @main.command()
 @click.argument("scene")
-@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html, .npz, .csv, .glb, .gltf or .usd.")
+@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name in .html, .npz, .csv, .glb, .gltf or .usd.")
 @export_options
 @run_options
 def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:

@@ -42,10 +42,12 @@ def load_usd(path: Path, gravity: ArrayLike | None) -> Scene:
     except Tf.ErrorException as error:
         raise SceneError(f"it is no readable USD file ({_first(error)})", "export it again", where) from None
     try:
-        return _scene(stage, gravity)
+        # Transforms and points are looked at after they are computed, so what overflows here is no number that a message could miss.
+        with np.errstate(all="ignore"):
+            return _scene(stage, gravity)
     except SceneError as error:
         raise error.within(where) from None
-    except (Tf.ErrorException, RuntimeError) as error:
+    except (Tf.ErrorException, RuntimeError, TypeError, ValueError, ArithmeticError) as error:  # values of another type than their schema's
         raise SceneError(f"it could not be read ({_first(error)})", "export it again", where) from None
 
 
