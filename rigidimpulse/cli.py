@@ -11,11 +11,11 @@ import click
 import rigidimpulse
 from rigidimpulse.cli_studies import compare, hardcases, study
 from rigidimpulse.cli_wedge import wedge
+from rigidimpulse.files import ANIMATED_SUFFIXES
 from rigidimpulse.jobs import (
     BAD_SCENE,
     CHECK_FAILED,
     RECORDING_SUFFIXES,
-    SCENE_SUFFIXES,
     find_job,
     given_options,
     job_of,
@@ -58,7 +58,8 @@ class Commands(click.Group):
 def main() -> None:
     """Rigid bodies that collide exactly: mesh scenes in, accurate motion for animation out.
 
-    SCENE is the name of a gallery scene (`rigidimpulse demo` lists them), a .glb or .gltf file, or a file.py that defines scene().
+    SCENE is the name of a gallery scene (`rigidimpulse demo` lists them), a .glb, .gltf, .usd, .urdf or .xml (MJCF) file, or a
+    file.py that defines scene().
     """
 
 
@@ -80,14 +81,19 @@ def run_options(command: Callable) -> Callable:
 
 def export_options(command: Callable) -> Callable:
     """Add the options of commands that write recordings."""
-    command = click.option("--impact-keys", is_flag=True, help="Have keys at impacts between frames in .glb and .gltf, too.")(command)
-    command = click.option("--tolerance", type=float, help="Leave out keys in .glb and .gltf that no point misses by more, m.")(command)
-    return click.option("--start-frame", type=float, default=0.0, help="Number of the first frame in .glb and .gltf: 1001.")(command)
+    for option in (
+        click.option("--samples", type=int, default=1, help="Keys a frame in glTF and USD files, for motion blur."),
+        click.option("--impact-keys", is_flag=True, help="Have keys at impacts between frames in glTF and USD files, too."),
+        click.option("--tolerance", type=float, help="Leave out keys in glTF and USD files that no point misses by more, m."),
+        click.option("--start-frame", type=float, default=0.0, help="Number of the first frame in glTF and USD files: 1001."),
+    ):
+        command = option(command)
+    return command
 
 
 @main.command()
 @click.argument("name", required=False)
-@click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html, .npz, .glb or .gltf.")
+@click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html, .npz, .csv, .glb, .gltf or .usd.")
 @export_options
 @run_options
 def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, cache: str | None, **settings: Any) -> None:
@@ -117,7 +123,7 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, c
 
 @main.command()
 @click.argument("scene")
-@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name that ends in .html, .npz, .glb or .gltf.")
+@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name in .html, .npz, .csv, .glb, .gltf or .usd.")
 @export_options
 @run_options
 def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, cache: str | None, **settings: Any) -> None:
@@ -165,7 +171,7 @@ def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
 
 def _export_settings(settings: dict[str, Any]) -> dict[str, Any]:
     """Take out and return the options of `export_options`."""
-    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys")}
+    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys", "samples")}
 
 
 def _print_checks(checks: Sequence[Check]) -> bool:
@@ -180,7 +186,7 @@ def _print_checks(checks: Sequence[Check]) -> bool:
 def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str, Any]) -> None:
     """Write the recording where it was asked for, and open it; keys: options of animated nodes."""
     for target in output:
-        path = run.export(target, **(keys if Path(target).suffix in SCENE_SUFFIXES else {}))
+        path = run.export(target, **(keys if Path(target).suffix in ANIMATED_SUFFIXES else {}))
         click.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
     if view:
         show(run)

@@ -1,10 +1,13 @@
-"""Files that are there as a whole or not at all."""
+"""Files by suffix, and files that are there as a whole or not at all."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
 from pathlib import Path
+
+ANIMATED_SUFFIXES = (".glb", ".gltf", ".usda", ".usdc", ".usd", ".usdz")
+"""Of files with animated bodies."""
 
 
 def write_renamed(path: Path, write: Callable[[Path], object]) -> Path:

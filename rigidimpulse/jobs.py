@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from rigidimpulse.files import ANIMATED_SUFFIXES
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
@@ -18,8 +20,8 @@ if TYPE_CHECKING:
     from rigidimpulse.studies.compare import Comparison
     from rigidimpulse.studies.wishes import Wish
 
-SCENE_SUFFIXES = (".glb", ".gltf")
-OUTPUT_SUFFIXES = (".html", ".npz", ".glb", ".gltf")
+SCENE_SUFFIXES = (*ANIMATED_SUFFIXES, ".urdf", ".xml", ".mjcf")
+OUTPUT_SUFFIXES = (".html", ".npz", *ANIMATED_SUFFIXES, ".csv")
 RECORDING_SUFFIXES = (".npz", ".h5", ".hdf5")
 DEFAULT_DURATION = 4.0
 """s, of scenes from files."""
@@ -84,13 +86,13 @@ def find_job(scene: str) -> Job:
     if path.suffix in SCENE_SUFFIXES:
         return Job(path.stem, partial(_load_scene, path), DEFAULT_DURATION, DEFAULT_FPS, "standard", None)
     if path.suffix or len(path.parts) > 1:
-        known = "a gallery scene (`rigidimpulse demo` lists them), a .glb or .gltf file, or a file.py that defines scene()"
+        known = "a gallery scene (`rigidimpulse demo` lists them), a .glb, .gltf, .usd, .urdf or .xml file, a file.py that defines scene()"
         raise SceneError(f"cannot read a scene from {scene!r}", f"supported: {known}")
     return job_of(gallery.load(scene))
 
 
 def _load_scene(path: Path) -> Scene:
-    """Return the scene of a .glb or .gltf file; what of the file is not in it is printed."""
+    """Return the scene of a file; what of the file is not in it is printed."""
     from rigidimpulse.io.scene_file import load_scene
 
     scene = load_scene(path)

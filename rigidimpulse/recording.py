@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rigidimpulse.errors import SceneError, unknown_name
-from rigidimpulse.files import write_renamed
+from rigidimpulse.files import ANIMATED_SUFFIXES, write_renamed
 from rigidimpulse.observe.contacts import CONTACT_DTYPE, forces_on
 
 if TYPE_CHECKING:
@@ -229,38 +229,50 @@ class Recording:
         return digest.hexdigest()
 
     def export(
-        self, path: str | os.PathLike, *, start_frame: float = 0.0, tolerance: float | None = None, impact_keys: bool = False
-    ) -> Path:
-        """Write the recording; the suffix says how: .npz (arrays), .html (a page that plays it), .glb or .gltf (animated nodes).
+        self, path: str | os.PathLike, *, start_frame: float = 0.0, tolerance: float | None = None, impact_keys: bool = False,
+        only_moved: bool = True, samples: int = 1,
+    ) -> Path:  # fmt: skip
+        """Write the recording; the suffix says how.
 
-        A scene from a glTF file is written as that file with its nodes animated; any other as a node a body, Y up.
+        .npz: arrays. .csv: a table, one row a frame and body. .html: a page that plays it. .glb, .gltf: animated nodes of glTF.
+        .usda, .usdc, .usd, .usdz: animated prims of USD (extra `usd`). A scene from a glTF or USD file is written as that file
+        with its nodes or prims animated, into its own kind of file; any other as a node or prim a body. See docs/gltf.md and
+        docs/usd.md.
 
         Args:
             path: where to.
-            start_frame: of .glb and .gltf: number of the first frame, at the time start_frame / fps.
-            tolerance: of .glb and .gltf, m: leave out keys that no point of a body misses by more; None: a key a frame.
-            impact_keys: of .glb and .gltf: have keys at the impacts between frames of bodies that fly freely before and after.
+            start_frame: of animated files: number of the first frame, at the time start_frame / fps.
+            tolerance: of animated files, m: leave out keys that no point of a body misses by more; None: a key a frame.
+            impact_keys: of animated files: have keys at the impacts between frames of bodies that fly freely before and after.
+            only_moved: of animated files: bodies that do not move have no keys.
+            samples: of animated files: keys a frame, for motion blur; in between bodies turn evenly and fly on parabolas.
 
         Raises:
-            SceneError: for another suffix, an option that the format has not, or .html, .glb and .gltf without a scene.
+            SceneError: for another suffix, an option that the format has not, or without a scene, which .npz and .csv do not need.
 
         """
         path = Path(path)
-        if path.suffix in (".glb", ".gltf"):
-            self._need_scene("a glTF file")
-            from rigidimpulse.io.gltf.animate import write_motion
+        options = (start_frame, tolerance, impact_keys, only_moved, samples)
+        if path.suffix in ANIMATED_SUFFIXES:
+            self._need_scene("an animated file")
+            from rigidimpulse.io.motion_file import write_motion
 
-            return write_renamed(path, lambda target: write_motion(self, target, start_frame, tolerance, impact_keys))
-        if start_frame != 0.0 or tolerance is not None or impact_keys:
-            raise SceneError(f"start_frame, tolerance or impact_keys for {path.name!r}", "give them for .glb and .gltf only")
+            return write_motion(self, path, *options)
+        if options != (0.0, None, False, True, 1):
+            names = "start_frame, tolerance, impact_keys, only_moved or samples"
+            raise SceneError(f"{names} for {path.name!r}", f"give them for {', '.join(ANIMATED_SUFFIXES)} only")
         if path.suffix == ".npz":
             return write_renamed(path, self._write_npz)
+        if path.suffix == ".csv":
+            from rigidimpulse.io.table import write_csv
+
+            return write_renamed(path, lambda target: write_csv(self, target))
         if path.suffix == ".html":
             self._need_scene("an HTML page")
             from rigidimpulse.view import write_html
 
             return write_renamed(path, lambda target: write_html(self, target))
-        raise SceneError(f"cannot export to {path.name!r}", "use a name that ends in .npz, .html, .glb or .gltf")
+        raise SceneError(f"cannot export to {path.name!r}", f"use a name that ends in .npz, .csv, .html, {', '.join(ANIMATED_SUFFIXES)}")
 
     def show(self) -> Any:
         """Open the recording in the browser (meshcat); returns the viewer, which ends with the program.

@@ -15,7 +15,7 @@ from rigidimpulse.errors import SceneError, unknown_name
 from rigidimpulse.mass import body_mass
 
 if TYPE_CHECKING:
-    from rigidimpulse.io.gltf.origin import Origin
+    from rigidimpulse.io.origin import FileOrigin
 
 
 class Scene:
@@ -37,7 +37,7 @@ class Scene:
         self.gravity = gravity
         self._bodies: dict[str, Body] = {}
         self._effects: list[Any] = []
-        self.origin: Origin | None = None
+        self.origin: FileOrigin | None = None
         for body in bodies:
             self.add(body)
 

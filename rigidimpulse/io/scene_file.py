@@ -13,41 +13,64 @@ from rigidimpulse.scene import Scene
 
 logger = logging.getLogger("rigidimpulse")
 
-SCENE_SUFFIXES = (".glb", ".gltf")
+GLTF_SUFFIXES = (".glb", ".gltf")
+USD_SUFFIXES = (".usda", ".usdc", ".usd", ".usdz")
+SCENE_SUFFIXES = (*GLTF_SUFFIXES, *USD_SUFFIXES, ".urdf", ".xml", ".mjcf")
 GLTF_GRAVITY = (0.0, -9.81, 0.0)
 """m/s^2, of scenes that say nothing else: glTF is Y up."""
 
 
-def load_scene(path: str | os.PathLike[str], gravity: ArrayLike | None = None, *, allow_outside: bool = False) -> Scene:
-    """Read a scene from a .glb or .gltf file (glTF 2.0 with KHR_physics_rigid_bodies and KHR_implicit_shapes).
+def load_scene(
+    path: str | os.PathLike[str], gravity: ArrayLike | None = None, *, allow_outside: bool = False, fixed_base: bool | None = None
+) -> Scene:
+    """Read a scene from a file: the suffix says how.
 
-    Bodies have the names of their nodes, "node3" for one without. Metres, kilograms and Y up stay as they are. A file
-    without physics is taken as it looks: every node with a mesh is a body, see docs/gltf.md.
+    .glb, .gltf: glTF 2.0 with KHR_physics_rigid_bodies and KHR_implicit_shapes, or without physics, see docs/gltf.md.
+    .usda, .usdc, .usd, .usdz: USD with UsdPhysics (extra `usd`), see docs/usd.md.
+    .urdf: robots, URDF; .xml, .mjcf: MuJoCo models, MJCF (extra `robot`), see docs/robots.md.
+
+    Bodies have the names of their nodes, prims or links. Units become metres, kilograms and radians; the up axis stays.
 
     Args:
         path: the file.
-        gravity: (3,) m/s^2; by default what the file says of it, else (0, -9.81, 0).
-        allow_outside: let buffers lie outside the folder of the file.
+        gravity: (3,) m/s^2; by default what the file says of it, else 9.81 m/s^2 against its up axis.
+        allow_outside: let files that a glTF file or a robot names lie outside the folder of the file.
+        fixed_base: of .urdf: whether the root link stands still; by default it does if it is called "world", or has no mass and
+            links move against it.
 
     Returns:
         The scene; `scene.report` lists, line by line, what of the file is not in it or not as it is written there.
 
     Raises:
-        SceneError: no such file, another kind of file, or a broken one; names the file, the part and the remedy.
+        SceneError: no such file, another kind of file, a broken one, or a package that is not installed; names the file,
+            the part and the remedy.
 
     """
     place = Path(path)
-    if place.suffix.lower() not in SCENE_SUFFIXES:
-        raise SceneError(f"cannot read a scene from {place.name!r}", f"give a file that ends in {' or '.join(SCENE_SUFFIXES)}")
-    from rigidimpulse.io.gltf.load import load_gltf
+    suffix = place.suffix.lower()
+    if suffix in GLTF_SUFFIXES:
+        from rigidimpulse.io.gltf.load import load_gltf
 
-    return load_gltf(place, gravity, allow_outside)
+        return load_gltf(place, gravity, allow_outside)
+    if suffix in USD_SUFFIXES:
+        from rigidimpulse.io.usd.load import load_usd
+
+        return load_usd(place, gravity)
+    if suffix == ".urdf":
+        from rigidimpulse.io.robots.urdf import load_urdf
+
+        return load_urdf(place, gravity, allow_outside, fixed_base)
+    if suffix in (".xml", ".mjcf"):
+        from rigidimpulse.io.robots.mjcf import load_mjcf
+
+        return load_mjcf(place, gravity, allow_outside)
+    raise SceneError(f"cannot read a scene from {place.name!r}", f"give a file that ends in {', '.join(SCENE_SUFFIXES)}")
 
 
 def write_scene(scene: Scene, path: Path) -> Path:
     """Write a scene as a file with physics; see `Scene.export`."""
-    if path.suffix not in SCENE_SUFFIXES:
-        raise SceneError(f"cannot write a scene to {path.name!r}", f"use a name that ends in {' or '.join(SCENE_SUFFIXES)}")
+    if path.suffix not in GLTF_SUFFIXES:
+        raise SceneError(f"cannot write a scene to {path.name!r}", f"use a name that ends in {' or '.join(GLTF_SUFFIXES)}")
     from rigidimpulse.files import write_renamed
     from rigidimpulse.io.gltf.write import write_physics
 

@@ -5,7 +5,7 @@ nodes       hierarchy and transforms              animation       animated nodes
 geometry    meshes                                implicit        shapes given by figures
 load        a scene from a file                   bodies, joints  its bodies and joints
 plain       bodies of files without physics       origin          what is kept of the file
-keys        times and poses of an animation       animate         motion into a file
-draw        bodies without a file, as meshes      write           a scene as a file with physics
-write_joints, own_materials                       its joints, and what only our files say of materials
+draw        bodies without a file, as meshes      animate         motion into a file
+write, write_joints    a scene as a file with physics, its joints
+own_materials          what only our files say of materials
 """

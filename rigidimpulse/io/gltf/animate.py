@@ -12,7 +12,6 @@ written, and logged. Only what moves has keys; channels that the file has for no
 from __future__ import annotations
 
 import logging
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +20,11 @@ import numpy as np
 from rigidimpulse.errors import SceneError
 from rigidimpulse.io.gltf.container import Builder
 from rigidimpulse.io.gltf.draw import Drawing, new_file, node_pose, stage
-from rigidimpulse.io.gltf.keys import Keys, reduced
-from rigidimpulse.io.gltf.keys import Path as BodyPath
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.origin import Origin
+from rigidimpulse.io.keys import Keys
+from rigidimpulse.io.keys import Path as BodyPath
+from rigidimpulse.io.motion import Motion, MotionOptions
 from rigidimpulse.rotation import conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
 
 if TYPE_CHECKING:
@@ -38,62 +38,31 @@ ANIMATION = "rigidimpulse"
 """Name of the animation."""
 
 
-def write_motion(
-    run: Recording, target: Path, start_frame: float = 0.0, tolerance: float | None = None, impact_keys: bool = False
-) -> None:
+def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
     """Write a .glb or .gltf file of a run.
 
     Args:
-        run: with its scene. target: where; the suffix says which.
-        start_frame: number of the first frame: times begin at start_frame / fps.
-        tolerance: m; leave out keys that no point of the body misses by more. None: a key a frame.
-        impact_keys: have keys at impacts between frames, too.
+        run: with its scene. target: where; the suffix says which. options: see there.
 
     Raises:
         SceneError: a figure makes no sense, a pose is not finite, or a file beside the scene is gone.
 
     """
-    scene = run.scene
-    assert scene is not None
-    if not (math.isfinite(start_frame) and start_frame >= 0.0):
-        raise SceneError(f"start_frame = {start_frame!r}", "give the number of a frame, >= 0")
-    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
-        raise SceneError(f"tolerance = {tolerance!r}", "give a length in m, > 0, or None for a key a frame")
-    if not (np.isfinite(run.positions).all() and np.isfinite(run.orientations).all()):
-        raise SceneError("a pose of the run is not finite", "look at run.status")
+    motion = Motion(run, options)
+    paths, scene = motion.paths, motion.scene
     if run.nets:
         logger.warning("flexible bodies are not written to glTF: %s", ", ".join(track.name for track in run.nets))
-    paths = _paths(run, scene, impact_keys)
-    moving = {name: path for name, path in paths.items() if path.moves}
-    reach = {body.name: _reach(body) for body in scene.bodies} if tolerance is not None else {}
-    builder, locals_ = _from_origin(scene.origin, paths, scene) if scene.origin else _from_scene(paths, scene)
-    shift = start_frame * float(run.times[1] - run.times[0]) if len(run.times) > 1 else 0.0
-    writer = _Channels(builder, shift)
-    for name, path in moving.items():
-        if name not in locals_.node_of:
-            continue
-        keys = path.at(path.key_times())
-        if tolerance is not None:
-            places = reduced(keys, reach[name], tolerance)
-            keys = Keys(keys.times[places], keys.positions[places], keys.orientations[places])
-        writer.add(locals_.node_of[name], locals_.of(name, keys))
+    origin = scene.origin if isinstance(scene.origin, Origin) else None
+    builder, locals_ = _from_origin(origin, motion) if origin else _from_scene(motion)
+    shift = options.start_frame * float(run.times[1] - run.times[0]) if len(run.times) > 1 else 0.0
+    writer = _Channels(builder, shift, options.only_moved)
+    for name in paths:
+        if motion.is_keyed(name) and name in locals_.node_of:
+            writer.add(locals_.node_of[name], locals_.of(name, motion.keys(name)))
     if locals_.sheared:
         logger.warning("parents of uneven scale: the turn of %s is not exact in the file", ", ".join(sorted(locals_.sheared)))
     writer.close()
     builder.write(target)
-
-
-def _paths(run: Recording, scene, impact_keys: bool) -> dict[str, BodyPath]:
-    """The motion of all bodies, with the impacts of dynamic ones where they are asked for."""
-    if not impact_keys or not len(run.impacts):
-        return {name: BodyPath(run, name) for name in run.names}
-    paths = {}
-    for name in run.names:
-        i, body = run.index(name), scene[name]
-        mine = (run.impacts["body_a"] == i) | (run.impacts["body_b"] == i)
-        times = np.unique(run.impacts["time"][mine]) if body.motion == "dynamic" else np.zeros(0)
-        paths[name] = BodyPath(run, name, times, body.gravity_factor * np.asarray(scene.gravity, float))
-    return paths
 
 
 class _Locals:
@@ -162,8 +131,8 @@ class _Locals:
 class _Channels:
     """Channels of one animation, all values in one buffer view."""
 
-    def __init__(self, builder: Builder, shift: float) -> None:
-        self._builder, self._shift = builder, shift
+    def __init__(self, builder: Builder, shift: float, only_changes: bool) -> None:
+        self._builder, self._shift, self._only_changes = builder, shift, only_changes
         self._channels: list[dict[str, Any]] = []
         self._samplers: list[dict[str, Any]] = []
         self._data: list[bytes] = []
@@ -172,9 +141,9 @@ class _Channels:
         self._values: list[dict[str, Any]] = []
 
     def add(self, node: int, keys: Keys) -> None:
-        """Add the channels of a node; only what changes has one."""
+        """Add the channels of a node, or those of them that change."""
         for path, values in (("translation", keys.positions), ("rotation", keys.orientations[:, [1, 2, 3, 0]])):
-            if np.any(values != values[0]):
+            if not self._only_changes or np.any(values != values[0]):
                 sampler = {"input": self._input(keys.times), "output": self._accessor(values)}
                 self._samplers.append(sampler)
                 self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})
@@ -225,19 +194,19 @@ def _use_parts(entry: dict[str, Any]) -> None:
         entry["rotation"] = from_matrix(matrix[:3, :3] / scale)[[1, 2, 3, 0]].tolist()
 
 
-def _from_origin(origin: Origin, paths: dict[str, BodyPath], scene) -> tuple[Builder, _Locals]:
+def _from_origin(origin: Origin, motion: Motion) -> tuple[Builder, _Locals]:
     """The file of the scene; bodies that were added since have nodes of their own."""
-    builder = origin.builder()
+    builder, paths = origin.builder(), motion.paths
     node_of = {name: node for name, node in origin.node_of.items() if name in paths}
-    fresh = [body for body in scene.bodies if body.name not in origin.node_of and body.name not in origin.parts]
+    fresh = [body for body in motion.scene.bodies if body.name not in origin.node_of and body.name not in origin.parts]
     if fresh:
-        drawing = Drawing(builder, _half(paths))
+        drawing = Drawing(builder, motion.half())
         scenes = builder.tree.setdefault("scenes", [{"nodes": list(origin.animations.hierarchy.roots)}])
         for number, body in enumerate(fresh):
             pose = node_pose(paths[body.name].positions[0], paths[body.name].orientations[0])
             node_of[body.name] = builder.add("nodes", {"name": body.name, "mesh": drawing.mesh(body, number), **pose})
             scenes[builder.tree.get("scene", 0)].setdefault("nodes", []).append(node_of[body.name])
-    _drop_channels(builder.tree, {node_of[name] for name, path in paths.items() if name in node_of and path.moves})
+    _drop_channels(builder.tree, {node_of[name] for name in paths if name in node_of and motion.is_keyed(name)})
     return builder, _Locals(node_of, paths, origin)
 
 
@@ -255,29 +224,15 @@ def _drop_channels(tree: dict[str, Any], nodes: set[int]) -> None:
         tree["animations"] = kept
 
 
-def _from_scene(paths: dict[str, BodyPath], scene) -> tuple[Builder, _Locals]:
+def _from_scene(motion: Motion) -> tuple[Builder, _Locals]:
     """A file with a node and a mesh for each body, Y up."""
     builder = new_file()
-    parents, _ = stage(builder, scene.gravity, "world")
-    drawing, node_of, moving = Drawing(builder, _half(paths)), {}, 0
-    for body in scene.bodies:
-        path = paths[body.name]
+    parents, _ = stage(builder, motion.scene.gravity, "world")
+    drawing, node_of, moving = Drawing(builder, motion.half()), {}, 0
+    for body in motion.scene.bodies:
+        path = motion.paths[body.name]
         entry = {"name": body.name, "mesh": drawing.mesh(body, moving), **node_pose(path.positions[0], path.orientations[0])}
         moving += body.motion != "static"
         node_of[body.name] = builder.add("nodes", entry)
         parents.append(node_of[body.name])
-    return builder, _Locals(node_of, paths, None)
-
-
-def _half(paths: dict[str, BodyPath]) -> float:
-    """Half the side of a square that the whole motion takes place above, m."""
-    places = np.concatenate([path.positions for path in paths.values()])
-    return 2.0 * float(np.abs(places).max(initial=0.0))
-
-
-def _reach(body) -> float:
-    """Radius about the origin of a body that holds all its points, m; 0 for half spaces."""
-    from rigidimpulse.view.display import display_mesh
-
-    drawn = display_mesh(body.shape, 16)
-    return 0.0 if drawn is None else float(np.linalg.norm(drawn.vertices, axis=1).max())
+    return builder, _Locals(node_of, motion.paths, None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -14,25 +14,9 @@ from rigidimpulse.errors import SceneError
 from rigidimpulse.io.gltf.animation import Animations
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.schema import Motion
-from rigidimpulse.material import Material
-from rigidimpulse.rotation import from_matrix, rotate, to_matrix
+from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, fill_mass, joined
+from rigidimpulse.rotation import rotate, to_matrix
 from rigidimpulse.shape import Shape
-
-GHOST_RADIUS = 0.05
-"""m, of the sphere that stands for a body without colliders, which touches nothing."""
-DENSITY = 1000.0
-"""kg/m^3, of bodies whose mass is not given: glTF says nothing of it."""
-NOTHING = CollisionFilter(collide_with=())
-
-
-class Piece(NamedTuple):
-    """A collider in the frame of its body."""
-
-    shape: Shape
-    position: np.ndarray
-    orientation: np.ndarray
-    material: Material
-    collision_filter: CollisionFilter | None
 
 
 class BodyMaker:
@@ -57,16 +41,16 @@ class BodyMaker:
         self.name_of[node] = name
         if not pieces:
             self.notes.append(f"body {name!r} has no collider: it touches nothing")
-            pieces = [Piece(Shape.sphere(GHOST_RADIUS), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), Material(), NOTHING)]
+            pieces = [GHOST]
         groups: dict[CollisionFilter | None, list[Piece]] = {}
         for piece in pieces:
             groups.setdefault(piece.collision_filter, []).append(piece)
-        shape = _shape(pieces)
+        shape = joined(pieces)
         common = self._common(node, name, motion, shape)
         if len(groups) == 1 or common["motion"] == "static":
             for number, (filter_, group) in enumerate(groups.items()):
                 title = name if number == 0 else self._part_name(name, number)
-                self._add(title, _shape(group), group, filter_, common)
+                self._add(title, joined(group), group, filter_, common)
             return
         self._add_welded(name, motion, groups, shape, common)
 
@@ -89,7 +73,7 @@ class BodyMaker:
         centre, velocity = shape.solid().centroid, np.asarray(common.get("velocity", np.zeros(3)))
         turn = np.asarray(common["orientation"])
         for number, (filter_, group) in enumerate(groups.items()):
-            own, title = _shape(group), name if number == 0 else self._part_name(name, number)
+            own, title = joined(group), name if number == 0 else self._part_name(name, number)
             arm = rotate(turn, own.solid().centroid - centre)
             if common.get("keyframes") is None:
                 values["velocity"] = velocity + np.cross(common["angular_velocity"], arm)
@@ -138,32 +122,11 @@ class BodyMaker:
             axes = to_matrix(np.array([w, x, y, z]) / max(float(np.linalg.norm((w, x, y, z))), 1e-9))
             finite = [moments[k] if k in free else max(moments) for k in range(3)]
             values["inertia"] = axes @ np.diag(finite) @ axes.T
-        self._fill_mass(name, shape, values)
+        fill_mass(name, shape, values, self.notes)
         locked = [k for k in range(3) if moments is not None and k not in free]
         if motion.mass == 0.0 or locked:
             self._hold(name, motion, shape, values, locked)
         return values
-
-    def _fill_mass(self, name: str, shape: Shape, values: dict[str, Any]) -> None:
-        """Where colliders enclose no volume, take what is not given of the mass properties from their hulls."""
-        given = [values.get(key) is not None for key in ("mass", "inertia", "center_of_mass")]
-        try:
-            if not all(given):
-                shape.solid()
-            return
-        except SceneError as error:
-            problem = error.problem
-        hulls = Shape.compound([(_hull(part.shape), part.position, from_matrix(part.rotation)) for part in shape.parts_flat()])
-        try:
-            solid = hulls.solid()
-        except SceneError as error:
-            raise error.within(f"body {name!r}") from None
-        self.notes.append(f"body {name!r} encloses no volume ({problem}): its mass properties are those of the convex hull")
-        values.setdefault("mass", DENSITY * solid.volume)
-        values.setdefault("center_of_mass", solid.centroid)
-        off = np.asarray(values["center_of_mass"]) - solid.centroid
-        moved = solid.inertia + solid.volume * (off @ off * np.eye(3) - np.outer(off, off))
-        values.setdefault("inertia", values["mass"] / solid.volume * moved)
 
     def _hold(self, name: str, motion: Motion, shape: Shape, values: dict[str, Any], locked: list[int]) -> None:
         """Lock what is infinite by a joint to the world: the centre of mass, and turns about the axes of infinite inertia."""
@@ -191,22 +154,6 @@ class BodyMaker:
             centre = _centroid(shape)
         anchor = values["position"] + rotate(turn, np.asarray(centre))
         self.joints.append(SixAxisJoint(None, name, anchor=anchor, axes=axes.T, limits=limits, name=f"{name} infinite {what}"))
-
-
-def _shape(pieces: list[Piece]) -> Shape:
-    """The shape of a body: that of its only collider where it is not moved, else a compound."""
-    first = pieces[0]
-    if len(pieces) == 1 and not np.any(first.position) and np.array_equal(first.orientation, [1.0, 0.0, 0.0, 0.0]):
-        return first.shape
-    if len(pieces) == 1 and first.shape.kind == "half_space":
-        normal, offset = first.shape.plane()
-        turned = rotate(first.orientation, normal)
-        return Shape.half_space(turned, offset + float(turned @ first.position))
-    return Shape.compound([(piece.shape, piece.position, piece.orientation) for piece in pieces])
-
-
-def _hull(shape: Shape) -> Shape:
-    return Shape.convex_hull(shape) if shape.kind == "mesh" else shape
 
 
 def _centroid(shape: Shape) -> np.ndarray:

@@ -19,12 +19,10 @@ from rigidimpulse.errors import SceneError
 from rigidimpulse.io.gltf.container import GltfFile
 from rigidimpulse.io.gltf.geometry import Meshes, stays_finite
 from rigidimpulse.io.gltf.schema import Geometry, ImplicitShape, Tapered
+from rigidimpulse.io.pieces import EQUAL, rim_points, sphere_points
 from rigidimpulse.rotation import multiply
 from rigidimpulse.shape import Shape
 
-EQUAL = 1e-6
-"""Scales, radii and shears that differ by less, relative to the largest, are equal: files have single precision."""
-RIM = 48
 Y_FROM_Z = np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0])
 """Quaternion wxyz that takes z to Y."""
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])
@@ -122,7 +120,7 @@ class Shapes:
         if shape.type in ("capsule", "cylinder"):
             figures = shape.capsule if shape.type == "capsule" else shape.cylinder
             ends = [(figures.radius_bottom, -0.5 * figures.height), (figures.radius_top, 0.5 * figures.height)]
-            points = sphere_points() if shape.type == "capsule" else _rim()
+            points = sphere_points() if shape.type == "capsule" else rim_points()
             return np.concatenate([(radius * points if radius > 0.0 else np.zeros((1, 3))) + [0.0, y, 0.0] for radius, y in ends])
         raise self.file.error(f"its shape is {shape.type[:40]!r}", "use sphere, box, capsule, cylinder, plane or a mesh", owner)
 
@@ -136,27 +134,6 @@ def _what(shape: ImplicitShape) -> str:
     if figures is not None and not _is_straight(figures):
         return f"a {shape.type} with radii {figures.radius_bottom:g} and {figures.radius_top:g} m"
     return f"a {shape.type} of uneven scale"
-
-
-def _rim() -> np.ndarray:
-    angle = 2.0 * np.pi * np.arange(RIM) / RIM
-    return np.column_stack([np.cos(angle), np.zeros(RIM), np.sin(angle)])
-
-
-def sphere_points() -> np.ndarray:
-    """Return 162 points (162, 3) of the unit sphere, even: an icosahedron whose edges are halved twice."""
-    golden = 0.5 * (1.0 + np.sqrt(5.0))
-    signs = [(a, b) for a in (-1.0, 1.0) for b in (-golden, golden)]
-    points = np.array([np.roll([0.0, a, b], k) for a, b in signs for k in range(3)])
-    points /= np.linalg.norm(points, axis=1, keepdims=True)
-    for _ in range(2):
-        distance = np.linalg.norm(points[:, None] - points, axis=2)
-        np.fill_diagonal(distance, np.inf)
-        # Edges are at most 1.2 times as long as the shortest; the next distance is 1.6 times as long.
-        i, j = np.nonzero(np.triu(distance < 1.3 * distance.min()))
-        middle = points[i] + points[j]
-        points = np.concatenate([points, middle / np.linalg.norm(middle, axis=1, keepdims=True)])
-    return points
 
 
 def placed_in_body(placed: Placed, position: np.ndarray, rotation: np.ndarray) -> tuple[Shape, np.ndarray, np.ndarray]:

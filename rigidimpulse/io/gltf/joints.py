@@ -2,29 +2,18 @@
 
 The node with the joint has frame a, the connected node frame b: axes and limits are those of a, translation is that of b
 against a. Each frame moves with the body that its node belongs to; a node of no body is the world.
-
-Bodies whose surfaces meet where a joint holds them together touch there for ever: a contact that the joint says already, at
-a point where no force of it can be told from the joint's. Such bodies do not collide, also with enableCollision.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-import numpy as np
-
 from rigidimpulse.body import Body
 from rigidimpulse.constrain.six_axis import AXES, Drive, Limit, SixAxisJoint
-from rigidimpulse.detect.narrowphase import Narrowphase
-from rigidimpulse.geometry import compile_shape
 from rigidimpulse.io.gltf import schema
 from rigidimpulse.io.gltf.nodes import Hierarchy
-from rigidimpulse.observe.trigger import extent
+from rigidimpulse.io.jointed import touch_at_joint
 from rigidimpulse.rotation import to_matrix
-from rigidimpulse.shape import Shape
-
-NEAR = 1e-3
-"""Distance of a joint from a surface, relative to the size of the body, at which it is on it: figures of files are rounded."""
 
 
 def read_joints(
@@ -55,30 +44,12 @@ def read_joints(
         drives = [_drive(drive, name, notes) for drive in joint.drives]
         frames = [to_matrix(hierarchy.turn[k]).T for k in (node, entry.connected_node)]
         limits = [limit for limit in limits if limit is not None]
-        collide = entry.enable_collision
-        if collide and a is not None and b is not None and _holds_place(limits):
-            collide = not all(_is_on(bodies[k], hierarchy.position(node)) for k in (a, b))
-            if not collide:
-                notes.append(f"bodies {a!r} and {b!r} touch at joint {name!r} itself: they do not collide")
+        collide = entry.enable_collision and not touch_at_joint(name, a, b, bodies, limits, hierarchy.position(node), notes)
         joints.append(SixAxisJoint(
             a, b, anchor=hierarchy.position(node), axes=frames[0], anchor_b=hierarchy.position(entry.connected_node), axes_b=frames[1],
             limits=limits, drives=[drive for drive in drives if drive is not None], name=name, collide=collide,
         ))  # fmt: skip
     return joints, notes
-
-
-def _holds_place(limits: list[Limit]) -> bool:
-    """Whether limits lock all translations, hard."""
-    locked = "".join(limit.translation for limit in limits if limit.lower == limit.upper == 0.0 and limit.stiffness is None)
-    return set(locked) == set(AXES)
-
-
-def _is_on(body: Body, point: np.ndarray) -> bool:
-    """Whether a point (3,) of the world lies in a body or on it."""
-    probe = Shape.sphere(NEAR * extent(body.shape))
-    shapes = [compile_shape(shape, np.zeros(3), np.eye(3)) for shape in (body.shape, probe)]
-    pose = np.asarray(body.position, float), body.unit_orientation()
-    return bool(Narrowphase(shapes).overlap(0, pose, 1, (point, np.array([1.0, 0.0, 0.0, 0.0]))))
 
 
 def _letters(axes: list[int] | None) -> str:

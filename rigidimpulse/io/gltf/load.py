@@ -92,7 +92,7 @@ class _Loader:
         notes = [*self._unknown(), *self.animations.notes, *self.meshes.notes, *self.shapes.notes, *self.notes, *lines]
         report = tuple(dict.fromkeys(notes))
         node_of = {name: node for node, name in maker.name_of.items()}
-        scene.origin = Origin(self.animations, node_of, frozenset(maker.parts), report)
+        scene.origin = Origin(report, self.animations, node_of, frozenset(maker.parts))
         return scene
 
     def _gravity(self) -> ArrayLike:

@@ -9,23 +9,22 @@ from typing import Any
 
 from rigidimpulse.io.gltf.animation import Animations
 from rigidimpulse.io.gltf.container import Builder
+from rigidimpulse.io.origin import FileOrigin
 
 
 @dataclass(frozen=True)
-class Origin:
+class Origin(FileOrigin):
     """A glTF file and what became of it.
 
     Attributes:
         animations: the hierarchy and the animated nodes; its file is the one read.
         node_of: node of each body, by name. parts: names of bodies that are welded to another and have no node.
-        report: lines about what is not in the scene, or not as the file says.
 
     """
 
     animations: Animations
     node_of: dict[str, int]
     parts: frozenset[str]
-    report: tuple[str, ...]
 
     def builder(self) -> Builder:
         """Return a copy of the file to write into: all bytes and images in buffer 0."""

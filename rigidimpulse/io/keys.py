@@ -5,8 +5,12 @@ Between two frames such a body is taken to turn evenly. Of all rotation vectors 
 
     phi_k = (|phi_0| + 2 pi k) n,    phi_0 the shortest,    n its direction,
 
-the one nearest to dt w is it, w = (w_0 + w_1) / 2, with the angular velocities w that the run has at its frames; its centre of mass
-moves evenly, and its origin about that. Impacts between frames, which straight lines cut off, are keys where they are asked for.
+the one nearest to dt w is it, w = (w_0 + w_1) / 2, with the angular velocities w that the run has at its frames. Its centre of mass c moves
+on the parabola of its flight where the velocities v of the run agree with one, else evenly, and its origin about that:
+
+    c = c_0 + s (c_1 - c_0) - s (1 - s) b / 2,    b = dt (v_1 - v_0)    if    c_1 - c_0 = dt (v_0 + v_1) / 2,    else 0
+
+at the share s of the way. Impacts between frames, which straight lines cut off, are keys where they are asked for.
 """
 
 from __future__ import annotations
@@ -51,7 +55,7 @@ class Keys(NamedTuple):
 class Path:
     """The motion of one body of a run: its frames, and its impacts where they are asked for and known.
 
-    Between two of these it turns evenly, by the vector phi, and its centre of mass moves evenly.
+    Between two of these it turns evenly, by the vector phi, and its centre of mass flies or moves evenly.
     """
 
     def __init__(self, run, name: str, impacts: np.ndarray | None = None, gravity: np.ndarray | None = None) -> None:
@@ -70,6 +74,7 @@ class Path:
         self._rates = 0.5 * (spins[:-1] + spins[1:])
         speed = np.linalg.norm(spins, axis=1)
         self._speeds = np.maximum(speed[:-1], speed[1:])
+        self._bends = _bends(self.times, self._centers, run.velocities[:, i])
         if impacts is not None and len(impacts):
             assert gravity is not None
             self._split(impacts, run.velocities[:, i], spins, gravity)
@@ -101,6 +106,9 @@ class Path:
         clear = agree & (np.minimum(t, u)[:, 0] > LEAST * (t + u)[:, 0])
         f, time, center, q = f[clear], time[clear], ahead[clear], turned[clear]
         arm = rotate_inverse(self.orientations[f], self.positions[f] - self._centers[f])
+        bends = self._bends
+        bends[f] = gravity * t[clear] ** 2
+        self._bends = np.insert(bends, f + 1, gravity * u[clear] ** 2, axis=0)
         self._insert(f, time, center, center + rotate(q, arm), q, spins)
 
     def _insert(self, f: np.ndarray, time: np.ndarray, center: np.ndarray, place: np.ndarray, q: np.ndarray, spins: np.ndarray) -> None:
@@ -114,13 +122,19 @@ class Path:
         self._centers = np.insert(self._centers, f + 1, center, axis=0)
         self.orientations = quaternion_continuity(np.insert(self.orientations, f + 1, q, axis=0))
 
-    def key_times(self) -> np.ndarray:
-        """Times of the frames and impacts, and of the keys in between (k,) s."""
+    def key_times(self, samples: int = 1) -> np.ndarray:
+        """Times of the frames and impacts, and of the keys in between (k,) s.
+
+        Args:
+            samples: keys from one frame to the next, at least: even shares of the way.
+
+        """
         turn = np.diff(self.times) * self._speeds
-        fast = np.flatnonzero(turn > ALIASING)
-        if not len(fast):
+        parts = np.maximum(np.where(turn > ALIASING, np.ceil(turn / TURN), 1.0), samples).astype(int)
+        several = np.flatnonzero(parts > 1).tolist()
+        if not several:
             return self.times
-        between = [np.linspace(self.times[f], self.times[f + 1], int(np.ceil(turn[f] / TURN)) + 1)[1:-1] for f in fast.tolist()]
+        between = [np.linspace(self.times[f], self.times[f + 1], parts[f] + 1)[1:-1] for f in several]
         return np.unique(np.concatenate([self.times, *between]))
 
     def at(self, times: np.ndarray) -> Keys:
@@ -132,7 +146,7 @@ class Path:
         share = ((times - self.times[f]) / dt)[:, None]
         q = multiply(quaternion_from_rotation_vector(share * self._turns(f, dt)), self.orientations[f])
         arm = rotate_inverse(self.orientations[f], self.positions[f] - self._centers[f])
-        x = (1.0 - share) * self._centers[f] + share * self._centers[f + 1] + rotate(q, arm)
+        x = (1.0 - share) * self._centers[f] + share * self._centers[f + 1] - 0.5 * share * (1.0 - share) * self._bends[f] + rotate(q, arm)
         on = np.isin(times, self.times)
         frame = np.searchsorted(self.times, times[on])
         x[on], q[on] = self.positions[frame], self.orientations[frame]
@@ -150,6 +164,15 @@ class Path:
         n = np.where(clear[:, None], shortest / unit[:, None], instead)
         turns = np.round((np.sum(n * wanted, axis=1) - angle) / (2.0 * np.pi))
         return (angle + 2.0 * np.pi * turns)[:, None] * n
+
+
+def _bends(times: np.ndarray, centers: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+    """b (f - 1, 3) m of the parabolas between frames; 0 where the velocities are not those of one."""
+    dt = np.diff(times)[:, None]
+    bend = dt * np.diff(velocities, axis=0)
+    off = np.diff(centers, axis=0) - 0.5 * dt * (velocities[:-1] + velocities[1:])
+    flies = np.linalg.norm(off, axis=1) <= AGREE * np.linalg.norm(bend, axis=1)
+    return np.where(flies[:, None], bend, 0.0)
 
 
 def reduced(keys: Keys, reach: float, tolerance: float) -> np.ndarray:

@@ -1,0 +1,29 @@
+"""Motion to animated files, by suffix."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigidimpulse.files import write_renamed
+from rigidimpulse.io.motion import MotionOptions
+
+if TYPE_CHECKING:
+    from rigidimpulse.recording import Recording
+
+
+def write_motion(
+    run: Recording, path: Path, start_frame: float, tolerance: float | None, impact_keys: bool, only_moved: bool, samples: int
+) -> Path:
+    """Write a file of animated bodies; see `Recording.export` for its options. Returns the path.
+
+    Raises:
+        SceneError: an option makes no sense, a pose is not finite, or the package of a format is not installed.
+
+    """
+    options = MotionOptions(start_frame, tolerance, impact_keys, only_moved, samples)
+    if path.suffix in (".glb", ".gltf"):
+        from rigidimpulse.io.gltf.animate import write_motion as write
+    else:
+        from rigidimpulse.io.usd.animate import write_motion as write
+    return write_renamed(path, lambda target: write(run, target, options))

@@ -1,0 +1,17 @@
+"""What a scene keeps of the file that it was read from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class FileOrigin:
+    """A file and what became of it.
+
+    Attributes:
+        report: lines about what is not in the scene, or not as the file says.
+
+    """
+
+    report: tuple[str, ...]

@@ -1,0 +1,59 @@
+"""XML files of robots, guarded against entities that expand without end, and the files they name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rigidimpulse.errors import SceneError
+
+
+def read_xml(path: Path) -> Any:
+    """Return the root element of an XML file.
+
+    Raises:
+        SceneError: no such file, the package defusedxml is missing, or the file is broken or has entities of its own.
+
+    """
+    where = repr(path.name)
+    if not path.is_file():
+        raise SceneError(f"there is no such file (looked for {path.absolute()})", "check the path", where)
+    try:
+        from defusedxml import DefusedXmlException
+        from defusedxml.ElementTree import ParseError, parse
+    except ImportError as error:
+        raise SceneError(f"robot files need the package defusedxml ({error})", "pip install 'rigidimpulse[robot]'", where) from None
+    try:
+        return parse(str(path)).getroot()
+    except ParseError as error:
+        raise SceneError(f"it is no XML ({error})", "correct it at that line", where) from None
+    except (DefusedXmlException, UnicodeDecodeError) as error:
+        raise SceneError(f"its XML is refused ({error})", "leave out entities and document types", where) from None
+
+
+def file_inside(folder: Path, name: str, allow_outside: bool, where: str) -> Path:
+    """Return the path of a file that another one names, "package://" left out.
+
+    Args:
+        folder: of the file that names it. name: as written there. allow_outside: whether it may lie outside the folder.
+        where: what names it, for messages.
+
+    Raises:
+        SceneError: there is none, or it lies outside.
+
+    """
+    plain = name.removeprefix("file://")
+    ways = [folder / plain]
+    if name.startswith("package://"):
+        package, _, rest = name.removeprefix("package://").partition("/")
+        ways = [folder / package / rest, folder / rest]
+        if allow_outside:
+            above = [folder.resolve(), *folder.resolve().parents]
+            ways += [root / package / rest for root in above] + [root / rest for root in above if root.name == package]
+    found = next((way for way in ways if way.is_file()), None)
+    if found is None:
+        hint = "" if allow_outside else ", or give allow_outside=True where it lies in a folder above"
+        raise SceneError(f"there is no file {name!r}", f"put it beside the file that names it{hint}", where)
+    if not allow_outside and not found.resolve().is_relative_to(folder.resolve()):
+        raise SceneError(f"the file {name!r} lies outside the folder", "move it there, or give allow_outside=True", where)
+    return found

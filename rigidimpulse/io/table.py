@@ -1,0 +1,31 @@
+"""A recording as a table of text: one row a frame and body, figures with all their digits."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from rigidimpulse.recording import Recording
+
+COLUMNS = (
+    "time [s]", "frame", "body",
+    *(f"position {k} [m]" for k in "xyz"),
+    *(f"orientation {k}" for k in "wxyz"),
+    *(f"velocity {k} [m/s]" for k in "xyz"),
+    *(f"angular velocity {k} [rad/s]" for k in "xyz"),
+)  # fmt: skip
+"""Position and orientation (body to world) are of the body's origin, velocity is of its centre of mass; all in world axes."""
+
+
+def write_csv(run: Recording, target: Path) -> None:
+    """Write a .csv file of a run: UTF-8, with the head `COLUMNS`, frames in order, within a frame bodies in the order of `run.names`."""
+    figures = np.concatenate([run.positions, run.orientations, run.velocities, run.angular_velocities], axis=2).tolist()
+    with target.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file)
+        rows.writerow(COLUMNS)
+        for frame, (time, bodies) in enumerate(zip(run.times.tolist(), figures, strict=True)):
+            rows.writerows([time, frame, name, *values] for name, values in zip(run.names, bodies, strict=True))

@@ -1,0 +1,143 @@
+"""Motion into a USD file: a layer over the file that the scene came from, or one prim a body.
+
+The world pose of a body is (x, Q) at each key. Over a file with L metres a unit its prim keeps its stretch K at rest, what its
+world matrix is but for the rotation. Below a parent that stands still and has the matrix s R (an even scale and a rotation)
+
+    translate = (s R)^-1 (x / L - x_p),    orient = R^T Q,    then K / s
+
+else the prim stands in the world by itself (`!resetXformStack!`): x / L, Q, K. Linear translation and slerp in between are
+USD's own; bodies that turn fast have keys in between, see `rigidimpulse.io.keys`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigidimpulse.io.motion import Motion, MotionOptions
+from rigidimpulse.io.usd.draw import Drawing, draw_net
+from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place, quaternions, sample, valid_name, vectors
+from rigidimpulse.io.usd.library import Gf, Sdf, UsdUtils
+from rigidimpulse.io.usd.origin import UsdOrigin
+from rigidimpulse.rotation import from_matrix
+from rigidimpulse.view.camera import stage_rotation, up_axis
+from rigidimpulse.view.materials import color
+
+if TYPE_CHECKING:
+    from rigidimpulse.recording import Recording
+
+NEAR = 1e-9
+"""Share of a frame within which a key is at that frame: times are sums of rounded numbers."""
+LONE_FPS = 24.0
+"""Frames per second of a run of one frame."""
+IS_AXIS = 1e-9
+
+
+def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
+    """Write a .usda, .usdc, .usd or .usdz file of a run.
+
+    Args:
+        run: with its scene. target: where; the suffix says which. options: see there.
+
+    Raises:
+        SceneError: usd-core is missing, a figure makes no sense, or a pose is not finite.
+
+    """
+    motion = Motion(run, options)
+    if target.suffix != ".usdz":
+        layer = Sdf.Layer.CreateNew(str(target))
+        _Writer(run, motion, layer).write()
+        layer.Save()
+        return
+    inner = target.with_suffix(".usdc")
+    try:
+        write_motion(run, inner, options)
+        UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(inner)), str(target))
+    finally:
+        inner.unlink(missing_ok=True)
+
+
+class _Writer:
+    """A layer that is being made of a run."""
+
+    def __init__(self, run: Recording, motion: Motion, layer) -> None:
+        self.run, self.motion, self.layer = run, motion, layer
+        step = float(run.times[-1]) / (len(run.times) - 1) if len(run.times) > 1 else 1.0 / LONE_FPS
+        self.fps = round(1.0 / step, 9)
+        self.used: set[str] = set()
+
+    def codes(self, times: np.ndarray) -> list[float]:
+        """Time codes of times (k,) s; those of frames are whole numbers after the first."""
+        frames = times * self.fps
+        whole = np.round(frames)
+        return (self.motion.options.start_frame + np.where(np.abs(frames - whole) < NEAR * np.maximum(whole, 1.0), whole, frames)).tolist()
+
+    def write(self) -> None:
+        """Write everything."""
+        origin = self.motion.scene.origin
+        first = self.motion.options.start_frame
+        self.layer.timeCodesPerSecond = self.layer.framesPerSecond = self.fps
+        self.layer.startTimeCode, self.layer.endTimeCode = first, first + len(self.run.times) - 1
+        if isinstance(origin, UsdOrigin):
+            origin.write_over(self.layer, self.fps, first)
+            with Sdf.ChangeBlock():
+                self._over(origin)
+                self._bodies(Sdf.Path("/rigidimpulse"), origin.prim_of, 1.0 / origin.meters_per_unit)
+            return
+        with Sdf.ChangeBlock():
+            self._bodies(Sdf.Path("/World"), {}, 1.0)
+
+    def _over(self, origin) -> None:
+        """Give the prims of bodies their motion."""
+        for name, path in origin.prim_of.items():
+            if name not in self.motion.paths or not (self.motion.is_keyed(name) or origin.is_animated(path)):
+                continue
+            prim = define(self.layer, path, over=True)
+            keys, names = origin.local(path, self.motion.keys(name), self.motion, prim)
+            self._sample(prim, keys, names)
+
+    def _sample(self, prim, keys, names: tuple[str, str]) -> None:
+        """Write the keys of a prim by the names of its operations, or those of them that change."""
+        codes = self.codes(keys.times)
+        for name, given, made in ((names[0], keys.positions, vectors), (names[1], keys.orientations, quaternions)):
+            if not self.motion.options.only_moved or np.any(given != given[0]):
+                sample(prim, name, codes, made(given))
+
+    def _bodies(self, root, drawn: dict, scale: float) -> None:
+        """Write bodies that have no prim, below a root in metres."""
+        scene, paths = self.motion.scene, self.motion.paths
+        fresh = [body for body in scene.bodies if body.name not in drawn]
+        if not fresh and not self.run.nets:
+            return
+        self._root(root, scale, bool(drawn))
+        drawing, moving = Drawing(self.layer, self.motion.half(), fresh), 0
+        for body in fresh:
+            prim = drawing.body(root.AppendChild(valid_name(body.name, self.used)), body, moving)
+            moving += body.motion != "static"
+            path = paths[body.name]
+            names = place(prim, path.positions[0], path.orientations[0])
+            order(prim, list(names))
+            if self.motion.is_keyed(body.name):
+                self._sample(prim, self.motion.keys(body.name), names)
+        codes = self.codes(self.run.times)
+        for number, track in enumerate(self.run.nets):
+            draw_net(self.layer, root.AppendChild(valid_name(track.name, self.used)), track, codes, color(moving + number))
+
+    def _root(self, path, scale: float, inside: bool) -> None:
+        """Write the prim above the bodies; a stage of its own has metres, kilograms and the up axis of the scene."""
+        root = define(self.layer, path)
+        if inside:
+            attribute(root, "xformOp:scale", TYPES.Double3, Gf.Vec3d(scale, scale, scale))
+            order(root, ["xformOp:scale"])
+            return
+        up = up_axis(self.motion.scene.gravity)
+        axis = "Z" if np.abs(up - [0.0, 0.0, 1.0]).max() < IS_AXIS else "Y"
+        stage = self.layer.pseudoRoot
+        for key, value in (("upAxis", axis), ("metersPerUnit", 1.0), ("kilogramsPerUnit", 1.0)):
+            stage.SetInfo(key, value)
+        self.layer.defaultPrim = path.name
+        if axis == "Y" and np.abs(up - [0.0, 1.0, 0.0]).max() >= IS_AXIS:
+            names = place(root, np.zeros(3), from_matrix(stage_rotation(up)))
+            order(root, list(names))

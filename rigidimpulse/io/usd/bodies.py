@@ -1,0 +1,240 @@
+"""Bodies of UsdPhysics: rigid bodies with the colliders below them, and colliders of no body, which are static.
+
+    position, orientation    of the prim, its scale goes to its colliders
+    velocity                 in the space that the prim's own transform is in: that of its parent
+    mass                     that of the body, else of its colliders, else from densities: of the body, of the collider, of its
+                             material, else 1,000 kg/m^3
+    not enabled              static; kinematic along its time samples if it has any
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rigidimpulse.body import Body
+from rigidimpulse.errors import SceneError
+from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, fill_mass, joined, weighed
+from rigidimpulse.io.usd.frames import Frames, snapped
+from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
+from rigidimpulse.io.usd.materials import Filters, Units, given_mass, positive, read_material
+from rigidimpulse.io.usd.shapes import Shapes
+from rigidimpulse.keyframes import Keyframes
+from rigidimpulse.material import Material
+from rigidimpulse.observe.trigger import Trigger
+from rigidimpulse.rotation import from_matrix, multiply
+
+BETWEEN = 1.0 / 60.0
+"""s, longest time from key to key of keyframed bodies."""
+TRIGGER = "PhysxTriggerAPI"
+
+
+class BodyReader:
+    """Makes bodies of what the parser of UsdPhysics found.
+
+    Attributes:
+        name_of: body of each prim that is one, by path. bodies: by name. triggers: what was made of them.
+        notes: lines of the report.
+
+    """
+
+    def __init__(self, frames: Frames, parsed: dict[str, list[tuple[SdfPath, Any]]]) -> None:
+        """parsed: descriptions by kind."""
+        self.frames, self.stage, self.notes = frames, frames.stage, []
+        self.units = Units(self.stage, frames.meters_per_unit)
+        self.shapes = Shapes()
+        self.bodies: dict[str, Body] = {}
+        self.name_of: dict[SdfPath, str] = {}
+        self.triggers: list[Trigger] = []
+        self._materials: dict[SdfPath, tuple[Material, float]] = {}
+        self._rigid = dict(parsed.get("RigidBody", []))
+        self._colliders = [entry for kind, entries in parsed.items() if kind.endswith("Shape") for entry in entries]
+        # In the order of the file, whatever their kind.
+        place = {prim.GetPath(): k for k, prim in enumerate(frames.prims())}
+        self._colliders.sort(key=lambda entry: place.get(entry[0], 0))
+        self._names = _Names()
+        self._make(place)
+
+    def _make(self, place: dict[SdfPath, int]) -> None:
+        """Make all bodies and triggers."""
+        owned: dict[SdfPath, list[tuple[SdfPath, Any]]] = {path: [] for path in self._rigid}
+        apart: dict[SdfPath, list[SdfPath]] = {}
+        groups: dict[SdfPath, list[SdfPath]] = {}
+        later = []
+        for path, desc in self._colliders:
+            prim = self.stage.GetPrimAtPath(path)
+            if TRIGGER in prim.GetPrimTypeInfo().GetAppliedAPISchemas():
+                later.append((path, desc))
+                continue
+            if not desc.collisionEnabled:
+                self.notes.append(f"collider {path} is not enabled: left out")
+                continue
+            owner = desc.rigidBody if desc.rigidBody in self._rigid else path
+            owned.setdefault(owner, []).append((path, desc))
+            groups.setdefault(owner, []).extend(desc.collisionGroups)
+            apart.setdefault(owner, []).extend(desc.filteredCollisions)
+        for path in sorted(owned, key=lambda path: place.get(path, 0)):
+            self.name_of[path] = self._names.of(self.stage.GetPrimAtPath(path))
+            apart.setdefault(path, []).extend(self._rigid[path].filteredCollisions if path in self._rigid else [])
+        filters = Filters(self.stage).of(
+            {name: groups.get(path, []) for path, name in self.name_of.items()},
+            {self.name_of[path]: set().union(*map(self._below, others)) for path, others in apart.items() if others},
+        )
+        for path, name in self.name_of.items():
+            try:
+                self.bodies[name] = self._body(path, name, owned[path], filters[name])
+            except SceneError as error:
+                raise error if "prim " in error.where else error.within(f"prim {path}") from None
+        for path, desc in later:
+            self._add_trigger(path, desc)
+
+    def _below(self, path: SdfPath) -> set[str]:
+        """Names of the bodies that a path is, or that are below it, or above it."""
+        inside = {name for body, name in self.name_of.items() if body.HasPrefix(path)}
+        return inside or {name for body, name in self.name_of.items() if path.HasPrefix(body)}
+
+    def _body(self, path: SdfPath, name: str, owned: list[tuple[SdfPath, Any]], filter_: Any) -> Body:
+        """Return the body of a prim."""
+        prim, desc = self.stage.GetPrimAtPath(path), self._rigid.get(path)
+        pieces, masses, densities = self._pieces(prim, owned)
+        if not pieces:
+            self.notes.append(f"body {name!r} has no collider that is read: it touches nothing")
+            pieces, masses, densities, filter_ = [GHOST], [None], [DENSITY], GHOST.collision_filter
+        if any(piece.material != pieces[0].material for piece in pieces):
+            self.notes.append(f"body {name!r} has colliders of several materials: that of the first counts")
+        position, rotation = self.frames.rigid(prim)
+        values: dict[str, Any] = {"position": position, "orientation": from_matrix(rotation), "motion": "static"}
+        enabled = desc is not None and desc.rigidBodyEnabled
+        if desc is not None and not enabled:
+            self.notes.append(f"body {name!r} is not enabled: it is static")
+        if self.frames.moves(prim) and (desc is None or not enabled or desc.kinematicBody):
+            times, places, turns = self.frames.keys(prim, BETWEEN)
+            values |= {"motion": "kinematic", "position": places[0], "orientation": turns[0]}
+            values["keyframes"] = Keyframes(times, places, turns)
+        elif desc is not None and enabled:
+            values |= {"motion": "kinematic" if desc.kinematicBody else "dynamic", **self._velocities(prim)}
+            if not desc.kinematicBody:
+                values |= self._weight(prim, name, pieces, masses, densities)
+                if self.frames.moves(prim):
+                    self.notes.append(f"body {name!r} is animated and moved by physics: its animation is not read")
+            if desc.startsAsleep:
+                self.notes.append(f"body {name!r} starts asleep: it falls as any other")
+        material = pieces[0].material
+        if values.get("density") is not None:
+            material = replace(material, density=values.pop("density"))
+        return Body(name, joined(pieces), material=material, collision_filter=filter_, **values)
+
+    def _pieces(self, prim: Prim, owned: list[tuple[SdfPath, Any]]) -> tuple[list[Piece], list[float | None], list[float]]:
+        """Return colliders in the rigid frame of a body's prim, their own masses (kg) and densities (kg/m^3)."""
+        pieces: list[Piece] = []
+        masses: list[float | None] = []
+        densities: list[float] = []
+        own = given_mass(prim, self.units, np.eye(3)).get("density")
+        for path, desc in owned:
+            collider = self.stage.GetPrimAtPath(path)
+            placed = self._placed(collider, prim)
+            if placed is None:
+                continue
+            if any(self.frames.is_animated(above) for above in _between(collider, prim)):
+                self.notes.append(f"collider {path} is animated against its body: it stays as it is at rest")
+            material, density = self._material(desc.materials)
+            given = given_mass(collider, self.units, np.eye(3)) if collider != prim else {}
+            pieces.append(Piece(*placed, material, None))
+            masses.append(given.get("mass"))
+            densities.append(own or given.get("density") or density or DENSITY)
+        return pieces, masses, densities
+
+    def _placed(self, collider: Prim, prim: Prim) -> tuple[Any, np.ndarray, np.ndarray] | None:
+        """Return shape, position and orientation of a collider in the rigid frame of a prim."""
+        made = self.shapes.of(collider, self.frames.stretch(collider) * self.units.length)
+        if made is None:
+            return None
+        (x, turn), (origin, frame) = self.frames.rigid(collider), self.frames.rigid(prim)
+        shape, place, own = made
+        relative = snapped(frame.T @ turn)
+        position = frame.T @ (x - origin) + relative @ place
+        orientation = multiply(from_matrix(relative), own) if np.any(relative != np.eye(3)) else own
+        return shape, position, orientation
+
+    def _material(self, bound: Any) -> tuple[Material, float]:
+        """Return the material of a collider, and its density in kg/m^3, 0 if it says none."""
+        path = next((path for path in bound if path), None)
+        if path is None:
+            return Material(), 0.0
+        if path not in self._materials:
+            prim = self.stage.GetPrimAtPath(path)
+            density = self.units.density(positive(UsdPhysics.MaterialAPI(prim).GetDensityAttr()))
+            self._materials[path] = read_material(prim, self.notes), density
+        return self._materials[path]
+
+    def _velocities(self, prim: Prim) -> dict[str, np.ndarray]:
+        """Return both velocities of a body in the world."""
+        api = UsdPhysics.RigidBodyAPI(prim)
+        velocity, spin = (np.array(a.Get() or (0, 0, 0), float) for a in (api.GetVelocityAttr(), api.GetAngularVelocityAttr()))
+        parent = self.frames.matrix(prim.GetParent())[:3, :3]
+        if UsdGeom.Xformable(prim).GetResetXformStack():
+            parent = np.eye(3)
+        _, frame = self.frames.rigid(prim.GetParent())
+        if np.array_equal(parent, np.eye(3)):
+            frame = parent
+        return {"velocity": parent @ velocity * self.units.length, "angular_velocity": frame @ np.radians(spin)}
+
+    def _weight(
+        self, prim: Prim, name: str, pieces: list[Piece], masses: Sequence[float | None], densities: list[float]
+    ) -> dict[str, Any]:
+        """Return mass properties of a dynamic body: those that the shape and one density do not say already."""
+        values = given_mass(prim, self.units, self.frames.stretch(prim))
+        values.pop("density", None)
+        if not any(masses) and len(set(densities)) == 1:
+            values["density"] = densities[0]
+            fill_mass(name, joined(pieces), values, self.notes, densities[0])
+            return values
+        found = weighed(pieces, masses, densities)
+        share = values.get("mass", found.mass) / found.mass
+        values.setdefault("mass", found.mass)
+        values.setdefault("center_of_mass", found.center_of_mass)
+        values.setdefault("inertia", share * found.inertia)
+        return values
+
+    def _add_trigger(self, path: SdfPath, desc: Any) -> None:
+        """Make a trigger of a collider that reports overlap only."""
+        collider = self.stage.GetPrimAtPath(path)
+        body = self.name_of.get(desc.rigidBody)
+        frame = self.stage.GetPrimAtPath(desc.rigidBody) if body is not None else self.stage.GetPseudoRoot()
+        placed = self._placed(collider, frame)
+        if placed is not None:
+            shape, position, orientation = placed
+            name = self._names.of(collider)
+            self.triggers.append(Trigger(name, shape, body=body, position=position, orientation=orientation))
+
+    def owner(self, prim: Prim) -> str | None:
+        """Return the name of the body that a prim is, or is below; None for none."""
+        while prim and not prim.IsPseudoRoot():
+            if prim.GetPath() in self.name_of:
+                return self.name_of[prim.GetPath()]
+            prim = prim.GetParent()
+        return None
+
+
+class _Names:
+    """Names of prims, unlike one another: the path of a prim whose name is taken."""
+
+    def __init__(self) -> None:
+        self._used: set[str] = set()
+
+    def of(self, prim: Prim) -> str:
+        name = prim.GetName() if prim.GetName() not in self._used else str(prim.GetPath())
+        self._used.add(name)
+        return name
+
+
+def _between(collider: Prim, body: Prim) -> list[Prim]:
+    """Return a collider and what is above it, up to its body."""
+    chain = []
+    while collider and collider != body and not collider.IsPseudoRoot():
+        chain.append(collider)
+        collider = collider.GetParent()
+    return chain

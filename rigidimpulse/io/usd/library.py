@@ -1,0 +1,41 @@
+"""The modules of usd-core, which is optional, and has no types: importing this raises a `SceneError` where it is not installed."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+from rigidimpulse.errors import SceneError
+
+try:
+    from pxr import Gf as _Gf
+    from pxr import Sdf as _Sdf
+    from pxr import Tf as _Tf
+    from pxr import Usd as _Usd
+    from pxr import UsdGeom as _UsdGeom
+    from pxr import UsdPhysics as _UsdPhysics
+    from pxr import UsdShade as _UsdShade
+    from pxr import UsdUtils as _UsdUtils
+    from pxr import Vt as _Vt
+except ImportError as error:
+    raise SceneError(f"USD files need the package usd-core ({error})", "pip install 'rigidimpulse[usd]'") from None
+
+Gf: Any = _Gf
+Sdf: Any = _Sdf
+Tf: Any = _Tf
+Usd: Any = _Usd
+UsdGeom: Any = _UsdGeom
+UsdPhysics: Any = _UsdPhysics
+UsdShade: Any = _UsdShade
+UsdUtils: Any = _UsdUtils
+Vt: Any = _Vt
+
+Layer: TypeAlias = Any
+"""Sdf.Layer"""
+PrimSpec: TypeAlias = Any
+"""Sdf.PrimSpec"""
+SdfPath: TypeAlias = Any
+"""Sdf.Path"""
+Stage: TypeAlias = Any
+"""Usd.Stage"""
+Prim: TypeAlias = Any
+"""Usd.Prim"""

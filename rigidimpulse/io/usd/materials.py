@@ -1,0 +1,107 @@
+"""Physics materials, masses and collision groups of UsdPhysics, in SI units: L metres and W kilograms a unit of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from rigidimpulse.collision_filter import CollisionFilter
+from rigidimpulse.io.usd.library import Prim, SdfPath, Stage, UsdPhysics
+from rigidimpulse.material import Material
+from rigidimpulse.rotation import to_matrix
+
+COMBINE = {"average": "average", "min": "minimum", "max": "maximum", "multiply": "multiply"}
+"""Combine modes of PhysxMaterialAPI."""
+
+
+class Units:
+    """L and W of a stage."""
+
+    def __init__(self, stage: Stage, meters_per_unit: float) -> None:
+        """meters_per_unit: m."""
+        self.length = meters_per_unit
+        self.mass = float(UsdPhysics.GetStageKilogramsPerUnit(stage))
+
+    def density(self, value: float) -> float:
+        """Return a density of the file in kg/m^3."""
+        return value * self.mass / self.length**3
+
+
+def positive(attribute: Any) -> float:
+    """Return the value of an attribute, 0 if it is not a number above 0: UsdPhysics means "not given" by that."""
+    value = attribute.Get() if attribute else None
+    return float(value) if value is not None and np.isfinite(value) and value > 0.0 else 0.0
+
+
+def read_material(prim: Prim, notes: list[str]) -> Material:
+    """Return the contact coefficients of a material prim; its density is asked for by itself."""
+    api = UsdPhysics.MaterialAPI(prim)
+    static, dynamic, restitution = (
+        positive(a) for a in (api.GetStaticFrictionAttr(), api.GetDynamicFrictionAttr(), api.GetRestitutionAttr())
+    )
+    if dynamic > static:
+        notes.append(f"material {prim.GetPath()}: dynamic friction is above static friction, which is raised to it")
+        static = dynamic
+    modes = {}
+    for name in ("friction", "restitution"):
+        attribute = prim.GetAttribute(f"physxMaterial:{name}CombineMode")
+        mode = attribute.Get() if attribute else None
+        if mode in COMBINE:
+            modes[f"{name}_combine"] = COMBINE[mode]
+    if restitution > 1.0:
+        notes.append(f"material {prim.GetPath()}: restitution {restitution:g} feeds energy in")
+    return Material(
+        restitution=restitution, static_friction=static, dynamic_friction=dynamic, any_restitution=restitution > 1.0, **modes
+    )  # fmt: skip
+
+
+def given_mass(prim: Prim, units: Units, stretch: np.ndarray) -> dict[str, Any]:
+    """Return what the MassAPI of a prim says: mass, density, center_of_mass (3,), inertia (3, 3), in SI; only what is given.
+
+    stretch: K (3, 3) of the prim, which its centre of mass is under.
+    """
+    if not prim.HasAPI(UsdPhysics.MassAPI):
+        return {}
+    api, values = UsdPhysics.MassAPI(prim), {}
+    if mass := positive(api.GetMassAttr()):
+        values["mass"] = mass * units.mass
+    if density := positive(api.GetDensityAttr()):
+        values["density"] = units.density(density)
+    centre = np.array(api.GetCenterOfMassAttr().Get(), float)
+    if api.GetCenterOfMassAttr().HasAuthoredValue() and np.all(np.isfinite(centre)):
+        values["center_of_mass"] = stretch @ centre * units.length
+    moments = np.array(api.GetDiagonalInertiaAttr().Get(), float)
+    if np.all(np.isfinite(moments)) and np.all(moments > 0.0):
+        given = api.GetPrincipalAxesAttr().Get()
+        turn = np.array([given.GetReal(), *given.GetImaginary()], float)
+        axes = to_matrix(turn / np.linalg.norm(turn)) if np.linalg.norm(turn) > 1e-6 else np.eye(3)
+        values["inertia"] = axes @ np.diag(moments) @ axes.T * units.mass * units.length**2
+    return values
+
+
+class Filters:
+    """Collision filters of bodies, from collision groups and filtered pairs."""
+
+    def __init__(self, stage: Stage) -> None:
+        """Read the groups of a stage."""
+        self._table = UsdPhysics.CollisionGroup.ComputeCollisionGroupTable(stage)
+        self._groups = list(self._table.GetGroups())
+
+    def of(self, groups: Mapping[str, Iterable[SdfPath]], apart: Mapping[str, set[str]]) -> dict[str, CollisionFilter | None]:
+        """Return the filter of each body.
+
+        Args:
+            groups: of the colliders of bodies, by name. apart: names of bodies that each does not collide with.
+
+        """
+        alone = set().union(*apart.values()) if apart else set()
+        made: dict[str, CollisionFilter | None] = {}
+        for name, mine in groups.items():
+            member = [group for group in self._groups if group in set(mine)]
+            shut = [other for other in self._groups if any(not self._table.IsCollisionEnabled(group, other) for group in member)]
+            systems = [str(group) for group in member] + ([f"body {name}"] if name in alone else [])
+            barred = [str(other) for other in shut] + [f"body {other}" for other in sorted(apart.get(name, ()))]
+            made[name] = CollisionFilter(systems, not_collide_with=barred) if systems or barred else None
+        return made

@@ -1,0 +1,207 @@
+"""Motion into USD files, read back by usd-core itself: every body is where the run has it, at every frame.
+
+Positions are double, orientations single precision: to 1e-6 for matrices of unit size. A wrong order of quaternion components,
+operations in the wrong order or a frame off by one show as errors of the size of the motion.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_gltf_motion import recorded, smooth, turned
+
+import rigidimpulse as ri
+from rigidimpulse.flexible.track import FlexibleTrack
+
+pytest.importorskip("pxr")
+from pxr import Usd, UsdGeom
+
+SINGLE = 1e-6
+
+
+def opened(path: Path) -> Usd.Stage:
+    """The stage of a file."""
+    return Usd.Stage.Open(str(path))
+
+
+def world(stage: Usd.Stage, path: str, code: float) -> np.ndarray:
+    """World matrix (4, 4) of a prim at a time code, acting on columns, with translation in m."""
+    matrix = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(stage.GetPrimAtPath(path))).T
+    matrix[:3, 3] *= UsdGeom.GetStageMetersPerUnit(stage)
+    return matrix
+
+
+def off(stage: Usd.Stage, path: str, run: Any, name: str, start: float = 0.0, stretch: Any = 1.0) -> float:
+    """How far the matrix of a prim is from the pose of a body, over all frames; `stretch`: what is left of it but for the rotation."""
+    worst = 0.0
+    for k, (x, q) in enumerate(zip(run.position(name), run.orientation(name), strict=True)):
+        now = world(stage, path, start + k)
+        worst = max(worst, np.abs(now[:3, 3] - x).max(), np.abs(now[:3, :3] - turned(q) @ (np.eye(3) * stretch)).max())
+    return worst
+
+
+def scene_of_shapes(up: int = 2) -> ri.Scene:
+    """One body of every kind of shape, some with one mesh; names that are no identifiers."""
+    scene = ri.Scene(gravity=-9.81 * np.eye(3)[up])
+    hull = ri.Shape.convex_hull(np.random.default_rng(3).normal(size=(20, 3)))
+    turn = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
+    shapes = {
+        "a ball": ri.Shape.sphere(0.4), "a_ball": ri.Shape.box((1, 2, 3)), "7": ri.Shape.capsule(0.2, 0.6),
+        "größe": ri.Shape.cylinder(0.3, 0.5), "rock": hull, "twin": hull,
+        "both": ri.Shape.compound([(hull, (1, 0, 0), turn), (ri.Shape.box(0.5), (0, 1, 0), turn)]),
+    }  # fmt: skip
+    scene.add(ri.Body("floor", ri.Shape.half_space(np.eye(3)[up], 0.5), motion="static"))
+    for k, (name, shape) in enumerate(shapes.items()):
+        scene.add(ri.Body(name, shape, position=(3.0 * k, 0, 2)))
+    return scene
+
+
+PRIMS = {"a ball": "a_ball", "a_ball": "a_ball_2", "7": "_7", "rock": "rock", "twin": "twin", "both": "both"}
+
+
+@pytest.mark.parametrize("suffix", ["usda", "usdc", "usd", "usdz"])
+def test_every_body_is_where_the_run_has_it(tmp_path: Path, suffix: str) -> None:
+    """Names become identifiers, unlike one another; the names themselves are kept for display."""
+    scene = scene_of_shapes()
+    run = recorded(scene, {body.name: smooth(9, body.position, 1.0 + k) for k, body in enumerate(scene.bodies[1:])}, fps=25.0)
+    stage = opened(run.export(tmp_path / f"out.{suffix}", start_frame=1001))
+    assert (stage.GetTimeCodesPerSecond(), stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (25.0, 1001.0, 1009.0)
+    assert (UsdGeom.GetStageUpAxis(stage), UsdGeom.GetStageMetersPerUnit(stage)) == ("Z", 1.0)
+    for name, prim in PRIMS.items():
+        assert off(stage, f"/World/{prim}", run, name, 1001) < SINGLE, name
+        assert stage.GetPrimAtPath(f"/World/{prim}").GetDisplayName() == name
+    samples = UsdGeom.Xformable(stage.GetPrimAtPath("/World/rock")).GetTimeSamples()
+    assert samples == [1001.0 + k for k in range(9)]
+    assert not UsdGeom.Xformable(stage.GetPrimAtPath("/World/floor")).GetTimeSamples()
+
+
+def test_what_is_drawn_is_what_collides(tmp_path: Path) -> None:
+    """Boxes about the drawn shapes, in the world, are those of the bodies; one mesh of three bodies is there once."""
+    scene = scene_of_shapes()
+    run = recorded(scene, {"a ball": smooth(2, scene["a ball"].position)})
+    stage = opened(run.export(tmp_path / "out.usdc"))
+    boxes = UsdGeom.BBoxCache(0.0, [UsdGeom.Tokens.default_])
+    vertices = scene["rock"].shape.surface().vertices
+    prims = {prim.GetDisplayName(): prim for prim in stage.GetPrimAtPath("/World").GetChildren()}
+    half = {"a ball": [0.4] * 3, "a_ball": [0.5, 1, 1.5], "7": [0.2, 0.2, 0.5], "größe": [0.3, 0.3, 0.25]}
+    for name, wanted in half.items():
+        found = boxes.ComputeUntransformedBound(prims[name]).ComputeAlignedRange()
+        assert np.abs(np.array([found.GetMin(), found.GetMax()]) - [np.negative(wanted), wanted]).max() < SINGLE, name
+    found = boxes.ComputeWorldBound(stage.GetPrimAtPath("/World/rock")).ComputeAlignedRange()
+    low = vertices.min(axis=0) + scene["rock"].position
+    assert np.abs(np.array(found.GetMin()) - low).max() < 1e-5
+    meshes = [prim for prim in stage.TraverseAll() if prim.IsA(UsdGeom.Mesh)]
+    assert sorted(str(prim.GetPath()) for prim in meshes) == ["/World/floor/shape", "/_Shapes/mesh0/mesh"]
+    assert len(stage.GetPrototypes()) == 1 and stage.GetPrimAtPath("/_Shapes").IsAbstract()
+    floor = UsdGeom.Mesh(stage.GetPrimAtPath("/World/floor/shape"))
+    assert np.array(floor.GetPointsAttr().Get())[:, 2].tolist() == [0.5] * 4
+
+
+def test_up_axes(tmp_path: Path) -> None:
+    """Y up is Y, Z up is Z; anything else is turned Y up, and says so."""
+    for up, axis in ((1, "Y"), (2, "Z"), (0, "Y")):
+        scene = scene_of_shapes(up)
+        run = recorded(scene, {"rock": smooth(3, scene["rock"].position)})
+        stage = opened(run.export(tmp_path / f"{up}.usda"))
+        assert UsdGeom.GetStageUpAxis(stage) == axis
+        if up:
+            assert off(stage, "/World/rock", run, "rock") < SINGLE
+        else:
+            turn = world(stage, "/World", 0)[:3, :3]
+            assert np.abs(turn @ [1, 0, 0] - [0, 1, 0]).max() < SINGLE
+            assert np.abs(world(stage, "/World/rock", 2)[:3, 3] - turn @ run.position("rock")[2]).max() < 1e-5
+
+
+def test_fast_spin_does_not_alias(tmp_path: Path) -> None:
+    """100 rad/s at 24 fps are 4.17 rad a frame: slerp between frames alone turns back by 2.1 rad. Signs are continuous."""
+    spin, frames = 100.0, 13
+    scene = ri.Scene(bodies=[ri.Body("top", ri.Shape.box(1))])
+    angle = 0.5 * spin * np.arange(frames) / 24.0
+    q = np.column_stack([np.cos(angle), 0 * angle, 0 * angle, np.sin(angle)])
+    run = recorded(scene, {"top": (np.zeros((frames, 3)), q)}, spins={"top": (0, 0, spin)})
+    stage = opened(run.export(tmp_path / "out.usda"))
+    for time in np.linspace(0, run.times[-1], 100):
+        wanted = turned([np.cos(spin * time / 2), 0, 0, np.sin(spin * time / 2)])
+        assert np.abs(world(stage, "/World/top", 24 * time)[:3, :3] - wanted).max() < 1e-4
+    orient = stage.GetPrimAtPath("/World/top").GetAttribute("xformOp:orient")
+    codes = orient.GetTimeSamples()
+    keys = np.array([[orient.Get(code).real, *orient.Get(code).imaginary] for code in codes])
+    assert np.sum(keys[1:] * keys[:-1], axis=1).min() > 0.7 and set(range(frames)) <= set(codes)
+
+
+def test_samples_between_frames_are_on_the_parabola(tmp_path: Path) -> None:
+    """A thrown body at 10 fps: straight lines between frames miss its parabola by g dt^2 / 8 = 12 mm, four samples a frame are on it.
+
+    The same in glTF, in single precision.
+    """
+    scene = ri.Scene(bodies=[ri.Body("ball", ri.Shape.sphere(0.1), velocity=(1, 0, 3), angular_velocity=(0, 5, 0))])
+    run = ri.simulate(scene, 0.5, 10)
+    stage = opened(run.export(tmp_path / "out.usda", samples=4))
+    codes = UsdGeom.Xformable(stage.GetPrimAtPath("/World/ball")).GetTimeSamples()
+    assert np.allclose(codes, np.arange(21) / 4, atol=1e-9, rtol=0)
+    for code in codes:
+        t = code / 10
+        assert np.abs(world(stage, "/World/ball", code)[:3, 3] - [t, 0, 3 * t - 9.81 * t**2 / 2]).max() < 1e-9
+        assert np.abs(world(stage, "/World/ball", code)[:3, :3] - turned([np.cos(2.5 * t), 0, np.sin(2.5 * t), 0])).max() < SINGLE
+    with pytest.raises(ri.SceneError, match="samples"):
+        run.export(tmp_path / "out.usda", samples=0)
+
+
+def test_who_has_keys(tmp_path: Path) -> None:
+    """Bodies that stand have none, unless all are asked for; a tolerance leaves out what lies in between."""
+    scene = ri.Scene(bodies=[ri.Body("a", ri.Shape.box(1)), ri.Body("b", ri.Shape.box(1), position=(9, 0, 0))])
+    x = np.linspace([0, 0, 0], [1, 0, 0], 5)
+    run = recorded(scene, {"a": (x, np.tile([1.0, 0, 0, 0], (5, 1)))})
+
+    def count(name: str, **options: Any) -> tuple[int, int]:
+        stage = opened(run.export(tmp_path / "out.usda", **options))
+        prim = stage.GetPrimAtPath(f"/World/{name}")
+        return tuple(prim.GetAttribute(f"xformOp:{op}").GetNumTimeSamples() for op in ("translate", "orient"))
+
+    assert (count("a"), count("b")) == ((5, 0), (0, 0))
+    assert (count("a", only_moved=False), count("b", only_moved=False)) == ((5, 5), (5, 5))
+    assert count("a", tolerance=1e-3) == (2, 0)
+
+
+def test_flexible_bodies_have_moving_points(tmp_path: Path) -> None:
+    scene = ri.Scene(bodies=[ri.Body("a", ri.Shape.box(1))])
+    run = recorded(scene, {"a": smooth(4, (0, 0, 0))})
+    points = np.random.default_rng(1).normal(size=(4, 3, 3))
+    run.nets.append(FlexibleTrack("a", points, np.array([[0, 1, 2]])))
+    stage = opened(run.export(tmp_path / "out.usdc", start_frame=10))
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/World/a_2"))
+    for k in range(4):
+        assert np.abs(np.array(mesh.GetPointsAttr().Get(10 + k)) - points[k]).max() < SINGLE
+
+
+def test_a_thousand_bodies(tmp_path: Path) -> None:
+    """240 frames of 1,000 bodies: all samples are there, 56 bytes a pose: 24 + 16, and 16 that say where."""
+    from rigidimpulse.observe.events import IMPACT_DTYPE
+    from rigidimpulse.recording import Recording
+
+    rng, frames, count = np.random.default_rng(1), 240, 1000
+    box = ri.Shape.box(1)
+    scene = ri.Scene(bodies=[ri.Body(f"b{k}", box, position=(k, 0, 0)) for k in range(count)])
+    x, q = rng.normal(size=(frames, count, 3)), rng.normal(size=(frames, count, 4))
+    q /= np.linalg.norm(q, axis=-1, keepdims=True)
+    still = np.zeros((frames, count, 3))
+    run = Recording(np.arange(frames) / 24, list(scene.names), x, q, still, still, x, np.zeros(0, IMPACT_DTYPE), scene=scene)
+    path = run.export(tmp_path / "out.usdc")
+    assert frames * count * 56 < path.stat().st_size < frames * count * 58
+    stage = opened(path)
+    assert stage.GetPrimAtPath("/World/b999").GetAttribute("xformOp:orient").GetNumTimeSamples() == frames
+
+
+def test_without_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    scene = ri.Scene(bodies=[ri.Body("a", ri.Shape.box(1))])
+    for name in [name for name in sys.modules if name.startswith("rigidimpulse.io.usd.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    with pytest.raises(ri.SceneError, match=r"rigidimpulse\[usd\]"):
+        recorded(scene, {"a": smooth(3, (0, 0, 0))}).export(tmp_path / "out.usda")
+    assert not list(tmp_path.iterdir())
