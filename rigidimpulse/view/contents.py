@@ -127,7 +127,7 @@ def _entries(
         planes = _plane_entries(body, orientation[0], up)
         group, key = "ground" if planes and numbers[index] < 0 else "bodies", _path_key(index, body.name)
         entry = {"name": body.name, "group": group, "key": key, "planes": planes, "shape": numbers[index]}
-        entry |= {"rendered": rendered[index], "faceted": body.shape.kind not in ROUND_KINDS}
+        entry |= {"rendered": rendered[index], "faceted": all(part.shape.kind not in ROUND_KINDS for part in body.shape.parts_flat())}
         entry["surface"] = surface(num_coloured, body)
         num_coloured += body.motion != "static"
         entry["position"] = position[0].tolist()

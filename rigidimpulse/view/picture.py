@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -84,8 +85,11 @@ def draw_picture(recording: Any, width: int = 640, height: int = 400, frame: int
     """
     frame = telling_frame(recording) if frame is None else frame
     framing, drawn = page_scene(recording)
-    camera = _camera(framing, SUPERSAMPLING * width, SUPERSAMPLING * height)
     rotation = stage_rotation(up_axis(recording.scene.gravity))
+    if framing.follow:
+        middle = np.mean([recording.position(name)[frame] for name in framing.movers], axis=0)
+        framing = replace(framing, centre=tuple(float(x) for x in rotation @ middle))
+    camera = _camera(framing, SUPERSAMPLING * width, SUPERSAMPLING * height)
     meshes, levels = _meshes(recording, drawn, rotation, frame)
     picture = _background(camera)
     for level in levels:
