@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import rigidimpulse
+from rigidimpulse.cli_site import gallery as gallery_pages
 from rigidimpulse.cli_studies import compare, hardcases, study
 from rigidimpulse.cli_wedge import wedge
 from rigidimpulse.files import ANIMATED_SUFFIXES
@@ -192,5 +193,5 @@ def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str
         show(run)
 
 
-for command in (hardcases, study, compare, wedge):
+for command in (hardcases, study, compare, wedge, gallery_pages):
     main.add_command(command)

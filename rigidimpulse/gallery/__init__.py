@@ -15,7 +15,7 @@ from rigidimpulse.gallery.record import asset_path
 if TYPE_CHECKING:
     from rigidimpulse.gallery.record import GalleryScene
 
-__all__ = ["asset_path", "hard_names", "load", "names"]
+__all__ = ["asset_path", "hard_names", "load", "module_name", "names"]
 
 _MODULES = {
     "spot": "spot",
@@ -86,6 +86,20 @@ def hard_names() -> tuple[str, ...]:
     return tuple(_HARD_MODULES)
 
 
+def module_name(name: str) -> str:
+    """Return the module that makes the scene of a name, hard cases included.
+
+    Raises:
+        SceneError: for an unknown name, listing the known ones.
+
+    """
+    if name in _MODULES:
+        return f"rigidimpulse.gallery.{_MODULES[name]}"
+    if name in _HARD_MODULES:
+        return f"rigidimpulse.gallery.hard.{_HARD_MODULES[name]}"
+    raise unknown_name("gallery scene", name, names() + hard_names())
+
+
 def load(name: str) -> GalleryScene:
     """Return the scene of a name, hard cases included.
 
@@ -93,10 +107,5 @@ def load(name: str) -> GalleryScene:
         SceneError: for an unknown name, listing the known ones.
 
     """
-    if name in _MODULES:
-        module = importlib.import_module(f"rigidimpulse.gallery.{_MODULES[name]}")
-    elif name in _HARD_MODULES:
-        module = importlib.import_module(f"rigidimpulse.gallery.hard.{_HARD_MODULES[name]}")
-    else:
-        raise unknown_name("gallery scene", name, names() + hard_names())
+    module = importlib.import_module(module_name(name))
     return next(entry for entry in module.SCENES if entry.name == name)

@@ -111,34 +111,49 @@ def run_apart(name: str, limit: float) -> CaseResult:
     entry = gallery.load(name)
     start = perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        answer, words = Path(folder) / "answer.json", Path(folder) / "words.txt"
-        with words.open("wb") as stream:
-            process = subprocess.Popen(
-                [sys.executable, "-m", "rigidimpulse.studies.hard_cases", name, str(answer)],
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=stream, start_new_session=True,
-            )  # fmt: skip
-            try:
-                code = process.wait(limit)
-            except subprocess.TimeoutExpired:
-                code = None
-            finally:
-                _end(process)
+        answer = Path(folder) / "answer.json"
+        code, last = run_limited(["rigidimpulse.studies.hard_cases", name, str(answer)], limit)
         seconds = perf_counter() - start
         if code == 0:
             return CaseResult(**json.loads(answer.read_text(encoding="utf-8")))
-        last = words.read_text(encoding="utf-8", errors="replace").strip()[-LAST_WORDS:]
+    return lost_case(entry, family_of(name), code, last, seconds, limit)
+
+
+def lost_case(entry: GalleryScene, family: str, code: int | None, last: str, seconds: float, limit: float) -> CaseResult:
+    """Return the result of a process that brought none: its exit code, None over the limit, and its last words."""
     outcome = HUNG if code is None else CRASHED
     message = f"not done after {limit:g} s" if code is None else f"exit code {code}: {last}"
     return CaseResult(
-        name,
+        entry.name,
         entry.description,
-        family_of(name),
+        family,
         outcome,
         seconds=seconds,
         duration=entry.duration,
         message=message,
         elsewhere=entry.elsewhere,
     )
+
+
+def run_limited(arguments: Sequence[str], limit: float) -> tuple[int | None, str]:
+    """Run a module with arguments in a process that is ended, with all it has started, after `limit` s.
+
+    Returns:
+        The exit code, None if it was ended, and the last it wrote to standard error.
+
+    """
+    with tempfile.TemporaryFile() as words:
+        process = subprocess.Popen(
+            [sys.executable, "-m", *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=words, start_new_session=True
+        )
+        try:
+            code = process.wait(limit)
+        except subprocess.TimeoutExpired:
+            code = None
+        finally:
+            _end(process)
+        words.seek(0)
+        return code, words.read().decode("utf-8", errors="replace").strip()[-LAST_WORDS:]
 
 
 def _end(process: subprocess.Popen) -> None:

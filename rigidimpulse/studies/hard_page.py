@@ -95,18 +95,18 @@ def _case(case: CaseResult) -> str:
     return f"""<details class="{case.outcome}"><summary><span class="pill">{case.outcome}</span>
 <div class="title">{_text(case.description)}<small>{_text(case.name)}</small></div>{what}
 <span class="num fig">{value}</span><span class="num fig">{bound}</span><span class="num">{_seconds(case.seconds)}</span></summary>
-<div class="checks">{_checks(case)}{_notes(case)}</div></details>"""
+<div class="checks">{checks_table(case.checks)}{_notes(case)}</div></details>"""
 
 
-def _checks(case: CaseResult) -> str:
-    """Return the table of a case's checks."""
-    if not case.checks:
+def checks_table(checks: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of checks as plain data (`hard_cases.as_plain`)."""
+    if not checks:
         return ""
     rows = "".join(
         f'<tr class="{"yes" if c["passed"] else "no"}"><td>{"✓" if c["passed"] else "✗"}</td><td>{_text(c["what"])}</td>'
         f'<td class="num value">{figure(c["value"])}</td><td class="num">{SIGNS[c["relation"]]} {figure(c["bound"])}</td>'
         f'<td>{_bar(c)}</td><td class="law">{_text(c["law"])}</td></tr>'
-        for c in case.checks
+        for c in checks
     )
     head = '<tr><th></th><th>check</th><th class="num">value</th><th class="num">bound</th><th></th><th>law</th></tr>'
     return f"<table>{head}{rows}</table>"

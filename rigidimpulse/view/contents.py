@@ -28,7 +28,7 @@ import numpy as np
 
 from rigidimpulse.shape import rotation_matrix
 from rigidimpulse.view.arrows import arrow_rows, fade_time, longest_arrow
-from rigidimpulse.view.camera import Path, frame_action, up_axis
+from rigidimpulse.view.camera import Framing, Path, frame_action, up_axis
 from rigidimpulse.view.display import SEGMENTS, DisplayMesh, display_mesh, display_planes
 from rigidimpulse.view.history import contact_rows, energy_span, impact_marks, ledger_curves
 from rigidimpulse.view.materials import ROUND_KINDS, net_surface, surface
@@ -127,7 +127,7 @@ def _entries(
         planes = _plane_entries(body, orientation[0], up)
         group, key = "ground" if planes and numbers[index] < 0 else "bodies", _path_key(index, body.name)
         entry = {"name": body.name, "group": group, "key": key, "planes": planes, "shape": numbers[index]}
-        entry |= {"rendered": rendered[index], "faceted": body.shape.kind not in ROUND_KINDS}
+        entry |= {"rendered": rendered[index], "faceted": all(part.shape.kind not in ROUND_KINDS for part in body.shape.parts_flat())}
         entry["surface"] = surface(num_coloured, body)
         num_coloured += body.motion != "static"
         entry["position"] = position[0].tolist()
@@ -179,6 +179,27 @@ def glb_file(recording: Any) -> bytes:
         path = FilePath(folder) / "motion.glb"
         write_motion(plain, path)
         return path.read_bytes()
+
+
+def page_scene(recording: RecordingLike) -> tuple[Framing, list[tuple[Any, DisplayMesh | None, dict[str, Any], list[dict[str, Any]]]]]:
+    """Return the framing of a recording, and of each body itself, the mesh that is drawn of it, how it is painted and its half spaces.
+
+    Raises:
+        ValueError: the recording has no frames, or a pose is not finite.
+
+    """
+    if len(recording.times) == 0:
+        raise ValueError("the recording has no frames; simulate at least one")
+    bodies = list(recording.scene.bodies)
+    poses = [finite_poses(recording, body.name) for body in bodies]
+    numbers, meshes = _shared_meshes(bodies)
+    rendered, meshes = _with_rendered(recording.scene, bodies, numbers, meshes)
+    paths = _paths(bodies, poses, numbers, meshes) + [_net_path(track) for track in recording.nets]
+    framing, drawn = frame_action(paths, up_axis(recording.scene.gravity)), []
+    for entry, body in zip(_entries(recording, bodies, poses, numbers, rendered), bodies, strict=True):
+        number = entry["rendered"] if entry["rendered"] >= 0 else entry["shape"]
+        drawn.append((body, meshes[number] if number >= 0 else None, entry["surface"], entry["planes"]))
+    return framing, drawn
 
 
 def _both(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -181,6 +181,12 @@ def test_names_and_title_are_text_not_markup(opened: Opened) -> None:
     assert "2 moving bodies" in opened.page.inner_text("#summary")
 
 
+def test_page_leaves_out_what_its_recording_has_not(opened: Opened) -> None:
+    assert opened.page.query_selector("#ledger") is None
+    buttons = opened.page.eval_on_selector_all("#layers button", "all => all.map(each => each.textContent)")
+    assert buttons == ["Bodies", "Impacts", "Trails", "Ground", "Wireframe", "Track", "More"]
+
+
 def test_live_page_of_a_single_frame(browser: Any, capsys: pytest.CaptureFixture[str]) -> None:
     with show(recording(num_frames=1), open_browser=False) as viewer:
         assert viewer.url in capsys.readouterr().out

@@ -29,7 +29,7 @@ def opened(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Opened:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contents, "MOST_KEYS", 2 * 61 - 1)
         write_html(full_run(), path)
-    page = open_page(browser, path.as_uri(), 1000, 640)
+    page = open_page(browser, path.as_uri())
     page.do("r.pause()")
     return page
 
@@ -65,7 +65,7 @@ def test_time_line_plots_trails_and_playing_work_as_on_other_pages(opened: Opene
     run = full_run()
     marks = opened.page.locator("#marks").bounding_box()
     opened.page.mouse.click(marks["x"] + 8 + 0.5 * (marks["width"] - 16), marks["y"] + 10)
-    assert opened.do("r.time") == pytest.approx(0.5, abs=2.0 / 600.0)
+    assert opened.do("r.time") == pytest.approx(0.5, abs=2.0 / 400.0)
     path = np.array(opened.page.evaluate("(name) => window.rigidimpulse.trail(name)", STRANGE_NAME)).reshape(-1, 4)
     assert np.allclose(path[:, :3], run.center_of_mass(STRANGE_NAME), rtol=0, atol=POSE)
     opened.page.keyboard.press("-")
@@ -74,6 +74,7 @@ def test_time_line_plots_trails_and_playing_work_as_on_other_pages(opened: Opene
     opened.do("r.play()")
     opened.page.wait_for_function("window.rigidimpulse.time > 0.15", timeout=10_000)
     opened.do("r.pause()")
+    opened.page.keyboard.press("p")
     assert opened.page.is_visible("#energy")
     outside = [url for url in opened.requests if not url.startswith(("file:", "data:", "blob:"))]
     assert outside == [] and opened.errors == []

@@ -4,6 +4,7 @@
 const ENERGY_COLOURS = {kinetic: "#2f7fb8", potential: "#d9911f", total: PLOT_INK};
 const AXIS_COLOURS = {x: "#c4493a", y: "#3d8f5f", z: "#3b6fc4"};
 const LEAST_MOMENTUM = 1e-9; // N s, of the scale: what is less is round-off
+const ROUND_OFF = 1e-7; // of a plot's range: what is written as zero
 const ROOM_FOR_FIGURES = 52; // pixels beside a plot, without which they are in it
 const ROOM_FOR_PLOTS = [900, 620]; // pixels of a window in which the plots are there from the start
 
@@ -96,7 +97,8 @@ class LedgerPanel extends Panel {
     for (const plot of this.plots) {
       plot.draw(time, frame);
       for (const {values, figure} of plot.curves) {
-        const text = withUnit(plot.valueAt(values, frame, time), plot.unit, 3);
+        const value = plot.valueAt(values, frame, time), seen = Math.abs(value) > ROUND_OFF * (plot.high - plot.low);
+        const text = withUnit(seen ? value : 0, plot.unit, 3);
         if (figure.textContent !== text) { figure.textContent = text; }
       }
     }

@@ -1,7 +1,7 @@
 /* Bodies as they are simulated: the faces and edges that collide, where what is drawn is another mesh. */
 
 const FLAT_EDGE = 1; // degrees, from which an edge of the collision shape is drawn: all but those inside flat faces
-const ROUND_EDGE = 20; // of shapes that collide as round bodies: their corners are only drawn
+const ROUND_EDGE = 25; // the same where round bodies collide, whose corners are only drawn: 16 of them at least
 const SIMULATED_EDGE = "#17222c";
 
 class SimulatedShapes {
