@@ -172,12 +172,13 @@ def glb_file(recording: Any) -> bytes:
     from tempfile import TemporaryDirectory
 
     from rigidimpulse.io.gltf.animate import write_motion
+    from rigidimpulse.io.motion import MotionOptions
     from rigidimpulse.scene import Scene
 
     plain = replace(recording, scene=Scene(recording.scene.gravity, recording.scene.bodies), nets=[])
     with TemporaryDirectory() as folder:
         path = FilePath(folder) / "motion.glb"
-        write_motion(plain, path)
+        write_motion(plain, path, MotionOptions())
         return path.read_bytes()
 
 
