@@ -18,7 +18,7 @@ import numpy as np
 
 from rigidimpulse.errors import SceneError
 from rigidimpulse.io.pieces import EQUAL, rim_points, sphere_points
-from rigidimpulse.io.usd.library import Prim, UsdGeom, UsdPhysics
+from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
 from rigidimpulse.shape import Shape
 
 HALF = np.sqrt(0.5)
@@ -34,8 +34,9 @@ Placed = tuple[Shape, np.ndarray, np.ndarray]
 class Shapes:
     """Shapes of prims; those that are equal are one. notes: what is not as the file says."""
 
-    def __init__(self) -> None:
-        """Nothing is made before it is asked for."""
+    def __init__(self, hulls: frozenset[SdfPath] = frozenset()) -> None:
+        """hulls: paths of meshes that collide as their convex hull, whatever they say."""
+        self._hulls = hulls
         self.notes: list[str] = []
         self._known: dict[tuple, Placed] = {}
 
@@ -48,6 +49,8 @@ class Shapes:
         """
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         approximation = UsdPhysics.MeshCollisionAPI(prim).GetApproximationAttr().Get() if prim.IsA(UsdGeom.Mesh) else None
+        if prim.GetPath() in self._hulls:
+            approximation = "convexHull"
         key = (source.GetPath(), approximation, stretch.tobytes())
         if key not in self._known:
             try:
