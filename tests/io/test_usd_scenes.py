@@ -86,6 +86,20 @@ def test_meshes(tmp_path: Path, approximation: str | None, kind: str, volume: fl
     assert abs(shape.solid().volume - volume) < 1e-5 and kind in (shape.kind, "compound")
 
 
+def test_meshes_that_change_are_as_at_the_start(tmp_path: Path) -> None:
+    """Points with time samples and no default value, as exporters of animation write them."""
+    file = File()
+    points = UsdGeom.Mesh(file.collider("/mesh", "Mesh")).GetPointsAttr()
+    given = np.array(points.Get())
+    points.Clear()
+    for code, size in ((1.0, 2.0), (2.0, 5.0)):
+        points.Set([Gf.Vec3f(*(size * point).tolist()) for point in given], code)
+    file.stage.SetStartTimeCode(1)
+    file.stage.SetEndTimeCode(2)
+    scene = file.load(tmp_path)
+    assert abs(scene["mesh"].shape.solid().volume - 8) < 1e-6 and "changes its shape" in scene.report[0]
+
+
 def test_planes_and_static_colliders(tmp_path: Path) -> None:
     """A plane stands where its prim stands, its normal is its axis; a box falls on it and rests there."""
     file = File("Y", unit=0.01)

@@ -45,7 +45,7 @@ class BodyReader:
         """parsed: descriptions by kind. hulls: meshes that collide as their convex hull, whatever they say."""
         self.frames, self.stage, self.notes = frames, frames.stage, []
         self.units = Units(self.stage, frames.meters_per_unit)
-        self.shapes = Shapes(hulls)
+        self.shapes = Shapes(frames.start, hulls)
         self.bodies: dict[str, Body] = {}
         self.name_of: dict[SdfPath, str] = {}
         self.triggers: list[Trigger] = []

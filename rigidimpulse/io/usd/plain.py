@@ -41,7 +41,7 @@ def plain_bodies(frames: Frames) -> Plain:
 
     """
     found = Plain({"RigidBody": [], "MeshShape": []}, frozenset(), ["the file has no physics: every prim with a surface is a body"])
-    shapes, hulls = Shapes(), set()
+    shapes, hulls = Shapes(frames.start), set()
     for prim in frames.prims():
         if str(prim.GetTypeName()) not in KINDS or not _is_seen(prim):
             continue

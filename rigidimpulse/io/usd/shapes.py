@@ -34,9 +34,9 @@ Placed = tuple[Shape, np.ndarray, np.ndarray]
 class Shapes:
     """Shapes of prims; those that are equal are one. notes: what is not as the file says."""
 
-    def __init__(self, hulls: frozenset[SdfPath] = frozenset()) -> None:
-        """hulls: paths of meshes that collide as their convex hull, whatever they say."""
-        self._hulls = hulls
+    def __init__(self, code: float, hulls: frozenset[SdfPath] = frozenset()) -> None:
+        """code: time code of the scene. hulls: paths of meshes that collide as their convex hull, whatever they say."""
+        self._code, self._hulls = code, hulls
         self.notes: list[str] = []
         self._known: dict[tuple, Placed] = {}
 
@@ -84,7 +84,9 @@ class Shapes:
 
     def _mesh(self, prim: Prim, stretch: np.ndarray, approximation: str | None) -> Placed:
         """Return the shape of a mesh prim."""
-        points, faces = triangles(prim)
+        points, faces = triangles(prim, self._code)
+        if UsdGeom.Mesh(prim).GetPointsAttr().ValueMightBeTimeVarying():
+            self.notes.append(f"collider {prim.GetPath()} changes its shape: it stays as it is at the start")
         points = points @ stretch.T
         if approximation == "convexHull":
             return Shape.convex_hull(points), np.zeros(3), NO_TURN
@@ -101,8 +103,8 @@ class Shapes:
         return Shape.mesh(points, faces[:, ::-1] if np.linalg.det(stretch) < 0.0 else faces), np.zeros(3), NO_TURN
 
 
-def triangles(prim: Prim) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (v, 3) in units of the file and triangles (t, 3) of a mesh prim; polygons are fans.
+def triangles(prim: Prim, code: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return points (v, 3) in units of the file and triangles (t, 3) of a mesh prim at a time code; polygons are fans.
 
     Raises:
         SceneError: there are none, or an index is wrong.
@@ -110,7 +112,7 @@ def triangles(prim: Prim) -> tuple[np.ndarray, np.ndarray]:
     """
     mesh = UsdGeom.Mesh(prim)
     points, counts, index = (
-        np.array(attribute.Get() or (), dtype)
+        np.array(attribute.Get(code) or (), dtype)
         for attribute, dtype in (
             (mesh.GetPointsAttr(), float), (mesh.GetFaceVertexCountsAttr(), np.int64), (mesh.GetFaceVertexIndicesAttr(), np.int64)
         )
