@@ -88,7 +88,7 @@ KERNELS = {"springs", "joints", "rolling friction", "heaps", "contact forces", "
 ASKED_FOR = ("rigidimpulse.forces.", "rigidimpulse.flexible", "rigidimpulse.io", "rigidimpulse.observe.trigger")
 """Modules that are imported where a scene asks for them only, but for those of forces that do not vary."""
 ALWAYS = {"rigidimpulse.forces.gravity", "rigidimpulse.forces.constant", "rigidimpulse.forces.kinds"}
-OPTIONAL = {"clarabel", "meshcat", "mujoco", "pybullet", "dask", "h5py", "pxr", "matplotlib", "playwright"}
+OPTIONAL = {"clarabel", "defusedxml", "meshcat", "mujoco", "pybullet", "dask", "h5py", "pxr", "matplotlib", "playwright"}
 
 REPORT = '''
 import gc, json, sys

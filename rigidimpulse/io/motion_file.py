@@ -18,9 +18,12 @@ def write_motion(
     """Write a file of animated bodies; see `Recording.export` for its options. Returns the path.
 
     Raises:
-        SceneError: an option makes no sense, a pose is not finite, or the package of a format is not installed.
+        SceneError: an option makes no sense, a pose is not finite, the package of a format is not installed, or the file is one
+            that the scene comes from and the new one would refer to.
 
     """
+    if run.scene is not None and run.scene.origin is not None:
+        run.scene.origin.check_target(path)
     options = MotionOptions(start_frame, tolerance, impact_keys, only_moved, samples)
     if path.suffix in (".glb", ".gltf"):
         from rigidimpulse.io.gltf.animate import write_motion as write

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -15,3 +16,6 @@ class FileOrigin:
     """
 
     report: tuple[str, ...]
+
+    def check_target(self, path: Path) -> None:
+        """Raise a `SceneError` where motion cannot be written to a path for the sake of this file: by default never."""

@@ -21,6 +21,8 @@ NOTHING = CollisionFilter(collide_with=())
 EQUAL = 1e-6
 """Scales, radii and shears that differ by less, relative to the largest, are equal: files have single precision."""
 RIM = 48
+STATIC_WORDS = {"floor", "ground", "static", "wall", "walls", "terrain", "room", "ceiling", "plane", "ramp", "stairs"}
+"""Words of names of things that stand, in files without physics."""
 
 
 class Piece(NamedTuple):

@@ -48,6 +48,8 @@ def load_scene(
     """
     place = Path(path)
     suffix = place.suffix.lower()
+    if fixed_base is not None and suffix != ".urdf":
+        raise SceneError(f"fixed_base for {place.name!r}", "give it for .urdf only")
     if suffix in GLTF_SUFFIXES:
         from rigidimpulse.io.gltf.load import load_gltf
 

@@ -213,3 +213,5 @@ def test_broken_files(tmp_path: Path, text: str, match: str) -> None:
         ri.load_scene(path)
     with pytest.raises(ri.SceneError, match="no such file"):
         ri.load_scene(tmp_path / "gone.urdf")
+    with pytest.raises(ri.SceneError, match="fixed_base"):
+        ri.load_scene(tmp_path / "room.glb", fixed_base=True)

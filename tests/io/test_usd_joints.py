@@ -173,3 +173,33 @@ def test_what_does_not_move_is_left_alone(tmp_path: Path) -> None:
     assert not stage.GetRootLayer().GetPrimAtPath("/b") and stage.GetRootLayer().GetPrimAtPath("/a")
     assert np.allclose(world(stage, "/b", 2)[:3, 3], (5, 0, 0))
     assert ri.load_scene(tmp_path / "out.usda").names == ("a", "b")
+    # The file that the new one refers to is not written over.
+    with pytest.raises(ri.SceneError, match="comes from"):
+        run.export(tmp_path / "in.usda")
+    assert ri.load_scene(tmp_path / "in.usda").names == ("a", "b")
+    # A package has both.
+    stage = opened(run.export(tmp_path / "out.usdz"))
+    assert np.allclose(world(stage, "/b", 2)[:3, 3], (5, 0, 0)) and off(stage, "/a", run, "a") < SINGLE
+
+
+def test_on_the_command_line(tmp_path: Path) -> None:
+    """A file in, a file out, from frame 1001 on, with two samples a frame; what is not read is printed."""
+    from click.testing import CliRunner
+
+    from rigidimpulse.cli import main
+
+    file = File("Y", unit=0.01)
+    file.body("/ball", at=(0, 100, 0)).AddAppliedSchema("PhysxRigidBodyAPI")
+    file.collider("/ball/shape", "Sphere", radius=10.0)
+    file.save(tmp_path / "in.usda")
+    words = ["simulate", str(tmp_path / "in.usda"), "-o", str(tmp_path / "out.usdc"), "-o", str(tmp_path / "out.csv")]
+    more = ["--fps", "24", "--duration", "0.5", "--start-frame", "1001", "--samples", "2"]
+    result = CliRunner().invoke(main, words + more)
+    assert result.exit_code == 0 and "PhysxRigidBodyAPI of 1 prim is not read" in result.stderr, result.output
+    stage = opened(tmp_path / "out.usdc")
+    codes = UsdGeom.Xformable(stage.GetPrimAtPath("/ball")).GetTimeSamples()
+    assert codes == [1001 + k / 2 for k in range(25)]
+    heights = [world(stage, "/ball", code)[1, 3] for code in codes]
+    t = np.arange(25) / 48
+    assert np.abs(heights - (1 - 9.81 * t**2 / 2)).max() < SINGLE
+    assert len((tmp_path / "out.csv").read_text().splitlines()) == 14

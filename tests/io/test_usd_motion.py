@@ -177,6 +177,19 @@ def test_flexible_bodies_have_moving_points(tmp_path: Path) -> None:
         assert np.abs(np.array(mesh.GetPointsAttr().Get(10 + k)) - points[k]).max() < SINGLE
 
 
+def test_the_validators_of_usd_find_nothing(tmp_path: Path) -> None:
+    from pxr import UsdValidation
+
+    scene = scene_of_shapes()
+    run = recorded(scene, {body.name: smooth(4, body.position) for body in scene.bodies[1:]})
+    run.nets.append(FlexibleTrack("net", np.random.default_rng(1).normal(size=(4, 3, 3)), np.array([[0, 1, 2]])))
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    for name in ("out.usdc", "out.usdz"):
+        stage = opened(run.export(tmp_path / name))
+        found = UsdValidation.ValidationContext(validators).Validate(stage)
+        assert len(validators) > 10 and not [error.GetErrorAsString() for error in found]
+
+
 def test_a_thousand_bodies(tmp_path: Path) -> None:
     """240 frames of 1,000 bodies: all samples are there, 56 bytes a pose: 24 + 16, and 16 that say where."""
     from rigidimpulse.observe.events import IMPACT_DTYPE

@@ -86,6 +86,20 @@ def test_meshes(tmp_path: Path, approximation: str | None, kind: str, volume: fl
     assert abs(shape.solid().volume - volume) < 1e-5 and kind in (shape.kind, "compound")
 
 
+def test_meshes_that_change_are_as_at_the_start(tmp_path: Path) -> None:
+    """Points with time samples and no default value, as exporters of animation write them."""
+    file = File()
+    points = UsdGeom.Mesh(file.collider("/mesh", "Mesh")).GetPointsAttr()
+    given = np.array(points.Get())
+    points.Clear()
+    for code, size in ((1.0, 2.0), (2.0, 5.0)):
+        points.Set([Gf.Vec3f(*(size * point).tolist()) for point in given], code)
+    file.stage.SetStartTimeCode(1)
+    file.stage.SetEndTimeCode(2)
+    scene = file.load(tmp_path)
+    assert abs(scene["mesh"].shape.solid().volume - 8) < 1e-6 and "changes its shape" in scene.report[0]
+
+
 def test_planes_and_static_colliders(tmp_path: Path) -> None:
     """A plane stands where its prim stands, its normal is its axis; a box falls on it and rests there."""
     file = File("Y", unit=0.01)
@@ -189,6 +203,32 @@ def test_who_collides(tmp_path: Path) -> None:
     assert hit == {frozenset("ad")}
 
 
+def test_files_without_physics(tmp_path: Path) -> None:
+    """Surfaces are bodies by their names and animation; an open mesh is its hull; what nobody sees is left out."""
+    file = File("Y", unit=0.01)
+    file.prim("/set/bigFloor", "Cube", size=10.0, scale=(100, 1, 100))
+    file.prim("/set/crate", at=(0, 205, 0))
+    for path in ("/set/crate/mesh", "/set/flat", "/set/open"):
+        UsdPhysics.CollisionAPI(file.collider(path, "Mesh", scale=(100, 100, 100))).GetPrim().RemoveAPI(UsdPhysics.CollisionAPI)
+    for path, faces in (("/set/flat", 1), ("/set/open", 5)):
+        mesh = UsdGeom.Mesh(file.stage.GetPrimAtPath(path))
+        mesh.GetFaceVertexCountsAttr().Set([4] * faces)
+        mesh.GetFaceVertexIndicesAttr().Set(list(mesh.GetFaceVertexIndicesAttr().Get())[: 4 * faces])
+        UsdGeom.Xformable(mesh).GetOrderedXformOps()[0].Set(Gf.Vec3d(50, 50, 50))
+    UsdGeom.Xformable(file.stage.GetPrimAtPath("/set/open")).AddTranslateOp().Set((20, 20, 0))
+    UsdGeom.Imageable(file.prim("/set/hidden", "Sphere")).MakeInvisible()
+    door = UsdGeom.Xformable(file.prim("/set/door", "Sphere", radius=1.0)).AddTranslateOp()
+    door.Set((0, 500, 0), 0)
+    door.Set((100, 500, 0), 24)
+    scene = file.load(tmp_path)
+    motions = {body.name: body.motion for body in scene.bodies}
+    assert motions == {"bigFloor": "static", "crate": "dynamic", "flat": "static", "open": "dynamic", "door": "kinematic"}
+    assert any("no physics" in line for line in scene.report) and any("convex hull" in line for line in scene.report)
+    run = ri.simulate(scene, 0.5, 24)
+    t = run.times
+    assert np.abs(run.position("crate")[:, 1] - (2.05 - 9.81 * t**2 / 2)).max() < SINGLE
+
+
 def test_a_file_that_has_changed_is_read_again(tmp_path: Path) -> None:
     """usd-core keeps layers that somebody has open: here the scene that was read before."""
     file = File()
@@ -245,7 +285,7 @@ def test_instances_have_bodies_of_their_own(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("text", "match"), [
     ('#usda 1.0\ndef Cube "a" (prepend apiSchemas = ["PhysicsCollisionAPI"]) { double size = "x" }', "size|no readable"),
-    ("#usda 1.0\ndef Xform \"a\" {", "no readable USD"), ("not a file", "no readable USD"), ("#usda 1.0\n", "no rigid body"),
+    ("#usda 1.0\ndef Xform \"a\" {", "no readable USD"), ("not a file", "no readable USD"), ("#usda 1.0\n", "no surface"),
 ])  # fmt: skip
 def test_broken_files(tmp_path: Path, text: str, match: str) -> None:
     path = tmp_path / "in.usda"

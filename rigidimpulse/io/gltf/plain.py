@@ -21,10 +21,10 @@ from rigidimpulse.io.gltf.bodies import Piece
 from rigidimpulse.io.gltf.geometry import Meshes, stays_finite
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.schema import LARGEST, Motion
+from rigidimpulse.io.pieces import STATIC_WORDS
 from rigidimpulse.material import Material
 from rigidimpulse.shape import Shape
 
-STATIC_WORDS = {"floor", "ground", "static", "wall", "walls", "terrain", "room", "ceiling", "plane", "ramp", "stairs"}
 MOTIONS = ("dynamic", "kinematic", "static", "none")
 SHAPES = ("mesh", "convex_hull", "box", "sphere")
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])

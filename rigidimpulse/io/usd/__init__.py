@@ -5,5 +5,5 @@ frames     world frames of prims, and their keys  shapes     colliders
 materials  materials, masses, collision groups    bodies     bodies of them
 joints     joints                                 load       a scene from a file
 origin     what is kept of the file               draw       bodies without a file, as prims
-animate    motion into a file
+animate    motion into a file                     plain      bodies of files without physics
 """

@@ -41,11 +41,11 @@ class BodyReader:
 
     """
 
-    def __init__(self, frames: Frames, parsed: dict[str, list[tuple[SdfPath, Any]]]) -> None:
-        """parsed: descriptions by kind."""
+    def __init__(self, frames: Frames, parsed: dict[str, list[tuple[SdfPath, Any]]], hulls: frozenset[SdfPath] = frozenset()) -> None:
+        """parsed: descriptions by kind. hulls: meshes that collide as their convex hull, whatever they say."""
         self.frames, self.stage, self.notes = frames, frames.stage, []
         self.units = Units(self.stage, frames.meters_per_unit)
-        self.shapes = Shapes()
+        self.shapes = Shapes(frames.start, hulls)
         self.bodies: dict[str, Body] = {}
         self.name_of: dict[SdfPath, str] = {}
         self.triggers: list[Trigger] = []

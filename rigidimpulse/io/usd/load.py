@@ -19,6 +19,7 @@ from rigidimpulse.io.usd.frames import Frames
 from rigidimpulse.io.usd.joints import JointReader
 from rigidimpulse.io.usd.library import SdfPath, Stage, Tf, Usd, UsdGeom, UsdPhysics
 from rigidimpulse.io.usd.origin import UsdOrigin
+from rigidimpulse.io.usd.plain import plain_bodies
 from rigidimpulse.scene import Scene
 
 EARTH = 9.81
@@ -57,10 +58,14 @@ def _scene(stage: Stage, gravity: ArrayLike | None) -> Scene:
     if not (np.isfinite(frames.meters_per_unit) and frames.meters_per_unit > 0.0):
         raise SceneError(f"metersPerUnit is {frames.meters_per_unit}", "give a length > 0")
     reader = BodyReader(frames, parsed)
-    if not reader.bodies:
-        raise SceneError("it has no rigid body and no collider", "give prims PhysicsRigidBodyAPI and PhysicsCollisionAPI")
-    joints = JointReader(reader)
     notes = _unresolved(stage) + _unknown(frames)
+    if not reader.bodies:
+        plain = plain_bodies(frames)
+        reader = BodyReader(frames, plain.parsed, plain.hulls)
+        notes += plain.notes
+    if not reader.bodies:
+        raise SceneError("it has no rigid body, no collider and no surface", "give prims PhysicsRigidBodyAPI and PhysicsCollisionAPI")
+    joints = JointReader(reader)
     scene = Scene(_gravity(stage, parsed, frames.meters_per_unit, notes) if gravity is None else gravity)
     for thing in (*reader.bodies.values(), *joints.read(parsed), *reader.triggers):
         scene.add(thing)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.errors import SceneError
 from rigidimpulse.io.keys import Keys
 from rigidimpulse.io.motion import Motion
 from rigidimpulse.io.origin import FileOrigin
@@ -38,6 +39,12 @@ class UsdOrigin(FileOrigin):
     def meters_per_unit(self) -> float:
         """Length of a unit of the file, m."""
         return self.frames.meters_per_unit
+
+    def check_target(self, path: Path) -> None:
+        """See `FileOrigin`: the new file refers to this one and its layers, so it cannot take their place."""
+        for layer in self.frames.stage.GetUsedLayers():
+            if layer.realPath and Path(layer.realPath).resolve() == path.resolve():
+                raise SceneError(f"{path.name!r} is a file that the scene comes from", "give another name: the new one refers to it")
 
     def write_over(self, layer: Layer, fps: float, start_frame: float) -> None:
         """Put the file below a new layer, its first time code at the frame given."""

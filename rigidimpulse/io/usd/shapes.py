@@ -18,7 +18,7 @@ import numpy as np
 
 from rigidimpulse.errors import SceneError
 from rigidimpulse.io.pieces import EQUAL, rim_points, sphere_points
-from rigidimpulse.io.usd.library import Prim, UsdGeom, UsdPhysics
+from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
 from rigidimpulse.shape import Shape
 
 HALF = np.sqrt(0.5)
@@ -34,8 +34,9 @@ Placed = tuple[Shape, np.ndarray, np.ndarray]
 class Shapes:
     """Shapes of prims; those that are equal are one. notes: what is not as the file says."""
 
-    def __init__(self) -> None:
-        """Nothing is made before it is asked for."""
+    def __init__(self, code: float, hulls: frozenset[SdfPath] = frozenset()) -> None:
+        """code: time code of the scene. hulls: paths of meshes that collide as their convex hull, whatever they say."""
+        self._code, self._hulls = code, hulls
         self.notes: list[str] = []
         self._known: dict[tuple, Placed] = {}
 
@@ -48,6 +49,8 @@ class Shapes:
         """
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         approximation = UsdPhysics.MeshCollisionAPI(prim).GetApproximationAttr().Get() if prim.IsA(UsdGeom.Mesh) else None
+        if prim.GetPath() in self._hulls:
+            approximation = "convexHull"
         key = (source.GetPath(), approximation, stretch.tobytes())
         if key not in self._known:
             try:
@@ -81,7 +84,9 @@ class Shapes:
 
     def _mesh(self, prim: Prim, stretch: np.ndarray, approximation: str | None) -> Placed:
         """Return the shape of a mesh prim."""
-        points, faces = triangles(prim)
+        points, faces = triangles(prim, self._code)
+        if UsdGeom.Mesh(prim).GetPointsAttr().ValueMightBeTimeVarying():
+            self.notes.append(f"collider {prim.GetPath()} changes its shape: it stays as it is at the start")
         points = points @ stretch.T
         if approximation == "convexHull":
             return Shape.convex_hull(points), np.zeros(3), NO_TURN
@@ -98,8 +103,8 @@ class Shapes:
         return Shape.mesh(points, faces[:, ::-1] if np.linalg.det(stretch) < 0.0 else faces), np.zeros(3), NO_TURN
 
 
-def triangles(prim: Prim) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (v, 3) in units of the file and triangles (t, 3) of a mesh prim; polygons are fans.
+def triangles(prim: Prim, code: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return points (v, 3) in units of the file and triangles (t, 3) of a mesh prim at a time code; polygons are fans.
 
     Raises:
         SceneError: there are none, or an index is wrong.
@@ -107,7 +112,7 @@ def triangles(prim: Prim) -> tuple[np.ndarray, np.ndarray]:
     """
     mesh = UsdGeom.Mesh(prim)
     points, counts, index = (
-        np.array(attribute.Get() or (), dtype)
+        np.array(attribute.Get(code) or (), dtype)
         for attribute, dtype in (
             (mesh.GetPointsAttr(), float), (mesh.GetFaceVertexCountsAttr(), np.int64), (mesh.GetFaceVertexIndicesAttr(), np.int64)
         )
