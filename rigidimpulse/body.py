@@ -39,6 +39,7 @@ class Body:
         center_of_mass: (3,) m, body frame; by default the centroid of the shape.
         material: density and contact coefficients.
         keyframes: the path of a kinematic body.
+        release_time: s, > 0, from when on a kinematic body is dynamic: let go with the pose and the velocity that it has then. None: never.
         gravity_factor: scales the scene's gravity for this body.
         collision_filter: which other bodies it touches; None: all.
 
@@ -57,12 +58,18 @@ class Body:
     center_of_mass: ArrayLike | None = None
     material: Material = DEFAULT_MATERIAL
     keyframes: Keyframes | None = None
+    release_time: float | None = None
     gravity_factor: float = 1.0
     collision_filter: CollisionFilter | None = None
 
     def unit_orientation(self) -> np.ndarray:
         """Return the normalised orientation (4,)."""
         return normalized_quaternion(self.orientation)
+
+    @property
+    def becomes_dynamic(self) -> bool:
+        """Whether the body is dynamic, or will be."""
+        return self.motion == "dynamic" or self.release_time is not None
 
     def check(self) -> None:
         """Raise a `SceneError`, naming the body, for a value that makes no sense; masses are `mass.body_mass`'s."""
@@ -94,7 +101,12 @@ class Body:
                 raise SceneError(f"keyframes are a {type(self.keyframes).__name__}", "give Keyframes(times, positions)")
             if self.motion != "kinematic":
                 raise SceneError(f"it has keyframes, but its motion is {self.motion!r}", "use motion='kinematic'")
-        if self.motion == "dynamic" and any(part.shape.kind == "half_space" for part in self.shape.parts_flat()):
+        if self.release_time is not None:
+            if self.motion != "kinematic":
+                raise SceneError(f"it has a release_time, but its motion is {self.motion!r}", "use motion='kinematic'")
+            if number(self.release_time, "release_time", "s") <= 0.0:
+                raise SceneError(f"release_time is {self.release_time} s", "give a time > 0, or use motion='dynamic'")
+        if self.becomes_dynamic and any(part.shape.kind == "half_space" for part in self.shape.parts_flat()):
             raise SceneError("a half space is infinite and can not be dynamic", "use motion='static', or Shape.box")
 
     def _check_state(self) -> None:

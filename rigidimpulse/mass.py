@@ -63,7 +63,7 @@ def body_mass(body: Body) -> BodyMass:
 
     """
     try:
-        if body.motion != "dynamic":
+        if not body.becomes_dynamic:
             infinite = np.full(3, np.inf)
             return BodyMass(np.inf, _frame_origin(body), np.diag(infinite), infinite, np.eye(3))
         return _dynamic_mass(body)

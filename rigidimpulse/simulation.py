@@ -125,11 +125,12 @@ def _simulate(
         log.report(0.0, "effect left out", (name,), f"the scene calls for it: {reason}")
     context = StepContext(world, recorder, log)
     bind_forces(context, plan, times)
+    paths = KeyframePaths(world)
     start_courses(context)
     recorder.start(context.state.course)
     resolve_overlaps(context)
     bind_triggers(context, plan)
-    running = Running(context, KeyframePaths(world), make_flight(context, plan))
+    running = Running(context, paths, make_flight(context, plan))
     settings = RunSettings(float(duration), float(fps), world.accuracy, dict(effects or {}))
     if cache is None:
         run_to_end(running, plan, duration, progress)
@@ -241,7 +242,7 @@ def start_courses(context: StepContext) -> None:
     world, course = context.world, context.state.course
     course.position[:], course.orientation[:] = world.position, world.orientation
     course.velocity[:], course.angular_velocity[:] = world.velocity, world.angular_velocity
-    course.acceleration[:] = world.steady_acceleration
+    course.acceleration[:] = np.where(world.dynamic[:, None], world.steady_acceleration, 0.0)
     course.inertia[:] = world.inertia
     course.mode[:] = np.where(world.dynamic, FREE, np.where(world.moving, PRESCRIBED, FIXED))
     for i in range(world.num_bodies):
@@ -325,23 +326,30 @@ def close_stretches(context: StepContext) -> None:
         context.log.stretches.append((state.course.start[i], np.inf, i, state.energy_at_start[i], 0.0))
 
 
+def release_times(world: World) -> np.ndarray:
+    """When bodies that are carried first are let go, (n,) s; 0 for others."""
+    return np.array([0.0 if body.release_time is None else body.release_time for body in world.scene.bodies])
+
+
 def impulses_by_cause(context: StepContext, times: np.ndarray, impacts: np.ndarray, work: ForceWork | None) -> Impulses:
     """Split what bodies gained by cause."""
     world, recorder = context.world, context.recorder
-    # Mass at the frames over that at the end of the run, and in the middle between frames.
+    # Mass at the frames over that at the end of the run, in the middle between frames; and the part of that time in which it counts.
     share = np.ones((len(times), world.num_bodies)) if work is None or work.mass_share is None else work.mass_share
     middle = 0.5 * (share + np.vstack([share[:1], share[:-1]]))
+    passed = np.diff(times, prepend=0.0)[:, None]
+    counted = np.clip(times[:, None] - release_times(world), 0.0, passed)
     mass = np.where(world.dynamic, world.mass, 0.0)
     gained = np.diff(recorder.velocity, axis=0, prepend=recorder.velocity[:1])
     return Impulses(
         names=list(world.names),
         times=times,
         pull=mass[:, None, None] * np.stack([world.gravity, world.push], axis=1),
-        held=np.cumsum(np.diff(times, prepend=0.0)[:, None] * middle, axis=0),
+        held=np.cumsum(counted * middle, axis=0),
         book=context.impulses,
         forces=work,
         impacts=impacts,
-        gained=np.cumsum(middle[:, :, None] * mass[:, None] * gained, axis=0),
+        gained=np.cumsum(((counted > 0.0) * middle * mass)[:, :, None] * gained, axis=0),
     )
 
 
@@ -354,7 +362,7 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
     work = None if context.forces is None else context.forces.finish(world, times, recorder)
     ledger = make_ledger(
         times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
-        np.where(world.dynamic, world.mass, 0.0), world.inertia, world.steady_acceleration, context.log, work,
+        np.where(world.dynamic & (times[:, None] >= release_times(world)), world.mass, 0.0), world.inertia, world.steady_acceleration, context.log, work,
     )
     if context.nets is not None:
         context.nets.add_to(ledger)

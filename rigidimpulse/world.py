@@ -35,7 +35,7 @@ class World:
         scene: the scene as written.
         accuracy: settings of the run.
         names: body names in order of index.
-        dynamic: (n,) bool. moving: (n,) bool, kinematic bodies with a velocity or keyframes.
+        dynamic: (n,) bool, those that will be (see `Carried`) included. moving: (n,) bool, kinematic ones with a velocity or keyframes.
         mass, inv_mass: (n,) kg, 1/kg (0 for immovable). inertia: (n, 3) kg m2, principal (1 for immovable).
         offset: (n, 3) m, centre of mass in the body frame. turn: (n, 4), principal axes in the body frame.
         position, orientation, velocity, angular_velocity: principal-frame state at time 0.
@@ -190,7 +190,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
     bodies = list(scene.bodies)
     masses = [body_mass(body) for body in bodies]
     joints = [effect for effect in scene.effects if isinstance(effect, Joint) and "joints" not in left_out]
-    dynamic = np.array([body.motion == "dynamic" for body in bodies], bool)
+    dynamic = np.array([body.becomes_dynamic for body in bodies], bool)
     moving = np.array([body.motion == "kinematic" and _is_driven(body) for body in bodies], bool)
     start = _start(bodies, masses)
     shapes, shape_of_body = _compile_shapes(bodies, masses)

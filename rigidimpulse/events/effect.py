@@ -65,5 +65,6 @@ def kinds(world) -> np.ndarray:
     first = geometry.shape_first[shape]
     plane = (geometry.kind[first] == HALF_SPACE) & (geometry.shape_first[shape + 1] == first + 1) & ~world.moving & ~world.dynamic
     driven = np.array([body.keyframes is not None for body in world.scene.bodies], bool)
-    ball = world.ball & np.all(world.inertia == world.inertia[:, :1], axis=1)
+    carried = np.array([body.release_time is not None for body in world.scene.bodies], bool)
+    ball = world.ball & ~carried & np.all(world.inertia == world.inertia[:, :1], axis=1)
     return np.where(ball, BALL, np.where(plane & ~driven, PLANE, OTHER))

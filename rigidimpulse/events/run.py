@@ -100,7 +100,8 @@ class EventRun:
         return how, max(self._step_begin, (number - 1) * step), min(number * step, end)
 
     def _learn(self) -> None:
-        """Take over the rebounds since the last flight."""
+        """Take over the rebounds since the last flight, and what has become dynamic."""
+        self._paths[:, DYNAMIC] = self._context.world.dynamic
         rows = self._context.log.impacts
         known = self._context.state.rebounds
         for a, b in rows.rows[self._known : rows.count, 1:3].astype(np.int64).tolist():

@@ -40,8 +40,8 @@ class Ledger:
 def make_ledger(times, position, orientation, velocity, angular_velocity, mass, inertia, steady_acceleration, log, work=None) -> Ledger:
     """Ledger of recorded principal-frame states.
 
-    Arrays are (f, n, ...) for all bodies: centre of mass, principal orientation, velocity, world spin; mass (n,) with 0 for
-    bodies that are not dynamic, principal inertia (n, 3), acceleration by gravity and constant forces (n, 3); log: energy
+    Arrays are (f, n, ...) for all bodies: centre of mass, principal orientation, velocity, world spin; mass (f, n) with 0 for
+    bodies that are not dynamic yet, principal inertia (n, 3), acceleration by gravity and constant forces (n, 3); log: energy
     changes by cause and courses under contact forces; work: what varying forces did (`ForceWork`), if there are any.
     """
     share = np.ones((1, 1)) if work is None or work.mass_share is None else work.mass_share

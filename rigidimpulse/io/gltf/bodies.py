@@ -13,7 +13,7 @@ from rigidimpulse.constrain.six_axis import AXES, Limit, SixAxisJoint
 from rigidimpulse.errors import SceneError
 from rigidimpulse.io.gltf.animation import Animations
 from rigidimpulse.io.gltf.nodes import Hierarchy
-from rigidimpulse.io.gltf.schema import Motion
+from rigidimpulse.io.gltf.schema import LARGEST, Motion
 from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, fill_mass, joined
 from rigidimpulse.rotation import rotate, to_matrix
 from rigidimpulse.shape import Shape
@@ -87,22 +87,30 @@ class BodyMaker:
         """Arguments of the body but for shape, material and filter."""
         turn = self.hierarchy.turn[node]
         values: dict[str, Any] = {"position": self.hierarchy.position(node).copy(), "orientation": turn, "motion": "static"}
-        if motion is None or motion.is_kinematic:
-            if self.animations.moves(node):
-                keys = self.animations.keyframes(node)
-                _, places, turns = keys.arrays()
-                # Before its first key a node is where that has it.
-                return {**values, "motion": "kinematic", "position": places[0], "orientation": turns[0], "keyframes": keys}
-            if motion is None:
-                return values
-        elif self.animations.moves(node):
-            self.notes.append(f"body {name!r} is animated and moved by physics: its animation is not read")
+        release = release_of(self.hierarchy, node)
+        if self.animations.moves(node) and (motion is None or motion.is_kinematic or release is not None):
+            keys = self.animations.keyframes(node)
+            _, places, turns = keys.arrays()
+            # Before its first key a node is where that has it.
+            values |= {"position": places[0], "orientation": turns[0]}
+            if release is not None:
+                values = self._with_mass(name, motion or Motion(), shape, values) | {"release_time": release}
+            return {**values, "motion": "kinematic", "keyframes": keys}
+        if motion is None:
+            return values
+        if self.animations.moves(node):
+            self.notes.append(
+                f"body {name!r} is animated and moved by physics: its animation is not read; the extra release_time, in s, of its node says "
+                "until when it follows that"
+            )
         assert motion is not None
         velocity, spin = (rotate(turn, np.array(v)) for v in (motion.linear_velocity, motion.angular_velocity))
         values |= {"velocity": velocity, "angular_velocity": spin}
         if motion.center_of_mass is not None:
             stretch = to_matrix(turn).T @ self.hierarchy.world[node, :3, :3]
             values["center_of_mass"] = stretch @ np.array(motion.center_of_mass)
+        if motion.is_kinematic and release is not None:
+            return self._with_mass(name, motion, shape, values) | {"motion": "kinematic", "release_time": release}
         if motion.is_kinematic:
             return {**values, "motion": "kinematic"}
         return self._with_mass(name, motion, shape, values)
@@ -169,3 +177,21 @@ def _mass_of(shape: Shape) -> float:
         return DENSITY * shape.solid().volume
     except SceneError:
         return 1.0
+
+
+def release_of(hierarchy: Hierarchy, node: int) -> float | None:
+    """The time from when on a node's body is dynamic, s; None if its extras have none.
+
+    Raises:
+        SceneError: it is no time.
+
+    """
+    extras = hierarchy.nodes[node].extras
+    value = extras.get("release_time") if isinstance(extras, dict) else None
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value <= LARGEST:
+        raise hierarchy.file.error(
+            f"release_time is {str(value)[:40]!r}", "give a time in s, > 0", f"extras of node {hierarchy.names[node]!r}"
+        )
+    return float(value)

@@ -17,7 +17,7 @@ import numpy as np
 
 from rigidimpulse.errors import SceneError
 from rigidimpulse.io.gltf.animation import Animations
-from rigidimpulse.io.gltf.bodies import Piece
+from rigidimpulse.io.gltf.bodies import Piece, release_of
 from rigidimpulse.io.gltf.geometry import Meshes, stays_finite
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.schema import LARGEST, Motion
@@ -64,8 +64,9 @@ def plain_pieces(
             motion = "static" if words & STATIC_WORDS else "dynamic"
             if animations.moves(node):
                 motion = "kinematic"
-        if motion == "dynamic" and shape.kind == "mesh":
-            motion, shape = _solid(shape, name, notes, known)
+        if (motion == "dynamic" or release_of(hierarchy, node) is not None) and shape.kind == "mesh":
+            kept, (motion, shape) = motion, _solid(shape, name, notes, known)
+            motion = kept if motion == "dynamic" else motion
         material = Material(
             density=_figure(hierarchy, flags, "density", name) or 1000.0, restitution=_figure(hierarchy, flags, "restitution", name),
             static_friction=_figure(hierarchy, flags, "friction", name),

@@ -92,6 +92,8 @@ class _Writer:
         node = self.node_of[body.name]
         if body.motion != "static":
             self._physics(node)["motion"] = self._motion(body)
+        if body.release_time is not None:
+            self.builder.tree["nodes"][node]["extras"] = {"release_time": float(body.release_time)}
         if body.keyframes is not None:
             self._animate(body, node)
         material, lines = material_entry(body.material, body.name)
@@ -155,7 +157,7 @@ class _Writer:
         for name, value in (("linearVelocity", body.velocity), ("angularVelocity", body.angular_velocity)):
             if np.any(value):
                 motion[name] = rotate_inverse(orientation, np.asarray(value, float)).tolist()
-        if body.motion == "kinematic":
+        if not body.becomes_dynamic:
             return motion | {"centerOfMass": mass.center_of_mass.tolist()}
         motion |= {"mass": mass.mass, "centerOfMass": mass.center_of_mass.tolist(), "inertiaDiagonal": mass.moments.tolist()}
         if np.any(mass.axes != np.eye(3)):
