@@ -33,7 +33,7 @@ def write_site(folder: Path) -> None:
 
 def test_from_the_index_to_a_scene_that_plays(browser: Any, tmp_path: Path) -> None:
     write_site(tmp_path)
-    page = browser.new_page(viewport={"width": 700, "height": 500})
+    page = browser.new_page(viewport={"width": 400, "height": 300})
     errors: list[str] = []
     asked: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
@@ -48,7 +48,7 @@ def test_from_the_index_to_a_scene_that_plays(browser: Any, tmp_path: Path) -> N
     rows = page.eval_on_selector_all("section.checks tr", "all => all.map(row => row.innerText.split('\\t')[1])")
     assert rows == ["check", "error <m>", "other"]
     frame = next(each for each in page.frames if each.url.endswith("_play.html"))
-    frame.wait_for_function("window.rigidimpulse !== undefined && window.rigidimpulse.time > 0", timeout=45_000)
+    frame.wait_for_function("window.rigidimpulse !== undefined && window.rigidimpulse.playing", timeout=45_000)
     page.click(".back a")
     page.wait_for_selector(".cards")
     assert errors == [] and [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
