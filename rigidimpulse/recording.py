@@ -271,7 +271,7 @@ class Recording:
             self._need_scene("an HTML page")
             from rigidimpulse.view import write_html
 
-            return write_renamed(path, lambda target: write_html(self, target))
+            return write_renamed(path, lambda target: write_html(self, target, title=path.stem))
         raise SceneError(f"cannot export to {path.name!r}", f"use a name that ends in .npz, .csv, .html, {', '.join(ANIMATED_SUFFIXES)}")
 
     def show(self) -> Any:

@@ -36,10 +36,13 @@ def rendered_meshes(scene: Any, collision: dict[str, DisplayMesh]) -> dict[str, 
 
     """
     origin = getattr(scene, "origin", None)
-    if origin is None or not hasattr(origin, "node_of"):
+    if origin is None:
         return {}
     from rigidimpulse.io.gltf.geometry import Meshes
+    from rigidimpulse.io.gltf.origin import Origin
 
+    if not isinstance(origin, Origin):
+        return {}
     hierarchy = origin.animations.hierarchy
     meshes, bodies, drawn = Meshes(hierarchy), set(origin.node_of.values()), {}
     for name, node in origin.node_of.items():

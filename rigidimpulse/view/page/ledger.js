@@ -5,7 +5,6 @@ const ENERGY_COLOURS = {kinetic: "#2f7fb8", potential: "#d9911f", total: PLOT_IN
 const AXIS_COLOURS = {x: "#c4493a", y: "#3d8f5f", z: "#3b6fc4"};
 const LEAST_MOMENTUM = 1e-9; // N s, of the scale: what is less is round-off
 const ROUND_OFF = 1e-7; // of a plot's range: what is written as zero
-const ROOM_FOR_FIGURES = 52; // pixels beside a plot, without which they are in it
 const ROOM_FOR_PLOTS = [900, 620]; // pixels of a window in which the plots are there from the start
 
 /* Curves with one linear scale, which holds zero and as much above it as `leastSpan`. */
@@ -31,18 +30,11 @@ class CurvePlot extends TimePlot {
   }
 
   drawLayer(pen) {
-    pen.font = "10.5px system-ui, sans-serif";
-    pen.textAlign = "right";
-    pen.textBaseline = "middle";
-    const inside = this.left < ROOM_FOR_FIGURES;
-    if (inside) { pen.textAlign = "left"; }
     for (let k = Math.ceil(this.low / this.step - 1e-9); k * this.step <= this.high * (1 + 1e-9); k++) {
       const y = this.y(k * this.step);
       pen.fillStyle = `rgba(29, 39, 48, ${k === 0 ? 0.22 : 0.08})`;
       pen.fillRect(this.left, y - 0.5, this.right - this.left, 1);
-      pen.fillStyle = PLOT_SOFT;
-      if (this.empty && k !== 0) { continue; }
-      pen.fillText(withUnit(k * this.step, this.unit, 3), this.left + (inside ? 2 : -7), y - (inside ? 7 : 0));
+      if (k === 0 || !this.empty) { this.drawFigure(pen, withUnit(k * this.step, this.unit, 3), y); }
     }
     for (const {values, colour, width, shade} of this.curves) {
       if (shade) {

@@ -21,11 +21,11 @@ class Panel {
     this.fit();
   }
 
+  /* Shows or hides it. The camera stays where people have put it; only the middle of the picture moves. */
   turn(on) {
     this.shown = on;
     this.section.hidden = !on;
     this.fit();
-    this.stage.frameAction();
   }
 
   /* The camera looks at the action in the middle of what panel and bar leave free. */

@@ -4,6 +4,7 @@
 const PLOT_INK = "#1d2730", PLOT_SOFT = "#5b6873";
 const PREFIXES = ["f", "p", "n", "\u00b5", "m", "", "k", "M", "G"]; // of 10^-15, 10^-12, ...
 const NOT_PLAYED = 0.32;
+const ROOM_FOR_FIGURES = 52; // pixels beside a plot, without which the figures of its scale are in it
 const PLOT_HEAD = 14, PLOT_FOOT = 12; // pixels above and below the scale
 
 /* A figure with a prefix: "3.2 mm". */
@@ -91,6 +92,16 @@ class TimePlot {
     pen.lineJoin = "round";
     this.trace(pen, values);
     pen.stroke();
+  }
+
+  /* Writes a figure at a height of the scale: beside the plot, or where there is no room just above its line, in the plot. */
+  drawFigure(pen, text, y) {
+    const inside = this.left < ROOM_FOR_FIGURES;
+    pen.font = "10.5px system-ui, sans-serif";
+    pen.textAlign = inside ? "left" : "right";
+    pen.textBaseline = "middle";
+    pen.fillStyle = PLOT_SOFT;
+    pen.fillText(text, this.left + (inside ? 2 : -7), inside ? Math.max(y - 7, 7) : y);
   }
 
   drawCursor(pen, now) {
