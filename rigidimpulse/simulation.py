@@ -360,9 +360,10 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
     impacts = context.log.impacts.table()
     close_stretches(context)
     work = None if context.forces is None else context.forces.finish(world, times, recorder)
+    mass = np.where(world.dynamic & (times[:, None] >= release_times(world)), world.mass, 0.0)
     ledger = make_ledger(
         times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
-        np.where(world.dynamic & (times[:, None] >= release_times(world)), world.mass, 0.0), world.inertia, world.steady_acceleration, context.log, work,
+        mass, world.inertia, world.steady_acceleration, context.log, work,
     )
     if context.nets is not None:
         context.nets.add_to(ledger)

@@ -1,7 +1,8 @@
 """Paths of kinematic bodies with keyframes: constant velocity and spin between keys, held after the last; and bodies that are let go.
 
-A body with a `release_time` T is compiled as a dynamic one, with its mass, and made immovable when the run begins. Between two steps, at T, it
-gets its mass back and goes on freely with the pose, velocity and spin of its path just before T. In the ledger it counts from then on.
+A body with a `release_time` T is compiled as a dynamic one, with its mass, and made immovable when the run begins. At T, between two
+steps, it gets its mass back and goes on freely with the pose, velocity and spin of its path just before T. In the ledger it counts from
+then on.
 """
 
 from __future__ import annotations

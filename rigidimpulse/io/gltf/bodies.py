@@ -100,8 +100,8 @@ class BodyMaker:
             return values
         if self.animations.moves(node):
             self.notes.append(
-                f"body {name!r} is animated and moved by physics: its animation is not read; the extra release_time, in s, of its node says "
-                "until when it follows that"
+                f"body {name!r} is animated and moved by physics: its animation is not read; give its node the extra release_time, in s, "
+                "until which it follows that"
             )
         assert motion is not None
         velocity, spin = (rotate(turn, np.array(v)) for v in (motion.linear_velocity, motion.angular_velocity))

@@ -1,0 +1,136 @@
+"""Bodies that are carried along keyframes and let go: from then on they move as dynamic bodies do, with what they had."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import rigidimpulse as ri
+
+G = np.array([0.0, 0.0, -9.81])
+
+
+def carried(velocity, release_time, shape=None, **more):
+    """A body on a straight path of 2 s, let go on the way."""
+    times = np.linspace(0.0, 2.0, 49)
+    keys = ri.Keyframes(times, times[:, None] * np.asarray(velocity) + (0.0, 0.0, 5.0))
+    shape = shape or ri.Shape.box((0.3, 0.2, 0.1))
+    return ri.Body("thrown", shape, motion="kinematic", position=(0, 0, 5), keyframes=keys, release_time=release_time, **more)
+
+
+def test_it_flies_on_with_the_velocity_of_its_keys():
+    # Between 1/24 s apart keys and frames both: x(T) + v (t - T) + g (t - T)^2 / 2. A body that began at rest would be 0.5 m off.
+    v, release = np.array([2.0, 0.5, 1.0]), 0.51
+    run = ri.simulate(ri.Scene(bodies=[carried(v, release)]), 1.2, 60.0)
+    after = np.maximum(run.times - release, 0.0)[:, None]
+    expected = np.array([0.0, 0.0, 5.0]) + v * run.times[:, None] + 0.5 * G * after**2
+    np.testing.assert_allclose(run.position("thrown"), expected, rtol=0, atol=1e-13)
+    # Frame 0 is the state as given, before the first key.
+    np.testing.assert_allclose(run.velocity("thrown")[1:], (v + G * after)[1:], rtol=0, atol=1e-13)
+
+
+def test_it_spins_on():
+    # About a principal axis the spin stays: 3 rad/s, from keys that turn by 0.125 rad each; 1 s after the release it has turned by 4.5 rad.
+    times = np.linspace(0.0, 2.0, 49)
+    turns = np.stack([np.cos(1.5 * times), 0 * times, 0 * times, np.sin(1.5 * times)], axis=1)
+    keys = ri.Keyframes(times, np.zeros((49, 3)), turns)
+    body = ri.Body("top", ri.Shape.box((0.3, 0.2, 0.1)), motion="kinematic", keyframes=keys, release_time=0.5)
+    run = ri.simulate(ri.Scene(gravity=(0, 0, 0), bodies=[body]), 1.5, 60.0)
+    angle = 2.0 * np.arctan2(run.orientation("top")[-1, 3], run.orientation("top")[-1, 0])
+    assert np.cos(angle - 4.5) == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(run.angular_velocity("top")[-1], (0, 0, 3), atol=1e-12)
+
+
+def test_until_then_nothing_moves_it():
+    # A ball of a tonne drops on a plate of 1 kg that is carried: the plate stays until it is let go, then both fall.
+    scene = ri.Scene(bodies=[
+        ri.Body("plate", ri.Shape.box((1, 1, 0.1)), motion="kinematic", position=(0, 0, 3), mass=1.0, release_time=1.0),
+        ri.Body("ball", ri.Shape.sphere(0.2), position=(0, 0, 3.5), mass=1000.0, material=ri.Material(restitution=0.0)),
+    ])  # fmt: skip
+    run = ri.simulate(scene, 1.5, 60.0)
+    before = run.times <= 1.0
+    np.testing.assert_array_equal(run.position("plate")[before], np.tile((0, 0, 3), (before.sum(), 1)))
+    assert run.position("ball")[before][-1, 2] == pytest.approx(3.25, abs=1e-4)
+    for name in ("plate", "ball"):  # g t^2 / 2 of half a second
+        fall = run.position(name)[before][-1, 2] - run.position(name)[-1, 2]
+        assert fall == pytest.approx(0.5 * 9.81 * 0.25, abs=1e-4)
+
+
+@pytest.mark.parametrize("count", [1, 8])
+def test_what_rests_on_it_wakes(count):
+    # Boxes sleep on a tray; when it is let go all fall with g: after 0.2 s by 0.196 m. Eight times eight boxes are a heap.
+    scene = ri.Scene(bodies=[ri.Body("tray", ri.Shape.box((5, 5, 0.1)), motion="kinematic", position=(0, 0, 2), release_time=0.5)])
+    for k in range(count):
+        for j in range(count):
+            scene.add(ri.Body(f"box{k}{j}", ri.Shape.box((0.3, 0.3, 0.3)), position=(-2 + 0.5 * k, -2 + 0.5 * j, 2.2)))
+    run = ri.simulate(scene, 0.7, 60.0)
+    before = int(np.flatnonzero(run.times <= 0.5)[-1])
+    for name in run.names:
+        assert run.position(name)[before, 2] - run.position(name)[-1, 2] == pytest.approx(0.5 * 9.81 * 0.04, rel=0.01)
+
+
+def test_joints_and_forces_hold_it_from_then_on():
+    # A bob hangs from a trolley; let go, their centre of mass falls with g, and nothing of their energy is lost.
+    scene = ri.Scene(bodies=[carried((1, 0, 0), 0.5, ri.Shape.box((0.3, 0.3, 0.3)))])
+    scene.add(ri.Body("bob", ri.Shape.sphere(0.1), position=(0, 0, 4)))
+    scene.add(ri.BallJoint("thrown", "bob", (0, 0, 5)))
+    run = ri.simulate(scene, 1.5, 120.0)
+    masses = np.array([0.3**3, 4 / 3 * np.pi * 0.1**3])
+    centre = (masses[0] * run.center_of_mass("thrown") + masses[1] * run.center_of_mass("bob")) / masses.sum()
+    acceleration = np.diff(centre, 2, axis=0)[70:] * 120.0**2
+    np.testing.assert_allclose(acceleration, np.tile(G, (len(acceleration), 1)), atol=1e-7)
+    arm = run.position("bob") - run.position("thrown")
+    np.testing.assert_allclose(np.linalg.norm(arm, axis=1), 1.0, atol=1e-6)
+
+
+def test_the_ledger_counts_it_from_then_on():
+    scene = ri.Scene(bodies=[ri.Body("floor", ri.Shape.half_space(), motion="static"), carried((2, 0, 1), 0.51)])
+    run = ri.simulate(scene, 2.5, 60.0)
+    whole = run.ledger.total + sum(run.ledger.dissipated.values())
+    np.testing.assert_allclose(whole, whole[0], atol=1e-10)
+    assert np.all(run.ledger.kinetic[run.times < 0.51] == 0.0)
+    pulled = run.impulses("thrown")["gravity"][-1]
+    np.testing.assert_allclose(pulled, 6.0 * G * (2.5 - 0.51), rtol=1e-12)
+
+
+def test_it_bounces_and_comes_to_rest_like_any_other_body():
+    scene = ri.Scene(bodies=[ri.Body("floor", ri.Shape.half_space(), motion="static"), carried((0.3, 0, 0), 0.4)])
+    run = ri.simulate(scene, 5.0, 60.0)
+    assert run.status.ok
+    assert np.all(run.velocity("thrown")[-1] == 0.0)
+    assert run.position("thrown")[:, 2].min() > 0.049
+
+
+def test_the_same_bits_with_a_cache_that_is_gone_on_with(tmp_path):
+    pytest.importorskip("h5py")
+    scene = ri.Scene(bodies=[ri.Body("floor", ri.Shape.half_space(), motion="static"), carried((2, 0, 1), 0.5)])
+
+    def stop_after(end):
+        def progress(time):
+            if time > end:
+                raise KeyboardInterrupt
+
+        return progress
+
+    for end in (0.3, 0.7):
+        with pytest.raises(KeyboardInterrupt):
+            ri.simulate(scene, 2.0, cache=ri.Cache(tmp_path / "run.h5", every=0.0), progress=stop_after(end))
+    whole = ri.simulate(scene, 2.0)
+    assert ri.simulate(scene, 2.0, cache=tmp_path / "run.h5").state_hash() == whole.state_hash()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"release_time": 0.0}, "release_time is 0.0"),
+        ({"release_time": np.nan}, "release_time"),
+        ({"motion": "dynamic", "keyframes": None}, "motion is 'dynamic'"),
+        ({"shape": ri.Shape.half_space()}, "half space"),
+        ({"shape": ri.Shape.mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])}, "encloses no volume|open|not closed"),
+    ],
+)
+def test_what_cannot_be_let_go_is_refused(change, words):
+    from dataclasses import replace
+
+    with pytest.raises(ri.SceneError, match=words):
+        ri.simulate(ri.Scene(bodies=[replace(carried((0, 0, 0), 0.5), **change)]), 0.1)
