@@ -101,4 +101,4 @@ def _direction(k: int) -> np.ndarray:
     return np.array([np.sqrt(1.0 - height**2) * np.cos(turn), np.sqrt(1.0 - height**2) * np.sin(turn), height])
 
 
-SCENES = (GalleryScene("crowd_momentum", "A crowd collides in flight, momentum is kept (dynamics notes B4)", scene, check, DURATION),)
+SCENES = (GalleryScene("crowd_momentum", "A crowd collides in flight, momentum is kept", scene, check, DURATION),)

@@ -82,6 +82,6 @@ def check(run: Recording) -> list[Check]:
 
 SCENES = (
     GalleryScene(
-        "driven_oscillator", "Harmonic forces on free balls and on springs (dynamics notes B1)", scene, check, DURATION, exact=exact
+        "driven_oscillator", "Harmonic forces on free balls and on springs", scene, check, DURATION, exact=exact
     ),
 )

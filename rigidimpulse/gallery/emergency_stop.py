@@ -86,4 +86,4 @@ def _spare(run: Recording) -> float:
     return float(near - run.position("car")[-1, 0] - 0.5 * LENGTH)
 
 
-SCENES = (GalleryScene("emergency_stop", "A car with locked wheels stops before a cow (dynamics notes B2)", scene, check, DURATION),)
+SCENES = (GalleryScene("emergency_stop", "A car with locked wheels stops before a cow", scene, check, DURATION),)

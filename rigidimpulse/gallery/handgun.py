@@ -69,4 +69,4 @@ def check(run: Recording) -> list[Check]:
     return [*checks, at_most("ledger, relative", np.ptp(balance) / balance[0], 1e-10, "energy is conserved or dissipated")]
 
 
-SCENES = (GalleryScene("handgun", "Two handguns recoil against a spring (dynamics notes B6)", scene, check, DURATION, FPS),)
+SCENES = (GalleryScene("handgun", "Two handguns recoil against a spring", scene, check, DURATION, FPS),)

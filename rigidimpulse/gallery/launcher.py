@@ -96,4 +96,4 @@ def check(run: Recording) -> list[Check]:
     ]
 
 
-SCENES = (GalleryScene("launcher", "Two stages and a payload that escapes (dynamics notes B8)", scene, check, DURATION),)
+SCENES = (GalleryScene("launcher", "Two stages and a payload that escapes", scene, check, DURATION),)

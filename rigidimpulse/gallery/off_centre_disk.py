@@ -68,6 +68,6 @@ def check(run: Recording) -> list[Check]:
 
 SCENES = (
     GalleryScene(
-        "off_centre_disk", "A disk strikes an equal one off centre (dynamics notes B14)", scene, check, DURATION
+        "off_centre_disk", "A disk strikes an equal one off centre", scene, check, DURATION
     ),
 )

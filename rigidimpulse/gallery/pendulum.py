@@ -128,6 +128,6 @@ def _mean(run: Recording, joint: str, period: float) -> np.ndarray:
 
 SCENES = (
     GalleryScene(
-        "pendulum", "Pendulums, and what their pivots carry over a full swing (dynamics notes B3)", scene, check, DURATION, accuracy="exact"
+        "pendulum", "Pendulums, and what their pivots carry over a full swing", scene, check, DURATION, accuracy="exact"
     ),
 )

@@ -168,7 +168,7 @@ def _angle(one: np.ndarray, other: np.ndarray) -> float:
 
 def _entry(name: str, description: str, make: Callable[[], Shot], law: str, duration: float) -> GalleryScene:
     options: dict[str, Any] = {"scene": partial(scene, make), "check": partial(check, make, law)}
-    return GalleryScene(name, f"Pool: {description} (dynamics notes B15)", duration=duration, **options)
+    return GalleryScene(name, f"Pool: {description}", duration=duration, **options)
 
 
 SCENES = (

@@ -72,5 +72,5 @@ def check(run: Recording) -> list[Check]:
 
 
 SCENES = (
-    GalleryScene("rear_end_crash", "A rear-end crash, its speed read from the skid marks (dynamics notes B12)", scene, check, DURATION),
+    GalleryScene("rear_end_crash", "A rear-end crash, its speed read from the skid marks", scene, check, DURATION),
 )

@@ -140,4 +140,4 @@ def _barrel() -> Shape:
     return Shape.mesh(np.concatenate(rings), np.concatenate(faces))
 
 
-SCENES = (GalleryScene("rifle", "Recoil of a rifle of 2.5 and 5 kg (dynamics notes B5)", scene, check, DURATION),)
+SCENES = (GalleryScene("rifle", "Recoil of a rifle of 2.5 and 5 kg", scene, check, DURATION),)

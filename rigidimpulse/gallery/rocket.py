@@ -74,4 +74,4 @@ def check(run: Recording) -> list[Check]:
     return [*checks, at_most("momentum of the mass that is left, relative error", error, 1e-12, "m(t) v")]
 
 
-SCENES = (GalleryScene("rocket", "Two rockets, in space and from a moon (dynamics notes B7)", scene, check, DURATION),)
+SCENES = (GalleryScene("rocket", "Two rockets, in space and from a moon", scene, check, DURATION),)

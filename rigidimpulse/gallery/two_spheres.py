@@ -84,6 +84,6 @@ def check(run: Recording) -> list[Check]:
 
 SCENES = (
     GalleryScene(
-        "two_spheres", "Two smooth spheres meet obliquely in space (dynamics notes B13)", scene, check, DURATION, exact=exact
+        "two_spheres", "Two smooth spheres meet obliquely in space", scene, check, DURATION, exact=exact
     ),
 )
