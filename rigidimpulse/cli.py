@@ -83,6 +83,8 @@ def run_options(command: Callable) -> Callable:
 def export_options(command: Callable) -> Callable:
     """Add the options of commands that write recordings."""
     for option in (
+        click.option("--up-axis", type=click.Choice(["y", "z"]), help="Of USD files; by default that of the scene."),
+        click.option("--unit", type=float, default=1.0, help="Of USD files: metres in a unit, 0.01 for centimetres."),
         click.option("--samples", type=int, default=1, help="Keys a frame in glTF and USD files, for motion blur."),
         click.option("--impact-keys", is_flag=True, help="Have keys at impacts between frames in glTF and USD files, too."),
         click.option("--tolerance", type=float, help="Leave out keys in glTF and USD files that no point misses by more, m."),
@@ -172,7 +174,7 @@ def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
 
 def _export_settings(settings: dict[str, Any]) -> dict[str, Any]:
     """Take out and return the options of `export_options`."""
-    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys", "samples")}
+    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys", "samples", "up_axis", "unit")}
 
 
 def _print_checks(checks: Sequence[Check]) -> bool:

@@ -230,7 +230,7 @@ class Recording:
 
     def export(
         self, path: str | os.PathLike, *, start_frame: float = 0.0, tolerance: float | None = None, impact_keys: bool = False,
-        only_moved: bool = True, samples: int = 1,
+        only_moved: bool = True, samples: int = 1, up_axis: str | None = None, unit: float = 1.0,
     ) -> Path:  # fmt: skip
         """Write the recording; the suffix says how.
 
@@ -246,20 +246,23 @@ class Recording:
             impact_keys: of animated files: have keys at the impacts between frames of bodies that fly freely before and after.
             only_moved: of animated files: bodies that do not move have no keys.
             samples: of animated files: keys a frame, for motion blur; in between bodies turn evenly and fly on parabolas.
+            up_axis: of USD: "y" or "z"; None: that of the scene. (glTF is Y up.)
+            unit: of USD: metres in a unit of the file, 0.01 for centimetres. (glTF is in metres.)
 
         Raises:
             SceneError: for another suffix, an option that the format has not, or without a scene, which .npz and .csv do not need.
 
         """
         path = Path(path)
-        options = (start_frame, tolerance, impact_keys, only_moved, samples)
+        options = (start_frame, tolerance, impact_keys, only_moved, samples, up_axis, unit)
         if path.suffix in ANIMATED_SUFFIXES:
             self._need_scene("an animated file")
+            from rigidimpulse.io.motion import MotionOptions
             from rigidimpulse.io.motion_file import write_motion
 
-            return write_motion(self, path, *options)
-        if options != (0.0, None, False, True, 1):
-            names = "start_frame, tolerance, impact_keys, only_moved or samples"
+            return write_motion(self, path, MotionOptions(*options))
+        if options != (0.0, None, False, True, 1, None, 1.0):
+            names = "start_frame, tolerance, impact_keys, only_moved, samples, up_axis or unit"
             raise SceneError(f"{names} for {path.name!r}", f"give them for {', '.join(ANIMATED_SUFFIXES)} only")
         if path.suffix == ".npz":
             return write_renamed(path, self._write_npz)

@@ -27,6 +27,8 @@ class MotionOptions(NamedTuple):
     impact_keys: bool = False
     only_moved: bool = True
     samples: int = 1
+    up_axis: str | None = None
+    unit: float = 1.0
 
     def check(self) -> None:
         """Raise a `SceneError` for a figure that makes no sense."""
@@ -36,6 +38,10 @@ class MotionOptions(NamedTuple):
             raise SceneError(f"tolerance = {self.tolerance!r}", "give a length in m, > 0, or None for a key a frame")
         if isinstance(self.samples, bool) or not isinstance(self.samples, int) or not 1 <= self.samples <= MOST_SAMPLES:
             raise SceneError(f"samples = {self.samples!r}", f"give a whole number of keys a frame, 1 to {MOST_SAMPLES}")
+        if self.up_axis not in (None, "y", "z"):
+            raise SceneError(f"up_axis = {self.up_axis!r}", "give 'y', 'z', or None for that of the scene")
+        if not (math.isfinite(self.unit) and self.unit > 0.0):
+            raise SceneError(f"unit = {self.unit!r}", "give the metres in a unit of the file, 0.01 for centimetres")
 
 
 class Motion:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rigidimpulse.errors import SceneError
 from rigidimpulse.files import write_renamed
 from rigidimpulse.io.motion import MotionOptions
 
@@ -12,9 +13,7 @@ if TYPE_CHECKING:
     from rigidimpulse.recording import Recording
 
 
-def write_motion(
-    run: Recording, path: Path, start_frame: float, tolerance: float | None, impact_keys: bool, only_moved: bool, samples: int
-) -> Path:
+def write_motion(run: Recording, path: Path, options: MotionOptions) -> Path:
     """Write a file of animated bodies; see `Recording.export` for its options. Returns the path.
 
     Raises:
@@ -24,8 +23,9 @@ def write_motion(
     """
     if run.scene is not None and run.scene.origin is not None:
         run.scene.origin.check_target(path)
-    options = MotionOptions(start_frame, tolerance, impact_keys, only_moved, samples)
     if path.suffix in (".glb", ".gltf"):
+        if (options.up_axis, options.unit) != (None, 1.0):
+            raise SceneError(f"up_axis or unit for {path.name!r}", "glTF is Y up and in metres: leave them out, or write USD")
         from rigidimpulse.io.gltf.animate import write_motion as write
     else:
         from rigidimpulse.io.usd.animate import write_motion as write

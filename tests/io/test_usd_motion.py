@@ -115,6 +115,35 @@ def test_up_axes(tmp_path: Path) -> None:
             assert np.abs(world(stage, "/World/rock", 2)[:3, 3] - turn @ run.position("rock")[2]).max() < 1e-5
 
 
+@pytest.mark.parametrize("gravity", [(0, 0, -9.81), (0, -9.81, 0), (0, 0, 0), (3, -4, 5)])
+@pytest.mark.parametrize(("axis", "unit"), [("y", 1.0), ("z", 1.0), ("z", 0.01), (None, 0.0254)])
+def test_axis_and_unit_as_asked(tmp_path: Path, gravity: Any, axis: str | None, unit: float) -> None:
+    # Up of the scene is up of the stage, and lengths in metres are those of the run, whatever the unit.
+    scene = ri.Scene(gravity=gravity, bodies=[ri.Body("a", ri.Shape.box(1)), ri.Body("b", ri.Shape.box(1))])
+    run = recorded(scene, {"a": smooth(4, (1, 2, 3)), "b": smooth(4, (4, 5, 9))})
+    stage = opened(run.export(tmp_path / "out.usda", up_axis=axis, unit=unit))
+    assert UsdGeom.GetStageMetersPerUnit(stage) == unit
+    assert axis is None or UsdGeom.GetStageUpAxis(stage) == axis.upper()
+    top = {"Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}[UsdGeom.GetStageUpAxis(stage)]
+    up = -np.asarray(gravity, float) / np.linalg.norm(gravity) if np.any(gravity) else np.array([0.0, 0.0, 1.0])
+    for k in range(4):
+        a, b = (world(stage, f"/World/{name}", k)[:3, 3] for name in "ab")
+        recorded_way = run.position("b")[k] - run.position("a")[k]
+        assert abs((b - a) @ top - recorded_way @ up) < SINGLE
+        assert abs(np.linalg.norm(b - a) - np.linalg.norm(recorded_way)) < SINGLE
+
+
+def test_axis_and_unit_that_cannot_be(tmp_path: Path) -> None:
+    run = recorded(ri.Scene(bodies=[ri.Body("a", ri.Shape.box(1))]), {"a": smooth(4, (1, 2, 3))})
+    bad = (("out.glb", {"unit": 0.01}), ("out.gltf", {"up_axis": "z"}), ("out.usda", {"up_axis": "x"}), ("out.usda", {"unit": 0.0}))
+    for name, options in bad:
+        with pytest.raises(ri.SceneError, match=r"up_axis|unit"):
+            run.export(tmp_path / name, **options)
+    usd = run.export(tmp_path / "in.usda")
+    with pytest.raises(ri.SceneError, match="that file"):
+        recorded(ri.load_scene(usd), {"a": smooth(4, (1, 2, 3))}).export(tmp_path / "out.usda", unit=0.01)
+
+
 def test_fast_spin_does_not_alias(tmp_path: Path) -> None:
     """100 rad/s at 24 fps are 4.17 rad a frame: slerp between frames alone turns back by 2.1 rad. Signs are continuous."""
     spin, frames = 100.0, 13

@@ -20,6 +20,7 @@ import numpy as np
 from rigidimpulse.errors import SceneError
 from rigidimpulse.io.gltf.container import Builder
 from rigidimpulse.io.gltf.draw import Drawing, new_file, node_pose, stage
+from rigidimpulse.io.gltf.morph import add_nets
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.origin import Origin
 from rigidimpulse.io.keys import Keys
@@ -50,8 +51,6 @@ def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
     """
     motion = Motion(run, options)
     paths, scene = motion.paths, motion.scene
-    if run.nets:
-        logger.warning("flexible bodies are not written to glTF: %s", ", ".join(track.name for track in run.nets))
     origin = scene.origin if isinstance(scene.origin, Origin) else None
     builder, locals_ = _from_origin(origin, motion) if origin else _from_scene(motion)
     shift = options.start_frame * float(run.times[1] - run.times[0]) if len(run.times) > 1 else 0.0
@@ -59,6 +58,11 @@ def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
     for name in paths:
         if motion.is_keyed(name) and name in locals_.node_of:
             writer.add(locals_.node_of[name], locals_.of(name, motion.keys(name)))
+    if run.nets:
+        colour = sum(body.motion != "static" for body in scene.bodies)
+        for node, frames, weights in add_nets(builder, run.nets, scene.gravity, colour, options.tolerance):
+            if len(frames) > 1:
+                writer.add_weights(node, run.times[frames], weights)
     if locals_.sheared:
         logger.warning("parents of uneven scale: the turn of %s is not exact in the file", ", ".join(sorted(locals_.sheared)))
     writer.close()
@@ -149,6 +153,11 @@ class _Channels:
                 self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})
                 entry = self._builder.tree["nodes"][node]
                 _use_parts(entry)
+
+    def add_weights(self, node: int, times: np.ndarray, weights: np.ndarray) -> None:
+        """Add the channel of the morph targets of a node, weights (k, targets)."""
+        self._samplers.append({"input": self._input(times), "output": self._accessor(weights.reshape(-1, 1))})
+        self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": "weights"}})
 
     def _input(self, times: np.ndarray) -> int:
         data = (times + self._shift).astype(np.float32)

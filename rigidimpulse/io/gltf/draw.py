@@ -66,7 +66,7 @@ class Drawing:
         paint = surface(index % len(PALETTE), body)
         key = (_key(shape), str(paint))
         if key not in self._meshes:
-            primitive = {**self._primitive(shape), "material": self._paint(paint)}
+            primitive = {**self._primitive(shape), "material": self.paint(paint)}
             self._meshes[key] = self.builder.add("meshes", {"primitives": [primitive]})
         return self._meshes[key]
 
@@ -90,7 +90,8 @@ class Drawing:
             self._geometry[key] = {"attributes": attributes, "indices": index}
         return self._geometry[key]
 
-    def _paint(self, paint: dict[str, Any]) -> int:
+    def paint(self, paint: dict[str, Any]) -> int:
+        """Return the material of a surface."""
         key = str(paint)
         if key not in self._paints:
             shade = np.array([int(paint["color"][k : k + 2], 16) for k in (1, 3, 5)]) / 255.0

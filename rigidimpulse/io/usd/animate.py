@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigidimpulse.errors import SceneError
 from rigidimpulse.io.motion import Motion, MotionOptions
 from rigidimpulse.io.usd.draw import Drawing, draw_net
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place, quaternions, sample, valid_name, vectors
@@ -33,6 +34,7 @@ NEAR = 1e-9
 LONE_FPS = 24.0
 """Frames per second of a run of one frame."""
 IS_AXIS = 1e-9
+AXES = {"y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
 
 
 def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
@@ -81,6 +83,8 @@ class _Writer:
         self.layer.timeCodesPerSecond = self.layer.framesPerSecond = self.fps
         self.layer.startTimeCode, self.layer.endTimeCode = first, first + len(self.run.times) - 1
         if isinstance(origin, UsdOrigin):
+            if (self.motion.options.up_axis, self.motion.options.unit) != (None, 1.0):
+                raise SceneError("up_axis or unit for a file that the scene came from", "leave them out: they are those of that file")
             origin.write_over(self.layer, self.fps, first)
             with Sdf.ChangeBlock():
                 self._over(origin)
@@ -126,18 +130,24 @@ class _Writer:
             draw_net(self.layer, root.AppendChild(valid_name(track.name, self.used)), track, codes, color(moving + number))
 
     def _root(self, path, scale: float, inside: bool) -> None:
-        """Write the prim above the bodies; a stage of its own has metres, kilograms and the up axis of the scene."""
+        """Write the prim above the bodies; a stage of its own has kilograms, metres and the up axis of the scene, or what is asked for."""
         root = define(self.layer, path)
         if inside:
             attribute(root, "xformOp:scale", TYPES.Double3, Gf.Vec3d(scale, scale, scale))
             order(root, ["xformOp:scale"])
             return
-        up = up_axis(self.motion.scene.gravity)
-        axis = "Z" if np.abs(up - [0.0, 0.0, 1.0]).max() < IS_AXIS else "Y"
+        up, unit = up_axis(self.motion.scene.gravity), self.motion.options.unit
+        axis = (self.motion.options.up_axis or ("z" if np.abs(up - AXES["z"]).max() < IS_AXIS else "y")).upper()
         stage = self.layer.pseudoRoot
-        for key, value in (("upAxis", axis), ("metersPerUnit", 1.0), ("kilogramsPerUnit", 1.0)):
+        for key, value in (("upAxis", axis), ("metersPerUnit", unit), ("kilogramsPerUnit", 1.0)):
             stage.SetInfo(key, value)
         self.layer.defaultPrim = path.name
-        if axis == "Y" and np.abs(up - [0.0, 1.0, 0.0]).max() >= IS_AXIS:
-            names = place(root, np.zeros(3), from_matrix(stage_rotation(up)))
-            order(root, list(names))
+        names: list[str] = []
+        if np.abs(up - AXES[axis.lower()]).max() >= IS_AXIS:
+            # To Y up, and from there to Z up.
+            names += place(root, np.zeros(3), from_matrix(stage_rotation(AXES[axis.lower()]).T @ stage_rotation(up)))
+        if unit != 1.0:
+            attribute(root, "xformOp:scale", TYPES.Double3, Gf.Vec3d(1.0 / unit, 1.0 / unit, 1.0 / unit))
+            names.append("xformOp:scale")
+        if names:
+            order(root, names)
