@@ -83,6 +83,7 @@ def run_options(command: Callable) -> Callable:
 def export_options(command: Callable) -> Callable:
     """Add the options of commands that write recordings."""
     for option in (
+        click.option("--pre-roll", type=click.IntRange(min=0), default=0, help="Frames at the beginning that are not written."),
         click.option("--up-axis", type=click.Choice(["y", "z"]), help="Of USD files; by default that of the scene."),
         click.option("--unit", type=float, default=1.0, help="Of USD files: metres in a unit, 0.01 for centimetres."),
         click.option("--samples", type=int, default=1, help="Keys a frame in glTF and USD files, for motion blur."),
@@ -174,7 +175,7 @@ def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
 
 def _export_settings(settings: dict[str, Any]) -> dict[str, Any]:
     """Take out and return the options of `export_options`."""
-    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys", "samples", "up_axis", "unit")}
+    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys", "samples", "up_axis", "unit", "pre_roll")}
 
 
 def _print_checks(checks: Sequence[Check]) -> bool:
@@ -187,7 +188,8 @@ def _print_checks(checks: Sequence[Check]) -> bool:
 
 
 def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str, Any]) -> None:
-    """Write the recording where it was asked for, and open it; keys: options of animated nodes."""
+    """Write the recording where it was asked for, and open it; keys: options of animated nodes, and the pre-roll."""
+    run = run.part(keys.pop("pre_roll"))
     for target in output:
         path = run.export(target, **(keys if Path(target).suffix in ANIMATED_SUFFIXES else {}))
         click.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")

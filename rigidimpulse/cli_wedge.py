@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 @click.option("--duration", type=float, help="Time to simulate, s.")
 @click.option("--fps", type=float, help="Frames per second.")
 @click.option("--accuracy", help="preview, standard or exact.")
-def wedge(scene: str, vary: tuple[str, ...], output: str | None, **settings) -> None:
+@click.option("--view", is_flag=True, help="Open the sheet of all takes in the browser.")
+def wedge(scene: str, vary: tuple[str, ...], output: str | None, view: bool, **settings: Any) -> None:
     """Run SCENE with all combinations of varied parameters; the exit code is 1 if a take fails."""
     from pathlib import Path
 
@@ -48,5 +49,7 @@ def wedge(scene: str, vary: tuple[str, ...], output: str | None, **settings) -> 
     print_table([(*row[:-1], row[-1].splitlines()[0]) for row in rows], right=(0, *range(1, len(rows[0]) - 1)))
     click.echo(f"{len(result.takes) - len(result.failed)} of {len(result.takes)} takes done")
     click.echo(f"wrote {folder / 'wedge.csv'} and {folder / 'index.html'}")
+    if view:
+        click.launch((folder / "index.html").resolve().as_uri())
     if result.failed:
         sys.exit(CHECK_FAILED)

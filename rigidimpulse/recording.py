@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -215,6 +215,35 @@ class Recording:
 
         """
         return forces_on(self.contacts, self.index(name), self.times)
+
+    def part(self, first: int, last: int | None = None) -> Recording:
+        """Frames `first` to `last`, that included, None: the last one, as a recording of its own whose time begins at 0.
+
+        For a pre-roll: `run.part(48).export("x.glb", start_frame=1001)` leaves out the first 48 frames. Impulses by cause, settings and
+        horizon are those of whole runs only.
+
+        Raises:
+            SceneError: there are no such frames.
+
+        """
+        frames = range(len(self.times))[first : None if last is None else last + 1]
+        if not 0 <= first < len(self.times) or not frames or (last is not None and last >= len(self.times)):
+            raise SceneError(f"frames {first} to {last} of a run of {len(self.times)}", f"give frames from 0 to {len(self.times) - 1}")
+        here, begin, end = slice(frames[0], frames[-1] + 1), self.times[frames[0]], self.times[frames[-1]]
+        impacts, contacts = self.impacts.copy(), self.contacts.copy()
+        for table, names in ((impacts, ("time",)), (contacts, ("start", "end"))):
+            for name in names:
+                table[name] -= begin
+        arrays = ("positions", "orientations", "velocities", "angular_velocities", "centers")
+        return replace(
+            self, times=self.times[here] - begin, **{name: getattr(self, name)[here] for name in arrays},
+            impacts=impacts[(impacts["time"] >= 0.0) & (impacts["time"] <= end - begin)],
+            contacts=contacts[(contacts["end"] > 0.0) & (contacts["start"] <= end - begin)],
+            ledger=None if self.ledger is None else self.ledger.part(here),
+            reactions={name: force[here] for name, force in self.reactions.items()},
+            nets=[replace(track, vertices=track.vertices[here]) for track in self.nets],
+            by_cause=None, settings=None,
+        )  # fmt: skip
 
     def state_hash(self) -> str:
         """SHA-256 of all frames, nets and impacts: equal if and only if two runs agree in every bit."""

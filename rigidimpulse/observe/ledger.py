@@ -36,6 +36,14 @@ class Ledger:
         """(f,) kinetic plus potential energy, J."""
         return self.kinetic + self.potential
 
+    def part(self, here: slice) -> Ledger:
+        """The frames of a slice, with times from 0 on."""
+        times = self.times[here]
+        taken = {cause: lost[here] for cause, lost in self.dissipated.items()}
+        return Ledger(
+            times - times[0], self.kinetic[here], self.potential[here], self.momentum[here], self.angular_momentum[here], taken
+        )
+
 
 def make_ledger(times, position, orientation, velocity, angular_velocity, mass, inertia, steady_acceleration, log, work=None) -> Ledger:
     """Ledger of recorded principal-frame states.
