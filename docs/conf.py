@@ -1,0 +1,54 @@
+"""The site of the documentation: `python -m sphinx -W -b html docs site`. What is built needs no network."""
+
+import html
+import sys
+from pathlib import Path
+
+from docutils import nodes
+from latex2mathml.converter import convert
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from rigidimpulse import __version__  # noqa: E402
+
+project = "rigidimpulse"
+author = "rigidimpulse"
+version = release = __version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+exclude_patterns = ["_build"]
+highlight_language = "none"
+autodoc_member_order = "bysource"
+napoleon_use_ivar = True
+python_maximum_signature_line_length = 100
+toc_object_entries = False
+
+html_theme = "furo"
+html_title = f"rigidimpulse {version}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_copyright = False
+html_show_sphinx = False
+html_copy_source = False
+
+
+def visit_inline(self, node):
+    """Write an equation within a line as MathML, which browsers draw themselves."""
+    self.body.append(convert(node.astext()))
+    raise nodes.SkipNode
+
+
+def visit_display(self, node):
+    """Write an equation on lines of its own."""
+    mathml = convert(node.astext(), display="block")
+    self.body.append(f'<div class="equation" title="{html.escape(node.astext(), quote=True)}">{mathml}</div>')
+    raise nodes.SkipNode
+
+
+def setup(app):
+    """Make MathML the way of equations."""
+    app.add_html_math_renderer("mathml", (visit_inline, None), (visit_display, None))
+
+
+html_math_renderer = "mathml"
