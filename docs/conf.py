@@ -19,6 +19,7 @@ myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
 highlight_language = "none"
+default_role = "code"
 autodoc_member_order = "bysource"
 napoleon_use_ivar = True
 python_maximum_signature_line_length = 100
@@ -46,8 +47,14 @@ def visit_display(self, node):
     raise nodes.SkipNode
 
 
+def plain_bars(app, what, name, thing, options, lines):
+    """Docstrings are plain text, in which |v| is a length and no substitution."""
+    lines[:] = [line.replace("|", r"\|") for line in lines]
+
+
 def setup(app):
-    """Make MathML the way of equations."""
+    """Make MathML the way of equations, and read docstrings before napoleon does."""
+    app.connect("autodoc-process-docstring", plain_bars, priority=400)
     app.add_html_math_renderer("mathml", (visit_inline, None), (visit_display, None))
 
 
