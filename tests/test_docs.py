@@ -114,6 +114,15 @@ def test_links_lead_to_files() -> None:
     assert not lost
 
 
+def test_files_that_pages_name_are_there() -> None:
+    lost = []
+    for page in PAGES:
+        for name in re.findall(r"`((?:tests|rigidimpulse|docs|demos|assets)/[\w/.*-]*)`", page.read_text(encoding="utf-8")):
+            if not any(ROOT.glob(name)):
+                lost.append(f"{page.name}: {name}")
+    assert not lost
+
+
 def test_every_public_name_has_one_entry_in_the_reference() -> None:
     entries = [
         name
