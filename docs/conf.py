@@ -1,15 +1,17 @@
 """The site of the documentation: `python -m sphinx -W -b html docs site`. What is built needs no network."""
 
 import html
+import re
 import sys
 from pathlib import Path
 
 from docutils import nodes
 from latex2mathml.converter import convert
+from sphinx.domains.python import PyObject
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from rigidimpulse import __version__  # noqa: E402
+from rigidimpulse import __version__
 
 project = "rigidimpulse"
 author = "rigidimpulse"
@@ -22,6 +24,8 @@ highlight_language = "none"
 default_role = "code"
 autodoc_member_order = "bysource"
 napoleon_use_ivar = True
+autodoc_preserve_defaults = True
+autodoc_type_aliases = {"ArrayLike": "ArrayLike"}
 python_maximum_signature_line_length = 100
 toc_object_entries = False
 
@@ -52,9 +56,19 @@ def plain_bars(app, what, name, thing, options, lines):
     lines[:] = [line.replace("|", r"\|") for line in lines]
 
 
+def plain_signature(app, what, name, thing, options, signature, returns):
+    """Signatures with names of types and defaults as people write them."""
+    signature = re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", signature or "")
+    return re.sub(r"Material\(density[^)]*\)", "Material()", signature), returns
+
+
 def setup(app):
-    """Make MathML the way of equations, and read docstrings before napoleon does."""
+    """Make MathML the way of equations, read docstrings before napoleon does, call attributes so."""
+    for field in PyObject.doc_field_types:
+        if field.name == "variable":
+            field.label = "Attributes"
     app.connect("autodoc-process-docstring", plain_bars, priority=400)
+    app.connect("autodoc-process-signature", plain_signature)
     app.add_html_math_renderer("mathml", (visit_inline, None), (visit_display, None))
 
 
