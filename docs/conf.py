@@ -58,7 +58,9 @@ def plain_bars(app, what, name, thing, options, lines):
 
 def plain_signature(app, what, name, thing, options, signature, returns):
     """Signatures with names of types and defaults as people write them."""
-    signature = re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", signature or "")
+    if signature is None:
+        return None
+    signature = re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", signature)
     return re.sub(r"Material\(density[^)]*\)", "Material()", signature), returns
 
 
