@@ -64,7 +64,7 @@ ADVICE = """## What to choose
   their error goes away with the stiffness, not with the step.
 - **Chaos** ends every promise: look at `run.horizon` before you make the step smaller.
 - **Other engines** take a fixed step whatever happens in it, so their error is of first order in the step; a contact lasts some steps
-  there. They are made for crowds of bodies at 60 steps a second, which is where they are fast: see [speed.md](speed.md).
+  there. They are made for crowds of bodies at 60 steps a second, which is where they are fast: see [speed](speed.md).
 """
 
 
@@ -87,7 +87,7 @@ def main() -> None:
 HEAD = f"""# What accuracy costs
 
 Made by `python docs/make_what_accuracy_costs.py` from runs on {platform.machine()}, one core; how to measure a scene of your own:
-[study.md](study.md). Errors are the largest of any body at any frame; costs are CPU seconds of the loop (of the steps, in other engines).
+[studies](study.md). Errors are the largest of any body at any frame; costs are CPU seconds of the loop (of the steps, in other engines).
 """
 
 
