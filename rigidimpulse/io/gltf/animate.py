@@ -7,10 +7,14 @@ translation and rotation are those with
 
 with K and S, its scales at rest. Where a parent with uneven scale would shear the body there is no such R: the nearest is
 written, and logged. Only what moves has keys; channels that the file has for nodes of bodies are replaced.
+
+Programs show the first animation alone, so all that moves in the run is in that one: also the channels of the file that move what
+is no body, by the same time s_0 later as the run, s_0 the time of the first frame.
 """
 
 from __future__ import annotations
 
+import json
 import logging
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,6 +65,8 @@ def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
             writer.add(locals_.node_of[name], locals_.of(name, motion.keys(name)))
     if locals_.sheared:
         logger.warning("parents of uneven scale: the turn of %s is not exact in the file", ", ".join(sorted(locals_.sheared)))
+    if origin:
+        writer.take_over(origin)
     writer.close()
     builder.write(target)
 
@@ -173,14 +179,38 @@ class _Channels:
         self._values.append(entry)
         return self._builder.add("accessors", entry)
 
+    def take_over(self, origin: Origin) -> None:
+        """Move the channels that the file still has here; of two that move the same the first, as in the scene. Others stay."""
+        file, tree = origin.animations.hierarchy.file, self._builder.tree
+        targets: set[str] = set()
+        taken: dict[tuple[int, int], int] = {}
+        for number, animation in enumerate(tree.get("animations", [])):
+            left = []
+            for channel in animation["channels"]:
+                target = json.dumps(channel["target"], sort_keys=True)
+                if target in targets:
+                    left.append(channel)
+                    continue
+                targets.add(target)
+                key = number, channel["sampler"]
+                if key not in taken:
+                    sampler = animation["samplers"][channel["sampler"]]
+                    times = np.asarray(file.array(sampler["input"], "SCALAR"), float)
+                    taken[key] = len(self._samplers)
+                    self._samplers.append({**sampler, "input": self._input(times)})
+                self._channels.append({**channel, "sampler": taken[key]})
+            animation["channels"] = left
+        _drop_empty(tree)
+
     def close(self) -> None:
-        """Put the animation into the file."""
+        """Put the animation into the file, before all others."""
         if not self._channels:
             return
         view = self._builder.view(b"".join(self._data))
         for entry in self._values:
             entry["bufferView"] = view
-        self._builder.add("animations", {"name": ANIMATION, "channels": self._channels, "samplers": self._samplers})
+        animation = {"name": ANIMATION, "channels": self._channels, "samplers": self._samplers}
+        self._builder.tree.setdefault("animations", []).insert(0, animation)
 
 
 def _use_parts(entry: dict[str, Any]) -> None:
@@ -211,23 +241,28 @@ def _from_origin(origin: Origin, motion: Motion) -> tuple[Builder, _Locals]:
 
 
 def _drop_channels(tree: dict[str, Any], nodes: set[int]) -> None:
-    """Leave out the channels that move the nodes, and animations without channels."""
-    kept = []
-    for animation in tree.pop("animations", []):
+    """Leave out the channels that move the nodes."""
+    for animation in tree.get("animations", []):
         animation["channels"] = [
             channel for channel in animation["channels"]
             if channel["target"].get("node") not in nodes or channel["target"]["path"] not in ("translation", "rotation")
         ]  # fmt: skip
-        if animation["channels"]:
-            kept.append(animation)
+    _drop_empty(tree)
+
+
+def _drop_empty(tree: dict[str, Any]) -> None:
+    """Leave out animations without channels, and their list if it is empty."""
+    kept = [animation for animation in tree.pop("animations", []) if animation["channels"]]
     if kept:
         tree["animations"] = kept
 
 
 def _from_scene(motion: Motion) -> tuple[Builder, _Locals]:
     """A file with a node and a mesh for each body, Y up."""
-    builder = new_file()
-    parents, _ = stage(builder, motion.scene.gravity, "world")
+    builder, root = new_file(), "world"
+    while root in motion.paths:
+        root += "_"
+    parents, _ = stage(builder, motion.scene.gravity, root)
     drawing, node_of, moving = Drawing(builder, motion.half()), {}, 0
     for body in motion.scene.bodies:
         path = motion.paths[body.name]
