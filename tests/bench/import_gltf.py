@@ -36,7 +36,8 @@ POSE = 1e-5
 ARM = 0.1
 """m, least distance from the origin at which a tolerance is a turn."""
 ORIGIN = "http://import.test/"
-PAGE = """<!doctype html><script type="importmap">{"imports": {"three": "/three/build/three.module.js", "three/addons/": "/three/examples/jsm/"}}
+PAGE = """<!doctype html><script type="importmap">
+{"imports": {"three": "/three/build/three.module.js", "three/addons/": "/three/examples/jsm/"}}
 </script><script type="module">
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
@@ -166,7 +167,7 @@ def install_blender(folder: Path) -> Path | None:
 
 
 def table(program: str, cases: list[Case], found: Iterator[np.ndarray], axes: Axes) -> bool:
-    """Print a line for each case; `axes`: the world and the meshes of each body (n, 4, 4) as the program turns them. Whether all are good."""
+    """Print a line for each case and return whether all are good; `axes`: how the program turns the world, and the meshes of bodies."""
     fine = True
     for case, matrices in zip(cases, found, strict=True):
         world, meshes = axes(case)

@@ -114,7 +114,8 @@ def boxes() -> ri.Scene:
 
 
 def room() -> Any:
-    """A glTF file with a hierarchy: scales, mirrors, a matrix, cameras, a skewed pivot, parents that move, a lamp of an animation of its own."""
+    """A glTF file with scales, a mirror, a matrix, cameras, and parents that move by each kind of key, in animations of their own."""
+    turned = [0, 2, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1]
     nodes: list[dict[str, Any]] = [
         {"name": "room", "translation": [1, 2, 3], "rotation": [HALF, 0, 0, HALF], "scale": [2, 2, 2], "children": [1, 4], "camera": 0},
         {"name": "crate", "scale": [0.5, 0.5, 0.5], "children": [2, 3], "extensions": physics({"mass": 1}, shaped())},
@@ -122,12 +123,15 @@ def room() -> Any:
         {"name": "rider", "mesh": 0, "translation": [0, 4, 0], "scale": [1, 2, 1], "extensions": physics({"mass": 1}, shaped())},
         {"name": "mirror", "scale": [-1, 1, 1], "children": [5]},
         {"name": "seen", "mesh": 0, "translation": [3, 0, 0], "extensions": physics({"mass": 1}, shaped())},
-        {"name": "odd", "mesh": 0, "matrix": [0, 2, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1], "extensions": physics({"mass": 1}, shaped())},
+        {"name": "odd", "mesh": 0, "matrix": turned, "extensions": physics({"mass": 1}, shaped())},
         {"name": "cart", "children": [8, 9]},
         {"name": "load", "mesh": 0, "translation": [0, 1, 0], "extensions": physics({"mass": 1}, shaped(1))},
         {"name": "eye", "camera": 0, "translation": [0, 2, 5]},
         {"name": "lamp", "mesh": 0, "translation": [0, 8, 0]},
         {"name": "door", "mesh": 0, "translation": [-9, 0, 0], "extensions": physics(None, shaped())},
+        {"name": "lift", "children": [13]},
+        {"name": "cage", "translation": [20, 0, 0], "children": [14]},
+        {"name": "guest", "mesh": 0, "translation": [0, 1, 0], "extensions": physics({"mass": 1}, shaped(1))},
         {"name": "witness", "camera": 0, "translation": [0, 9, 9], "extensions": physics({"mass": 1}, shaped())},
     ]  # fmt: skip
     file = with_physics(nodes, [BOX, BALL])
@@ -137,6 +141,9 @@ def room() -> Any:
     file.animate(7, "translation", [0, 1, 2], [[0, 0, 0], [2, 0, 1], [4, 1, 0]])
     file.animate(7, "rotation", [0, 1, 2], [[0, 0, 0, 1], [0, HALF, 0, HALF], [0, 1, 0, 0]])
     file.animate(11, "translation", [0, 1], [[-9, 0, 0], [-9, 3, 0]])
+    file.animate(12, "translation", [0, 0.51, 1.2], [[0, 0, 0], [0, 2, 0], [0, 3, 0]], "STEP")
+    turns = [[0, 0, 0, 0], [0, 0, 0, 1], [1, 0, 0, 0], [1, 0, 0, 0], [HALF, 0, 0, HALF], [0, 0, 0, 0]]
+    file.animate(13, "rotation", [0, 1.7], turns, "CUBICSPLINE")
     return file
 
 
@@ -150,9 +157,10 @@ def gltf_cases(folder: Path) -> list[Case]:
         cases.append(Case(name, path, run, same, eye, options.get("start_frame", 0.0), options.get("tolerance", 0.0)))
     source = room().save(folder / "room.glb")
     scene = ri.load_scene(source)
-    rest = Player(*unpack(source))
+    tree, data = unpack(source)
+    rest = Player({**tree, "animations": []}, data)
     poses = {}
-    for k, name in enumerate(("crate", "rider", "seen", "odd", "load", "witness")):
+    for k, name in enumerate(("crate", "rider", "seen", "odd", "load", "guest", "witness")):
         x, q = smooth(49, scene[name].position, 1.0 + k)
         poses[name] = x, np.array([from_matrix(matrix) for matrix in to_matrix(q) @ to_matrix(scene[name].unit_orientation())])
     times = np.arange(49) / 24.0

@@ -9,7 +9,8 @@ with K and S, its scales at rest. Where a parent with uneven scale would shear t
 written, and logged. Only what moves has keys; channels that the file has for nodes of bodies are replaced.
 
 Programs show the first animation alone, so all that moves in the run is in that one: also the channels of the file that move what
-is no body, by the same time s_0 later as the run, s_0 the time of the first frame.
+is no body, by the same time s_0 later as the run, s_0 the time of the first frame. Blender turns evenly by components of the
+quaternion and splines by rules of its own, so nodes above bodies have linear keys wherever these have some: there M_p is what it was.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from rigidimpulse.io.gltf.origin import Origin
 from rigidimpulse.io.keys import Keys
 from rigidimpulse.io.keys import Path as BodyPath
 from rigidimpulse.io.motion import Motion, MotionOptions
-from rigidimpulse.rotation import conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
+from rigidimpulse.rotation import angle_between, conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
 
 if TYPE_CHECKING:
     from rigidimpulse.recording import Recording
@@ -38,6 +39,10 @@ logger = logging.getLogger("rigidimpulse")
 
 EVEN = 1e-6
 """Unevenness of the scale of parents, relative, that is none."""
+ELSEWHERE = 1e-9
+"""m and rad, from the place of a node on which a body that stands has a key."""
+APART = 4.0
+"""Units in the last place of single precision between keys, at least."""
 ANIMATION = "rigidimpulse"
 """Name of the animation."""
 
@@ -60,12 +65,20 @@ def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
     builder, locals_ = _from_origin(origin, motion) if origin else _from_scene(motion)
     shift = options.start_frame * float(run.times[1] - run.times[0]) if len(run.times) > 1 else 0.0
     writer = _Channels(builder, shift, options.only_moved)
+    above: dict[int, list[np.ndarray]] = {}
     for name in paths:
-        if motion.is_keyed(name) and name in locals_.node_of:
-            writer.add(locals_.node_of[name], locals_.of(name, motion.keys(name)))
+        if name in locals_.node_of and locals_.is_keyed(name, motion):
+            keys = motion.keys(name)
+            writer.add(locals_.node_of[name], locals_.of(name, keys))
+            for node in locals_.animated_above(name):
+                above.setdefault(node, []).append(keys.times)
+    for node, times in above.items():
+        assert origin
+        writer.add(node, origin.animations.keys(node, np.unique(np.concatenate(times)), writer.apart(float(run.times[-1]))))
     if locals_.sheared:
         logger.warning("parents of uneven scale: the turn of %s is not exact in the file", ", ".join(sorted(locals_.sheared)))
     if origin:
+        _drop_channels(builder.tree, set(writer.nodes))
         writer.take_over(origin)
     writer.close()
     builder.write(target)
@@ -78,6 +91,30 @@ class _Locals:
         self.node_of, self._paths, self._origin = node_of, paths, origin
         self.sheared: set[str] = set()
         self._name_of = {node: name for name, node in node_of.items()}
+
+    def is_keyed(self, name: str, motion: Motion) -> bool:
+        """Whether a body has keys: it moves, or it is not where its node is in the file, or all have some."""
+        node = self.node_of[name]
+        if motion.is_keyed(name) or self._origin is None or node >= len(self._origin.animations.hierarchy.nodes):
+            return motion.is_keyed(name)
+        hierarchy, path = self._origin.animations.hierarchy, self._paths[name]
+        way = np.abs(path.positions[0] - hierarchy.position(node)).max()
+        return bool(max(way, angle_between(path.orientations[0], hierarchy.turn[node])) > ELSEWHERE)
+
+    def animated_above(self, name: str) -> list[int]:
+        """Nodes above a body that the file moves and the run does not."""
+        node = self.node_of[name]
+        if self._origin is None or node >= len(self._origin.animations.hierarchy.nodes):
+            return []
+        animations = self._origin.animations
+        above = []
+        for k in animations.hierarchy.chain(node)[1:]:
+            carrier = self._name_of.get(k)
+            if carrier is not None and self._paths[carrier].moves:
+                break
+            if any((k, path) in animations.tracks for path in ("translation", "rotation")):
+                above.append(k)
+        return above
 
     def of(self, name: str, keys: Keys) -> Keys:
         """Keys of a body as its node has them."""
@@ -145,16 +182,27 @@ class _Channels:
         self._length = 0
         self._times: dict[bytes, int] = {}
         self._values: list[dict[str, Any]] = []
+        self.nodes: list[int] = []
 
     def add(self, node: int, keys: Keys) -> None:
-        """Add the channels of a node, or those of them that change."""
-        for path, values in (("translation", keys.positions), ("rotation", keys.orientations[:, [1, 2, 3, 0]])):
-            if not self._only_changes or np.any(values != values[0]):
-                sampler = {"input": self._input(keys.times), "output": self._accessor(values)}
+        """Add the channels of a node, or those of them that change or are not what the node has at rest."""
+        entry = self._builder.tree["nodes"][node]
+        _use_parts(entry)
+        self.nodes.append(node)
+        parts = ("translation", keys.positions, [0, 0, 0]), ("rotation", keys.orientations[:, [1, 2, 3, 0]], [0, 0, 0, 1])
+        for path, values, rest in parts:
+            there = np.array(entry.get(path, rest), float)
+            changes = bool(np.any(values != values[0]))
+            off = min(np.abs(values[0] - there).max(), np.abs(values[0] + there).max() if path == "rotation" else np.inf)
+            if changes or not self._only_changes or off > EVEN * max(1.0, float(np.abs(there).max())):
+                count = len(keys.times) if changes or not self._only_changes else 1
+                sampler = {"input": self._input(keys.times[:count]), "output": self._accessor(values[:count])}
                 self._samplers.append(sampler)
                 self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})
-                entry = self._builder.tree["nodes"][node]
-                _use_parts(entry)
+
+    def apart(self, last: float) -> float:
+        """Return the least time between keys, s, in a run that ends at `last` s."""
+        return APART * float(np.spacing(np.float32(last + self._shift)))
 
     def _input(self, times: np.ndarray) -> int:
         data = (times + self._shift).astype(np.float32)
@@ -236,7 +284,6 @@ def _from_origin(origin: Origin, motion: Motion) -> tuple[Builder, _Locals]:
             pose = node_pose(paths[body.name].positions[0], paths[body.name].orientations[0])
             node_of[body.name] = builder.add("nodes", {"name": body.name, "mesh": drawing.mesh(body, number), **pose})
             scenes[builder.tree.get("scene", 0)].setdefault("nodes", []).append(node_of[body.name])
-    _drop_channels(builder.tree, {node_of[name] for name in paths if name in node_of and motion.is_keyed(name)})
     return builder, _Locals(node_of, paths, origin)
 
 
