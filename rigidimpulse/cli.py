@@ -24,6 +24,7 @@ from rigidimpulse.jobs import (
     recording_with_shapes,
     run_job,
     show,
+    size_of,
 )
 
 if TYPE_CHECKING:
@@ -192,7 +193,7 @@ def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str
     run = run.part(keys.pop("pre_roll"))
     for target in output:
         path = run.export(target, **(keys if Path(target).suffix in ANIMATED_SUFFIXES else {}))
-        click.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
+        click.echo(f"wrote {path} ({size_of(path)})")
     if view:
         show(run)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rigidimpulse.jobs import CHECK_FAILED, find_job, given_options, print_table, recording_with_shapes, run_job, show
+from rigidimpulse.jobs import CHECK_FAILED, find_job, given_options, print_table, recording_with_shapes, run_job, show, size_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -137,7 +137,7 @@ def compare(first: str, second: str, scene: str, output: str | None, view: bool,
     click.echo(result.table())
     if output:
         path = result.export(output)
-        click.echo(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
+        click.echo(f"wrote {path} ({size_of(path)})")
     if view:
         show(result)
 

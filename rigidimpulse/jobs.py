@@ -206,3 +206,9 @@ def recording_with_shapes(path: Path, scene: str | None) -> Recording:
         bodies = f"its bodies are {', '.join(run.names)}, those of the scene {', '.join(made.names)}"
         raise SceneError(bodies, "name the scene it was made of", f"recording {str(path)!r}")
     return replace(run, scene=made)
+
+
+def size_of(path: Path) -> str:
+    """Return the size of a file in words."""
+    size = path.stat().st_size
+    return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"

@@ -55,4 +55,4 @@ def check(run: Recording) -> list[Check]:
     ]
 
 
-SCENES = (GalleryScene("cloth_on_ball", "a cloth falls on a ball and hangs over it", scene, check, DURATION),)
+SCENES = (GalleryScene("cloth_on_ball", "A cloth falls on a ball and hangs over it", scene, check, DURATION),)

@@ -67,4 +67,4 @@ def check(run: Recording) -> list[Check]:
     ]
 
 
-SCENES = (GalleryScene("jelly_on_stairs", "a cube of jelly falls down stairs", scene, check, DURATION),)
+SCENES = (GalleryScene("jelly_on_stairs", "A cube of jelly falls down stairs", scene, check, DURATION),)

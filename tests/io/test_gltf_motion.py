@@ -118,6 +118,73 @@ def test_channels_of_bodies_are_replaced_and_others_stay(tmp_path: Path) -> None
     assert len(found["door", "translation"][0]) == 5 and np.array_equal(found["lamp", "translation"][1][-1], [0, 7, 0])
 
 
+def test_all_that_moves_is_in_the_first_animation(tmp_path: Path) -> None:
+    """Blender shows the first animation of a file and no other, so bodies stood there. What moves a thing a second time stays apart."""
+    file = with_physics([{"name": "crate", "extensions": physics({"mass": 1}, shaped())}, {"name": "lamp"}], [BOX])
+    file.animate(1, "translation", [0, 1], [[0, 0, 0], [0, 7, 0]])
+    file.animate(1, "translation", [0, 1], [[0, 0, 0], [0, 0, 9]])
+    scene = ri.load_scene(file.save(tmp_path / "in.glb"))
+    run = recorded(scene, {"crate": smooth(5, (0, 0, 0))})
+    tree, data = unpack(run.export(tmp_path / "out.glb", start_frame=24))
+    first, second = ({**tree, "animations": [animation]} for animation in tree["animations"])
+    found = channels(first, data)
+    assert set(found) == {("crate", "translation"), ("crate", "rotation"), ("lamp", "translation")}
+    assert np.array_equal(found["lamp", "translation"][0], [1, 2]) and np.array_equal(found["lamp", "translation"][1][1], [0, 7, 0])
+    assert np.array_equal(channels(second, data)["lamp", "translation"][1][1], [0, 0, 9])
+
+
+@pytest.mark.parametrize("join", ["LINEAR", "STEP", "CUBICSPLINE"])
+def test_parents_that_move_do_so_at_their_time(tmp_path: Path, join: str) -> None:
+    """A body below a cart is where the run has it at every frame, at frame 1001 too, whatever the cart's keys are like.
+
+    The cart has linear keys at the frames, since programs differ in what they make of others in between. With its own times the
+    cart would have arrived, 4 m away, when the run begins. Read at the keys themselves: no error of times in single precision.
+    """
+    file = with_physics(
+        [{"name": "cart", "children": [1]}, {"name": "load", "translation": [0, 1, 0], "extensions": physics({"mass": 1}, shaped())}], [BOX]
+    )
+    places, turns = [[0, 0, 0], [4, 0, 1]], [[0, 0, 0, 1], [0, HALF, 0, HALF]]
+    if join == "CUBICSPLINE":
+        places, turns = ([[0] * len(keys[0]), keys[0], [3] * len(keys[0]), [0] * len(keys[0]), keys[1], [0] * len(keys[0])]
+                         for keys in (places, turns))  # fmt: skip
+    file.animate(0, "translation", [0, 0.31], places, join)
+    file.animate(0, "rotation", [0, 0.31], turns, join)
+    scene = ri.load_scene(file.save(tmp_path / "in.glb"))
+    run = recorded(scene, {"load": smooth(13, (0, 1, 0))})
+    tree, data = unpack(run.export(tmp_path / "out.glb", start_frame=1001))
+    check_structure(tree, data)
+    player, found = Player(tree, data), channels(tree, data)
+    times = found["load", "translation"][0]
+    assert len(times) == 13 and set(times) <= set(found["cart", "rotation"][0])
+    for frame, time in enumerate(times):
+        now = player.world(1, time)
+        assert np.abs(now[:3, 3] - run.position("load")[frame]).max() < SINGLE
+        assert np.abs(now[:3, :3] - turned(run.orientation("load")[frame])).max() < SINGLE
+
+
+def test_bodies_that_stand_elsewhere_have_a_key(tmp_path: Path) -> None:
+    """A body that was moved apart from another one before the run, and a turn that the file holds all the time: both were lost."""
+    file = with_physics(
+        [{"name": "crate", "extensions": physics({"mass": 1}, shaped())}, {"name": "door", "extensions": physics(None, shaped())}], [BOX]
+    )
+    file.animate(1, "translation", [0, 1], [[0, 0, 0], [1, 0, 0]])
+    file.animate(1, "rotation", [0, 1], [[0, HALF, 0, HALF]] * 2)
+    scene = ri.load_scene(file.save(tmp_path / "in.glb"))
+    still, aside = np.tile([1.0, 0, 0, 0], (5, 1)), np.tile([HALF, 0, HALF, 0], (5, 1))
+    poses = {"crate": (np.tile([0, 2.0, 0], (5, 1)), still), "door": (np.linspace([0, 0, 0], [1, 0, 0], 5), aside)}
+    tree, data = unpack(recorded(scene, poses).export(tmp_path / "out.glb"))
+    player = Player(tree, data)
+    assert np.allclose(player.world(0, 0.1)[:3, 3], [0, 2, 0], rtol=0, atol=SINGLE)
+    assert np.allclose(player.world(1, 0.1)[:3, :3], turned(aside[0]), rtol=0, atol=SINGLE)
+
+
+def test_the_root_is_named_unlike_all_bodies(tmp_path: Path) -> None:
+    """Programs rename one of two nodes of one name: the body "world" would be "world.001"."""
+    scene = ri.Scene(gravity=(0, 0, -9.81), bodies=[ri.Body("world", ri.Shape.box(1))])
+    tree, _ = unpack(recorded(scene, {"world": smooth(3, (0, 0, 0))}).export(tmp_path / "out.glb"))
+    assert sorted(node["name"] for node in tree["nodes"]) == ["world", "world_"]
+
+
 def test_a_scene_from_code_stands_y_up(tmp_path: Path) -> None:
     """Z up turns to Y up: (x, y, z) is at (x, z, -y). Equal shapes share vertices, a half space is a square in its plane."""
     scene = ri.Scene(gravity=(0, 0, -9.81))

@@ -79,7 +79,10 @@ def test_every_body_is_where_the_run_has_it(tmp_path: Path, suffix: str) -> None
 
 
 def test_what_is_drawn_is_what_collides(tmp_path: Path) -> None:
-    """Boxes about the drawn shapes, in the world, are those of the bodies; one mesh of three bodies is there once."""
+    """Boxes about the drawn shapes, in the world, are those of the bodies; one mesh of three bodies is there once.
+
+    A shape that is alone and in the place of its body has the name of the body: programs that make one object of both keep that one.
+    """
     scene = scene_of_shapes()
     run = recorded(scene, {"a ball": smooth(2, scene["a ball"].position)})
     stage = opened(run.export(tmp_path / "out.usdc"))
@@ -94,9 +97,9 @@ def test_what_is_drawn_is_what_collides(tmp_path: Path) -> None:
     low = vertices.min(axis=0) + scene["rock"].position
     assert np.abs(np.array(found.GetMin()) - low).max() < 1e-5
     meshes = [prim for prim in stage.TraverseAll() if prim.IsA(UsdGeom.Mesh)]
-    assert sorted(str(prim.GetPath()) for prim in meshes) == ["/World/floor/shape", "/_Shapes/mesh0/mesh"]
+    assert sorted(str(prim.GetPath()) for prim in meshes) == ["/World/floor/floor", "/_Shapes/mesh0/mesh"]
     assert len(stage.GetPrototypes()) == 1 and stage.GetPrimAtPath("/_Shapes").IsAbstract()
-    floor = UsdGeom.Mesh(stage.GetPrimAtPath("/World/floor/shape"))
+    floor = UsdGeom.Mesh(stage.GetPrimAtPath("/World/floor/floor"))
     assert np.array(floor.GetPointsAttr().Get())[:, 2].tolist() == [0.5] * 4
 
 

@@ -89,8 +89,7 @@ class Keeper:
             return None
         known, content = read(self._path, alone=True)
         if known.fingerprint != header.fingerprint:
-            told = f"it is of another scene, of other settings or of another version of the library ({known.version})"
-            raise SceneError(told, "delete it, or give another name", f"cache {str(self._path)!r}")
+            raise SceneError(_difference(known, header), "delete it, or give another name", f"cache {str(self._path)!r}")
         return content
 
     def _recall(self, running: Running, kept: Content) -> Running:
@@ -161,3 +160,14 @@ def _constants(context: Any, plan: Any) -> Constants:
     own = [plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), context.log.impacts.rows]
     return Constants([world.scene, world.scene.bodies, world.scene.effects, world.shapes, world.geometry, *own])
 
+
+def _difference(known: Header, header: Header) -> str:
+    """What a cache is of that the run is not: as much as both say."""
+    if known.version != header.version:
+        return f"it is of version {known.version} of the library, this is {header.version}"
+    if known.names != header.names:
+        return "it is of another scene: its bodies have other names"
+    for what, unit, kept, asked in (("duration", " s", known.duration, header.duration), ("fps", "", known.fps, header.fps)):
+        if kept != asked:
+            return f"it is of other settings: {what} {kept:g}{unit}, asked for is {asked:g}{unit}"
+    return "it is of another scene, of another accuracy or of other effects"

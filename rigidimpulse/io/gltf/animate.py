@@ -7,10 +7,15 @@ translation and rotation are those with
 
 with K and S, its scales at rest. Where a parent with uneven scale would shear the body there is no such R: the nearest is
 written, and logged. Only what moves has keys; channels that the file has for nodes of bodies are replaced.
+
+Programs show the first animation alone, so all that moves in the run is in that one: also the channels of the file that move what
+is no body, by the same time s_0 later as the run, s_0 the time of the first frame. Blender turns evenly by components of the
+quaternion and splines by rules of its own, so nodes above bodies have linear keys wherever these have some: there M_p is what it was.
 """
 
 from __future__ import annotations
 
+import json
 import logging
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +31,7 @@ from rigidimpulse.io.gltf.origin import Origin
 from rigidimpulse.io.keys import Keys
 from rigidimpulse.io.keys import Path as BodyPath
 from rigidimpulse.io.motion import Motion, MotionOptions
-from rigidimpulse.rotation import conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
+from rigidimpulse.rotation import angle_between, conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
 
 if TYPE_CHECKING:
     from rigidimpulse.recording import Recording
@@ -35,6 +40,10 @@ logger = logging.getLogger("rigidimpulse")
 
 EVEN = 1e-6
 """Unevenness of the scale of parents, relative, that is none."""
+ELSEWHERE = 1e-9
+"""m and rad, from the place of a node on which a body that stands has a key."""
+APART = 4.0
+"""Units in the last place of single precision between keys, at least."""
 ANIMATION = "rigidimpulse"
 """Name of the animation."""
 
@@ -55,9 +64,16 @@ def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
     builder, locals_ = _from_origin(origin, motion) if origin else _from_scene(motion)
     shift = options.start_frame * float(run.times[1] - run.times[0]) if len(run.times) > 1 else 0.0
     writer = _Channels(builder, shift, options.only_moved)
+    above: dict[int, list[np.ndarray]] = {}
     for name in paths:
-        if motion.is_keyed(name) and name in locals_.node_of:
-            writer.add(locals_.node_of[name], locals_.of(name, motion.keys(name)))
+        if name in locals_.node_of and locals_.is_keyed(name, motion):
+            keys = motion.keys(name)
+            writer.add(locals_.node_of[name], locals_.of(name, keys))
+            for node in locals_.animated_above(name):
+                above.setdefault(node, []).append(keys.times)
+    for node, times in above.items():
+        assert origin
+        writer.add(node, origin.animations.keys(node, np.unique(np.concatenate(times)), writer.apart(float(run.times[-1]))))
     if run.nets:
         colour = sum(body.motion != "static" for body in scene.bodies)
         for node, frames, weights in add_nets(builder, run.nets, scene.gravity, colour, options.tolerance):
@@ -65,6 +81,9 @@ def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
                 writer.add_weights(node, run.times[frames], weights)
     if locals_.sheared:
         logger.warning("parents of uneven scale: the turn of %s is not exact in the file", ", ".join(sorted(locals_.sheared)))
+    if origin:
+        _drop_channels(builder.tree, set(writer.nodes))
+        writer.take_over(origin)
     writer.close()
     builder.write(target)
 
@@ -76,6 +95,30 @@ class _Locals:
         self.node_of, self._paths, self._origin = node_of, paths, origin
         self.sheared: set[str] = set()
         self._name_of = {node: name for name, node in node_of.items()}
+
+    def is_keyed(self, name: str, motion: Motion) -> bool:
+        """Whether a body has keys: it moves, or it is not where its node is in the file, or all have some."""
+        node = self.node_of[name]
+        if motion.is_keyed(name) or self._origin is None or node >= len(self._origin.animations.hierarchy.nodes):
+            return motion.is_keyed(name)
+        hierarchy, path = self._origin.animations.hierarchy, self._paths[name]
+        way = np.abs(path.positions[0] - hierarchy.position(node)).max()
+        return bool(max(way, angle_between(path.orientations[0], hierarchy.turn[node])) > ELSEWHERE)
+
+    def animated_above(self, name: str) -> list[int]:
+        """Nodes above a body that the file moves and the run does not."""
+        node = self.node_of[name]
+        if self._origin is None or node >= len(self._origin.animations.hierarchy.nodes):
+            return []
+        animations = self._origin.animations
+        above = []
+        for k in animations.hierarchy.chain(node)[1:]:
+            carrier = self._name_of.get(k)
+            if carrier is not None and self._paths[carrier].moves:
+                break
+            if any((k, path) in animations.tracks for path in ("translation", "rotation")):
+                above.append(k)
+        return above
 
     def of(self, name: str, keys: Keys) -> Keys:
         """Keys of a body as its node has them."""
@@ -143,16 +186,27 @@ class _Channels:
         self._length = 0
         self._times: dict[bytes, int] = {}
         self._values: list[dict[str, Any]] = []
+        self.nodes: list[int] = []
 
     def add(self, node: int, keys: Keys) -> None:
-        """Add the channels of a node, or those of them that change."""
-        for path, values in (("translation", keys.positions), ("rotation", keys.orientations[:, [1, 2, 3, 0]])):
-            if not self._only_changes or np.any(values != values[0]):
-                sampler = {"input": self._input(keys.times), "output": self._accessor(values)}
+        """Add the channels of a node, or those of them that change or are not what the node has at rest."""
+        entry = self._builder.tree["nodes"][node]
+        _use_parts(entry)
+        self.nodes.append(node)
+        parts = ("translation", keys.positions, [0, 0, 0]), ("rotation", keys.orientations[:, [1, 2, 3, 0]], [0, 0, 0, 1])
+        for path, values, rest in parts:
+            there = np.array(entry.get(path, rest), float)
+            changes = bool(np.any(values != values[0]))
+            off = min(np.abs(values[0] - there).max(), np.abs(values[0] + there).max() if path == "rotation" else np.inf)
+            if changes or not self._only_changes or off > EVEN * max(1.0, float(np.abs(there).max())):
+                count = len(keys.times) if changes or not self._only_changes else 1
+                sampler = {"input": self._input(keys.times[:count]), "output": self._accessor(values[:count])}
                 self._samplers.append(sampler)
                 self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})
-                entry = self._builder.tree["nodes"][node]
-                _use_parts(entry)
+
+    def apart(self, last: float) -> float:
+        """Return the least time between keys, s, in a run that ends at `last` s."""
+        return APART * float(np.spacing(np.float32(last + self._shift)))
 
     def add_weights(self, node: int, times: np.ndarray, weights: np.ndarray) -> None:
         """Add the channel of the morph targets of a node, weights (k, targets)."""
@@ -182,14 +236,38 @@ class _Channels:
         self._values.append(entry)
         return self._builder.add("accessors", entry)
 
+    def take_over(self, origin: Origin) -> None:
+        """Move the channels that the file still has here; of two that move the same the first, as in the scene. Others stay."""
+        file, tree = origin.animations.hierarchy.file, self._builder.tree
+        targets: set[str] = set()
+        taken: dict[tuple[int, int], int] = {}
+        for number, animation in enumerate(tree.get("animations", [])):
+            left = []
+            for channel in animation["channels"]:
+                target = json.dumps(channel["target"], sort_keys=True)
+                if target in targets:
+                    left.append(channel)
+                    continue
+                targets.add(target)
+                key = number, channel["sampler"]
+                if key not in taken:
+                    sampler = animation["samplers"][channel["sampler"]]
+                    times = np.asarray(file.array(sampler["input"], "SCALAR"), float)
+                    taken[key] = len(self._samplers)
+                    self._samplers.append({**sampler, "input": self._input(times)})
+                self._channels.append({**channel, "sampler": taken[key]})
+            animation["channels"] = left
+        _drop_empty(tree)
+
     def close(self) -> None:
-        """Put the animation into the file."""
+        """Put the animation into the file, before all others."""
         if not self._channels:
             return
         view = self._builder.view(b"".join(self._data))
         for entry in self._values:
             entry["bufferView"] = view
-        self._builder.add("animations", {"name": ANIMATION, "channels": self._channels, "samplers": self._samplers})
+        animation = {"name": ANIMATION, "channels": self._channels, "samplers": self._samplers}
+        self._builder.tree.setdefault("animations", []).insert(0, animation)
 
 
 def _use_parts(entry: dict[str, Any]) -> None:
@@ -215,28 +293,32 @@ def _from_origin(origin: Origin, motion: Motion) -> tuple[Builder, _Locals]:
             pose = node_pose(paths[body.name].positions[0], paths[body.name].orientations[0])
             node_of[body.name] = builder.add("nodes", {"name": body.name, "mesh": drawing.mesh(body, number), **pose})
             scenes[builder.tree.get("scene", 0)].setdefault("nodes", []).append(node_of[body.name])
-    _drop_channels(builder.tree, {node_of[name] for name in paths if name in node_of and motion.is_keyed(name)})
     return builder, _Locals(node_of, paths, origin)
 
 
 def _drop_channels(tree: dict[str, Any], nodes: set[int]) -> None:
-    """Leave out the channels that move the nodes, and animations without channels."""
-    kept = []
-    for animation in tree.pop("animations", []):
+    """Leave out the channels that move the nodes."""
+    for animation in tree.get("animations", []):
         animation["channels"] = [
             channel for channel in animation["channels"]
             if channel["target"].get("node") not in nodes or channel["target"]["path"] not in ("translation", "rotation")
         ]  # fmt: skip
-        if animation["channels"]:
-            kept.append(animation)
+    _drop_empty(tree)
+
+
+def _drop_empty(tree: dict[str, Any]) -> None:
+    """Leave out animations without channels, and their list if it is empty."""
+    kept = [animation for animation in tree.pop("animations", []) if animation["channels"]]
     if kept:
         tree["animations"] = kept
 
 
 def _from_scene(motion: Motion) -> tuple[Builder, _Locals]:
     """A file with a node and a mesh for each body, Y up."""
-    builder = new_file()
-    parents, _ = stage(builder, motion.scene.gravity, "world")
+    builder, root = new_file(), "world"
+    while root in motion.paths:
+        root += "_"
+    parents, _ = stage(builder, motion.scene.gravity, root)
     drawing, node_of, moving = Drawing(builder, motion.half()), {}, 0
     for body in motion.scene.bodies:
         path = motion.paths[body.name]

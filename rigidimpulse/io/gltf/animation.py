@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.io.gltf.nodes import Hierarchy, Local
+from rigidimpulse.io.keys import Keys
 from rigidimpulse.keyframes import Keyframes
 from rigidimpulse.rotation import multiply, quaternion_continuity, to_matrix
 
@@ -46,6 +47,13 @@ class Track(NamedTuple):
         if a.shape[1] == 4:
             return _turned(a, b, s)
         return a + s * (b - a)
+
+    def between(self) -> np.ndarray:
+        """Times (t,) s of more keys, with which linear ones do what this channel does."""
+        if self.join == "STEP":
+            return self.times[1:] - np.minimum(BETWEEN, np.diff(self.times))
+        span = self.times[-1] - self.times[0] if self.join == "CUBICSPLINE" else 0.0
+        return self.times[0] + BETWEEN * np.arange(1, int(min(span / BETWEEN, MOST_KEYS)) + 1)
 
 
 def _turned(a: np.ndarray, b: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -122,6 +130,25 @@ class Animations:
         q = np.tile(rest.rotation, (len(times), 1)) if turn is None else turn.at(times)
         length = np.linalg.norm(q, axis=1, keepdims=True)
         return Local(x, q / np.where(length > 0.0, length, 1.0) + np.where(length > 0.0, 0.0, [1.0, 0.0, 0.0, 0.0]), rest.scale)
+
+    def keys(self, node: int, times: np.ndarray, apart: float) -> Keys:
+        """Linear keys of a node against its parent: at times (t,) s, and where it needs some to go as its channels say.
+
+        apart: s, least time between keys.
+        """
+        own = [times]
+        for path in ("translation", "rotation"):
+            track = self.tracks.get((node, path))
+            if track is not None:
+                own += [track.times, track.between()]
+        extra = np.unique(np.concatenate(own[1:]))
+        extra = extra[np.diff(extra, prepend=-np.inf) > apart]
+        after = np.searchsorted(times, extra)
+        bounds = np.concatenate([[-np.inf], times, [np.inf]])
+        extra = extra[np.minimum(extra - bounds[after], bounds[after + 1] - extra) > apart]
+        made = np.union1d(times, extra)
+        x, q, _ = self.local(node, made)
+        return Keys(made, x, quaternion_continuity(q))
 
     def frames(self, node: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rigid frame of a node at times, (t, 3) m and (t, 4) wxyz, and the linear part of its world matrix (t, 3, 3)."""

@@ -45,8 +45,15 @@ class Drawing:
         paint(prim, surface(number % len(PALETTE), body)["color"])
         parts = body.shape.parts_flat()
         for k, part in enumerate(parts):
-            self._part(path.AppendChild("shape" if len(parts) == 1 else f"shape{k}"), part)
+            # Blender makes one object of an Xform and a shape that is alone in it and has no operations, and names it after the shape.
+            single = len(parts) == 1 and not self._is_placed(part)
+            self._part(path.AppendChild(path.name if single else f"{path.name}_shape{k}"), part)
         return prim
+
+    def _is_placed(self, part: Part) -> bool:
+        """Whether the prim of a part has operations, or is an instance."""
+        moved = bool(np.any(part.position)) or not np.array_equal(part.rotation, np.eye(3))
+        return moved or part.shape.kind == "box" or self._uses[id(part.shape)] > 1
 
     def _part(self, path: SdfPath, part: Part) -> None:
         shape = part.shape

@@ -112,4 +112,6 @@ def _unknown(frames: Frames) -> list[str]:
 
 
 def _first(error: Exception) -> str:
-    return (str(error).strip() or type(error).__name__).splitlines()[-1][:200]
+    """The cause of an error in one line; of several errors of usd-core the first, which has the line of the file."""
+    text = getattr(error.args[0], "commentary", "") if error.args else ""
+    return ((text or str(error)).strip() or type(error).__name__).splitlines()[-1][:200]
