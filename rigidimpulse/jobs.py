@@ -151,8 +151,7 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str |
     from rigidimpulse.simulation import simulate as run_scene
 
     scene = job.make()
-    if cache is not None and Path(cache).exists():
-        click.echo(f"going on with what is in {cache}")
+    begun = cache is not None and Path(cache).exists()
     start = perf_counter()
     # disable=None: no bar where the output is no terminal.
     with tqdm(
@@ -167,7 +166,8 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str |
     seconds = perf_counter() - start
     num_impacts = len(run.impacts)
     impacts = f"{num_impacts} {'impact' if num_impacts == 1 else 'impacts'}"
-    click.echo(f"{job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s")
+    rest = f"; {cache} had what came before, or all" if begun else ""
+    click.echo(f"{job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s{rest}")
     click.echo(f"status: {run.status.message}")
     if profile and run.profile is not None:
         click.echo(run.profile.table())
