@@ -211,10 +211,29 @@ class Harmful:
         return os.getcwd, ()
 
 
+class RunsAFile:
+    """Pickled, it would have the library run a scene file."""
+
+    def __reduce__(self):
+        from rigidimpulse.jobs import find_job
+
+        return find_job, ("harmful.py",)
+
+
+class Exports:
+    """Pickled, it would have a scene write a file."""
+
+    def __reduce__(self):
+        from rigidimpulse.io.cache.freeze import _bound
+
+        return _bound, (gas(), "export")
+
+
 def test_checkpoints_call_nothing_but_the_library(tmp_path):
     from rigidimpulse.io.cache.freeze import Constants, thaw
 
-    for bad in (pickle.dumps((0, Harmful())), pickle.dumps((0, getattr)), b"", b"junk", pickle.dumps((3, None))):
+    harmful = [pickle.dumps((0, thing)) for thing in (Harmful(), RunsAFile(), Exports(), getattr)]
+    for bad in (*harmful, b"", b"junk", pickle.dumps((3, None))):
         with pytest.raises(ri.SceneError, match="checkpoint"):
             thaw(bad, Constants([]))
 

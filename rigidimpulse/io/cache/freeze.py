@@ -5,7 +5,7 @@ scene with all that people put into it (functions among it, which have no bytes)
 compiled them anew, and walks them in the same order. Arrays that share memory share it again when they are read: a view is written as its
 base, and where and how it lies in it.
 
-Only classes of this package and plain containers and arrays are ever made from bytes.
+Only what a run is made of (`HOMES`), plain containers and arrays are ever made from bytes.
 """
 
 from __future__ import annotations
@@ -33,6 +33,11 @@ CONTAINERS: dict[str, tuple[Any, ...]] = {
 }
 LINE = 64
 """Bytes of a line of the processor's cache."""
+HOMES = (
+    "constrain", "detect", "events", "flexible", "forces", "integrate", "observe", "respond", "sweep",
+    "accuracy", "geometry", "io.cache.freeze", "mass", "plan", "rotation", "simulation", "state", "world",
+)  # fmt: skip
+"""Packages and modules of what a state is made of: nothing in them reads or runs files."""
 NUMPY = ("dtype", "ndarray", "scalar", "_reconstruct", "_frombuffer")
 """What numpy makes arrays of."""
 
@@ -122,9 +127,14 @@ def _view(whole: np.ndarray, dtype: np.dtype, shape: tuple[int, ...], offset: in
 
 def _bound(thing: Any, name: str) -> Any:
     """A method of an object of this package."""
-    if not type(thing).__module__.startswith("rigidimpulse."):
+    if not _is_home(type(thing).__module__):
         raise pickle.UnpicklingError(f"a method of a {type(thing).__name__}")
     return getattr(thing, name)
+
+
+def _is_home(module_name: str) -> bool:
+    """Whether what a state is made of may come from a module."""
+    return any(f"{module_name}.".startswith(f"rigidimpulse.{home}.") for home in HOMES)
 
 
 class _Reader(pickle.Unpickler):
@@ -143,8 +153,8 @@ class _Reader(pickle.Unpickler):
         for known in CONTAINERS.get(module_name, ()):
             if known.__name__ == global_name:
                 return known
-        if module_name.startswith("rigidimpulse."):
-            found = functools.reduce(getattr, global_name.split("."), importlib.import_module(module_name))
+        if _is_home(module_name):
+            found = getattr(importlib.import_module(module_name), global_name, None)
             if getattr(found, "__module__", None) == module_name:
                 return found
         raise pickle.UnpicklingError(f"{module_name}.{global_name} has no place in a checkpoint")
