@@ -378,14 +378,3 @@ def test_a_gltf_with_its_buffer_inside_is_the_same(tmp_path: Path) -> None:
     file.mesh()
     first, second = (ri.load_scene(file.save(tmp_path / name)) for name in ("a.glb", "a.gltf"))
     assert np.array_equal(first["it"].shape.vertices, second["it"].shape.vertices)
-
-
-def test_the_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "gltf.md").read_text()
-    code = "\n".join(line[4:] for line in page.split("\n\n")[1].splitlines())
-    motion = {"mass": 1, "linearVelocity": [0, 3, 0], "inertiaDiagonal": [1, 1, 1]}
-    file = with_physics([{"name": "box", "extensions": physics(motion, shaped())}], [BOX])
-    file.save(tmp_path / "room.glb")
-    monkeypatch.chdir(tmp_path)
-    exec(code, {"ri": ri})
-    assert ri.load_scene("room_again.glb").names == ("box",) and (tmp_path / "room_moving.glb").is_file()
