@@ -118,6 +118,22 @@ def test_up_axes(tmp_path: Path) -> None:
             assert np.abs(world(stage, "/World/rock", 2)[:3, 3] - turn @ run.position("rock")[2]).max() < 1e-5
 
 
+def test_a_body_that_was_moved_by_hand_and_stands_is_where_the_run_has_it(tmp_path: Path) -> None:
+    # Only "b" was moved since the file: "a" keeps the file's own pose, without an opinion of the layer.
+    bodies = [ri.Body(name, ri.Shape.box(1), position=(k, 2, 3)) for k, name in enumerate("ab")]
+    made = recorded(ri.Scene(bodies=bodies), {name: smooth(1, (k, 2, 3)) for k, name in enumerate("ab")})
+    scene = ri.load_scene(made.export(tmp_path / "in.usda"))
+    assert set(scene.names) == {"a", "b"}
+    poses = {name: (np.tile(scene[name].position, (4, 1)), np.tile(scene[name].unit_orientation(), (4, 1))) for name in "ab"}
+    poses["b"] = (poses["b"][0] + [0, 0, 5.0], poses["b"][1])
+    run = recorded(scene, poses)
+    stage = opened(run.export(tmp_path / "out.usda"))
+    paths = {name: str(next(prim.GetPath() for prim in stage.Traverse() if prim.GetName() == name)) for name in "ab"}
+    for name in "ab":
+        assert off(stage, paths[name], run, name) < SINGLE
+    assert stage.GetRootLayer().GetPrimAtPath(paths["a"]) is None
+
+
 @pytest.mark.parametrize("gravity", [(0, 0, -9.81), (0, -9.81, 0), (0, 0, 0), (3, -4, 5)])
 @pytest.mark.parametrize(("axis", "unit"), [("y", 1.0), ("z", 1.0), ("z", 0.01), (None, 0.0254)])
 def test_axis_and_unit_as_asked(tmp_path: Path, gravity: Any, axis: str | None, unit: float) -> None:

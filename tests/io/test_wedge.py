@@ -121,6 +121,11 @@ def test_failing_takes_stop_no_others(tmp_path, monkeypatch):
     assert "no such height" in result.takes[4].message
 
 
+def test_a_first_take_that_fails_stops_no_others(tmp_path):
+    result = ri.wedge(fragile, {"height": [5.0, 2.0, 1.0]}, tmp_path, duration=0.1, processes=1)
+    assert [take.outcome for take in result.takes] == ["failed", "failed", "ok"]
+
+
 def test_a_killed_wedge_goes_on(tmp_path):
     program = [sys.executable, str(Path(wedge_scenes.__file__)), "2", str(tmp_path)]
     assert subprocess.run(program).returncode == -signal.SIGKILL

@@ -96,7 +96,11 @@ class _Writer:
     def _over(self, origin) -> None:
         """Give the prims of bodies their motion."""
         for name, path in origin.prim_of.items():
-            if name not in self.motion.paths or not (self.motion.is_keyed(name) or origin.is_animated(path)):
+            if name not in self.motion.paths:
+                continue
+            start = self.motion.paths[name]
+            displaced = origin.is_displaced(path, start.positions[0], start.orientations[0])
+            if not (self.motion.is_keyed(name) or origin.is_animated(path) or displaced):
                 continue
             prim = define(self.layer, path, over=True)
             keys, names = origin.local(path, self.motion.keys(name), self.motion, prim)

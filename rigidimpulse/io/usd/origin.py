@@ -16,8 +16,10 @@ from rigidimpulse.io.origin import FileOrigin
 from rigidimpulse.io.usd.frames import Frames, is_even
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place
 from rigidimpulse.io.usd.library import Gf, Layer, Prim, PrimSpec, Sdf, SdfPath, Stage, UsdGeom
-from rigidimpulse.rotation import conjugate, from_matrix, multiply, quaternion_continuity
+from rigidimpulse.rotation import conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
 
+DISPLACED = 1e-6
+"""Relative to places, and of matrices of rotation, by which a body is off its prim that someone has moved."""
 SUFFIX = ":rigidimpulse"
 """Of the names of operations on prims of the file: those of the file itself stay as they are, unused."""
 STAGE = ("upAxis", "metersPerUnit", "kilogramsPerUnit", "defaultPrim")
@@ -66,6 +68,14 @@ class UsdOrigin(FileOrigin):
     def is_animated(self, path: SdfPath) -> bool:
         """Whether the file moves a prim by itself."""
         return self.frames.moves(self.frames.stage.GetPrimAtPath(path))
+
+    def is_displaced(self, path: SdfPath, position: np.ndarray, orientation: np.ndarray) -> bool:
+        """Whether a body begins elsewhere than the file has its prim: someone has moved it since."""
+        source = self.frames.stage.GetPrimAtPath(path)
+        matrix = self.frames.matrix(source)
+        place, turn = matrix[:3, 3] * self.meters_per_unit, matrix[:3, :3] @ np.linalg.inv(self.frames.stretch(source))
+        scale = 1.0 + float(np.abs(place).max())
+        return bool(np.abs(place - position).max() > DISPLACED * scale or np.abs(turn - to_matrix(orientation)).max() > DISPLACED)
 
     def local(self, path: SdfPath, keys: Keys, motion: Motion, prim: PrimSpec) -> tuple[Keys, tuple[str, str]]:
         """Give the prim of a body its operations; return its keys as it has them, and the names of position and orientation."""

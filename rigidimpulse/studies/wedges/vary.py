@@ -35,6 +35,10 @@ gravity of the body's speed."""
 MOST_TAKES = 100_000
 
 
+class UnknownParameter(SceneError):
+    """Nothing of the scene has a parameter's name: no take could be made."""
+
+
 def parse_vary(text: str) -> tuple[str, list[Any]]:
     """Return name and values of NAME=VALUES: numbers and words with commas, A:B:N (N numbers from A to B), A:B (whole numbers).
 
@@ -135,7 +139,7 @@ def with_parameter(scene: Scene, name: str, value: Any) -> Scene:
         if changed:
             return _copy(scene, changed, scene.gravity)
     names = [body.name for body in scene.bodies] + [effect.name for effect in scene.effects if getattr(effect, "name", None)]
-    raise SceneError(
+    raise UnknownParameter(
         f"nothing to vary is called {name!r}",
         f"name an argument of scene(), seed, duration, accuracy, gravity, a field of bodies such as material.restitution, "
         f"or one of {', '.join(names)} with a field",
@@ -169,7 +173,7 @@ def _part(thing: Any, path: list[str], value: Any, name: str) -> Any:
         array = np.array(thing, float)
         array[AXES.index(path[0])] = value
         return tuple(array.tolist())
-    raise SceneError(f"{name}: there is no {path[0]!r}", "name a field of the body, of its material, or x, y, z of a vector")
+    raise UnknownParameter(f"{name}: there is no {path[0]!r}", "name a field of the body, of its material, or x, y, z of a vector")
 
 
 def _copy(scene: Scene, changed: Mapping[int, Any], gravity: Any) -> Scene:

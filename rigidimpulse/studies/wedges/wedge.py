@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import logging
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,8 +16,10 @@ from rigidimpulse.files import write_renamed
 from rigidimpulse.recording import Recording, load_recording
 from rigidimpulse.scene import Scene
 from rigidimpulse.studies.wedges.take import FAILED, Take, TakeJob, make_scene
-from rigidimpulse.studies.wedges.vary import combinations
+from rigidimpulse.studies.wedges.vary import UnknownParameter, combinations
 from rigidimpulse.studies.wedges.workers import run_dask, run_here, run_pool
+
+logger = logging.getLogger("rigidimpulse")
 
 MEASURES = {"impacts": "", "kinetic": "J", "potential": "J", "dissipated": "J", "travel": "m", "seconds": "s"}
 """Columns of the table besides the parameters, and their units."""
@@ -110,7 +113,7 @@ def wedge(
     told = named if named is not None else scene
     assert not isinstance(told, os.PathLike)
     jobs = [TakeJob(k, told, parameters, settings, os.fspath(folder)) for k, parameters in enumerate(combinations(vary))]
-    make_scene(told, jobs[0].parameters)
+    _check_names(jobs[0])
     _claim(Path(folder), {"scene": named or getattr(scene, "__name__", "scene"), "vary": vary, "settings": settings})
     takes = []
     number = min(processes or os.cpu_count() or 1, len(jobs))
@@ -126,6 +129,16 @@ def wedge(
     _write_table(result)
     _write_sheet(result, Path(named).stem if named is not None else getattr(scene, "__name__", "scene"))
     return result
+
+
+def _check_names(job: TakeJob) -> None:
+    """Raise a SceneError where nothing of the scene has a parameter's name; whatever else is wrong with a take, it says itself."""
+    try:
+        make_scene(job.scene, job.parameters)
+    except UnknownParameter:
+        raise
+    except Exception as error:
+        logger.debug("the first take: %s", error)
 
 
 def _claim(folder: Path, told: dict[str, Any]) -> None:
