@@ -82,50 +82,80 @@ def plan_elimination(first, second, n):
 
 
 @jit
-def _factor_block(a, pivots):
-    """LU factors of a block in its place, rows exchanged."""
+def _factor_block(blocks, s, pivots, body):
+    """LU factors of block s in its place, rows exchanged."""
     for k in range(SIZE):
         pivot = k
         for i in range(k + 1, SIZE):
-            if abs(a[i, k]) > abs(a[pivot, k]):
+            if abs(blocks[s, i, k]) > abs(blocks[s, pivot, k]):
                 pivot = i
-        pivots[k] = pivot
+        pivots[body, k] = pivot
         if pivot != k:
             for j in range(SIZE):
-                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-        if a[k, k] == 0.0:
-            a[k, k] = TINY
+                blocks[s, k, j], blocks[s, pivot, j] = blocks[s, pivot, j], blocks[s, k, j]
+        if blocks[s, k, k] == 0.0:
+            blocks[s, k, k] = TINY
+        head = blocks[s, k, k]
         for i in range(k + 1, SIZE):
-            a[i, k] /= a[k, k]
-            factor = a[i, k]
+            factor = blocks[s, i, k] / head
+            blocks[s, i, k] = factor
             if factor != 0.0:
                 for j in range(k + 1, SIZE):
-                    a[i, j] -= factor * a[k, j]
+                    blocks[s, i, j] -= factor * blocks[s, k, j]
 
 
 @jit
-def _solve_block(a, pivots, x):
-    """Solve with a factored block for the columns of x (6, c), in place."""
-    columns = x.shape[1]
+def _solve_block(blocks, s, pivots, body, t):
+    """Solve with the factored block s of a body for the columns of block t, in place."""
     for k in range(SIZE):
-        pivot = pivots[k]
+        pivot = pivots[body, k]
         if pivot != k:
-            for c in range(columns):
-                x[k, c], x[pivot, c] = x[pivot, c], x[k, c]
+            for c in range(SIZE):
+                blocks[t, k, c], blocks[t, pivot, c] = blocks[t, pivot, c], blocks[t, k, c]
     for k in range(SIZE):
         for i in range(k + 1, SIZE):
-            factor = a[i, k]
+            factor = blocks[s, i, k]
             if factor != 0.0:
-                for c in range(columns):
-                    x[i, c] -= factor * x[k, c]
+                for c in range(SIZE):
+                    blocks[t, i, c] -= factor * blocks[t, k, c]
     for k in range(SIZE - 1, -1, -1):
         for j in range(k + 1, SIZE):
-            factor = a[k, j]
+            factor = blocks[s, k, j]
             if factor != 0.0:
-                for c in range(columns):
-                    x[k, c] -= factor * x[j, c]
-        for c in range(columns):
-            x[k, c] /= a[k, k]
+                for c in range(SIZE):
+                    blocks[t, k, c] -= factor * blocks[t, j, c]
+        head = blocks[s, k, k]
+        for c in range(SIZE):
+            blocks[t, k, c] /= head
+
+
+@jit
+def _solve_vector(blocks, s, pivots, x, body):
+    """Solve with the factored block s of a body for its row of x, in place."""
+    for k in range(SIZE):
+        pivot = pivots[body, k]
+        if pivot != k:
+            x[body, k], x[body, pivot] = x[body, pivot], x[body, k]
+    for k in range(SIZE):
+        value = x[body, k]
+        for i in range(k + 1, SIZE):
+            x[body, i] -= blocks[s, i, k] * value
+    for k in range(SIZE - 1, -1, -1):
+        value = x[body, k]
+        for j in range(k + 1, SIZE):
+            value -= blocks[s, k, j] * x[body, j]
+        x[body, k] = value / blocks[s, k, k]
+
+
+@jit
+def _subtract_product(blocks, left, upper, target):
+    """Block `target` -= block `left` times block `upper`."""
+    for i in range(SIZE):
+        for m in range(SIZE):
+            value = blocks[left, i, m]
+            if value != 0.0:
+                for j in range(SIZE):
+                    blocks[target, i, j] -= value * blocks[upper, m, j]
 
 
 @jit
@@ -134,20 +164,13 @@ def factor(elimination, blocks, pivots):
     order, start, later, slot = elimination.order, elimination.start, elimination.later, elimination.slot
     for k in range(order.shape[0]):
         body = order[k]
-        diagonal = blocks[slot[body, body]]
-        _factor_block(diagonal, pivots[body])
+        diagonal = slot[body, body]
+        _factor_block(blocks, diagonal, pivots, body)
         for y in range(start[k], start[k + 1]):
-            upper = blocks[slot[body, later[y]]]
-            _solve_block(diagonal, pivots[body], upper)
+            upper = slot[body, later[y]]
+            _solve_block(blocks, diagonal, pivots, body, upper)
             for x in range(start[k], start[k + 1]):
-                left = blocks[slot[later[x], body]]
-                target = blocks[slot[later[x], later[y]]]
-                for i in range(SIZE):
-                    for m in range(SIZE):
-                        value = left[i, m]
-                        if value != 0.0:
-                            for j in range(SIZE):
-                                target[i, j] -= value * upper[m, j]
+                _subtract_product(blocks, slot[later[x], body], upper, slot[later[x], later[y]])
 
 
 @jit
@@ -157,16 +180,16 @@ def solve_factored(elimination, blocks, pivots, x):
     n = order.shape[0]
     for k in range(n):
         body = order[k]
-        _solve_block(blocks[slot[body, body]], pivots[body], x[body].reshape((SIZE, 1)))
+        _solve_vector(blocks, slot[body, body], pivots, x, body)
         for t in range(start[k], start[k + 1]):
-            left, target = blocks[slot[later[t], body]], x[later[t]]
+            left, target = slot[later[t], body], later[t]
             for i in range(SIZE):
                 for m in range(SIZE):
-                    target[i] -= left[i, m] * x[body, m]
+                    x[target, i] -= blocks[left, i, m] * x[body, m]
     for k in range(n - 1, -1, -1):
         body = order[k]
         for t in range(start[k], start[k + 1]):
-            upper, source = blocks[slot[body, later[t]]], x[later[t]]
+            upper, source = slot[body, later[t]], later[t]
             for i in range(SIZE):
                 for m in range(SIZE):
-                    x[body, i] -= upper[i, m] * source[m]
+                    x[body, i] -= blocks[upper, i, m] * x[source, m]

@@ -112,39 +112,48 @@ def _impulse_law(rows, u, q, r, frozen, p, slope):
 
 
 @jit
-def _add_outer(blocks, slot, left, body_left, right, body_right):
-    """Block (body_left, body_right) += left^T right; (6,) each."""
-    if body_left < 0 or body_right < 0:
-        return
-    block = blocks[slot[body_left, body_right]]
+def _add_outer(blocks, place, jacobian, row, first, right, start):
+    """Block `place` += left^T right, with left the six entries of a row of the Jacobian from `first` on, right from `start` on."""
+    r0, r1, r2 = right[start], right[start + 1], right[start + 2]
+    r3, r4, r5 = right[start + 3], right[start + 4], right[start + 5]
     for i in range(6):
-        for j in range(6):
-            block[i, j] += left[i] * right[j]
+        left = jacobian[row, first + i]
+        blocks[place, i, 0] += left * r0
+        blocks[place, i, 1] += left * r1
+        blocks[place, i, 2] += left * r2
+        blocks[place, i, 3] += left * r3
+        blocks[place, i, 4] += left * r4
+        blocks[place, i, 5] += left * r5
 
 
 @jit
 def _assemble(rows, slope, slot, blocks, n):
     """I + Jh^T slope Jh."""
-    blocks[:] = 0.0
+    jacobian, kinds, masters, right = rows.jacobian, rows.kind, rows.master, np.empty(12)
+    for place in range(blocks.shape[0]):
+        for i in range(6):
+            for j in range(6):
+                blocks[place, i, j] = 0.0
     for i in range(n):
-        block = blocks[slot[i, i]]
+        place = slot[i, i]
         for k in range(6):
-            block[k, k] = 1.0
-    right = np.empty(12)
+            blocks[place, k, k] = 1.0
     for i in range(slope.shape[0]):
         here, partner, master = slope[i, 0], slope[i, 1], slope[i, 2]
         if here == 0.0 and partner == 0.0 and master == 0.0:
             continue
-        line = rows.jacobian[i]
-        other = rows.jacobian[i + 1 if rows.kind[i] == DISC else (i - 1 if rows.kind[i] == DISC_SECOND else i)]
-        above = rows.jacobian[rows.master[i]]
+        other = i + 1 if kinds[i] == DISC else (i - 1 if kinds[i] == DISC_SECOND else i)
+        above = masters[i]
         for k in range(12):
-            right[k] = here * line[k] + partner * other[k] + master * above[k]
+            right[k] = here * jacobian[i, k] + partner * jacobian[other, k] + master * jacobian[above, k]
         a, b = rows.first[i], rows.second[i]
-        _add_outer(blocks, slot, line[:6], a, right[:6], a)
-        _add_outer(blocks, slot, line[:6], a, right[6:], b)
-        _add_outer(blocks, slot, line[6:], b, right[:6], a)
-        _add_outer(blocks, slot, line[6:], b, right[6:], b)
+        if a >= 0:
+            _add_outer(blocks, slot[a, a], jacobian, i, 0, right, 0)
+        if a >= 0 and b >= 0:
+            _add_outer(blocks, slot[a, b], jacobian, i, 0, right, 6)
+            _add_outer(blocks, slot[b, a], jacobian, i, 6, right, 0)
+        if b >= 0:
+            _add_outer(blocks, slot[b, b], jacobian, i, 6, right, 6)
 
 
 @jit
@@ -158,12 +167,14 @@ def _norm(v):
 
 @jit
 def _evaluate(rows, base, change, q, r, frozen, u, p, slope, residual):
-    """u, p and slope at y + change, and the residual F (n, 6); returns |F|."""
+    """p and slope at y + change, and the residual F (n, 6); returns |F|. u (r,) is room for the velocities."""
     multiply(rows, change, u)
     for i in range(u.shape[0]):
         u[i] += base[i]
     _impulse_law(rows, u, q, r, frozen, p, slope)
-    multiply_transposed(rows, p - q, residual)
+    for i in range(u.shape[0]):
+        u[i] = p[i] - q[i]
+    multiply_transposed(rows, u, residual)
     for i in range(change.shape[0]):
         for k in range(6):
             residual[i, k] = change[i, k] - residual[i, k]

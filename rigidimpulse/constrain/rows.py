@@ -182,35 +182,35 @@ def impulse_along(rows, i, frame, out):
 @jit
 def multiply(rows, y, out):
     """Jh y, into out (r,); y (n, 6)."""
+    jacobian, first, second = rows.jacobian, rows.first, rows.second
     for i in range(out.shape[0]):
-        total = 0.0
-        line = rows.jacobian[i]
-        if rows.first[i] >= 0:
-            part = y[rows.first[i]]
+        total, a, b = 0.0, first[i], second[i]
+        if a >= 0:
             for k in range(6):
-                total += line[k] * part[k]
-        if rows.second[i] >= 0:
-            part = y[rows.second[i]]
+                total += jacobian[i, k] * y[a, k]
+        if b >= 0:
             for k in range(6):
-                total += line[6 + k] * part[k]
+                total += jacobian[i, 6 + k] * y[b, k]
         out[i] = total
 
 
 @jit
 def multiply_transposed(rows, p, out):
     """Jh^T p, into out (n, 6)."""
-    out[:] = 0.0
+    jacobian, first, second = rows.jacobian, rows.first, rows.second
+    for i in range(out.shape[0]):
+        for k in range(6):
+            out[i, k] = 0.0
     for i in range(p.shape[0]):
-        if p[i] != 0.0:
-            line = rows.jacobian[i]
-            if rows.first[i] >= 0:
-                part = out[rows.first[i]]
-                for k in range(6):
-                    part[k] += line[k] * p[i]
-            if rows.second[i] >= 0:
-                part = out[rows.second[i]]
-                for k in range(6):
-                    part[k] += line[6 + k] * p[i]
+        size, a, b = p[i], first[i], second[i]
+        if size == 0.0:
+            continue
+        if a >= 0:
+            for k in range(6):
+                out[a, k] += jacobian[i, k] * size
+        if b >= 0:
+            for k in range(6):
+                out[b, k] += jacobian[i, 6 + k] * size
 
 
 @jit
