@@ -33,7 +33,7 @@ HALF_SPACE, ROUND, CYLINDER = 0, 1, 2
 EDGE_HIDDEN, EDGE_CONVEX, EDGE_BOUNDARY, EDGE_CAPSULE = 0, 1, 2, 3
 """Kinds of edge: flat or concave, convex, boundary (or not manifold), axis of a capsule."""
 
-LEAF_SIZE = 4
+LEAF_SIZE = 2
 """Most triangles in a leaf of the box tree."""
 
 _POINT_OWNS = 0b000001  # a sphere's triangle (v, v, v) owns its vertex

@@ -23,6 +23,9 @@ POINT_FIRST, POINT_SECOND, NORMAL, GAP, DIRECTION, LIMIT_SIZE = np.array([0, 3, 
 (zeros if unknown), gap along it, and the direction that did best, from first to second. The witness has the first
 four, from a to b in the world."""
 
+VIEW_SIZE = 8
+"""Of a direction that is carried: how points move along it, see `guard_root`."""
+
 STACK_SIZE = 128
 """Depth of a walk through two trees; they are less deep than that together."""
 
@@ -31,6 +34,7 @@ _SIZES = {
     "rotation": 9,  # columns: axes of the second body
     "origin": 6,  # centres of mass
     "seen": 2 * SEEN_SIZE,  # second body seen from the first, first seen from the second; all in the first's axes
+    "views": 8 * VIEW_SIZE,  # along the direction at LIMIT, the axes of the first and of the second box, and another direction
     "corner": 18,  # three points each
     "face": 6,  # unit normals
     "cylinder": 2 * CYLINDER_SIZE,
@@ -46,8 +50,9 @@ _SIZES = {
     "stack_time": STACK_SIZE,
 }
 _STARTS = np.concatenate([[0], np.cumsum(list(_SIZES.values()))])
-MOTION, ROTATION, ORIGIN, SEEN, CORNER, FACE, CYLINDER, CYLINDER_AXES = _STARTS[:8]
-CLOSEST, THINNED, LIMIT, TOWARDS, WITNESS, PLACE, TURN, FRAME, STACK_TIME, WORK_SIZE = _STARTS[8:]
+MOTION, ROTATION, ORIGIN, SEEN, VIEWS, CORNER, FACE, CYLINDER, CYLINDER_AXES = _STARTS[:9]
+CLOSEST, THINNED, LIMIT, TOWARDS, WITNESS, PLACE, TURN, FRAME, STACK_TIME, WORK_SIZE = _STARTS[9:]
+LIMIT_VIEW, AXIS_VIEWS, OTHER_VIEW = VIEWS + VIEW_SIZE * np.array([0, 1, 7])
 """Places in the float array, in the order of `_SIZES`."""
 
 PRIMITIVE_A, ELEMENT_A, PRIMITIVE_B, ELEMENT_B, CARRIER, COUNT, BASE, STACK = np.array([0, 1, 2, 3, 4, 5, 7, 8])

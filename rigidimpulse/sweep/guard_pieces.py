@@ -53,15 +53,17 @@ from rigidimpulse.sweep.guard_layout import (
     FIRST,
     GAP,
     LIMIT,
+    LIMIT_VIEW,
     NORMAL,
     ORIGIN,
+    OTHER_VIEW,
     POINT_FIRST,
     POINT_SECOND,
     SECOND,
     SEEN,
     THINNED,
 )
-from rigidimpulse.sweep.guard_root import cylinder_safe_until, point_safe_until, safe_until
+from rigidimpulse.sweep.guard_root import cylinder_safe_until, safe_until, viewed_safe_until, write_view
 
 _ON_SIDE = 1e-6  # cosine to the axis below which a normal is one of the side of a cylinder
 _TURN = 0.5  # rad, angle that a direction turns at most: beyond it the third derivatives take over
@@ -85,11 +87,10 @@ def _top(work, index, side, normal, cylinders):
 
 
 @jit
-def _carried(work, index, side, normal, threshold, horizon, cylinders):
-    """Safe time of the other piece along a normal that the body of one side carries and that points away from it."""
+def _carried(work, index, side, normal, view, level, horizon, cylinders):
+    """Safe time of the other piece above a level along a normal, with its view, that the body of one side carries."""
     other = 1 - side
     seen, origin = SEEN + SEEN_SIZE * side, vector(work, ORIGIN + 3 * other)
-    level = _top(work, index, side, normal, cylinders) + threshold
     if cylinders is not None:
         if index[COUNT + other] == 0:
             centre, axis, half_height, radius = _cylinder_record(work, other)
@@ -99,7 +100,8 @@ def _carried(work, index, side, normal, threshold, horizon, cylinders):
     for k in range(index[COUNT + other]):
         point = vector(work, CORNER + 9 * other + 3 * k)
         gap = dot(normal, point) - level
-        horizon = point_safe_until(work, seen, normal, subtract(point, origin), 0.0, gap, horizon)
+        arm = subtract(point, origin)
+        horizon = viewed_safe_until(work, seen, view, 1.0, arm, length(arm), 0.0, gap, horizon)
     return horizon
 
 
@@ -226,11 +228,13 @@ def pieces_safe_until(work, index, threshold, horizon, cylinders):
             if separation <= 0.0:
                 break
         outward = normal if side == 0 else scaled(normal, -1.0)
-        if trial < 3:
-            top = _top(work, index, side, outward, cylinders)
-            if -_top(work, index, 1 - side, scaled(outward, -1.0), cylinders) - top <= threshold:
-                continue
-        s = _carried(work, index, side, outward, threshold, horizon, cylinders)
+        level = _top(work, index, side, outward, cylinders) + threshold
+        if trial < 3 and -_top(work, index, 1 - side, scaled(outward, -1.0), cylinders) <= level:
+            continue
+        if trial > 0:
+            write_view(work, SEEN + SEEN_SIZE * side, outward, OTHER_VIEW)
+        view = OTHER_VIEW if trial > 0 else LIMIT_VIEW
+        s = _carried(work, index, side, outward, view, level, horizon, cylinders)
         if s >= horizon:
             return horizon, side
         if s > best or (trial == 3 and best == 0.0):

@@ -8,6 +8,10 @@ With n fixed in the carrier, g the present gap along n and y the path of a point
 so the gap stays above a threshold until the first root of the right side. A point that is at or below its threshold
 but leaving stays above its present gap until it comes back to it.
 
+Both rates grow linearly with the arm, so that for many points along one n they cost two dot products each (`write_view`):
+
+    n.y' = n.u + (n x w).r,    n.y'' = n.c + (n x beta + (n.w) w - w^2 n).r
+
 A cylinder with unit axis e, half height H and rim radius R reaches from its centre by the support H |n.e| + R |n x e|
 along -n. With q = n.e and N = n x e (q', q'', N', N'' from e' = w x e, e'' = beta x e + w x (w x e), |e'''| <= J_r),
 over s in [0, h]:
@@ -31,13 +35,16 @@ from rigidimpulse._jit import jit
 from rigidimpulse.detect.features import along, cross, dot
 from rigidimpulse.integrate.course import turning_points
 from rigidimpulse.sweep.bound import (
+    SEEN_ACCELERATION,
     SEEN_ARM_JERK,
     SEEN_JERK,
     SEEN_SPIN,
     SEEN_SPIN_SIZE,
     SEEN_TURN,
     SEEN_TURN_SIZE,
+    SEEN_VELOCITY,
     length,
+    put,
     seen_motion,
     vector,
 )
@@ -104,6 +111,28 @@ def point_safe_until(work, seen, normal, arm, reach, gap, horizon):
     jerk = work[seen + SEEN_JERK] + work[seen + SEEN_ARM_JERK] * (length(arm) + reach)
     closing = work[seen + SEEN_SPIN_SIZE] * reach - dot(normal, velocity)
     bend = work[seen + SEEN_TURN_SIZE] * reach - dot(normal, acceleration)
+    return safe_until(gap, closing, bend + jerk * horizon / 3.0, horizon)
+
+
+@jit
+def write_view(work, seen, normal, view):
+    """Write how points seen move along a carried normal: n.u, n x w, n.c and the vector of n.y'', VIEW_SIZE numbers at `view`."""
+    w = vector(work, seen + SEEN_SPIN)
+    across = cross(normal, vector(work, seen + SEEN_TURN))
+    work[view] = dot(normal, vector(work, seen + SEEN_VELOCITY))
+    put(work, view + 1, cross(normal, w))
+    work[view + 4] = dot(normal, vector(work, seen + SEEN_ACCELERATION))
+    put(work, view + 5, along(along(across, dot(normal, w), w), -dot(w, w), normal))
+
+
+@jit
+def viewed_safe_until(work, seen, view, sign, arm, far, reach, gap, horizon):
+    """As `point_safe_until`, along the normal of a view (sign 1) or against it (-1); `far`: |arm|, m."""
+    speed = work[view] + dot(vector(work, view + 1), arm)
+    bend = work[view + 4] + dot(vector(work, view + 5), arm)
+    closing = work[seen + SEEN_SPIN_SIZE] * reach - sign * speed
+    bend = work[seen + SEEN_TURN_SIZE] * reach - sign * bend
+    jerk = work[seen + SEEN_JERK] + work[seen + SEEN_ARM_JERK] * (far + reach)
     return safe_until(gap, closing, bend + jerk * horizon / 3.0, horizon)
 
 

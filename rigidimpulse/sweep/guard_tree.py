@@ -10,6 +10,7 @@ from rigidimpulse._jit import jit
 from rigidimpulse.detect.features import along, dot, subtract
 from rigidimpulse.sweep.bound import SEEN_SIZE, length, put, scaled, turned, turned_back, vector
 from rigidimpulse.sweep.guard_layout import (
+    AXIS_VIEWS,
     BASE,
     CARRIER,
     CLOSEST,
@@ -27,15 +28,18 @@ from rigidimpulse.sweep.guard_layout import (
     FIRST,
     LIMIT,
     LIMIT_SIZE,
+    LIMIT_VIEW,
     ORIGIN,
+    OTHER_VIEW,
     ROTATION,
     SECOND,
     SEEN,
     STACK,
     STACK_TIME,
+    VIEW_SIZE,
 )
 from rigidimpulse.sweep.guard_pieces import pieces_safe_until
-from rigidimpulse.sweep.guard_root import point_safe_until
+from rigidimpulse.sweep.guard_root import viewed_safe_until, write_view
 
 NO_NODE = -1
 """In place of a tree node: the cylinder."""
@@ -63,36 +67,55 @@ def _load_triangle(vertex, triangle, triangle_normal, i, work, index, side):
 
 
 @jit
+def _write_axis_views(work, axes):
+    """Views along the axes of the first body's boxes and, against them, the columns of the matrix at `axes`."""
+    for k in range(3):
+        axis = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
+        write_view(work, SEEN, axis, AXIS_VIEWS + VIEW_SIZE * k)
+        column = (-work[axes + k], -work[axes + 3 + k], -work[axes + 6 + k])
+        write_view(work, SEEN + SEEN_SIZE, column, AXIS_VIEWS + VIEW_SIZE * (3 + k))
+
+
+@jit
 def _boxes_safe_until(low, high, centre, half, work, carrier, axes, threshold, horizon):
     """Safe time of a box [low, high] of the first body and a box of the second; 0 where no direction separates them.
 
     `centre` middle of the second box, `half` its half extents along the columns of the matrix at `axes`; frame of the
     first body. Directions: the one that limits the safe time so far (`carrier`: its side), and the axes of both
-    boxes.
+    boxes. All have views, from the carrier outward where the direction points from the first box to the second.
     """
     middle, half_first = scaled(along(low, 1.0, high), 0.5), scaled(subtract(high, low), 0.5)
-    between = subtract(centre, middle)
+    between, arm = subtract(centre, middle), subtract(centre, vector(work, ORIGIN + 3))
+    reach, reach_first = length(half), length(half_first)
+    far, far_first = length(arm), length(middle)
     best = 0.0
     for trial in range(7):
-        k = (trial - 1) % 3
+        k, side = (trial - 1) % 3, 0
         if trial == 0:
             axis, side = vector(work, LIMIT + DIRECTION), carrier
             if dot(axis, axis) == 0.0:
                 continue
+            other = turned_back(work, axes, axis)
+            distance = dot(axis, between)
+            extent = abs(axis[0]) * half_first[0] + abs(axis[1]) * half_first[1] + abs(axis[2]) * half_first[2]
+            extent += abs(other[0]) * half[0] + abs(other[1]) * half[1] + abs(other[2]) * half[2]
         elif trial < 4:
-            axis, side = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0), 0
+            other = vector(work, axes + 3 * k)
+            distance = between[k]
+            extent = half_first[k] + (abs(other[0]) * half[0] + abs(other[1]) * half[1] + abs(other[2]) * half[2])
         else:
             axis, side = (work[axes + k], work[axes + 3 + k], work[axes + 6 + k]), 1
-        other = turned_back(work, axes, axis)
-        extent = abs(axis[0]) * half_first[0] + abs(axis[1]) * half_first[1] + abs(axis[2]) * half_first[2]
-        extent += abs(other[0]) * half[0] + abs(other[1]) * half[1] + abs(other[2]) * half[2]
-        distance = dot(axis, between)
+            distance = dot(axis, between)
+            extent = half[k] + (abs(axis[0]) * half_first[0] + abs(axis[1]) * half_first[1] + abs(axis[2]) * half_first[2])
         gap = abs(distance) - extent - threshold
         if gap > 0.0:
-            outward = scaled(axis, 1.0 if (distance > 0.0) == (side == 0) else -1.0)
-            arm = middle if side else subtract(centre, vector(work, ORIGIN + 3))
-            reach = length(half_first if side else half)
-            best = max(best, point_safe_until(work, SEEN + SEEN_SIZE * side, outward, arm, reach, gap, horizon))
+            view, sign = LIMIT_VIEW + VIEW_SIZE * trial, 1.0 if distance > 0.0 else -1.0
+            seen = SEEN + SEEN_SIZE * side
+            if side:
+                s = viewed_safe_until(work, seen, view, sign, middle, far_first, reach_first, gap, horizon)
+            else:
+                s = viewed_safe_until(work, seen, view, sign, arm, far, reach, gap, horizon)
+            best = max(best, s)
             if best >= horizon:
                 return horizon
     return best
@@ -153,6 +176,7 @@ def trees_safe_until(nodes, surface, first, second, work, index, threshold, hori
     node_min, node_max, child, start, count = nodes
     vertex, triangle, triangle_normal = surface
     put(work, LIMIT + DIRECTION, (0.0, 0.0, 0.0))
+    _write_axis_views(work, CYLINDER_AXES if second == NO_NODE else ROTATION)
     index[BASE] = 0
     depth = _push(work, index, FIRST, first, second, 0.0)
     while depth > 0 and horizon > 0.0:
@@ -183,6 +207,8 @@ def trees_safe_until(nodes, surface, first, second, work, index, threshold, hori
                     index[ELEMENT_A], index[ELEMENT_B], index[CARRIER] = i, j, carrier
                     for k in range(LIMIT_SIZE):
                         work[LIMIT + k] = work[CLOSEST + k]
+                    outward = scaled(vector(work, LIMIT + DIRECTION), -1.0 if carrier else 1.0)
+                    write_view(work, SEEN + SEEN_SIZE * carrier, outward, LIMIT_VIEW)
     return horizon
 
 
@@ -192,6 +218,7 @@ def half_space_safe_until(nodes, triangle, owns, vertex, root, normal, level, wo
     node_min, node_max, child, start, count = nodes
     back = turned_back(work, ROTATION, normal)
     level -= dot(normal, vector(work, ORIGIN + 3))
+    write_view(work, SEEN, normal, OTHER_VIEW)
     index[STACK] = root
     depth = 1
     while depth > 0 and horizon > 0.0:
@@ -201,7 +228,7 @@ def half_space_safe_until(nodes, triangle, owns, vertex, root, normal, level, wo
         half, middle = scaled(subtract(high, low), 0.5), scaled(along(low, 1.0, high), 0.5)
         gap = dot(back, middle) - (abs(back[0]) * half[0] + abs(back[1]) * half[1] + abs(back[2]) * half[2]) - level
         arm = turned(work, ROTATION, middle)
-        if gap > 0.0 and point_safe_until(work, SEEN, normal, arm, length(half), gap, horizon) >= horizon:
+        if gap > 0.0 and viewed_safe_until(work, SEEN, OTHER_VIEW, 1.0, arm, length(arm), length(half), gap, horizon) >= horizon:
             continue
         if child[node] >= 0:
             index[STACK + depth] = child[node]
@@ -213,7 +240,7 @@ def half_space_safe_until(nodes, triangle, owns, vertex, root, normal, level, wo
                 if owns[i] >> k & 1:
                     point = row(vertex, triangle[i, k])
                     arm = turned(work, ROTATION, point)
-                    s = point_safe_until(work, SEEN, normal, arm, 0.0, dot(back, point) - level, horizon)
+                    s = viewed_safe_until(work, SEEN, OTHER_VIEW, 1.0, arm, length(arm), 0.0, dot(back, point) - level, horizon)
                     if s < horizon:
                         horizon = s
                         index[ELEMENT_B] = -1 - triangle[i, k]
