@@ -30,7 +30,7 @@ REST = 3.0
 """For how long members must have hardly moved to be calm, in sqrt(r / g), see `heap_courses`."""
 LEAVING = 0.1
 """Part of its speed at which a fast body must leave a heap that it has hit to be no part of it."""
-MOST_PIECES = 2
+MOST_PIECES = 4
 """Parts of a step at most, between which a heap's courses begin anew."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the heap that comes near it."""

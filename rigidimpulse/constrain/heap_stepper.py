@@ -41,9 +41,9 @@ COLUMN = 20.0
 PRESSED = 0.25
 LEAST_SUB_STEPS, MOST_SUB_STEPS = 16, 256
 """Sub-steps in a whole step."""
-MOTION, LEAST_SUB_STEPS_BETWEEN = 0.3, 2
+MOTION, LEAST_SUB_STEPS_BETWEEN = 0.05, 2
 """Inner radii that touching bodies may come past each other until contacts are looked for again; sub-steps from look to look."""
-KEPT = 0.05
+KEPT = 0.01
 """Inner radii that a pair may come past each other with the contacts it has, in the middle of a step."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
