@@ -146,9 +146,7 @@ def jit(function: Callable[..., Any]) -> Any:
     return Kernel(function)
 
 
-def kernels_are_cached() -> bool:
-    """Whether kernels of these sources lie in the cache, so that a run starts at once."""
-    from rigidimpulse.detect import touching
-
-    digest = source_digest(Path(touching.__file__))
-    return any(key[-1] == digest for key in touching.contacts_of_pairs.entry._cache._cache_file._load_index())
+def is_cached(kernel: Kernel) -> bool:
+    """Whether a kernel of these sources lies in the cache on disk, for whatever types."""
+    digest = source_digest(Path(kernel.py_func.__code__.co_filename))
+    return any(key[-1] == digest for key in kernel.entry._cache._cache_file._load_index())

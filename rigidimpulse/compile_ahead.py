@@ -1,8 +1,8 @@
 """The first run on a machine: compile kernels on two cores.
 
-Numba compiles one kernel at a time in a process. So a second process compiles one half of what a run with contacts needs (motion,
-sweep, the solver of rows) into the cache on disk, while the first one compiles the other half, and then waits for it. Where the plan has
-the event kernel in, a third one compiles that.
+Numba compiles one kernel at a time in a process. So for each kind of kernels that a run needs and that is not in the cache on disk a second
+process compiles one half into the cache (of contacts: motion, sweep, the solver of rows), while this one compiles the other half, and
+then waits for it. The event kernel is one kernel, which a process of its own compiles.
 """
 
 from __future__ import annotations
@@ -14,18 +14,48 @@ from contextlib import ExitStack, contextmanager
 
 import numpy as np
 
-CYLINDERS, EVENTS = "cylinders", "events"
+from rigidimpulse._jit import is_cached
+
+CYLINDERS, CONTACTS, EVENTS, HEAPS, JOINTS = "cylinders", "contacts", "impacts of balls", "heaps", "joints"
+STEP = 1.0 / 60.0
 
 
-def compile_kernels(world, with_events: bool) -> None:
-    """Compile what a run of a world with contacts needs. Should another process fail, its part is compiled when used."""
-    shapes = [CYLINDERS] if world.cylinders is not None else []
+def kernels_to_compile(world, with_events: bool, with_heaps: bool) -> list[str]:
+    """Kinds of kernels that a run of a world needs and that do not lie in the cache: what is compiled last of each tells."""
+    missing = []
+    if world.can_collide:
+        from rigidimpulse.detect.touching import contacts_of_pairs
+
+        missing += [] if is_cached(contacts_of_pairs) else [CONTACTS]
+    if with_events:
+        from rigidimpulse.events.flight import fly
+
+        missing += [] if is_cached(fly) else [EVENTS]
+    if with_heaps:
+        from rigidimpulse.constrain.heap_solver import advance
+
+        missing += [] if is_cached(advance) else [HEAPS]
+    if world.joints_of_scene:
+        from rigidimpulse.constrain.joint_forces import close_at_end
+
+        missing += [] if is_cached(close_at_end) else [JOINTS]
+    return missing
+
+
+def compile_kernels(world, kinds: list[str]) -> None:
+    """Compile kernels of these kinds for a world. Should another process fail, its part is compiled when used."""
+    cylinders = [CYLINDERS] if world.cylinders is not None else []
     with ExitStack() as processes:
-        processes.enter_context(_process(*shapes))
-        if with_events:
-            processes.enter_context(_process(EVENTS))
+        for kind in kinds:
+            processes.enter_context(_process(kind, *cylinders))
         with _without_garbage_collection():
-            _respond_and_detect(_box_on_floor(bool(shapes)))
+            context = _box_on_floor(bool(cylinders))
+            if CONTACTS in kinds:
+                _respond_and_detect(context)
+            if HEAPS in kinds:
+                _look_at_heap(context)
+            if JOINTS in kinds:
+                _start_joints(_box_on_floor(bool(cylinders), jointed=True))
 
 
 def _process(*arguments: str) -> subprocess.Popen:
@@ -47,9 +77,10 @@ def _without_garbage_collection():
             gc.enable()
 
 
-def _box_on_floor(with_cylinder: bool):
-    """Context of a scene that has a contact from the start."""
+def _box_on_floor(with_cylinder: bool, jointed: bool = False):
+    """Context of a scene that has a contact from the start, and a joint if it is to."""
     from rigidimpulse.body import Body
+    from rigidimpulse.constrain.joint import HingeJoint
     from rigidimpulse.observe.events import EventLog
     from rigidimpulse.observe.recorder import Recorder
     from rigidimpulse.scene import Scene
@@ -60,6 +91,8 @@ def _box_on_floor(with_cylinder: bool):
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static")])
     shape = Shape.cylinder(1, 1) if with_cylinder else Shape.box((1, 1, 1))
     scene.add(Body("body", shape, position=(0, 0, 0.5), velocity=(0, 0, -1)))
+    if jointed:
+        scene.add(HingeJoint("body", None, (0, 0, 1), (1, 0, 0)))
     return StepContext(compile_scene(scene), Recorder(np.zeros(1), 2), EventLog())
 
 
@@ -148,6 +181,70 @@ def _move_sweep_and_solve(context) -> None:
     bisection.sweep(context.detector, state.course, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
 
 
+def _look_at_heap(context) -> None:
+    """What comes before the solver of heaps: pairs and their contacts."""
+    from rigidimpulse.constrain.heap_islands import islands, refusals
+    from rigidimpulse.constrain.heap_stepper import HeapStepper
+
+    world, state, member = context.world, context.state, np.array([False, True])
+    state.now.inv_inertia[1] = np.eye(3)
+    stepper = HeapStepper(world)
+    stepper.set_up(context, np.array([1]), np.array([0]), STEP)
+    a, b = stepper.near(context, member, ~member, STEP)
+    refusals(world, islands(world.num_bodies, a, b, member), member, ~member, a, b, True)
+
+
+def _step_heap(context) -> None:
+    """The solver of heaps, and what brings bodies from step to step."""
+    from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_fly, mark_slow, most_stray
+    from rigidimpulse.constrain.heap_stepper import HeapStepper
+
+    state, now, members = context.state, context.state.now, np.array([1])
+    stepper = HeapStepper(context.world)
+    stepper.members = members
+    out = stepper.step(context, 0.0, STEP)
+    steady = context.world.steady_acceleration
+    arrive(state.course, members, 0.0, steady, now, state.rotation, context.acceleration, context.angular_acceleration)
+    depart(state.course, members, 0.0, STEP, now, out.position, out.orientation, out.velocity)
+    context.recorder.flush_all(state.course, members, STEP)
+    let_fly(state.course, members, steady)
+    mark_slow(now, stepper.inner, 1.0, 1.0, np.array([False, True]))
+    most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin)
+    count_calm(
+        members, out.position, out.orientation, out.velocity, context.world.steady_strength, stepper.inner, stepper.skin, STEP,
+        np.zeros((2, 7)), np.zeros(2),
+    )  # fmt: skip
+
+
+def _start_joints(context) -> None:
+    """Rows of joints at the start of a sub-step and at impacts, and those that close them."""
+    from rigidimpulse.constrain.joint_forces import count_joint_rows, fill_closing_rows, start_joint_rows
+    from rigidimpulse.constrain.joint_impact import fill_rates, impact_rows
+    from rigidimpulse.constrain.rows import make_rows
+
+    state, joints, which, members = context.state, context.joints, np.array([0]), np.array([1])
+    now, table, memory = state.now, joints.table, joints.memory
+    rows = make_rows.py_func(int(count_joint_rows(table, which)))
+    fill_closing_rows(table, which, now, state.rotation, context.column, memory.angle, rows, 0)
+    start_joint_rows(table, which, now, state.rotation, context.column, memory, STEP, 1.0, rows, 0)
+    impact_rows(table, which, now, state.rotation, members, context.column, memory, 1.0, joints.moment)
+    fill_rates(table, which, now, state.rotation, context.column, memory, 1.0, rows)
+
+
+def _close_and_stop_joints(context) -> None:
+    """Rows of joints at the end of a sub-step."""
+    from rigidimpulse.constrain.joint_forces import close_at_end, count_joint_rows, stop_rows
+    from rigidimpulse.constrain.rows import make_rows
+
+    state, joints, which, members = context.state, context.joints, np.array([0]), np.array([1])
+    count = int(count_joint_rows.py_func(joints.table, which))
+    rows = make_rows.py_func(count)
+    close_at_end(
+        joints.table, which, state.now, context.acceleration, members, STEP, joints.memory, rows, 0, np.zeros(count), context.wrench
+    )
+    stop_rows(joints.table, which, state.now, state.rotation, members, context.column, joints.memory, np.zeros(1))
+
+
 def _fly() -> None:
     """The event kernel."""
     from rigidimpulse.body import Body
@@ -166,9 +263,18 @@ def _fly() -> None:
     EventRun(context).fly(1.0)
 
 
+def _compile_other_half(kind: str, with_cylinder: bool) -> None:
+    """What the process that runs the scene leaves to this one."""
+    if kind == EVENTS:
+        _fly()
+    elif kind == HEAPS:
+        _step_heap(_box_on_floor(with_cylinder))
+    elif kind == JOINTS:
+        _close_and_stop_joints(_box_on_floor(with_cylinder, jointed=True))
+    else:
+        _move_sweep_and_solve(_box_on_floor(with_cylinder))
+
+
 if __name__ == "__main__":
     with _without_garbage_collection():
-        if EVENTS in sys.argv[1:]:
-            _fly()
-            sys.exit()
-        _move_sweep_and_solve(_box_on_floor(CYLINDERS in sys.argv[1:]))
+        _compile_other_half(sys.argv[1], CYLINDERS in sys.argv[2:])

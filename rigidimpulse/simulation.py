@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import kernels_are_cached
 from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.compile_ahead import compile_kernels
+from rigidimpulse.compile_ahead import compile_kernels, kernels_to_compile
 from rigidimpulse.constrain.contact_forces import ContactForces
 from rigidimpulse.constrain.heap import HeapForces
 from rigidimpulse.constrain.jointed import reaction_table
@@ -178,10 +177,12 @@ def finish_run(running: Running, plan: Plan, duration: float) -> Recording:
 
 def prepare_kernels(world: World, plan: Plan) -> None:
     """Say so and compile on several cores what the plan needs, where this machine has never run these sources."""
-    if not kernels_are_cached():
-        logger.warning("compiling kernels for the first run on this machine, once: this takes about half a minute")
-        if world.can_collide:
-            compile_kernels(world, has_events(plan))
+    heaps = any(line.included for line in plan.lines if line.name == HeapForces.name)
+    missing = kernels_to_compile(world, has_events(plan), heaps)
+    if missing:
+        kinds = ", ".join(missing)
+        logger.warning(f"compiling kernels ({kinds}) for the first run on this machine, once: this takes about half a minute for each")
+        compile_kernels(world, missing)
 
 
 def frame_times(duration: float, fps: float) -> np.ndarray:

@@ -102,6 +102,7 @@ class HeapStepper:
         self.pressed = np.zeros(n, bool)
         self._places = self._general = np.zeros(0, np.int64)
         self._margins = np.zeros(0)
+        self.members, self.ahead, self._parts = np.zeros(0, np.int64), 0.0, 1
 
     def _make_bodies(self) -> HeapBodies:
         """Rows of all bodies by rank, and one of none."""

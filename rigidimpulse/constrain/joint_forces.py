@@ -105,14 +105,14 @@ def stop_joints(joints, which, bodies, rotation, members, number, memory: JointM
 
     elapsed (j,): length of the sub-step that ends, s; moment (j, 3): the impulse on b of each joint is added, N s.
     """
-    rows, direction, scale = _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed)
+    rows, direction, scale = stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed)
     solve_newton(rows, len(members), SOLVE_TOLERANCE * scale)
     change_velocities(bodies, members, rows)
     _add_moments(joints, which, rows, 0, direction, moment)
 
 
 @jit
-def _stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed):
+def stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed):
     """Rows of the impulses nu, their directions (s, 3) and the largest speed to stop."""
     count = count_joint_rows(joints, which)
     for k in range(members.shape[0]):
@@ -176,7 +176,7 @@ def close_joints(joints, which, bodies, contacts, rotation, members, number, ang
     before = bodies.position[members].copy(), bodies.orientation[members].copy()
     for _ in range(MAX_ROUNDS):
         rows, _, _ = contact_rows(bodies, smooth, members, number, count_joint_rows(joints, which))
-        worst = _fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, m)
+        worst = fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, m)
         if not worst < last:
             # No pose closes them; the one before was the best.
             bodies.position[members], bodies.orientation[members] = before
@@ -195,7 +195,7 @@ def close_joints(joints, which, bodies, contacts, rotation, members, number, ang
 
 
 @jit
-def _fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, start):
+def fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, start):
     """Rows, from `start` on, of the displacement that closes the joints; returns the worst error of a coordinate."""
     count = rows.bias.shape[0] - start
     value, direction = np.empty(count), np.empty((count, 3))
@@ -249,7 +249,7 @@ def hold_jointed(
             bodies, contacts, rolling, number, angular_acceleration, frames, first_row, h, rows, start - extra
         )
     start_contact_impulses(rows, first_row, force, h)
-    direction, beta = _start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed, rows, start)
+    direction, beta = start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed, rows, start)
     level = np.zeros(len(first_row))
     scale, u = fill_contact_bias(
         bodies, contacts, frames, turning, level, acceleration, angular_acceleration, h, rows, first_row
@@ -258,7 +258,7 @@ def hold_jointed(
     scale = max(scale, h * float(np.sqrt(np.max(np.sum(acceleration[members] ** 2, axis=1)))))
     residual, best, kept, failures = 0.0, np.inf, rows.impulse, 0
     for round_ in range(MAX_ROUNDS):
-        worst, largest = _close_at_end(
+        worst, largest = close_at_end(
             joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench
         )
         closer = worst <= max(best, allowed) and residual <= UNSOLVED * scale
@@ -272,13 +272,13 @@ def hold_jointed(
             solve, rows, n, first_row, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale
         )
     rows.impulse[:] = kept
-    worst, _ = _close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench)
+    worst, _ = close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench)
     _finish(joints, which, bodies, members, rows, first_row, start, h, memory, direction, force, moment)
     return residual / scale, worst
 
 
 @jit
-def _close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench):
+def close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench):
     """Bias of the joints' rows for the next round; wrench: that of the present impulses.
 
     Returns the violation at the end under that wrench, inf if there is no end, and the largest bias.
@@ -310,7 +310,7 @@ def _finish(joints, which, bodies, members, rows, first_row, start, h, memory, d
 
 
 @jit
-def _start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed, rows, start):
+def start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed, rows, start):
     """Joints' rows from `start` on, with bounds, softness and first impulses; their coordinates and rates are remembered.
 
     Limits that are not reached carry nothing. Returns their directions (s, 3) and the terms beta (s,) of soft ones.

@@ -53,7 +53,7 @@ def impact_rows(joints, which, bodies, rotation, members, number, memory, allowe
 
 
 @jit
-def _fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows):
+def fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows):
     """Rates of all rows, to their bias; returns the fastest approach to a hard limit that is reached, m/s or rad/s."""
     count = rows.bias.shape[0]
     again, value, direction = make_rows(count), np.empty(count), np.empty((count, 3))
@@ -72,7 +72,7 @@ def stop_at_limits(joints, which, bodies, rotation, members, number, memory, all
     """Impacts without rebound on the hard limits that are reached; arguments as of `impact_rows`."""
     block = impact_rows(joints, which, bodies, rotation, members, number, memory, allowed, moment)
     rows = block.rows
-    if _fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows) > 0.0:
+    if fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows) > 0.0:
         solve_newton(rows, len(members), SOLVE_TOLERANCE * float(np.abs(rows.bias).max()))
         change_velocities(bodies, members, rows)
         add_moments(block, rows.impulse)

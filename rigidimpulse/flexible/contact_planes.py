@@ -65,6 +65,8 @@ class Surfaces:
         faces: all faces of nets, one mesh; None without any.
         sample, sample_radius, sample_body: (s, 3) m in the body's frame, (s,) m, (s,).
         skip: (v, n) bool, vertices that do not touch a body.
+        ball: (n,) bool, bodies that are one sphere about their centre of mass.
+        is_slim: (s,) bool, samples that fit through a face between its vertices: through larger ones no ball gets that vertices stop.
         gap: m.
 
     """
@@ -77,11 +79,31 @@ class Surfaces:
     sample_radius: np.ndarray
     sample_body: np.ndarray
     skip: np.ndarray
+    ball: np.ndarray
+    is_slim: np.ndarray
     gap: float
 
-    def find(self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, sides: dict[int, float], gap: float) -> Touches:
-        """Find all places that come within a gap (m) while vertices move from start to end (v, 3) m. `sides`: see `_samples`."""
-        return joined([self._vertices(start, end, rigid, gap), self._samples(start, end, rigid, sides, gap)])
+    def find(
+        self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, sides: dict[int, float], gap: float, frame: np.ndarray, every: bool
+    ) -> Touches:
+        """Find all places that come within a gap (m) while vertices move from start to end (v, 3) m. `sides`: see `_samples`.
+
+        every: whether to find all faces that a sample point meets, where it could slip through one, or its first one only.
+        frame: (n, 3, 3), the rotations at the end that normals and places are written for. Planes of vertices lie on the bodies and turn
+        with them; those of sample points lie on the faces, and those on balls, on which no rotation can be seen, stay as well.
+        """
+        seen = rigid._replace(end_rotation=np.where(self.ball[:, None, None], rigid.rotation, rigid.end_rotation))
+        found = joined([self._vertices(start, end, seen, gap), self._samples(start, end, seen, sides, gap, every)])
+        stays, b = (found.key >= self.skip.size) | self.ball[found.body], found.body
+        back = np.einsum("mji,mjk->mik", frame[b], seen.end_rotation[b])
+        normal = np.where(stays[:, None], np.einsum("mij,mj->mi", back, found.normal), found.normal)
+        middle, radius = np.zeros_like(normal), np.zeros(len(b))
+        is_sample = found.key >= self.skip.size
+        middle[is_sample] = self.sample[found.key[is_sample] - self.skip.size]
+        radius[is_sample] = self.sample_radius[found.key[is_sample] - self.skip.size]
+        place = np.where(is_sample[:, None], middle + radius[:, None] * normal, found.place)
+        place = np.where((self.ball[b] & ~is_sample)[:, None], np.einsum("mij,mj->mi", back, found.place), place)
+        return found._replace(normal=normal, place=place)
 
     def _vertices(self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, gap: float) -> Touches:
         """Touches of vertices on bodies."""
@@ -103,7 +125,7 @@ class Surfaces:
         key = vertex * len(self.radius) + body
         return Touches(key, np.tile(vertex[:, None], 3), weight, body, real[:, 3:6], real[:, :3], target, distance, time)
 
-    def _samples(self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, sides: dict[int, float], gap: float) -> Touches:
+    def _samples(self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, sides: dict[int, float], gap: float, every: bool) -> Touches:
         """Touches of sample points on faces.
 
         `sides` says, by key, on which side of the faces a sample was when it was last in contact: one that is found on the other side,
@@ -116,10 +138,15 @@ class Surfaces:
         p1 = rigid.end_position[body] + np.einsum("sij,sj->si", rigid.end_rotation[body], self.sample)
         low, high = np.empty_like(self.faces.node_min), np.empty_like(self.faces.node_max)
         fit_boxes(self.faces, start, end, low, high)
-        which, real = np.empty((len(body), 2), np.int64), np.empty((len(body), 8))
-        count = samples_on_faces(
-            self.faces, low, high, p0, p1, self.sample_radius, body, start, end, gap, self.skip, which, real
-        )
+        room = len(body)
+        while True:
+            which, real = np.empty((room, 2), np.int64), np.empty((room, 8))
+            count = samples_on_faces(
+                self.faces, low, high, p0, p1, self.sample_radius, body, start, end, gap, self.skip, every & self.is_slim, which, real
+            )
+            if count <= room:
+                break
+            room = 2 * count
         sample, face, real = which[:count, 0], which[:count, 1], real[:count]
         node, weight, normal, distance, time = self.faces.triangle[face], real[:, :3], real[:, 3:6], real[:, 6], real[:, 7]
         key = self.skip.size + sample
@@ -151,7 +178,7 @@ def _no_touches() -> Touches:
     return Touches(index, np.zeros((0, 3), np.int64), flat, index, flat, flat, np.zeros(0), np.zeros(0), np.zeros(0))
 
 
-def make_surfaces(geometry: Geometry, shape_of_body, radius, position, face, skip: np.ndarray, gap: float) -> Surfaces:
+def make_surfaces(geometry: Geometry, shape_of_body, radius, ball, position, face, skip: np.ndarray, edge: float, gap: float) -> Surfaces:
     """Prepare the surfaces of a scene: bodies as in `World`, vertices (v, 3) m and faces (f, 3) of all nets; see `Surfaces`."""
     samples, radii, owner = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0, np.int64)]
     for b, shape in enumerate(shape_of_body):
@@ -159,10 +186,11 @@ def make_surfaces(geometry: Geometry, shape_of_body, radius, position, face, ski
         samples.append(points)
         radii.append(r)
         owner.append(np.full(len(points), b))
+    is_slim = np.concatenate(radii) < edge / np.sqrt(3.0)
     faces = build_geometry([CompiledShape((Primitive(ROUND, vertices=position, faces=face),))]) if len(face) else None
     return Surfaces(
         geometry, shape_of_body, np.asarray(radius, float), faces, np.concatenate(samples), np.concatenate(radii),
-        np.concatenate(owner), skip, gap,
+        np.concatenate(owner), skip, np.asarray(ball, bool), is_slim, gap,
     )  # fmt: skip
 
 

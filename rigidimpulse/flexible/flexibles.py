@@ -31,7 +31,7 @@ from rigidimpulse.world import World
 
 GAP = 0.01
 """Gap at which nets are kept from bodies, relative to the mean length of their edges."""
-ROUNDS = 5
+ROUNDS = 10
 """Most times that contacts are looked for again on the way that was solved for."""
 MIDPOINT_EXCESS = 1e-3
 """Energy out of nothing, relative to twice the kinetic energy, above which a step of the midpoint rule is done again by Euler's."""
@@ -39,6 +39,8 @@ MIDPOINT_MADE = 1e-7
 """The same for what no motion is left to be taken from; the solver's tolerance alone makes 1e-8."""
 ALIKE = 0.95
 """Cosine of the angle between two normals above which one plane guards both places."""
+AT_ONCE = 0.05
+"""Share of the step in which faces that a sample point meets count as met at once: what it meets later depends on what these do to it."""
 SCHEMES = ("euler", "midpoint")
 
 
@@ -137,7 +139,7 @@ class Flexibles:
         self._edge = float(edges.mean())
         gap = GAP * self._edge
         self._surfaces = make_surfaces(
-            world.geometry, world.shape_of_body, world.bound_radius, self.position, self.net.face, skip, gap
+            world.geometry, world.shape_of_body, world.bound_radius, world.ball, self.position, self.net.face, skip, self._edge, gap
         )
 
     @property
@@ -189,7 +191,8 @@ class Flexibles:
         rigid = rigid._replace(end_position=rigid.end_position - 0.5 * h * h * rigid.inv_mass[:, None] * self._load)
         target = start.copy()
         self._place_held(rigid, target)
-        touches = self._surfaces.find(start, np.where(self._free[:, None], flight, target), rigid, self._sides, self._surfaces.gap)
+        way = np.where(self._free[:, None], flight, target)
+        touches = self._surfaces.find(start, way, rigid, self._sides, self._surfaces.gap, rigid.end_rotation, False)
         lift = self._lift(touches, rigid, start)
         midpoint = self.scheme == "midpoint" and len(touches.key) == 0 and len(self._joined[0]) == 0
         rounds, unresolved = 0, 0
@@ -197,7 +200,7 @@ class Flexibles:
             solution, contacts, problem, slots = self._solve(touches, rigid, h, flight + lift, target, start + lift, midpoint)
             n = len(start)
             end = solution.z[:n] if not midpoint else 2.0 * solution.z[:n] - start
-            new = self._missing(touches, end, start + lift, self._moved(rigid, solution, slots))
+            new = self._missing(touches, end, start + lift, rigid, self._moved(rigid, solution, slots))
             rounds += 1
             unresolved = len(new.key)
             if unresolved == 0 or rounds == ROUNDS:
@@ -284,20 +287,22 @@ class Flexibles:
             rotation[b] = to_matrix(quaternion_from_rotation_vector(turn)) @ rotation[b]
         return rigid._replace(end_position=position, end_rotation=rotation)
 
-    def _missing(self, known: Touches, end: np.ndarray, start: np.ndarray, rigid: RigidMotion) -> Touches:
-        """Touches on the way solved for that no plane guards yet.
+    def _missing(self, known: Touches, end: np.ndarray, start: np.ndarray, rigid: RigidMotion, moved: RigidMotion) -> Touches:
+        """Touches on the way solved for, on which bodies are `moved`, that no plane guards yet; of a sample point the earliest ones.
 
         They are looked for at half the gap: nearer than planes let anything come, but for what had less than that from the start.
         """
-        found = self._surfaces.find(start, end, rigid, self._sides, 0.5 * self._surfaces.gap)
-        guarded: dict[tuple[int, int], list[np.ndarray]] = {}
-        for key, node, normal in zip(known.key.tolist(), known.node[:, 0].tolist(), known.normal, strict=True):
-            guarded.setdefault((key, node), []).append(normal)
-        fresh = []
-        for c, (key, node) in enumerate(zip(found.key.tolist(), found.node[:, 0].tolist(), strict=True)):
-            if all(float(found.normal[c] @ normal) < ALIKE for normal in guarded.get((key, node), [])):
-                fresh.append(c)
-        return Touches(*(column[np.array(fresh, np.int64)] for column in found))
+        found = self._surfaces.find(start, end, moved, self._sides, 0.5 * self._surfaces.gap, rigid.end_rotation, True)
+        guarded: dict[tuple[int, ...], list[np.ndarray]] = {}
+        for key, nodes, normal in zip(known.key.tolist(), known.node.tolist(), known.normal, strict=True):
+            guarded.setdefault((key, *nodes), []).append(normal)
+        fresh, first = [], {}
+        keys, nodes_of = found.key.tolist(), found.node.tolist()
+        for c in np.argsort(found.time, kind="stable").tolist():
+            if all(float(found.normal[c] @ normal) < ALIKE for normal in guarded.get((keys[c], *nodes_of[c]), [])):
+                if found.time[c] <= first.setdefault(keys[c], float(found.time[c])) + AT_ONCE:
+                    fresh.append(c)
+        return Touches(*(column[np.array(sorted(fresh), np.int64)] for column in found))
 
     def _finish(self, start, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h) -> FlexibleStep | None:
         """Take over the new state; see `balance` for what is set right. None if the midpoint rule shall not be taken."""

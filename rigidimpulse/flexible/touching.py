@@ -85,13 +85,14 @@ def fit_boxes(geometry, start, end, low, high):
 
 
 @jit
-def samples_on_faces(geometry, low, high, p0, p1, radius, body, start, end, gap, skip, out_int, out_real):
-    """Find sample points that come within the gap of faces of nets; returns their number. Each meets its first face only.
+def samples_on_faces(geometry, low, high, p0, p1, radius, body, start, end, gap, skip, every, out_int, out_real):
+    """Find sample points that come within the gap of faces of nets; returns their number, which may exceed the room in the output.
 
     Args:
         geometry: faces of all nets as one mesh. low, high: boxes of its tree, see `fit_boxes`.
         p0, p1: (s, 3) m, samples at both ends of the step. radius: (s,) m. body: (s,).
         start, end: (n, 3) m, vertices. gap: m. skip: (n, b) bool, see `vertices_on_bodies`.
+        every: (s,) bool, whether to find all faces that a sample meets, or its first one only.
         out_int: (k, 2) sample, face. out_real: (k, 8) weights, normal from the sample to the face, distance at the start, time.
 
     """
@@ -129,17 +130,27 @@ def samples_on_faces(geometry, low, high, p0, p1, radius, body, start, end, gap,
                     subtract(row(end, i), corners[0]), subtract(row(end, j), corners[1]), subtract(row(end, m), corners[2])
                 )  # fmt: skip
                 time, w, n, away = first_touch_of_triangle(a, way, corners, ways, radius[s], gap)
-                if time < first or (time == first and away < nearest):
+                if time == inf:
+                    continue
+                if every[s]:
+                    _write_sample(count, s, t, w, n, away, time, out_int, out_real)
+                    count += 1
+                elif time < first or (time == first and away < nearest):
                     first, hit, weights, normal, nearest = time, t, w, n, away
-        if hit < 0:
-            continue
-        if count < out_int.shape[0]:
-            out_int[count, 0], out_int[count, 1] = s, hit
-            for k in range(3):
-                out_real[count, k], out_real[count, 3 + k] = weights[k], normal[k]
-            out_real[count, 6], out_real[count, 7] = nearest, first
-        count += 1
+        if hit >= 0:
+            _write_sample(count, s, hit, weights, normal, nearest, first, out_int, out_real)
+            count += 1
     return count
+
+
+@jit
+def _write_sample(c, s, face, weights, normal, distance, time, out_int, out_real):
+    """Row c of what `samples_on_faces` finds, if there is room."""
+    if c < out_int.shape[0]:
+        out_int[c, 0], out_int[c, 1] = s, face
+        for k in range(3):
+            out_real[c, k], out_real[c, 3 + k] = weights[k], normal[k]
+        out_real[c, 6], out_real[c, 7] = distance, time
 
 
 @jit

@@ -123,6 +123,7 @@ def test_cloth_over_a_ball_is_never_inside() -> None:
     assert done.num_contacts > 20
 
 
+@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(
     ("shape", "speed"),
     [
@@ -134,12 +135,17 @@ def test_cloth_over_a_ball_is_never_inside() -> None:
     ],
     ids=["box", "small box", "small sphere", "cylinder", "capsule"],
 )
-def test_nothing_falls_through_a_trampoline(shape: ri.Shape, speed: float) -> None:
-    """Corners, rims and balls much smaller than its faces, in steps of a frame or of the limit that it states."""
+def test_nothing_falls_through_a_trampoline(shape: ri.Shape, speed: float, seed: int) -> None:
+    """Corners, rims and balls much smaller than its faces, in steps of a frame or of the limit that it states.
+
+    Balls of 2 cm at 30 m/s press the net to a spike, meet several of its faces in a step, and are spun by radians in it: where only the first
+    face that each met was looked at, 5 of 12 fell through.
+    """
     x, faces = sheet_mesh(11)
-    turn = quaternion_from_axis_angle((1, 0.7, 0.1), 0.9)
+    turn, random = quaternion_from_axis_angle((1, 0.7, 0.1), 0.9), np.random.default_rng(seed)
+    place = (0.53, 0.47, 0.4) if seed == 0 else (*random.uniform((0.43, 0.37), (0.63, 0.57)), 0.4)
     scene = ri.Scene(gravity=(0, 0, 0))
-    scene.add(ri.Body("body", shape, mass=0.3, position=(0.53, 0.47, 0.4), velocity=(0, 0, -speed), orientation=turn))
+    scene.add(ri.Body("body", shape, mass=0.3, position=place, velocity=(0, 0, -speed), orientation=turn))
     scene.add(FlexibleBody("net", x, faces, stiffness=2e3, bending=1e-3, mass=0.5, damping=1e-3, pinned=rim(x)))
     run = Run(scene, tolerance=1e-6)
     turned = False

@@ -182,8 +182,12 @@ def test_real_mesh_is_closed_and_its_tree_is_balanced():
     g = build(Shape.from_file(SPOT))
     assert g.closed.tolist() == [True]
     assert len(g.triangle) == 5856 and len(g.edge) == 3 * 5856 // 2 and len(g.vertex) == 2 + len(g.edge) - 5856
-    leaves = g.node_count[g.node_child < 0]
-    assert leaves.sum() == 5856 and leaves.min() >= 2
+    depth = np.zeros(len(g.node_child), int)
+    for node in np.flatnonzero(g.node_child >= 0):  # children come after their parents
+        depth[g.node_child[node] : g.node_child[node] + 2] = depth[node] + 1
+    leaves = g.node_child < 0
+    assert g.node_count[leaves].sum() == 5856
+    assert depth.max() == depth[leaves].min() + 1 == np.ceil(np.log2(5856 / LEAF_SIZE))
 
 
 def test_curved_primitives_have_their_point_segment_or_frame():
