@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from rigidimpulse.studies.wishes import Wish
 
 logger = logging.getLogger("rigidimpulse")
+SECONDS_OF_A_KIND = 30
+"""s that compiling one kind of kernels takes, about."""
 
 # Frames whose product with the number of bodies is refused as a slip of the keyboard (about 1e9 poses, 100 GB).
 MOST_POSES = 1_000_000_000
@@ -180,8 +182,8 @@ def prepare_kernels(world: World, plan: Plan) -> None:
     heaps = any(line.included for line in plan.lines if line.name == HeapForces.name)
     missing = kernels_to_compile(world, has_events(plan), heaps)
     if missing:
-        kinds = ", ".join(missing)
-        logger.warning(f"compiling kernels ({kinds}) for the first run on this machine, once: this takes about half a minute for each")
+        kinds, seconds = ", ".join(missing), SECONDS_OF_A_KIND * len(missing)
+        logger.warning(f"compiling kernels ({kinds}) for the first run on this machine, once: this takes about {seconds} s")
         compile_kernels(world, missing)
 
 
