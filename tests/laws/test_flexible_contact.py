@@ -138,8 +138,8 @@ def test_cloth_over_a_ball_is_never_inside() -> None:
 def test_nothing_falls_through_a_trampoline(shape: ri.Shape, speed: float, seed: int) -> None:
     """Corners, rims and balls much smaller than its faces, in steps of a frame or of the limit that it states.
 
-    Balls of 2 cm at 30 m/s press the net to a spike, meet several of its faces in a step, and are spun by radians in it: where only the first
-    face that each met was looked at, 5 of 12 fell through.
+    Balls of 2 cm at 30 m/s press the net to a spike, meet several of its faces in a step, and are spun by radians in it: where only the
+    first face that each met was looked at, 5 of 12 fell through.
     """
     x, faces = sheet_mesh(11)
     turn, random = quaternion_from_axis_angle((1, 0.7, 0.1), 0.9), np.random.default_rng(seed)

@@ -240,10 +240,11 @@ def thrown(seed: int) -> ri.Scene:
 
 
 def test_boxes_hardly_sink_into_each_other_on_the_way():
-    # A fall at up to 7 m/s, 10 rad/s: soft contact eats its skin (2 mm) and at worst as much again. Of 32 heaps half stay within 1.9 mm, the
-    # worst is at 5.6 mm; which of them are among these five depends on round-off, so on the compiler. Edges have one contact, and what else of a pair comes to touch is found at the next look, up to 2 ms later: boxes that a third
-    # one drives together at 5 m/s are 10 mm deep by then. Looked at once a step, 16 ms, most heaps have boxes 15 mm and more inside each
-    # other; without contacts ahead of time 0.1 m.
+    # A fall at up to 7 m/s, 10 rad/s: soft contact eats its skin (2 mm) and at worst as much again. Of 32 heaps half stay within 1.9 mm,
+    # the worst is at 5.6 mm; which of them these five are like depends on round-off, so on the compiler. Edges have one contact, and what
+    # else of a pair comes to touch is found at the next look, up to 2 ms later: boxes that a third one drives together at 5 m/s are 10 mm
+    # deep by then. Looked at once a step, 16 ms, most heaps have boxes 15 mm and more inside each other; without contacts ahead of time
+    # 0.1 m.
     from rigidimpulse.rotation import to_matrix
 
     depths = []
