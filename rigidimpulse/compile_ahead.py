@@ -11,34 +11,30 @@ import gc
 import subprocess
 import sys
 from contextlib import ExitStack, contextmanager
+from importlib import import_module
 
 import numpy as np
 
 from rigidimpulse._jit import is_cached
 
 CYLINDERS, CONTACTS, EVENTS, HEAPS, JOINTS = "cylinders", "contacts", "impacts of balls", "heaps", "joints"
+LAST = {
+    CONTACTS: ("detect.touching", "contacts_of_pairs"),
+    EVENTS: ("events.flight", "fly"),
+    HEAPS: ("constrain.heap_solver", "advance"),
+    JOINTS: ("constrain.joint_forces", "close_at_end"),
+}
+"""The kernel of each kind that is compiled last."""
 STEP = 1.0 / 60.0
 
 
 def kernels_to_compile(world, with_events: bool, with_heaps: bool) -> list[str]:
     """Kinds of kernels that a run of a world needs and that do not lie in the cache: what is compiled last of each tells."""
+    needed = {CONTACTS: world.can_collide, EVENTS: with_events, HEAPS: with_heaps, JOINTS: bool(world.joints_of_scene)}
     missing = []
-    if world.can_collide:
-        from rigidimpulse.detect.touching import contacts_of_pairs
-
-        missing += [] if is_cached(contacts_of_pairs) else [CONTACTS]
-    if with_events:
-        from rigidimpulse.events.flight import fly
-
-        missing += [] if is_cached(fly) else [EVENTS]
-    if with_heaps:
-        from rigidimpulse.constrain.heap_solver import advance
-
-        missing += [] if is_cached(advance) else [HEAPS]
-    if world.joints_of_scene:
-        from rigidimpulse.constrain.joint_forces import close_at_end
-
-        missing += [] if is_cached(close_at_end) else [JOINTS]
+    for kind, (module, name) in LAST.items():
+        if needed[kind] and not is_cached(getattr(import_module(f"rigidimpulse.{module}"), name)):
+            missing.append(kind)
     return missing
 
 
@@ -190,7 +186,9 @@ def _look_at_heap(context) -> None:
     state.now.inv_inertia[1] = np.eye(3)
     stepper = HeapStepper(world)
     stepper.set_up(context, np.array([1]), np.array([0]), STEP)
-    a, b = stepper.near(context, member, ~member, STEP)
+    stepper.near(context, member, ~member, STEP)
+    # Columns of one row only would be another type.
+    a, b = np.array([[0, 1], [0, 1]]).T
     refusals(world, islands(world.num_bodies, a, b, member), member, ~member, a, b, True)
 
 

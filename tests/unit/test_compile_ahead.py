@@ -1,0 +1,57 @@
+"""What is compiled ahead of a first run is what runs call: with other types it would be compiled for nothing, and again."""
+
+import subprocess
+import sys
+
+import pytest
+
+import rigidimpulse as ri
+from rigidimpulse import compile_ahead
+from rigidimpulse.gallery import load
+from rigidimpulse.world import compile_scene
+
+PROGRAM = """
+import rigidimpulse as ri
+from rigidimpulse import compile_ahead
+from rigidimpulse._jit import KERNELS
+from rigidimpulse.gallery import load
+
+for half in (compile_ahead.{first}, compile_ahead.{second}):
+    half(compile_ahead._box_on_floor(False, {jointed}))
+ahead = {{kernel.name: set(kernel.entry.overloads) for kernel in KERNELS if kernel.entry.overloads}}
+entry = load("{scene}")
+ri.simulate(entry.scene(), 0.3, accuracy=entry.accuracy)
+for kernel in KERNELS:
+    if kernel.name in ahead and set(kernel.entry.overloads) - ahead[kernel.name]:
+        print(kernel.name)
+print(len(ahead), "compared")
+"""
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "jointed", "scene"),
+    [
+        ("_respond_and_detect", "_move_sweep_and_solve", False, "stack_10"),
+        ("_look_at_heap", "_step_heap", False, "pile"),
+        ("_start_joints", "_close_and_stop_joints", True, "arm"),
+    ],
+    ids=["contacts", "heaps", "joints"],
+)
+def test_runs_call_what_was_compiled_ahead(first, second, jointed, scene):
+    program = PROGRAM.format(first=first, second=second, jointed=jointed, scene=scene)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    *again, compared = done.stdout.splitlines()
+    assert again == []
+    assert int(compared.split()[0]) > 5
+
+
+def test_only_what_a_scene_needs_and_the_cache_lacks_is_compiled(monkeypatch):
+    ball = ri.Body("ball", ri.Shape.sphere(0.1), position=(0, 0, 1))
+    flies = compile_scene(ri.Scene(bodies=[ball]))
+    arm = compile_scene(load("arm").scene())
+    monkeypatch.setattr(compile_ahead, "is_cached", lambda _kernel: False)
+    assert compile_ahead.kernels_to_compile(flies, False, False) == []
+    assert compile_ahead.kernels_to_compile(flies, True, True) == ["impacts of balls", "heaps"]
+    assert "joints" in compile_ahead.kernels_to_compile(arm, False, False)
+    monkeypatch.setattr(compile_ahead, "is_cached", lambda _kernel: True)
+    assert compile_ahead.kernels_to_compile(arm, True, True) == []
