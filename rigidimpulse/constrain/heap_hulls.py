@@ -164,16 +164,15 @@ def _farthest(corner, first, last, x, y, z):
 
 
 @jit
-def closest(shapes, s, t, d, c, towards, small, margin, simplex):
+def closest(shapes, s, t, d, c, small, margin, simplex):
     """Axis of the largest gap in the axes of a, the gap along it, m, and how many corners bear it, 0 where that is above `margin`.
 
-    d: centre of b in the axes of a; c = R_a^T R_b; towards: an axis to begin with; small: factor of the bodies' lengths. 5 corners: they
-    overlap, the axis is none.
+    d: centre of b in the axes of a; c = R_a^T R_b; small: factor of the bodies' lengths. 5 corners: they overlap, the axis is none.
     """
     corner, w = shapes.corner, simplex.w
     a0, a1, b0, b1 = shapes.corner_first[s], shapes.corner_first[s + 1], shapes.corner_first[t], shapes.corner_first[t + 1]
     count, square = np.int64(0), inf
-    x, y, z, gap = towards[0], towards[1], towards[2], 0.0
+    x, y, z, gap = d[0], d[1], d[2], 0.0
     for _ in range(MOST_ROUNDS):
         i, high = _farthest(corner, a0, a1, x, y, z)
         bx, by, bz = (
@@ -263,20 +262,18 @@ def _one_contact(shapes, rotation, a, d, c, n, gap, count, simplex, real, ids):
 
 
 @jit
-def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, towards, size, margin, ahead, c, simplex, scratch, real, ids):
+def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, scratch, real, ids):
     """Contacts of two convex polyhedra relative to the first body; returns their number and a bound of the gap.
 
-    between: from a to b, world; origin: (0, 0, 0); towards: an axis near the one that is sought, world; size: smaller inner radius, m;
-    c: room (3, 3).
+    between: from a to b, world; origin: (0, 0, 0); size: smaller inner radius, m; c: room (3, 3).
     """
     d = turned_back(rotation, a, between[0], between[1], between[2])
     for i in range(3):
         for j in range(3):
             c[i, j] = rotation[a, 0, i] * rotation[b, 0, j] + rotation[a, 1, i] * rotation[b, 1, j] + rotation[a, 2, i] * rotation[b, 2, j]
-    first = turned_back(rotation, a, towards[0], towards[1], towards[2])
-    nx, ny, nz, gap, count = closest(shapes, s, t, d, c, first, 1.0, margin, simplex)
+    nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0, margin, simplex)
     if count == 5:
-        nx, ny, nz, gap, count = closest(shapes, s, t, d, c, first, 1.0 - SHRINK, margin, simplex)
+        nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0 - SHRINK, margin, simplex)
     if count == 0:
         return count, gap
     if count < 5:

@@ -276,12 +276,9 @@ def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, places, ma
         if pairs.kind[p] == WALL:
             count, gap = _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, found)
         elif pairs.kind[p] == HULLS:
-            size, towards = min(bodies.inner[a], bodies.inner[b]), (between[0], between[1], between[2])
-            if pairs.count[p] > 0:
-                r = pairs.start[p]
-                towards = turned(rotation, b if pairs.carrier[p] else a, rows[r, 0], rows[r, 1], rows[r, 2])
+            size = min(bodies.inner[a], bodies.inner[b])
             count, gap = hull_contacts(
-                shapes, velocity, rotation, a, b, s, t, between, origin, towards, size, margin, ahead, c, simplex, scratch, real, found
+                shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, scratch, real, found
             )
         else:
             count, gap = _of_boxes(shapes.half, velocity, rotation, a, b, s, t, between, margin, ahead, c, work, scratch, real, found)
