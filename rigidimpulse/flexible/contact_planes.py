@@ -93,17 +93,11 @@ class Surfaces:
         with them; those of sample points lie on the faces, and those on balls, on which no rotation can be seen, stay as well.
         """
         seen = rigid._replace(end_rotation=np.where(self.ball[:, None, None], rigid.rotation, rigid.end_rotation))
-        found = joined([self._vertices(start, end, seen, gap), self._samples(start, end, seen, sides, gap, every)])
-        stays, b = (found.key >= self.skip.size) | self.ball[found.body], found.body
-        back = np.einsum("mji,mjk->mik", frame[b], seen.end_rotation[b])
-        normal = np.where(stays[:, None], np.einsum("mij,mj->mi", back, found.normal), found.normal)
-        middle, radius = np.zeros_like(normal), np.zeros(len(b))
-        is_sample = found.key >= self.skip.size
-        middle[is_sample] = self.sample[found.key[is_sample] - self.skip.size]
-        radius[is_sample] = self.sample_radius[found.key[is_sample] - self.skip.size]
-        place = np.where(is_sample[:, None], middle + radius[:, None] * normal, found.place)
-        place = np.where((self.ball[b] & ~is_sample)[:, None], np.einsum("mij,mj->mi", back, found.place), place)
-        return found._replace(normal=normal, place=place)
+        vertices = self._vertices(start, end, seen, gap)
+        back = np.einsum("nji,njk->nik", frame, seen.end_rotation)
+        back[~self.ball] = np.eye(3)
+        normal, place = (np.einsum("mij,mj->mi", back[vertices.body], v) for v in (vertices.normal, vertices.place))
+        return joined([vertices._replace(normal=normal, place=place), self._samples(start, end, seen, sides, gap, every, frame)])
 
     def _vertices(self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, gap: float) -> Touches:
         """Touches of vertices on bodies."""
@@ -125,8 +119,10 @@ class Surfaces:
         key = vertex * len(self.radius) + body
         return Touches(key, np.tile(vertex[:, None], 3), weight, body, real[:, 3:6], real[:, :3], target, distance, time)
 
-    def _samples(self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, sides: dict[int, float], gap: float, every: bool) -> Touches:
-        """Touches of sample points on faces.
+    def _samples(
+        self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, sides: dict[int, float], gap: float, every: bool, frame: np.ndarray
+    ) -> Touches:
+        """Touches of sample points on faces; every, frame: see `find`.
 
         `sides` says, by key, on which side of the faces a sample was when it was last in contact: one that is found on the other side,
         by less than the gap, has not passed but was moved there by round-off, and is sent back.
@@ -156,7 +152,7 @@ class Surfaces:
         distance = np.where(wrong, -distance - 2.0 * self.sample_radius[sample], distance)
         target = np.where(time == 0.0, np.minimum(distance, gap), gap)
         b = body[sample]
-        turned = np.einsum("sji,sj->si", rigid.end_rotation[b], normal)
+        turned = np.einsum("sji,sj->si", frame[b], normal)
         place = self.sample[sample] + self.sample_radius[sample, None] * turned
         return Touches(key, node, weight, b, place, turned, target, distance, time)
 
