@@ -18,7 +18,7 @@ import numpy as np
 from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_fly, mark_slow, most_stray, stirred
 from rigidimpulse.constrain.heap_islands import FAST, MANY, SPIN, TALL, islands, refusals, support_levels
-from rigidimpulse.constrain.heap_stepper import KEPT, HeapStepper, Outcome
+from rigidimpulse.constrain.heap_stepper import HeapStepper, Outcome
 from rigidimpulse.detect.groups import Group, empty_contacts
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs
 from rigidimpulse.integrate.course import FIXED, STEPPED
@@ -32,6 +32,8 @@ LEAVING = 0.1
 """Part of its speed at which a fast body must leave a heap that it has hit to be no part of it."""
 MOST_PIECES = 4
 """Parts of a step at most, between which a heap's courses begin anew."""
+STRAY = 10.0
+"""Skins by which courses may stray from the ways of turning bodies, over `Accuracy.heap_motion`: half a skin by default."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the heap that comes near it."""
 
@@ -157,13 +159,10 @@ class Heaps:
         mark_slow(context.state.now, self.stepper.inner, FAST / h, SPIN / context.world.accuracy.step, member)
 
     def _near(self, context, member: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray]:
-        other = ~member & ~self._excluded(context)
+        # Movable bodies under way that are no members are swept.
+        other = ~member & ~(context.world.dynamic & (context.state.course.mode != FIXED))
         self.stepper.find_pairs(context, np.flatnonzero(member), np.flatnonzero(other), ahead)
         return self.stepper.near(context, member, other, ahead)
-
-    def _excluded(self, context) -> np.ndarray:
-        """Movable bodies under way that are no members: they are swept."""
-        return context.world.dynamic & (context.state.course.mode != FIXED)
 
     def _touched(self, context, member: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Bodies at rest that members touch, and all of the heaps they belong to."""
@@ -316,7 +315,7 @@ class Heaps:
         self._most = max(self._most, len(members))
         members = members[~self.asleep[members]]
         end = self._end_of(context, window, group.time, members)
-        self._set_up(context, members, group.time, end - group.time, KEPT if group.time > window.begin else 0.0)
+        self._set_up(context, members, group.time, end - group.time, self.stepper.kept if group.time > window.begin else 0.0)
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
             self._ends[label] = end
@@ -339,11 +338,11 @@ class Heaps:
     def _end_of(self, context, window, time: float, members: np.ndarray) -> float:
         """When the courses of members end: before the step does where straight ways would stray from those of turning bodies.
 
-        The centre of a body that rolls over a point at r strays by r (w h)^2 / 8 in h s; half of the skin is allowed, within
-        MOST_PIECES a step.
+        The centre of a body that rolls over a point at r strays by r (w h)^2 / 8 in h s.
         """
-        stepper, step = self.stepper, context.world.accuracy.step
-        stray = most_stray(context.state.now, members, stepper.pressed, stepper.reach, stepper.skin)
+        stepper, accuracy = self.stepper, context.world.accuracy
+        step, allowed = accuracy.step, STRAY * accuracy.heap_motion
+        stray = most_stray(context.state.now, members, stepper.pressed, stepper.reach, stepper.skin, allowed)
         pieces = min(max(math.ceil(stray * step), 1), MOST_PIECES)
         left = max(math.ceil((window.end - time) * pieces / step - 1e-6), 1)
         return window.end if left == 1 else time + (window.end - time) / left

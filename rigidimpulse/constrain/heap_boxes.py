@@ -101,10 +101,10 @@ def _cut_side(polygon, ids, count, spare, spare_ids, axis, sign, limit, side):
 
 
 @jit
-def _facing(k, c, of_b, y, m, sign, polygon):
-    """The face of the other box, with half sides k and centre y, that looks at the face of axis m: corners into polygon; its code.
+def _facing(half, other, c, of_b, yu, yv, ym, m, sign, polygon):
+    """The face of the other box, of half sides half[other], that looks at the face of axis m: corners into polygon; returns its code.
 
-    Corners are written along axes m', m'' and as gaps less the half side of m, see `face_contacts`.
+    y: its centre, along m', m'' and m. Corners are written along axes m', m'' and as gaps less the half side of m, see `face_contacts`.
     """
     q, most = np.int64(0), -inf
     for n in range(3):
@@ -112,11 +112,12 @@ def _facing(k, c, of_b, y, m, sign, polygon):
         if cosine > most:
             q, most = n, cosine
     q1, q2 = (q + 1) % 3, (q + 2) % 3
-    side = -k[q] if sign * (c[q, m] if of_b else c[m, q]) > 0.0 else k[q]
+    k, k1, k2 = half[other, q], half[other, q1], half[other, q2]
+    side = -k if sign * (c[q, m] if of_b else c[m, q]) > 0.0 else k
     for n in range(3):
         row = (m + 1 + n) % 3
         x, x1, x2 = (c[q, row], c[q1, row], c[q2, row]) if of_b else (c[row, q], c[row, q1], c[row, q2])
-        middle, x1, x2 = y[row] + side * x, k[q1] * x1, k[q2] * x2
+        middle, x1, x2 = (yu if n == 0 else (yv if n == 1 else ym)) + side * x, k1 * x1, k2 * x2
         factor = sign if n == 2 else 1.0
         polygon[0, n], polygon[1, n] = factor * (middle + x1 + x2), factor * (middle - x1 + x2)
         polygon[2, n], polygon[3, n] = factor * (middle - x1 - x2), factor * (middle + x1 - x2)
@@ -124,21 +125,30 @@ def _facing(k, c, of_b, y, m, sign, polygon):
 
 
 @jit
-def _reach(velocity, r, i, j, y, m, sign, ahead, polygon, reach):
-    """How far corners of box j beside a face of box i come over its four sides, +m', -m', +m'', -m'', in `ahead` s, into reach (4, 0)."""
-    a, b, u, v = 8 * i, 8 * j, (m + 1) % 3, (m + 2) % 3
-    x = turned_back(r, i, velocity[b] - velocity[a], velocity[b + 1] - velocity[a + 1], velocity[b + 2] - velocity[a + 2])
-    w = turned_back(r, i, velocity[a + 3], velocity[a + 4], velocity[a + 5])
-    o = turned_back(r, i, velocity[b + 3], velocity[b + 4], velocity[b + 5])
-    for side in range(4):
-        reach[side, 0] = 0.0
+def _along(r, i, axis, x, y, z):
+    """Component of a vector along an axis of box i."""
+    return r[i, 0, axis] * x + r[i, 1, axis] * y + r[i, 2, axis] * z
+
+
+@jit
+def _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon):
+    """How far corners of box j beside a face of box i come over its four sides, +m', -m', +m'', -m'', in `ahead` s: four numbers."""
+    a, b = 8 * i, 8 * j
+    x, y, z = velocity[b] - velocity[a], velocity[b + 1] - velocity[a + 1], velocity[b + 2] - velocity[a + 2]
+    xu, xv = _along(r, i, u, x, y, z), _along(r, i, v, x, y, z)
+    x, y, z = velocity[a + 3], velocity[a + 4], velocity[a + 5]
+    wu, wv, wm = _along(r, i, u, x, y, z), _along(r, i, v, x, y, z), _along(r, i, m, x, y, z)
+    x, y, z = velocity[b + 3], velocity[b + 4], velocity[b + 5]
+    ou, ov, om = _along(r, i, u, x, y, z), _along(r, i, v, x, y, z), _along(r, i, m, x, y, z)
+    low_u = high_u = low_v = high_v = 0.0
     for k in range(4):
         pu, pv, pm = polygon[k, 0], polygon[k, 1], sign * polygon[k, 2]
-        su, sv, sm = pu - y[u], pv - y[v], pm - y[m]
-        along_u = ahead * (x[u] + (o[v] * sm - o[m] * sv) - (w[v] * pm - w[m] * pv))
-        along_v = ahead * (x[v] + (o[m] * su - o[u] * sm) - (w[m] * pu - w[u] * pm))
-        reach[0, 0], reach[1, 0] = max(reach[0, 0], -along_u), max(reach[1, 0], along_u)
-        reach[2, 0], reach[3, 0] = max(reach[2, 0], -along_v), max(reach[3, 0], along_v)
+        su, sv, sm = pu - yu, pv - yv, pm - ym
+        along_u = ahead * (xu + (ov * sm - om * sv) - (wv * pm - wm * pv))
+        along_v = ahead * (xv + (om * su - ou * sm) - (wm * pu - wu * pm))
+        low_u, high_u = min(low_u, along_u), max(high_u, along_u)
+        low_v, high_v = min(low_v, along_v), max(high_v, along_v)
+    return -low_u, high_u, -low_v, high_v
 
 
 @jit
@@ -150,14 +160,15 @@ def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c
     polygon, ids, spare, spare_ids, ways, height, chosen = scratch
     of_b = axis >= 3
     i, j, m, own, other = (b, a, axis - 3, t, s) if of_b else (a, b, axis, s, t)
-    turn = -1.0 if of_b else 1.0
-    y = turned_back(r, i, turn * between[0], turn * between[1], turn * between[2])
-    sign = 1.0 if y[m] > 0.0 else -1.0
-    code = _facing((half[other, 0], half[other, 1], half[other, 2]), c, of_b, y, m, sign, polygon)
+    turn, u, v = -1.0 if of_b else 1.0, (m + 1) % 3, (m + 2) % 3
+    x, y, z = turn * between[0], turn * between[1], turn * between[2]
+    yu, yv, ym = _along(r, i, u, x, y, z), _along(r, i, v, x, y, z), _along(r, i, m, x, y, z)
+    sign = 1.0 if ym > 0.0 else -1.0
+    code = _facing(half, other, c, of_b, yu, yv, ym, m, sign, polygon)
     for k in range(4):
         ids[k] = k
-    _reach(velocity, r, i, j, y, m, sign, ahead, polygon, ways)
-    count, u, v = np.int64(4), (m + 1) % 3, (m + 2) % 3
+    ways[0, 0], ways[1, 0], ways[2, 0], ways[3, 0] = _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon)
+    count = np.int64(4)
     for side in range(4):
         limit = half[own, u if side < 2 else v] + ways[side, 0]
         count = _cut_side(polygon, ids, count, spare, spare_ids, side // 2, 1.0 if side % 2 == 0 else -1.0, limit, side)

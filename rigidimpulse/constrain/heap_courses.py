@@ -3,7 +3,7 @@
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.integrate.course import FREE, STEPPED, begin, state_at
+from rigidimpulse.integrate.course import FREE, STEPPED, begin, begin_straight, stepped_at
 from rigidimpulse.rotation import product, quaternion_to_matrix
 
 CALM, PLAY = 0.05, 0.5
@@ -14,14 +14,20 @@ CALM, PLAY = 0.05, 0.5
 def arrive(course, members, time, steady, bodies, rotation, acceleration, angular_acceleration):
     """End the courses of members at `time`, bring them there, and let them go straight on; steady (n, 3) m/s2 is what pulls them."""
     for i in members:
-        state_at(course, i, time, bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i])
-        r = rotation[i]
-        quaternion_to_matrix(bodies.orientation[i], r)
+        place, q, v, w = stepped_at(course, i, time)
         x, y, z = 1.0 / course.inertia[i, 0], 1.0 / course.inertia[i, 1], 1.0 / course.inertia[i, 2]
+        quaternion_to_matrix(q, rotation[i])
         for c in range(3):
             for d in range(3):
-                bodies.inv_inertia[i, c, d] = x * r[c, 0] * r[d, 0] + y * r[c, 1] * r[d, 1] + z * r[c, 2] * r[d, 2]
+                bodies.inv_inertia[i, c, d] = (
+                    x * rotation[i, c, 0] * rotation[i, d, 0] + y * rotation[i, c, 1] * rotation[i, d, 1]
+                    + z * rotation[i, c, 2] * rotation[i, d, 2]
+                )
         course.start[i], course.stepped[i, 12] = time, 1.0
+        bodies.position[i, 0], bodies.position[i, 1], bodies.position[i, 2] = place
+        bodies.orientation[i, 0], bodies.orientation[i, 1], bodies.orientation[i, 2], bodies.orientation[i, 3] = q
+        bodies.velocity[i, 0], bodies.velocity[i, 1], bodies.velocity[i, 2] = v
+        bodies.angular_velocity[i, 0], bodies.angular_velocity[i, 1], bodies.angular_velocity[i, 2] = w
         for c in range(4):
             course.orientation[i, c] = bodies.orientation[i, c]
         for c in range(3):
@@ -30,7 +36,7 @@ def arrive(course, members, time, steady, bodies, rotation, acceleration, angula
             course.angular_velocity[i, c] = course.stepped[i, 3 + c] = bodies.angular_velocity[i, c]
             course.stepped[i, 6 + c] = course.stepped[i, 9 + c] = 0.0
             acceleration[i, c], angular_acceleration[i, c] = steady[i, c], 0.0
-        begin(course, i)
+        begin_straight(course, i)
 
 
 @jit
@@ -57,8 +63,8 @@ def mark_slow(bodies, inner, farthest, fastest, member):
 
 
 @jit
-def most_stray(bodies, members, pressed, reach, skin):
-    """Largest w sqrt(r / (4 skin)) of the members that contacts act on, 1/s."""
+def most_stray(bodies, members, pressed, reach, skin, allowed):
+    """Largest w sqrt(r / (8 d)) of the members that contacts act on, 1/s; d: `allowed` skins."""
     most = 0.0
     for i in members:
         if not pressed[i]:
@@ -66,7 +72,7 @@ def most_stray(bodies, members, pressed, reach, skin):
         spin = 0.0
         for c in range(3):
             spin += bodies.angular_velocity[i, c] ** 2
-        most = max(most, np.sqrt(spin * reach[i] / (4.0 * skin[i])))
+        most = max(most, np.sqrt(spin * reach[i] / (8.0 * allowed * skin[i])))
     return most
 
 
@@ -136,8 +142,8 @@ def depart(course, members, time, length, bodies, position, orientation, velocit
     """Courses from the present poses to the given ones (k, 3), (k, 4), where the velocities are (k, 6)."""
     for k in range(members.shape[0]):
         i = members[k]
-        a, b = bodies.orientation[i], orientation[k]
-        q0, q1, q2, q3 = product(b[0], b[1], b[2], b[3], a[0], -a[1], -a[2], -a[3])
+        a0, a1, a2, a3 = bodies.orientation[i, 0], bodies.orientation[i, 1], bodies.orientation[i, 2], bodies.orientation[i, 3]
+        q0, q1, q2, q3 = product(orientation[k, 0], orientation[k, 1], orientation[k, 2], orientation[k, 3], a0, -a1, -a2, -a3)
         if q0 < 0.0:
             q0, q1, q2, q3 = -q0, -q1, -q2, -q3
         sine = np.sqrt(q1 * q1 + q2 * q2 + q3 * q3)
@@ -154,6 +160,6 @@ def depart(course, members, time, length, bodies, position, orientation, velocit
             course.stepped[i, 6 + c] = velocity[k, c] - bodies.velocity[i, c]
             course.stepped[i, 9 + c] = velocity[k, 3 + c] - bodies.angular_velocity[i, c]
         for c in range(4):
-            course.orientation[i, c] = a[c]
+            course.orientation[i, c] = bodies.orientation[i, c]
         course.stepped[i, 12] = length
-        begin(course, i)
+        begin_straight(course, i)

@@ -182,7 +182,7 @@ def write_row(
     bx, by, bz = (real[c, 3] - dx) / factor_b, (real[c, 4] - dy) / factor_b, (real[c, 5] - dz) / factor_b
     bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz
     m, t = material[a], material[b]
-    for k in range(ROW_SIZE):
+    for k in range(IMPULSE, ROW_SIZE):
         rows[r, k] = 0.0
     rows[r, 0], rows[r, 1], rows[r, 2] = turned_back(rotation, b if carrier else a, nx, ny, nz)
     rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2] = turned_back(rotation, a, ax, ay, az)
@@ -293,12 +293,15 @@ def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, places, ma
                 for j in range(3):
                     ids[used + i, j] = ids[before + i, j]
             used += POINTS
-        start, kept = pairs.start[p], pairs.count[p]
-        for i in range(kept):
-            for j in range(ROW_SIZE):
-                old[i, j] = rows[start + i, j]
-            for j in range(3):
-                old_ids[i, j] = ids[start + i, j]
+        start, kept = pairs.start[p], 0
+        for i in range(start, start + pairs.count[p]):
+            # An old contact without impulse has nothing to hand over.
+            if rows[i, IMPULSE] > 0.0:
+                for j in range(ROW_SIZE):
+                    old[kept, j] = rows[i, j]
+                for j in range(3):
+                    old_ids[kept, j] = ids[i, j]
+                kept += 1
         for i in range(count):
             write_row(
                 position, rotation, bodies.material, bodies.skin, a, b, pairs.carrier[p], real, i, 0.0, 0.0, 1.0, 1.0, coefficients, rows,

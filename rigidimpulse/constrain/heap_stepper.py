@@ -41,10 +41,10 @@ COLUMN = 20.0
 PRESSED = 0.25
 LEAST_SUB_STEPS, MOST_SUB_STEPS = 16, 256
 """Sub-steps in a whole step."""
-MOTION, LEAST_SUB_STEPS_BETWEEN = 0.05, 2
-"""Inner radii that touching bodies may come past each other until contacts are looked for again; sub-steps from look to look."""
-KEPT = 0.01
-"""Inner radii that a pair may come past each other with the contacts it has, in the middle of a step."""
+LEAST_SUB_STEPS_BETWEEN = 2
+"""Sub-steps from look to look."""
+KEPT = 0.2
+"""Part of the motion until a look (`Accuracy.heap_motion`) that a pair may make with the contacts it has, in the middle of a step."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -65,6 +65,7 @@ class HeapStepper:
     Attributes:
         order: (n,) bodies by their places at the start of the run; rank: (n,) place of each in it.
         inner: (n,) m, distance from the centre of mass to the nearest face; inf for what cannot be moved. skin: (n,) m.
+        kept: inner radii that a pair may come past each other with the contacts it has, in the middle of a step.
         bodies: by rank. table: pairs and contact points. pressed: (n,) bool, contacts acted on the body when it was last stepped.
 
     """
@@ -98,6 +99,8 @@ class HeapStepper:
         self._begins = np.zeros(256, np.int64)
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
+        self._motion = world.accuracy.heap_motion
+        self.kept = KEPT * self._motion
         self._special = bool(world.moving.any() or world.ball.any() or world.coefficients[:, :, 0].any())
         self.pressed = np.zeros(n, bool)
         self._places = self._general = np.zeros(0, np.int64)
@@ -150,7 +153,7 @@ class HeapStepper:
         load_bodies(self.bodies, self.order, context.state.now, context.acceleration, self.world.inv_mass, self._part)
         motion = most_motion(self.bodies, self.table.pairs, ahead)
         most = max(math.ceil(ahead / self.sub_step(members) - 1e-9) // LEAST_SUB_STEPS_BETWEEN, 1)
-        self._parts = min(max(math.ceil(motion / MOTION), 1), most)
+        self._parts = min(max(math.ceil(motion / self._motion), 1), most)
         self.ahead = ahead / self._parts
         self._look(context, between)
 
@@ -232,7 +235,7 @@ class HeapStepper:
         work, done = 0.0, 0
         for part in range(self._parts):
             if part:
-                self._look(context, KEPT)
+                self._look(context, self.kept)
             some = (part + 1) * sub_steps // self._parts - done
             work += self._advance(some, h)
             done += some

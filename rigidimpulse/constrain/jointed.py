@@ -21,7 +21,7 @@ SWAY = 0.7
 """rad, how far the fastest oscillation may go in a sub-step that the tension of joints keeps up across them; 2 is unstable."""
 NOT_CLOSED = 1e3
 """How many times farther than allowed joints may be off before that is reported."""
-MOST_SUB_STEPS = 256
+MOST_SUB_STEPS = 1024
 """Sub-steps in a step."""
 SHORT = 1e-5
 """Part of a step below which a sub-step is planned as a longer one: closing divides by its length."""

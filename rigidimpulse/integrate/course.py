@@ -28,6 +28,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.integrate import forced_top, free_top
+from rigidimpulse.rotation import exponential, product
 
 FIXED, PRESCRIBED, FREE, FORCED, STEPPED = 0, 1, 2, 3, 4
 
@@ -100,15 +101,25 @@ def make_course(num_bodies: int) -> Course:
 def begin(course, i):
     """Prepare `course.top[i]`; call it after any other column of row i has changed. Rates that the mode has not are set to 0."""
     mode = course.mode[i]
-    inertia, q, w, top = course.inertia[i], course.orientation[i], course.angular_velocity[i], course.top[i]
     if mode != FORCED:
-        top[TORQUE_RATE if mode == FREE else JERK :] = 0.0
+        for k in range(TORQUE_RATE if mode == FREE else JERK, TOP_SIZE):
+            course.top[i, k] = 0.0
+    if mode == PRESCRIBED or mode == STEPPED:
+        begin_straight(course, i)
+        return
+    inertia, q, w, top = course.inertia[i], course.orientation[i], course.angular_velocity[i], course.top[i]
     if mode == FORCED and forced_top.prepare(inertia, q, w, course.torque[i], top[TORQUE_RATE:], top):
         return
     if mode == FREE or mode == FORCED:
         free_top.prepare(inertia, q, w, top)
-    elif mode == PRESCRIBED or mode == STEPPED:
-        free_top.keep_axis(q, w, top)
+
+
+@jit
+def begin_straight(course, i):
+    """The same in mode STEPPED: apart, so that it is compiled into loops over thousands of bodies."""
+    for k in range(JERK, TOP_SIZE):
+        course.top[i, k] = 0.0
+    free_top.keep_axis(course.orientation[i], course.angular_velocity[i], course.top[i])
 
 
 @jit
@@ -194,13 +205,46 @@ def pose_at(course, i, t, x_out, q_out):
 @jit
 def state_at(course, i, t, x_out, q_out, v_out, w_out):
     """Write position, quaternion, velocity (3,) and world angular velocity (3,) of body i at the time t >= start."""
-    motion_at(course, i, t, x_out, q_out, v_out, w_out)
     if course.mode[i] == STEPPED:
-        line = course.stepped[i]
-        share = min((t - course.start[i]) / line[12], 1.0)
-        for k in range(3):
-            v_out[k] = line[k] + share * line[6 + k]
-            w_out[k] = line[3 + k] + share * line[9 + k]
+        x, q, v, w = stepped_at(course, i, t)
+        x_out[0], x_out[1], x_out[2] = x
+        q_out[0], q_out[1], q_out[2], q_out[3] = q
+        v_out[0], v_out[1], v_out[2] = v
+        w_out[0], w_out[1], w_out[2] = w
+    else:
+        motion_at(course, i, t, x_out, q_out, v_out, w_out)
+
+
+@jit
+def stepped_at(course, i, t):
+    """Position, quaternion, velocity and angular velocity, three and four numbers each, of body i in mode STEPPED.
+
+    Heaps have thousands of such: numbers, since a view of an array costs more than what is computed.
+    """
+    s = t - course.start[i]
+    share = min(s / course.stepped[i, 12], 1.0)
+    x = (
+        _moved(course.position[i, 0], course.velocity[i, 0], 0.0, 0.0, s),
+        _moved(course.position[i, 1], course.velocity[i, 1], 0.0, 0.0, s),
+        _moved(course.position[i, 2], course.velocity[i, 2], 0.0, 0.0, s),
+    )
+    q = (course.orientation[i, 0], course.orientation[i, 1], course.orientation[i, 2], course.orientation[i, 3])
+    wx, wy, wz = course.angular_velocity[i, 0], course.angular_velocity[i, 1], course.angular_velocity[i, 2]
+    if s != 0.0 and (wx != 0.0 or wy != 0.0 or wz != 0.0):
+        e0, e1, e2, e3 = exponential(s * wx, s * wy, s * wz)
+        norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+        q = product(e0, e1, e2, e3, q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm)
+    v = (
+        course.stepped[i, 0] + share * course.stepped[i, 6],
+        course.stepped[i, 1] + share * course.stepped[i, 7],
+        course.stepped[i, 2] + share * course.stepped[i, 8],
+    )
+    w = (
+        course.stepped[i, 3] + share * course.stepped[i, 9],
+        course.stepped[i, 4] + share * course.stepped[i, 10],
+        course.stepped[i, 5] + share * course.stepped[i, 11],
+    )
+    return x, q, v, w
 
 
 @jit

@@ -10,14 +10,21 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.integrate.course import state_at
+from rigidimpulse.integrate.course import STEPPED, state_at, stepped_at
 
 
 @jit
 def sample_path(course, i, times, first, last, position, orientation, velocity, angular_velocity):
     """Write frames first ... last - 1 of body i on its present course; times (f,) s, the others (f, n, ...)."""
     for f in range(first, last):
-        state_at(course, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
+        if course.mode[i] == STEPPED:
+            x, q, v, w = stepped_at(course, i, times[f])
+            position[f, i, 0], position[f, i, 1], position[f, i, 2] = x
+            orientation[f, i, 0], orientation[f, i, 1], orientation[f, i, 2], orientation[f, i, 3] = q
+            velocity[f, i, 0], velocity[f, i, 1], velocity[f, i, 2] = v
+            angular_velocity[f, i, 0], angular_velocity[f, i, 1], angular_velocity[f, i, 2] = w
+        else:
+            state_at(course, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
 
 
 @jit

@@ -39,13 +39,15 @@ class EngineRun(NamedTuple):
     spin: np.ndarray
 
 
-def run_engines(scene: Scene, step: float, steps: int, sleeping: bool = False) -> dict[str, EngineRun | str]:
-    """Run a scene in all engines, one after the other; a text says why one is left out."""
+def run_engines(
+    scene: Scene, step: float, steps: int, sleeping: bool = False, names: tuple[str, ...] = ("MuJoCo", "Bullet", "PhysX", "Rapier")
+) -> dict[str, EngineRun | str]:
+    """Run a scene in the engines named, one after the other; a text says why one is left out."""
     engines: dict[str, Callable] = {"MuJoCo": _peer("mujoco"), "Bullet": _peer("pybullet"), "PhysX": _physx, "Rapier": _rapier}
     out: dict[str, EngineRun | str] = {}
-    for name, run in engines.items():
+    for name in names:
         try:
-            out[name] = run(scene, step, steps, sleeping)
+            out[name] = engines[name](scene, step, steps, sleeping)
         except (SceneError, ImportError, OSError) as error:
             out[name] = str(error).splitlines()[0]
     return out
