@@ -74,8 +74,9 @@ other on the way. The knobs are `heap_motion`, how far bodies move past each oth
 
 ![heap](heap_costs.png)
 
-On the lines between their points other engines are three to ten times as deep in the same time, or take one and a half times to twice as long
-to be no deeper. The one setting that is faster than any here is Rapier's usual one, with overlaps of 127 mm, a quarter of a box.
+On the lines between their points other engines are three to ten times as deep in the same time, or take one and a half times to
+twice as long to be no deeper. The one setting that is faster than any here is Rapier's usual one, with overlaps of 127 mm, a quarter of a
+box.
 """
 
 

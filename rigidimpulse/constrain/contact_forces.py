@@ -112,6 +112,8 @@ def hold(context, window, group: Group) -> None:
         context.joints.log_rest(group)
     if h < rest and not group.rests:
         window.wake[group.members] = group.time + h
+    if group.shift > 0.0:
+        window.look_around(group.members, group.time, group.shift)
 
 
 def _makes_energy(context, group: Group, h: float) -> bool:
@@ -205,6 +207,7 @@ def _lift(context, window, group: Group) -> None:
     A light body turns far to make room for a heavy one: what it may come near is looked for farther away.
     """
     state, now = context.state, context.state.now
+    place, turn = now.position[group.members].copy(), now.orientation[group.members].copy()
     before = mechanical_energy(now, context.world, group.members)
     around, held = _look(context, window, group, LIFT_MARGIN), dict(zip(group.keys, group.slow().tolist(), strict=True))
     lifted = np.array([held.get(key, False) for key in around.keys], bool)
@@ -212,6 +215,8 @@ def _lift(context, window, group: Group) -> None:
     refresh_pose(group.members, now, state.rotation, state.course.inertia)
     context.log.book(group.time, "lift", mechanical_energy(now, context.world, group.members) - before)
     group.moved = True
+    reach = 2.0 * context.world.bound_radius[group.members] * np.linalg.norm(now.orientation[group.members] - turn, axis=1)
+    group.shift = float((np.linalg.norm(now.position[group.members] - place, axis=1) + reach).max())
     again = _look(context, window, group, MARGIN)
     for name in ("contacts", "place", "kinds", "features", "keys", "delta", "approach", "rest_speed", "live"):
         setattr(group, name, getattr(again, name))

@@ -13,7 +13,7 @@ from rigidimpulse.constrain.joint_limits import next_switch
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.integrate.course import FIXED
-from rigidimpulse.observe.energy import mechanical_energy
+from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 
 TURN = 0.02
 """rad, how far the bodies of a joint may turn against each other in a sub-step."""
@@ -21,8 +21,10 @@ SWAY = 0.7
 """rad, how far the fastest oscillation may go in a sub-step that the tension of joints keeps up across them; 2 is unstable."""
 NOT_CLOSED = 1e3
 """How many times farther than allowed joints may be off before that is reported."""
-MOST_SUB_STEPS = 1024
-"""Sub-steps in a step."""
+MOST_SUB_STEPS, MOST_SWAYS = 4096, 256
+"""Sub-steps in a step, and those that bounds of rates may ask for while energy is kept: light links between heavy bodies mostly stand."""
+DRIFT = 1e-7
+"""Part of its kinetic energy that a group may gain or lose in a sub-step as if nothing swayed."""
 SHORT = 1e-5
 """Part of a step below which a sub-step is planned as a longer one: closing divides by its length."""
 MOST_CUTS = 20
@@ -40,6 +42,7 @@ class JointState:
         moment: (j, 3) N s, impulse on b at the instant being worked on. shock: (j, 3) N s, by impacts, so far.
         pull: (j, 3) N, last force on b.
         are_closed: whether the forces found last close the joints.
+        drift: (j,) energy gained or lost in the last sub-step without contacts, as a part of the kinetic energy.
         began: (j,) s, start of the present sub-step. length: (j,) s, that of the one before.
         reactions: (time, joint, force (3,) on b) at the ends of sub-steps.
 
@@ -59,6 +62,8 @@ class JointState:
         self._booked_shock = np.zeros((len(joints), 3))
         self.pull = np.zeros((len(joints), 3))
         self.are_closed = True
+        self.drift = np.zeros(len(joints))
+        self._energy = np.full(len(joints), np.nan)
         self.began = np.zeros(len(joints))
         self.length = np.zeros(len(joints))
         self.reactions: list[tuple[float, int, np.ndarray]] = []
@@ -132,7 +137,16 @@ class JointState:
             )
         memory.wrench[members] = 0.0
         self.length[which] = elapsed[which]
-        context.log.book(group.time, "joints", mechanical_energy(now, context.world, members) - before)
+        after = mechanical_energy(now, context.world, members)
+        context.log.book(group.time, "joints", after - before)
+        self._note_drift(which, after, kinetic_energy(now, context.world, members))
+
+    def _note_drift(self, which: np.ndarray, energy: float, kinetic: float) -> None:
+        """What the sub-step that ends has made or lost of the energy that joints keep by themselves."""
+        begun, self._energy[which] = self._energy[which], np.nan
+        self.drift[which] = 0.0
+        if len(which) and np.all(begun == begun[0]) and kinetic > 0.0:
+            self.drift[which] = abs(energy - begun[0]) / kinetic
 
     def _book(self, context, which: np.ndarray, time: float) -> None:
         """Impulses on b of the sub-steps that end: half of what their forces were, and what stopped the joints."""
@@ -163,7 +177,9 @@ class JointState:
         waits = self.release_time[group.joints] - group.time
         h = min(h, float(waits[waits > 0.0].min(initial=np.inf)))
         step = world.accuracy.step
-        pieces = min(max(math.ceil(fastest * step / TURN), math.ceil(rates * step / SWAY), 1), MOST_SUB_STEPS)
+        most = MOST_SUB_STEPS if self.drift[group.joints].max(initial=0.0) > DRIFT else MOST_SWAYS
+        pieces = max(math.ceil(fastest * step / TURN), min(math.ceil(rates * step / SWAY), most), 1)
+        pieces = min(pieces, MOST_SUB_STEPS)
         piece = step / pieces
         return piece if h > piece * (1.0 + SHORT) else max(h, SHORT * step)
 
@@ -219,6 +235,8 @@ class JointState:
         self.moment[:] = moment
         self._log(group, h)
         self.began[group.joints] = group.time
+        if not len(group.contacts.gap) and group.free is None and self.are_passive(group.joints):
+            self._energy[group.joints] = mechanical_energy(state.now, context.world, group.members)
         self._report(context, group, worst)
         self.are_closed = worst <= NOT_CLOSED * self._allowed
         return h, residual

@@ -42,7 +42,7 @@ def integrate(context, window, group: Group) -> None:
     if group.heap is not None:
         context.heaps.take_courses(context, window, group)
     for n, i in enumerate(group.members.tolist()):
-        if window.inside[i] or (group.rests and course.mode[i] == FIXED):
+        if window.inside[i] or (group.rests and course.mode[i] == FIXED and not group.moved):
             continue
         if (
             group.moved

@@ -61,12 +61,12 @@ def test_a_linkage_at_its_full_reach_is_stopped(plate: bool) -> None:
     """No pose closes a linkage that is asked to go beyond its reach: the search for one ran away.
 
     With the plate that ended the run with "cannot convert float NaN to integer"; without it the rod "broke" with a force of
-    nan N and the state was not finite. Now the forces are refused and the joints closed where they are: like an impact, which takes energy.
+    nan N and the state was not finite. Now sub-steps get so short that the linkage stops: like an impact, which takes energy.
     Joints hold to 1e-10 of their size wherever a step ends, and energy may grow by (w h)^2, 1e-3.
     """
     run = ri.simulate(linkage(plate), 0.3)
     assert np.all(np.isfinite(run.positions)) and np.all(np.isfinite(run.velocities))
-    assert [event.kind for event in run.status.events] == ["joints not closed"]
+    assert run.status.ok, run.status.message
     rod = np.linalg.norm(run.position("stone") - run.position("wheel"), axis=1)
     pin = run.position("wheel") + rotate(run.orientation("wheel"), np.tile([0.15, 0, 0.25], (len(run.times), 1)))
     np.testing.assert_allclose(rod, np.sqrt(5.0), rtol=1e-10)
