@@ -111,10 +111,13 @@ def _momentum(plan: ScenePlan, run: ri.Recording, mass, acceleration) -> list[st
 
 
 def _captured(run: ri.Recording, mass) -> float:
-    """N s that captures may have pulled: k of them that take E off the motion of m pull by sqrt(2 m E k) at most (Cauchy and Schwarz)."""
+    """N s that captures may have pulled: k of them that take E off the motion of m pull by sqrt(2 m E k) at most (Cauchy and Schwarz).
+
+    By a floor that moves, captures may as well have given: then E is what they took, and the work of the floor, together.
+    """
     assert run.ledger is not None
-    energy = float(run.ledger.dissipated.get("capture", np.zeros(1))[-1])
-    return float(np.sqrt(2.0 * mass.sum() * max(energy, 0.0) * len(run.contacts)))
+    energy = abs(float(run.ledger.dissipated.get("capture", np.zeros(1))[-1]))
+    return float(np.sqrt(2.0 * mass.sum() * energy * len(run.contacts)))
 
 
 def _impulse_of_supports(run: ri.Recording, number: int) -> np.ndarray:
