@@ -70,8 +70,11 @@ def release(context, window: Window, time: float, bodies: np.ndarray, groups: li
     if not len(bodies):
         return
     free = np.zeros(6)
-    held = np.concatenate([group.members for group in groups]) if groups else bodies[:0]
-    left = np.setdiff1d(bodies, held)
+    leaves = np.zeros(len(state.under_contact), bool)
+    leaves[bodies] = True
+    for group in groups:
+        leaves[group.members] = False
+    left = leaves.nonzero()[0]
     left = left[(state.course.start[left] < time) & ~window.inside[left]]
     for i in left.tolist():
         take_course(context, window, i, time, free, rests=False)

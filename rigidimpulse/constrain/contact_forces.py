@@ -233,10 +233,10 @@ def _rests(context, group: Group, h: float) -> bool:
     """Whether all members stand still and their loads are carried, on supports that do not move."""
     world, now = context.world, context.state.now
     i = group.members
-    supports = np.unique(np.concatenate([group.contacts.body_a, group.contacts.body_b]))
+    moves = world.moving[group.contacts.body_a].any() or world.moving[group.contacts.body_b].any()
     if len(group.joints):
-        supports = np.union1d(supports, context.joints.bodies_of(group.joints))
-    if np.any(world.moving[supports]) or (group.loaded and not context.forces.may_rest(i)):
+        moves = moves or world.moving[context.joints.bodies_of(group.joints)].any()
+    if moves or (group.loaded and not context.forces.may_rest(i)):
         return False
     limit = TOLERANCES.rest * world.steady_strength[i] * h
     force, torque = context.wrench[i, :3], context.wrench[i, 3:]

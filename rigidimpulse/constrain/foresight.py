@@ -45,8 +45,10 @@ class Foresight:
         motion: what `contact_motion` said of them; wrench (n, 6): of their forces.
         """
         world, state, now = context.world, context.state, context.state.now
-        others = np.setdiff1d(np.concatenate([contacts.body_a, contacts.body_b]), group.members)
-        for i in others:
+        beside = np.zeros(world.num_bodies, bool)
+        beside[contacts.body_a] = beside[contacts.body_b] = True
+        beside[group.members] = False
+        for i in beside.nonzero()[0]:
             self._copy(state, i)
         self._bring(now, group.members, context.acceleration, wrench, h)
         normal = contacts.normal + h * motion.normal_rate

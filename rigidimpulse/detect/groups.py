@@ -167,7 +167,9 @@ def _partners(context, bodies: np.ndarray) -> np.ndarray:
     pressed = bodies[state.under_contact[bodies]]
     if not len(pressed):
         return partners
-    sharers = (state.under_contact & np.isin(state.sharing, state.sharing[pressed])).nonzero()[0]
+    shares = np.zeros(len(state.sharing), bool)
+    shares[state.sharing[pressed]] = True
+    sharers = (state.under_contact & shares[state.sharing]).nonzero()[0]
     return np.concatenate([partners, sharers])
 
 

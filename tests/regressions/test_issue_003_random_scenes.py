@@ -61,7 +61,8 @@ def test_a_linkage_at_its_full_reach_is_stopped(plate: bool) -> None:
     """No pose closes a linkage that is asked to go beyond its reach: the search for one ran away.
 
     With the plate that ended the run with "cannot convert float NaN to integer"; without it the rod "broke" with a force of
-    nan N and the state was not finite. Now sub-steps get so short that the linkage stops: like an impact, which takes energy.
+    nan N and the state was not finite. The wheel of 4 g whips round in a thousandth of a step, and the stone goes back. Nothing takes energy
+    in truth; where 4,096 sub-steps a step are too few for the whip some percent are lost, where it was one force for all of it, half.
     Joints hold to 1e-10 of their size wherever a step ends, and energy may grow by (w h)^2, 1e-3.
     """
     run = ri.simulate(linkage(plate), 0.3)
@@ -73,7 +74,7 @@ def test_a_linkage_at_its_full_reach_is_stopped(plate: bool) -> None:
     np.testing.assert_allclose(pin, [(1.15, 0, 1.75)] * len(run.times), atol=1e-10)
     assert np.all(np.isfinite(run.reaction("rod"))) and np.all(np.isfinite(run.reaction("hinge")))
     assert rise(run) < 1e-3 * run.ledger.kinetic[0]
-    assert run.ledger.kinetic[-1] < 0.9 * run.ledger.kinetic[0]
+    assert run.ledger.kinetic[-1] > 0.8 * run.ledger.kinetic[0]
 
 
 @pytest.mark.parametrize(("box", "radius", "height"), [((0.1, 0.3, 0.1), 0.25, 0.16), ((0.05, 0.15, 0.08), 0.3, 0.2)])
