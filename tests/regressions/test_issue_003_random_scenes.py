@@ -61,8 +61,8 @@ def test_a_linkage_at_its_full_reach_is_stopped(plate: bool) -> None:
     """No pose closes a linkage that is asked to go beyond its reach: the search for one ran away.
 
     With the plate that ended the run with "cannot convert float NaN to integer"; without it the rod "broke" with a force of
-    nan N and the state was not finite. The wheel of 4 g whips round in a thousandth of a step, and the stone goes back. Nothing takes energy
-    in truth; where 4,096 sub-steps a step are too few for the whip some percent are lost, where it was one force for all of it, half.
+    nan N and the state was not finite. The wheel of 4 g whips round in a thousandth of a step, and the stone goes back. In truth
+    nothing is lost; where 4,096 sub-steps a step are too few for the whip some percent are, where it was one force for all of it, half.
     Joints hold to 1e-10 of their size wherever a step ends, and energy may grow by (w h)^2, 1e-3.
     """
     run = ri.simulate(linkage(plate), 0.3)
