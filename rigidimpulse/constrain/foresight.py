@@ -48,7 +48,7 @@ class Foresight:
         beside = np.zeros(world.num_bodies, bool)
         beside[contacts.body_a] = beside[contacts.body_b] = True
         beside[group.members] = False
-        for i in beside.nonzero()[0]:
+        for i in beside.nonzero()[0].tolist():
             self._copy(state, i)
         self._bring(now, group.members, context.acceleration, wrench, h)
         normal = contacts.normal + h * motion.normal_rate
