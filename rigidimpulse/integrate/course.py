@@ -101,12 +101,12 @@ def make_course(num_bodies: int) -> Course:
 def begin(course, i):
     """Prepare `course.top[i]`; call it after any other column of row i has changed. Rates that the mode has not are set to 0."""
     mode = course.mode[i]
-    if mode != FORCED:
-        for k in range(TORQUE_RATE if mode == FREE else JERK, TOP_SIZE):
-            course.top[i, k] = 0.0
     if mode == PRESCRIBED or mode == STEPPED:
         begin_straight(course, i)
         return
+    if mode != FORCED:
+        for k in range(TORQUE_RATE if mode == FREE else JERK, TOP_SIZE):
+            course.top[i, k] = 0.0
     inertia, q, w, top = course.inertia[i], course.orientation[i], course.angular_velocity[i], course.top[i]
     if mode == FORCED and forced_top.prepare(inertia, q, w, course.torque[i], top[TORQUE_RATE:], top):
         return
@@ -116,7 +116,7 @@ def begin(course, i):
 
 @jit
 def begin_straight(course, i):
-    """The same in mode STEPPED: apart, so that it is compiled into loops over thousands of bodies."""
+    """The same in modes PRESCRIBED and STEPPED: apart, so that it is compiled into loops over thousands of bodies."""
     for k in range(JERK, TOP_SIZE):
         course.top[i, k] = 0.0
     free_top.keep_axis(course.orientation[i], course.angular_velocity[i], course.top[i])
