@@ -313,7 +313,7 @@ def fly(context: StepContext, plan: Plan, flight: EventRun, stop: float) -> int:
 def finish_sub_steps(context: StepContext, plan: Plan, end: float) -> None:
     """End the sub-steps of joints and contacts at the end of the run, so that the last frame has the velocities of its instant."""
     state = context.state
-    bodies = {i for pair in state.pair_force for i in pair if context.world.dynamic[i]}
+    bodies = {i for pair in state.pair_force for i in pair if state.under_contact[i]}
     if context.joints is not None:
         bodies.update(context.joints.moving_bodies(context).tolist())
     if bodies:

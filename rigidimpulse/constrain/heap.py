@@ -263,6 +263,8 @@ class Heaps:
 
     def join(self, context, window, time: float, groups: list[Group]) -> list[Group]:
         """The groups at `time` with the heaps that they touch; at the start of a step all of its heaps."""
+        if window.end <= window.begin:  # the end of the run: there is no time to step a heap over
+            return [group for group in groups if np.all(self.label[group.members] < 0)]
         first = not window.heaps_begun
         window.heaps_begun = True
         hit = [group for group in groups if np.any(self.label[group.members] >= 0)]
@@ -302,8 +304,7 @@ class Heaps:
             self._leave_out_fast(context, stays)
             stays[group.members] |= ~self._leaves(context, group)
             near = group.members[stays[group.members] & ~self._jointed[group.members]]
-            label = int(self.label[members].max())
-            self.label[np.setdiff1d(near, members)] = label
+            self.label[np.setdiff1d(near, members)] = self.label[members].max()
             group.heap = members = np.union1d(members, near)
             window.inside[members] = True
             context.wrench[group.members] = 0.0
