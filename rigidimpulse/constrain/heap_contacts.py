@@ -172,12 +172,13 @@ def _write(geometry, bodies, a, b, carrier, real, c, factor_a, factor_b, coeffic
 
 @jit
 def store_contacts(
-    geometry, bodies, pairs, places, margins, convex, factor, coefficients, real, integer, count, order, rows, ids, used
+    geometry, solid, bodies, pairs, places, margins, convex, prism, factor, coefficients, real, integer, count, order, rows, ids, used
 ):
     """Put the contacts found for the pairs at `places` into rows from `used` on, with the impulses of those they replace.
 
     real, integer: `count` contacts in the order of the places, `integer[:, :2]` by indices of the scene, order (n,) indices by rank;
-    convex (polyhedra) and factor (n,) by rank; margins (k,) m. Returns the rows used.
+    solid: the geometry by which bodies inside each other are found, of those that are convex (n,) bool, some of them prisms for cylinders
+    (n,) bool; these and factor (n,) by rank; margins (k,) m. Returns the rows used.
     """
     c = np.int64(0)
     deep, deep_ids = np.empty((MOST_SUNK, 10)), np.empty((MOST_SUNK, 3), np.int64)
@@ -191,7 +192,10 @@ def store_contacts(
         new = used
         size = min(bodies.inner[a], bodies.inner[b])
         carrier = pairs.carrier[p]
-        sunk = _sunk(geometry, bodies, convex, factor, a, b, real, first, last, FLUSH * size, deep, deep_ids)
+        # It costs much to find that prisms are apart: they are asked where contacts were, or nothing is known.
+        sunk = 0
+        if not (prism[a] or prism[b]) or pairs.count[p] > 0 or not pairs.known[p]:
+            sunk = _sunk(solid, bodies, convex, factor, a, b, real, first, last, FLUSH * size, deep, deep_ids)
         for s in range(sunk if sunk > 0 else last - first):
             if sunk > 0:
                 separation = _write(geometry, bodies, a, b, carrier, deep, s, 1.0, 1.0, coefficients, rows, used)

@@ -19,6 +19,7 @@ from rigidimpulse.constrain.heap_cover import Cover
 from rigidimpulse.constrain.heap_fill import fill, keep_impulses, place_bodies
 from rigidimpulse.constrain.heap_motion import energies, note_pressed, slow_down
 from rigidimpulse.constrain.heap_narrow import classify, look, most_motion, review
+from rigidimpulse.constrain.heap_overlap import solids
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
 from rigidimpulse.constrain.heap_records import (
     FIELDS,
@@ -84,7 +85,9 @@ class HeapStepper:
         self.geometry, factor = shrunk_geometry(world.geometry, dynamic_shapes)
         convex = convex_polyhedra(world.geometry)
         self.shapes = make_polyhedra(world.geometry, convex)
-        self._factor, self._convex = factor[world.shape_of_body[self.order]], convex[world.shape_of_body[self.order]]
+        self._solid, prism = solids(world.shapes, world.geometry, convex)
+        kinds = world.shape_of_body[self.order]
+        self._factor, self._prism, self._convex = factor[kinds], prism[kinds], (convex | prism)[kinds]
         bound = np.where(np.isfinite(world.bound_radius), world.bound_radius, 0.0)
         lost = (1.0 - factor[world.shape_of_body]) * bound
         self._taken_off = lost[self.order]
@@ -199,8 +202,8 @@ class HeapStepper:
         # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
         table.make_room(found + MOST_SUNK * len(places) + 1)
         table.used = store_contacts(
-            world.geometry, self.bodies, pairs, places, margin, self._convex, self._factor, world.coefficients, context.contact_real,
-            context.contact_int, found, self.order, table.rows, table.ids, table.used,
+            world.geometry, self._solid, self.bodies, pairs, places, margin, self._convex, self._prism, self._factor, world.coefficients,
+            context.contact_real, context.contact_int, found, self.order, table.rows, table.ids, table.used,
         )  # fmt: skip
 
     def _fill(self, h: float) -> int:
