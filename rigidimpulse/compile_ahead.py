@@ -207,7 +207,7 @@ def _step_heap(context) -> None:
     context.recorder.flush_all(state.course, members, STEP)
     let_fly(state.course, members, steady)
     mark_slow(now, stepper.inner, 1.0, 1.0, np.array([False, True]))
-    most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin)
+    most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin, 0.5)
     count_calm(
         members, out.position, out.orientation, out.velocity, context.world.steady_strength, stepper.inner, stepper.skin, STEP,
         np.zeros((2, 7)), np.zeros(2),
