@@ -104,19 +104,20 @@ def _momentum(plan: ScenePlan, run: ri.Recording, mass, acceleration) -> list[st
         # Sums since the start: at a frame inside a sub-step each body has its own share of the forces of that sub-step.
         pull = float(-given[:, 2].min())
         drag = float((np.linalg.norm(given[:, :2], axis=1) - _greatest_friction(plan) * given[:, 2]).max())
-        allowed = FLOOR * allowed + _captured(run, mass)
+        allowed = FLOOR * allowed + _captured(run, mass, moves=any(plan.support_velocity))
         if max(pull, drag) > allowed:
             return [f"floor pulls by {pull:.1e} N s, drags too much by {drag:.1e} N s, allowed {allowed:.1e}"]
     return []
 
 
-def _captured(run: ri.Recording, mass) -> float:
+def _captured(run: ri.Recording, mass, moves: bool) -> float:
     """N s that captures may have pulled: k of them that take E off the motion of m pull by sqrt(2 m E k) at most (Cauchy and Schwarz).
 
-    By a floor that moves, captures may as well have given: then E is what they took, and the work of the floor, together.
+    Where the floor moves, its work is part of what the ledger has, which then may be of either sign.
     """
     assert run.ledger is not None
-    energy = abs(float(run.ledger.dissipated.get("capture", np.zeros(1))[-1]))
+    energy = float(run.ledger.dissipated.get("capture", np.zeros(1))[-1])
+    energy = abs(energy) if moves else max(energy, 0.0)
     return float(np.sqrt(2.0 * mass.sum() * energy * len(run.contacts)))
 
 
