@@ -189,7 +189,7 @@ def _look_at_heap(context) -> None:
     stepper.near(context, member, ~member, STEP)
     # Columns of one row only would be another type.
     a, b = np.array([[0, 1], [0, 1]]).T
-    refusals(world, islands(world.num_bodies, a, b, member), member, ~member, a, b, True)
+    refusals(world, islands(world.num_bodies, a, b, member), member, ~member, member, a, b, True)
 
 
 def _step_heap(context) -> None:

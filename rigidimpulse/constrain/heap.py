@@ -17,7 +17,7 @@ import numpy as np
 
 from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_fly, mark_slow, most_stray, stirred
-from rigidimpulse.constrain.heap_islands import FAST, MANY, SPIN, TALL, islands, refusals, support_levels
+from rigidimpulse.constrain.heap_islands import FAST, MANY, SPIN, TALL, islands, moving, refusals, support_levels
 from rigidimpulse.constrain.heap_stepper import HeapStepper, Outcome
 from rigidimpulse.detect.groups import Group, empty_contacts
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs
@@ -31,7 +31,7 @@ REST = 3.0
 LEAVING = 0.1
 """Part of its speed at which a fast body must leave a heap that it has hit to be no part of it."""
 MOST_PIECES = 4
-"""Parts of a step at most, between which a heap's courses begin anew."""
+"""Parts of what is stepped at once, between which a heap's courses begin anew."""
 STRAY = 10.0
 """Skins by which courses may stray from the ways of turning bodies, over `Accuracy.heap_motion`: half a skin by default."""
 TOUCHES = 5.0
@@ -136,15 +136,13 @@ class Heaps:
         context.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
         self._leave_out_fast(context, member)
         a, b = self._near(context, member, ahead)
-        while True:
-            woken = self._touched(context, member, a, b)
-            if not len(woken):
-                break
+        while len(woken := self._touched(context, member, a, b)):
             member[woken] = True
             a, b = self._near(context, member, ahead)
         root = islands(world.num_bodies, a, b, member)
         root[~member] = -1
-        refused = refusals(world, root, self.label >= 0, self._jointed, a, b, self._auto)
+        moves = moving(context.state.now, world.steady_strength, self.stepper.inner)
+        refused = refusals(world, root, self.label >= 0, self._jointed, moves, a, b, self._auto)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         chosen = self._low(context, window, chosen, root, refused)
         for reason in refused.values():
@@ -156,7 +154,7 @@ class Heaps:
     def _leave_out_fast(self, context, member: np.ndarray) -> None:
         """Unmark those that are too fast for sub-steps."""
         h = self.stepper.sub_step(np.flatnonzero(context.world.dynamic))
-        mark_slow(context.state.now, self.stepper.inner, FAST / h, SPIN / context.world.accuracy.step, member)
+        mark_slow(context.state.now, self.stepper.inner, FAST / h, SPIN / h, member)
 
     def _near(self, context, member: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray]:
         # Movable bodies under way that are no members are swept.
@@ -337,14 +335,12 @@ class Heaps:
             context.state.under_contact[i] = False
 
     def _end_of(self, context, window, time: float, members: np.ndarray) -> float:
-        """When the courses of members end: before the step does where straight ways would stray from those of turning bodies.
-
-        The centre of a body that rolls over a point at r strays by r (w h)^2 / 8 in h s.
-        """
+        """When the courses of members end: before the step does where bodies are tiny, spin fast, or stray from their straight ways."""
         stepper, accuracy = self.stepper, context.world.accuracy
         step, allowed = accuracy.step, STRAY * accuracy.heap_motion
         stray = most_stray(context.state.now, members, stepper.pressed, stepper.reach, stepper.skin, allowed)
-        pieces = min(max(math.ceil(stray * step), 1), MOST_PIECES)
+        spans = max(math.ceil(step / stepper.span(members) - 1e-9), 1)
+        pieces = max(min(math.ceil(stray * step), MOST_PIECES * spans), spans)
         left = max(math.ceil((window.end - time) * pieces / step - 1e-6), 1)
         return window.end if left == 1 else time + (window.end - time) / left
 

@@ -2,7 +2,7 @@
 
 Those kernels want bodies apart. So that soft contacts may sink in, convex bodies are shown to them shrunk about their centre of
 mass by `shrunk` of all lengths: normals stay the same, and points are put back to where they are on the true body. Other bodies
-are shown as they are; where they overlap, the contacts they had before they did are kept.
+that move are shown by their cores (`heap_cores`); where even these overlap, the contacts they had before they did are kept.
 """
 
 from __future__ import annotations
@@ -11,8 +11,12 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.contact_motion import only_primitive, side_radius
-from rigidimpulse.constrain.heap_narrow import NEAR, hand_over, note_seen, write_row
-from rigidimpulse.constrain.heap_overlap import FLUSH, deepest_normal, gap_along, overlap_contacts, support
+from rigidimpulse.constrain.heap_cores import put_back
+from rigidimpulse.constrain.heap_depth import make_polytope
+from rigidimpulse.constrain.heap_hulls import make_simplex
+from rigidimpulse.constrain.heap_narrow import NEAR, POINTS, hand_over, note_seen, write_row
+from rigidimpulse.constrain.heap_overlap import gap_along, overlap_contacts, support
+from rigidimpulse.constrain.heap_polyhedra import make_scratch
 from rigidimpulse.constrain.heap_rows import CORE_A, CORE_B, ROUND_A, ROUND_B, SKIN, turned
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.manifold import reduce_contacts
@@ -20,8 +24,6 @@ from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
 
 SHRINK = 1.5 * TOLERANCES.skin
 """Part of their lengths by which convex bodies are shrunk for the contact kernels."""
-MOST_SUNK = 8
-"""Contacts of a pair of bodies that sank into each other, at most."""
 PER_NORMAL = np.int64(4)
 """Contacts kept of one normal, beside the deepest."""
 FARTHER = 1.5
@@ -130,21 +132,14 @@ def _contradicts(bodies, pairs, p, rows, new, new_end):
 
 
 @jit
-def _sunk(geometry, bodies, convex, factor, a, b, real, first, last, flush, deep, deep_ids):
-    """Contacts into deep (cap, 10), deep_ids (cap, 3) of convex bodies that the kernels found no sound contact for; their number."""
-    if not (convex[a] and convex[b]) or factor[a] * factor[b] == 1.0:
-        return 0
+def _is_sound(geometry, bodies, factor, a, b, real, first, last):
+    """Whether the shrunk bodies are apart along the normal of a contact found for them."""
     p, q = geometry.shape_first[bodies.shape[a]], geometry.shape_first[bodies.shape[b]]
-    bearing = np.empty(3)
     for s in range(first, last):
-        # Along a sound contact's normal the shrunk bodies are apart.
         gap = gap_along(geometry, bodies, a, b, p, q, real[s, 6:9])
         if gap + _shrunk_by(geometry, bodies, factor, a, b, p, q, real[s, 6:9]) > 0.0:
-            return 0
-    depth, of_b = deepest_normal(geometry, bodies, a, b, p, q, bearing)
-    if depth > 0.0:
-        return 0
-    return overlap_contacts(geometry, bodies, a, b, p, q, bearing, depth, of_b, flush, deep, deep_ids)
+            return True
+    return False
 
 
 @jit
@@ -172,16 +167,19 @@ def _write(geometry, bodies, a, b, carrier, real, c, factor_a, factor_b, coeffic
 
 @jit
 def store_contacts(
-    geometry, solid, bodies, pairs, places, margins, convex, prism, factor, coefficients, real, integer, count, order, rows, ids, used
+    geometry, shown, back, polyhedra, bodies, pairs, places, margins, convex, factor, depth, coefficients, real, integer, count, order,
+    rows, ids, used,
 ):
     """Put the contacts found for the pairs at `places` into rows from `used` on, with the impulses of those they replace.
 
     real, integer: `count` contacts in the order of the places, `integer[:, :2]` by indices of the scene, order (n,) indices by rank;
-    solid: the geometry by which bodies inside each other are found, of those that are convex (n,) bool, some of them prisms for cylinders
-    (n,) bool; these and factor (n,) by rank; margins (k,) m. Returns the rows used.
+    geometry: the true shapes; shown: as the contacts were found; back, depth (n,) m by rank: see `heap_cores`; polyhedra: by which bodies
+    inside each other are found, of those that are convex (n,) bool, see `heap_overlap`; these and factor (n,) by rank; margins (k,) m.
+    Returns the rows used.
     """
     c = np.int64(0)
-    deep, deep_ids = np.empty((MOST_SUNK, 10)), np.empty((MOST_SUNK, 3), np.int64)
+    deep, deep_ids = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
+    work = np.empty(3), np.zeros(3), np.empty((3, 3)), make_simplex(), make_polytope(), make_scratch()
     for k in range(places.shape[0]):
         p = places[k]
         a, b = pairs.first[p], pairs.second[p]
@@ -192,15 +190,15 @@ def store_contacts(
         new = used
         size = min(bodies.inner[a], bodies.inner[b])
         carrier = pairs.carrier[p]
-        # It costs much to find that prisms are apart: they are asked where contacts were, or nothing is known.
         sunk = 0
-        if not (prism[a] or prism[b]) or pairs.count[p] > 0 or not pairs.known[p]:
-            sunk = _sunk(solid, bodies, convex, factor, a, b, real, first, last, FLUSH * size, deep, deep_ids)
+        if convex[a] and convex[b] and factor[a] * factor[b] < 1.0 and not _is_sound(geometry, bodies, factor, a, b, real, first, last):
+            sunk = overlap_contacts(polyhedra, bodies, a, b, size, work, deep, deep_ids)
         for s in range(sunk if sunk > 0 else last - first):
             if sunk > 0:
                 separation = _write(geometry, bodies, a, b, carrier, deep, s, 1.0, 1.0, coefficients, rows, used)
                 ids[used] = deep_ids[s]
             else:
+                put_back(shown, back, depth, bodies, a, b, real, integer, first + s)
                 separation = _write(geometry, bodies, a, b, carrier, real, first + s, factor[a], factor[b], coefficients, rows, used)
                 ids[used] = integer[first + s, 2:]
             if separation <= margins[k]:

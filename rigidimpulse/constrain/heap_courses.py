@@ -8,6 +8,8 @@ from rigidimpulse.rotation import product, quaternion_to_matrix
 
 CALM, PLAY = 0.05, 0.5
 """Speed, in sqrt(g r), and motion, in skins, below which a body is calm."""
+TURN = 2.5
+"""Angle by which a body may turn in one course, rad."""
 
 
 @jit
@@ -64,15 +66,18 @@ def mark_slow(bodies, inner, farthest, fastest, member):
 
 @jit
 def most_stray(bodies, members, pressed, reach, skin, allowed):
-    """Largest w sqrt(r / (8 d)) of the members that contacts act on, 1/s; d: `allowed` skins."""
+    """Largest w / TURN of the members, and w sqrt(r / (8 d)) of those that contacts act on, 1/s; d: `allowed` skins.
+
+    The centre of a body that rolls over a point at r strays by d = r (w h)^2 / 8 from its straight way in h s.
+    """
     most = 0.0
     for i in members:
-        if not pressed[i]:
-            continue
         spin = 0.0
         for c in range(3):
             spin += bodies.angular_velocity[i, c] ** 2
-        most = max(most, np.sqrt(spin * reach[i] / (8.0 * allowed * skin[i])))
+        most = max(most, np.sqrt(spin) / TURN)
+        if pressed[i]:
+            most = max(most, np.sqrt(spin * reach[i] / (8.0 * allowed * skin[i])))
     return most
 
 

@@ -4,7 +4,7 @@ With X_a the points of body a less their centre c_a, the gap of the bodies is th
 and v / |v| the axis of largest gap. It is found by the algorithm of Gilbert, Johnson and Keerthi (1988): from simplices of corners,
 w = argmin over y - x of v.w is added until |v|^2 - v.w is round-off, and corners that do not bear v are dropped. For bodies inside each
 other it is done again with both taken smaller about their centres by SHRINK: normals of faces stay the same, and gaps are those of
-the true bodies along them. Bodies that are deeper inside get the face of largest gap.
+the true bodies along them. Where these are inside each other, too, the axis is that of their least depth (`heap_depth`).
 
 Where a face has the largest gap, but for EDGE_WINS of the smaller inner radius, it is cut with the face that looks at it; else the
 closest points are the contact.
@@ -19,6 +19,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.heap_clip import clip_faces, face_like
+from rigidimpulse.constrain.heap_depth import EXACT, MOST_CORNERS, add_corner, nearest_face, start
 from rigidimpulse.constrain.heap_polyhedra import EDGE_WINS
 from rigidimpulse.constrain.heap_rows import turned, turned_back
 
@@ -164,6 +165,17 @@ def _farthest(corner, first, last, x, y, z):
 
 
 @jit
+def _farthest_of_both(corner, a0, a1, b0, b1, c, x, y, z):
+    """The corner of a farthest along (x, y, z), and how far; that of b farthest the other way, and how far."""
+    i, high = _farthest(corner, a0, a1, x, y, z)
+    bx, by, bz = (
+        c[0, 0] * x + c[1, 0] * y + c[2, 0] * z, c[0, 1] * x + c[1, 1] * y + c[2, 1] * z, c[0, 2] * x + c[1, 2] * y + c[2, 2] * z
+    )  # fmt: skip
+    j, low = _farthest(corner, b0, b1, -bx, -by, -bz)
+    return i, high, j, low
+
+
+@jit
 def closest(shapes, s, t, d, c, small, margin, simplex):
     """Axis of the largest gap in the axes of a, the gap along it, m, and how many corners bear it, 0 where that is above `margin`.
 
@@ -174,11 +186,7 @@ def closest(shapes, s, t, d, c, small, margin, simplex):
     count, square = np.int64(0), inf
     x, y, z, gap = d[0], d[1], d[2], 0.0
     for _ in range(MOST_ROUNDS):
-        i, high = _farthest(corner, a0, a1, x, y, z)
-        bx, by, bz = (
-            c[0, 0] * x + c[1, 0] * y + c[2, 0] * z, c[0, 1] * x + c[1, 1] * y + c[2, 1] * z, c[0, 2] * x + c[1, 2] * y + c[2, 2] * z
-        )  # fmt: skip
-        j, low = _farthest(corner, b0, b1, -bx, -by, -bz)
+        i, high, j, low = _farthest_of_both(corner, a0, a1, b0, b1, c, x, y, z)
         length = sqrt(x * x + y * y + z * z)
         if length == 0.0:
             return x, y, z, 0.0, np.int64(5)
@@ -207,6 +215,37 @@ def closest(shapes, s, t, d, c, small, margin, simplex):
     if length == 0.0:
         return x, y, z, 0.0, np.int64(5)
     return x / length, y / length, z / length, gap, count
+
+
+@jit
+def least_deep(shapes, s, t, d, c, small, exact, simplex, polytope):
+    """Axis of the least depth of bodies inside each other, as `closest` gives it, from its simplex; 5 corners where there is none."""
+    corner, w = shapes.corner, polytope.w
+    a0, a1, b0, b1 = shapes.corner_first[s], shapes.corner_first[s + 1], shapes.corner_first[t], shapes.corner_first[t + 1]
+    faces, gap = start(polytope, simplex), 0.0
+    f = nearest_face(polytope, faces)
+    for corners in range(4, MOST_CORNERS + 1):
+        if faces == 0:
+            return 1.0, 0.0, 0.0, 0.0, np.int64(5)
+        f = nearest_face(polytope, faces)
+        x, y, z = -polytope.plane[f, 0], -polytope.plane[f, 1], -polytope.plane[f, 2]
+        i, high, j, low = _farthest_of_both(corner, a0, a1, b0, b1, c, x, y, z)
+        middle = d[0] * x + d[1] * y + d[2] * z
+        gap = middle - low - high
+        if corners == MOST_CORNERS or -(middle - small * (low + high)) <= polytope.plane[f, 3] + exact:
+            break
+        for m in range(3):
+            turned_b = c[m, 0] * corner[j, 0] + c[m, 1] * corner[j, 1] + c[m, 2] * corner[j, 2]
+            w[corners, m] = d[m] + small * (turned_b - corner[i, m])
+        polytope.corner[corners, 0], polytope.corner[corners, 1] = i, j
+        faces = add_corner(polytope, corners, faces)
+    for n in range(3):
+        k = polytope.face[f, n]
+        for m in range(3):
+            simplex.w[n, m] = w[k, m]
+        simplex.corner[n, 0], simplex.corner[n, 1] = polytope.corner[k, 0], polytope.corner[k, 1]
+    count = _reduce(simplex, 3)
+    return -polytope.plane[f, 0], -polytope.plane[f, 1], -polytope.plane[f, 2], gap, count
 
 
 @jit
@@ -262,18 +301,26 @@ def _one_contact(shapes, rotation, a, d, c, n, gap, count, simplex, real, ids):
 
 
 @jit
-def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, scratch, real, ids):
+def seen_from(rotation, a, b, between, c):
+    """The pose of b in the axes of a: writes R_a^T R_b to c (3, 3), returns its centre; between: from a to b, world."""
+    for i in range(3):
+        for j in range(3):
+            c[i, j] = rotation[a, 0, i] * rotation[b, 0, j] + rotation[a, 1, i] * rotation[b, 1, j] + rotation[a, 2, i] * rotation[b, 2, j]
+    return turned_back(rotation, a, between[0], between[1], between[2])
+
+
+@jit
+def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, polytope, scratch, real, ids):
     """Contacts of two convex polyhedra relative to the first body; returns their number and a bound of the gap.
 
     between: from a to b, world; origin: (0, 0, 0); size: smaller inner radius, m; c: room (3, 3).
     """
-    d = turned_back(rotation, a, between[0], between[1], between[2])
-    for i in range(3):
-        for j in range(3):
-            c[i, j] = rotation[a, 0, i] * rotation[b, 0, j] + rotation[a, 1, i] * rotation[b, 1, j] + rotation[a, 2, i] * rotation[b, 2, j]
+    d = seen_from(rotation, a, b, between, c)
     nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0, margin, simplex)
     if count == 5:
         nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0 - SHRINK, margin, simplex)
+    if count == 5:
+        nx, ny, nz, gap, count = least_deep(shapes, s, t, d, c, 1.0 - SHRINK, EXACT * size, simplex, polytope)
     if count == 0:
         return count, gap
     if count < 5:

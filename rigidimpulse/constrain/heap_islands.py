@@ -2,15 +2,16 @@
 
 The exact solver is the better one wherever it can be afforded. "auto" takes an island for a heap only where all of this holds:
 
-    many        at least MANY movable bodies (KEPT for one that is a heap already)
+    many        at least MANY movable bodies, or FEW that move (faster than what is calm, see `heap_courses`) in a scene of MANY;
+                KEPT for one that is a heap already
     no joints   they want exact rows
 and, where a heap begins (who comes near one later is taken in):
     alike       no two neighbours of masses beyond RATIO : 1
     dull        no restitution above REBOUND: a rebound is found at the end of the step only
     low         no body more than TALL others above a support: long columns want exact rows
 
-"substepped" takes every island without joints. Bodies that move farther than FAST of their inner radius in a sub-step, or spin
-more than SPIN in a step, are no part of any: they are swept.
+"substepped" takes every island without joints. Bodies that move farther than FAST of their inner radius in a sub-step, or turn
+by more than SPIN rad, are no part of any: they are swept.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse._jit import jit
+from rigidimpulse.constrain.heap_courses import CALM
 from rigidimpulse.constrain.heap_narrow import in_play
 from rigidimpulse.constrain.heap_rows import SEPARATION, SKIN, SUPPORT
 
-MANY, KEPT = 60, 30
+MANY, FEW, KEPT = 60, 8, 4
 RATIO, REBOUND, TALL = 30.0, 0.5, 12
-FAST, SPIN = 0.5, 2.5
+FAST, SPIN = 0.5, 2.5 / 16.0
 
 
 @jit
@@ -79,15 +81,22 @@ def support_levels(bodies, pairs, rows, tall):
     return level
 
 
+def moving(now, strength: np.ndarray, inner: np.ndarray) -> np.ndarray:
+    """Which bodies (n,) bool are faster than what is calm; strength (n,) m/s2 of what pulls them, inner (n,) m."""
+    radius = np.where(np.isfinite(inner), inner, 0.0)
+    speed = np.linalg.norm(now.velocity, axis=1) + radius * np.linalg.norm(now.angular_velocity, axis=1)
+    return speed > CALM * np.sqrt(strength * radius)
+
+
 def refusals(
-    world, root: np.ndarray, heap_before: np.ndarray, jointed: np.ndarray, a: np.ndarray, b: np.ndarray, auto: bool
+    world, root: np.ndarray, heap_before: np.ndarray, jointed: np.ndarray, moves: np.ndarray, a: np.ndarray, b: np.ndarray, auto: bool
 ) -> dict[int, str]:
     """Why islands are no heaps, by their root; what holds of contacts (`low`) is not looked at here.
 
     Args:
         world: the compiled scene.
         root: (n,) of every body; -1 for those in no island.
-        heap_before: (n,) bool, members of heaps. jointed: (n,) bool.
+        heap_before: (n,) bool, members of heaps. jointed, moves: (n,) bool.
         a: (k,) bodies of the pairs that may touch in the step; likewise b.
         auto: False where every island without joints is taken.
 
@@ -104,7 +113,9 @@ def refusals(
         alone = np.setdiff1d(np.flatnonzero(size), owner)
         out.update(dict.fromkeys(alone.tolist(), "alone"))
         return out
-    for r in np.flatnonzero((size > 0) & (size < np.where(was_heap, KEPT, MANY))).tolist():
+    stir = np.bincount(root[members[moves[members]]], minlength=len(root))
+    least = np.where(was_heap, KEPT, np.where(stir >= FEW, FEW, MANY))
+    for r in np.flatnonzero((size > 0) & (size < least)).tolist():
         out[r] = "few bodies"
     begins = ~was_heap[owner]
     if not begins.any():

@@ -16,7 +16,8 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.heap_boxes import box_axis, edge_contact, face_contacts
-from rigidimpulse.constrain.heap_hulls import hull_contacts, make_simplex
+from rigidimpulse.constrain.heap_depth import make_polytope
+from rigidimpulse.constrain.heap_hulls import closest, hull_contacts, make_simplex, seen_from
 from rigidimpulse.constrain.heap_polyhedra import half_space_contacts, make_scratch
 from rigidimpulse.constrain.heap_rows import (
     CARRIER,
@@ -48,6 +49,8 @@ AHEAD, FARTHEST = 0.12, 2.0
 """Contacts are looked for at least and at most that many inner radii away."""
 SAME, SAME_GENERAL = 2e-3, 0.02
 """Part of the inner radius that touching pairs may move past each other until they are looked at again."""
+FAR = 4.0
+"""Margins within which it is found how far convex bodies are apart."""
 NEAR = 0.2
 """Inner radii within which an old contact hands its impulse to a new one of other features."""
 POINTS = 4
@@ -252,33 +255,50 @@ def _of_boxes(half, velocity, rotation, a, b, s, t, between, margin, ahead, c, w
 
 
 @jit
-def look(shapes, bodies, pairs, rows, ids, used, ahead, coefficients, places, margins, number, general):
+def _are_apart(solids, inset, bodies, pairs, p, between, margin, c, simplex):
+    """Whether the bodies of a general pair are convex and farther apart than the margin; how far is noted."""
+    a, b = pairs.first[p], pairs.second[p]
+    s, t = bodies.shape[a], bodies.shape[b]
+    if min(_corners(solids, s), _corners(solids, t)) == 0 or max(_corners(solids, s), _corners(solids, t)) > MOST_HULL_CORNERS:
+        return False
+    d, wanted = seen_from(bodies.rotation, a, b, between, c), margin + inset[s] + inset[t]
+    _, _, _, gap, corners = closest(solids, s, t, d, c, 1.0, FAR * wanted, simplex)
+    if corners == 5 or gap <= wanted:
+        return False
+    pairs.count[p], pairs.apart[p] = 0, gap - inset[s] - inset[t]
+    note_seen(bodies, pairs, p)
+    return True
+
+
+@jit
+def look(shapes, solids, inset, bodies, pairs, rows, ids, used, ahead, coefficients, places, margins, number, general):
     """Find the contacts of `number` pairs at `places`, but for general ones, whose places among these are written to general (k,).
 
-    used: rows of the pool in use; ahead: length of the step, s; coefficients (k, k, 4) of two materials; margins (k,) m. Returns the
-    rows used, -1 where the pool is too small (then call it again), and how many general ones there are.
+    solids, inset: see `heap_overlap`; used: rows of the pool in use; ahead: length of the step, s; coefficients (k, k, 4) of two materials;
+    margins (k,) m. Returns the rows used, -1 where the pool is too small (then call it again), and how many general ones there are.
     """
     real, found = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
-    scratch, work, simplex, origin = make_scratch(), np.empty((3, 3)), make_simplex(), np.zeros(3)
+    scratch, work, simplex, polytope, origin = make_scratch(), np.empty((3, 3)), make_simplex(), make_polytope(), np.zeros(3)
     position, rotation, velocity, shape = bodies.position, bodies.rotation, bodies.velocity, bodies.shape
     old, old_ids = np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64)
     between, c, waiting = np.empty(3), np.empty((3, 3)), 0
     for k in range(number):
         p, margin = places[k], margins[k]
-        if pairs.kind[p] == GENERAL:
-            general[waiting] = k
-            waiting += 1
-            continue
         a, b = pairs.first[p], pairs.second[p]
         for i in range(3):
             between[i] = position[b, i] - position[a, i]
+        if pairs.kind[p] == GENERAL:
+            if not _are_apart(solids, inset, bodies, pairs, p, between, margin, c, simplex):
+                general[waiting] = k
+                waiting += 1
+            continue
         s, t = shape[a], shape[b]
         if pairs.kind[p] == WALL:
             count, gap = _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, found)
         elif pairs.kind[p] == HULLS:
             size = min(bodies.inner[a], bodies.inner[b])
             count, gap = hull_contacts(
-                shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, scratch, real, found
+                shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, polytope, scratch, real, found
             )
         else:
             count, gap = _of_boxes(shapes.half, velocity, rotation, a, b, s, t, between, margin, ahead, c, work, scratch, real, found)

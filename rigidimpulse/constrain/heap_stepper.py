@@ -7,14 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.constrain.heap_contacts import (
-    FARTHER,
-    MOST_SUNK,
-    convex_polyhedra,
-    inner_radii,
-    shrunk_geometry,
-    store_contacts,
-)
+from rigidimpulse.constrain.heap_contacts import FARTHER, convex_polyhedra, inner_radii, shrunk_geometry, store_contacts
+from rigidimpulse.constrain.heap_cores import cores
 from rigidimpulse.constrain.heap_cover import Cover
 from rigidimpulse.constrain.heap_fill import fill, keep_impulses, place_bodies
 from rigidimpulse.constrain.heap_motion import energies, note_pressed, slow_down
@@ -40,8 +34,10 @@ from rigidimpulse.detect.touching import contacts_of_pairs
 COLUMN = 20.0
 """Bodies whose weight may press the skin in by PRESSED."""
 PRESSED = 0.25
-LEAST_SUB_STEPS, MOST_SUB_STEPS = 16, 256
+LEAST_SUB_STEPS = 16
 """Sub-steps in a whole step."""
+SPAN = 1.0
+"""Longest time that is stepped at once, in sqrt(r / g) of the smallest inner radius r."""
 LEAST_SUB_STEPS_BETWEEN = 2
 """Sub-steps from look to look."""
 KEPT = 0.2
@@ -82,15 +78,17 @@ class HeapStepper:
         self.inner = np.where(world.dynamic, inner_radii(world.geometry)[world.shape_of_body], np.inf)
         self.skin = TOLERANCES.skin * self.inner
         self.reach = np.where(world.ball, 0.0, world.bound_radius)
-        self.geometry, factor = shrunk_geometry(world.geometry, dynamic_shapes)
         convex = convex_polyhedra(world.geometry)
+        cored, depth, self._back = cores(world.shapes, world.geometry, convex, dynamic_shapes)
+        self.geometry, factor = shrunk_geometry(cored, dynamic_shapes)
         self.shapes = make_polyhedra(world.geometry, convex)
-        self._solid, prism = solids(world.shapes, world.geometry, convex)
+        solid, self._inset = solids(world.shapes, world.geometry, convex)
+        convex |= self._inset > 0.0
+        self._solids = make_polyhedra(solid, convex) if self._inset.any() else self.shapes
         kinds = world.shape_of_body[self.order]
-        self._factor, self._prism, self._convex = factor[kinds], prism[kinds], (convex | prism)[kinds]
+        self._factor, self._depth, self._convex = factor[kinds], depth[kinds], convex[kinds]
         bound = np.where(np.isfinite(world.bound_radius), world.bound_radius, 0.0)
-        lost = (1.0 - factor[world.shape_of_body]) * bound
-        self._taken_off = lost[self.order]
+        self._taken_off = self._depth + (1.0 - self._factor) * bound[self.order]
         self.bodies = self._make_bodies()
         self._masses, self._pull = world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order])
         self.table = HeapTable()
@@ -133,8 +131,13 @@ class HeapStepper:
         pieces = LEAST_SUB_STEPS
         if strength > 0.0:
             h = 2.0 * math.pi * FREQUENCY * math.sqrt(PRESSED * float(self.skin[members].min()) / (COLUMN * strength))
-            pieces = min(max(math.ceil(step / h), pieces), MOST_SUB_STEPS)
+            pieces = max(math.ceil(step / h), pieces)
         return step / pieces
+
+    def span(self, members: np.ndarray) -> float:
+        """Longest time that members are stepped at once, s: bodies may fall by half an inner radius in it."""
+        strength, step = float(self.world.steady_strength[members].max()), self.world.accuracy.step
+        return min(step, SPAN * math.sqrt(float(self.inner[members].min()) / strength)) if strength > 0.0 else step
 
     def find_pairs(self, context, members: np.ndarray, others: np.ndarray, ahead: float) -> None:
         """See that the pairs hold all that members may meet in `ahead` s, among themselves and of the others."""
@@ -169,8 +172,8 @@ class HeapStepper:
         number = review(self.bodies, table.pairs, self.ahead, between, self._places, self._margins)
         while True:
             used, waiting = look(
-                self.shapes, self.bodies, table.pairs, table.rows, table.ids, table.used, self.ahead, world.coefficients, self._places,
-                self._margins, number, self._general,
+                self.shapes, self._solids, self._inset, self.bodies, table.pairs, table.rows, table.ids, table.used, self.ahead,
+                world.coefficients, self._places, self._margins, number, self._general,
             )  # fmt: skip
             if used >= 0:
                 break
@@ -200,10 +203,11 @@ class HeapStepper:
                 break
             context.grow_contacts(-found)
         # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
-        table.make_room(found + MOST_SUNK * len(places) + 1)
+        table.make_room(found + POINTS * len(places) + 1)
         table.used = store_contacts(
-            world.geometry, self._solid, self.bodies, pairs, places, margin, self._convex, self._prism, self._factor, world.coefficients,
-            context.contact_real, context.contact_int, found, self.order, table.rows, table.ids, table.used,
+            world.geometry, self.geometry, self._back, self._solids, self.bodies, pairs, places, margin, self._convex, self._factor,
+            self._depth, world.coefficients, context.contact_real, context.contact_int, found, self.order, table.rows, table.ids,
+            table.used,
         )  # fmt: skip
 
     def _fill(self, h: float) -> int:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
+from rigidimpulse.constrain.heap_depth import EXACT
 from rigidimpulse.constrain.heap_hulls import SHRINK
 from rigidimpulse.constrain.heap_narrow import HULLS
 from rigidimpulse.constrain.heap_polyhedra import EDGE_WINS
@@ -63,12 +64,15 @@ def stepper_at(seed: int, wanted: float):
     return stepper, world
 
 
-@pytest.mark.parametrize("wanted", [5e-3, 1e-4, -3e-3, -3e-2])
+@pytest.mark.parametrize("wanted", [5e-3, 1e-4, -3e-3, -3e-2, -0.1, -0.2])
 def test_contacts_are_at_the_gap_of_the_best_axis(wanted):
     # The deepest contact is at the gap of the best axis n*, but for what an edge must win over faces by: EDGE_WINS of the inner radius
     # (0.1 to 0.2 m), 0.2 to 0.4 mm. Inside each other the axis n is the best of bodies shorter by the factor f: f s(n) + (1 - f) n.d is
     # largest, d from centre to centre, so s(n*) - s(n) <= (1/f - 1) (n - n*).d <= (1/f - 1) (|d| - s(n*) - both inner radii): 2 mm.
+    # Where even these are inside each other the least depth is found to EXACT of the inner radius, 0.2 mm. (The deepest corner may lie
+    # beside the face that bears it, one time in 40: then the deepest point over the face counts, at a quarter less.)
     # A wrong sign, simplex or face is off by centimetres.
+    beside = 0
     for seed in range(40):
         stepper, world = stepper_at(seed, wanted)
         pairs, rows, bodies = stepper.table.pairs, stepper.table.rows, stepper.bodies
@@ -82,12 +86,12 @@ def test_contacts_are_at_the_gap_of_the_best_axis(wanted):
             points = [bodies.position[k] + bodies.rotation[k] @ row[at : at + 3] for k, at in ((0, CORE_A), (1, CORE_B))]
             gaps.append(float((points[1] - points[0]) @ n))
             np.testing.assert_allclose(points[1] - points[0], gaps[-1] * n, atol=1e-12)
-        if wanted < -0.02:
-            # Where even the smaller bodies overlap the best face bears; no other axis has a smaller depth than the best one.
-            assert min(gaps) <= wanted + 1e-9
-            continue
         slack = EDGE_WINS * float(stepper.inner.min())
         if wanted < 0.0:
             distance = float(np.linalg.norm(world.position[1] - world.position[0]))
-            slack += SHRINK / (1.0 - SHRINK) * (distance - wanted - float(stepper.inner.sum()))
+            slack += SHRINK / (1.0 - SHRINK) * (distance - wanted - float(stepper.inner.sum())) + EXACT * float(stepper.inner.min())
+        if wanted < -0.02 and wanted + slack < min(gaps) < 0.7 * wanted:
+            beside += 1
+            continue
         assert min(gaps) == pytest.approx(wanted, abs=slack + 1e-9)
+    assert beside <= 1
