@@ -108,7 +108,7 @@ def shrunk_geometry(geometry: Geometry, dynamic_shapes: np.ndarray) -> tuple[Geo
 
 @jit
 def _contradicts(bodies, pairs, p, rows, new, new_end):
-    """Whether the new contacts of a pair cannot be: there are none though an old one is closed, or a normal has turned round."""
+    """Whether the new contacts of a pair cannot be: there are none though an old one is closed, or its normal has turned round."""
     a, b = pairs.first[p], pairs.second[p]
     carrier = b if pairs.carrier[p] else a
     for o in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
@@ -125,9 +125,13 @@ def _contradicts(bodies, pairs, p, rows, new, new_end):
             return True
         if gap > row[SKIN]:
             continue
+        lowest, highest = 1.0, -1.0
         for c in range(new, new_end):
-            if rows[c, 0] * row[0] + rows[c, 1] * row[1] + rows[c, 2] * row[2] < -0.5:
-                return True
+            cosine = rows[c, 0] * row[0] + rows[c, 1] * row[1] + rows[c, 2] * row[2]
+            lowest, highest = min(lowest, cosine), max(highest, cosine)
+        # (Bodies that hook into each other have normals either way.)
+        if lowest < -0.5 and highest < 0.0:
+            return True
     return False
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.heap_rows import turned_back
+from rigidimpulse.detect.cylinder_rims import CYLINDER_CONTACT
 from rigidimpulse.detect.features import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
 from rigidimpulse.detect.inside import points_inside
 from rigidimpulse.detect.manifold import pair_gap
@@ -142,8 +143,24 @@ def put_back(geometry, back, depth, bodies, a, b, real, integer, c):
             rise = _rise(back, feature // 2, n) if feature % 2 == 0 else _rise_of_edge(geometry, back, feature // 2, p, n)
         elif kind == HALF_SPACE_CONTACT:
             rise = _rise(back, feature, n)
+        elif kind == CYLINDER_CONTACT and not _has_cylinder(geometry, bodies.shape[i]):
+            # (Features of cylinders have other numbers, and their rise is the depth.)
+            f = feature // 3
+            if feature % 3 == 2:
+                rise = _rise_of_face(geometry, back, f, p, n)
+            else:
+                rise = _rise(back, f, n) if feature % 3 == 0 else _rise_of_edge(geometry, back, f, p, n)
         for k in range(3):
             real[c, at + k] += sign * rise * real[c, 6 + k]
+
+
+@jit
+def _has_cylinder(geometry, s):
+    """Whether cylinders are among the primitives of a shape."""
+    for p in range(geometry.shape_first[s], geometry.shape_first[s + 1]):
+        if geometry.kind[p] == CYLINDER:
+            return True
+    return False
 
 
 @jit
