@@ -171,15 +171,15 @@ def _write(geometry, bodies, a, b, carrier, real, c, factor_a, factor_b, coeffic
 
 @jit
 def store_contacts(
-    geometry, shown, back, polyhedra, bodies, pairs, places, margins, convex, factor, depth, coefficients, real, integer, count, order,
+    geometry, shown, back, polyhedra, bodies, pairs, places, margins, far, convex, factor, depth, coefficients, real, integer, count, order,
     rows, ids, used,
 ):
     """Put the contacts found for the pairs at `places` into rows from `used` on, with the impulses of those they replace.
 
     real, integer: `count` contacts in the order of the places, `integer[:, :2]` by indices of the scene, order (n,) indices by rank;
     geometry: the true shapes; shown: as the contacts were found; back, depth (n,) m by rank: see `heap_cores`; polyhedra: by which bodies
-    inside each other are found, of those that are convex (n,) bool, see `heap_overlap`; these and factor (n,) by rank; margins (k,) m.
-    Returns the rows used.
+    inside each other are found, of those that are convex (n,) bool, see `heap_overlap`; these and factor (n,) by rank; margins (k,) m,
+    far (k,) m: up to where pairs without contacts are known to be apart. Returns the rows used.
     """
     c = np.int64(0)
     deep, deep_ids = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
@@ -213,6 +213,6 @@ def store_contacts(
             old = pairs.start[p]
             hand_over(rows, ids, old, old + pairs.count[p], rows, ids, new, used, NEAR * size)
             pairs.start[p], pairs.count[p], pairs.room[p] = new, used - new, used - new
-        pairs.apart[p] = FARTHER * margins[k] if pairs.count[p] == 0 and sunk == 0 and last == first else 0.0
+        pairs.apart[p] = far[k] if pairs.count[p] == 0 and sunk == 0 and last == first else 0.0
         note_seen(bodies, pairs, p)
     return used

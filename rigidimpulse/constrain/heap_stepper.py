@@ -186,7 +186,9 @@ class HeapStepper:
         """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `detect`."""
         table, world, pairs = self.table, self.world, self.table.pairs
         first, second = pairs.first[places], pairs.second[places]
-        shown = FARTHER * margin + self._taken_off[first] + self._taken_off[second]
+        # A wide margin is dear for meshes.
+        far = np.where(self._depth[first] + self._depth[second] > 0.0, margin, FARTHER * margin)
+        shown = far + self._taken_off[first] + self._taken_off[second]
         n, now, rotation = world.num_bodies, context.state.now, context.state.rotation.copy()
         # In the course of a step bodies are elsewhere than at its start.
         now = now._replace(position=now.position.copy(), orientation=now.orientation.copy())
@@ -205,7 +207,7 @@ class HeapStepper:
         # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
         table.make_room(found + POINTS * len(places) + 1)
         table.used = store_contacts(
-            world.geometry, self.geometry, self._back, self._solids, self.bodies, pairs, places, margin, self._convex, self._factor,
+            world.geometry, self.geometry, self._back, self._solids, self.bodies, pairs, places, margin, far, self._convex, self._factor,
             self._depth, world.coefficients, context.contact_real, context.contact_int, found, self.order, table.rows, table.ids,
             table.used,
         )  # fmt: skip
