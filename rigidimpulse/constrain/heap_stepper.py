@@ -40,6 +40,8 @@ SPAN = 1.0
 """Longest time that is stepped at once, in sqrt(r / g) of the smallest inner radius r."""
 LEAST_SUB_STEPS_BETWEEN = 2
 """Sub-steps from look to look."""
+COARSEST = 6.0
+"""Times `Accuracy.heap_motion` that bodies may pass each other from look to look; sub-steps are made shorter for it."""
 KEPT = 0.2
 """Part of the motion until a look (`Accuracy.heap_motion`) that a pair may make with the contacts it has, in the middle of a step."""
 CLEAR = 0.2
@@ -106,7 +108,7 @@ class HeapStepper:
         self.pressed = np.zeros(n, bool)
         self._places = self._general = np.zeros(0, np.int64)
         self._margins = np.zeros(0)
-        self.members, self.ahead, self._parts = np.zeros(0, np.int64), 0.0, 1
+        self.members, self.ahead, self._parts, self._sub_steps = np.zeros(0, np.int64), 0.0, 1, 1
 
     def _make_bodies(self) -> HeapBodies:
         """Rows of all bodies by rank, and one of none."""
@@ -158,7 +160,9 @@ class HeapStepper:
         self._part[supports], self._part[members] = SUPPORT, MEMBER
         load_bodies(self.bodies, self.order, context.state.now, context.acceleration, self.world.inv_mass, self._part)
         motion = most_motion(self.bodies, self.table.pairs, ahead)
-        most = max(math.ceil(ahead / self.sub_step(members) - 1e-9) // LEAST_SUB_STEPS_BETWEEN, 1)
+        usual, needed = math.ceil(ahead / self.sub_step(members) - 1e-9), math.ceil(motion / (COARSEST * self._motion))
+        self._sub_steps = max(usual, LEAST_SUB_STEPS_BETWEEN * needed, 1)
+        most = max(self._sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
         self._parts = min(max(math.ceil(motion / self._motion), 1), most)
         self.ahead = ahead / self._parts
         self._look(context, between)
@@ -237,9 +241,8 @@ class HeapStepper:
     def step(self, context, time: float, end: float) -> Outcome:
         """Step what `set_up` put before the kernels from `time` to `end`."""
         bodies, members = self.bodies, self.members
-        length = end - time
-        sub_steps = max(math.ceil(length / self.sub_step(members) - 1e-9), 1)
-        h = length / sub_steps
+        sub_steps = self._sub_steps
+        h = (end - time) / sub_steps
         _, before = energies(bodies, self._masses, self._pull)
         work, done = 0.0, 0
         for part in range(self._parts):
