@@ -23,7 +23,7 @@ from rigidimpulse.constrain.heap_courses import CALM
 from rigidimpulse.constrain.heap_narrow import in_play
 from rigidimpulse.constrain.heap_rows import SEPARATION, SKIN, SUPPORT
 
-MANY, FEW, KEPT = 60, 8, 4
+MANY, FEW, KEPT = 60, 8, 2
 RATIO, REBOUND, TALL = 30.0, 0.5, 12
 FAST, SPIN = 0.5, 2.5 / 16.0
 
