@@ -17,7 +17,7 @@ import numpy as np
 
 from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_fly, mark_slow, most_stray, stirred
-from rigidimpulse.constrain.heap_islands import FAST, MANY, SPIN, TALL, islands, moving, refusals, support_levels
+from rigidimpulse.constrain.heap_islands import FAST, MANY, SPIN, TALL, islands, lively, refusals, support_levels
 from rigidimpulse.constrain.heap_stepper import HeapStepper, Outcome
 from rigidimpulse.detect.groups import Group, empty_contacts
 from rigidimpulse.detect.touching import bring_all, contacts_of_pairs
@@ -110,7 +110,7 @@ class Heaps:
         return f"{text}; left to newton, islands times steps: {refused}" if refused else text
 
     def gather(self, context, window) -> None:
-        """Choose the heaps of the step: `window.inside` marks their bodies."""
+        """Choose the heaps of the step: `window.inside` marks their bodies, `window.still` those at rest."""
         world, course, time = context.world, context.state.course, window.begin
         ended = course.mode == STEPPED
         self._end_courses(context, np.flatnonzero(ended), time)
@@ -121,6 +121,7 @@ class Heaps:
         self._taken &= chosen
         self.asleep &= chosen
         window.inside |= chosen
+        window.still |= (self.label >= 0) & (course.mode == FIXED)
 
     def _choose(self, context, window, brought: np.ndarray) -> np.ndarray:
         """Which bodies (n,) bool are stepped; those `brought` are at the begin of the window already."""
@@ -141,7 +142,7 @@ class Heaps:
             a, b = self._near(context, member, ahead)
         root = islands(world.num_bodies, a, b, member)
         root[~member] = -1
-        moves = moving(context.state.now, world.steady_strength, self.stepper.inner)
+        moves = lively(context.state.now, world.steady_strength, self.stepper.inner)
         refused = refusals(world, root, self.label >= 0, self._jointed, moves, a, b, self._auto)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         chosen = self._low(context, window, chosen, root, refused)
@@ -232,6 +233,7 @@ class Heaps:
         now.velocity[members] = now.angular_velocity[members] = 0.0
         course.mode[members], course.start[members] = FIXED, time
         course.velocity[members] = course.angular_velocity[members] = 0.0
+        self.stepper.report_crossed(context, members, time)
         context.log.book(time, "heap", mechanical_energy(now, world, members) - before)
 
     def _end_courses(self, context, members: np.ndarray, time: float) -> None:
@@ -257,6 +259,7 @@ class Heaps:
         """Book what the steps under way take until `time`, the end of the run."""
         members = np.flatnonzero(context.state.course.mode == STEPPED)
         self._end_courses(context, members, time)
+        self.stepper.report_crossed(context, members, time)
         let_fly(context.state.course, members, context.world.steady_acceleration)
 
     def join(self, context, window, time: float, groups: list[Group]) -> list[Group]:

@@ -81,7 +81,7 @@ def support_levels(bodies, pairs, rows, tall):
     return level
 
 
-def moving(now, strength: np.ndarray, inner: np.ndarray) -> np.ndarray:
+def lively(now, strength: np.ndarray, inner: np.ndarray) -> np.ndarray:
     """Which bodies (n,) bool are faster than what is calm; strength (n,) m/s2 of what pulls them, inner (n,) m."""
     radius = np.where(np.isfinite(inner), inner, 0.0)
     speed = np.linalg.norm(now.velocity, axis=1) + radius * np.linalg.norm(now.angular_velocity, axis=1)

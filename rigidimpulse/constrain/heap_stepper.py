@@ -29,7 +29,9 @@ from rigidimpulse.constrain.heap_solver import FREQUENCY, advance, softness, spe
 from rigidimpulse.constrain.heap_table import HeapTable
 from rigidimpulse.constrain.lanes import ROW, aligned, machine_lanes
 from rigidimpulse.conventions import TOLERANCES
+from rigidimpulse.detect.manifold import pair_gap
 from rigidimpulse.detect.touching import contacts_of_pairs
+from rigidimpulse.rotation import to_matrix
 
 COLUMN = 20.0
 """Bodies whose weight may press the skin in by PRESSED."""
@@ -38,10 +40,12 @@ LEAST_SUB_STEPS = 16
 """Sub-steps in a whole step."""
 SPAN = 1.0
 """Longest time that is stepped at once, in sqrt(r / g) of the smallest inner radius r."""
+CROSSED = 1e-6
+"""Inner radii below which the surfaces of two cores cross."""
 LEAST_SUB_STEPS_BETWEEN = 2
 """Sub-steps from look to look."""
-COARSEST = 6.0
-"""Times `Accuracy.heap_motion` that bodies may pass each other from look to look; sub-steps are made shorter for it."""
+COARSEST = 0.3
+"""Inner radii by which bodies with cores may pass each other from look to look: sub-steps are made shorter for it."""
 KEPT = 0.2
 """Part of the motion until a look (`Accuracy.heap_motion`) that a pair may make with the contacts it has, in the middle of a step."""
 CLEAR = 0.2
@@ -160,8 +164,8 @@ class HeapStepper:
         self._part[supports], self._part[members] = SUPPORT, MEMBER
         load_bodies(self.bodies, self.order, context.state.now, context.acceleration, self.world.inv_mass, self._part)
         motion = most_motion(self.bodies, self.table.pairs, ahead)
-        usual, needed = math.ceil(ahead / self.sub_step(members) - 1e-9), math.ceil(motion / (COARSEST * self._motion))
-        self._sub_steps = max(usual, LEAST_SUB_STEPS_BETWEEN * needed, 1)
+        needed = math.ceil(motion / COARSEST) if self._depth.any() else 0
+        self._sub_steps = max(math.ceil(ahead / self.sub_step(members) - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
         most = max(self._sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
         self._parts = min(max(math.ceil(motion / self._motion), 1), most)
         self.ahead = ahead / self._parts
@@ -215,6 +219,23 @@ class HeapStepper:
             self._depth, world.coefficients, context.contact_real, context.contact_int, found, self.order, table.rows, table.ids,
             table.used,
         )  # fmt: skip
+
+    def report_crossed(self, context, members: np.ndarray, time: float) -> None:
+        """Report pairs of members, brought to the present, whose cores cross: where they press on each other is not known any more."""
+        if not self._depth.any():
+            return
+        pairs, world, now = self.table.pairs, self.world, context.state.now
+        mine = np.zeros(world.num_bodies, bool)
+        mine[self.rank[members]] = True
+        asked = (mine[pairs.first] | mine[pairs.second]) & (self._depth[pairs.first] + self._depth[pairs.second] > 0.0)
+        for i, j in zip(self.order[pairs.first[asked]].tolist(), self.order[pairs.second[asked]].tolist(), strict=True):
+            a, b, limit = int(world.shape_of_body[i]), int(world.shape_of_body[j]), CROSSED * min(self.inner[i], self.inner[j])
+            rotation = to_matrix(now.orientation[i]), to_matrix(now.orientation[j])
+            if pair_gap(self.geometry, a, now.position[i], rotation[0], b, now.position[j], rotation[1], limit, np.zeros(7)) < limit:
+                context.log.report(
+                    time, "overlap in a heap", (world.names[min(i, j)], world.names[max(i, j)]),
+                    "the bodies are deeper inside each other than their contacts can tell; use a smaller step",
+                )  # fmt: skip
 
     def _fill(self, h: float) -> int:
         """Make patches, colours and records for sub-steps of h s; returns the number of batches."""

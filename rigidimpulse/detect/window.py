@@ -29,6 +29,7 @@ class Window:
         pairs: the table; its columns are attributes of their own, too.
         wake: (n,) s, when bodies must be looked at again though nothing meets them.
         inside: (n,) bool, members of heaps: their pairs with each other and with immovable bodies are not swept.
+        still: (n,) bool, members of heaps at rest, and bodies that never move: nor are their pairs with each other.
         heaps_begun: whether the heaps of the step have been stepped from its start.
     """
 
@@ -39,6 +40,7 @@ class Window:
         self.wake = np.full(context.world.num_bodies, np.inf)
         self._looked_around = np.full(context.world.num_bodies, -np.inf)
         self.inside = np.zeros(context.world.num_bodies, bool)
+        self.still = ~(context.world.dynamic | context.world.moving)
         self.heaps_begun = False
         self._moves = (context.state.course.mode != FIXED) | context.world.dynamic
 
@@ -117,7 +119,7 @@ class Window:
     def _is_shut(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Which pairs are not swept, since a heap's solver looks after them."""
         free = self.context.world.dynamic & ~self.inside
-        return ~(free[a] | free[b])
+        return ~(free[a] | free[b]) | (self.still[a] & self.still[b])
 
     def _append(self, a: np.ndarray, b: np.ndarray, start: float) -> None:
         """Add pairs whose bodies may meet and that are not there yet."""
