@@ -91,7 +91,7 @@ def _moved_in(p: Primitive, d: float) -> np.ndarray:
         wrong = (length > 0.0) & ~points_inside(surface, 1, y)
         for v in np.flatnonzero((length > 0.0) & ~wrong):
             wrong[v] = _distance(surface, y[v], length[v]) < CLEAR * min(share[v] * d, length[v])
-        turned = np.einsum("ij,ij->i", _area_vectors(y, faces), normals) <= 0.0
+        turned = np.einsum("ij,ij->i", _area_vectors(y, faces), normals) < 0.0
         wrong[faces[turned]] = True
         share[wrong] = factor
     return x + share[:, None] * ways

@@ -44,7 +44,7 @@ def make_polytope():
 
 @jit
 def start(polytope, simplex):
-    """Begin with the tetrahedron of a simplex; returns the number of faces, 0 where it is flat."""
+    """Begin with the tetrahedron of a simplex; returns the number of faces, 0 where it is flat or not about 0."""
     w, inside = polytope.w, polytope.inside
     for m in range(3):
         inside[m] = 0.0
@@ -54,7 +54,7 @@ def start(polytope, simplex):
     for n in range(4):
         polytope.corner[n, 0], polytope.corner[n, 1] = simplex.corner[n, 0], simplex.corner[n, 1]
         _set_face(polytope, n, (n + 1) % 4, (n + 2) % 4, (n + 3) % 4)
-        if polytope.plane[n, 3] == inf:
+        if not 0.0 <= polytope.plane[n, 3] < inf:
             return 0
     return 4
 
