@@ -49,11 +49,11 @@ def cores(
 
     """
     out, depth = list(shapes), np.zeros(len(shapes))
-    for s in np.flatnonzero(dynamic_shapes & ~convex):
+    for s in np.flatnonzero(dynamic_shapes & ~convex).tolist():
         primitives = shapes[s].primitives
         if len(primitives) == 1 and not len(primitives[0].faces):
             continue
-        first, last = geometry.shape_first[s : s + 2]
+        first, last = int(geometry.shape_first[s]), int(geometry.shape_first[s + 1])
         reach = np.linalg.norm(geometry.bound_centre[first:last], axis=1) + geometry.bound_radius[first:last]
         d = min([DEPTH * float(reach.max()), *(THIN * _radius(p) for p in primitives if not len(p.faces))])
         out[s], depth[s] = CompiledShape(tuple(_core(p, d) for p in primitives)), d

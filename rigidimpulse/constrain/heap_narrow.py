@@ -256,7 +256,7 @@ def _of_boxes(half, velocity, rotation, a, b, s, t, between, margin, ahead, c, w
 
 @jit
 def _are_apart(solids, inset, bodies, pairs, p, between, margin, c, simplex):
-    """Whether the bodies of a general pair are convex and farther apart than the margin; how far is noted."""
+    """Whether the bodies of a general pair are known by `solids` to be farther apart than the margin; how far is noted."""
     a, b = pairs.first[p], pairs.second[p]
     s, t = bodies.shape[a], bodies.shape[b]
     if min(_corners(solids, s), _corners(solids, t)) == 0 or max(_corners(solids, s), _corners(solids, t)) > MOST_HULL_CORNERS:

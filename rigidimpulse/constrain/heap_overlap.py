@@ -13,7 +13,8 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.heap_hulls import hull_contacts
-from rigidimpulse.geometry import CYLINDER, CompiledShape, Geometry, build_geometry, compile_shape
+from rigidimpulse.constrain.heap_polyhedra import Polyhedra, make_polyhedra
+from rigidimpulse.geometry import CYLINDER, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
 from rigidimpulse.shape import Shape
 
 FLUSH = 0.02
@@ -22,21 +23,22 @@ SIDES = 32
 """Of the prism in a cylinder: 0.5 % of the radius inside it, less than what cylinders are made smaller by for the contact kernels."""
 
 
-def solids(shapes: Sequence[CompiledShape], geometry: Geometry, convex: np.ndarray) -> tuple[Geometry, np.ndarray]:
-    """The shapes with prisms for those that are one cylinder, and how far these are inside it (s,), m; 0 for all others.
+def solids(
+    shapes: Sequence[CompiledShape], geometry: Geometry, convex: np.ndarray, polyhedra: Polyhedra
+) -> tuple[Polyhedra, np.ndarray, np.ndarray]:
+    """Polyhedra in the shapes: `convex` ones (s,) bool, whose tables are there; prisms in cylinders, axes of capsules, centres of balls.
 
-    Shapes that are neither cylinders nor `convex` (s,) polyhedra are not asked for, and replaced by something small.
+    Returns them, which shapes are cylinders (s,) bool, and how far each is inside its shape at most (s,), m. Others have no corners.
     """
     first = geometry.shape_first
-    round_ = np.array([first[s + 1] == first[s] + 1 and geometry.kind[first[s]] == CYLINDER for s in range(len(shapes))], bool)
-    inset = np.where(round_, (1.0 - np.cos(np.pi / SIDES)) * geometry.radius[first[:-1]], 0.0)
-    if not round_.any():
-        return geometry, inset
+    single, kind, radius = np.diff(first) == 1, geometry.kind[first[:-1]], geometry.radius[first[:-1]]
+    drum, ball = single & (kind == CYLINDER), single & (kind == ROUND) & (radius > 0.0)
+    inset = np.where(drum, (1.0 - np.cos(np.pi / SIDES)) * radius, np.where(ball, radius, 0.0))
+    if not inset.any():
+        return polyhedra, drum, inset
     none = compile_shape(Shape.box(1.0), np.zeros(3), np.eye(3))
-    out = []
-    for s, shape in enumerate(shapes):
-        out.append(_prism(geometry, int(first[s])) if round_[s] else shape if convex[s] else none)
-    return build_geometry(out), inset
+    known = [_prism(geometry, int(first[s])) if drum[s] else shape if convex[s] or ball[s] else none for s, shape in enumerate(shapes)]
+    return make_polyhedra(build_geometry(known), convex | drum, ball), drum, inset
 
 
 def _prism(geometry: Geometry, p: int) -> CompiledShape:

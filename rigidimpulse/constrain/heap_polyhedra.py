@@ -62,8 +62,8 @@ class Polyhedra(NamedTuple):
     wall: np.ndarray  # (s, 4) unit normal and offset of shapes that are one half space, 0 for others
 
 
-def make_polyhedra(geometry: Geometry, convex: np.ndarray) -> Polyhedra:
-    """Tables of the shapes that are `convex` (s,) bool; the others have no faces."""
+def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | None = None) -> Polyhedra:
+    """Tables of the shapes that are `convex` (s,) bool; those that are `bare` (s,) bool have corners, but no faces, others neither."""
     half, wall = np.zeros((len(convex), 3)), np.zeros((len(convex), 4))
     planes: list[np.ndarray] = []
     loops: list[list[int]] = []
@@ -73,9 +73,10 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray) -> Polyhedra:
         p = int(geometry.shape_first[s])
         if geometry.shape_first[s + 1] == p + 1 and geometry.kind[p] == HALF_SPACE:
             wall[s] = geometry.frame[p, :4]
+        vertex = geometry.vertex[int(geometry.vertex_first[p]) : int(geometry.vertex_first[p + 1])]
+        if bare is not None and bare[s]:
+            corners.append(vertex)
         if is_convex:
-            low = int(geometry.vertex_first[p])
-            vertex = geometry.vertex[low : geometry.vertex_first[p + 1]]
             before = sum(map(len, corners))
             for normal, loop in _faces(geometry, p):
                 planes.append(np.append(normal, (vertex[loop] @ normal).max()))

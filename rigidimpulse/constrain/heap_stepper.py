@@ -88,9 +88,8 @@ class HeapStepper:
         cored, depth, self._back = cores(world.shapes, world.geometry, convex, dynamic_shapes)
         self.geometry, factor = shrunk_geometry(cored, dynamic_shapes)
         self.shapes = make_polyhedra(world.geometry, convex)
-        solid, self._inset = solids(world.shapes, world.geometry, convex)
-        convex |= self._inset > 0.0
-        self._solids = make_polyhedra(solid, convex) if self._inset.any() else self.shapes
+        self._solids, drum, self._inset = solids(world.shapes, world.geometry, convex, self.shapes)
+        convex |= drum
         kinds = world.shape_of_body[self.order]
         self._factor, self._depth, self._convex = factor[kinds], depth[kinds], convex[kinds]
         bound = np.where(np.isfinite(world.bound_radius), world.bound_radius, 0.0)
