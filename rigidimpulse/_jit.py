@@ -106,14 +106,14 @@ class Kernel:
 
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        """Nothing is compiled before the first call."""
+    def __init__(self, function: Callable[..., Any], **options: bool) -> None:
+        """Nothing is compiled before the first call; options: of numba, for the part."""
         update_wrapper(self, function)
         self.py_func = function
         self.name = f"{function.__module__.removeprefix('rigidimpulse.')}.{function.__name__}"
         self.calls, self.seconds, self.preparing = 0, 0.0, 0.0
         KERNELS.append(self)
-        self.part = _njit(no_cpython_wrapper=True, pipeline_class=_PartCompiler, **_OPTIONS)(function)
+        self.part = _njit(no_cpython_wrapper=True, pipeline_class=_PartCompiler, **_OPTIONS, **options)(function)
 
     @cached_property
     def entry(self) -> Any:
@@ -144,6 +144,14 @@ def _type_of_kernel(kernel: Kernel, _context: Any) -> types.Type:
 def jit(function: Callable[..., Any]) -> Any:
     """Make a kernel of a function; it is compiled when it is first called."""
     return Kernel(function)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Make a kernel that is written out wherever another calls it: where it is called for each pair, and does little.
+
+    A call passes a tuple of arrays word by word, which takes longer than many a kernel does. The bits stay the same.
+    """
+    return Kernel(function, forceinline=True)
 
 
 def is_cached(kernel: Kernel) -> bool:

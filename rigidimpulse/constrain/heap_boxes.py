@@ -17,7 +17,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined
 from rigidimpulse.constrain.heap_polyhedra import EDGE_WINS, FROM_EDGE, four_of
 from rigidimpulse.constrain.heap_rows import turned, turned_back
 
@@ -27,7 +27,7 @@ SECOND_WINS = 1e-6
 """Part of the sides by which a face of b must have the larger gap."""
 
 
-@jit
+@inlined
 def box_axis(half, s, t, r, a, b, dx, dy, dz, far, c):
     """The axis of largest gap: 0-2 faces of a, 3-5 of b, 6 + 3 i + j edges; and that gap, or some gap above `far`, m.
 
@@ -70,7 +70,7 @@ def box_axis(half, s, t, r, a, b, dx, dy, dz, far, c):
     return best, axis
 
 
-@jit
+@inlined
 def _cut_side(polygon, ids, count, spare, spare_ids, axis, sign, limit, side):
     """Keep the part of the polygon where sign times the coordinate `axis` is at most `limit`; returns its number of corners."""
     outside = False
@@ -100,7 +100,7 @@ def _cut_side(polygon, ids, count, spare, spare_ids, axis, sign, limit, side):
     return kept
 
 
-@jit
+@inlined
 def _facing(half, other, c, of_b, yu, yv, ym, m, sign, polygon):
     """The face of the other box, of half sides half[other], that looks at the face of axis m: corners into polygon; returns its code.
 
@@ -124,13 +124,13 @@ def _facing(half, other, c, of_b, yu, yv, ym, m, sign, polygon):
     return 2 * q + np.int64(side > 0.0)
 
 
-@jit
+@inlined
 def _along(r, i, axis, x, y, z):
     """Component of a vector along an axis of box i."""
     return r[i, 0, axis] * x + r[i, 1, axis] * y + r[i, 2, axis] * z
 
 
-@jit
+@inlined
 def _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon):
     """How far corners of box j beside a face of box i come over its four sides, +m', -m', +m'', -m'', in `ahead` s: four numbers."""
     a, b = 8 * i, 8 * j
@@ -151,7 +151,7 @@ def _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon):
     return -low_u, high_u, -low_v, high_v
 
 
-@jit
+@inlined
 def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c, scratch, real, out_ids):
     """Contacts of the face of `axis` (0-2 of a, 3-5 of b) with the face of the other box that looks at it; returns their number.
 
@@ -196,7 +196,7 @@ def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c
     return number
 
 
-@jit
+@inlined
 def edge_contact(half, s, t, r, a, dx, dy, dz, axis, gap, c, work, real, ids):
     """The contact of two edges of boxes, with the gap found for their axis; returns 1. work: room (3, 3)."""
     i, j = (axis - 6) // 3, (axis - 6) % 3

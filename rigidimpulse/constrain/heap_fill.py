@@ -11,7 +11,7 @@ p (y t_1 - x t_2), and moves points along n by u.n + y w.t_1 - x w.t_2.
 
 from __future__ import annotations
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_lanes import DEEPEST, TINY, add, along, cross, dot, less, linear, store_three, three, times
 from rigidimpulse.constrain.heap_records import (
     ARM_A,
@@ -73,7 +73,7 @@ def place_bodies(bodies, places):
             places[8 * i + 3 + k] = bodies.orientation[i, k]
 
 
-@jit
+@inlined
 def _rotation(lanes, place):
     """Rows of the matrices of the orientations in lines of `place_bodies`."""
     one, two = spread(lanes, 1.0), spread(lanes, 2.0)
@@ -85,19 +85,19 @@ def _rotation(lanes, place):
     )
 
 
-@jit
+@inlined
 def _turned(r, a):
     """The matrix r times a."""
     return dot(r[0], a), dot(r[1], a), dot(r[2], a)
 
 
-@jit
+@inlined
 def _choose(a, b, x, y):
     """Vectors x where a > b, else y."""
     return where_greater(a, b, x[0], y[0]), where_greater(a, b, x[1], y[1]), where_greater(a, b, x[2], y[2])
 
 
-@jit
+@inlined
 def _normal(lanes, first, second, ra, rb, core_a, core_b):
     """World normal of a row's lines: that of two rounded surfaces runs between their centres."""
     zero, tiny = spread(lanes, 0.0), spread(lanes, TINY)
@@ -110,7 +110,7 @@ def _normal(lanes, first, second, ra, rb, core_a, core_b):
     return _choose(where_greater(square, tiny, both, zero), zero, (between[0] * inverse, between[1] * inverse, between[2] * inverse), n)
 
 
-@jit
+@inlined
 def _tangents(lanes, n):
     """Two unit vectors with t_1 x t_2 = n."""
     zero, one, tiny = spread(lanes, 0.0), spread(lanes, 1.0), spread(lanes, TINY)
@@ -121,7 +121,7 @@ def _tangents(lanes, n):
     return t, cross(n, t)
 
 
-@jit
+@inlined
 def _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
     """Places and gaps of the points of batch k into its record; returns their mean from the centre of a."""
     w = width_of(lanes)
@@ -149,7 +149,7 @@ def _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
     return mean[0] * inverse, mean[1] * inverse, mean[2] * inverse
 
 
-@jit
+@inlined
 def _impulses(lanes, batches, k, lines, middle, t, u):
     """Points from the centre of the patch, and impulses carried over, into the record of batch k."""
     w = width_of(lanes)
@@ -212,7 +212,7 @@ def fill(lanes, batches, number, places, mass, lines, soft):
         _couple(lanes, record, o, batches.points[k], ma, mb, arm_a, arm_b, n, t, u)
 
 
-@jit
+@inlined
 def _couple(lanes, record, o, points, ma, mb, arm_a, arm_b, n, t, u):
     """Effective masses and couplings: entries of K and M along (t_1, t_2, n), turns about them numbered 4 to 6."""
     w = width_of(lanes)
@@ -249,7 +249,7 @@ def _couple(lanes, record, o, points, ma, mb, arm_a, arm_b, n, t, u):
     _couple_points(lanes, record, o, points, k33, k34, k35, k44, k45, k55)
 
 
-@jit
+@inlined
 def _couple_points(lanes, record, o, points, k33, k34, k35, k44, k45, k55):
     """Effective masses of the points along n, and how they push each other."""
     w = width_of(lanes)

@@ -11,7 +11,7 @@ Seidel) and gives their sum to the bodies.
 
 from __future__ import annotations
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_records import (
     ARM_A,
     ARM_B,
@@ -55,17 +55,17 @@ DEEPEST = 10.0
 TINY = 1e-30
 
 
-@jit
+@inlined
 def cross(a, b):
     return fma(a[1], b[2], -(a[2] * b[1])), fma(a[2], b[0], -(a[0] * b[2])), fma(a[0], b[1], -(a[1] * b[0]))
 
 
-@jit
+@inlined
 def dot(a, b):
     return fma(a[0], b[0], fma(a[1], b[1], a[2] * b[2]))
 
 
-@jit
+@inlined
 def times(m, a):
     """The symmetric matrix m (xx, xy, xz, yy, yz, zz) times a."""
     return (
@@ -75,47 +75,47 @@ def times(m, a):
     )
 
 
-@jit
+@inlined
 def add(a, b):
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@jit
+@inlined
 def less(a, b):
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@jit
+@inlined
 def along(a, f, b):
     """a + f b."""
     return fma(f, b[0], a[0]), fma(f, b[1], a[1]), fma(f, b[2], a[2])
 
 
-@jit
+@inlined
 def three(lanes, record, at):
     """The field of three at `at`."""
     w = width_of(lanes)
     return load(lanes, record, at), load(lanes, record, at + w), load(lanes, record, at + 2 * w)
 
 
-@jit
+@inlined
 def linear(row):
     return row[0], row[1], row[2]
 
 
-@jit
+@inlined
 def angular(row):
     return row[3], row[4], row[5]
 
 
-@jit
+@inlined
 def store_three(record, at, w, a, b, c):
     store(record, at, a)
     store(record, at + w, b)
     store(record, at + 2 * w, c)
 
 
-@jit
+@inlined
 def _arms(lanes, record, o, xa, xb):
     """The arms to O, and how far b has moved from a."""
     w = width_of(lanes)
@@ -125,7 +125,7 @@ def _arms(lanes, record, o, xa, xb):
     return along(arm_a, spread(lanes, 1.0) - share, d), along(arm_b, -share, d), d
 
 
-@jit
+@inlined
 def _push(velocity, batches, first, va, vb, ma, mb, arm_a, arm_b, f, torque):
     """Give the impulse f at O and the torque to b and their opposites to a."""
     ta, tb = times(ma, add(cross(arm_a, f), torque)), times(mb, add(cross(arm_b, f), torque))
@@ -140,7 +140,7 @@ def _push(velocity, batches, first, va, vb, ma, mb, arm_a, arm_b, f, torque):
     )  # fmt: skip
 
 
-@jit
+@inlined
 def sum_up(t, u, n, along_t, along_u, along_n):
     """along_t t + along_u u + along_n n."""
     return (
@@ -177,13 +177,13 @@ def warm_start(lanes, batches, number, velocity, moved, mass):
         _push(velocity, batches, k * w, va, vb, ma, mb, arm_a, arm_b, f, torque)
 
 
-@jit
+@inlined
 def _clamp(lanes, x, limit):
     x = where_greater(x, limit, limit, x)
     return where_greater(-limit, x, -limit, x)
 
 
-@jit
+@inlined
 def _rub(lanes, record, o, points, u1, u2, w3):
     """Friction of a patch with slip (u1, u2) and spin w3 about n: the changes of its impulses along t_1, t_2 and about n."""
     w = width_of(lanes)
@@ -213,7 +213,7 @@ def _rub(lanes, record, o, points, u1, u2, w3):
     return f1 - old_1, f2 - old_2, d3
 
 
-@jit
+@inlined
 def _press(lanes, record, g, speed, gap, relaxing, per_h, stiff, hard, soft, deepest):
     """Normal impulse of the points at g that approach at -speed, in m/s; returns its change."""
     w = width_of(lanes)
@@ -232,7 +232,7 @@ def _press(lanes, record, g, speed, gap, relaxing, per_h, stiff, hard, soft, dee
     return new - old
 
 
-@jit
+@inlined
 def _turned_normal(theta, n, half):
     """G of a body turned by theta."""
     across = cross(theta, n)
@@ -275,13 +275,13 @@ def solve(lanes, batches, number, velocity, moved, mass, h, relaxing):
         _push(velocity, batches, k * w, va, vb, ma, mb, arm_a, arm_b, f, torque)
 
 
-@jit
+@inlined
 def _coupled(lanes, record, at, f1, f2, f3, speed):
     c = three(lanes, record, at)
     return fma(c[0], f1, fma(c[1], f2, fma(c[2], f3, speed)))
 
 
-@jit
+@inlined
 def _press_points(lanes, record, o, points, un, w1, w2, at_o, slope_1, slope_2, relaxing, per_h):
     """Normal impulses of the points of a patch; returns the sum of their changes along n and its torque about t_1 and t_2."""
     w = width_of(lanes)

@@ -2,12 +2,12 @@
 
 from math import sqrt
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_rows import MEMBER, OUTSIDE, set_inverse_inertia, turned, turned_back
 from rigidimpulse.rotation import exponential, product, quaternion_to_matrix
 
 
-@jit
+@inlined
 def _set_orientation(bodies, i, x, y, z):
     """Turn body i by the vector (x, y, z), rad."""
     q = bodies.orientation[i]
@@ -18,14 +18,14 @@ def _set_orientation(bodies, i, x, y, z):
     quaternion_to_matrix(q, bodies.rotation[i])
 
 
-@jit
+@inlined
 def _spin_rate(moments, i, x0, x1, x2):
     """Euler's equations without torque: the rate of the spin x in principal axes."""
     a, b, c = moments[i, 0], moments[i, 1], moments[i, 2]
     return (b - c) / a * x1 * x2, (c - a) / b * x2 * x0, (a - b) / c * x0 * x1
 
 
-@jit
+@inlined
 def _turn_freely(bodies, i, h):
     """Turn body i of unlike moments by its spin over h, keeping its angular momentum; returns the mean spin.
 

@@ -14,7 +14,7 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_boxes import box_axis, edge_contact, face_contacts
 from rigidimpulse.constrain.heap_depth import make_polytope
 from rigidimpulse.constrain.heap_hulls import closest, hull_contacts, make_simplex, seen_from
@@ -57,7 +57,7 @@ POINTS = 4
 """Contacts of two convex polyhedra."""
 
 
-@jit
+@inlined
 def in_play(part, a, b):
     """Whether a pair is stepped."""
     return part[a] != OUTSIDE and part[b] != OUTSIDE and (part[a] == MEMBER or part[b] == MEMBER)
@@ -72,7 +72,7 @@ def classify(pairs, bodies, shapes):
         pairs.carrier[p] = bodies.reach[a] <= bodies.reach[b]
         pairs.round[p] = (bodies.reach[a] if pairs.carrier[p] else bodies.reach[b]) == 0.0
         solid_s, solid_t = shapes.face_first[s] < shapes.face_first[s + 1], shapes.face_first[t] < shapes.face_first[t + 1]
-        wall_s, wall_t = np.any(shapes.wall[s] != 0.0), np.any(shapes.wall[t] != 0.0)
+        wall_s, wall_t = _is_wall(shapes.wall, s), _is_wall(shapes.wall, t)
         pairs.kind[p] = GENERAL
         if shapes.half[s, 0] > 0.0 and shapes.half[t, 0] > 0.0:
             pairs.kind[p] = BOXES
@@ -82,13 +82,19 @@ def classify(pairs, bodies, shapes):
             pairs.kind[p] = HULLS
 
 
-@jit
+@inlined
+def _is_wall(wall, s):
+    """Whether shape s is a half space."""
+    return wall[s, 0] != 0.0 or wall[s, 1] != 0.0 or wall[s, 2] != 0.0
+
+
+@inlined
 def _corners(shapes, s):
     """Number of corners of shape s."""
     return shapes.corner_first[s + 1] - shapes.corner_first[s]
 
 
-@jit
+@inlined
 def _relative_pose(position, orientation, rotation, carrier, other):
     """The pose of the other body in the axes of the carrier."""
     x, q = position, orientation
@@ -99,7 +105,7 @@ def _relative_pose(position, orientation, rotation, carrier, other):
     return turned_back(rotation, carrier, dx, dy, dz), turn
 
 
-@jit
+@inlined
 def _motion(seen, p, is_round, reach, place, turn):
     """m: how far points of a pair have moved past each other at most since contacts were looked for."""
     d = (place[0] - seen[p, 0]) ** 2 + (place[1] - seen[p, 1]) ** 2 + (place[2] - seen[p, 2]) ** 2
@@ -110,7 +116,7 @@ def _motion(seen, p, is_round, reach, place, turn):
     return sqrt(d) + 2.0 * reach * sqrt(max(2.0 - 2.0 * abs(same), 0.0))
 
 
-@jit
+@inlined
 def note_seen(bodies, pairs, p):
     """Remember how the bodies of a pair lie to each other now."""
     a, b = pairs.first[p], pairs.second[p]
@@ -171,7 +177,7 @@ def review(bodies, pairs, ahead, between, places, margins):
     return number
 
 
-@jit
+@inlined
 def write_row(
     position, rotation, material, skin, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b, coefficients, rows, r
 ):
@@ -198,7 +204,7 @@ def write_row(
     return rows[r, SEPARATION]
 
 
-@jit
+@inlined
 def hand_over(old_rows, old_ids, old, old_end, rows, ids, new, new_end, near):
     """Give new rows the impulses of the old ones of the same features, else of one nearby with much the same normal.
 
@@ -225,7 +231,7 @@ def hand_over(old_rows, old_ids, old, old_end, rows, ids, new, new_end, near):
                 break
 
 
-@jit
+@inlined
 def _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, ids):
     """Contacts of a half space and a convex polyhedron relative to the first body; returns their number and the gap."""
     wall_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
@@ -242,7 +248,7 @@ def _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, ids):
     return count, least
 
 
-@jit
+@inlined
 def _of_boxes(half, velocity, rotation, a, b, s, t, between, margin, ahead, c, work, scratch, real, ids):
     """Contacts of two boxes relative to the first body; returns their number and a bound of the gap."""
     dx, dy, dz = between[0], between[1], between[2]

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_rows import turned
 from rigidimpulse.geometry import HALF_SPACE, Geometry
 
@@ -118,7 +118,7 @@ def _loop(flat: list[int], geometry: Geometry, low: int) -> list[int]:
     return loop
 
 
-@jit
+@inlined
 def four_of(points, height, count, chosen):
     """Write the places of the points (count, 3) that carry all the others' load to chosen (4,); returns their number."""
     deepest = 0

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.rotation import quaternion_to_matrix
 
 # Kernels that are called for each pair or point get arrays one by one, and indices: a tuple of twenty arrays is passed word by word,
@@ -112,7 +112,7 @@ def load_bodies(bodies, order, now, acceleration, inv_mass, part):
             bodies.mass[8 * k : 8 * k + 8] = 0.0
 
 
-@jit
+@inlined
 def turned(rotation, i, x, y, z):
     """The vector (x, y, z) turned by the matrix rotation[i]."""
     return (
@@ -122,7 +122,7 @@ def turned(rotation, i, x, y, z):
     )
 
 
-@jit
+@inlined
 def turned_back(rotation, i, x, y, z):
     """The vector (x, y, z) turned by the transpose of the matrix rotation[i]."""
     return (
@@ -132,7 +132,7 @@ def turned_back(rotation, i, x, y, z):
     )
 
 
-@jit
+@inlined
 def closing_speed(position, velocity, reach, a, b, carrier):
     """How fast the points of bodies a and b move past each other at most, m/s, seen from the carrier (b where it is true)."""
     v, i, j = velocity, 8 * a, 8 * b

@@ -34,7 +34,8 @@ def _carry_over(old, new):
         if o < old.first.shape[0] and old.first[o] == a and old.second[o] == b:
             new.start[p], new.count[p], new.room[p] = old.start[o], old.count[o], old.room[o]
             new.known[p], new.apart[p] = old.known[o], old.apart[o]
-            new.seen[p, :] = old.seen[o]
+            for k in range(7):
+                new.seen[p, k] = old.seen[o, k]
 
 
 @jit
@@ -44,8 +45,10 @@ def _pack(pairs, rows, ids, new_rows, new_ids):
     for p in range(pairs.first.shape[0]):
         count = pairs.count[p]
         for c in range(count):
-            new_rows[used + c, :] = rows[pairs.start[p] + c]
-            new_ids[used + c, :] = ids[pairs.start[p] + c]
+            for k in range(ROW_SIZE):
+                new_rows[used + c, k] = rows[pairs.start[p] + c, k]
+            for k in range(3):
+                new_ids[used + c, k] = ids[pairs.start[p] + c, k]
         pairs.start[p], pairs.room[p] = used, count
         used += count
     return used

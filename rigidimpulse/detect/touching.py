@@ -15,7 +15,7 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.contact_motion import contact_motion
 from rigidimpulse.detect.manifold import MAX_PER_NORMAL, pair_contacts, reduce_contacts
 from rigidimpulse.integrate.course import FIXED, JERK, TORQUE_RATE, place_at, rate_of, row_at, state_at
@@ -51,7 +51,7 @@ def gyroscopic_acceleration(r, inertia, w, torque, out):
         out[k] = r[k, 0] * a0 + r[k, 1] * a1 + r[k, 2] * a2
 
 
-@jit
+@inlined
 def bring(course, i, time, bodies, rotation, acceleration, angular_acceleration):
     """Bring body i to `time`: pose, velocities, inverse inertia and its present accelerations."""
     state_at(course, i, time, bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i])

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.integrate import forced_top, free_top
 from rigidimpulse.rotation import exponential, product
 
@@ -114,7 +114,7 @@ def begin(course, i):
         free_top.prepare(inertia, q, w, top)
 
 
-@jit
+@inlined
 def begin_straight(course, i):
     """The same in modes PRESCRIBED and STEPPED: apart, so that it is compiled into loops over thousands of bodies."""
     for k in range(JERK, TOP_SIZE):
@@ -215,7 +215,7 @@ def state_at(course, i, t, x_out, q_out, v_out, w_out):
         motion_at(course, i, t, x_out, q_out, v_out, w_out)
 
 
-@jit
+@inlined
 def stepped_at(course, i, t):
     """Position, quaternion, velocity and angular velocity, three and four numbers each, of body i in mode STEPPED.
 

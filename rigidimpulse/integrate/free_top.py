@@ -28,7 +28,7 @@ import math
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.rotation import exponential, product, rotated
 
 # Kinds of rotation, and places in the row of constants.
@@ -314,7 +314,7 @@ def _prepare_symmetric(axis, excess, c):
     c[KIND] = SYMMETRIC
 
 
-@jit
+@inlined
 def keep_axis(q, w_world, constants_out):
     """Write the constants of a turn at constant angular velocity, whatever the inertia."""
     c = constants_out

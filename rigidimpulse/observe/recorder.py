@@ -9,8 +9,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.integrate.course import STEPPED, state_at, stepped_at
+
+
+@inlined
+def _write_stepped(course, i, times, f, position, orientation, velocity, angular_velocity):
+    """Write frame f of body i in mode STEPPED."""
+    x, q, v, w = stepped_at(course, i, times[f])
+    position[f, i, 0], position[f, i, 1], position[f, i, 2] = x
+    orientation[f, i, 0], orientation[f, i, 1], orientation[f, i, 2], orientation[f, i, 3] = q
+    velocity[f, i, 0], velocity[f, i, 1], velocity[f, i, 2] = v
+    angular_velocity[f, i, 0], angular_velocity[f, i, 1], angular_velocity[f, i, 2] = w
 
 
 @jit
@@ -18,11 +28,7 @@ def sample_path(course, i, times, first, last, position, orientation, velocity, 
     """Write frames first ... last - 1 of body i on its present course; times (f,) s, the others (f, n, ...)."""
     for f in range(first, last):
         if course.mode[i] == STEPPED:
-            x, q, v, w = stepped_at(course, i, times[f])
-            position[f, i, 0], position[f, i, 1], position[f, i, 2] = x
-            orientation[f, i, 0], orientation[f, i, 1], orientation[f, i, 2], orientation[f, i, 3] = q
-            velocity[f, i, 0], velocity[f, i, 1], velocity[f, i, 2] = v
-            angular_velocity[f, i, 0], angular_velocity[f, i, 1], angular_velocity[f, i, 2] = w
+            _write_stepped(course, i, times, f, position, orientation, velocity, angular_velocity)
         else:
             state_at(course, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
 
@@ -30,9 +36,15 @@ def sample_path(course, i, times, first, last, position, orientation, velocity, 
 @jit
 def _sample_all(course, bodies, times, last, written, position, orientation, velocity, angular_velocity):
     for i in bodies:
-        if written[i] < last:
+        if written[i] >= last:
+            continue
+        if course.mode[i] == STEPPED:
+            # Here, and not by `sample_path`: heaps have thousands of such.
+            for f in range(written[i], last):
+                _write_stepped(course, i, times, f, position, orientation, velocity, angular_velocity)
+        else:
             sample_path(course, i, times, written[i], last, position, orientation, velocity, angular_velocity)
-            written[i] = last
+        written[i] = last
 
 
 class Recorder:
