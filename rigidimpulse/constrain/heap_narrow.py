@@ -281,7 +281,8 @@ def look(shapes, solids, inset, bodies, pairs, rows, ids, used, ahead, coefficie
     """Find the contacts of `number` pairs at `places`, but for general ones, whose places among these are written to general (k,).
 
     solids, inset: see `heap_overlap`; used: rows of the pool in use; ahead: length of the step, s; coefficients (k, k, 4) of two materials;
-    margins (k,) m. Returns the rows used, -1 where the pool is too small (then call it again), and how many general ones there are.
+    margins (k,) m. Returns the rows used, minus those where the pool is too small (make room and call it again), and how many general
+    ones there are.
     """
     real, found = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
     scratch, work, simplex, polytope, origin = make_scratch(), np.empty((3, 3)), make_simplex(), make_polytope(), np.zeros(3)
@@ -310,7 +311,7 @@ def look(shapes, solids, inset, bodies, pairs, rows, ids, used, ahead, coefficie
             count, gap = _of_boxes(shapes.half, velocity, rotation, a, b, s, t, between, margin, ahead, c, work, scratch, real, found)
         if count > pairs.room[p]:
             if used + POINTS > rows.shape[0]:
-                return np.int64(-1), waiting
+                return -used, waiting
             before = pairs.start[p]
             pairs.start[p], pairs.room[p] = used, POINTS
             for i in range(pairs.count[p]):

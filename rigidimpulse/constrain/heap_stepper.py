@@ -182,10 +182,11 @@ class HeapStepper:
                 self.shapes, self._solids, self._inset, self.bodies, table.pairs, table.rows, table.ids, table.used, self.ahead,
                 world.coefficients, self._places, self._margins, number, self._general,
             )  # fmt: skip
+            # What a look that found no room has taken is in use.
+            table.used = abs(used)
             if used >= 0:
                 break
             table.make_room(len(table.rows) // 4)
-        table.used = used
         if waiting:
             self._look_at_general(context, self._places[self._general[:waiting]], self._margins[self._general[:waiting]])
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse._jit import inlined, jit
-from rigidimpulse.integrate.course import STEPPED, state_at, stepped_at
+from rigidimpulse.integrate.course import FIXED, STEPPED, state_at, stepped_at
 
 
 @inlined
@@ -23,12 +23,24 @@ def _write_stepped(course, i, times, f, position, orientation, velocity, angular
     angular_velocity[f, i, 0], angular_velocity[f, i, 1], angular_velocity[f, i, 2] = w
 
 
+@inlined
+def _write_fixed(course, i, f, position, orientation, velocity, angular_velocity):
+    """Write frame f of body i in mode FIXED."""
+    for k in range(3):
+        position[f, i, k] = course.position[i, k]
+        velocity[f, i, k] = angular_velocity[f, i, k] = 0.0
+    for k in range(4):
+        orientation[f, i, k] = course.orientation[i, k]
+
+
 @jit
 def sample_path(course, i, times, first, last, position, orientation, velocity, angular_velocity):
     """Write frames first ... last - 1 of body i on its present course; times (f,) s, the others (f, n, ...)."""
     for f in range(first, last):
         if course.mode[i] == STEPPED:
             _write_stepped(course, i, times, f, position, orientation, velocity, angular_velocity)
+        elif course.mode[i] == FIXED:
+            _write_fixed(course, i, f, position, orientation, velocity, angular_velocity)
         else:
             state_at(course, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
 
@@ -36,15 +48,16 @@ def sample_path(course, i, times, first, last, position, orientation, velocity, 
 @jit
 def _sample_all(course, bodies, times, last, written, position, orientation, velocity, angular_velocity):
     for i in bodies:
-        if written[i] >= last:
-            continue
+        # The first two here, and not by `sample_path`: heaps have thousands of such.
         if course.mode[i] == STEPPED:
-            # Here, and not by `sample_path`: heaps have thousands of such.
             for f in range(written[i], last):
                 _write_stepped(course, i, times, f, position, orientation, velocity, angular_velocity)
-        else:
+        elif course.mode[i] == FIXED:
+            for f in range(written[i], last):
+                _write_fixed(course, i, f, position, orientation, velocity, angular_velocity)
+        elif written[i] < last:
             sample_path(course, i, times, written[i], last, position, orientation, velocity, angular_velocity)
-        written[i] = last
+        written[i] = max(written[i], last)
 
 
 class Recorder:
