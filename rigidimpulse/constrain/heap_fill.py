@@ -172,14 +172,14 @@ def _impulses(lanes, batches, k, lines, middle, t, u):
 
 
 @jit
-def fill(lanes, batches, number, places, mass, lines, soft):
-    """Records of `number` batches.
+def fill(lanes, batches, begin, number, places, mass, lines, soft):
+    """Records of the batches from `begin` to `number`.
 
     places: lines (8 (n+1),) of `place_bodies`; lines (8 m,) of the pool; soft (2, 3) from `heap_solver.softness`: movable, immovable.
     """
     w = width_of(lanes)
     record, zero, one, half = batches.record, spread(lanes, 0.0), spread(lanes, 1.0), spread(lanes, 0.5)
-    for k in range(number):
+    for k in range(begin, number):
         o = k * FIELDS * w
         pa, pb = gather(lanes, places, batches.first, k * w), gather(lanes, places, batches.second, k * w)
         ma, mb = gather(lanes, mass, batches.first, k * w), gather(lanes, mass, batches.second, k * w)

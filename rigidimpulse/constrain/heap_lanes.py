@@ -151,11 +151,11 @@ def sum_up(t, u, n, along_t, along_u, along_n):
 
 
 @jit
-def warm_start(lanes, batches, number, velocity, moved, mass):
-    """Give all bodies the impulses carried over."""
+def warm_start(lanes, batches, begin, number, velocity, moved, mass):
+    """Give bodies the impulses carried over of the batches from `begin` to `number`; moved: since these were made."""
     w = width_of(lanes)
     record, zero = batches.record, spread(lanes, 0.0)
-    for k in range(number):
+    for k in range(begin, number):
         o = k * FIELDS * w
         va, vb = gather(lanes, velocity, batches.first, k * w), gather(lanes, velocity, batches.second, k * w)
         ma, mb = gather(lanes, mass, batches.first, k * w), gather(lanes, mass, batches.second, k * w)
@@ -241,11 +241,14 @@ def _turned_normal(theta, n, half):
 
 
 @jit
-def solve(lanes, batches, number, velocity, moved, mass, h, relaxing):
-    """One pass over all patches; relaxing: the one with friction and without springs, after the bodies have moved."""
+def solve(lanes, batches, begin, number, velocity, moved, mass, h, relaxing):
+    """One pass over the batches from `begin` to `number`; moved: since these were made.
+
+    relaxing: the one with friction and without springs, after the bodies have moved.
+    """
     w = width_of(lanes)
     record, zero, per_h, half = batches.record, spread(lanes, 0.0), spread(lanes, 1.0 / h), spread(lanes, 0.5)
-    for k in range(number):
+    for k in range(begin, number):
         o, points = k * FIELDS * w, batches.points[k]
         va, vb = gather(lanes, velocity, batches.first, k * w), gather(lanes, velocity, batches.second, k * w)
         xa, xb = gather(lanes, moved, batches.first, k * w), gather(lanes, moved, batches.second, k * w)

@@ -75,7 +75,7 @@ def kick(bodies, h):
 @jit
 def move(bodies, h):
     """Move all bodies by their velocities over h s; those that no contact pushed, on their parabola."""
-    v, before, moved = bodies.velocity, bodies.before, bodies.moved
+    v, before, moved, drift = bodies.velocity, bodies.before, bodies.moved, bodies.drift
     for i in range(bodies.part.shape[0]):
         if bodies.part[i] == OUTSIDE:
             continue
@@ -89,19 +89,41 @@ def move(bodies, h):
             step = h * v[o + k] - back * bodies.gravity[i, k]
             bodies.position[i, k] += step
             moved[o + k] += step
+            drift[o + k] += step
         wx, wy, wz = v[o + 3], v[o + 4], v[o + 5]
         if wx == 0.0 and wy == 0.0 and wz == 0.0:
             continue
         if member and not bodies.alike[i]:
             wx, wy, wz = _turn_freely(bodies, i, h)
-        moved[o + 3] += h * wx
-        moved[o + 4] += h * wy
-        moved[o + 5] += h * wz
+        for k, turn in ((3, h * wx), (4, h * wy), (5, h * wz)):
+            moved[o + k] += turn
+            drift[o + k] += turn
+
+
+@inlined
+def _length(a, o):
+    return sqrt(a[o] * a[o] + a[o + 1] * a[o + 1] + a[o + 2] * a[o + 2])
+
+
+@jit
+def mark_quick(bodies, ahead, limit):
+    """Mark members as quick that have come farther than `limit` inner radii in the step, or will in `ahead` s; returns their share."""
+    v, drift, members, quick = bodies.velocity, bodies.drift, 0, 0
+    for i in range(bodies.part.shape[0]):
+        if bodies.part[i] != MEMBER:
+            bodies.quick[i] = False
+            continue
+        o = 8 * i
+        way = _length(drift, o) + ahead * _length(v, o) + bodies.reach[i] * (_length(drift, o + 3) + ahead * _length(v, o + 3))
+        bodies.quick[i] = way > limit * bodies.inner[i]
+        members += 1
+        quick += bodies.quick[i]
+    return quick / members
 
 
 @jit
 def finish(bodies):
-    """Orientations at the end of a step of those that have not been turned in its sub-steps; what has moved counts from here on."""
+    """Orientations at the end of sub-steps of those that have not been turned in them; what has moved counts from here on."""
     for i in range(bodies.part.shape[0]):
         if bodies.part[i] != OUTSIDE and (bodies.part[i] != MEMBER or bodies.alike[i]):
             o = 8 * i + 3

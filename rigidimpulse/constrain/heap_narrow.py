@@ -45,8 +45,8 @@ BOXES, WALL, GENERAL, HULLS = 0, 1, 2, 3
 """Kinds of pairs: two boxes, a half space and a convex polyhedron, all others, two convex polyhedra."""
 MOST_HULL_CORNERS = 256
 """Corners of a polyhedron that are all asked for the farthest one."""
-AHEAD, FARTHEST = 0.12, 2.0
-"""Contacts are looked for at least and at most that many inner radii away."""
+AHEAD, AHEAD_GENERAL, FARTHEST = 0.05, 0.12, 2.0
+"""Contacts are looked for at least and at most that many inner radii away, at least somewhat farther where pairs are general ones."""
 SAME, SAME_GENERAL = 2e-3, 0.02
 """Part of the inner radius that touching pairs may move past each other until they are looked at again."""
 FAR = 4.0
@@ -141,22 +141,23 @@ def most_motion(bodies, pairs, ahead):
 
 @jit
 def review(bodies, pairs, ahead, between, places, margins):
-    """Write the pairs in play whose contacts must be looked for, and their margins, m: how far they come in `ahead` s, within bounds.
+    """Write the pairs in play of quick bodies whose contacts must be looked for, and their margins, m: how far they come in `ahead` s.
 
     between: in the middle of a step, how many inner radii pairs may have come past each other by the next look with the contacts they
     have; 0 at its start. Pairs that are too far apart lose their contacts. Returns the number of places (k,) and margins (k,) written.
     """
     part, position, orientation, rotation, velocity = bodies.part, bodies.position, bodies.orientation, bodies.rotation, bodies.velocity
-    inner, skin, radius, reach = bodies.inner, bodies.skin, bodies.radius, bodies.reach
+    inner, skin, radius, reach, quick = bodies.inner, bodies.skin, bodies.radius, bodies.reach, bodies.quick
     seen, known, count, apart = pairs.seen, pairs.known, pairs.count, pairs.apart
     number = 0
     for p in range(pairs.first.shape[0]):
         a, b, is_second = pairs.first[p], pairs.second[p], pairs.carrier[p]
-        if not in_play(part, a, b):
+        if not (quick[a] or quick[b]) or not in_play(part, a, b):
             continue
         size = min(inner[a], inner[b])
+        general = pairs.kind[p] == GENERAL
         speed = closing_speed(position, velocity, reach, a, b, is_second)
-        margin = min(skin[a], skin[b]) + min(max(speed * ahead, AHEAD * size), FARTHEST * size)
+        margin = min(skin[a], skin[b]) + min(max(speed * ahead, (AHEAD_GENERAL if general else AHEAD) * size), FARTHEST * size)
         far = radius[a] + radius[b] + margin
         dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
         if dx * dx + dy * dy + dz * dz > far * far:
@@ -169,7 +170,7 @@ def review(bodies, pairs, ahead, between, places, margins):
             motion = _motion(seen, p, pairs.round[p], reach[other], place, turn)
             if count[p] == 0 and apart[p] - motion > margin:
                 continue
-            same = SAME_GENERAL if pairs.kind[p] == GENERAL else SAME
+            same = SAME_GENERAL if general else SAME
             if count[p] > 0 and (motion <= same * size or (between > 0.0 and motion + speed * ahead <= between * size)):
                 continue
         places[number], margins[number] = p, margin

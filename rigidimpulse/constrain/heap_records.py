@@ -24,6 +24,7 @@ from rigidimpulse.constrain.heap_rows import (
     SKIN,
     turned,
 )
+from rigidimpulse.constrain.lanes import ROW, aligned
 
 NORMAL, TANGENT_1, TANGENT_2, ARM_A, ARM_B = 0, 3, 6, 9, 12
 """Fields of three: axes; from the centres of the bodies to O, m."""
@@ -77,15 +78,33 @@ def empty_patches(m: int) -> Patches:
     return Patches(pair=np.zeros(m, np.int64), row=row, size=row[:, 0].copy(), colour=row[:, 0].copy(), slot=row[:, 0].copy())
 
 
+def more_patches(patches: Patches, m: int) -> Patches:
+    """The same with room for m."""
+    out = empty_patches(m)
+    for new, old in zip(out, patches, strict=True):
+        new[: len(old)] = old
+    return out
+
+
+def more_batches(batches: Batches, b: int, width: int) -> Batches:
+    """The same with room for b batches."""
+    record, (first, second) = aligned((FIELDS * b * width + ROW - 1) // ROW), np.zeros((2, b * width), np.int64)
+    out = Batches(record, first, second, np.zeros(POINTS * b * width, np.int64), np.zeros(b, np.int64))
+    for new, old in zip(out, batches, strict=True):
+        new[: len(old)] = old
+    return out
+
+
 @jit
-def list_patches(bodies, pairs, rows, patches):
-    """Write the patches of all pairs in play; returns their number, minus the number needed where there is no room."""
-    m = 0
-    room, part = patches.pair.shape[0], bodies.part
+def list_patches(bodies, pairs, rows, patches, begin):
+    """Write the patches of pairs in play of quick bodies from place `begin` on; returns where they end, negative without room."""
+    m = begin
+    room, part, quick = patches.pair.shape[0], bodies.part, bodies.quick
     taken = np.zeros(64, np.bool_)
     for p in range(pairs.first.shape[0]):
         count = min(pairs.count[p], 64)
-        if count == 0 or not in_play(part, pairs.first[p], pairs.second[p]):
+        a, b = pairs.first[p], pairs.second[p]
+        if count == 0 or not (quick[a] or quick[b]) or not in_play(part, a, b):
             continue
         start = pairs.start[p]
         if pairs.kind[p] != GENERAL:
@@ -115,14 +134,33 @@ def list_patches(bodies, pairs, rows, patches):
 
 
 @jit
-def colour_patches(width, bodies, pairs, patches, count, begins):
-    """Colour `count` patches and give them slots; begins (c+1,) is set to the first batch of each colour.
+def leave_out_quick(width, bodies, pairs, patches, count, batches):
+    """Leave lanes of the first `count` patches idle where one of the bodies is quick."""
+    idle, record = bodies.part.shape[0] - 1, batches.record
+    for m in range(count):
+        if not (bodies.quick[pairs.first[patches.pair[m]]] or bodies.quick[pairs.second[patches.pair[m]]]):
+            continue
+        s = patches.slot[m]
+        k, lane = s // width, s % width
+        o = k * FIELDS * width + lane
+        batches.first[s] = batches.second[s] = idle
+        for field in (PUSH_1, PUSH_2, TWIST, STEP_T, STEP_N):
+            record[o + field * width] = 0.0
+        for c in range(POINTS):
+            batches.row[(POINTS * k + c) * width + lane] = 0
+            g = o + (POINT + POINT_SIZE * c) * width
+            record[g + MASS * width] = record[g + PRESS * width] = 0.0
 
-    Returns the numbers of batches and of colours, minus the number of colours needed where `begins` is too small.
+
+@jit
+def colour_patches(width, bodies, pairs, patches, begin, count, batches, begins):
+    """Colour the patches from `begin` to `count` and give them slots, after so many batches; begins (c+1,): where colours begin.
+
+    Returns where their batches end, and the number of colours, minus that where `begins` is too small.
     """
     used = np.zeros(bodies.part.shape[0], np.int64)
     one, colours, crowded = np.int64(1), np.int64(0), np.int64(0)
-    for m in range(count):
+    for m in range(begin, count):
         a, b = pairs.first[patches.pair[m]], pairs.second[patches.pair[m]]
         free_a, free_b = bodies.mass[8 * a + INVERSE_MASS] > 0.0, bodies.mass[8 * b + INVERSE_MASS] > 0.0
         taken = (used[a] if free_a else np.int64(0)) | (used[b] if free_b else np.int64(0))
@@ -140,16 +178,15 @@ def colour_patches(width, bodies, pairs, patches, count, begins):
                 used[b] |= one << c
         patches.colour[m] = c
     # Colours of crowded patches follow those in use.
-    for m in range(count):
+    for m in range(begin, count):
         if patches.colour[m] >= COLOURS:
             patches.colour[m] += colours - COLOURS
     colours += crowded
     if colours + 1 > begins.shape[0]:
         return np.int64(0), -colours
     number = np.zeros((colours, POINTS), np.int64)
-    for m in range(count):
+    for m in range(begin, count):
         number[patches.colour[m], POINTS - patches.size[m]] += 1
-    batches = np.int64(0)
     for c in range(colours):
         begins[c] = batches
         place = batches * width
@@ -159,7 +196,7 @@ def colour_patches(width, bodies, pairs, patches, count, begins):
             place += here
         batches = (place + width - 1) // width
     begins[colours] = batches
-    for m in range(count):
+    for m in range(begin, count):
         k = POINTS - patches.size[m]
         patches.slot[m] = number[patches.colour[m], k]
         number[patches.colour[m], k] += 1
@@ -210,13 +247,13 @@ def normal_of(position, rotation, rows, r, a, b, carrier):
 
 
 @jit
-def place_patches(width, bodies, pairs, patches, count, batches, number):
-    """Put `count` patches into their lanes of `number` batches."""
+def place_patches(width, bodies, pairs, patches, begin, count, batches, first, number):
+    """Put the patches from `begin` to `count` into their lanes of the batches from `first` to `number`."""
     idle = bodies.part.shape[0] - 1
-    batches.first[: number * width] = batches.second[: number * width] = idle
-    batches.row[: POINTS * number * width] = 0
-    batches.points[:number] = 0
-    for m in range(count):
+    batches.first[first * width : number * width] = batches.second[first * width : number * width] = idle
+    batches.row[POINTS * first * width : POINTS * number * width] = 0
+    batches.points[first:number] = 0
+    for m in range(begin, count):
         p, s = patches.pair[m], patches.slot[m]
         k, lane = s // width, s % width
         batches.first[s], batches.second[s] = pairs.first[p], pairs.second[p]

@@ -4,8 +4,8 @@ Bodies are numbered in the order of their places at the start of the run (their 
 number, so that scenes whose bodies were added in another order give the same bits. Pair p has the contact points
 [start[p], start[p] + count[p]) of a pool of rows.
 
-What changes in a sub-step lies in rows of 8 doubles, see `lanes`: velocity (v, w), moved (displacement and rotation vector since
-the step began), mass (inverse inertia xx, xy, xz, yy, yz, zz in world axes, and 1/m).
+What changes in a sub-step lies in rows of 8 doubles, see `lanes`: velocity (v, w), moved and drift (displacement and rotation vector),
+mass (inverse inertia xx, xy, xz, yy, yz, zz in world axes, and 1/m).
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ class HeapBodies(NamedTuple):
     gravity: np.ndarray  # (n+1, 3) m/s2
     velocity: np.ndarray  # (8 (n+1),) m/s and rad/s, world
     before: np.ndarray  # (8 (n+1),) the same before contacts acted in the sub-step
-    moved: np.ndarray  # (8 (n+1),) m and rad
+    moved: np.ndarray  # (8 (n+1),) m and rad, since contacts were last looked for
+    drift: np.ndarray  # (8 (n+1),) the same since the step began
+    quick: np.ndarray  # (n+1,) bool, its contacts are looked for in the course of the step
     mass: np.ndarray  # (8 (n+1),)
 
 
@@ -92,7 +94,7 @@ def load_bodies(bodies, order, now, acceleration, inv_mass, part):
     """Put the bodies that play a part (n,) by index, at the present instant, before the kernels; order (n,) index by rank."""
     for k in range(order.shape[0]):
         i = order[k]
-        bodies.part[k] = part[i]
+        bodies.part[k], bodies.quick[k] = part[i], True
         if part[i] == OUTSIDE:
             continue
         for c in range(3):
@@ -103,7 +105,7 @@ def load_bodies(bodies, order, now, acceleration, inv_mass, part):
         for c in range(4):
             bodies.orientation[k, c] = now.orientation[i, c]
         for c in range(6):
-            bodies.moved[8 * k + c] = 0.0
+            bodies.moved[8 * k + c] = bodies.drift[8 * k + c] = 0.0
         quaternion_to_matrix(bodies.orientation[k], bodies.rotation[k])
         if part[i] == MEMBER:
             bodies.mass[8 * k + INVERSE_MASS] = inv_mass[i]

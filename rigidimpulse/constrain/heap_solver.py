@@ -144,13 +144,14 @@ def _slip_at(bodies, a, b, arm_a, arm_b):
 
 
 @jit
-def special_patches(width, bodies, pairs, patches, count, rows, batches, gravity, lists, target):
-    """Patches that need more than the passes give: lists (3, m) of two balls, of rebounds, of moving supports; their numbers.
+def special_patches(width, bodies, pairs, patches, begin, count, rows, batches, gravity, lists, target):
+    """Patches from `begin` to `count` that need more than the passes give: of two balls, of rebounds, of moving supports.
 
-    gravity: its strength, m/s2. target (m, 4): speeds at which points leave after they have closed, m/s, 0 for none.
+    Writes them to lists (3, m), and returns their numbers. gravity: its strength, m/s2. target (m, 4): speeds at which points leave after
+    they have closed, m/s, 0 for none.
     """
     balls, rebounds, supports = 0, 0, 0
-    for m in range(count):
+    for m in range(begin, count):
         p, s = patches.pair[m], patches.slot[m]
         a, b = pairs.first[p], pairs.second[p]
         if bodies.reach[a] == 0.0 and bodies.reach[b] == 0.0:
@@ -261,18 +262,21 @@ def _work_of(width, bodies, patches, chosen, batches):
 
 
 @jit
-def advance(lanes, bodies, pairs, patches, batches, number, rows, lists, balls, rebounds, supports, target, sub_steps, h):
-    """All sub-steps of a step, of length h; returns the work of moving supports, J."""
+def advance(lanes, bodies, pairs, patches, batches, steady, number, rows, lists, balls, rebounds, supports, target, sub_steps, h):
+    """So many sub-steps of length h; the first `steady` batches are as the step began. Returns the work of moving supports, J."""
     width = width_of(lanes)
     work, pressing, relaxing = 0.0, np.bool_(0), np.bool_(1)
-    velocity, moved, mass = bodies.velocity, bodies.moved, bodies.mass
+    velocity, moved, drift, mass = bodies.velocity, bodies.moved, bodies.drift, bodies.mass
     for _ in range(sub_steps):
         kick(bodies, h)
-        warm_start(lanes, batches, number, velocity, moved, mass)
-        solve(lanes, batches, number, velocity, moved, mass, h, pressing)
+        warm_start(lanes, batches, 0, steady, velocity, drift, mass)
+        warm_start(lanes, batches, steady, number, velocity, moved, mass)
+        solve(lanes, batches, 0, steady, velocity, drift, mass, h, pressing)
+        solve(lanes, batches, steady, number, velocity, moved, mass, h, pressing)
         move(bodies, h)
         _turn_balls(width, bodies, pairs, patches, lists[0, :balls], rows, batches.record)
-        solve(lanes, batches, number, velocity, moved, mass, h, relaxing)
+        solve(lanes, batches, 0, steady, velocity, drift, mass, h, relaxing)
+        solve(lanes, batches, steady, number, velocity, moved, mass, h, relaxing)
         # Whatever a rebound takes from the impulses has acted already.
         work += _work_of(width, bodies, patches, lists[2, :supports], batches)
         work += _rebound(width, bodies, patches, lists[1, :rebounds], batches, target)

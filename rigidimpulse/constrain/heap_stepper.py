@@ -11,17 +11,19 @@ from rigidimpulse.constrain.heap_contacts import FARTHER, convex_polyhedra, inne
 from rigidimpulse.constrain.heap_cores import cores
 from rigidimpulse.constrain.heap_cover import Cover
 from rigidimpulse.constrain.heap_fill import fill, keep_impulses, place_bodies
-from rigidimpulse.constrain.heap_motion import energies, note_pressed, slow_down
+from rigidimpulse.constrain.heap_motion import energies, mark_quick, note_pressed, slow_down
 from rigidimpulse.constrain.heap_narrow import classify, look, most_motion, review
 from rigidimpulse.constrain.heap_overlap import solids
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
 from rigidimpulse.constrain.heap_records import (
-    FIELDS,
     POINTS,
     Batches,
     colour_patches,
     empty_patches,
+    leave_out_quick,
     list_patches,
+    more_batches,
+    more_patches,
     place_patches,
 )
 from rigidimpulse.constrain.heap_rows import MEMBER, OUTSIDE, SUPPORT, HeapBodies, load_bodies
@@ -48,6 +50,10 @@ COARSEST = 0.3
 """Inner radii by which bodies with cores may pass each other from look to look: sub-steps are made shorter for it."""
 KEPT = 0.2
 """Part of the motion until a look (`Accuracy.heap_motion`) that a pair may make with the contacts it has, in the middle of a step."""
+QUICK = 0.4
+"""Part of `kept` beyond which a body is quick: its contacts are looked for, and their records made anew, in the middle of a step."""
+MOSTLY = 0.3
+"""Part of the bodies that are quick beyond which all count as such."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -100,14 +106,15 @@ class HeapStepper:
         least = CLEAR * np.where(world.dynamic, self.inner, 0.0)
         self.cover = Cover(world, self.order, self.inner, least)
         self.lanes = machine_lanes()
-        self._patches, self._count = empty_patches(64), 0
+        self._patches, self._count, self._steady = empty_patches(64), 0, (0, 0)
         self._batches = Batches(np.zeros(0), *np.zeros((4, 0), np.int64))
         self._begins = np.zeros(256, np.int64)
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
         self._motion = world.accuracy.heap_motion
         self.kept = KEPT * self._motion
-        self._special = bool(world.moving.any() or world.ball.any() or world.coefficients[:, :, 0].any())
+        self._all_quick = bool(world.moving.any() or world.ball.any())
+        self._special = self._all_quick or bool(world.coefficients[:, :, 0].any())
         self.pressed = np.zeros(n, bool)
         self._places = self._general = np.zeros(0, np.int64)
         self._margins = np.zeros(0)
@@ -126,7 +133,8 @@ class HeapStepper:
             alike=by_rank(~unlike, True), inner=by_rank(self.inner, np.inf), skin=by_rank(self.skin, np.inf),
             reach=by_rank(self.reach, 0.0), radius=by_rank(world.bound_radius, 0.0), part=np.zeros(n + 1, np.int64),
             position=np.zeros((n + 1, 3)), orientation=np.zeros((n + 1, 4)), rotation=np.zeros((n + 1, 3, 3)),
-            gravity=np.zeros((n + 1, 3)), velocity=aligned(n + 1), before=aligned(n + 1), moved=aligned(n + 1), mass=aligned(n + 1),
+            gravity=np.zeros((n + 1, 3)), velocity=aligned(n + 1), before=aligned(n + 1), moved=aligned(n + 1), drift=aligned(n + 1),
+            quick=np.zeros(n + 1, bool), mass=aligned(n + 1),
         )  # fmt: skip
 
     def sub_step(self, members: np.ndarray) -> float:
@@ -237,26 +245,36 @@ class HeapStepper:
                     "the bodies are deeper inside each other than their contacts can tell; use a smaller step",
                 )  # fmt: skip
 
-    def _fill(self, h: float) -> int:
-        """Make patches, colours and records for sub-steps of h s; returns the number of batches."""
+    def _look_again(self, context) -> None:
+        """Look at the contacts of quick bodies in the course of a step; those of all others stay in the batches that they have."""
         bodies, table, width = self.bodies, self.table, self.lanes.width
-        count = list_patches(bodies, table.pairs, table.rows, self._patches)
+        if self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY:
+            bodies.quick[:] = True
+        lines = table.lines
+        self._look(context, self.kept)
+        if table.lines is not lines:
+            bodies.quick[:] = True
+        if bodies.quick[-1]:
+            self._steady = 0, 0
+        leave_out_quick(width, bodies, table.pairs, self._patches, self._steady[0], self._batches)
+
+    def _fill(self, h: float) -> int:
+        """Make patches, colours and records of quick bodies after the steady ones, for sub-steps of h s; returns the number of batches."""
+        bodies, table, width, (begin, first) = self.bodies, self.table, self.lanes.width, self._steady
+        count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
         if count < 0:
-            self._patches = empty_patches(-2 * count)
-            count = list_patches(bodies, table.pairs, table.rows, self._patches)
+            self._patches = more_patches(self._patches, -2 * count)
+            count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
         self._count = count
-        number, colours = colour_patches(width, bodies, table.pairs, self._patches, count, self._begins)
+        number, colours = colour_patches(width, bodies, table.pairs, self._patches, begin, count, first, self._begins)
         if colours < 0:
             self._begins = np.zeros(1 - 2 * colours, np.int64)
-            number, colours = colour_patches(width, bodies, table.pairs, self._patches, count, self._begins)
+            number, colours = colour_patches(width, bodies, table.pairs, self._patches, begin, count, first, self._begins)
         if number > len(self._batches.points):
-            room = number + number // 4
-            record = aligned((FIELDS * room * width + ROW - 1) // ROW)
-            first, second = np.zeros((2, room * width), np.int64)
-            self._batches = Batches(record, first, second, np.zeros(POINTS * room * width, np.int64), np.zeros(room, np.int64))
-        place_patches(width, bodies, table.pairs, self._patches, count, self._batches, number)
+            self._batches = more_batches(self._batches, number + number // 4, width)
+        place_patches(width, bodies, table.pairs, self._patches, begin, count, self._batches, first, number)
         place_bodies(bodies, self._places_of_bodies)
-        fill(self.lanes, self._batches, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
+        fill(self.lanes, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
         return number
 
     def step(self, context, time: float, end: float) -> Outcome:
@@ -266,9 +284,10 @@ class HeapStepper:
         h = (end - time) / sub_steps
         _, before = energies(bodies, self._masses, self._pull)
         work, done = 0.0, 0
+        self._steady = 0, 0
         for part in range(self._parts):
             if part:
-                self._look(context, self.kept)
+                self._look_again(context)
             some = (part + 1) * sub_steps // self._parts - done
             work += self._advance(some, h)
             done += some
@@ -290,11 +309,13 @@ class HeapStepper:
         if self._special:
             strength = float(self.world.steady_strength[self.members].max())
             balls, rebounds, supports = special_patches(
-                width, bodies, table.pairs, self._patches, self._count, table.rows, self._batches, strength, lists, target
+                width, bodies, table.pairs, self._patches, self._steady[0], self._count, table.rows, self._batches, strength, lists, target
             )
         work = advance(
-            self.lanes, bodies, table.pairs, self._patches, self._batches, number, table.rows, lists, balls, rebounds, supports, target,
-            sub_steps, h,
+            self.lanes, bodies, table.pairs, self._patches, self._batches, self._steady[1], number, table.rows, lists, balls, rebounds,
+            supports, target, sub_steps, h,
         )  # fmt: skip
         keep_impulses(self.lanes, self._batches, number, table.lines)
+        if self._steady == (0, 0):
+            self._steady = self._count, number
         return work

@@ -8,6 +8,9 @@ import numpy as np
 
 from rigidimpulse.rotation import cross, rotate, rotate_inverse
 
+BLOCK = 4096
+"""Frames times bodies that are summed up at once."""
+
 
 @dataclass(frozen=True)
 class Ledger:
@@ -52,14 +55,16 @@ def make_ledger(times, position, orientation, velocity, angular_velocity, mass, 
     bodies that are not dynamic yet, principal inertia (n, 3), acceleration by gravity and constant forces (n, 3); log: energy
     changes by cause and courses under contact forces; work: what varying forces did (`ForceWork`), if there are any.
     """
-    share = np.ones((1, 1)) if work is None or work.mass_share is None else work.mass_share
-    mass, inertia = share * mass, share[:, :, None] * inertia
-    spin_body = rotate_inverse(orientation, angular_velocity)
-    angular_body = spin_body * np.where(mass > 0.0, 1.0, 0.0)[:, :, None] * inertia
-    kinetic = 0.5 * (mass * (velocity**2).sum(-1) + (spin_body * angular_body).sum(-1))
-    potential = -(mass[:, :, None] * steady_acceleration * position).sum(-1)
-    momentum = (mass[:, :, None] * velocity).sum(1)
-    angular = (rotate(orientation, angular_body) + cross(position, mass[:, :, None] * velocity)).sum(1)
+    share = None if work is None else work.mass_share
+    kinetic, potential, (momentum, angular) = np.empty_like(mass), np.empty_like(mass), np.empty((2, len(times), 3))
+    # Few frames at a time: arrays of all frames of thousands of bodies leave the caches.
+    length = max(BLOCK // max(mass.shape[1], 1), 1)
+    for first in range(0, len(times), length):
+        block = slice(first, first + length)
+        kinetic[block], potential[block], momentum[block], angular[block] = _mechanics(
+            position[block], orientation[block], velocity[block], angular_velocity[block], mass[block],
+            inertia, steady_acceleration, np.ones((1, 1)) if share is None else share[block],
+        )  # fmt: skip
     dissipated: dict[str, np.ndarray] = {}
     for cause in sorted({c for _, c, _ in log.energy}):
         stamps = np.array([t for t, c, _ in log.energy if c == cause])
@@ -79,6 +84,18 @@ def make_ledger(times, position, orientation, velocity, angular_velocity, mass, 
             total = kinetic.sum(1) + stored + sum(dissipated.values())
             dissipated["mass that left"] = total[0] - total
     return Ledger(times, kinetic.sum(1), stored, momentum, angular, dissipated)
+
+
+def _mechanics(position, orientation, velocity, angular_velocity, mass, inertia, steady_acceleration, share):
+    """Energies, kinetic and potential (f, n), momentum and angular momentum (f, 3) of frames; share (f, n): mass and inertia left."""
+    mass, inertia = share * mass, share[:, :, None] * inertia
+    spin_body = rotate_inverse(orientation, angular_velocity)
+    angular_body = spin_body * np.where(mass > 0.0, 1.0, 0.0)[:, :, None] * inertia
+    kinetic = 0.5 * (mass * (velocity**2).sum(-1) + (spin_body * angular_body).sum(-1))
+    potential = -(mass[:, :, None] * steady_acceleration * position).sum(-1)
+    momentum = (mass[:, :, None] * velocity).sum(1)
+    angular = (rotate(orientation, angular_body) + cross(position, mass[:, :, None] * velocity)).sum(1)
+    return kinetic, potential, momentum, angular
 
 
 def _contact_work(times: np.ndarray, energy: np.ndarray, stretches) -> np.ndarray:
