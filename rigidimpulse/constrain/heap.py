@@ -136,10 +136,10 @@ class Heaps:
         )  # fmt: skip
         context.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
         self._leave_out_fast(context, member)
-        a, b = self._near(context, member, ahead)
+        a, b, touch = self._near(context, member, ahead)
         while len(woken := self._touched(context, member, a, b)):
             member[woken] = True
-            a, b = self._near(context, member, ahead)
+            a, b, touch = self._near(context, member, ahead)
         root = islands(world.num_bodies, a, b, member)
         root[~member] = -1
         moves = lively(context.state.now, world.steady_strength, self.stepper.inner)
@@ -149,7 +149,7 @@ class Heaps:
         for reason in refused.values():
             self._refused[reason] = self._refused.get(reason, 0) + 1
         self.label[member & ~chosen] = -1
-        self._settle(context, chosen, root, a, b, time)
+        self._settle(context, chosen, root, a, b, touch > 0, time)
         return chosen
 
     def _leave_out_fast(self, context, member: np.ndarray) -> None:
@@ -157,7 +157,7 @@ class Heaps:
         h = self.stepper.sub_step(np.flatnonzero(context.world.dynamic))
         mark_slow(context.state.now, self.stepper.inner, FAST / h, SPIN / h, member)
 
-    def _near(self, context, member: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray]:
+    def _near(self, context, member: np.ndarray, ahead: float) -> np.ndarray:
         # Movable bodies under way that are no members are swept.
         other = ~member & ~(context.world.dynamic & (context.state.course.mode != FIXED))
         self.stepper.find_pairs(context, np.flatnonzero(member), np.flatnonzero(other), ahead)
@@ -201,7 +201,7 @@ class Heaps:
         refused.update(dict.fromkeys(tall.tolist(), "tall"))
         return chosen & ~np.isin(root, tall)
 
-    def _settle(self, context, chosen: np.ndarray, root: np.ndarray, a: np.ndarray, b: np.ndarray, time: float) -> None:
+    def _settle(self, context, chosen, root, a: np.ndarray, b: np.ndarray, touch: np.ndarray, time: float) -> None:
         """Label the heaps; let those that have been calm for long stand still, and members that are far from restless ones."""
         world, course = context.world, context.state.course
         inner = self.stepper.inner
@@ -216,7 +216,7 @@ class Heaps:
         if np.array_equal(restless, chosen):
             self.asleep[:] = False
             return
-        still = chosen & ~stirred(a, b, chosen, restless, context.state.now, world.mass, world.steady_strength, inner)
+        still = chosen & ~stirred(a[touch], b[touch], chosen, restless, context.state.now, world.mass, world.steady_strength, inner)
         self._stand_still(context, np.flatnonzero(still & (course.mode != FIXED)), time)
         alive = np.zeros(len(root), bool)
         alive[root[restless]] = True

@@ -83,7 +83,7 @@ def most_stray(bodies, members, pressed, reach, skin, allowed):
 
 @jit
 def stirred(first, second, member, restless, bodies, mass, strength, inner):
-    """Mark (n,) restless members, and calm ones that such a one may move, over pairs (k,) that may meet.
+    """Mark (n,) restless members, and calm ones that such a one may move, over pairs (k,) that may touch.
 
     A body of mass m at a speed v that runs into calm ones of mass m_0 sets at most k = m v / (m_0 u) of them going faster than u: behind
     that many bodies nothing moves on by more than what calm bodies may. u = CALM sqrt(g r), m_0 is the least mass of a member.
@@ -99,7 +99,7 @@ def stirred(first, second, member, restless, bodies, mass, strength, inner):
                 speed += bodies.velocity[i, c] ** 2
                 spin += bodies.angular_velocity[i, c] ** 2
             size = np.sqrt(speed) + inner[i] * np.sqrt(spin)
-            reach[i] = 2.0 + mass[i] * size / (least * max(CALM * np.sqrt(strength[i] * inner[i]), 1e-300))
+            reach[i] = 1.0 + max(mass[i] * size / (least * max(CALM * np.sqrt(strength[i] * inner[i]), 1e-300)), 1.0)
     spreads = True
     while spreads:
         spreads = False

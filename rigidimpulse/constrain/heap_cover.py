@@ -15,6 +15,8 @@ from rigidimpulse.detect.broadphase import overlapping_pairs
 
 SLACK = 0.1
 """Inner radii of slack that every body gets beside what it needs."""
+CLOSE = 0.02
+"""Inner radii within which two slow bodies stay of where they were to each other; contacts are looked for farther away than that."""
 WINDOWS = 3.0
 """Lengths of time ahead for whose motion bodies get slack, too."""
 
@@ -80,15 +82,22 @@ def _drop_far(order, now, moves, radius, slack, pairs, count):
 
 
 @jit
-def near_pairs(order, pairs, now, acceleration, least, ahead, world_min, world_max, moves, radius, member, other, out):
-    """Write pairs (a, b) by index, of members with each other and with others, that may meet in `ahead` s; their number.
+def near_pairs(order, pairs, now, acceleration, least, inner, ahead, world_min, world_max, moves, radius, member, other, out):
+    """Write pairs (a, b, touch) by index, of members with each other and with others, that may meet in `ahead` s; their number.
 
-    member, other: (n,) bool; out (k, 2). Others stay where they are, or nearly so.
+    member, other: (n,) bool; out (k, 3). Others stay where they are, or nearly so. touch is 0 where the pair had no contact when it
+    was looked at, and neither body has gone or goes far enough to make one.
     """
     reach, x, count = radius.copy(), now.position, 0
+    way = np.zeros(radius.shape[0])
     for i in range(radius.shape[0]):
         if member[i]:
             reach[i] += least[i] + _way(now.velocity, acceleration, i, ahead)
+            spin = 0.0
+            for k in range(3):
+                way[i] += now.velocity[i, k] ** 2
+                spin += now.angular_velocity[i, k] ** 2
+            way[i] = ahead * (sqrt(way[i]) + radius[i] * sqrt(spin)) / inner[i]
     for p in range(pairs.first.shape[0]):
         i, j = order[pairs.first[p]], order[pairs.second[p]]
         if not ((member[i] and (member[j] or other[j])) or (member[j] and other[i])):
@@ -104,6 +113,7 @@ def near_pairs(order, pairs, now, acceleration, least, ahead, world_min, world_m
         if apart:
             continue
         out[count, 0], out[count, 1] = i, j
+        out[count, 2] = pairs.count[p] > 0 or not pairs.known[p] or way[i] + way[j] > CLOSE
         count += 1
     return count
 
@@ -159,12 +169,12 @@ class Cover:
             first, second = first[may], second[may]
         return first, second
 
-    def near(self, pairs, now, acceleration, member: np.ndarray, other: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs (a, b) by index, a of lower rank, of members with each other and with others that may meet in `ahead` s."""
+    def near(self, pairs, now, acceleration, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
+        """Pairs (a, b, touch) by index, a of lower rank, of members with each other and with others that may meet in `ahead` s, (3, k)."""
         world = self.world
-        out = np.empty((len(pairs.first), 2), np.int64)
+        out = np.empty((len(pairs.first), 3), np.int64)
         count = near_pairs(
-            self.order, pairs, now, acceleration, self.least, ahead, world.static_min, world.static_max, self._moves,
+            self.order, pairs, now, acceleration, self.least, self._inner, ahead, world.static_min, world.static_max, self._moves,
             world.bound_radius, member, other, out,
         )  # fmt: skip
-        return out[:count, 0], out[:count, 1]
+        return out[:count].T

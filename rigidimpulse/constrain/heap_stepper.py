@@ -159,8 +159,8 @@ class HeapStepper:
             self.table.replace(*found)
             classify(self.table.pairs, self.bodies, self.shapes)
 
-    def near(self, context, member: np.ndarray, other: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs (a, b), a of lower rank, of members with each other and with others, (n,) bool each, that may meet in `ahead` s."""
+    def near(self, context, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
+        """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `Cover.near`."""
         return self.cover.near(self.table.pairs, context.state.now, context.acceleration, member, other, ahead)
 
     def set_up(self, context, members: np.ndarray, supports: np.ndarray, ahead: float, between: float = 0.0) -> None:
