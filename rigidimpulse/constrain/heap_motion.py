@@ -107,15 +107,14 @@ def _length(a, o):
 
 @jit
 def mark_quick(bodies, ahead, limit):
-    """Mark members as quick that have come farther than `limit` inner radii in the step, or will in `ahead` s; returns their share."""
+    """Mark members as quick that have drifted by more than `limit` inner radii, or will have in `ahead` s; returns the share that is."""
     v, drift, members, quick = bodies.velocity, bodies.drift, 0, 0
     for i in range(bodies.part.shape[0]):
         if bodies.part[i] != MEMBER:
-            bodies.quick[i] = False
             continue
         o = 8 * i
         way = _length(drift, o) + ahead * _length(v, o) + bodies.reach[i] * (_length(drift, o + 3) + ahead * _length(v, o + 3))
-        bodies.quick[i] = way > limit * bodies.inner[i]
+        bodies.quick[i] = bodies.quick[i] or way > limit * bodies.inner[i]
         members += 1
         quick += bodies.quick[i]
     return quick / members

@@ -55,8 +55,8 @@ class HeapBodies(NamedTuple):
     velocity: np.ndarray  # (8 (n+1),) m/s and rad/s, world
     before: np.ndarray  # (8 (n+1),) the same before contacts acted in the sub-step
     moved: np.ndarray  # (8 (n+1),) m and rad, since contacts were last looked for
-    drift: np.ndarray  # (8 (n+1),) the same since the step began
-    quick: np.ndarray  # (n+1,) bool, its contacts are looked for in the course of the step
+    drift: np.ndarray  # (8 (n+1),) the same since the steady batches were made
+    quick: np.ndarray  # (n+1,) bool, its contacts are in none of these
     mass: np.ndarray  # (8 (n+1),)
 
 

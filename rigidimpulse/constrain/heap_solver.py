@@ -263,7 +263,10 @@ def _work_of(width, bodies, patches, chosen, batches):
 
 @jit
 def advance(lanes, bodies, pairs, patches, batches, steady, number, rows, lists, balls, rebounds, supports, target, sub_steps, h):
-    """So many sub-steps of length h; the first `steady` batches are as the step began. Returns the work of moving supports, J."""
+    """So many sub-steps of length h; returns the work of moving supports, J.
+
+    steady: batches that were made before the last look; what bodies have come since then is in `drift`.
+    """
     width = width_of(lanes)
     work, pressing, relaxing = 0.0, np.bool_(0), np.bool_(1)
     velocity, moved, drift, mass = bodies.velocity, bodies.moved, bodies.drift, bodies.mass

@@ -246,15 +246,16 @@ class HeapStepper:
                 )  # fmt: skip
 
     def _look_again(self, context) -> None:
-        """Look at the contacts of quick bodies in the course of a step; those of all others stay in the batches that they have."""
+        """Look at the contacts of quick bodies in the course of a step; those of all others stay in the steady batches, where they are."""
         bodies, table, width = self.bodies, self.table, self.lanes.width
-        if self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY:
+        all_quick = self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY
+        if all_quick:
             bodies.quick[:] = True
         lines = table.lines
         self._look(context, self.kept)
-        if table.lines is not lines:
+        if all_quick or table.lines is not lines:
             bodies.quick[:] = True
-        if bodies.quick[-1]:
+            bodies.drift[:] = 0.0
             self._steady = 0, 0
         leave_out_quick(width, bodies, table.pairs, self._patches, self._steady[0], self._batches)
 
@@ -317,5 +318,6 @@ class HeapStepper:
         )  # fmt: skip
         keep_impulses(self.lanes, self._batches, number, table.lines)
         if self._steady == (0, 0):
+            bodies.quick[:] = False
             self._steady = self._count, number
         return work

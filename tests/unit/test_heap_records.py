@@ -1,0 +1,54 @@
+"""Which contacts of a heap the solver sees in the course of a step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rigidimpulse as ri
+from rigidimpulse.constrain import heap_stepper
+from rigidimpulse.constrain.heap_narrow import in_play
+from rigidimpulse.constrain.heap_records import LINES, POINTS
+
+
+def pile(number: int) -> ri.Scene:
+    """Boxes that fall on each other: some lie already while others arrive."""
+    random = np.random.default_rng(4)
+    material = ri.Material(density=500, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
+    scene = ri.Scene(gravity=(0, 0, -9.81))
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=material))
+    for k in range(number):
+        place, turn = (0.18 * (k % 5), 0.18 * (k // 5 % 5), 0.1 + 0.2 * (k // 25)), random.normal(size=4)
+        scene.add(ri.Body(f"box {k}", ri.Shape.box((0.12, 0.1, 0.08)), position=place, orientation=turn, material=material))
+    return scene
+
+
+def test_every_contact_is_in_one_lane_with_the_motion_since_it_was_put_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the middle of a step only contacts of quick bodies are put anew; none may be lost or doubled by it.
+
+    And what a body has drifted is how far it has come since the steady batches were made, to round-off of places of 1 m.
+    """
+    advance, made, steps = heap_stepper.advance, {}, {"whole": 0, "steady": 0}
+
+    def checked(lanes: Any, bodies: Any, pairs: Any, patches: Any, batches: Any, steady: int, number: int, *rest: Any) -> float:
+        rows = batches.row[: POINTS * number * lanes.width]
+        seen = np.sort(rows[rows > 0] // LINES)
+        listed = [
+            range(start, start + count)
+            for a, b, start, count in zip(pairs.first, pairs.second, pairs.start, pairs.count, strict=True)
+            if in_play.py_func(bodies.part, a, b)
+        ]
+        assert np.array_equal(seen, np.sort(np.concatenate([*listed, []]).astype(np.int64)))
+        steps["steady" if steady else "whole"] += 1
+        if steady == 0:
+            made["place"] = bodies.position.copy()
+        drift = bodies.drift.reshape(-1, 8)[:, :3]
+        moves = bodies.part == heap_stepper.MEMBER
+        assert np.abs(drift - (bodies.position - made["place"]))[moves].max(initial=0.0) < 1e-13
+        return advance(lanes, bodies, pairs, patches, batches, steady, number, *rest)
+
+    monkeypatch.setattr(heap_stepper, "advance", checked)
+    assert ri.simulate(pile(100), 1.2).status.ok
+    assert min(steps.values()) > 50
