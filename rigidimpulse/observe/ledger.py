@@ -51,14 +51,15 @@ class Ledger:
 def make_ledger(times, position, orientation, velocity, angular_velocity, mass, inertia, steady_acceleration, log, work=None) -> Ledger:
     """Ledger of recorded principal-frame states.
 
-    Arrays are (f, n, ...) for all bodies: centre of mass, principal orientation, velocity, world spin; mass (f, n) with 0 for
-    bodies that are not dynamic yet, principal inertia (n, 3), acceleration by gravity and constant forces (n, 3); log: energy
+    Arrays are (f, n, ...) for all bodies: centre of mass, principal orientation, velocity, world spin; mass (f, n) or (n,) with 0
+    for bodies that are not dynamic yet, principal inertia (n, 3), acceleration by gravity and constant forces (n, 3); log: energy
     changes by cause and courses under contact forces; work: what varying forces did (`ForceWork`), if there are any.
     """
     share = None if work is None else work.mass_share
-    kinetic, potential, (momentum, angular) = np.empty_like(mass), np.empty_like(mass), np.empty((2, len(times), 3))
+    shape = position.shape[:2]
+    mass, (kinetic, potential), (momentum, angular) = np.broadcast_to(mass, shape), np.empty((2, *shape)), np.empty((2, len(times), 3))
     # Few frames at a time: arrays of all frames of thousands of bodies leave the caches.
-    length = max(BLOCK // max(mass.shape[1], 1), 1)
+    length = max(BLOCK // max(shape[1], 1), 1)
     for first in range(0, len(times), length):
         block = slice(first, first + length)
         kinetic[block], potential[block], momentum[block], angular[block] = _mechanics(
