@@ -57,7 +57,8 @@ def make_ledger(times, position, orientation, velocity, angular_velocity, mass, 
     """
     share = None if work is None else work.mass_share
     shape = position.shape[:2]
-    mass, (kinetic, potential), (momentum, angular) = np.broadcast_to(mass, shape), np.empty((2, *shape)), np.empty((2, len(times), 3))
+    mass, kinetic, potential = np.broadcast_to(mass, shape), np.empty(shape), np.empty(shape)
+    momentum, angular = np.empty((len(times), 3)), np.empty((len(times), 3))
     # Few frames at a time: arrays of all frames of thousands of bodies leave the caches.
     length = max(BLOCK // max(shape[1], 1), 1)
     for first in range(0, len(times), length):
