@@ -335,24 +335,19 @@ def release_times(world: World) -> np.ndarray:
 
 
 def impulses_by_cause(context: StepContext, times: np.ndarray, impacts: np.ndarray, work: ForceWork | None) -> Impulses:
-    """Split what bodies gained by cause."""
-    world, recorder = context.world, context.recorder
-    # Mass at the frames over that at the end of the run, in the middle between frames; and the part of that time in which it counts.
-    share = np.ones((len(times), world.num_bodies)) if work is None or work.mass_share is None else work.mass_share
-    middle = 0.5 * (share + np.vstack([share[:1], share[:-1]]))
-    passed = np.diff(times, prepend=0.0)[:, None]
-    counted = np.clip(times[:, None] - release_times(world), 0.0, passed)
+    """What bodies gained, to be split by cause."""
+    world = context.world
     mass = np.where(world.dynamic, world.mass, 0.0)
-    gained = np.diff(recorder.velocity, axis=0, prepend=recorder.velocity[:1])
     return Impulses(
         names=list(world.names),
         times=times,
         pull=mass[:, None, None] * np.stack([world.gravity, world.push], axis=1),
-        held=np.cumsum(counted * middle, axis=0),
+        mass=mass,
+        release=release_times(world),
+        velocity=context.recorder.velocity,
         book=context.impulses,
         forces=work,
         impacts=impacts,
-        gained=np.cumsum(((counted > 0.0) * middle * mass)[:, :, None] * gained, axis=0),
     )
 
 

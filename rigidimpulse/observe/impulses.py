@@ -9,7 +9,7 @@ left side is the integral of m v'.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,22 +59,23 @@ class Impulses:
 
     Attributes:
         names: of the bodies. times: (f,) s.
-        pull: (n, 2, 3) N of gravity and of constant forces on each body, at its mass at the end. held: (f, n) s, time until each frame,
-            each instant counted by its mass over that at the end.
+        pull: (n, 2, 3) N of gravity and of constant forces on each body, at its mass at the end.
+        mass: (n,) kg at the end, 0 of bodies that are never dynamic. release: (n,) s, when bodies that are carried first are let go.
+        velocity: (f, n, 3) m/s.
         book: what pairs exchange. forces: what varying forces did, None where there are none.
-        impacts: the table of impacts. gained: (f, n, 3) N s, all that each body gained.
+        impacts: the table of impacts.
 
     """
 
     names: list[str]
     times: np.ndarray
     pull: np.ndarray
-    held: np.ndarray
+    mass: np.ndarray
+    release: np.ndarray
+    velocity: np.ndarray
     book: ImpulseBook
     forces: ForceWork | None
     impacts: np.ndarray
-    gained: np.ndarray
-    _cache: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
 
     def of(self, name: str) -> dict[str, np.ndarray]:
         """Impulses (f, 3) N s on a body by cause.
@@ -86,19 +87,32 @@ class Impulses:
         if name not in self.names:
             raise unknown_name("body", name, self.names)
         i = self.names.index(name)
+        held, gained = self._course_of(i)
         parts: dict[str, np.ndarray] = {}
         for what, pull in zip(("gravity", "constant forces"), self.pull[i], strict=True):
             if np.any(pull):
-                parts[what] = self.held[:, i, None] * pull
+                parts[what] = held[:, None] * pull
         if self.forces is not None:
             parts.update(self.forces.impulses_on(i))
         for (cause, other), impulse in sorted(self.book.of(i).items(), key=lambda item: item[0]):
             parts[cause if other < 0 or cause.startswith("joint ") else f"{cause} {self.names[other]}"] = impulse
         parts.update(self._impacts_on(i))
-        rest = self.gained[:, i] - sum(parts.values(), np.zeros_like(self.gained[:, i]))
+        rest = gained - sum(parts.values(), np.zeros_like(gained))
         if np.any(np.abs(rest) > 0.0):
             parts["corrections"] = rest
         return parts
+
+    def _course_of(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+        """Time until each frame (f,) s, each instant counted by the body's mass over that at the end, and what it gained (f, 3) N s."""
+        share = np.ones(len(self.times))
+        if self.forces is not None and self.forces.mass_share is not None:
+            share = self.forces.mass_share[:, i]
+        # Mass at the frames over that at the end of the run, in the middle between frames; and the part of that time in which it counts.
+        middle = 0.5 * (share + np.concatenate([share[:1], share[:-1]]))
+        counted = np.clip(self.times - self.release[i], 0.0, np.diff(self.times, prepend=0.0))
+        gain = np.diff(self.velocity[:, i], axis=0, prepend=self.velocity[:1, i])
+        weight = (counted > 0.0) * middle * self.mass[i]
+        return np.cumsum(counted * middle), np.cumsum(weight[:, None] * gain, axis=0)
 
     def _impacts_on(self, i: int) -> dict[str, np.ndarray]:
         """Impulses (f, 3) of impacts with each other body."""

@@ -61,8 +61,14 @@ def make_ledger(times, position, orientation, velocity, angular_velocity, mass, 
     momentum, angular = np.empty((len(times), 3)), np.empty((len(times), 3))
     # Few frames at a time: arrays of all frames of thousands of bodies leave the caches.
     length = max(BLOCK // max(shape[1], 1), 1)
+    frames = [position, orientation, velocity, angular_velocity, mass] + ([] if share is None else [share])
     for first in range(0, len(times), length):
-        block = slice(first, first + length)
+        end = min(first + length, len(times))
+        block = slice(first, end)
+        if first and all(np.array_equal(one[block], one[first - 1 : end - 1]) for one in frames):  # all stands still
+            for sums in (kinetic, potential, momentum, angular):
+                sums[block] = sums[first - 1]
+            continue
         kinetic[block], potential[block], momentum[block], angular[block] = _mechanics(
             position[block], orientation[block], velocity[block], angular_velocity[block], mass[block],
             inertia, steady_acceleration, np.ones((1, 1)) if share is None else share[block],

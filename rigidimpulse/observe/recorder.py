@@ -28,7 +28,11 @@ def _write_fixed(course, i, f, position, orientation, velocity, angular_velocity
     """Write frame f of body i in mode FIXED."""
     for k in range(3):
         position[f, i, k] = course.position[i, k]
-        velocity[f, i, k] = angular_velocity[f, i, k] = 0.0
+        # Only where it is not 0: zeros that nobody has written take no memory.
+        if velocity[f, i, k] != 0.0:
+            velocity[f, i, k] = 0.0
+        if angular_velocity[f, i, k] != 0.0:
+            angular_velocity[f, i, k] = 0.0
     for k in range(4):
         orientation[f, i, k] = course.orientation[i, k]
 
@@ -60,6 +64,10 @@ def _sample_all(course, bodies, times, last, written, position, orientation, vel
         written[i] = max(written[i], last)
 
 
+AT_ONCE = 16
+"""Frames of all bodies that are written at once, since those of one body are far apart in memory."""
+
+
 class Recorder:
     """Frames of n bodies in the principal frame: position (f, n, 3), orientation (f, n, 4), velocities (f, n, 3)."""
 
@@ -68,8 +76,8 @@ class Recorder:
         self.times = times
         self.position = np.empty((len(times), num_bodies, 3))
         self.orientation = np.empty((len(times), num_bodies, 4))
-        self.velocity = np.empty((len(times), num_bodies, 3))
-        self.angular_velocity = np.empty((len(times), num_bodies, 3))
+        self.velocity = np.zeros((len(times), num_bodies, 3))
+        self.angular_velocity = np.zeros((len(times), num_bodies, 3))
         self.written = np.zeros(num_bodies, np.int64)
 
     def start(self, course) -> None:
@@ -99,8 +107,10 @@ class Recorder:
 
     def finish(self, course) -> None:
         """Write what is left of all bodies."""
-        for i in range(len(self.written)):
-            self._write(course, i, len(self.times))
+        everyone = np.arange(len(self.written))
+        for last in range(int(self.written.min(initial=0)), len(self.times), AT_ONCE):
+            self.flush_all(course, everyone, self.times[last])
+        self.flush_all(course, everyone, np.inf)
 
     def _write(self, course, i: int, last: int) -> None:
         first = int(self.written[i])
