@@ -10,7 +10,7 @@ import numpy as np
 from rigidimpulse.constrain.arrival import forget_forces, remember_forces
 from rigidimpulse.constrain.contact_motion import Motion, contact_motion
 from rigidimpulse.constrain.drift import lift_contacts, needs_lift
-from rigidimpulse.constrain.energy_guard import note_hold
+from rigidimpulse.constrain.energy_guard import guard_lift, note_hold
 from rigidimpulse.constrain.foresight import ALLOWED
 from rigidimpulse.constrain.joint_forces import UNSOLVED
 from rigidimpulse.constrain.resting import Held, hold_contacts
@@ -213,7 +213,9 @@ def _lift(context, window, group: Group) -> None:
     lifted = np.array([held.get(key, False) for key in around.keys], bool)
     lift_contacts(now, around.contacts, lifted, around.delta, group.members, context.column)
     refresh_pose(group.members, now, state.rotation, state.course.inertia)
-    context.log.book(group.time, "lift", mechanical_energy(now, context.world, group.members) - before)
+    gained = mechanical_energy(now, context.world, group.members) - before
+    context.log.book(group.time, "lift", gained)
+    guard_lift(context, group, around.contacts, gained, float(around.delta.max()))
     group.moved = True
     reach = 2.0 * context.world.bound_radius[group.members] * np.linalg.norm(now.orientation[group.members] - turn, axis=1)
     group.shift = float((np.linalg.norm(now.position[group.members] - place, axis=1) + reach).max())

@@ -41,12 +41,22 @@ class Ground:
 
 
 def note_hold(context, group, contacts, force: np.ndarray) -> None:
-    """Remember who shares the forces (m, 3) of the held contacts from now on, and whether they may make energy.
+    """Remember who shares the forces (m, 3) of the held contacts from now on, and whether they may make energy."""
+    state, first = context.state, int(group.members[0])
+    ground = _passive_ground(context, group, contacts, bool(np.any(force[:, 0] > 0.0)))
+    state.sharing[group.members] = first
+    state.closed[group.members] = ground is not None
+    if ground is not None:
+        state.ground[first] = ground
+
+
+def _passive_ground(context, group, contacts, presses: bool) -> Ground | None:
+    """What stands by a group, or None where forces may make energy.
 
     They may not where all that stands moves with one velocity, joints are neither driven nor springs, and no other force varies.
+    presses: whether contacts press.
     """
-    world, state, now = context.world, context.state, context.state.now
-    first, members = int(group.members[0]), group.members
+    world, now = context.world, context.state.now
     pairs = np.column_stack([contacts.body_a, contacts.body_b])
     stands = ~world.dynamic[pairs]
     supports, rough = np.unique(pairs[stands]), bool(np.any(stands.any(axis=1) & (contacts.static_friction > 0.0)))
@@ -57,12 +67,26 @@ def note_hold(context, group, contacts, force: np.ndarray) -> None:
         rough = rough or tied or not np.all(world.dynamic[ends])
         supports = np.union1d(supports, ends[~world.dynamic[ends]])
         # Without contact joints keep energy by themselves, up and down: what they gain they lose.
-        passive = passive and context.joints.are_passive(group.joints) and bool(np.any(force[:, 0] > 0.0))
+        passive = passive and context.joints.are_passive(group.joints) and presses
     velocity = now.velocity[supports[0]].copy() if len(supports) else np.zeros(3)
     steady = not np.any(now.angular_velocity[supports]) and not np.any(now.velocity[supports] != velocity)
-    state.sharing[members] = first
-    state.closed[members] = passive and steady and not (tied and np.any(velocity))
-    state.ground[first] = Ground(velocity, np.eye(3) if rough else contacts.normal[stands.any(axis=1)])
+    if not (passive and steady) or (tied and np.any(velocity)):
+        return None
+    return Ground(velocity, np.eye(3) if rough else contacts.normal[stands.any(axis=1)])
+
+
+def guard_lift(context, group, contacts, gained: float, depth: float) -> None:
+    """Take off the members' speeds what a lift gained [J] beyond their weight times the depth [m] that contacts may sink."""
+    world, now, members = context.world, context.state.now, group.members
+    weight = float(world.mass[members] @ np.linalg.norm(world.steady_acceleration[members], axis=1))
+    excess = gained - weight * depth
+    ground = _passive_ground(context, group, contacts, True) if excess > 0.0 else None
+    if ground is not None:
+        before = kinetic_energy(now, world, members)
+        now.velocity[members] -= ground.velocity
+        take_off(now, world, members, excess, ground.pushes)
+        now.velocity[members] += ground.velocity
+        context.log.book(group.time, "guard", kinetic_energy(now, world, members) - before)
 
 
 def note_arrival(context, bodies: list[int]) -> None:
