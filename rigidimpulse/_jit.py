@@ -8,8 +8,11 @@ old version of another one inside it.
 from __future__ import annotations
 
 import hashlib
+import multiprocessing
+import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from time import perf_counter
@@ -17,6 +20,7 @@ from typing import Any
 
 import numba
 from numba import types
+from numba.core import config
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
@@ -90,6 +94,8 @@ class _PartCompiler(Compiler):
         super().__init__(typing_context, target_context, library, *arguments)
 
 
+MOST_CORES = 4
+"""Cores on which a kernel is worth calling at once."""
 KERNELS: list[Kernel] = []
 """All kernels of the modules that have been imported."""
 
@@ -118,7 +124,7 @@ class Kernel:
     @cached_property
     def entry(self) -> Any:
         """The dispatcher that Python calls."""
-        dispatcher = _njit(**_OPTIONS)(self.py_func)
+        dispatcher = _njit(nogil=True, **_OPTIONS)(self.py_func)
         dispatcher._cache = _KernelCache(self.py_func)
         return dispatcher
 
@@ -134,6 +140,29 @@ class Kernel:
         else:
             self.preparing += spent
         return result
+
+
+    def together(self, calls: Sequence[tuple]) -> list[Any]:
+        """Call it from Python with each of these tuples of arguments at once, on as many cores; results in their order."""
+        if len(calls) == 1 or not self.entry.overloads:
+            return [self(*arguments) for arguments in calls]
+        start = perf_counter()
+        others = [_threads(os.getpid()).submit(self.entry, *arguments) for arguments in calls[1:]]
+        results = [self.entry(*calls[0]), *(other.result() for other in others)]
+        self.calls += len(calls)
+        self.seconds += perf_counter() - start
+        return results
+
+
+def number_of_cores() -> int:
+    """Cores that kernels may use: those that numba may (NUMBA_NUM_THREADS, else all of the process), one in a process of a pool."""
+    return 1 if multiprocessing.parent_process() else min(int(vars(config)["NUMBA_NUM_THREADS"]), MOST_CORES)
+
+
+@cache
+def _threads(_process: int) -> ThreadPoolExecutor:
+    """The threads of a process; one that is forked off has none of its parent's."""
+    return ThreadPoolExecutor(MOST_CORES - 1, "rigidimpulse")
 
 
 @typeof_impl.register(Kernel)

@@ -13,6 +13,7 @@ from rigidimpulse.constrain.foresight import Foresight
 from rigidimpulse.constrain.heap import Heaps, why_no_heaps
 from rigidimpulse.constrain.jointed import JointState
 from rigidimpulse.constrain.qp import row_solver
+from rigidimpulse.detect.contact_buffer import ContactBuffer
 from rigidimpulse.detect.groups import NO_FORCE
 from rigidimpulse.detect.touching import bring_all
 from rigidimpulse.geometry import Geometry
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from rigidimpulse.forces.varying import VaryingForces
     from rigidimpulse.observe.trigger import Triggers
 
-CONTACT_CAPACITY = 1024
-PAIR_CAPACITY = 4096
 LOG_CAPACITY = 4096
 
 
@@ -107,9 +106,7 @@ class StepContext:
         self.impulses = ImpulseBook(recorder.times)
         self.contact_log = ContactLog(recorder.times, self.impulses)
         self.detector = Detector(world.geometry, world.shape_of_body, make_scratch(world.geometry), world.accuracy.iterations)
-        self.contact_real = np.empty((CONTACT_CAPACITY, 10))
-        self.contact_int = np.empty((CONTACT_CAPACITY, 5), np.int64)
-        self.scratch_pairs = np.empty((PAIR_CAPACITY, 2), np.int64)
+        self.contact_buffer = ContactBuffer()
         self.impact_log = np.empty((LOG_CAPACITY, 7))
         self.column = np.zeros(n, np.int64)
         self.acceleration = np.zeros((n, 3))
@@ -136,13 +133,6 @@ class StepContext:
         x, q = np.empty(3), np.empty(4)
         pose_at(self.state.course, i, time, x, q)
         return x, to_matrix(q)
-
-    def grow_contacts(self, needed: int) -> None:
-        """Make room for `needed` contacts and candidate pairs."""
-        capacity = max(needed, 2 * len(self.contact_real))
-        self.contact_real = np.empty((capacity, 10))
-        self.contact_int = np.empty((capacity, 5), np.int64)
-        self.scratch_pairs = np.empty((4 * capacity, 2), np.int64)
 
     def quarantine(self, i: int, time: float) -> None:
         """Freeze a body whose state stopped being finite where its course last was, and report it."""

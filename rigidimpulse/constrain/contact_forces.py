@@ -213,9 +213,8 @@ def _lift(context, window, group: Group) -> None:
     lifted = np.array([held.get(key, False) for key in around.keys], bool)
     lift_contacts(now, around.contacts, lifted, around.delta, group.members, context.column)
     refresh_pose(group.members, now, state.rotation, state.course.inertia)
-    gained = mechanical_energy(now, context.world, group.members) - before
-    context.log.book(group.time, "lift", gained)
-    guard_lift(context, group, around.contacts, gained, float(around.delta.max()))
+    context.log.book(group.time, "lift", mechanical_energy(now, context.world, group.members) - before)
+    guard_lift(context, group, around.contacts, now.position[group.members] - place, float(around.delta.max()))
     group.moved = True
     reach = 2.0 * context.world.bound_radius[group.members] * np.linalg.norm(now.orientation[group.members] - turn, axis=1)
     group.shift = float((np.linalg.norm(now.position[group.members] - place, axis=1) + reach).max())

@@ -75,11 +75,11 @@ def _passive_ground(context, group, contacts, presses: bool) -> Ground | None:
     return Ground(velocity, np.eye(3) if rough else contacts.normal[stands.any(axis=1)])
 
 
-def guard_lift(context, group, contacts, gained: float, depth: float) -> None:
-    """Take off the members' speeds what a lift gained [J] beyond their weight times the depth [m] that contacts may sink."""
+def guard_lift(context, group, contacts, way: np.ndarray, depth: float) -> None:
+    """Take off the members' speeds what a lift by `way` (k, 3) m gained beyond their weight times the depth [m] that contacts may sink."""
     world, now, members = context.world, context.state.now, group.members
-    weight = float(world.mass[members] @ np.linalg.norm(world.steady_acceleration[members], axis=1))
-    excess = gained - weight * depth
+    weight = world.mass[members, None] * world.steady_acceleration[members]
+    excess = -float((weight * way).sum()) - depth * float(np.linalg.norm(weight, axis=1).sum())
     ground = _passive_ground(context, group, contacts, True) if excess > 0.0 else None
     if ground is not None:
         before = kinetic_energy(now, world, members)

@@ -20,7 +20,7 @@ from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_
 from rigidimpulse.constrain.heap_islands import FAST, MANY, SPIN, TALL, islands, lively, refusals, support_levels
 from rigidimpulse.constrain.heap_stepper import HeapStepper, Outcome
 from rigidimpulse.detect.groups import Group, empty_contacts
-from rigidimpulse.detect.touching import bring_all, contacts_of_pairs
+from rigidimpulse.detect.touching import bring_all
 from rigidimpulse.integrate.course import FIXED, STEPPED
 from rigidimpulse.integrate.flight import book_contact_work
 from rigidimpulse.observe.energy import mechanical_energy
@@ -172,15 +172,9 @@ class Heaps:
             return which
         a, b = a[which], b[which]
         margin = TOUCHES * np.minimum(self.stepper.skin[a], self.stepper.skin[b])
-        while True:
-            count = contacts_of_pairs(
-                self.stepper.geometry, world.shape_of_body, context.state.now, context.state.rotation, a, b, margin,
-                context.scratch_pairs, context.contact_real, context.contact_int, world.cylinders,
-            )  # fmt: skip
-            if count >= 0:
-                break
-            context.grow_contacts(-count)
-        touched = np.unique(context.contact_int[:count, :2])
+        buffer = context.contact_buffer
+        count = buffer.find(self.stepper.geometry, world, context.state.now, context.state.rotation, a, b, margin)
+        touched = np.unique(buffer.integer[:count, :2])
         touched = touched[resting[touched]]
         labels = self.label[touched]
         mates = np.flatnonzero(resting & np.isin(self.label, labels[labels >= 0]))
@@ -355,8 +349,8 @@ class Heaps:
         speed = np.linalg.norm(context.state.now.velocity[group.members], axis=1)
         return slowest[group.members] > LEAVING * speed
 
-    def _set_up(self, context, members: np.ndarray, time: float, ahead: float, between: float) -> None:
-        """Put members, in their order, and the bodies near them that stand still before the solver; between: see `review`."""
+    def _set_up(self, context, members: np.ndarray, time: float, ahead: float, kept: float) -> None:
+        """Put members, in their order, and the bodies near them that stand still before the solver; kept: see `review`."""
         world, order = context.world, self.stepper.order
         marked = np.zeros(world.num_bodies, bool)
         marked[members] = True
@@ -367,7 +361,7 @@ class Heaps:
             context.state.course, moving, time, context.state.now, context.state.rotation, context.acceleration,
             context.angular_acceleration,
         )  # fmt: skip
-        self.stepper.set_up(context, members, fixed, ahead, between)
+        self.stepper.set_up(context, members, fixed, ahead, kept)
 
     def take_courses(self, context, window, group: Group) -> None:
         """Give the members of a group's heap the courses that the solver found."""

@@ -55,6 +55,8 @@ NEAR = 0.2
 """Inner radii within which an old contact hands its impulse to a new one of other features."""
 POINTS = 4
 """Contacts of two convex polyhedra."""
+BLOCK = 64
+"""Pairs that are dealt out together."""
 
 
 @inlined
@@ -140,42 +142,52 @@ def most_motion(bodies, pairs, ahead):
 
 
 @jit
-def review(bodies, pairs, ahead, between, places, margins):
+def share_of(number, share, shares):
+    """Where the places of a share of so many pairs begin: pairs are dealt out in blocks, so that all shares are alike."""
+    return share * (number // (BLOCK * shares) + 1) * BLOCK
+
+
+@jit
+def review(bodies, pairs, share, shares, ahead, kept, places, margins):
     """Write the pairs in play of quick bodies whose contacts must be looked for, and their margins, m: how far they come in `ahead` s.
 
-    between: in the middle of a step, how many inner radii pairs may have come past each other by the next look with the contacts they
-    have; 0 at its start. Pairs that are too far apart lose their contacts. Returns the number of places (k,) and margins (k,) written.
+    share: which of the `shares` of pairs. kept: in the middle of a step, how many inner radii pairs may have come past each other by
+    the next look with the contacts they have; 0 at its start. Pairs that are too far apart lose their contacts. Returns where the places
+    (k,) and margins (k,) of the share begin and end.
     """
     part, position, orientation, rotation, velocity = bodies.part, bodies.position, bodies.orientation, bodies.rotation, bodies.velocity
     inner, skin, radius, reach, quick = bodies.inner, bodies.skin, bodies.radius, bodies.reach, bodies.quick
     seen, known, count, apart = pairs.seen, pairs.known, pairs.count, pairs.apart
-    number = 0
-    for p in range(pairs.first.shape[0]):
-        a, b, is_second = pairs.first[p], pairs.second[p], pairs.carrier[p]
-        if not (quick[a] or quick[b]) or not in_play(part, a, b):
-            continue
-        size = min(inner[a], inner[b])
-        general = pairs.kind[p] == GENERAL
-        speed = closing_speed(position, velocity, reach, a, b, is_second)
-        margin = min(skin[a], skin[b]) + min(max(speed * ahead, (AHEAD_GENERAL if general else AHEAD) * size), FARTHEST * size)
-        far = radius[a] + radius[b] + margin
-        dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
-        if dx * dx + dy * dy + dz * dz > far * far:
-            known[p] = known[p] and count[p] == 0
-            count[p] = 0
-            continue
-        if known[p]:
-            carrier, other = (b, a) if is_second else (a, b)
-            place, turn = _relative_pose(position, orientation, rotation, carrier, other)
-            motion = _motion(seen, p, pairs.round[p], reach[other], place, turn)
-            if count[p] == 0 and apart[p] - motion > margin:
+    total = pairs.first.shape[0]
+    begin = share_of(total, share, shares)
+    end = begin
+    for block in range(share * BLOCK, total, shares * BLOCK):
+        for p in range(block, min(block + BLOCK, total)):
+            a, b, is_second = pairs.first[p], pairs.second[p], pairs.carrier[p]
+            if not (quick[a] or quick[b]) or not in_play(part, a, b):
                 continue
-            same = SAME_GENERAL if general else SAME
-            if count[p] > 0 and (motion <= same * size or (between > 0.0 and motion + speed * ahead <= between * size)):
+            size = min(inner[a], inner[b])
+            general = pairs.kind[p] == GENERAL
+            speed = closing_speed(position, velocity, reach, a, b, is_second)
+            margin = min(skin[a], skin[b]) + min(max(speed * ahead, (AHEAD_GENERAL if general else AHEAD) * size), FARTHEST * size)
+            far = radius[a] + radius[b] + margin
+            dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
+            if dx * dx + dy * dy + dz * dz > far * far:
+                known[p] = known[p] and count[p] == 0
+                count[p] = 0
                 continue
-        places[number], margins[number] = p, margin
-        number += 1
-    return number
+            if known[p]:
+                carrier, other = (b, a) if is_second else (a, b)
+                place, turn = _relative_pose(position, orientation, rotation, carrier, other)
+                motion = _motion(seen, p, pairs.round[p], reach[other], place, turn)
+                if count[p] == 0 and apart[p] - motion > margin:
+                    continue
+                same = SAME_GENERAL if general else SAME
+                if count[p] > 0 and (motion <= same * size or (kept > 0.0 and motion + speed * ahead <= kept * size)):
+                    continue
+            places[end], margins[end] = p, margin
+            end += 1
+    return begin, end
 
 
 @inlined
@@ -278,26 +290,27 @@ def _are_apart(solids, inset, bodies, pairs, p, between, margin, c, simplex):
 
 
 @jit
-def look(shapes, solids, inset, bodies, pairs, rows, ids, used, ahead, coefficients, places, margins, number, general):
-    """Find the contacts of `number` pairs at `places`, but for general ones, whose places among these are written to general (k,).
+def look(shapes, solids, inset, bodies, pairs, share, shares, ahead, kept, places, margins, rows, ids, free, coefficients):
+    """Find the contacts of a share of the pairs where `review` says so, but for general ones, which are left at the begin of its places.
 
-    solids, inset: see `heap_overlap`; used: rows of the pool in use; ahead: length of the step, s; coefficients (k, k, 4) of two materials;
-    margins (k,) m. Returns the rows used, minus those where the pool is too small (make room and call it again), and how many general
-    ones there are.
+    solids, inset: see `heap_overlap`; ahead: length of the step, s; free (shares, 2): where the rows of the pool that each share may take
+    begin and end; coefficients (k, k, 4) of two materials. Returns how many pairs were looked at, and how many general ones there are,
+    -1 where there are too few rows (make room and call it again).
     """
     real, found = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
     scratch, work, simplex, polytope, origin = make_scratch(), np.empty((3, 3)), make_simplex(), make_polytope(), np.zeros(3)
     position, rotation, velocity, shape = bodies.position, bodies.rotation, bodies.velocity, bodies.shape
     old, old_ids = np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64)
     between, c, waiting = np.empty(3), np.empty((3, 3)), 0
-    for k in range(number):
+    begin, end = review(bodies, pairs, share, shares, ahead, kept, places, margins)
+    for k in range(begin, end):
         p, margin = places[k], margins[k]
         a, b = pairs.first[p], pairs.second[p]
         for i in range(3):
             between[i] = position[b, i] - position[a, i]
         if pairs.kind[p] == GENERAL:
             if not _are_apart(solids, inset, bodies, pairs, p, between, margin, c, simplex):
-                general[waiting] = k
+                places[begin + waiting], margins[begin + waiting] = p, margin
                 waiting += 1
             continue
         s, t = shape[a], shape[b]
@@ -311,8 +324,9 @@ def look(shapes, solids, inset, bodies, pairs, rows, ids, used, ahead, coefficie
         else:
             count, gap = _of_boxes(shapes.half, velocity, rotation, a, b, s, t, between, margin, ahead, c, work, scratch, real, found)
         if count > pairs.room[p]:
-            if used + POINTS > rows.shape[0]:
-                return -used, waiting
+            used = free[share, 0]
+            if used + POINTS > free[share, 1]:
+                return end - begin, -1
             before = pairs.start[p]
             pairs.start[p], pairs.room[p] = used, POINTS
             for i in range(pairs.count[p]):
@@ -320,7 +334,7 @@ def look(shapes, solids, inset, bodies, pairs, rows, ids, used, ahead, coefficie
                     rows[used + i, j] = rows[before + i, j]
                 for j in range(3):
                     ids[used + i, j] = ids[before + i, j]
-            used += POINTS
+            free[share, 0] = used + POINTS
         start, kept = pairs.start[p], 0
         for i in range(start, start + pairs.count[p]):
             # An old contact without impulse has nothing to hand over.
@@ -342,4 +356,4 @@ def look(shapes, solids, inset, bodies, pairs, rows, ids, used, ahead, coefficie
         pairs.count[p] = count
         pairs.apart[p] = max(gap, 0.0) if count == 0 else 0.0
         note_seen(bodies, pairs, p)
-    return used, waiting
+    return end - begin, waiting

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigidimpulse._jit import number_of_cores
 from rigidimpulse.constrain.heap_contacts import FARTHER, convex_polyhedra, inner_radii, shrunk_geometry, store_contacts
 from rigidimpulse.constrain.heap_cores import cores
 from rigidimpulse.constrain.heap_cover import Cover
 from rigidimpulse.constrain.heap_fill import fill, keep_impulses, place_bodies
 from rigidimpulse.constrain.heap_motion import energies, mark_quick, note_pressed, slow_down
-from rigidimpulse.constrain.heap_narrow import classify, look, most_motion, review
+from rigidimpulse.constrain.heap_narrow import classify, look, most_motion, share_of
 from rigidimpulse.constrain.heap_overlap import solids
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
 from rigidimpulse.constrain.heap_records import (
@@ -31,8 +32,8 @@ from rigidimpulse.constrain.heap_solver import FREQUENCY, advance, softness, spe
 from rigidimpulse.constrain.heap_table import HeapTable
 from rigidimpulse.constrain.lanes import ROW, aligned, machine_lanes
 from rigidimpulse.conventions import TOLERANCES
+from rigidimpulse.detect.contact_buffer import ContactBuffer, find_together
 from rigidimpulse.detect.manifold import pair_gap
-from rigidimpulse.detect.touching import contacts_of_pairs
 from rigidimpulse.rotation import to_matrix
 
 COLUMN = 20.0
@@ -54,6 +55,8 @@ QUICK = 0.4
 """Part of `kept` beyond which a body is quick: its contacts are looked for, and their records made anew, in the middle of a step."""
 MOSTLY = 0.3
 """Part of the bodies that are quick beyond which all count as such."""
+WORTHWHILE, WORTHWHILE_GENERAL = 400, 16
+"""Pairs, all and general ones, beyond which several cores look at them: some tens of microseconds are lost by it."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -102,7 +105,9 @@ class HeapStepper:
         self._taken_off = self._depth + (1.0 - self._factor) * bound[self.order]
         self.bodies = self._make_bodies()
         self._masses, self._pull = world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order])
-        self.table = HeapTable()
+        self._shares, self._looked_at = number_of_cores(), 0
+        self._more_buffers: list[ContactBuffer] = []
+        self.table = HeapTable(self._shares)
         least = CLEAR * np.where(world.dynamic, self.inner, 0.0)
         self.cover = Cover(world, self.order, self.inner, least)
         self.lanes = machine_lanes()
@@ -116,8 +121,7 @@ class HeapStepper:
         self._all_quick = bool(world.moving.any() or world.ball.any())
         self._special = self._all_quick or bool(world.coefficients[:, :, 0].any())
         self.pressed = np.zeros(n, bool)
-        self._places = self._general = np.zeros(0, np.int64)
-        self._margins = np.zeros(0)
+        self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
         self.members, self.ahead, self._parts, self._sub_steps = np.zeros(0, np.int64), 0.0, 1, 1
 
     def _make_bodies(self) -> HeapBodies:
@@ -163,9 +167,10 @@ class HeapStepper:
         """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `Cover.near`."""
         return self.cover.near(self.table.pairs, context.state.now, context.acceleration, member, other, ahead)
 
-    def set_up(self, context, members: np.ndarray, supports: np.ndarray, ahead: float, between: float = 0.0) -> None:
-        """Put members and what they may touch before the kernels at the present instant, with their contacts; between: see `review`."""
+    def set_up(self, context, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0) -> None:
+        """Put members and what they may touch before the kernels at the present instant, with their contacts; kept: see `review`."""
         self.find_pairs(context, members, supports, ahead)
+        self.table.pack()
         self.members = members
         self._part[:] = OUTSIDE
         self._part[supports], self._part[members] = SUPPORT, MEMBER
@@ -176,27 +181,32 @@ class HeapStepper:
         most = max(self._sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
         self._parts = min(max(math.ceil(motion / self._motion), 1), most)
         self.ahead = ahead / self._parts
-        self._look(context, between)
+        self._look(context, kept)
 
-    def _look(self, context, between: float) -> None:
-        """Look at the contacts of all pairs in play; between: see `review`."""
-        table, world = self.table, self.world
-        if len(table.pairs.first) > len(self._places):
-            self._places, self._general = np.zeros((2, 2 * len(table.pairs.first)), np.int64)
-            self._margins = np.zeros(len(self._places))
-        number = review(self.bodies, table.pairs, self.ahead, between, self._places, self._margins)
+    def _look(self, context, kept: float) -> None:
+        """Look at the contacts of all pairs in play, on several cores where the last look had much to do; kept: see `review`."""
+        table, number = self.table, len(self.table.pairs.first)
+        shares = self._shares if self._looked_at > WORTHWHILE else 1
+        room = share_of(number, shares, shares)
+        if room > len(self._places):
+            self._places, self._margins = np.zeros(2 * room, np.int64), np.zeros(2 * room)
         while True:
-            used, waiting = look(
-                self.shapes, self._solids, self._inset, self.bodies, table.pairs, table.rows, table.ids, table.used, self.ahead,
-                world.coefficients, self._places, self._margins, number, self._general,
-            )  # fmt: skip
-            # What a look that found no room has taken is in use.
-            table.used = abs(used)
-            if used >= 0:
+            outcome = look.together([
+                (
+                    self.shapes, self._solids, self._inset, self.bodies, table.pairs, share, shares, self.ahead, kept, self._places,
+                    self._margins, table.rows, table.ids, table.free, self.world.coefficients,
+                )
+                for share in range(shares)
+            ])  # fmt: skip
+            if min(waiting for _, waiting in outcome) >= 0:
                 break
-            table.make_room(len(table.rows) // 4)
-        if waiting:
-            self._look_at_general(context, self._places[self._general[:waiting]], self._margins[self._general[:waiting]])
+            table.make_room(len(table.rows) // (4 * self._shares))
+        self._looked_at = sum(looked_at for looked_at, _ in outcome)
+        begins = [share_of(number, share, shares) for share in range(shares)]
+        waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
+        if len(waits):
+            waits = waits[np.argsort(self._places[waits])]
+            self._look_at_general(context, self._places[waits], self._margins[waits])
 
     def _look_at_general(self, context, places: np.ndarray, margin: np.ndarray) -> None:
         """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `detect`."""
@@ -212,21 +222,20 @@ class HeapStepper:
         at = self.order[mine]
         now.position[at], now.orientation[at] = self.bodies.position[:n][mine], self.bodies.orientation[:n][mine]
         rotation[at] = self.bodies.rotation[:n][mine]
-        while True:
-            found = contacts_of_pairs(
-                self.geometry, world.shape_of_body, now, rotation, self.order[first], self.order[second], shown, context.scratch_pairs,
-                context.contact_real, context.contact_int, world.cylinders,
+        shares = np.array_split(np.arange(len(places)), self._shares if len(places) > WORTHWHILE_GENERAL else 1)
+        while len(self._more_buffers) < len(shares) - 1:
+            self._more_buffers.append(ContactBuffer())
+        buffers = [context.contact_buffer, *self._more_buffers][: len(shares)]
+        a, b = self.order[first], self.order[second]
+        found = find_together(buffers, [(self.geometry, world, now, rotation, a[some], b[some], shown[some]) for some in shares])
+        for some, buffer, count in zip(shares, buffers, found, strict=True):
+            # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
+            table.make_room(count + POINTS * len(some) + 1)
+            table.free[0, 0] = store_contacts(
+                world.geometry, self.geometry, self._back, self._solids, self.bodies, pairs, places[some], margin[some], far[some],
+                self._convex, self._factor, self._depth, world.coefficients, buffer.real, buffer.integer, count, self.order, table.rows,
+                table.ids, int(table.free[0, 0]),
             )  # fmt: skip
-            if found >= 0:
-                break
-            context.grow_contacts(-found)
-        # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
-        table.make_room(found + POINTS * len(places) + 1)
-        table.used = store_contacts(
-            world.geometry, self.geometry, self._back, self._solids, self.bodies, pairs, places, margin, far, self._convex, self._factor,
-            self._depth, world.coefficients, context.contact_real, context.contact_int, found, self.order, table.rows, table.ids,
-            table.used,
-        )  # fmt: skip
 
     def report_crossed(self, context, members: np.ndarray, time: float) -> None:
         """Report pairs of members, brought to the present, whose cores cross: where they press on each other is not known any more."""
@@ -247,17 +256,15 @@ class HeapStepper:
 
     def _look_again(self, context) -> None:
         """Look at the contacts of quick bodies in the course of a step; those of all others stay in the steady batches, where they are."""
-        bodies, table, width = self.bodies, self.table, self.lanes.width
+        bodies, width = self.bodies, self.lanes.width
         all_quick = self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY
         if all_quick:
             bodies.quick[:] = True
-        lines = table.lines
         self._look(context, self.kept)
-        if all_quick or table.lines is not lines:
-            bodies.quick[:] = True
+        if all_quick:
             bodies.drift[:] = 0.0
             self._steady = 0, 0
-        leave_out_quick(width, bodies, table.pairs, self._patches, self._steady[0], self._batches)
+        leave_out_quick(width, bodies, self.table.pairs, self._patches, self._steady[0], self._batches)
 
     def _fill(self, h: float) -> int:
         """Make patches, colours and records of quick bodies after the steady ones, for sub-steps of h s; returns the number of batches."""

@@ -9,6 +9,8 @@ from rigidimpulse.constrain.heap_rows import ROW_SIZE, HeapPairs
 from rigidimpulse.constrain.lanes import ROW, aligned
 
 FIRST_ROWS = 1024
+LOW, FULL = 0.25, 0.6
+"""Parts of the rows: free below which they are packed, in use beyond which it is not worth it."""
 
 
 def empty_pairs(k: int) -> HeapPairs:
@@ -60,21 +62,27 @@ def _make_pool(number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return lines, lines.reshape(number, ROW_SIZE), np.zeros((number, 3), np.int64)
 
 
+def _parts(begin: int, end: int, shares: int) -> np.ndarray:
+    """Begins and ends (shares, 2) of equal parts."""
+    edges = np.linspace(begin, end, shares + 1).astype(np.int64)
+    return np.column_stack([edges[:-1], edges[1:]])
+
+
 class HeapTable:
     """Pairs and their rows in a pool.
 
     Attributes:
         pairs: ascending by first, then second.
         lines: (8 m,) the pool as lines of 8, and rows: (P, ROW_SIZE), the same memory. ids: (P, 3) kind and features of each row.
-        used: rows in use; the first is none.
+        free: (shares, 2) where the rows that are free for each share of the pairs begin and end; the first row of all is none.
 
     """
 
-    def __init__(self) -> None:
-        """Nothing."""
+    def __init__(self, shares: int) -> None:
+        """Nothing; shares: into which pairs are dealt out at most."""
         self.pairs = empty_pairs(0)
         self.lines, self.rows, self.ids = _make_pool(FIRST_ROWS)
-        self.used = 1
+        self.free = _parts(1, FIRST_ROWS, shares)
 
     def replace(self, first: np.ndarray, second: np.ndarray) -> None:
         """Let these (ascending) be the pairs; known ones keep what they have."""
@@ -84,11 +92,20 @@ class HeapTable:
         self.pairs = fresh
 
     def make_room(self, needed: int) -> None:
-        """Room for `needed` more rows; all rows may move."""
-        if self.used + needed <= len(self.rows):
+        """Room for `needed` more rows in each share; all rows keep their numbers."""
+        if (self.free[:, 1] - self.free[:, 0]).min() >= needed:
             return
-        total = int(self.pairs.count.sum())
-        capacity = max(len(self.rows), 1 + total + 2 * needed)
-        lines, rows, ids = _make_pool(capacity)
-        self.used = _pack(self.pairs, self.rows, self.ids, rows, ids)
-        self.lines, self.rows, self.ids = lines, rows, ids
+        old, shares = len(self.rows), len(self.free)
+        total = old + max(needed * shares, old // 4)
+        lines, rows, ids = _make_pool(total)
+        rows[:old], ids[:old] = self.rows, self.ids
+        self.lines, self.rows, self.ids, self.free = lines, rows, ids, _parts(old, total, shares)
+
+    def pack(self) -> None:
+        """Put the rows of all pairs one after the other, with other numbers, where a share has little room left but rows are to be had."""
+        total, shares = len(self.rows), len(self.free)
+        least = int((self.free[:, 1] - self.free[:, 0]).min())
+        if least * shares < LOW * total and int(self.pairs.count.sum()) < FULL * total:
+            lines, rows, ids = _make_pool(total)
+            used = _pack(self.pairs, self.rows, self.ids, rows, ids)
+            self.lines, self.rows, self.ids, self.free = lines, rows, ids, _parts(used, total, shares)

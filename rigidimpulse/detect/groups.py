@@ -12,7 +12,7 @@ from rigidimpulse.constrain.energy_guard import guard_energy, note_arrival
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import CORNER, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.detect.pair_table import live_contacts
-from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts, near_pairs, pressing
+from rigidimpulse.detect.touching import bring_all, fill_contacts, near_pairs, pressing
 from rigidimpulse.respond.impulse import Contacts
 
 if TYPE_CHECKING:
@@ -100,16 +100,9 @@ def collect(context, window, pairs: np.ndarray, time: float, margin: float = MAR
     witness of its sweep for a contact.
     """
     world, state = context.world, context.state
-    while True:
-        count = contacts_of_pairs(
-            world.geometry, world.shape_of_body, state.now, state.rotation, window.a[pairs], window.b[pairs],
-            margin * window.delta[pairs], context.scratch_pairs, context.contact_real, context.contact_int,
-            world.cylinders,
-        )
-        if count >= 0:
-            break
-        context.grow_contacts(-count)
-    real, integer = context.contact_real[:count].copy(), context.contact_int[:count].copy()
+    buffer, a, b = context.contact_buffer, window.a[pairs], window.b[pairs]
+    count = buffer.find(world.geometry, world, state.now, state.rotation, a, b, margin * window.delta[pairs])
+    real, integer = buffer.real[:count].copy(), buffer.integer[:count].copy()
     for p in pairs[window.time[pairs] <= time].tolist():
         a, b = window.a[p], window.b[p]
         if not np.any((integer[:, 0] == a) & (integer[:, 1] == b)) and np.any(window.witness[p, 6:9]):

@@ -16,7 +16,7 @@ import pytest
 
 import rigidimpulse as ri
 from rigidimpulse.constrain.contact_motion import contact_motion
-from rigidimpulse.detect.touching import bring_all, contacts_of_pairs, fill_contacts
+from rigidimpulse.detect.touching import bring_all, fill_contacts
 from rigidimpulse.integrate.course import begin
 from rigidimpulse.observe.events import EventLog
 from rigidimpulse.observe.recorder import Recorder
@@ -103,16 +103,12 @@ def contact_at(context: StepContext, time: float):
     """The nearest contact of the pair at a time: contacts of one, kinds and features."""
     world, state = context.world, context.state
     bring_all(state.course, np.arange(2), time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
-    count = contacts_of_pairs(
-        world.geometry, world.shape_of_body, state.now, state.rotation, np.array([0]), np.array([1]), np.array([MARGIN]),
-        context.scratch_pairs, context.contact_real, context.contact_int, world.cylinders,
-    )  # fmt: skip
-    nearest = np.array([np.argmin(context.contact_real[:count, 9])])
+    buffer = context.contact_buffer
+    count = buffer.find(world.geometry, world, state.now, state.rotation, np.array([0]), np.array([1]), np.array([MARGIN]))
+    nearest = np.array([np.argmin(buffer.real[:count, 9])])
     one = Contacts(*(np.empty(1, np.int64) for _ in range(2)), *(np.empty((1, 3)) for _ in range(3)), *(np.empty(1) for _ in range(5)))
-    fill_contacts(
-        state.now, context.contact_real, context.contact_int, nearest, world.material_of_body, world.coefficients, one
-    )
-    row = context.contact_int[nearest]
+    fill_contacts(state.now, buffer.real, buffer.integer, nearest, world.material_of_body, world.coefficients, one)
+    row = buffer.integer[nearest]
     return one, row[:, 2].copy(), row[:, 3:5].copy()
 
 

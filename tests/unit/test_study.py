@@ -61,7 +61,7 @@ def test_exact_motions_of_the_gallery_are_those_of_their_scenes(name: str) -> No
 
 def test_closed_form_tells_the_error_of_a_late_impact() -> None:
     settings = [setting for setting in grid() if setting.name in ("standard", "after, step 1/120", "linear, step 1/30")]
-    result = ri.study("bounce", settings=settings)
+    result = ri.study("bounce", settings=settings, budget=600.0)
     assert result.reference.kind == CLOSED_FORM and result.reference.until == 10.0
     rows = {row.name: row for row in result.rows}
     assert rows["standard"].whole.position < 1e-12 and rows["standard"].whole.impact_time < 1e-13

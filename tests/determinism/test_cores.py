@@ -1,0 +1,108 @@
+"""Heaps on several cores: the same bits as on one, whatever is dealt out to whom, and however their memory grows."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+
+import rigidimpulse as ri
+from rigidimpulse._jit import MOST_CORES, number_of_cores
+from rigidimpulse.constrain import heap_stepper, heap_table
+from rigidimpulse.constrain.heap_narrow import BLOCK, look, share_of
+from rigidimpulse.detect.contact_buffer import ContactBuffer
+
+ROUGH = ri.Material(density=500, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
+
+
+def cloud(shapes: list[ri.Shape], number: int) -> ri.Scene:
+    """Bodies of 0.2 m that fall on each other and the floor, turned and thrown at random."""
+    random = np.random.default_rng(7)
+    scene = ri.Scene(gravity=(0, 0, -9.81))
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
+    for k in range(number):
+        place = 0.3 * np.array([k % 6, k // 6 % 6, k // 36 + 0.7])
+        throw = {"velocity": random.normal(0.0, 0.5, 3), "angular_velocity": random.normal(0.0, 3.0, 3)}
+        shape = shapes[k % len(shapes)]
+        scene.add(ri.Body(f"body {k}", shape, position=place, orientation=random.normal(size=4), material=ROUGH, **throw))
+    return scene
+
+
+def rings() -> list[ri.Shape]:
+    """Rings and boxes."""
+    ring = trimesh.creation.torus(0.07, 0.03, major_sections=12, minor_sections=6)
+    return [ri.Shape.mesh(ring.vertices, ring.faces), ri.Shape.box((0.2, 0.15, 0.1))]
+
+
+@pytest.mark.parametrize(("shapes", "number", "duration"), [([ri.Shape.box(0.2)], 144, 0.6), (rings(), 72, 0.45)], ids=["boxes", "rings"])
+def test_heaps_have_the_same_bits_on_one_core_and_on_several(monkeypatch, shapes, number, duration) -> None:
+    hashes, dealt = set(), []
+
+    def together(calls):
+        dealt.append(len(calls))
+        return type(look).together(look, calls)
+
+    monkeypatch.setattr(look, "together", together, raising=False)
+    monkeypatch.setattr(heap_stepper, "WORTHWHILE", 20)
+    monkeypatch.setattr(heap_stepper, "WORTHWHILE_GENERAL", 4)
+    for cores, rows in ((1, 1024), (2, 1024), (3, 48)):
+        monkeypatch.setattr(heap_stepper, "number_of_cores", lambda cores=cores: cores)
+        monkeypatch.setattr(heap_table, "FIRST_ROWS", rows)
+        dealt.clear()
+        run = ri.simulate(cloud(shapes, number), duration)
+        hashes.add(run.state_hash())
+        assert max(dealt) == cores
+    assert len(hashes) == 1
+
+
+def test_contacts_that_find_no_room_are_found_again(monkeypatch) -> None:
+    """Whatever a buffer holds at first, in whichever share."""
+
+    def small(buffer: ContactBuffer) -> None:
+        buffer.real, buffer.integer, buffer.scratch = np.empty((40, 10)), np.empty((40, 5), np.int64), np.empty((160, 2), np.int64)
+
+    monkeypatch.setattr(heap_stepper, "WORTHWHILE_GENERAL", 4)
+    monkeypatch.setattr(heap_stepper, "number_of_cores", lambda: 2)
+    usual = ri.simulate(cloud(rings(), 72), 0.3).state_hash()
+    monkeypatch.setattr(ContactBuffer, "__init__", small)
+    assert ri.simulate(cloud(rings(), 72), 0.3).state_hash() == usual
+
+
+@pytest.mark.parametrize("shares", [1, 2, 3])
+@pytest.mark.parametrize("number", [0, 1, BLOCK - 1, BLOCK, 5 * BLOCK + 3, 1000])
+def test_every_share_has_room_for_its_pairs(number: int, shares: int) -> None:
+    dealt = [sum(len(range(b, min(b + BLOCK, number))) for b in range(s * BLOCK, number, shares * BLOCK)) for s in range(shares)]
+    begins = [share_of(number, share, shares) for share in range(shares + 1)]
+    assert sum(dealt) == number
+    assert all(after - before >= mine for before, after, mine in zip(begins[:-1], begins[1:], dealt, strict=True))
+
+
+def _ask(answers) -> None:
+    answers.put((number_of_cores(), share_of.together([(1000, share, 4) for share in range(4)])))
+
+
+@pytest.mark.parametrize("method", ["spawn", "fork"])
+def test_processes_of_a_pool_use_one_core_each_and_threads_of_their_own(method: str) -> None:
+    """One that is forked off while its parent has threads would wait for ever for them."""
+    assert share_of.together([(1000, share, 4) for share in range(4)]) == [share_of(1000, share, 4) for share in range(4)]
+    context = multiprocessing.get_context(method)
+    answers = context.Queue()
+    process = context.Process(target=_ask, args=(answers,))
+    process.start()
+    cores, places = answers.get(timeout=120)
+    process.join()
+    assert cores == 1
+    assert places == [share_of(1000, share, 4) for share in range(4)]
+
+
+@pytest.mark.parametrize(("threads", "cores"), [("1", 1), ("3", 3), ("64", MOST_CORES)])
+def test_the_number_of_cores_is_that_of_numba(threads: str, cores: int) -> None:
+    code = "from rigidimpulse._jit import number_of_cores; print(number_of_cores())"
+    environment = {**os.environ, "NUMBA_NUM_THREADS": threads}
+    answer = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert int(answer.stdout) == cores
