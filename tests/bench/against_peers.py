@@ -2,59 +2,80 @@
 
 Scenes are those of `piles` (boxes_1000, boxes_5000, hulls_1000) and of `impacts` (gas, bounce); engines are those of `engines`. Everything
 runs in turn, round after round, so that other work on the machine hits all alike; what counts is the median over the rounds of the ratio to
-the fastest engine of the same round. Piles: median time of a step, at 1/60 s, and how deep bodies are inside each other at the end. Gas:
-all of 10 s, steps of 1/240 s, and the error of the energy; bounce: all of 20 s at 1/60 s, the same. Times are those of the loop, as they
-are those of the steps in other engines: scenes are compiled before, frames handed out after. With --save the lines go to
-tests/bench/<machine>/against_peers.csv.
+the fastest engine of the same round. Piles, here at several settings: mean and median time for 1/60 s of motion, others at that step,
+and how deep bodies are inside each other at any time (frames at 1/3 s, other engines only at the end) and at the end. Gas: all of 10 s,
+steps of 1/240 s, and the error of the energy; bounce: all of 20 s at 1/60 s, the same. Times are those of the loop, as they are those of
+the steps in other engines: scenes are compiled before, frames handed out after. All have one core; with --cores N the kernels here have N,
+and times here are those of a clock instead of a processor. With --save the lines go to tests/bench/<machine>/against_peers.csv.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+from collections.abc import Callable
 from pathlib import Path
 from statistics import median
-from time import process_time
+from time import perf_counter, process_time
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 from bench_scenes import machine
-from engines import EngineRun, run_engines
+from engines import ENGINES, EngineRun, run_engines, use_cores
 from impacts import bounce, gas
-from piles import PILES, STEPS, depths, pile
+from piles import FPS, PILES, STEPS, depths, pile
 
 import rigidimpulse as ri
 from rigidimpulse.plan import STAGES
 
 OURS = "rigidimpulse"
+SETTINGS = {
+    OURS: "standard",
+    "preview": "preview",
+    "step=1/30, heap_motion=1": ri.Accuracy(step=1.0 / 30.0, heap_motion=1.0),
+    "heap_motion=1": ri.Accuracy(heap_motion=1.0),
+}
 FLIGHTS = {"gas": (gas, 1000, 10.0, 1.0 / 240.0), "bounce": (bounce, 49, 20.0, 1.0 / 60.0)}
 """Maker, number of balls, duration [s] and step of the other engines [s]."""
 
 
-def pile_round(name: str) -> dict[str, tuple[float, str]]:
-    """Run a pile in all engines: ms a step, and what else is to be known."""
+class Result(NamedTuple):
+    """Mean and median time, ms for 1/60 s or s in all, and what else is to be known."""
+
+    mean: float
+    median: float
+    note: str
+
+
+def pile_round(name: str, engines: tuple[str, ...], clock: Callable[[], float]) -> dict[str, Result]:
+    """Run a pile at all settings and in all engines."""
     number, hulls = PILES[name]
-    scene, ends = pile(number, hulls), [0.0]
-    run = ri.simulate(scene, STEPS / 60.0, progress=lambda _time: ends.append(process_time()))
-    out = {OURS: (1e3 * median(np.diff(ends[1:])), _depth(scene, run))}
-    for engine, answer in run_engines(scene, 1.0 / 60.0, STEPS).items():
+    scene, out = pile(number, hulls), {}
+    for what, accuracy in SETTINGS.items():
+        ends: list[tuple[float, float]] = []
+        run = ri.simulate(scene, STEPS / FPS, FPS, accuracy=accuracy, progress=lambda time, ends=ends: ends.append((time, clock())))
+        at, spent = np.array(ends).T
+        taken = 1e3 * np.diff(spent) / np.diff(at) / FPS
+        ever = 1e3 * max(depths(scene, run, f).max(initial=0.0) for f in range(20, STEPS, 20))
+        out[what] = Result(float(taken.mean()), float(np.median(taken)), f"depth ever {ever:.1f} mm, {_depth(scene, run)}")
+    for engine, answer in run_engines(scene, 1.0 / FPS, STEPS, names=engines).items():
         out[engine] = _pile_line(scene, answer)
     return out
 
 
-def _pile_line(scene: ri.Scene, answer: EngineRun | str) -> tuple[float, str]:
+def _pile_line(scene: ri.Scene, answer: EngineRun | str) -> Result:
     if isinstance(answer, str):
-        return np.nan, answer
+        return Result(np.nan, np.nan, answer)
     frame = SimpleNamespace(positions=answer.position[None], orientations=answer.orientation[None])
-    return float(np.median(answer.times)), _depth(scene, frame)
+    return Result(float(answer.times.mean()), float(np.median(answer.times)), _depth(scene, frame))
 
 
 def _depth(scene: ri.Scene, run) -> str:
-    deep = 1e3 * depths(scene, run, -1)
-    return f"depth at most {deep.max(initial=0.0):.1f} mm, mean {deep.mean() if len(deep) else 0.0:.2f}"
+    return f"at the end {1e3 * depths(scene, run, -1).max(initial=0.0):.1f} mm"
 
 
-def flight_round(name: str) -> dict[str, tuple[float, str]]:
+def flight_round(name: str, engines: tuple[str, ...]) -> dict[str, Result]:
     """Run a gas or bouncing balls in all engines: s in all, and the error of the energy."""
     make, number, duration, step = FLIGHTS[name]
     scene = make(number)
@@ -63,12 +84,13 @@ def flight_round(name: str) -> dict[str, tuple[float, str]]:
     assert profile is not None
     loop = sum(profile.stages[stage] for stage in STAGES if stage in profile.stages)
     note = f"{_energy_error(scene, run.velocities[-1], run.positions[-1])}; {profile.seconds:.3f} s with the scene compiled and recorded"
-    out = {OURS: (loop, note)}
-    for engine, answer in run_engines(scene, step, round(duration / step)).items():
+    out = {OURS: Result(loop, loop, note)}
+    for engine, answer in run_engines(scene, step, round(duration / step), names=engines).items():
         if isinstance(answer, str):
-            out[engine] = np.nan, answer
+            out[engine] = Result(np.nan, np.nan, answer)
         else:
-            out[engine] = 1e-3 * float(answer.times.sum()), _energy_error(scene, answer.velocity, answer.position)
+            total = 1e-3 * float(answer.times.sum())
+            out[engine] = Result(total, total, _energy_error(scene, answer.velocity, answer.position))
     return out
 
 
@@ -84,36 +106,47 @@ def _energy_error(scene: ri.Scene, velocity: np.ndarray, position: np.ndarray) -
     return f"energy off by {abs(energy(velocity, position) / start - 1.0):.1e}"
 
 
+def show(name: str, rounds: list[dict[str, Result]], settings: list[str]) -> list[tuple]:
+    """Print the lines of a scene, and return them: medians over the rounds, and of the ratios to the fastest engine of each."""
+    fastest = [
+        tuple(min(one[engine][k] for engine in one if engine not in settings and np.isfinite(one[engine][k])) for k in range(2))
+        for one in rounds
+    ]
+    lines = []
+    for what in rounds[0]:
+        mean, middle = (median([one[what][k] for one in rounds]) for k in range(2))
+        ratios = [median([one[what][k] / best[k] for one, best in zip(rounds, fastest, strict=True)]) for k in range(2)]
+        lines.append((name, what, mean, middle, *ratios, rounds[-1][what].note))
+        times = f"mean {mean:8.3f} median {middle:8.3f} {'ms for 1/60 s' if name in PILES else 's'}"
+        print(f"{name:11} {what:36} {times}  of the fastest engine {ratios[0]:.2f} {ratios[1]:.2f}  {rounds[-1][what].note}", flush=True)
+    return lines
+
+
 def main() -> None:
     """Run, print, save if asked to."""
     parser = argparse.ArgumentParser(description="The benchmark scenes here and in other engines.")
     parser.add_argument("scenes", nargs="*", help=f"of {', '.join([*PILES, *FLIGHTS])}; all but boxes_5000 if none is given")
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--engines", default=",".join(ENGINES), help="others to run")
+    parser.add_argument("--cores", type=int, default=1, help="that kernels here may use")
     parser.add_argument("--save", action="store_true", help="write tests/bench/<machine>/against_peers.csv")
     options = parser.parse_args()
-    print(machine())
+    print(machine(), "| cores here:", options.cores)
+    use_cores(options.cores)
+    engines, clock = tuple(options.engines.split(",")), process_time if options.cores == 1 else perf_counter
     ri.simulate(gas(20), 1.0)
-    ri.simulate(pile(64, False), 1.0)
-    ri.simulate(pile(64, True), 1.0)
+    ri.simulate(pile(200, False), 1.0)
+    ri.simulate(pile(200, True), 1.0)
     lines = []
     for name in options.scenes or [name for name in [*PILES, *FLIGHTS] if name != "boxes_5000"]:
-        rounds = [pile_round(name) if name in PILES else flight_round(name) for _ in range(options.rounds)]
-        for engine in rounds[0]:
-            times = [one[engine][0] for one in rounds]
-            ratios = [one[OURS][0] / one[engine][0] for one in rounds]
-            lines.append((name, engine, median(times), median(ratios), rounds[-1][engine][1]))
-            unit = "ms a step" if name in PILES else "s"
-            compared = f"ours / its {median(ratios):7.3f}"
-            print(f"{name:11} {engine:13} {median(times):9.3f} {unit}  {compared}  {rounds[-1][engine][1]}", flush=True)
-        best = [min(v[0] for k, v in one.items() if k != OURS and np.isfinite(v[0])) for one in rounds]
-        to_best = median([one[OURS][0] / b for one, b in zip(rounds, best)])
-        print(f"{name:11} against the fastest of each round: {to_best:.3f}", flush=True)
+        rounds = [pile_round(name, engines, clock) if name in PILES else flight_round(name, engines) for _ in range(options.rounds)]
+        lines.extend(show(name, rounds, list(SETTINGS)))
     if options.save:
         folder = Path(__file__).parent / machine()
         folder.mkdir(exist_ok=True)
         with (folder / "against_peers.csv").open("w", newline="") as file:
             writer = csv.writer(file)
-            writer.writerow(("scene", "engine", "time", "ours over its", "note"))
+            writer.writerow(("scene", "engine", "mean", "median", "mean of the fastest", "median of the fastest", "note"))
             writer.writerows(lines)
 
 

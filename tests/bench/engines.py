@@ -17,6 +17,7 @@ from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.core import config
 
 from rigidimpulse.errors import SceneError
 from rigidimpulse.rotation import from_matrix
@@ -25,6 +26,7 @@ from rigidimpulse.shape import Part
 from rigidimpulse.studies.peers import load_peer
 from rigidimpulse.studies.peers.common import PeerBody, read_scene
 
+ENGINES = ("MuJoCo", "Bullet", "PhysX", "Rapier")
 WALL, DEEP = 60.0, 2.0
 """m: half of the width of the box that stands for a half space, and its half depth."""
 
@@ -39,8 +41,13 @@ class EngineRun(NamedTuple):
     spin: np.ndarray
 
 
+def use_cores(number: int) -> None:
+    """Let the kernels here have so many cores, as NUMBA_NUM_THREADS does."""
+    vars(config)["NUMBA_NUM_THREADS"] = number
+
+
 def run_engines(
-    scene: Scene, step: float, steps: int, sleeping: bool = False, names: tuple[str, ...] = ("MuJoCo", "Bullet", "PhysX", "Rapier")
+    scene: Scene, step: float, steps: int, sleeping: bool = False, names: tuple[str, ...] = ENGINES
 ) -> dict[str, EngineRun | str]:
     """Run a scene in the engines named, one after the other; a text says why one is left out."""
     engines: dict[str, Callable] = {"MuJoCo": _peer("mujoco"), "Bullet": _peer("pybullet"), "PhysX": _physx, "Rapier": _rapier}

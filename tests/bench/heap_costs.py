@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 from bench_scenes import machine
-from engines import run_engines
+from engines import run_engines, use_cores
 from piles import depths, pile
 
 import rigidimpulse as ri
@@ -51,7 +51,8 @@ class Point(NamedTuple):
 
 
 def ours() -> list[Point]:
-    """All settings here."""
+    """All settings here, on one core."""
+    use_cores(1)
     ri.simulate(pile(64, False), 1.0)
     points = []
     for family, settings in SETTINGS.items():
