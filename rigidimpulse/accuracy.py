@@ -48,7 +48,7 @@ class Accuracy(BaseModel):
     penalty_damping: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
     integrator: Literal["exact", "semi_implicit", "runge_kutta"] = "exact"
     contact_solver: Literal["auto", "newton", "substepped", "qp"] = "auto"
-    heap_motion: float = Field(default=0.05, gt=0.0, le=1.0, allow_inf_nan=False)
+    heap_motion: float = Field(default=0.1, gt=0.0, le=1.0, allow_inf_nan=False)
     step: float = Field(default=1.0 / 60.0, gt=0.0, allow_inf_nan=False)
     tolerance: float = Field(default=1e-13, gt=0.0, le=1e-2, allow_inf_nan=False)
     iterations: int = Field(default=10_000, ge=1)

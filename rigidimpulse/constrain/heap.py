@@ -33,7 +33,7 @@ LEAVING = 0.1
 MOST_PIECES = 4
 """Parts of what is stepped at once, between which a heap's courses begin anew."""
 STRAY = 10.0
-"""Skins by which courses may stray from the ways of turning bodies, over `Accuracy.heap_motion`: half a skin by default."""
+"""Skins by which courses may stray from the ways of turning bodies, over `Accuracy.heap_motion`: a skin by default."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the heap that comes near it."""
 

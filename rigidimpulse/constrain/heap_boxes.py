@@ -9,6 +9,7 @@ along one of b likewise, and along the common normal of the edges e_i of a and f
     s_ij = (|d_i'' C_i'j - d_i' C_i''j| - h_i' |C_i''j| - h_i'' |C_i'j| - k_j' |C_ij''| - k_j'' |C_ij'|) / sqrt(1 - C_ij^2).
 
 Where a face has the largest gap, the face of the other box that looks most squarely at it is cut by its sides, in the axes of its box.
+Where two edges have it see `heap_polyhedra`.
 """
 
 from __future__ import annotations
@@ -236,3 +237,17 @@ def edge_contact(half, s, t, r, a, dx, dy, dz, axis, gap, c, work, real, ids):
     real[0, 6], real[0, 7], real[0, 8], real[0, 9] = nx, ny, nz, gap
     ids[0, 0], ids[0, 1], ids[0, 2] = -2, axis, code
     return np.int64(1)
+
+
+@inlined
+def face_along(n, c):
+    """The face, 0-2 of a and 3-5 of b, whose normal is nearest to the line n (3,), in the axes of a, and the cosine of their angle."""
+    face, most = np.int64(0), -1.0
+    for m in range(3):
+        if abs(n[m]) > most:
+            face, most = m, abs(n[m])
+    for m in range(3):
+        cosine = abs(n[0] * c[0, m] + n[1] * c[1, m] + n[2] * c[2, m])
+        if cosine > most + SECOND_WINS:
+            face, most = 3 + m, cosine
+    return face, most

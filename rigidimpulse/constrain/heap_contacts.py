@@ -14,9 +14,9 @@ from rigidimpulse.constrain.contact_motion import only_primitive, side_radius
 from rigidimpulse.constrain.heap_cores import put_back
 from rigidimpulse.constrain.heap_depth import make_polytope
 from rigidimpulse.constrain.heap_hulls import make_simplex
-from rigidimpulse.constrain.heap_narrow import NEAR, POINTS, hand_over, note_seen, write_row
+from rigidimpulse.constrain.heap_narrow import NEAR, hand_over, note_seen, write_row
 from rigidimpulse.constrain.heap_overlap import gap_along, overlap_contacts, support
-from rigidimpulse.constrain.heap_polyhedra import make_scratch
+from rigidimpulse.constrain.heap_polyhedra import POINTS, make_scratch
 from rigidimpulse.constrain.heap_rows import CORE_A, CORE_B, ROUND_A, ROUND_B, SKIN, turned
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.manifold import reduce_contacts
@@ -182,7 +182,7 @@ def store_contacts(
     far (k,) m: up to where pairs without contacts are known to be apart. Returns the rows used.
     """
     c = np.int64(0)
-    deep, deep_ids = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
+    deep, deep_ids = np.empty((POINTS + 1, 10)), np.empty((POINTS + 1, 3), np.int64)
     work = np.empty(3), np.zeros(3), np.empty((3, 3)), make_simplex(), make_polytope(), make_scratch()
     for k in range(places.shape[0]):
         p = places[k]

@@ -17,10 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_clip import clip_faces, face_like
 from rigidimpulse.constrain.heap_depth import EXACT, MOST_CORNERS, add_corner, nearest_face, start
-from rigidimpulse.constrain.heap_polyhedra import EDGE_WINS
+from rigidimpulse.constrain.heap_polyhedra import ALIKE, EDGE_WINS, POINTS, along_edges, copy_contact
 from rigidimpulse.constrain.heap_rows import turned, turned_back
 
 SHRINK = 0.012
@@ -313,7 +313,7 @@ def seen_from(rotation, a, b, between, c):
 def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, polytope, scratch, real, ids):
     """Contacts of two convex polyhedra relative to the first body; returns their number and a bound of the gap.
 
-    between: from a to b, world; origin: (0, 0, 0); size: smaller inner radius, m; c: room (3, 3).
+    between: from a to b, world; origin: (0, 0, 0); size: smaller inner radius, m; c: room (3, 3); real, ids: POINTS + 1 rows.
     """
     d = seen_from(rotation, a, b, between, c)
     nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0, margin, simplex)
@@ -323,25 +323,45 @@ def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size,
         nx, ny, nz, gap, count = least_deep(shapes, s, t, d, c, 1.0 - SHRINK, EXACT * size, simplex, polytope)
     if count == 0:
         return count, gap
+    x, y, z = turned(rotation, a, nx, ny, nz)
     if count < 5:
-        x, y, z = turned(rotation, a, nx, ny, nz)
         face_a, face_b = face_like(shapes, s, rotation, a, x, y, z), face_like(shapes, t, rotation, b, -x, -y, -z)
     else:
         face_a, face_b, gap = _best_face(shapes, s, t, d, c, 1.0), _best_face(shapes, t, s, d, c, -1.0), -inf
     (gap_a, corner_b), (gap_b, corner_a) = _face_gap(shapes, s, t, face_a, d, c, 1.0), _face_gap(shapes, t, s, face_b, d, c, -1.0)
-    if gap > max(gap_a, gap_b) + EDGE_WINS * size:
-        return _one_contact(shapes, rotation, a, d, c, (nx, ny, nz), gap, count, simplex, real, ids), gap
-    if gap_b > gap_a + SECOND_WINS * size:
+    cosine, edges, of_b = 1.0, gap > max(gap_a, gap_b) + EDGE_WINS * size, gap_b > gap_a + SECOND_WINS * size
+    if edges:
+        _one_contact(shapes, rotation, a, d, c, (nx, ny, nz), gap, count, simplex, real, ids)
+        cosine, cosine_b = _cosine(shapes, face_a, rotation, a, (x, y, z)), -_cosine(shapes, face_b, rotation, b, (x, y, z))
+        of_b = cosine_b > cosine + SECOND_WINS
+        cosine = max(cosine, cosine_b)
+        if cosine < ALIKE:
+            return np.int64(1), gap
+        copy_contact(real, ids, 0, POINTS)
+        # What hangs down beside a tilted face is not to be held up by it.
+        ahead = 0.0
+    if of_b:
         other = _face_at(shapes, s, corner_a, rotation, a, t, b, face_b)
         found = clip_faces(shapes, velocity, rotation, t, b, between, face_b, s, a, origin, other, margin, ahead, -1.0, scratch, real, ids)
     else:
         other = _face_at(shapes, t, corner_b, rotation, b, s, a, face_a)
         found = clip_faces(shapes, velocity, rotation, s, a, origin, face_a, t, b, between, other, margin, ahead, 1.0, scratch, real, ids)
-    if found == 0 and max(gap_a, gap_b) <= margin:
+    if edges:
+        if not along_edges(real, found, POINTS, cosine, of_b, gap, size):
+            copy_contact(real, ids, POINTS, 0)
+            found = np.int64(1)
+    elif found == 0 and max(gap_a, gap_b) <= margin:
         # The face that looks at it lies wholly beside it.
         face, corner, i, j = (face_b, corner_a, b, a) if gap_b > gap_a else (face_a, corner_b, a, b)
         found = _corner_contact(shapes, rotation, face, corner, i, j, i == a, between, max(gap_a, gap_b), real, ids)
     return found, max(gap, gap_a, gap_b)
+
+
+@inlined
+def _cosine(shapes, face, r, i, n):
+    """Cosine of the angle of n and the normal of a face of body i."""
+    x, y, z = turned(r, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
+    return x * n[0] + y * n[1] + z * n[2]
 
 
 @jit

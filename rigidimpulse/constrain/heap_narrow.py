@@ -15,10 +15,10 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse._jit import inlined, jit
-from rigidimpulse.constrain.heap_boxes import box_axis, edge_contact, face_contacts
+from rigidimpulse.constrain.heap_boxes import box_axis, edge_contact, face_along, face_contacts
 from rigidimpulse.constrain.heap_depth import make_polytope
 from rigidimpulse.constrain.heap_hulls import closest, hull_contacts, make_simplex, seen_from
-from rigidimpulse.constrain.heap_polyhedra import half_space_contacts, make_scratch
+from rigidimpulse.constrain.heap_polyhedra import ALIKE, POINTS, along_edges, copy_contact, half_space_contacts, make_scratch
 from rigidimpulse.constrain.heap_rows import (
     CARRIER,
     CORE_A,
@@ -53,8 +53,6 @@ FAR = 4.0
 """Margins within which it is found how far convex bodies are apart."""
 NEAR = 0.2
 """Inner radii within which an old contact hands its impulse to a new one of other features."""
-POINTS = 4
-"""Contacts of two convex polyhedra."""
 BLOCK = 64
 """Pairs that are dealt out together."""
 
@@ -268,9 +266,22 @@ def _of_boxes(half, velocity, rotation, a, b, s, t, between, margin, ahead, c, w
     gap, axis = box_axis(half, s, t, rotation, a, b, dx, dy, dz, margin, c)
     if gap > margin:
         return np.int64(0), gap
-    if axis >= 6:
-        return edge_contact(half, s, t, rotation, a, dx, dy, dz, axis, gap, c, work, real, ids), gap
-    return face_contacts(half, velocity, rotation, a, b, s, t, between, axis, margin, ahead, c, scratch, real, ids), gap
+    cosine, edges = 1.0, axis
+    if edges >= 6:
+        edge_contact(half, s, t, rotation, a, dx, dy, dz, edges, gap, c, work, real, ids)
+        axis, cosine = face_along(work[0], c)
+        if cosine < ALIKE:
+            return np.int64(1), gap
+        copy_contact(real, ids, 0, POINTS)
+        # What hangs down beside a tilted face is not to be held up by it.
+        ahead = 0.0
+    count = face_contacts(half, velocity, rotation, a, b, s, t, between, axis, margin, ahead, c, scratch, real, ids)
+    if edges >= 6:
+        size = min(half[s, 0], half[s, 1], half[s, 2], half[t, 0], half[t, 1], half[t, 2])
+        if not along_edges(real, count, POINTS, cosine, axis >= 3, gap, size):
+            copy_contact(real, ids, POINTS, 0)
+            count = np.int64(1)
+    return count, gap
 
 
 @jit
@@ -297,7 +308,7 @@ def look(shapes, solids, inset, bodies, pairs, share, shares, ahead, kept, place
     begin and end; coefficients (k, k, 4) of two materials. Returns how many pairs were looked at, and how many general ones there are,
     -1 where there are too few rows (make room and call it again).
     """
-    real, found = np.empty((POINTS, 10)), np.empty((POINTS, 3), np.int64)
+    real, found = np.empty((POINTS + 1, 10)), np.empty((POINTS + 1, 3), np.int64)
     scratch, work, simplex, polytope, origin = make_scratch(), np.empty((3, 3)), make_simplex(), make_polytope(), np.zeros(3)
     position, rotation, velocity, shape = bodies.position, bodies.rotation, bodies.velocity, bodies.shape
     old, old_ids = np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64)

@@ -76,7 +76,7 @@ def gap_along(geometry, bodies, a, b, p, q, n):
 
 @jit
 def overlap_contacts(polyhedra, bodies, a, b, size, work, real, ids):
-    """Contacts into real (4, 10), in the world, and ids (4, 3) of two bodies that have sunk into each other; their number.
+    """Contacts into real (5, 10), in the world, and ids (5, 3) of two bodies that have sunk into each other; their number.
 
     polyhedra: with prisms for cylinders; size: smaller inner radius, m; work: room for `hull_contacts`.
     """

@@ -5,7 +5,9 @@ of faces and the cross products of edges (the separating axes; Gottschalk, Lin a
 are nearest, at most the gap elsewhere, and minus the depth of bodies inside each other. Where a face has it, the polygon of
 the other body that faces it most squarely is cut by its sides (Sutherland and Hodgman 1974), and of the points within
 the margin four stay: the deepest, the one farthest from it, and the ones farthest from their line on either side. Where two
-edges have it by more than EDGE_WINS of the smaller inner radius, their closest points are the contact.
+edges have it by more than EDGE_WINS of the smaller inner radius, their closest points are the contact, unless their normal is within
+ALIKE of that of a face: then what is cut out there are the contacts, along the normal of the edges, since bodies that lie crosswise on
+each other, and rock, come to touch at the next of these points before they are looked at again.
 
 Contacts are written as (x, y, z on a, x, y, z on b, normal, gap) in world axes relative to the position of a.
 """
@@ -22,6 +24,10 @@ from rigidimpulse.constrain.heap_rows import turned
 from rigidimpulse.geometry import HALF_SPACE, Geometry
 
 EDGE_WINS = 2e-3
+ALIKE = 0.95
+"""Cosine of the angle of the normal of two edges and that of a face above which it is the faces that come to touch."""
+POINTS = 4
+"""Contacts of two convex polyhedra."""
 MOST_CORNERS = 64
 """Corners of a polygon that is cut."""
 FROM_EDGE = 1 << 20
@@ -189,3 +195,29 @@ def half_space_contacts(shapes, s, r, j, nx, ny, nz, offset, margin, sign, scrat
         real[c, 9] = height[k]
         out_ids[c, 0], out_ids[c, 1], out_ids[c, 2] = -1, -1, ids[k]
     return number, least
+
+
+@inlined
+def copy_contact(real, ids, source, target):
+    """Copy a contact."""
+    for k in range(10):
+        real[target, k] = real[source, k]
+    for k in range(3):
+        ids[target, k] = ids[source, k]
+
+
+@inlined
+def along_edges(real, count, edges, cosine, of_b, gap, size):
+    """Turn `count` contacts of faces to the normal of the edges in row `edges`; returns whether the nearest is as near as the edges are.
+
+    A corner at the height h over a face is h cos over it along the normal of edges that is tilted so, and at least as far as the edges are.
+    cosine: of both normals; of_b: whether the face is b's; gap: of the edges, m; size: smaller inner radius, m.
+    """
+    nearest, own, other, turn = inf, 3 if of_b else 0, 0 if of_b else 3, 1.0 if of_b else -1.0
+    for n in range(count):
+        real[n, 9] *= cosine
+        nearest = min(nearest, real[n, 9])
+        for k in range(3):
+            real[n, 6 + k] = real[edges, 6 + k]
+            real[n, own + k] = real[n, other + k] + turn * real[n, 9] * real[n, 6 + k]
+    return nearest <= gap + EDGE_WINS * size

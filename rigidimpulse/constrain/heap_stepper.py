@@ -176,7 +176,7 @@ class HeapStepper:
         self._part[supports], self._part[members] = SUPPORT, MEMBER
         load_bodies(self.bodies, self.order, context.state.now, context.acceleration, self.world.inv_mass, self._part)
         motion = most_motion(self.bodies, self.table.pairs, ahead)
-        needed = math.ceil(motion / COARSEST) if self._depth.any() else 0
+        needed = math.ceil(motion / COARSEST)
         self._sub_steps = max(math.ceil(ahead / self.sub_step(members) - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
         most = max(self._sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
         self._parts = min(max(math.ceil(motion / self._motion), 1), most)

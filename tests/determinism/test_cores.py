@@ -64,7 +64,7 @@ def test_contacts_that_find_no_room_are_found_again(monkeypatch) -> None:
     """Whatever a buffer holds at first, in whichever share."""
 
     def small(buffer: ContactBuffer) -> None:
-        buffer.real, buffer.integer, buffer.scratch = np.empty((40, 10)), np.empty((40, 5), np.int64), np.empty((160, 2), np.int64)
+        buffer.real, buffer.integer, buffer.scratch = np.empty((40, 10)), np.empty((40, 5), np.int64), np.empty((4096, 2), np.int64)
 
     monkeypatch.setattr(heap_stepper, "WORTHWHILE_GENERAL", 4)
     monkeypatch.setattr(heap_stepper, "number_of_cores", lambda: 2)
