@@ -141,7 +141,6 @@ class Kernel:
             self.preparing += spent
         return result
 
-
     def together(self, calls: Sequence[tuple]) -> list[Any]:
         """Call it from Python with each of these tuples of arguments at once, on as many cores; results in their order."""
         if len(calls) == 1 or not self.entry.overloads:

@@ -86,6 +86,7 @@ def _ask(answers) -> None:
     answers.put((number_of_cores(), share_of.together([(1000, share, 4) for share in range(4)])))
 
 
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 @pytest.mark.parametrize("method", ["spawn", "fork"])
 def test_processes_of_a_pool_use_one_core_each_and_threads_of_their_own(method: str) -> None:
     """One that is forked off while its parent has threads would wait for ever for them."""
