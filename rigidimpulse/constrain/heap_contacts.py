@@ -14,7 +14,8 @@ from rigidimpulse.constrain.contact_motion import only_primitive, side_radius
 from rigidimpulse.constrain.heap_cores import put_back
 from rigidimpulse.constrain.heap_depth import make_polytope
 from rigidimpulse.constrain.heap_hulls import make_simplex
-from rigidimpulse.constrain.heap_narrow import NEAR, hand_over, note_seen, write_row
+from rigidimpulse.constrain.heap_narrow import note_seen
+from rigidimpulse.constrain.heap_new_rows import NEAR, hand_over, take_up, write_row
 from rigidimpulse.constrain.heap_overlap import gap_along, overlap_contacts, support
 from rigidimpulse.constrain.heap_polyhedra import POINTS, make_scratch
 from rigidimpulse.constrain.heap_rows import CORE_A, CORE_B, ROUND_A, ROUND_B, SKIN, turned
@@ -156,7 +157,7 @@ def _shrunk_by(geometry, bodies, factor, a, b, p, q, n):
 
 
 @jit
-def _write(geometry, bodies, a, b, carrier, real, c, factor_a, factor_b, coefficients, rows, r):
+def _write(geometry, bodies, held, a, b, carrier, real, c, factor_a, factor_b, coefficients, rows, r):
     """A new row r of the contact real[c] (10,) of bodies a and b, with places in the world; returns its separation."""
     round_a = side_radius(geometry, only_primitive(geometry, bodies.shape[a]), bodies.rotation[a], real[c, 6:9])
     round_b = side_radius(geometry, only_primitive(geometry, bodies.shape[b]), bodies.rotation[b], real[c, 6:9])
@@ -164,7 +165,7 @@ def _write(geometry, bodies, a, b, carrier, real, c, factor_a, factor_b, coeffic
         real[c, k] -= bodies.position[a, k]
         real[c, 3 + k] -= bodies.position[a, k]
     return write_row(
-        bodies.position, bodies.rotation, bodies.material, bodies.skin, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b,
+        bodies.position, bodies.rotation, bodies.material, bodies.skin, held, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b,
         coefficients, rows, r,
     )  # fmt: skip
 
@@ -194,22 +195,27 @@ def store_contacts(
         new = used
         size = min(bodies.inner[a], bodies.inner[b])
         carrier = pairs.carrier[p]
+        if pairs.count[p] == 0:
+            pairs.held[p] = min(bodies.skin[a], bodies.skin[b])
+        held = pairs.held[p]
         sunk = 0
         if convex[a] and convex[b] and factor[a] * factor[b] < 1.0 and not _is_sound(geometry, bodies, factor, a, b, real, first, last):
             sunk = overlap_contacts(polyhedra, bodies, a, b, size, work, deep, deep_ids)
         for s in range(sunk if sunk > 0 else last - first):
             if sunk > 0:
-                separation = _write(geometry, bodies, a, b, carrier, deep, s, 1.0, 1.0, coefficients, rows, used)
+                separation = _write(geometry, bodies, held, a, b, carrier, deep, s, 1.0, 1.0, coefficients, rows, used)
                 ids[used] = deep_ids[s]
             else:
                 put_back(shown, back, depth, bodies, a, b, real, integer, first + s)
-                separation = _write(geometry, bodies, a, b, carrier, real, first + s, factor[a], factor[b], coefficients, rows, used)
+                separation = _write(geometry, bodies, held, a, b, carrier, real, first + s, factor[a], factor[b], coefficients, rows, used)
                 ids[used] = integer[first + s, 2:]
             if separation <= margins[k]:
                 used += 1
         if sunk == 0 and _contradicts(bodies, pairs, p, rows, new, used):
             used = new
         else:
+            if pairs.count[p] == 0:
+                take_up(pairs.held, p, rows, new, used)
             old = pairs.start[p]
             hand_over(rows, ids, old, old + pairs.count[p], rows, ids, new, used, NEAR * size)
             pairs.start[p], pairs.count[p], pairs.room[p] = new, used - new, used - new

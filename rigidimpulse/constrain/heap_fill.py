@@ -50,6 +50,7 @@ from rigidimpulse.constrain.heap_rows import (
     CORE_B,
     DYNAMIC_FRICTION,
     FRICTION,
+    HELD,
     IMPULSE,
     INVERSE_MASS,
     ROUND_A,
@@ -134,15 +135,14 @@ def _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
         first, second = gather(lanes, lines, batches.row, at), gather(lanes, lines[ROW:], batches.row, at)
         a = _turned(ra, (first[CORE_A], first[CORE_A + 1], first[CORE_A + 2]))
         b = add(between, _turned(rb, (second[CORE_B - ROW], second[CORE_B + 1 - ROW], second[CORE_B + 2 - ROW])))
-        skin = second[SKIN - ROW]
-        gap = dot(n, less(b, a)) - (first[ROUND_A] + first[ROUND_B]) - skin
+        gap = dot(n, less(b, a)) - (first[ROUND_A] + first[ROUND_B]) - second[HELD - ROW]
         a, b = along(a, first[ROUND_A], n), along(b, -first[ROUND_B], n)
         x = (fma(share, a[0], rest * b[0]), fma(share, a[1], rest * b[1]), fma(share, a[2], rest * b[2]))
         store(record, g + X * w, dot(t, x))
         store(record, g + Y * w, dot(u, x))
         store(record, g + GAP * w, gap)
         # A lane without this point has no skin.
-        here = where_greater(skin, zero, one, zero)
+        here = where_greater(second[SKIN - ROW], zero, one, zero)
         store(record, g + MASS * w, here)
         number, mean = number + here, along(mean, here, x)
     inverse = one / where_greater(number, zero, number, one)

@@ -20,8 +20,7 @@ import numpy as np
 
 from rigidimpulse._jit import jit
 from rigidimpulse.constrain.heap_courses import CALM
-from rigidimpulse.constrain.heap_narrow import in_play
-from rigidimpulse.constrain.heap_rows import SEPARATION, SKIN, SUPPORT
+from rigidimpulse.constrain.heap_rows import SEPARATION, SKIN, SUPPORT, in_play
 
 MANY, FEW, KEPT = 60, 8, 2
 RATIO, REBOUND, TALL = 30.0, 0.5, 12

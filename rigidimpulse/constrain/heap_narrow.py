@@ -18,27 +18,9 @@ from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_boxes import box_axis, edge_contact, face_along, face_contacts
 from rigidimpulse.constrain.heap_depth import make_polytope
 from rigidimpulse.constrain.heap_hulls import closest, hull_contacts, make_simplex, seen_from
+from rigidimpulse.constrain.heap_new_rows import NEAR, hand_over, take_up, write_row
 from rigidimpulse.constrain.heap_polyhedra import ALIKE, POINTS, along_edges, copy_contact, half_space_contacts, make_scratch
-from rigidimpulse.constrain.heap_rows import (
-    CARRIER,
-    CORE_A,
-    CORE_B,
-    DYNAMIC_FRICTION,
-    FRICTION,
-    IMPULSE,
-    MEMBER,
-    OUTSIDE,
-    RESTITUTION,
-    ROUND_A,
-    ROUND_B,
-    ROW_SIZE,
-    SEPARATION,
-    SKIN,
-    STATIC_FRICTION,
-    closing_speed,
-    turned,
-    turned_back,
-)
+from rigidimpulse.constrain.heap_rows import IMPULSE, ROW_SIZE, closing_speed, in_play, turned, turned_back
 from rigidimpulse.rotation import product
 
 BOXES, WALL, GENERAL, HULLS = 0, 1, 2, 3
@@ -51,16 +33,8 @@ SAME, SAME_GENERAL = 2e-3, 0.02
 """Part of the inner radius that touching pairs may move past each other until they are looked at again."""
 FAR = 4.0
 """Margins within which it is found how far convex bodies are apart."""
-NEAR = 0.2
-"""Inner radii within which an old contact hands its impulse to a new one of other features."""
 BLOCK = 64
 """Pairs that are dealt out together."""
-
-
-@inlined
-def in_play(part, a, b):
-    """Whether a pair is stepped."""
-    return part[a] != OUTSIDE and part[b] != OUTSIDE and (part[a] == MEMBER or part[b] == MEMBER)
 
 
 @jit
@@ -189,60 +163,6 @@ def review(bodies, pairs, share, shares, ahead, kept, places, margins):
 
 
 @inlined
-def write_row(
-    position, rotation, material, skin, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b, coefficients, rows, r
-):
-    """A new row r, without impulse, of the contact real[c] (10,) of bodies a and b, with places relative to a; carrier: whether it is b.
-
-    factor_a, factor_b: lengths of the bodies as the contact was found, parts of their true ones. Returns the separation.
-    """
-    nx, ny, nz = real[c, 6], real[c, 7], real[c, 8]
-    dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
-    ax, ay, az = real[c, 0] / factor_a - round_a * nx, real[c, 1] / factor_a - round_a * ny, real[c, 2] / factor_a - round_a * nz
-    bx, by, bz = (real[c, 3] - dx) / factor_b, (real[c, 4] - dy) / factor_b, (real[c, 5] - dz) / factor_b
-    bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz
-    m, t = material[a], material[b]
-    for k in range(IMPULSE, ROW_SIZE):
-        rows[r, k] = 0.0
-    rows[r, 0], rows[r, 1], rows[r, 2] = turned_back(rotation, b if carrier else a, nx, ny, nz)
-    rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2] = turned_back(rotation, a, ax, ay, az)
-    rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2] = turned_back(rotation, b, bx, by, bz)
-    rows[r, ROUND_A], rows[r, ROUND_B], rows[r, CARRIER] = round_a, round_b, 1.0 if carrier else 0.0
-    rows[r, RESTITUTION], rows[r, STATIC_FRICTION] = coefficients[m, t, 0], coefficients[m, t, 1]
-    rows[r, DYNAMIC_FRICTION], rows[r, SKIN] = coefficients[m, t, 2], min(skin[a], skin[b])
-    apart = nx * (dx + (bx - ax)) + ny * (dy + (by - ay)) + nz * (dz + (bz - az))
-    rows[r, SEPARATION] = apart - (round_a + round_b) - rows[r, SKIN]
-    return rows[r, SEPARATION]
-
-
-@inlined
-def hand_over(old_rows, old_ids, old, old_end, rows, ids, new, new_end, near):
-    """Give new rows the impulses of the old ones of the same features, else of one nearby with much the same normal.
-
-    An old one that has given its impulse has none.
-    """
-    for nearby in range(2):
-        for c in range(new, new_end):
-            if rows[c, IMPULSE] > 0.0:
-                continue
-            for o in range(old, old_end):
-                if old_rows[o, IMPULSE] == 0.0:
-                    continue
-                cosine = rows[c, 0] * old_rows[o, 0] + rows[c, 1] * old_rows[o, 1] + rows[c, 2] * old_rows[o, 2]
-                same = ids[c, 0] == old_ids[o, 0] and ids[c, 1] == old_ids[o, 1] and ids[c, 2] == old_ids[o, 2]
-                if nearby == 1:
-                    x, y = rows[c, CORE_A] - old_rows[o, CORE_A], rows[c, CORE_A + 1] - old_rows[o, CORE_A + 1]
-                    z = rows[c, CORE_A + 2] - old_rows[o, CORE_A + 2]
-                    same = x * x + y * y + z * z < near * near
-                if not same or cosine < 0.9:
-                    continue
-                rows[c, IMPULSE], old_rows[o, IMPULSE] = old_rows[o, IMPULSE], 0.0
-                for k in range(FRICTION, FRICTION + 3):
-                    rows[c, k] = old_rows[o, k]
-                break
-
-
-@inlined
 def _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, ids):
     """Contacts of a half space and a convex polyhedron relative to the first body; returns their number and the gap."""
     wall_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
@@ -346,24 +266,29 @@ def look(shapes, solids, inset, bodies, pairs, share, shares, ahead, kept, place
                 for j in range(3):
                     ids[used + i, j] = ids[before + i, j]
             free[share, 0] = used + POINTS
-        start, kept = pairs.start[p], 0
+        start, handed = pairs.start[p], 0
         for i in range(start, start + pairs.count[p]):
             # An old contact without impulse has nothing to hand over.
             if rows[i, IMPULSE] > 0.0:
                 for j in range(ROW_SIZE):
-                    old[kept, j] = rows[i, j]
+                    old[handed, j] = rows[i, j]
                 for j in range(3):
-                    old_ids[kept, j] = ids[i, j]
-                kept += 1
+                    old_ids[handed, j] = ids[i, j]
+                handed += 1
+        if pairs.count[p] == 0:
+            pairs.held[p] = min(bodies.skin[a], bodies.skin[b])
+        held = pairs.held[p]
         for i in range(count):
             write_row(
-                position, rotation, bodies.material, bodies.skin, a, b, pairs.carrier[p], real, i, 0.0, 0.0, 1.0, 1.0, coefficients, rows,
-                start + i,
+                position, rotation, bodies.material, bodies.skin, held, a, b, pairs.carrier[p], real, i, 0.0, 0.0, 1.0, 1.0, coefficients,
+                rows, start + i,
             )  # fmt: skip
             for j in range(3):
                 ids[start + i, j] = found[i, j]
-        if count > 0 and kept > 0:
-            hand_over(old, old_ids, np.int64(0), kept, rows, ids, start, start + count, NEAR * min(bodies.inner[a], bodies.inner[b]))
+        if pairs.count[p] == 0:
+            take_up(pairs.held, p, rows, start, start + count)
+        if count > 0 and handed > 0:
+            hand_over(old, old_ids, np.int64(0), handed, rows, ids, start, start + count, NEAR * min(bodies.inner[a], bodies.inner[b]))
         pairs.count[p] = count
         pairs.apart[p] = max(gap, 0.0) if count == 0 else 0.0
         note_seen(bodies, pairs, p)

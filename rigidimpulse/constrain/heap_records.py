@@ -14,14 +14,15 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.heap_narrow import GENERAL, in_play
+from rigidimpulse.constrain.heap_narrow import GENERAL
 from rigidimpulse.constrain.heap_rows import (
     CORE_A,
     CORE_B,
+    HELD,
     INVERSE_MASS,
     ROUND_A,
     ROUND_B,
-    SKIN,
+    in_play,
     turned,
 )
 from rigidimpulse.constrain.lanes import ROW, aligned
@@ -42,7 +43,7 @@ BETWEEN = 40
 """How points push each other along n: 01, 02, 03, 12, 13, 23."""
 POINT, POINT_SIZE = 46, 6
 X, Y, GAP, MASS, PRESS, LEVER = 0, 1, 2, 3, 4, 5
-"""First field of the points, and fields of each: place, m; gap less the skin, m; effective mass, 0 for none; impulse; distance from O."""
+"""First field of the points, and fields of each: place, m; gap less the held one, m; effective mass, 0: none; impulse; distance from O."""
 FIELDS = POINT + 4 * POINT_SIZE
 POINTS, LINES = 4, 3
 """Points of a patch at most; lines of 8 of a row of the pool."""
@@ -217,14 +218,14 @@ def tangents(nx, ny, nz):
 
 @jit
 def point_of(position, rotation, rows, r, a, b, nx, ny, nz, share):
-    """Where the impulses of row r act, from the centre of a, and the gap less the skin, m."""
+    """Where the impulses of row r act, from the centre of a, and the gap less the held one, m."""
     ax, ay, az = turned(rotation, a, rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2])
     bx, by, bz = turned(rotation, b, rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2])
     bx += position[b, 0] - position[a, 0]
     by += position[b, 1] - position[a, 1]
     bz += position[b, 2] - position[a, 2]
     s, t = rows[r, ROUND_A], rows[r, ROUND_B]
-    gap = nx * (bx - ax) + ny * (by - ay) + nz * (bz - az) - (s + t) - rows[r, SKIN]
+    gap = nx * (bx - ax) + ny * (by - ay) + nz * (bz - az) - (s + t) - rows[r, HELD]
     rest = 1.0 - share
     x = share * (ax + s * nx) + rest * (bx - t * nx)
     y = share * (ay + s * ny) + rest * (by - t * ny)

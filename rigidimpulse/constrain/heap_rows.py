@@ -24,10 +24,10 @@ from rigidimpulse.rotation import quaternion_to_matrix
 NORMAL, CORE_A, ROUND_A, ROUND_B, CORE_B = 0, 3, 6, 7, 8
 """Offsets in a row: unit normal from first to second in the axes of the pair's carrier; body-fixed points, in the axes of their
 bodies, and the radii of the rounded surfaces around them, m."""
-SKIN, STATIC_FRICTION, DYNAMIC_FRICTION, RESTITUTION, CARRIER = 11, 12, 13, 14, 15
-"""Offsets in a row: skin, m; coefficients; 1 where the carrier is the second body, else 0."""
+SKIN, STATIC_FRICTION, DYNAMIC_FRICTION, HELD, CARRIER = 11, 12, 13, 14, 15
+"""Offsets in a row: skin, m; coefficients; gap at which it is held, m; 1 where the carrier is the second body, else 0."""
 IMPULSE, FRICTION, SEPARATION, ROW_SIZE = 16, 17, 20, 24
-"""Offsets in a row: normal impulse, N s; friction impulse (3), N s, world; gap less the skin when the row was last written or read, m.
+"""Offsets in a row: normal impulse, N s; friction impulse (3), N s, world; gap less the held one when the row was last written or read, m.
 A row is three lines of 8, the last of which the solver writes. Row 0 of a pool is none: all 0."""
 
 OUTSIDE, MEMBER, SUPPORT = 0, 1, 2
@@ -73,6 +73,7 @@ class HeapPairs(NamedTuple):
     room: np.ndarray  # (k,) rows that are the pair's own
     known: np.ndarray  # (k,) bool, `seen` and `apart` hold
     apart: np.ndarray  # (k,) m, the gap was at least that; 0 for a pair that has rows
+    held: np.ndarray  # (k,) m, gap at which contacts are held
     seen: np.ndarray  # (k, 7) pose of the other body in the axes of the carrier when contacts were looked for: m, and quaternion
 
 
@@ -112,6 +113,12 @@ def load_bodies(bodies, order, now, acceleration, inv_mass, part):
             set_inverse_inertia(bodies, k)
         else:
             bodies.mass[8 * k : 8 * k + 8] = 0.0
+
+
+@inlined
+def in_play(part, a, b):
+    """Whether a pair is stepped."""
+    return part[a] != OUTSIDE and part[b] != OUTSIDE and (part[a] == MEMBER or part[b] == MEMBER)
 
 
 @inlined

@@ -61,7 +61,7 @@ from rigidimpulse.constrain.heap_records import (
     point_of,
     tangents,
 )
-from rigidimpulse.constrain.heap_rows import INVERSE_MASS, RESTITUTION, SKIN
+from rigidimpulse.constrain.heap_rows import INVERSE_MASS, SKIN
 from rigidimpulse.constrain.lanes import width_of
 
 FREQUENCY = 0.25
@@ -144,11 +144,11 @@ def _slip_at(bodies, a, b, arm_a, arm_b):
 
 
 @jit
-def special_patches(width, bodies, pairs, patches, begin, count, rows, batches, gravity, lists, target):
+def special_patches(width, bodies, pairs, patches, begin, count, rows, batches, coefficients, gravity, lists, target):
     """Patches from `begin` to `count` that need more than the passes give: of two balls, of rebounds, of moving supports.
 
-    Writes them to lists (3, m), and returns their numbers. gravity: its strength, m/s2. target (m, 4): speeds at which points leave after
-    they have closed, m/s, 0 for none.
+    Writes them to lists (3, m), and returns their numbers. coefficients (k, k, 4) of two materials; gravity: its strength, m/s2. target
+    (m, 4): speeds at which points leave after they have closed, m/s, 0 for none.
     """
     balls, rebounds, supports = 0, 0, 0
     for m in range(begin, count):
@@ -161,8 +161,8 @@ def special_patches(width, bodies, pairs, patches, begin, count, rows, batches, 
             if bodies.mass[8 * i + INVERSE_MASS] == 0.0 and np.any(bodies.velocity[8 * i : 8 * i + 6] != 0.0):
                 lists[2, supports] = m
                 supports += 1
-        row = rows[patches.row[m, 0]]
-        if row[RESTITUTION] == 0.0:
+        restitution = coefficients[bodies.material[a], bodies.material[b], 0]
+        if restitution == 0.0:
             continue
         o = (s // width) * FIELDS * width + s % width
         nx, ny, nz = _vector(batches.record, o + NORMAL * width, width)
@@ -170,8 +170,8 @@ def special_patches(width, bodies, pairs, patches, begin, count, rows, batches, 
         for c in range(patches.size[m]):
             _, _, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
             ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
-            speed = -row[RESTITUTION] * (ux * nx + uy * ny + uz * nz)
-            target[m, c] = speed if speed > sqrt(2.0 * gravity * row[SKIN]) else 0.0
+            speed = -restitution * (ux * nx + uy * ny + uz * nz)
+            target[m, c] = speed if speed > sqrt(2.0 * gravity * rows[patches.row[m, 0], SKIN]) else 0.0
             some = some or target[m, c] > 0.0
         if some:
             lists[1, rebounds] = m

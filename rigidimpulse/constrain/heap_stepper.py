@@ -14,6 +14,7 @@ from rigidimpulse.constrain.heap_cover import Cover
 from rigidimpulse.constrain.heap_fill import fill, keep_impulses, place_bodies
 from rigidimpulse.constrain.heap_motion import energies, mark_quick, note_pressed, slow_down
 from rigidimpulse.constrain.heap_narrow import classify, look, most_motion, share_of
+from rigidimpulse.constrain.heap_new_rows import widen
 from rigidimpulse.constrain.heap_overlap import solids
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
 from rigidimpulse.constrain.heap_records import (
@@ -57,6 +58,8 @@ MOSTLY = 0.3
 """Part of the bodies that are quick beyond which all count as such."""
 WORTHWHILE, WORTHWHILE_GENERAL = 400, 16
 """Pairs, all and general ones, beyond which several cores look at them: some tens of microseconds are lost by it."""
+WIDENING = 0.01
+"""Part of their weight by which pairs that began closer than the skin are driven apart: friction is that much too large meanwhile."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -181,6 +184,8 @@ class HeapStepper:
         most = max(self._sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
         self._parts = min(max(math.ceil(motion / self._motion), 1), most)
         self.ahead = ahead / self._parts
+        strength = float(self.world.steady_strength[members].max())
+        widen(self.bodies, self.table.pairs, self.table.rows, WIDENING * strength * ahead * ahead / self._sub_steps)
         self._look(context, kept)
 
     def _look(self, context, kept: float) -> None:
@@ -317,7 +322,8 @@ class HeapStepper:
         if self._special:
             strength = float(self.world.steady_strength[self.members].max())
             balls, rebounds, supports = special_patches(
-                width, bodies, table.pairs, self._patches, self._steady[0], self._count, table.rows, self._batches, strength, lists, target
+                width, bodies, table.pairs, self._patches, self._steady[0], self._count, table.rows, self._batches,
+                self.world.coefficients, strength, lists, target,
             )
         work = advance(
             self.lanes, bodies, table.pairs, self._patches, self._batches, self._steady[1], number, table.rows, lists, balls, rebounds,

@@ -21,7 +21,7 @@ def empty_pairs(k: int) -> HeapPairs:
 
     return HeapPairs(
         first=numbers(), second=numbers(), carrier=np.zeros(k, bool), round=np.zeros(k, bool), kind=numbers(), start=numbers(),
-        count=numbers(), room=numbers(), known=np.zeros(k, bool), apart=np.zeros(k), seen=np.zeros((k, 7)),
+        count=numbers(), room=numbers(), known=np.zeros(k, bool), apart=np.zeros(k), held=np.zeros(k), seen=np.zeros((k, 7)),
     )  # fmt: skip
 
 
@@ -35,7 +35,7 @@ def _carry_over(old, new):
             o += 1
         if o < old.first.shape[0] and old.first[o] == a and old.second[o] == b:
             new.start[p], new.count[p], new.room[p] = old.start[o], old.count[o], old.room[o]
-            new.known[p], new.apart[p] = old.known[o], old.apart[o]
+            new.known[p], new.apart[p], new.held[p] = old.known[o], old.apart[o], old.held[o]
             for k in range(7):
                 new.seen[p, k] = old.seen[o, k]
 

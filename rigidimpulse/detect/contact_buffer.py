@@ -24,13 +24,17 @@ class ContactBuffer:
 
     def find(self, *question) -> int:
         """Find the contacts of pairs, see `arguments`; returns their number."""
-        while True:
+        count = contacts_of_pairs(*self.arguments(*question))
+        while count < 0:
+            self.grow(-count)
             count = contacts_of_pairs(*self.arguments(*question))
-            if count >= 0:
-                return count
-            capacity = max(-count, 2 * len(self.real))
-            self.real, self.integer = np.empty((capacity, 10)), np.empty((capacity, 5), np.int64)
-            self.scratch = np.empty((4 * capacity, 2), np.int64)
+        return count
+
+    def grow(self, needed: int) -> None:
+        """Make room for at least so many contacts, and for twice as many as before."""
+        capacity = max(needed, 2 * len(self.real))
+        self.real, self.integer = np.empty((capacity, 10)), np.empty((capacity, 5), np.int64)
+        self.scratch = np.empty((4 * capacity, 2), np.int64)
 
     def arguments(self, geometry, world, bodies, rotation, a: np.ndarray, b: np.ndarray, margin: np.ndarray) -> tuple:
         """Of `contacts_of_pairs`: contacts of bodies a with bodies b (k,) at their poses, within margins (k,) m."""
@@ -42,4 +46,8 @@ def find_together(buffers: list[ContactBuffer], questions: list[tuple]) -> list[
     """Numbers of contacts found for each question, see `ContactBuffer.arguments`, in the buffer of the same place; on several cores."""
     asked = list(zip(buffers, questions, strict=True))
     counts = contacts_of_pairs.together([buffer.arguments(*question) for buffer, question in asked])
-    return [count if count >= 0 else buffer.find(*question) for (buffer, question), count in zip(asked, counts, strict=True)]
+    for k, (buffer, question) in enumerate(asked):
+        if counts[k] < 0:
+            buffer.grow(-counts[k])
+            counts[k] = buffer.find(*question)
+    return counts

@@ -6,7 +6,8 @@ the fastest engine of the same round. Piles, here at several settings: mean and 
 and how deep bodies are inside each other at any time (frames at 1/3 s, other engines only at the end) and at the end. Gas: all of 10 s,
 steps of 1/240 s, and the error of the energy; bounce: all of 20 s at 1/60 s, the same. Times are those of the loop, as they are those of
 the steps in other engines: scenes are compiled before, frames handed out after. All have one core; with --cores N the kernels here have N,
-and times here are those of a clock instead of a processor. With --save the lines go to tests/bench/<machine>/against_peers.csv.
+and times here are those of a clock instead of a processor. Each round has another fall of the same pile; depths are the greatest of
+all rounds. With --save the lines go to tests/bench/<machine>/against_peers.csv.
 """
 
 from __future__ import annotations
@@ -42,24 +43,26 @@ FLIGHTS = {"gas": (gas, 1000, 10.0, 1.0 / 240.0), "bounce": (bounce, 49, 20.0, 1
 
 
 class Result(NamedTuple):
-    """Mean and median time, ms for 1/60 s or s in all, and what else is to be known."""
+    """Mean and median time, ms for 1/60 s or s in all; depths of piles, ever and at the end, mm; and what else is to be known."""
 
     mean: float
     median: float
-    note: str
+    deepest: float = np.nan
+    last: float = np.nan
+    note: str = ""
 
 
-def pile_round(name: str, engines: tuple[str, ...], clock: Callable[[], float]) -> dict[str, Result]:
-    """Run a pile at all settings and in all engines."""
+def pile_round(name: str, fall: int, engines: tuple[str, ...], clock: Callable[[], float]) -> dict[str, Result]:
+    """Run a fall of a pile at all settings and in all engines."""
     number, hulls = PILES[name]
-    scene, out = pile(number, hulls), {}
+    scene, out = pile(number, hulls, fall), {}
     for what, accuracy in SETTINGS.items():
         ends: list[tuple[float, float]] = []
         run = ri.simulate(scene, STEPS / FPS, FPS, accuracy=accuracy, progress=lambda time, ends=ends: ends.append((time, clock())))
         at, spent = np.array(ends).T
         taken = 1e3 * np.diff(spent) / np.diff(at) / FPS
         ever = 1e3 * max(depths(scene, run, f).max(initial=0.0) for f in range(20, STEPS, 20))
-        out[what] = Result(float(taken.mean()), float(np.median(taken)), f"depth ever {ever:.1f} mm, {_depth(scene, run)}")
+        out[what] = Result(float(taken.mean()), float(np.median(taken)), ever, _depth(scene, run))
     for engine, answer in run_engines(scene, 1.0 / FPS, STEPS, names=engines).items():
         out[engine] = _pile_line(scene, answer)
     return out
@@ -67,13 +70,13 @@ def pile_round(name: str, engines: tuple[str, ...], clock: Callable[[], float]) 
 
 def _pile_line(scene: ri.Scene, answer: EngineRun | str) -> Result:
     if isinstance(answer, str):
-        return Result(np.nan, np.nan, answer)
+        return Result(np.nan, np.nan, note=answer)
     frame = SimpleNamespace(positions=answer.position[None], orientations=answer.orientation[None])
-    return Result(float(answer.times.mean()), float(np.median(answer.times)), _depth(scene, frame))
+    return Result(float(answer.times.mean()), float(np.median(answer.times)), last=_depth(scene, frame))
 
 
-def _depth(scene: ri.Scene, run) -> str:
-    return f"at the end {1e3 * depths(scene, run, -1).max(initial=0.0):.1f} mm"
+def _depth(scene: ri.Scene, run) -> float:
+    return 1e3 * float(depths(scene, run, -1).max(initial=0.0))
 
 
 def flight_round(name: str, engines: tuple[str, ...]) -> dict[str, Result]:
@@ -85,13 +88,13 @@ def flight_round(name: str, engines: tuple[str, ...]) -> dict[str, Result]:
     assert profile is not None
     loop = sum(profile.stages[stage] for stage in STAGES if stage in profile.stages)
     note = f"{_energy_error(scene, run.velocities[-1], run.positions[-1])}; {profile.seconds:.3f} s with the scene compiled and recorded"
-    out = {OURS: Result(loop, loop, note)}
+    out = {OURS: Result(loop, loop, note=note)}
     for engine, answer in run_engines(scene, step, round(duration / step), names=engines).items():
         if isinstance(answer, str):
-            out[engine] = Result(np.nan, np.nan, answer)
+            out[engine] = Result(np.nan, np.nan, note=answer)
         else:
             total = 1e-3 * float(answer.times.sum())
-            out[engine] = Result(total, total, _energy_error(scene, answer.velocity, answer.position))
+            out[engine] = Result(total, total, note=_energy_error(scene, answer.velocity, answer.position))
     return out
 
 
@@ -117,9 +120,11 @@ def show(name: str, rounds: list[dict[str, Result]], settings: list[str]) -> lis
     for what in rounds[0]:
         mean, middle = (median([one[what][k] for one in rounds]) for k in range(2))
         ratios = [median([one[what][k] / best[k] for one, best in zip(rounds, fastest, strict=True)]) for k in range(2)]
-        lines.append((name, what, mean, middle, *ratios, rounds[-1][what].note))
+        deepest, last = (max(one[what][k] for one in rounds) for k in (2, 3))
+        lines.append((name, what, mean, middle, *ratios, deepest, last, rounds[-1][what].note))
         times = f"mean {mean:8.3f} median {middle:8.3f} {'ms for 1/60 s' if name in PILES else 's'}"
-        print(f"{name:11} {what:36} {times}  of the fastest engine {ratios[0]:.2f} {ratios[1]:.2f}  {rounds[-1][what].note}", flush=True)
+        deep = f"deepest {deepest:.1f} mm, at the end {last:.1f}" if name in PILES else ""
+        print(f"{name:11} {what:25} {times}  of the fastest engine {ratios[0]:.2f} {ratios[1]:.2f}  {deep}{lines[-1][-1]}", flush=True)
     return lines
 
 
@@ -140,14 +145,17 @@ def main() -> None:
     ri.simulate(pile(200, True), 1.0)
     lines = []
     for name in options.scenes or [name for name in [*PILES, *FLIGHTS] if name != "boxes_5000"]:
-        rounds = [pile_round(name, engines, clock) if name in PILES else flight_round(name, engines) for _ in range(options.rounds)]
+        rounds = [
+            pile_round(name, fall, engines, clock) if name in PILES else flight_round(name, engines) for fall in range(options.rounds)
+        ]
         lines.extend(show(name, rounds, list(SETTINGS)))
     if options.save:
         folder = Path(__file__).parent / machine()
         folder.mkdir(exist_ok=True)
         with (folder / "against_peers.csv").open("w", newline="") as file:
             writer = csv.writer(file)
-            writer.writerow(("scene", "engine", "mean", "median", "mean of the fastest", "median of the fastest", "note"))
+            columns = "scene", "engine", "mean", "median", "mean of the fastest", "median of the fastest", "deepest", "at the end", "note"
+            writer.writerow(columns)
             writer.writerows(lines)
 
 

@@ -28,6 +28,8 @@ from rigidimpulse.rotation import to_matrix
 
 SIDE, PITCH, MASS = 0.5, 0.9, 1.0
 STEPS, FPS = 300, 60.0
+NUDGE = 1e-9
+"""m."""
 LAST = 60
 """Steps before rest that count as settled."""
 FRAMES = 10
@@ -50,8 +52,8 @@ class Line(NamedTuple):
     largest_depth_ever: float
 
 
-def pile(number: int, hulls: bool) -> ri.Scene:
-    """Return the scene of `number` boxes or convex hulls."""
+def pile(number: int, hulls: bool, fall: int = 0) -> ri.Scene:
+    """Return the scene of `number` boxes or convex hulls; falls begin NUDGE apart, but end differently, as chaotic motions do."""
     random = np.random.default_rng(5)
     side = 10 if number <= 1000 else 20
     half = 0.5 * side * PITCH
@@ -68,7 +70,7 @@ def pile(number: int, hulls: bool) -> ri.Scene:
         shapes = [ri.Shape.convex_hull(_corners(random)) for _ in range(20)]
     for k in range(number):
         layer, cell = divmod(k, side * side)
-        place = ((cell % side + 0.5) * PITCH - half, (cell // side + 0.5) * PITCH - half, 0.5 + layer)
+        place = ((cell % side + 0.5) * PITCH - half, (cell // side + 0.5) * PITCH - half, 0.5 + layer + fall * NUDGE)
         q = random.normal(size=4)
         scene.add(
             ri.Body(

@@ -8,7 +8,7 @@ import pytest
 import rigidimpulse as ri
 from rigidimpulse.constrain.heap_narrow import review
 from rigidimpulse.constrain.heap_polyhedra import EDGE_WINS
-from rigidimpulse.constrain.heap_rows import CORE_A, CORE_B, SEPARATION, SKIN
+from rigidimpulse.constrain.heap_rows import CORE_A, CORE_B, HELD, SEPARATION
 from rigidimpulse.constrain.heap_stepper import HeapStepper
 from rigidimpulse.observe.events import EventLog
 from rigidimpulse.observe.recorder import Recorder
@@ -75,7 +75,7 @@ def test_contacts_lie_on_both_boxes_at_the_gap_of_the_best_axis(wanted):
             points = [bodies.position[k] + bodies.rotation[k] @ row[at : at + 3] for k, at in ((0, CORE_A), (1, CORE_B))]
             gap = float((points[1] - points[0]) @ n)
             np.testing.assert_allclose(points[1] - points[0], gap * n, atol=1e-12)
-            assert row[SEPARATION] + row[SKIN] == pytest.approx(gap, abs=1e-12)
+            assert row[SEPARATION] + row[HELD] == pytest.approx(gap, abs=1e-12)
             for k, at in ((0, CORE_A), (1, CORE_B)):
                 # On the surface of the one whose face or edge it is, and at most the depth inside the other.
                 assert np.max(np.abs(row[at : at + 3]) - half[k]) <= 1e-9 + max(gap, 0.0) + max(-wanted, 0.0)

@@ -9,8 +9,8 @@ import pytest
 
 import rigidimpulse as ri
 from rigidimpulse.constrain import heap_stepper
-from rigidimpulse.constrain.heap_narrow import in_play
 from rigidimpulse.constrain.heap_records import LINES, POINTS
+from rigidimpulse.constrain.heap_rows import in_play
 
 
 def pile(number: int) -> ri.Scene:
