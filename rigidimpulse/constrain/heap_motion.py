@@ -59,10 +59,10 @@ def _turn_freely(bodies, i, h):
 
 
 @jit
-def kick(bodies, h):
-    """Let gravity act over h s."""
+def kick(bodies, begin, end, h):
+    """Let gravity act over h s on the bodies from `begin` to `end`."""
     v, before = bodies.velocity, bodies.before
-    for i in range(bodies.part.shape[0]):
+    for i in range(begin, end):
         if bodies.part[i] != MEMBER:
             continue
         o = 8 * i
@@ -73,10 +73,10 @@ def kick(bodies, h):
 
 
 @jit
-def move(bodies, h):
-    """Move all bodies by their velocities over h s; those that no contact pushed, on their parabola."""
+def move(bodies, begin, end, h):
+    """Move the bodies from `begin` to `end` by their velocities over h s; those that no contact pushed, on their parabola."""
     v, before, moved, drift = bodies.velocity, bodies.before, bodies.moved, bodies.drift
-    for i in range(bodies.part.shape[0]):
+    for i in range(begin, end):
         if bodies.part[i] == OUTSIDE:
             continue
         o = 8 * i

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_narrow import GENERAL
 from rigidimpulse.constrain.heap_rows import (
     CORE_A,
@@ -47,6 +47,8 @@ X, Y, GAP, MASS, PRESS, LEVER = 0, 1, 2, 3, 4, 5
 FIELDS = POINT + 4 * POINT_SIZE
 POINTS, LINES = 4, 3
 """Points of a patch at most; lines of 8 of a row of the pool."""
+REGIONS = 2
+"""Parts of the heap, by the places of bodies at the start: each core works in one of them as long as it can."""
 COLOURS = 62
 """Patches that find no colour among these have a batch each."""
 ONE_WALL = 1.0 - 1e-8
@@ -153,6 +155,14 @@ def leave_out_quick(width, bodies, pairs, patches, count, batches):
             record[g + MASS * width] = record[g + PRESS * width] = 0.0
 
 
+@inlined
+def _class_of(bodies, pairs, patches, m):
+    """Place of patch m in its colour: by region, then by the number of its points."""
+    a, b = pairs.first[patches.pair[m]], pairs.second[patches.pair[m]]
+    i = a if bodies.mass[8 * a + INVERSE_MASS] > 0.0 else b
+    return i * REGIONS // bodies.part.shape[0] * POINTS + POINTS - patches.size[m]
+
+
 @jit
 def colour_patches(width, bodies, pairs, patches, begin, count, batches, begins):
     """Colour the patches from `begin` to `count` and give them slots, after so many batches; begins (c+1,): where colours begin.
@@ -185,20 +195,20 @@ def colour_patches(width, bodies, pairs, patches, begin, count, batches, begins)
     colours += crowded
     if colours + 1 > begins.shape[0]:
         return np.int64(0), -colours
-    number = np.zeros((colours, POINTS), np.int64)
+    number = np.zeros((colours, REGIONS * POINTS), np.int64)
     for m in range(begin, count):
-        number[patches.colour[m], POINTS - patches.size[m]] += 1
+        number[patches.colour[m], _class_of(bodies, pairs, patches, m)] += 1
     for c in range(colours):
         begins[c] = batches
         place = batches * width
-        for k in range(POINTS):
+        for k in range(REGIONS * POINTS):
             here = number[c, k]
             number[c, k] = place
             place += here
         batches = (place + width - 1) // width
     begins[colours] = batches
     for m in range(begin, count):
-        k = POINTS - patches.size[m]
+        k = _class_of(bodies, pairs, patches, m)
         patches.slot[m] = number[patches.colour[m], k]
         number[patches.colour[m], k] += 1
     return batches, colours

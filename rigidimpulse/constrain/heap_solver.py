@@ -62,12 +62,17 @@ from rigidimpulse.constrain.heap_records import (
     tangents,
 )
 from rigidimpulse.constrain.heap_rows import INVERSE_MASS, SKIN
+from rigidimpulse.constrain.heap_team import LAST, NONE, PATIENCE, look_at, open_round, pause, report_piece, take_piece, wait_for
 from rigidimpulse.constrain.lanes import width_of
 
 FREQUENCY = 0.25
 """F: frequency of the spring in sub-steps."""
 DAMPING = 10.0
 """z: damping ratio."""
+KICK, WARM, SOLVE, MOVE, RELAX = range(5)
+"""Phases of a sub-step: gravity, warm start, normal rows, motion, relaxing. WARM, SOLVE and RELAX have a round for each colour."""
+BODIES_EACH, BATCHES_EACH = 128, 8
+"""Bodies and batches of a piece of a round: a microsecond or two of work."""
 
 
 def softness(h: float) -> np.ndarray:
@@ -262,26 +267,108 @@ def _work_of(width, bodies, patches, chosen, batches):
 
 
 @jit
-def advance(lanes, bodies, pairs, patches, batches, steady, number, rows, lists, balls, rebounds, supports, target, sub_steps, h):
+def _round(number, colours):
+    """Phase and colour of a round."""
+    k = number % (3 * colours + 2)
+    if k == 0:
+        return KICK, 0
+    if k == 2 * colours + 1:
+        return MOVE, 0
+    if k > 2 * colours + 1:
+        return RELAX, k - 2 * colours - 2
+    return (WARM, k - 1) if k <= colours else (SOLVE, k - 1 - colours)
+
+
+@jit
+def _extent(bodies, edges, phase, colour):
+    """Begin and end of the bodies or batches of a round, how many of them make a piece, and the number of pieces."""
+    begin, end, each = 0, bodies.part.shape[0], BODIES_EACH
+    if phase not in (KICK, MOVE):
+        begin, end, each = edges[colour], edges[colour + 1], BATCHES_EACH
+    return begin, end, each, (end - begin + each - 1) // each
+
+
+@jit
+def _work_on(lanes, bodies, batches, calm, h, phase, colour, begin, end):
+    """A piece of a round; calm: colours of batches that were made before the last look."""
+    moved = bodies.drift if colour < calm else bodies.moved
+    if phase == KICK:
+        kick(bodies, begin, end, h)
+    elif phase == WARM:
+        warm_start(lanes, batches, begin, end, bodies.velocity, moved, bodies.mass)
+    elif phase == MOVE:
+        move(bodies, begin, end, h)
+    else:
+        solve(lanes, batches, begin, end, bodies.velocity, moved, bodies.mass, h, phase == RELAX)
+
+
+@jit
+def _lead(lanes, bodies, batches, edges, calm, h, deck, is_shared, number):
+    """Work on a round until it is done."""
+    phase, colour = _round(number, edges.shape[0] - 1)
+    begin, end, each, pieces = _extent(bodies, edges, phase, colour)
+    if not is_shared or pieces < 2:
+        _work_on(lanes, bodies, batches, calm, h, phase, colour, begin, end)
+        return
+    open_round(deck, number)
+    mine = 0
+    while True:
+        _, taken = take_piece(deck)
+        if taken >= pieces:
+            break
+        first = begin + mine * each
+        _work_on(lanes, bodies, batches, calm, h, phase, colour, first, min(first + each, end))
+        mine += 1
+    wait_for(deck, pieces - mine)
+
+
+@jit
+def _help(lanes, bodies, batches, edges, calm, h, deck):
+    """Work on whatever round is open, to the last."""
+    waited, colours, mine, last = 0, edges.shape[0] - 1, 0, NONE
+    while waited < PATIENCE:
+        number, taken = look_at(deck)
+        if number >= 0 and number != LAST and taken < _extent(bodies, edges, *_round(number, colours))[3]:
+            # Another round may be open by now.
+            number, taken = take_piece(deck)
+        if number == LAST:
+            return
+        waited += 1
+        if number >= 0:
+            phase, colour = _round(number, colours)
+            begin, end, each, pieces = _extent(bodies, edges, phase, colour)
+            if taken < pieces:
+                mine, last, waited = 0 if number != last else mine, number, 0
+                mine += 1
+                first = begin + (pieces - mine) * each
+                _work_on(lanes, bodies, batches, calm, h, phase, colour, first, min(first + each, end))
+                report_piece(deck)
+        pause()
+
+
+@jit
+def advance(
+    lanes, bodies, pairs, patches, batches, edges, calm, rows, lists, balls, rebounds, supports, target, sub_steps, h, deck, share, shares
+):
     """So many sub-steps of length h; returns the work of moving supports, J.
 
-    steady: batches that were made before the last look; what bodies have come since then is in `drift`.
+    edges (c+1,): where the batches of colours begin; calm: how many colours were made before the last look; what bodies have come since
+    then is in `drift`. share: 0 for who leads, 1 for who helps, if `shares` is 2, see `heap_team`.
     """
-    width = width_of(lanes)
-    work, pressing, relaxing = 0.0, np.bool_(0), np.bool_(1)
-    velocity, moved, drift, mass = bodies.velocity, bodies.moved, bodies.drift, bodies.mass
-    for _ in range(sub_steps):
-        kick(bodies, h)
-        warm_start(lanes, batches, 0, steady, velocity, drift, mass)
-        warm_start(lanes, batches, steady, number, velocity, moved, mass)
-        solve(lanes, batches, 0, steady, velocity, drift, mass, h, pressing)
-        solve(lanes, batches, steady, number, velocity, moved, mass, h, pressing)
-        move(bodies, h)
+    width, colours, work = width_of(lanes), edges.shape[0] - 1, 0.0
+    if share > 0:
+        _help(lanes, bodies, batches, edges, calm, h, deck)
+        return 0.0
+    for s in range(sub_steps):
+        first = s * (3 * colours + 2)
+        for k in range(2 * colours + 2):
+            _lead(lanes, bodies, batches, edges, calm, h, deck, shares > 1, first + k)
         _turn_balls(width, bodies, pairs, patches, lists[0, :balls], rows, batches.record)
-        solve(lanes, batches, 0, steady, velocity, drift, mass, h, relaxing)
-        solve(lanes, batches, steady, number, velocity, moved, mass, h, relaxing)
+        for k in range(2 * colours + 2, 3 * colours + 2):
+            _lead(lanes, bodies, batches, edges, calm, h, deck, shares > 1, first + k)
         # Whatever a rebound takes from the impulses has acted already.
         work += _work_of(width, bodies, patches, lists[2, :supports], batches)
         work += _rebound(width, bodies, patches, lists[1, :rebounds], batches, target)
+    open_round(deck, LAST)
     finish(bodies)
     return work

@@ -31,6 +31,7 @@ from rigidimpulse.constrain.heap_records import (
 from rigidimpulse.constrain.heap_rows import MEMBER, OUTSIDE, SUPPORT, HeapBodies, load_bodies
 from rigidimpulse.constrain.heap_solver import FREQUENCY, advance, softness, special_patches
 from rigidimpulse.constrain.heap_table import HeapTable
+from rigidimpulse.constrain.heap_team import empty_deck
 from rigidimpulse.constrain.lanes import ROW, aligned, machine_lanes
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.contact_buffer import ContactBuffer, find_together
@@ -60,6 +61,10 @@ WORTHWHILE, WORTHWHILE_GENERAL = 400, 16
 """Pairs, all and general ones, beyond which several cores look at them: some tens of microseconds are lost by it."""
 WIDENING = 0.01
 """Part of their weight by which pairs that began closer than the skin are driven apart: friction is that much too large meanwhile."""
+WORTHWHILE_BATCHES, MOST_SOLVERS = 2000, 2
+"""Batches, each counted in every sub-step, beyond which two cores solve them."""
+_NO_STEADY = 0, np.zeros(1, np.int64)
+"""Patches, and edges of the colours of batches, that were made before the last look."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -114,9 +119,10 @@ class HeapStepper:
         least = CLEAR * np.where(world.dynamic, self.inner, 0.0)
         self.cover = Cover(world, self.order, self.inner, least)
         self.lanes = machine_lanes()
-        self._patches, self._count, self._steady = empty_patches(64), 0, (0, 0)
+        self._patches, self._count, self._steady = empty_patches(64), 0, _NO_STEADY
         self._batches = Batches(np.zeros(0), *np.zeros((4, 0), np.int64))
-        self._begins = np.zeros(256, np.int64)
+        self._begins, self._edges = np.zeros(256, np.int64), np.zeros(1, np.int64)
+        self._deck = empty_deck()
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
         self._motion = world.accuracy.heap_motion
@@ -268,12 +274,13 @@ class HeapStepper:
         self._look(context, self.kept)
         if all_quick:
             bodies.drift[:] = 0.0
-            self._steady = 0, 0
+            self._steady = _NO_STEADY
         leave_out_quick(width, bodies, self.table.pairs, self._patches, self._steady[0], self._batches)
 
     def _fill(self, h: float) -> int:
         """Make patches, colours and records of quick bodies after the steady ones, for sub-steps of h s; returns the number of batches."""
-        bodies, table, width, (begin, first) = self.bodies, self.table, self.lanes.width, self._steady
+        bodies, table, width, (begin, edges) = self.bodies, self.table, self.lanes.width, self._steady
+        first = int(edges[-1])
         count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
         if count < 0:
             self._patches = more_patches(self._patches, -2 * count)
@@ -285,6 +292,7 @@ class HeapStepper:
             number, colours = colour_patches(width, bodies, table.pairs, self._patches, begin, count, first, self._begins)
         if number > len(self._batches.points):
             self._batches = more_batches(self._batches, number + number // 4, width)
+        self._edges = np.concatenate([edges[:-1], self._begins[: colours + 1]])
         place_patches(width, bodies, table.pairs, self._patches, begin, count, self._batches, first, number)
         place_bodies(bodies, self._places_of_bodies)
         fill(self.lanes, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
@@ -297,7 +305,7 @@ class HeapStepper:
         h = (end - time) / sub_steps
         _, before = energies(bodies, self._masses, self._pull)
         work, done = 0.0, 0
-        self._steady = 0, 0
+        self._steady = _NO_STEADY
         for part in range(self._parts):
             if part:
                 self._look_again(context)
@@ -325,12 +333,17 @@ class HeapStepper:
                 width, bodies, table.pairs, self._patches, self._steady[0], self._count, table.rows, self._batches,
                 self.world.coefficients, strength, lists, target,
             )
-        work = advance(
-            self.lanes, bodies, table.pairs, self._patches, self._batches, self._steady[1], number, table.rows, lists, balls, rebounds,
-            supports, target, sub_steps, h,
-        )  # fmt: skip
+        shares, calm = min(self._shares, MOST_SOLVERS) if number * sub_steps > WORTHWHILE_BATCHES else 1, len(self._steady[1]) - 1
+        self._deck[:] = empty_deck()
+        work, *_ = advance.together([
+            (
+                self.lanes, bodies, table.pairs, self._patches, self._batches, self._edges, calm, table.rows, lists, balls, rebounds,
+                supports, target, sub_steps, h, self._deck, share, shares,
+            )
+            for share in range(shares)
+        ])  # fmt: skip
         keep_impulses(self.lanes, self._batches, number, table.lines)
-        if self._steady == (0, 0):
+        if not calm:
             bodies.quick[:] = False
-            self._steady = self._count, number
+            self._steady = self._count, self._edges
         return work

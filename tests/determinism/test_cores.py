@@ -15,6 +15,7 @@ import rigidimpulse as ri
 from rigidimpulse._jit import MOST_CORES, number_of_cores
 from rigidimpulse.constrain import heap_stepper, heap_table
 from rigidimpulse.constrain.heap_narrow import BLOCK, look, share_of
+from rigidimpulse.constrain.heap_solver import advance
 from rigidimpulse.detect.contact_buffer import ContactBuffer
 
 ROUGH = ri.Material(density=500, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
@@ -58,6 +59,27 @@ def test_heaps_have_the_same_bits_on_one_core_and_on_several(monkeypatch, shapes
         hashes.add(run.state_hash())
         assert max(dealt) == cores
     assert len(hashes) == 1
+
+
+@pytest.mark.parametrize("together", ["at once", "nobody helps", "help comes too late"])
+def test_sub_steps_have_the_same_bits_however_much_the_helper_does(monkeypatch, together: str) -> None:
+    asked = []
+
+    def team(calls):
+        asked.append(len(calls))
+        if together == "at once":
+            return type(advance).together(advance, calls)
+        return [advance(*arguments) for arguments in (calls[:1] if together == "nobody helps" else calls)]
+
+    def bits() -> str:
+        return ri.simulate(cloud([ri.Shape.box(0.2), ri.Shape.sphere(0.1)], 144), 0.6).state_hash()
+
+    monkeypatch.setattr(heap_stepper, "number_of_cores", lambda: 2)
+    alone = bits()
+    monkeypatch.setattr(heap_stepper, "WORTHWHILE_BATCHES", 0)
+    monkeypatch.setattr(advance, "together", team, raising=False)
+    assert bits() == alone
+    assert set(asked) == {2}
 
 
 def test_contacts_that_find_no_room_are_found_again(monkeypatch) -> None:

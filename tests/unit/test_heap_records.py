@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -32,8 +32,9 @@ def test_every_contact_is_in_one_lane_with_the_motion_since_it_was_put_there(mon
     """
     advance, made, steps = heap_stepper.advance, {}, {"whole": 0, "steady": 0}
 
-    def checked(lanes: Any, bodies: Any, pairs: Any, patches: Any, batches: Any, steady: int, number: int, *rest: Any) -> float:
-        rows = batches.row[: POINTS * number * lanes.width]
+    def checked(calls: list[tuple]) -> list[float]:
+        lanes, bodies, pairs, _, batches, edges, calm, *_ = calls[0]
+        rows = batches.row[: POINTS * edges[-1] * lanes.width]
         seen = np.sort(rows[rows > 0] // LINES)
         listed = [
             range(start, start + count)
@@ -41,14 +42,14 @@ def test_every_contact_is_in_one_lane_with_the_motion_since_it_was_put_there(mon
             if in_play.py_func(bodies.part, a, b)
         ]
         assert np.array_equal(seen, np.sort(np.concatenate([*listed, []]).astype(np.int64)))
-        steps["steady" if steady else "whole"] += 1
-        if steady == 0:
+        steps["steady" if calm else "whole"] += 1
+        if calm == 0:
             made["place"] = bodies.position.copy()
         drift = bodies.drift.reshape(-1, 8)[:, :3]
         moves = bodies.part == heap_stepper.MEMBER
         assert np.abs(drift - (bodies.position - made["place"]))[moves].max(initial=0.0) < 1e-13
-        return advance(lanes, bodies, pairs, patches, batches, steady, number, *rest)
+        return advance.together(calls)
 
-    monkeypatch.setattr(heap_stepper, "advance", checked)
+    monkeypatch.setattr(heap_stepper, "advance", SimpleNamespace(together=checked))
     assert ri.simulate(pile(100), 1.2).status.ok
     assert min(steps.values()) > 50
