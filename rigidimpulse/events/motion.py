@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import inlined, jit
 from rigidimpulse.detect.touching import world_inverse_inertia
 from rigidimpulse.integrate.course import FIXED, FREE, JERK
 from rigidimpulse.integrate.free_top import BASE, FIXED_AXIS, KIND, RATE, REST, keep_axis
@@ -21,38 +21,53 @@ def keeps_axis(course, i):
     return course.mode[i] == FIXED or course.top[i, KIND] <= FIXED_AXIS
 
 
-@jit
-def write_state(course, i, t, x_out, q_out, v_out, w_out):
-    """As `course.state_at`, for a body that keeps its axis and whose forces do not change."""
+@inlined
+def _coordinate(course, i, k, s, moves):
+    """Coordinate k of the place and of the velocity after s."""
+    a, v, x = course.acceleration[i, k], course.velocity[i, k], course.position[i, k]
+    displacement = s * (v + 0.5 * s * a)
+    return (x + displacement if displacement != 0.0 else x), (v + s * a if moves else 0.0)
+
+
+@inlined
+def _turn(course, i, s, moves):
+    """Quaternion and angular velocity after s, as seven numbers."""
+    top = course.top
+    if s == 0.0:
+        q0, q1, q2, q3 = course.orientation[i, 0], course.orientation[i, 1], course.orientation[i, 2], course.orientation[i, 3]
+        if not moves:
+            return q0, q1, q2, q3, 0.0, 0.0, 0.0
+        return q0, q1, q2, q3, course.angular_velocity[i, 0], course.angular_velocity[i, 1], course.angular_velocity[i, 2]
+    q0, q1, q2, q3 = top[i, BASE], top[i, BASE + 1], top[i, BASE + 2], top[i, BASE + 3]
+    if top[i, KIND] == REST:
+        return q0, q1, q2, q3, 0.0, 0.0, 0.0
+    wx, wy, wz = top[i, RATE], top[i, RATE + 1], top[i, RATE + 2]
+    e0, e1, e2, e3 = exponential(s * wx, s * wy, s * wz)
+    q0, q1, q2, q3 = product(e0, e1, e2, e3, q0, q1, q2, q3)
+    return q0, q1, q2, q3, wx, wy, wz
+
+
+@inlined
+def state_of(course, i, t):
+    """As `course.state_at`, for a body that keeps its axis and whose forces do not change; numbers, since views cost more than the rest."""
     moves = course.mode[i] != FIXED
     s = t - course.start[i] if moves else 0.0
-    for k in range(3):
-        a, v = course.acceleration[i, k], course.velocity[i, k]
-        displacement = s * (v + 0.5 * s * a)
-        x_out[k] = course.position[i, k] + displacement if displacement != 0.0 else course.position[i, k]
-        v_out[k] = v + s * a if moves else 0.0
-        w_out[k] = course.angular_velocity[i, k] if moves else 0.0
-    if s == 0.0:
-        for k in range(4):
-            q_out[k] = course.orientation[i, k]
-        return
-    c = course.top[i]
-    q0, q1, q2, q3 = c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3]
-    if c[KIND] == REST:
-        w_out[0] = w_out[1] = w_out[2] = 0.0
-    else:
-        wx, wy, wz = c[RATE], c[RATE + 1], c[RATE + 2]
-        e0, e1, e2, e3 = exponential(s * wx, s * wy, s * wz)
-        q0, q1, q2, q3 = product(e0, e1, e2, e3, q0, q1, q2, q3)
-        w_out[0], w_out[1], w_out[2] = wx, wy, wz
-    q_out[0], q_out[1], q_out[2], q_out[3] = q0, q1, q2, q3
+    x0, v0 = _coordinate(course, i, 0, s, moves)
+    x1, v1 = _coordinate(course, i, 1, s, moves)
+    x2, v2 = _coordinate(course, i, 2, s, moves)
+    q0, q1, q2, q3, w0, w1, w2 = _turn(course, i, s, moves)
+    return (x0, x1, x2), (q0, q1, q2, q3), (v0, v1, v2), (w0, w1, w2)
 
 
 @jit
 def bring_ball(motion, i, time):
     """As `touching.bring`, for a body that keeps its axis; what accelerates it is left out."""
     now, course = motion.now, motion.course
-    write_state(course, i, time, now.position[i], now.orientation[i], now.velocity[i], now.angular_velocity[i])
+    x, q, v, w = state_of(course, i, time)
+    now.position[i, 0], now.position[i, 1], now.position[i, 2] = x
+    now.orientation[i, 0], now.orientation[i, 1], now.orientation[i, 2], now.orientation[i, 3] = q
+    now.velocity[i, 0], now.velocity[i, 1], now.velocity[i, 2] = v
+    now.angular_velocity[i, 0], now.angular_velocity[i, 1], now.angular_velocity[i, 2] = w
     quaternion_to_matrix(now.orientation[i], motion.rotation[i])
     if now.inv_mass[i] > 0.0:
         world_inverse_inertia(motion.rotation[i], course.inertia[i], now.inv_inertia[i])
@@ -83,13 +98,15 @@ def write_frames(course, book, first_body, end_body, time):
     last = first
     while last < len(book.times) and book.times[last] < time:
         last += 1
+    position, orientation, velocity, angular_velocity = book.position, book.orientation, book.velocity, book.angular_velocity
     for f in range(first, last):
         for i in range(first_body, end_body):
             if book.written[i] <= f and keeps_axis(course, i):
-                write_state(
-                    course, i, book.times[f], book.position[f, i], book.orientation[f, i], book.velocity[f, i],
-                    book.angular_velocity[f, i],
-                )  # fmt: skip
+                x, q, v, w = state_of(course, i, book.times[f])
+                position[f, i, 0], position[f, i, 1], position[f, i, 2] = x
+                orientation[f, i, 0], orientation[f, i, 1], orientation[f, i, 2], orientation[f, i, 3] = q
+                velocity[f, i, 0], velocity[f, i, 1], velocity[f, i, 2] = v
+                angular_velocity[f, i, 0], angular_velocity[f, i, 1], angular_velocity[f, i, 2] = w
     for i in range(first_body, end_body):
         if keeps_axis(course, i):
             book.written[i] = max(book.written[i], last)

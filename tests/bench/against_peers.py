@@ -123,7 +123,8 @@ def show(name: str, rounds: list[dict[str, Result]], settings: list[str]) -> lis
         deepest, last = (max(one[what][k] for one in rounds) for k in (2, 3))
         lines.append((name, what, mean, middle, *ratios, deepest, last, rounds[-1][what].note))
         times = f"mean {mean:8.3f} median {middle:8.3f} {'ms for 1/60 s' if name in PILES else 's'}"
-        deep = f"deepest {deepest:.1f} mm, at the end {last:.1f}" if name in PILES else ""
+        deep = f"deepest {deepest:.1f} mm, " if np.isfinite(deepest) else ""
+        deep += f"at the end {last:.1f} mm" if np.isfinite(last) else ""
         print(f"{name:11} {what:25} {times}  of the fastest engine {ratios[0]:.2f} {ratios[1]:.2f}  {deep}{lines[-1][-1]}", flush=True)
     return lines
 
