@@ -338,8 +338,8 @@ def _help(lanes, bodies, batches, edges, calm, h, deck):
             phase, colour = _round(number, colours)
             begin, end, each, pieces = _extent(bodies, edges, phase, colour)
             if taken < pieces:
-                mine, last, waited = 0 if number != last else mine, number, 0
-                mine += 1
+                mine = mine + 1 if number == last else 1
+                last, waited = number, 0
                 first = begin + (pieces - mine) * each
                 _work_on(lanes, bodies, batches, calm, h, phase, colour, first, min(first + each, end))
                 report_piece(deck)

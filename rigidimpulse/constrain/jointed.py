@@ -10,6 +10,7 @@ from rigidimpulse.constrain.joint import Joint
 from rigidimpulse.constrain.joint_forces import close_joints, hold_jointed, make_memory, stop_joints
 from rigidimpulse.constrain.joint_impact import impact_rows, stop_at_limits
 from rigidimpulse.constrain.joint_limits import next_switch
+from rigidimpulse.constrain.joint_rows import RADIUS
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.integrate.course import FIXED
@@ -21,8 +22,9 @@ SWAY = 0.7
 """rad, how far the fastest oscillation may go in a sub-step that the tension of joints keeps up across them; 2 is unstable."""
 NOT_CLOSED = 1e3
 """How many times farther than allowed joints may be off before that is reported."""
-MOST_SUB_STEPS, MOST_SWAYS = 4096, 256
-"""Sub-steps in a step, and those that bounds of rates may ask for while energy is kept: light links between heavy bodies mostly stand."""
+MOST_SUB_STEPS, MOST_SWAYS, MOST_SWINGS = 4096, 256, 16
+"""Sub-steps in a step, and those that bounds of rates may ask for while energy is kept: light links between heavy bodies mostly stand, and
+what only swings about a fixed point has a far lower rate than its bound."""
 DRIFT = 1e-7
 """Part of its kinetic energy that a group may gain or lose in a sub-step as if nothing swayed."""
 SHORT = 1e-5
@@ -69,6 +71,9 @@ class JointState:
         self.reactions: list[tuple[float, int, np.ndarray]] = []
         self._allowed = TOLERANCES.joint * world.joint_size
         self._joint_of_row = np.repeat(np.arange(len(joints)), np.diff(self.table.first))
+        held = (self.table.coordinate < RADIUS) & np.isinf(self.table.stiffness) & np.isinf(self.table.lower) & np.isinf(self.table.upper)
+        movable = [(i >= 0) & world.dynamic[i] for i in (self.table.body_a, self.table.body_b)]
+        self._pins = (np.bincount(self._joint_of_row[held], minlength=len(joints)) == 3) & ~(movable[0] & movable[1])
         self._limited = bool(np.any((self.table.lower == 0.0) != (self.table.upper == 0.0)))
         self._dynamic = world.dynamic
         self._of_body: dict[int, list[int]] = {}
@@ -170,16 +175,21 @@ class JointState:
         """Length of the next sub-step: h, the rest of the step, or a part of it. Very short rests are planned as longer ones."""
         world, now = context.world, context.state.now
         fastest = 0.0
-        rates = max(self._tension_rates(context, group.joints), self._spring_rate(group.joints))
+        sways, swings = self._tension_rates(context, group.joints)
+        rates = max(sways, self._spring_rate(group.joints))
         for a, b in zip(self.table.body_a[group.joints].tolist(), self.table.body_b[group.joints].tolist(), strict=True):
             spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
             fastest = max(fastest, float(np.linalg.norm(spins[1] - spins[0])))
         waits = self.release_time[group.joints] - group.time
         h = min(h, float(waits[waits > 0.0].min(initial=np.inf)))
         step = world.accuracy.step
-        most = MOST_SUB_STEPS if self.drift[group.joints].max(initial=0.0) > DRIFT else MOST_SWAYS
-        pieces = max(math.ceil(fastest * step / TURN), min(math.ceil(rates * step / SWAY), most), 1)
-        pieces = min(pieces, MOST_SUB_STEPS)
+        drifts = self.drift[group.joints].max(initial=0.0) > DRIFT
+        pieces = max(
+            math.ceil(fastest * step / TURN),
+            min(math.ceil(rates * step / SWAY), MOST_SUB_STEPS if drifts else MOST_SWAYS),
+            min(math.ceil(swings * step / SWAY), MOST_SUB_STEPS if drifts else MOST_SWINGS),
+        )
+        pieces = max(min(pieces, MOST_SUB_STEPS), 1)
         piece = step / pieces
         return piece if h > piece * (1.0 + SHORT) else max(h, SHORT * step)
 
@@ -193,8 +203,11 @@ class JointState:
         square = np.where(table.per_mass[works], stiffness, stiffness * memory.weight[works])
         return math.sqrt(square.max(initial=0.0))
 
-    def _tension_rates(self, context, which: np.ndarray) -> float:
-        """Bound of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m r))."""
+    def _tension_rates(self, context, which: np.ndarray) -> tuple[float, float]:
+        """Bounds of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m r)).
+
+        Returns that of all others, and that of bodies that only swing about a point which cannot be moved.
+        """
         world, table, squares = context.world, self.table, {}
         force = np.linalg.norm(self.pull[which], axis=1)
         for bodies, anchors in ((table.body_a[which], table.anchor_a[which]), (table.body_b[which], table.anchor_b[which])):
@@ -202,7 +215,11 @@ class JointState:
                 if i >= 0 and world.dynamic[i] and r > 0.0:
                     square = f * (r / world.inertia[i].min() + world.inv_mass[i] / r)
                     squares[i] = squares.get(i, 0.0) + square
-        return math.sqrt(max(squares.values(), default=0.0))
+        swinging = {self.movable_end(j) for j in which[self._pins[which]].tolist()}
+        swinging = {i for i in swinging if len(self.at([i])) == 1}
+        others = (square for i, square in squares.items() if i not in swinging)
+        own = (square for i, square in squares.items() if i in swinging)
+        return math.sqrt(max(others, default=0.0)), math.sqrt(max(own, default=0.0))
 
     def hold(self, context, group, contacts, turning, force, rest: float, rolling) -> tuple[float, float]:
         """Forces into context.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
