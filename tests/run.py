@@ -1,7 +1,7 @@
 """The test suite, from a clone and Python alone: `python tests/run.py [arguments of pytest]`.
 
-Makes the environment `.venv` in the clone on the first run, and returns pytest's exit code. Two processes share out the tests; `-n 0` is
-one. Standard library only.
+Makes the environment `.venv` in the clone on the first run, and returns pytest's exit code. Two processes, each with whole files, of which
+some keep what they have run; `-n 0` for one. Standard library only.
 """
 
 import subprocess
@@ -17,7 +17,7 @@ import environment  # noqa: E402
 def main(arguments):
     """Run pytest; return its exit code."""
     python = environment.prepare("test")
-    return subprocess.call([str(python), "-m", "pytest", "-n", "2", "--dist", "worksteal", *arguments], cwd=ROOT)
+    return subprocess.call([str(python), "-m", "pytest", "-n", "2", "--dist", "loadfile", *arguments], cwd=ROOT)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import pytest
 
 import rigidimpulse as ri
 
-NUMBER, DURATION = 24, 1.0
+NUMBER, DURATION = 24, 0.6
 STEPS = (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 960)
 
 
