@@ -20,7 +20,7 @@ import numpy as np
 from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_clip import clip_faces, face_like
 from rigidimpulse.constrain.heap_depth import EXACT, MOST_CORNERS, add_corner, nearest_face, start
-from rigidimpulse.constrain.heap_polyhedra import ALIKE, EDGE_WINS, POINTS, along_edges, copy_contact
+from rigidimpulse.constrain.heap_polyhedra import ALIKE, EDGE_WINS, POINTS, add_contact, along_edges, copy_contact, nearest_of
 from rigidimpulse.constrain.heap_rows import turned, turned_back
 
 SHRINK = 0.012
@@ -329,15 +329,17 @@ def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size,
     else:
         face_a, face_b, gap = _best_face(shapes, s, t, d, c, 1.0), _best_face(shapes, t, s, d, c, -1.0), -inf
     (gap_a, corner_b), (gap_b, corner_a) = _face_gap(shapes, s, t, face_a, d, c, 1.0), _face_gap(shapes, t, s, face_b, d, c, -1.0)
-    cosine, edges, of_b = 1.0, gap > max(gap_a, gap_b) + EDGE_WINS * size, gap_b > gap_a + SECOND_WINS * size
+    edges, of_b = gap > max(gap_a, gap_b) + EDGE_WINS * size, gap_b > gap_a + SECOND_WINS * size
+    cosine, cosine_b = _cosine(shapes, face_a, rotation, a, (x, y, z)), -_cosine(shapes, face_b, rotation, b, (x, y, z))
     if edges:
-        _one_contact(shapes, rotation, a, d, c, (nx, ny, nz), gap, count, simplex, real, ids)
-        cosine, cosine_b = _cosine(shapes, face_a, rotation, a, (x, y, z)), -_cosine(shapes, face_b, rotation, b, (x, y, z))
         of_b = cosine_b > cosine + SECOND_WINS
-        cosine = max(cosine, cosine_b)
+    cosine = cosine_b if of_b else cosine
+    if count < 5:
+        _one_contact(shapes, rotation, a, d, c, (nx, ny, nz), gap, count, simplex, real, ids)
+        copy_contact(real, ids, 0, POINTS)
+    if edges:
         if cosine < ALIKE:
             return np.int64(1), gap
-        copy_contact(real, ids, 0, POINTS)
         # What hangs down beside a tilted face is not to be held up by it.
         ahead = 0.0
     if of_b:
@@ -354,6 +356,10 @@ def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size,
         # The face that looks at it lies wholly beside it.
         face, corner, i, j = (face_b, corner_a, b, a) if gap_b > gap_a else (face_a, corner_b, a, b)
         found = _corner_contact(shapes, rotation, face, corner, i, j, i == a, between, max(gap_a, gap_b), real, ids)
+    elif count < 5 and found > 0 and cosine >= ALIKE and nearest_of(real, found) > max(gap_a, gap_b) + EDGE_WINS * size:
+        # What is deepest lies beside the face.
+        along_edges(real, found, POINTS, cosine, of_b, gap, size)
+        found = add_contact(real, ids, found, POINTS)
     return found, max(gap, gap_a, gap_b)
 
 

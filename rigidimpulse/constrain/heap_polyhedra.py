@@ -207,17 +207,38 @@ def copy_contact(real, ids, source, target):
 
 
 @inlined
+def nearest_of(real, count):
+    """Least gap of `count` contacts."""
+    nearest = inf
+    for n in range(count):
+        nearest = min(nearest, real[n, 9])
+    return nearest
+
+
+@inlined
+def add_contact(real, ids, count, source):
+    """Add the contact in row `source` to `count` others, in the place of the farthest where there are POINTS; returns their number."""
+    at = count
+    if count == POINTS:
+        at = 0
+        for n in range(1, count):
+            if real[n, 9] > real[at, 9]:
+                at = n
+    copy_contact(real, ids, source, at)
+    return min(count + 1, POINTS)
+
+
+@inlined
 def along_edges(real, count, edges, cosine, of_b, gap, size):
     """Turn `count` contacts of faces to the normal of the edges in row `edges`; returns whether the nearest is as near as the edges are.
 
     A corner at the height h over a face is h cos over it along the normal of edges that is tilted so, and at least as far as the edges are.
     cosine: of both normals; of_b: whether the face is b's; gap: of the edges, m; size: smaller inner radius, m.
     """
-    nearest, own, other, turn = inf, 3 if of_b else 0, 0 if of_b else 3, 1.0 if of_b else -1.0
+    own, other, turn = 3 if of_b else 0, 0 if of_b else 3, 1.0 if of_b else -1.0
     for n in range(count):
         real[n, 9] *= cosine
-        nearest = min(nearest, real[n, 9])
         for k in range(3):
             real[n, 6 + k] = real[edges, 6 + k]
             real[n, own + k] = real[n, other + k] + turn * real[n, 9] * real[n, 6 + k]
-    return nearest <= gap + EDGE_WINS * size
+    return nearest_of(real, count) <= gap + EDGE_WINS * size
