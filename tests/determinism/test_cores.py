@@ -15,7 +15,7 @@ import rigidimpulse as ri
 from rigidimpulse._jit import MOST_CORES, number_of_cores
 from rigidimpulse.constrain import heap_stepper, heap_table
 from rigidimpulse.constrain.heap_narrow import BLOCK, look, share_of
-from rigidimpulse.constrain.heap_solver import advance
+from rigidimpulse.constrain.heap_solver import BATCHES_EACH, advance
 from rigidimpulse.detect.contact_buffer import ContactBuffer
 
 ROUGH = ri.Material(density=500, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
@@ -63,23 +63,28 @@ def test_heaps_have_the_same_bits_on_one_core_and_on_several(monkeypatch, shapes
 
 @pytest.mark.parametrize("together", ["at once", "nobody helps", "help comes too late"])
 def test_sub_steps_have_the_same_bits_however_much_the_helper_does(monkeypatch, together: str) -> None:
-    asked = []
+    asked, largest = [], 0
 
     def team(calls):
+        nonlocal largest
         asked.append(len(calls))
+        largest = max(largest, int(np.diff(calls[0][5]).max(initial=0)))
         if together == "at once":
             return type(advance).together(advance, calls)
         return [advance(*arguments) for arguments in (calls[:1] if together == "nobody helps" else calls)]
 
     def bits() -> str:
-        return ri.simulate(cloud([ri.Shape.box(0.2), ri.Shape.sphere(0.1)], 144), 0.6).state_hash()
+        return ri.simulate(cloud([ri.Shape.box(0.28)], 288), 0.08).state_hash()
 
     monkeypatch.setattr(heap_stepper, "number_of_cores", lambda: 2)
+    monkeypatch.setattr(heap_stepper, "WORTHWHILE_BATCHES", 10**9)
     alone = bits()
     monkeypatch.setattr(heap_stepper, "WORTHWHILE_BATCHES", 0)
     monkeypatch.setattr(advance, "together", team, raising=False)
     assert bits() == alone
     assert set(asked) == {2}
+    # Some colours have more than two pieces, so that both take of them.
+    assert largest > 2 * BATCHES_EACH
 
 
 def test_contacts_that_find_no_room_are_found_again(monkeypatch) -> None:
