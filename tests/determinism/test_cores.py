@@ -21,13 +21,13 @@ from rigidimpulse.detect.contact_buffer import ContactBuffer
 ROUGH = ri.Material(density=500, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
 
 
-def cloud(shapes: list[ri.Shape], number: int) -> ri.Scene:
+def cloud(shapes: list[ri.Shape], number: int, pitch: float = 0.3) -> ri.Scene:
     """Bodies of 0.2 m that fall on each other and the floor, turned and thrown at random."""
     random = np.random.default_rng(7)
     scene = ri.Scene(gravity=(0, 0, -9.81))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
     for k in range(number):
-        place = 0.3 * np.array([k % 6, k // 6 % 6, k // 36 + 0.7])
+        place = pitch * np.array([k % 6, k // 6 % 6, k // 36 + 0.7])
         throw = {"velocity": random.normal(0.0, 0.5, 3), "angular_velocity": random.normal(0.0, 3.0, 3)}
         shape = shapes[k % len(shapes)]
         scene.add(ri.Body(f"body {k}", shape, position=place, orientation=random.normal(size=4), material=ROUGH, **throw))
@@ -61,8 +61,21 @@ def test_heaps_have_the_same_bits_on_one_core_and_on_several(monkeypatch, shapes
     assert len(hashes) == 1
 
 
+@pytest.fixture(scope="module")
+def alone() -> str:
+    """The hash of a heap whose sub-steps had no helper."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(heap_stepper, "WORTHWHILE_BATCHES", 10**9)
+        return crowded()
+
+
+def crowded() -> str:
+    """The hash of a heap with colours of many batches."""
+    return ri.simulate(cloud([ri.Shape.box(0.2)], 288, 0.24), 0.3).state_hash()
+
+
 @pytest.mark.parametrize("together", ["at once", "nobody helps", "help comes too late"])
-def test_sub_steps_have_the_same_bits_however_much_the_helper_does(monkeypatch, together: str) -> None:
+def test_sub_steps_have_the_same_bits_however_much_the_helper_does(monkeypatch, alone: str, together: str) -> None:
     asked, largest = [], 0
 
     def team(calls):
@@ -73,15 +86,10 @@ def test_sub_steps_have_the_same_bits_however_much_the_helper_does(monkeypatch, 
             return type(advance).together(advance, calls)
         return [advance(*arguments) for arguments in (calls[:1] if together == "nobody helps" else calls)]
 
-    def bits() -> str:
-        return ri.simulate(cloud([ri.Shape.box(0.28)], 288), 0.08).state_hash()
-
     monkeypatch.setattr(heap_stepper, "number_of_cores", lambda: 2)
-    monkeypatch.setattr(heap_stepper, "WORTHWHILE_BATCHES", 10**9)
-    alone = bits()
     monkeypatch.setattr(heap_stepper, "WORTHWHILE_BATCHES", 0)
     monkeypatch.setattr(advance, "together", team, raising=False)
-    assert bits() == alone
+    assert crowded() == alone
     assert set(asked) == {2}
     # Some colours have more than two pieces, so that both take of them.
     assert largest > 2 * BATCHES_EACH
