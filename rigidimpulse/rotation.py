@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 
 _SMALL_ANGLE = 1e-5
 """rad; below it sin(a/2)/a is taken from two terms of its series, which is then exact to round-off"""
@@ -90,7 +90,7 @@ def quaternion_to_matrix(q, R_out):
     R_out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@jit
+@jit_making_arrays
 def matrix_to_quaternion(R):
     """The unit quaternion (4,), first component >= 0, of a rotation matrix (3, 3)."""
     q = np.empty(4)

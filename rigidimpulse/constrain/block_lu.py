@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.copying import copy_vector
 
 SIZE = 6
@@ -31,7 +31,7 @@ class Elimination(NamedTuple):
     num_blocks: np.int64
 
 
-@jit
+@jit_making_arrays
 def plan_elimination(first, second, n):
     """Return the `Elimination` of n bodies; constraint i joins bodies first[i] and second[i], either may be -1."""
     joined = np.zeros((n, n), np.bool_)

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.copying import copy_vector
 from rigidimpulse.detect.features import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND
@@ -80,7 +80,7 @@ def only_primitive(geometry, shape):
     return p if geometry.shape_first[shape + 1] == p + 1 else -1
 
 
-@jit
+@jit_making_arrays
 def side_radius(geometry, p, rotation, normal):
     """Radius of a cylinder (the only primitive of its shape) that is touched at its side, or of a ball; else 0."""
     if p < 0 or geometry.kind[p] == HALF_SPACE:
@@ -92,7 +92,7 @@ def side_radius(geometry, p, rotation, normal):
     return geometry.radius[p] if geometry.kind[p] == ROUND else 0.0
 
 
-@jit
+@jit_making_arrays
 def _edge_direction(geometry, edge, rotation, direction):
     """Unit direction (3,) of an edge in the world."""
     tail, head, d = geometry.vertex[geometry.edge[edge, 0]], geometry.vertex[geometry.edge[edge, 1]], np.empty(3)
@@ -105,7 +105,7 @@ def _edge_direction(geometry, edge, rotation, direction):
         direction[k] /= sqrt(length)
 
 
-@jit
+@jit_making_arrays
 def _cylinder_core(geometry, p, rotation, normal, direction):
     """A cylinder is a face at its caps, a line with its radius at its side, and at its rims the line along them."""
     axis = np.empty(3)
@@ -152,7 +152,7 @@ def _core(geometry, p, kind, feature, is_a, rotation, normal, direction):
     return geometry.radius[_owner(geometry.edge_first, feature)], LINE
 
 
-@jit
+@jit_making_arrays
 def _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, w, out):
     """r' of a point of a round cylinder, at a rim or on its side, into out. False where it is touched elsewhere.
 
@@ -210,7 +210,7 @@ def _on_face(geometry, p, rotation, bodies, i, arm, core_velocity, radius, outwa
         place[k] = core_velocity[k] - radius * outward_rate[k]
 
 
-@jit
+@jit_making_arrays
 def _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
     """Two crossing lines: n' turns with both, and their crossing runs along both. False if they are parallel."""
     x = np.empty(3)
@@ -234,7 +234,7 @@ def _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
     return True
 
 
-@jit
+@jit_making_arrays
 def _between_cores(bodies, a, b, core_a, core_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate):
     """Points and lines with a rounding."""
     wa, wb, x = bodies.angular_velocity[a], bodies.angular_velocity[b], np.empty(3)
@@ -253,7 +253,7 @@ def _between_cores(bodies, a, b, core_a, core_b, va, vb, ea, eb, n, distance, ra
         place[k] = va[k] + ra * normal_rate[k] if core_a == POINT else vb[k] - rb * normal_rate[k]
 
 
-@jit
+@jit_making_arrays
 def _place_velocity(geometry, shape_of_body, rotation, bodies, contacts, c, kind, feature_a, feature_b, place, normal_rate):
     """p' and n' of contact c, into place and normal_rate."""
     a, b, n = contacts.body_a[c], contacts.body_b[c], contacts.normal[c]
@@ -298,7 +298,7 @@ class Motion(NamedTuple):
     """rad/s, at which the fastest arm or normal turns"""
 
 
-@jit
+@jit_making_arrays
 def contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, features):
     """The `Motion` of m contacts; kinds (m,) and features (m, 2) as `detect.features` has them."""
     m = contacts.gap.shape[0]

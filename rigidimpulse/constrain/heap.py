@@ -183,9 +183,10 @@ class Heaps:
     def _low(self, context, window, chosen: np.ndarray, root: np.ndarray, refused: dict[int, str]) -> np.ndarray:
         """Leave out islands that begin as tall columns."""
         begins = chosen & (self.label < 0)
-        old = np.unique(root[chosen & ~begins])
-        begins &= ~np.isin(root, old)
         if not self._auto or not begins.any():
+            return chosen
+        begins &= ~np.isin(root, np.unique(root[chosen & ~begins]))
+        if not begins.any():
             return chosen
         self._set_up(context, np.flatnonzero(begins), window.begin, window.end - window.begin, 0.0)
         stepper = self.stepper
@@ -199,12 +200,13 @@ class Heaps:
         """Label the heaps; let those that have been calm for long stand still, and members that are far from restless ones."""
         world, course = context.world, context.state.course
         inner = self.stepper.inner
-        moving = np.unique(root[np.where(world.moving[a], b, a)][world.moving[a] | world.moving[b]])
+        carried = world.moving[a] | world.moving[b]
+        moving = np.unique(root[np.where(world.moving[a], b, a)[carried]])
         restless = chosen.copy()
         for r in np.unique(root[chosen]).tolist():
             members = np.flatnonzero(chosen & (root == r))
             self.label[members] = r
-            strength = float(np.linalg.norm(context.acceleration[members], axis=1).max())
+            strength = float(world.steady_strength[members].max())
             if strength > 0.0 and r not in moving:
                 restless[members] = self.calm[members] < REST * np.sqrt(inner[members] / strength)
         if np.array_equal(restless, chosen):

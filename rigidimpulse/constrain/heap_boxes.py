@@ -19,13 +19,15 @@ from math import inf, sqrt
 import numpy as np
 
 from rigidimpulse._jit import inlined
-from rigidimpulse.constrain.heap_polyhedra import EDGE_WINS, FROM_EDGE, four_of
+from rigidimpulse.constrain.heap_polyhedra import EDGE_WINS, FROM_EDGE, MOST_CORNERS, four_of
 from rigidimpulse.constrain.heap_rows import turned, turned_back
 
 PARALLEL = 1e-6
 """Square of the sine of the angle of two edges below which they have no normal."""
 SECOND_WINS = 1e-6
 """Part of the sides by which a face of b must have the larger gap."""
+OTHER = MOST_CORNERS // 2
+"""Rows of a polygon are from 0 or from here on."""
 
 
 @inlined
@@ -72,33 +74,33 @@ def box_axis(half, s, t, r, a, b, dx, dy, dz, far, c):
 
 
 @inlined
-def _cut_side(polygon, ids, count, spare, spare_ids, axis, sign, limit, side):
-    """Keep the part of the polygon where sign times the coordinate `axis` is at most `limit`; returns its number of corners."""
+def _cut_side(polygon, ids, base, count, axis, sign, limit, side):
+    """Keep the part of the polygon where sign times the coordinate `axis` is at most `limit`; returns its first row and number of corners.
+
+    The polygon has `count` rows from row `base` on, and goes to the other rows (from 0 or OTHER on) where it is cut.
+    """
     outside = False
-    for k in range(count):
+    for k in range(base, base + count):
         outside = outside or sign * polygon[k, axis] > limit
     if not outside:
-        return count
-    kept, j = np.int64(0), count - 1
-    for k in range(count):
-        before, after = sign * polygon[j, axis] - limit, sign * polygon[k, axis] - limit
+        return base, count
+    kept, j = OTHER - base, base + count - 1
+    before = sign * polygon[j, axis] - limit
+    for k in range(base, base + count):
+        after = sign * polygon[k, axis] - limit
         if (before > 0.0) != (after > 0.0):
             t = before / (before - after)
             for m in range(3):
-                spare[kept, m] = polygon[j, m] + t * (polygon[k, m] - polygon[j, m])
-            spare_ids[kept] = FROM_EDGE * (side + 1) + (ids[j] if before > 0.0 else ids[k]) % FROM_EDGE
+                polygon[kept, m] = polygon[j, m] + t * (polygon[k, m] - polygon[j, m])
+            ids[kept] = FROM_EDGE * (side + 1) + (ids[j] if before > 0.0 else ids[k]) % FROM_EDGE
             kept += 1
         if after <= 0.0:
             for m in range(3):
-                spare[kept, m] = polygon[k, m]
-            spare_ids[kept] = ids[k]
+                polygon[kept, m] = polygon[k, m]
+            ids[kept] = ids[k]
             kept += 1
-        j = k
-    for k in range(kept):
-        for m in range(3):
-            polygon[k, m] = spare[k, m]
-        ids[k] = spare_ids[k]
-    return kept
+        j, before = k, after
+    return OTHER - base, kept - (OTHER - base)
 
 
 @inlined
@@ -158,7 +160,7 @@ def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c
 
     What is beside the face and comes over it in `ahead` s counts. between: from a to b; places are written relative to a.
     """
-    polygon, ids, spare, spare_ids, ways, height, chosen = scratch
+    polygon, ids, _, _, ways, height, chosen = scratch
     of_b = axis >= 3
     i, j, m, own, other = (b, a, axis - 3, t, s) if of_b else (a, b, axis, s, t)
     turn, u, v = -1.0 if of_b else 1.0, (m + 1) % 3, (m + 2) % 3
@@ -169,12 +171,12 @@ def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c
     for k in range(4):
         ids[k] = k
     ways[0, 0], ways[1, 0], ways[2, 0], ways[3, 0] = _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon)
-    count = np.int64(4)
+    base, count = np.int64(0), np.int64(4)
     for side in range(4):
         limit = half[own, u if side < 2 else v] + ways[side, 0]
-        count = _cut_side(polygon, ids, count, spare, spare_ids, side // 2, 1.0 if side % 2 == 0 else -1.0, limit, side)
+        base, count = _cut_side(polygon, ids, base, count, side // 2, 1.0 if side % 2 == 0 else -1.0, limit, side)
     kept = np.int64(0)
-    for k in range(count):
+    for k in range(base, base + count):
         gap = polygon[k, 2] - half[own, m]
         if gap <= margin:
             polygon[kept, 0], polygon[kept, 1], polygon[kept, 2] = polygon[k, 0], polygon[k, 1], polygon[k, 2]

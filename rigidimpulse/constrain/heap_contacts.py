@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.constrain.contact_motion import only_primitive, side_radius
 from rigidimpulse.constrain.heap_cores import put_back
 from rigidimpulse.constrain.heap_depth import make_polytope
@@ -156,7 +156,7 @@ def _shrunk_by(geometry, bodies, factor, a, b, p, q, n):
     return (1.0 - factor[a]) * reach_a + (1.0 - factor[b]) * reach_b
 
 
-@jit
+@jit_making_arrays
 def _write(geometry, bodies, held, a, b, carrier, real, c, factor_a, factor_b, coefficients, rows, r):
     """A new row r of the contact real[c] (10,) of bodies a and b, with places in the world; returns its separation."""
     round_a = side_radius(geometry, only_primitive(geometry, bodies.shape[a]), bodies.rotation[a], real[c, 6:9])
@@ -170,7 +170,7 @@ def _write(geometry, bodies, held, a, b, carrier, real, c, factor_a, factor_b, c
     )  # fmt: skip
 
 
-@jit
+@jit_making_arrays
 def store_contacts(
     geometry, shown, back, polyhedra, bodies, pairs, places, margins, far, convex, factor, depth, coefficients, real, integer, count, order,
     rows, ids, used,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.integrate.course import FREE, STEPPED, begin, begin_straight, stepped_at
 from rigidimpulse.rotation import product, quaternion_to_matrix
 
@@ -81,7 +81,7 @@ def most_stray(bodies, members, pressed, reach, skin, allowed):
     return most
 
 
-@jit
+@jit_making_arrays
 def stirred(first, second, member, restless, bodies, mass, strength, inner):
     """Mark (n,) restless members, and calm ones that such a one may move, over pairs (k,) that may touch.
 
@@ -100,10 +100,12 @@ def stirred(first, second, member, restless, bodies, mass, strength, inner):
                 spin += bodies.angular_velocity[i, c] ** 2
             size = np.sqrt(speed) + inner[i] * np.sqrt(spin)
             reach[i] = 1.0 + max(mass[i] * size / (least * max(CALM * np.sqrt(strength[i] * inner[i]), 1e-300)), 1.0)
-    spreads = True
+    spreads, number, turn = True, first.shape[0], 0
     while spreads:
-        spreads = False
-        for p in range(first.shape[0]):
+        spreads, turn = False, 1 - turn
+        for k in range(number):
+            # To and fro: a stir goes far either way.
+            p = k if turn else number - 1 - k
             a, b = first[p], second[p]
             if not (member[a] and member[b]):
                 continue

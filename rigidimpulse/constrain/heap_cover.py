@@ -10,14 +10,14 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.broadphase import overlapping_pairs
 
 SLACK = 0.1
 """Inner radii of slack that every body gets beside what it needs."""
 CLOSE = 0.02
 """Inner radii within which two slow bodies stay of where they were to each other; contacts are looked for farther away than that."""
-WINDOWS = 3.0
+WINDOWS = 2.0
 """Lengths of time ahead for whose motion bodies get slack, too."""
 
 
@@ -50,11 +50,9 @@ def _boxes(order, now, acceleration, least, ahead, world_min, world_max, moves, 
     """Covers at the present places, and their boxes (n, 3) by rank."""
     for r in range(order.shape[0]):
         i = order[r]
-        if not covered[i]:
-            low[r], high[r] = np.inf, -np.inf
-            continue
-        if not moves[i]:
-            low[r], high[r] = world_min[i], world_max[i]
+        if not (covered[i] and moves[i]):
+            for k in range(3):
+                low[r, k], high[r, k] = (world_min[i, k], world_max[i, k]) if covered[i] else (np.inf, -np.inf)
             continue
         slack[i] = least[i] + WINDOWS * _way(now.velocity, acceleration, i, ahead) + SLACK * min(inner[i], radius[i])
         for k in range(3):
@@ -81,7 +79,7 @@ def _drop_far(order, now, moves, radius, slack, pairs, count):
     return kept
 
 
-@jit
+@jit_making_arrays
 def near_pairs(order, pairs, now, acceleration, least, inner, ahead, world_min, world_max, moves, radius, member, other, out):
     """Write pairs (a, b, touch) by index, of members with each other and with others, that may meet in `ahead` s; their number.
 

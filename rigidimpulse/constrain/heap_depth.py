@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 
 MOST_CORNERS, MOST_FACES = 64, 192
 EXACT = 1e-3
@@ -33,7 +33,7 @@ class Polytope(NamedTuple):
     inside: np.ndarray  # (3,) m, a point within
 
 
-@jit
+@jit_making_arrays
 def make_polytope():
     """Room for one pair."""
     return Polytope(

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import inlined, jit
+from rigidimpulse._jit import inlined, jit, jit_making_arrays
 from rigidimpulse.constrain.heap_clip import clip_faces, face_like
 from rigidimpulse.constrain.heap_depth import EXACT, MOST_CORNERS, add_corner, nearest_face, start
 from rigidimpulse.constrain.heap_polyhedra import ALIKE, EDGE_WINS, POINTS, add_contact, along_edges, copy_contact, nearest_of
@@ -43,7 +43,7 @@ class Simplex(NamedTuple):
     trial: np.ndarray  # (4,)
 
 
-@jit
+@jit_making_arrays
 def make_simplex():
     """Room for one pair."""
     return Simplex(np.zeros((4, 3)), np.zeros((4, 2), np.int64), np.zeros(4), np.zeros(4))
@@ -54,7 +54,7 @@ def _dot(w, i, j):
     return w[i, 0] * w[j, 0] + w[i, 1] * w[j, 1] + w[i, 2] * w[j, 2]
 
 
-@jit
+@jit_making_arrays
 def _nearest_of_segment(w, i, j, weight):
     """Weights (4,) of the point of the segment nearest to 0."""
     weight[:] = 0.0
@@ -64,7 +64,7 @@ def _nearest_of_segment(w, i, j, weight):
     weight[i], weight[j] = 1.0 - t, t
 
 
-@jit
+@jit_making_arrays
 def _nearest_of_triangle(w, i, j, k, weight):
     """Weights (4,) of the point of the triangle nearest to 0 (regions of a triangle; Ericson 2005)."""
     ii, ij, ik, jj, jk, kk = _dot(w, i, i), _dot(w, i, j), _dot(w, i, k), _dot(w, j, j), _dot(w, j, k), _dot(w, k, k)
@@ -107,7 +107,7 @@ def _square_of(w, weight):
     return square
 
 
-@jit
+@jit_making_arrays
 def _nearest_of_tetrahedron(w, weight, trial):
     """The same of a tetrahedron; whether 0 is outside."""
     best, outside = inf, False
@@ -129,7 +129,7 @@ def _nearest_of_tetrahedron(w, weight, trial):
     return outside
 
 
-@jit
+@jit_making_arrays
 def _reduce(simplex, count):
     """Weights of the point nearest to 0, and the corners that bear it first; returns their number, 5 where 0 is inside."""
     w, corner, weight, trial = simplex

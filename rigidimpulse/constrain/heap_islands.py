@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.constrain.heap_courses import CALM
 from rigidimpulse.constrain.heap_rows import SEPARATION, SKIN, SUPPORT, in_play
 
@@ -27,7 +27,7 @@ RATIO, REBOUND, TALL = 30.0, 0.5, 12
 FAST, SPIN = 0.5, 2.5 / 16.0
 
 
-@jit
+@jit_making_arrays
 def islands(number, first, second, movable):
     """Root (l,) of each of `number` bodies: the lowest one that pairs of movable bodies join it with."""
     root = np.arange(number)
@@ -50,7 +50,7 @@ def islands(number, first, second, movable):
     return root
 
 
-@jit
+@jit_making_arrays
 def support_levels(bodies, pairs, rows, tall):
     """How many bodies each one is above what cannot be moved, by closed contacts, (n+1,): at most tall + 1; 0 for immovable ones.
 
@@ -83,7 +83,8 @@ def support_levels(bodies, pairs, rows, tall):
 def lively(now, strength: np.ndarray, inner: np.ndarray) -> np.ndarray:
     """Which bodies (n,) bool are faster than what is calm; strength (n,) m/s2 of what pulls them, inner (n,) m."""
     radius = np.where(np.isfinite(inner), inner, 0.0)
-    speed = np.linalg.norm(now.velocity, axis=1) + radius * np.linalg.norm(now.angular_velocity, axis=1)
+    v, w = now.velocity, now.angular_velocity
+    speed = np.sqrt(np.einsum("ij,ij->i", v, v)) + radius * np.sqrt(np.einsum("ij,ij->i", w, w))
     return speed > CALM * np.sqrt(strength * radius)
 
 

@@ -2,8 +2,8 @@
 
 Let m bound how far points of the pair have moved past each other since: m = |dp| + 2 r |dq|, p and q the pose of one body in the axes of
 the other, the carrier, and r its reach. Then a pair that was s apart is at least s - m apart, and is left alone while that
-is more than the margin within which contacts are looked for; contacts of touching ones are used again while m is below SAME of
-the smaller inner radius (their points are fixed in the bodies, so separations are exact, and the normal in the carrier).
+is more than the margin within which contacts are looked for; contacts of touching ones are used again while m is below a
+part of the smaller inner radius (their points are fixed in the bodies, so separations are exact, and the normal in the carrier).
 
 The margin is what the pair may come in the step, so that contacts are known before they close.
 """
@@ -11,16 +11,17 @@ The margin is what the pair may come in the step, so that contacts are known bef
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_boxes import box_axis, edge_contact, face_along, face_contacts
-from rigidimpulse.constrain.heap_depth import make_polytope
-from rigidimpulse.constrain.heap_hulls import closest, hull_contacts, make_simplex, seen_from
+from rigidimpulse.constrain.heap_depth import Polytope, make_polytope
+from rigidimpulse.constrain.heap_hulls import Simplex, closest, hull_contacts, make_simplex, seen_from
 from rigidimpulse.constrain.heap_new_rows import NEAR, hand_over, take_up, write_row
-from rigidimpulse.constrain.heap_polyhedra import ALIKE, POINTS, along_edges, copy_contact, half_space_contacts, make_scratch
-from rigidimpulse.constrain.heap_rows import IMPULSE, ROW_SIZE, closing_speed, in_play, turned, turned_back
+from rigidimpulse.constrain.heap_polyhedra import ALIKE, POINTS, Scratch, along_edges, copy_contact, half_space_contacts, make_scratch
+from rigidimpulse.constrain.heap_rows import IMPULSE, ROW_SIZE, UNKNOWN, closing_speed, in_play, turned, turned_back
 from rigidimpulse.rotation import product
 
 BOXES, WALL, GENERAL, HULLS = 0, 1, 2, 3
@@ -29,18 +30,45 @@ MOST_HULL_CORNERS = 256
 """Corners of a polyhedron that are all asked for the farthest one."""
 AHEAD, AHEAD_GENERAL, FARTHEST = 0.05, 0.12, 2.0
 """Contacts are looked for at least and at most that many inner radii away, at least somewhat farther where pairs are general ones."""
-SAME, SAME_GENERAL = 2e-3, 0.02
-"""Part of the inner radius that touching pairs may move past each other until they are looked at again."""
+SAME_GENERAL = 0.02
+"""Part of the inner radius that touching general pairs may move past each other until they are looked at again, at least."""
 FAR = 4.0
 """Margins within which it is found how far convex bodies are apart."""
 BLOCK = 64
 """Pairs that are dealt out together."""
 
 
+class Room(NamedTuple):
+    """What a share of the pairs is looked at in."""
+
+    real: np.ndarray  # (POINTS + 1, 10) the contacts of a pair
+    found: np.ndarray  # (POINTS + 1, 3) their ids
+    old: np.ndarray  # (POINTS, ROW_SIZE) rows that they replace
+    old_ids: np.ndarray  # (POINTS, 3)
+    scratch: Scratch
+    simplex: Simplex
+    polytope: Polytope
+    work: np.ndarray  # (3, 3)
+    axes: np.ndarray  # (3, 3) R_a^T R_b
+    between: np.ndarray  # (3,) m, from a to b
+    origin: np.ndarray  # (3,) zeros
+
+
+def make_room() -> Room:
+    """Room for one share."""
+    number = POINTS + 1
+    return Room(
+        np.empty((number, 10)), np.empty((number, 3), np.int64), np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64),
+        make_scratch.py_func(), make_simplex.py_func(), make_polytope.py_func(), *np.empty((2, 3, 3)), *np.zeros((2, 3)),
+    )  # fmt: skip
+
+
 @jit
 def classify(pairs, bodies, shapes):
-    """Fill what follows from the bodies of all pairs."""
+    """Fill what follows from the bodies of pairs, where that is not known yet."""
     for p in range(pairs.first.shape[0]):
+        if pairs.kind[p] != UNKNOWN:
+            continue
         a, b = pairs.first[p], pairs.second[p]
         s, t = bodies.shape[a], bodies.shape[b]
         pairs.carrier[p] = bodies.reach[a] <= bodies.reach[b]
@@ -120,12 +148,12 @@ def share_of(number, share, shares):
 
 
 @jit
-def review(bodies, pairs, share, shares, ahead, kept, places, margins):
+def review(bodies, pairs, share, shares, ahead, same, kept, places, margins):
     """Write the pairs in play of quick bodies whose contacts must be looked for, and their margins, m: how far they come in `ahead` s.
 
-    share: which of the `shares` of pairs. kept: in the middle of a step, how many inner radii pairs may have come past each other by
-    the next look with the contacts they have; 0 at its start. Pairs that are too far apart lose their contacts. Returns where the places
-    (k,) and margins (k,) of the share begin and end.
+    share: which of the `shares` of pairs. same: inner radii that touching pairs may have come past each other with the contacts they
+    have; kept: the same, by the next look, in the middle of a step; 0 at its start. Pairs that are too far apart lose their contacts.
+    Returns where the places (k,) and margins (k,) of the share begin and end.
     """
     part, position, orientation, rotation, velocity = bodies.part, bodies.position, bodies.orientation, bodies.rotation, bodies.velocity
     inner, skin, radius, reach, quick = bodies.inner, bodies.skin, bodies.radius, bodies.reach, bodies.quick
@@ -154,8 +182,8 @@ def review(bodies, pairs, share, shares, ahead, kept, places, margins):
                 motion = _motion(seen, p, pairs.round[p], reach[other], place, turn)
                 if count[p] == 0 and apart[p] - motion > margin:
                     continue
-                same = SAME_GENERAL if general else SAME
-                if count[p] > 0 and (motion <= same * size or (kept > 0.0 and motion + speed * ahead <= kept * size)):
+                still = max(same, SAME_GENERAL) if general else same
+                if count[p] > 0 and (motion <= still * size or (kept > 0.0 and motion + speed * ahead <= kept * size)):
                     continue
             places[end], margins[end] = p, margin
             end += 1
@@ -221,19 +249,17 @@ def _are_apart(solids, inset, bodies, pairs, p, between, margin, c, simplex):
 
 
 @jit
-def look(shapes, solids, inset, bodies, pairs, share, shares, ahead, kept, places, margins, rows, ids, free, coefficients):
+def look(shapes, solids, inset, bodies, pairs, share, shares, ahead, same, kept, places, margins, rows, ids, free, coefficients, room):
     """Find the contacts of a share of the pairs where `review` says so, but for general ones, which are left at the begin of its places.
 
     solids, inset: see `heap_overlap`; ahead: length of the step, s; free (shares, 2): where the rows of the pool that each share may take
-    begin and end; coefficients (k, k, 4) of two materials. Returns how many pairs were looked at, and how many general ones there are,
-    -1 where there are too few rows (make room and call it again).
+    begin and end; coefficients (k, k, 4) of two materials; room: of its own. Returns how many pairs were looked at, and how many general
+    ones there are, -1 where there are too few rows (get more and call it again).
     """
-    real, found = np.empty((POINTS + 1, 10)), np.empty((POINTS + 1, 3), np.int64)
-    scratch, work, simplex, polytope, origin = make_scratch(), np.empty((3, 3)), make_simplex(), make_polytope(), np.zeros(3)
+    real, found, old, old_ids, scratch, simplex, polytope, work, c, between, origin = room
     position, rotation, velocity, shape = bodies.position, bodies.rotation, bodies.velocity, bodies.shape
-    old, old_ids = np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64)
-    between, c, waiting = np.empty(3), np.empty((3, 3)), 0
-    begin, end = review(bodies, pairs, share, shares, ahead, kept, places, margins)
+    waiting = 0
+    begin, end = review(bodies, pairs, share, shares, ahead, same, kept, places, margins)
     for k in range(begin, end):
         p, margin = places[k], margins[k]
         a, b = pairs.first[p], pairs.second[p]

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import inlined, jit
+from rigidimpulse._jit import inlined, jit, jit_making_arrays
 from rigidimpulse.constrain.heap_rows import turned
 from rigidimpulse.geometry import HALF_SPACE, Geometry
 
@@ -46,7 +46,7 @@ class Scratch(NamedTuple):
     chosen: np.ndarray  # (4,)
 
 
-@jit
+@jit_making_arrays
 def make_scratch():
     """Room for one pair."""
     return Scratch(
@@ -143,16 +143,16 @@ def four_of(points, height, count, chosen):
     ex, ey = points[farthest, 0] - points[deepest, 0], points[farthest, 1] - points[deepest, 1]
     ez = points[farthest, 2] - points[deepest, 2]
     # Twice the area of the triangle that a point makes with the first two, signed by a first one that has any.
-    mx, my, mz, least = 0.0, 0.0, 0.0, 1e-9 * distance
+    mx, my, mz, least, is_flat = 0.0, 0.0, 0.0, 1e-9 * distance, True
     high, low, most, lowest = -1, -1, least, -least
     for k in range(count):
         x, y, z = points[k, 0] - points[deepest, 0], points[k, 1] - points[deepest, 1], points[k, 2] - points[deepest, 2]
         cx, cy, cz = ey * z - ez * y, ez * x - ex * z, ex * y - ey * x
-        area = sqrt(cx * cx + cy * cy + cz * cz)
-        if area <= least:
-            continue
-        if mx == 0.0 and my == 0.0 and mz == 0.0:
-            mx, my, mz = cx / area, cy / area, cz / area
+        if is_flat:
+            area = sqrt(cx * cx + cy * cy + cz * cz)
+            if area <= least:
+                continue
+            mx, my, mz, is_flat = cx / area, cy / area, cz / area, False
         signed = mx * cx + my * cy + mz * cz
         if signed > most:
             high, most = k, signed

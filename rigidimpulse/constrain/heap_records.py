@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import inlined, jit
+from rigidimpulse._jit import inlined, jit, jit_making_arrays
 from rigidimpulse.constrain.heap_narrow import GENERAL
 from rigidimpulse.constrain.heap_rows import (
     CORE_A,
@@ -98,7 +98,7 @@ def more_batches(batches: Batches, b: int, width: int) -> Batches:
     return out
 
 
-@jit
+@jit_making_arrays
 def list_patches(bodies, pairs, rows, patches, begin):
     """Write the patches of pairs in play of quick bodies from place `begin` on; returns where they end, negative without room."""
     m = begin
@@ -163,7 +163,7 @@ def _class_of(bodies, pairs, patches, m):
     return i * REGIONS // bodies.part.shape[0] * POINTS + POINTS - patches.size[m]
 
 
-@jit
+@jit_making_arrays
 def colour_patches(width, bodies, pairs, patches, begin, count, batches, begins):
     """Colour the patches from `begin` to `count` and give them slots, after so many batches; begins (c+1,): where colours begin.
 
@@ -257,7 +257,7 @@ def normal_of(position, rotation, rows, r, a, b, carrier):
     return turned(rotation, b if carrier else a, rows[r, 0], rows[r, 1], rows[r, 2])
 
 
-@jit
+@jit_making_arrays
 def place_patches(width, bodies, pairs, patches, begin, count, batches, first, number):
     """Put the patches from `begin` to `count` into their lanes of the batches from `first` to `number`."""
     idle = bodies.part.shape[0] - 1

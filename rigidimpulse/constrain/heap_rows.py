@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import inlined, jit
+from rigidimpulse._jit import inlined, jit, jit_making_arrays
 from rigidimpulse.rotation import quaternion_to_matrix
 
 # Kernels that are called for each pair or point get arrays one by one, and indices: a tuple of twenty arrays is passed word by word,
@@ -60,6 +60,10 @@ class HeapBodies(NamedTuple):
     mass: np.ndarray  # (8 (n+1),)
 
 
+UNKNOWN = -1
+"""Kind of a pair that is new."""
+
+
 class HeapPairs(NamedTuple):
     """k pairs, ascending."""
 
@@ -67,7 +71,7 @@ class HeapPairs(NamedTuple):
     second: np.ndarray  # (k,)
     carrier: np.ndarray  # (k,) bool, relative motion is seen from the second body, the one of larger reach
     round: np.ndarray  # (k,) bool, the body that is not the carrier is a ball: its turning changes no contact
-    kind: np.ndarray  # (k,) how contacts are found, see `heap_contacts`
+    kind: np.ndarray  # (k,) how contacts are found, see `heap_narrow`; UNKNOWN for a new pair
     start: np.ndarray  # (k,) first row
     count: np.ndarray  # (k,) rows
     room: np.ndarray  # (k,) rows that are the pair's own
@@ -90,7 +94,7 @@ def set_inverse_inertia(bodies, i):
     bodies.mass[m + 5] = a * r[2, 0] * r[2, 0] + b * r[2, 1] * r[2, 1] + c * r[2, 2] * r[2, 2]
 
 
-@jit
+@jit_making_arrays
 def load_bodies(bodies, order, now, acceleration, inv_mass, part):
     """Put the bodies that play a part (n,) by index, at the present instant, before the kernels; order (n,) index by rank."""
     for k in range(order.shape[0]):

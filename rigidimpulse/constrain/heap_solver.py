@@ -33,7 +33,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.constrain.heap_lanes import solve, warm_start
 from rigidimpulse.constrain.heap_motion import finish, kick, move
 from rigidimpulse.constrain.heap_records import (
@@ -97,7 +97,7 @@ def _cross(ax, ay, az, bx, by, bz):
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-@jit
+@jit_making_arrays
 def _arms_to(bodies, batches, s, o, width, c):
     """Bodies of lane s, and the arms from them to its point c (to its centre for c < 0) as they are now."""
     record, moved = batches.record, bodies.moved
@@ -148,7 +148,7 @@ def _slip_at(bodies, a, b, arm_a, arm_b):
     return bx - ax, by - ay, bz - az
 
 
-@jit
+@jit_making_arrays
 def special_patches(width, bodies, pairs, patches, begin, count, rows, batches, coefficients, gravity, lists, target):
     """Patches from `begin` to `count` that need more than the passes give: of two balls, of rebounds, of moving supports.
 
@@ -212,7 +212,7 @@ def _turn_balls(width, bodies, pairs, patches, chosen, rows, record):
         record[o + (POINT + GAP) * width] = gap
 
 
-@jit
+@jit_making_arrays
 def _rebound(width, bodies, patches, chosen, batches, target):
     """Give points that came in fast and are closed their rebound, with friction; returns the supports' work, J."""
     record, work = batches.record, 0.0
@@ -241,7 +241,7 @@ def _rebound(width, bodies, patches, chosen, batches, target):
     return work
 
 
-@jit
+@jit_making_arrays
 def _work_of(width, bodies, patches, chosen, batches):
     """Work that moving supports did by the impulses of a sub-step, J."""
     record, work = batches.record, 0.0

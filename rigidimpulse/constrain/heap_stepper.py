@@ -13,7 +13,7 @@ from rigidimpulse.constrain.heap_cores import cores
 from rigidimpulse.constrain.heap_cover import Cover
 from rigidimpulse.constrain.heap_fill import fill, keep_impulses, place_bodies
 from rigidimpulse.constrain.heap_motion import energies, mark_quick, note_pressed, slow_down
-from rigidimpulse.constrain.heap_narrow import classify, look, most_motion, share_of
+from rigidimpulse.constrain.heap_narrow import classify, look, make_room, most_motion, share_of
 from rigidimpulse.constrain.heap_new_rows import widen
 from rigidimpulse.constrain.heap_overlap import solids
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
@@ -51,8 +51,9 @@ LEAST_SUB_STEPS_BETWEEN = 2
 """Sub-steps from look to look."""
 COARSEST = 0.3
 """Inner radii by which bodies with cores may pass each other from look to look: sub-steps are made shorter for it."""
-KEPT = 0.2
-"""Part of the motion until a look (`Accuracy.heap_motion`) that a pair may make with the contacts it has, in the middle of a step."""
+SAME, KEPT = 0.02, 0.2
+"""Parts of the motion until a look (`Accuracy.heap_motion`) that a pair may make with the contacts it has: at any time, and in the
+middle of a step."""
 QUICK = 0.4
 """Part of `kept` beyond which a body is quick: its contacts are looked for, and their records made anew, in the middle of a step."""
 MOSTLY = 0.3
@@ -114,6 +115,7 @@ class HeapStepper:
         self.bodies = self._make_bodies()
         self._masses, self._pull = world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order])
         self._shares, self._looked_at = number_of_cores(), 0
+        self._rooms = [make_room() for _ in range(self._shares)]
         self._more_buffers: list[ContactBuffer] = []
         self.table = HeapTable(self._shares)
         least = CLEAR * np.where(world.dynamic, self.inner, 0.0)
@@ -204,8 +206,8 @@ class HeapStepper:
         while True:
             outcome = look.together([
                 (
-                    self.shapes, self._solids, self._inset, self.bodies, table.pairs, share, shares, self.ahead, kept, self._places,
-                    self._margins, table.rows, table.ids, table.free, self.world.coefficients,
+                    self.shapes, self._solids, self._inset, self.bodies, table.pairs, share, shares, self.ahead, SAME * self._motion, kept,
+                    self._places, self._margins, table.rows, table.ids, table.free, self.world.coefficients, self._rooms[share],
                 )
                 for share in range(shares)
             ])  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse._jit import jit
-from rigidimpulse.constrain.heap_rows import ROW_SIZE, HeapPairs
+from rigidimpulse.constrain.heap_rows import ROW_SIZE, UNKNOWN, HeapPairs
 from rigidimpulse.constrain.lanes import ROW, aligned
 
 FIRST_ROWS = 1024
@@ -20,7 +20,7 @@ def empty_pairs(k: int) -> HeapPairs:
         return np.zeros(k, np.int64)
 
     return HeapPairs(
-        first=numbers(), second=numbers(), carrier=np.zeros(k, bool), round=np.zeros(k, bool), kind=numbers(), start=numbers(),
+        first=numbers(), second=numbers(), carrier=np.zeros(k, bool), round=np.zeros(k, bool), kind=np.full(k, UNKNOWN), start=numbers(),
         count=numbers(), room=numbers(), known=np.zeros(k, bool), apart=np.zeros(k), held=np.zeros(k), seen=np.zeros((k, 7)),
     )  # fmt: skip
 
@@ -36,6 +36,7 @@ def _carry_over(old, new):
         if o < old.first.shape[0] and old.first[o] == a and old.second[o] == b:
             new.start[p], new.count[p], new.room[p] = old.start[o], old.count[o], old.room[o]
             new.known[p], new.apart[p], new.held[p] = old.known[o], old.apart[o], old.held[o]
+            new.kind[p], new.carrier[p], new.round[p] = old.kind[o], old.carrier[o], old.round[o]
             for k in range(7):
                 new.seen[p, k] = old.seen[o, k]
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.constrain.joint_limits import is_reached, joint_weights, limit_side, spring_of
 from rigidimpulse.constrain.joint_rows import is_linear, joint_rows, joint_values, relative_point_velocity
 from rigidimpulse.constrain.newton import solve_newton
@@ -111,7 +111,7 @@ def stop_joints(joints, which, bodies, rotation, members, number, memory: JointM
     _add_moments(joints, which, rows, 0, direction, moment)
 
 
-@jit
+@jit_making_arrays
 def stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed):
     """Rows of the impulses nu, their directions (s, 3) and the largest speed to stop."""
     count = count_joint_rows(joints, which)
@@ -194,7 +194,7 @@ def close_joints(joints, which, bodies, contacts, rotation, members, number, ang
     return moved
 
 
-@jit
+@jit_making_arrays
 def fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, start):
     """Rows, from `start` on, of the displacement that closes the joints; returns the worst error of a coordinate."""
     count = rows.bias.shape[0] - start
@@ -216,7 +216,7 @@ def fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, star
     return worst
 
 
-@jit
+@jit_making_arrays
 def _end_values(joints, which, bodies, acceleration, members, wrench, h, memory, value):
     """Coordinates - targets (s,) after h under the wrenches (n_world, 6)."""
     course, q = memory.trial, np.empty(4)
@@ -277,7 +277,7 @@ def hold_jointed(
     return residual / scale, worst
 
 
-@jit
+@jit_making_arrays
 def close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench):
     """Bias of the joints' rows for the next round; wrench: that of the present impulses.
 
@@ -295,7 +295,7 @@ def close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, 
     return _violation(joints, which, memory, value, rows.impulse[start:]), largest
 
 
-@jit
+@jit_making_arrays
 def _finish(joints, which, bodies, members, rows, first_row, start, h, memory, direction, force, moment):
     """Forces of the contacts (m, 3); what is remembered of the joints; half of the joints' impulses to their moments."""
     for s in range(first_row.shape[0]):
@@ -309,7 +309,7 @@ def _finish(joints, which, bodies, members, rows, first_row, start, h, memory, d
     _add_moments(joints, which, rows, start, direction, moment)
 
 
-@jit
+@jit_making_arrays
 def start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed, rows, start):
     """Joints' rows from `start` on, with bounds, softness and first impulses; their coordinates and rates are remembered.
 
@@ -338,7 +338,7 @@ def start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed
     return direction, beta
 
 
-@jit
+@jit_making_arrays
 def _remember(joints, which, rows, start, h, memory):
     """Keep the rows' forces, and which of them are at work; leave in rows the impulses that are half taken back."""
     rows.impulse[:start] = 0.0
@@ -356,7 +356,7 @@ def _remember(joints, which, rows, start, h, memory):
             i += 1
 
 
-@jit
+@jit_making_arrays
 def _write_wrenches(bodies, members, y, h, wrench):
     """Wrenches (n_world, 6) over h that y = Jh^T p (n, 6) stands for."""
     for k in range(members.shape[0]):

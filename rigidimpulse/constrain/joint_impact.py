@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.constrain.joint_limits import is_reached, limit_side
 from rigidimpulse.constrain.joint_rows import is_linear, joint_rows, relative_point_velocity
 from rigidimpulse.constrain.newton import solve_newton
@@ -24,7 +24,7 @@ class JointBlock(NamedTuple):
     moment: np.ndarray  # (j, 3) N s on b by joint, added to
 
 
-@jit
+@jit_making_arrays
 def impact_rows(joints, which, bodies, rotation, members, number, memory, allowed, moment):
     """The `JointBlock` of the joints listed in `which`: hard rows hold, limits that are reached stop, soft rows are too slow.
 
@@ -52,7 +52,7 @@ def impact_rows(joints, which, bodies, rotation, members, number, memory, allowe
     return JointBlock(members, rows, joint, direction, moment)
 
 
-@jit
+@jit_making_arrays
 def fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows):
     """Rates of all rows, to their bias; returns the fastest approach to a hard limit that is reached, m/s or rad/s."""
     count = rows.bias.shape[0]

@@ -17,7 +17,7 @@ from math import ceil, sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.constrain.softness import response
 from rigidimpulse.copying import copy_vector
 
@@ -64,7 +64,7 @@ def _remainder(line, basis, held, out):
     return square
 
 
-@jit
+@jit_making_arrays
 def joint_weights(joints, which, rows, start, weight):
     """W of the rows of the joints listed in `which`, rows `start` and on; into weight (s,)."""
     basis, out = np.empty((6, 12)), np.empty(12)

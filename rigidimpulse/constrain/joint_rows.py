@@ -33,7 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.constrain.rows import BOUNDED, FREE, write_body, write_row
 from rigidimpulse.copying import copy_vector
 from rigidimpulse.rotation import from_columns
@@ -161,7 +161,7 @@ def _across(turn, e, k, i, direction):
     return -grown * right if first else grown * left
 
 
-@jit
+@jit_making_arrays
 def _angular(code, e, f, near, direction):
     """Coordinate that is an angle and the direction (3,) that it grows in; a TWIST is taken near the angle `near`."""
     turn = np.empty((3, 3))
@@ -188,7 +188,7 @@ def _angular(code, e, f, near, direction):
     return angle + 2.0 * pi * np.rint((near - angle) / (2.0 * pi))
 
 
-@jit
+@jit_making_arrays
 def _measure(code, d, e, f, near, direction):
     return _linear(code, d, e, direction) if is_linear(code) else _angular(code, e, f, near, direction)
 
@@ -199,7 +199,7 @@ def is_linear(code):
     return code < ABOUT
 
 
-@jit
+@jit_making_arrays
 def joint_values(joints, which, position, rotation, angle, value):
     """Fill value with coordinate - target of the rows of the joints listed in `which`; angle (k,): last coordinates."""
     pa, pb, d, direction = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -226,7 +226,7 @@ def _write_angular(bodies, number, a, b, direction, rows, i):
         write_body(bodies, b, rows.jacobian[i, 6:], 0.0, 0.0, 0.0, x, y, z)
 
 
-@jit
+@jit_making_arrays
 def joint_rows(joints, which, bodies, rotation, number, angle, rows, start, value, direction):
     """Fill rows from `start` on with those of the joints listed in `which`, in the present pose.
 
@@ -260,7 +260,7 @@ def joint_rows(joints, which, bodies, rotation, number, angle, rows, start, valu
     return i
 
 
-@jit
+@jit_making_arrays
 def relative_point_velocity(joints, which, bodies, rotation, direction, u):
     """Rates u (s,) of the coordinates at the present velocities."""
     pa, pb = np.empty(3), np.empty(3)

@@ -21,7 +21,7 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.constrain.block_lu import factor, plan_elimination, solve_factored
 from rigidimpulse.constrain.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMENT, multiply, multiply_transposed
 from rigidimpulse.copying import copy_matrix, copy_vector
@@ -126,7 +126,7 @@ def _add_outer(blocks, place, jacobian, row, first, right, start):
         blocks[place, i, 5] += left * r5
 
 
-@jit
+@jit_making_arrays
 def _assemble(rows, slope, slot, blocks, n):
     """I + Jh^T slope Jh."""
     jacobian, kinds, masters, right = rows.jacobian, rows.kind, rows.master, np.empty(12)
@@ -199,7 +199,7 @@ def _speed(rows, y, line):
     return largest
 
 
-@jit
+@jit_making_arrays
 def _newton(rows, elimination, base, q, r, frozen, p, target):
     """Find p with F = 0; base (r,): u at the impulses q. Returns whether it converged (or cannot be improved further)."""
     n, count = elimination.order.shape[0], p.shape[0]
@@ -254,7 +254,7 @@ def rounding_floor(rows, weight, p):
     return ROUND_OFF * largest
 
 
-@jit
+@jit_making_arrays
 def solve_newton(rows, n, target):
     """Solve the rows of an island of n movable bodies; `rows.impulse` is start and answer.
 

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.constrain.rolling import Rolling, add_rolling_wrench, count_rolling_rows, fill_rolling_rows, rolling_slip
 from rigidimpulse.constrain.rows import (
     FREE,
@@ -68,7 +68,7 @@ def start_contact_impulses(rows, first_row, force, h):
             rows.impulse[first_row[c] + k] = force[c, k] * h
 
 
-@jit
+@jit_making_arrays
 def fill_contact_bias(bodies, contacts, frames, turning, excess, acceleration, angular_acceleration, h, rows, first_row):
     """b = u + h a of the contact rows; turning (m, 3) from `contact_motion`, excess (m,): g - delta to be closed, m.
 
@@ -178,7 +178,7 @@ def capture(solve, bodies, members, rows: Rows, normals: np.ndarray, leaving: np
     change_velocities(bodies, members, stops)
 
 
-@jit
+@jit_making_arrays
 def add_contact_wrench(contacts, rows, first_row, frames, h, force, wrench):
     """The rows' impulses over h as forces (m, 3), and their sum on both bodies of each contact, added to wrench.
 

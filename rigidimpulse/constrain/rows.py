@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.respond.friction import tangents
 from rigidimpulse.rotation import multiply as quaternion_product
 from rigidimpulse.rotation import quaternion_from_rotation_vector
@@ -48,7 +48,7 @@ class Rows(NamedTuple):
     impulse: np.ndarray  # (r,) start and answer
 
 
-@jit
+@jit_making_arrays
 def make_rows(r):
     """Room for r rows, all of them FREE and hard, with no impulse."""
     return Rows(
@@ -78,7 +78,7 @@ def cholesky_3(a, c):
     c[0, 1] = c[0, 2] = c[1, 2] = 0.0
 
 
-@jit
+@jit_making_arrays
 def write_body(bodies, i, line, x, y, z, tx, ty, tz):
     """Half a row, line (6,): linear direction (x, y, z), angular (tx, ty, tz), scaled by the mass of body i."""
     factor = np.empty((3, 3))
@@ -102,7 +102,7 @@ def write_row(bodies, number, a, b, ra, rb, x, y, z, rows, i):
         write_body(bodies, b, rows.jacobian[i, 6:], x, y, z, tx, ty, tz)
 
 
-@jit
+@jit_making_arrays
 def contact_rows(bodies, contacts, members, number, extra):
     """Rows n, t1, t2 of m contacts, and room for `extra` (int) rows after them.
 
@@ -154,7 +154,7 @@ def contact_velocity(contacts, c, frame, velocity, angular_velocity, out):
         out[k] = x * frame[k, 0] + y * frame[k, 1] + z * frame[k, 2]
 
 
-@jit
+@jit_making_arrays
 def row_velocities(bodies, contacts, first_row, frames, u):
     """Velocities u (r,) of the contacts' rows."""
     v = np.empty(3)
@@ -170,7 +170,7 @@ def rows_of(rows, i):
     return 3 if i + 1 < rows.kind.shape[0] and rows.kind[i + 1] == DISC and rows.master[i + 1] == i else 1
 
 
-@jit
+@jit_making_arrays
 def impulse_along(rows, i, frame, out):
     """World impulse (3,) of a contact whose normal is row i, frame (3, 3)."""
     out[:] = 0.0
@@ -213,7 +213,7 @@ def multiply_transposed(rows, p, out):
                 out[b, k] += jacobian[i, 6 + k] * size
 
 
-@jit
+@jit_making_arrays
 def scaled_wrench(bodies, i, y, wrench):
     """Add C^-T y, the linear and angular impulse on body i that y = (Jh^T p)_i (6,) stands for, to wrench (6,)."""
     factor = np.empty((3, 3))
@@ -229,7 +229,7 @@ def scaled_wrench(bodies, i, y, wrench):
     wrench[5] += z
 
 
-@jit
+@jit_making_arrays
 def scaled_change(bodies, i, y, linear, angular):
     """C y of body i: the change of its velocity by impulses p with y = (Jh^T p)_i (6,), into linear and angular (3,)."""
     factor = np.empty((3, 3))
@@ -241,7 +241,7 @@ def scaled_change(bodies, i, y, linear, angular):
             angular[j] += factor[j, t] * y[3 + t]
 
 
-@jit
+@jit_making_arrays
 def changes_of(bodies, members, rows):
     """Changes (n, 6) of the members' velocities, linear and angular, by the rows' impulses."""
     n = members.shape[0]
@@ -252,7 +252,7 @@ def changes_of(bodies, members, rows):
     return change
 
 
-@jit
+@jit_making_arrays
 def change_velocities(bodies, members, rows):
     """Apply the rows' impulses."""
     change = changes_of(bodies, members, rows)
@@ -270,7 +270,7 @@ def move_bodies(bodies, members: np.ndarray, rows: Rows) -> None:
     bodies.orientation[members] = quaternion_product(turned, bodies.orientation[members])
 
 
-@jit
+@jit_making_arrays
 def response_to(rows, n, p):
     """W p (r,): the change of the rows' velocities by impulses p (r,)."""
     y, out = np.empty((n, 6)), np.empty(p.shape[0])
@@ -279,7 +279,7 @@ def response_to(rows, n, p):
     return out
 
 
-@jit
+@jit_making_arrays
 def let_slip(rows, n, first_row, dynamic_friction, slow):
     """Give contacts that slip faster than `slow` [m/s] their dynamic friction (m,); returns whether any had another one."""
     y, after = np.empty((n, 6)), np.empty(rows.bias.shape[0])

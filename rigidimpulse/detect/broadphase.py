@@ -15,7 +15,7 @@ from math import inf, isfinite, sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.features import inner
 
 FEW = 64
@@ -49,7 +49,7 @@ def _spread(box_min, box_max, axis):
     return spread
 
 
-@inner
+@jit_making_arrays
 def _sorted_order(box_min, axis):
     """Return the bodies in ascending order of the low ends of their boxes, equal ones by index (merge sort)."""
     n = box_min.shape[0]
@@ -86,7 +86,7 @@ def _strip_at(place, num_strips):
     return int(place) if place < num_strips else num_strips - 1
 
 
-@inner
+@jit_making_arrays
 def _strips(box_min, box_max, axis):
     """Return the number of strips across an axis and, for each body, the first and the last one it reaches."""
     n = box_min.shape[0]
@@ -110,7 +110,7 @@ def _strips(box_min, box_max, axis):
     return num_strips, reach
 
 
-@inner
+@jit_making_arrays
 def _strip_lists(order, num_strips, reach):
     """Return offsets and bodies of each strip, the bodies in the given order."""
     first = np.zeros(num_strips + 2, np.int64)
@@ -128,7 +128,7 @@ def _strip_lists(order, num_strips, reach):
     return first, members
 
 
-@inner
+@jit_making_arrays
 def _sort_pairs(pairs, count, num_bodies):
     """Put the first `count` pairs into ascending order, by a counting sort on the second, then on the first column."""
     other = np.empty((count, 2), np.int64)
@@ -154,7 +154,7 @@ def _keep(pairs_out, count, i, j):
     return count + 1
 
 
-@inner
+@jit_making_arrays
 def _column(bounds, axis, members):
     """Return the bounds of the listed bodies along an axis."""
     column = np.empty(len(members))
@@ -163,7 +163,7 @@ def _column(bounds, axis, members):
     return column
 
 
-@inner
+@jit_making_arrays
 def _sweep(box_min, box_max, movable, axis, across, reach, first, members, pairs_out):
     """Write all overlapping pairs, in no particular order; return how many there are.
 
@@ -191,7 +191,7 @@ def _sweep(box_min, box_max, movable, axis, across, reach, first, members, pairs
     return count
 
 
-@jit
+@jit_making_arrays
 def overlapping_pairs(box_min, box_max, movable, pairs_out):
     """Write all pairs of boxes that overlap or touch, lower index first, in ascending order.
 

@@ -12,6 +12,7 @@ from math import sqrt
 
 import numpy as np
 
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.detect.box_tree import STACK_ROWS, box_distance_squared, splits_first
 from rigidimpulse.detect.features import (
     along,
@@ -123,7 +124,7 @@ def _leaf_distance(geometry, a, b, R, t, best):
     return best
 
 
-@inner
+@jit_making_arrays
 def round_round_gap(geometry, first, second, R, t, limit, stack, out):
     """Return the least gap of two ROUND primitives, or `limit`, with `out` untouched, if it is not below.
 

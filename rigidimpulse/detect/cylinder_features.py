@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from math import copysign, cos, hypot, inf, pi, sin, sqrt
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.features import along, cross, dot, inner, over_triangle, subtract
 
 _EPSILON = 2.0**-52
@@ -47,7 +47,7 @@ def cylinder_support(axis, half_height, radius, n):
     return radius * sqrt(dot(across, across)) + half_height * abs(dot(axis, n))
 
 
-@jit
+@jit_making_arrays
 def cylinder_triangle_distance(centre, axis, half_height, radius, triangle, out):
     """Write the closest points and the normal to `out`; return the distance, 0 where they overlap."""
     u, v, w = basis(axis)
@@ -57,7 +57,7 @@ def cylinder_triangle_distance(centre, axis, half_height, radius, triangle, out)
     return _write(centre, u, v, w, closest_on_triangle(a, b, c, radius, half_height), out)
 
 
-@jit
+@jit_making_arrays
 def cylinder_cylinder_distance(
     centre_a, axis_a, half_height_a, radius_a, centre_b, axis_b, half_height_b, radius_b, out
 ):

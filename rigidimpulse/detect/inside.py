@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.features import inner
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry, build_geometry, compile_shape
 from rigidimpulse.shape import Shape
@@ -101,7 +101,7 @@ def _in_curved(kind, frame, radius, vertex, first, last, point):
     return x * x + y * y + z * z <= radius * radius
 
 
-@jit
+@jit_making_arrays
 def point_in_convex(geometry, primitive, point):
     """Say whether `point` (x, y, z) lies behind all face planes of a convex polyhedron."""
     terms = np.empty(_NUM_TERMS)
@@ -112,7 +112,7 @@ def point_in_convex(geometry, primitive, point):
     return True
 
 
-@jit
+@jit_making_arrays
 def point_in_mesh(geometry, primitive, point):
     """Say whether `point` (x, y, z) lies in a closed polyhedron, by the signed crossings of the ray along +x."""
     terms = np.empty(_NUM_TERMS)

@@ -27,7 +27,7 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.detect.box_tree import STACK_ROWS
 from rigidimpulse.detect.closed_form import (
     round_half_space_contacts,
@@ -102,7 +102,7 @@ def _rows_to_world(contact_real, contact_int, start, end, R, x, swapped):
         write_contact(contact_real, contact_int, i, point_a, point_b, normal, gap, kind, feature_a, feature_b)
 
 
-@jit
+@jit_making_arrays
 def pair_contacts(
     geometry, shape_a, x_a, R_a, shape_b, x_b, R_b, margin, scratch_pairs, contact_real, contact_int, count, cylinders=1
 ):
@@ -156,7 +156,7 @@ def pair_contacts(
     return count if count <= contact_real.shape[0] else -count
 
 
-@inner
+@jit_making_arrays
 def _relative_poses(x_a, R_a, x_b, R_b):
     """Return R, t with y_a = R y_b + t and the pose the other way."""
     R, t = np.empty((3, 3)), np.empty(3)
@@ -166,7 +166,7 @@ def _relative_poses(x_a, R_a, x_b, R_b):
     return R, t, R_back, t_back
 
 
-@jit
+@jit_making_arrays
 def pair_gap(geometry, shape_a, x_a, R_a, shape_b, x_b, R_b, limit, out):
     """Return the least gap of two shapes [m], or `limit`, with `out` untouched, if it is not below.
 
@@ -244,7 +244,7 @@ def _extreme(contact_real, contact_int, wall, label, first, direction):
     return best
 
 
-@jit
+@jit_making_arrays
 def reduce_contacts(contact_real, contact_int, first, count, max_per_normal=MAX_PER_NORMAL):
     """Keep the contacts that carry load, of rows [first, count), which belong to one pair of bodies.
 

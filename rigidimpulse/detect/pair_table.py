@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.broadphase import overlapping_with
 from rigidimpulse.integrate.course import FIXED, FREE, JERK, place_at, rate_of, row_at, turning_points
 
@@ -23,7 +23,7 @@ MAX_REPEATS = 100
 """Contacts of a pair at one instant after which there is no motion that its neighbours allow: bodies are squeezed."""
 
 
-@jit
+@jit_making_arrays
 def path_box(course, i, begin, end, radius, box_min, box_max):
     """Box of the sphere of `radius` about the centre of body i along its parabola or cubic from begin to end."""
     x = np.empty(3)
@@ -103,7 +103,7 @@ def sweep_pair_again(pairs, p, time, dynamic, inside):
     pairs.start[p] = time if swept and pairs.repeats[p] <= MAX_REPEATS else np.nan
 
 
-@jit
+@jit_making_arrays
 def live_contacts(pairs, place, gap, time):
     """Which contacts (m,) are at the gap at which contact is declared; of a pair that just came to it at least its nearest.
 
@@ -125,7 +125,7 @@ def live_contacts(pairs, place, gap, time):
     return live
 
 
-@jit
+@jit_making_arrays
 def renew_pairs(course, body, time, end, radius, margin, movable, dynamic, inside, pairs, box_min, box_max, fresh):
     """Let the pairs of a body that took a new course at `time` be swept again, and look whom it may now reach until `end`.
 

@@ -15,7 +15,7 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import inlined, jit
+from rigidimpulse._jit import inlined, jit, jit_making_arrays
 from rigidimpulse.constrain.contact_motion import contact_motion
 from rigidimpulse.detect.manifold import MAX_PER_NORMAL, pair_contacts, reduce_contacts
 from rigidimpulse.integrate.course import FIXED, JERK, TORQUE_RATE, place_at, rate_of, row_at, state_at
@@ -36,7 +36,7 @@ def world_inverse_inertia(r, inertia, out):
             )
 
 
-@jit
+@jit_making_arrays
 def gyroscopic_acceleration(r, inertia, w, torque, out):
     """I^-1 (torque - w x (I w)), world frame."""
     x = np.empty(3)
@@ -74,7 +74,7 @@ def bring_all(course, members, time, bodies, rotation, acceleration, angular_acc
         bring(course, i, time, bodies, rotation, acceleration, angular_acceleration)
 
 
-@jit
+@jit_making_arrays
 def near_pairs(course, time, pairs, margin, radius, bodies, seen, near):
     """Write the pairs of the given bodies (k,) that are not `seen` (p,) yet and whose bounding spheres are near at `time`.
 
@@ -173,7 +173,7 @@ def _point_acceleration(acceleration, angular_acceleration, i, r, n):
     return n[0] * x + n[1] * y + n[2] * z
 
 
-@jit
+@jit_making_arrays
 def pressing(
     geometry, shape_of_body, rotation, bodies, contacts, kinds, features, acceleration, angular_acceleration, normal_force, least,
     step, delta, approach, rest_speed,

@@ -27,6 +27,7 @@ from math import sqrt
 
 import numpy as np
 
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.box_tree import STACK_ROWS, gather_leaf_pairs
 from rigidimpulse.detect.edges import edge_contacts
@@ -227,7 +228,7 @@ def _corner_contacts(geometry, view, pairs, end, rows, count):
     return count
 
 
-@inner
+@jit_making_arrays
 def _pose_back(R, t):
     """Return the inverse (R^T, -R^T t) of a pose."""
     R_back = np.empty((3, 3))
@@ -254,7 +255,7 @@ def _keep_closest(contact_real, contact_int, first_row, end):
     return min(end, first_row + 1)
 
 
-@inner
+@jit_making_arrays
 def round_round_contacts(geometry, first, second, R, t, margin, pairs, contact_real, contact_int, count):
     """Append the contacts of two ROUND primitives with gap <= margin, in the first one's frame; return the new count.
 

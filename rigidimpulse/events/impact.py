@@ -16,7 +16,7 @@ from math import isfinite, sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.closed_form import plane_in_frame
 from rigidimpulse.detect.features import along, dot, moved, relative_pose, turned
@@ -68,7 +68,7 @@ def copy_rebounds(source, target):
             remember(target, source.key[at], source.time[at], source.speed[at], source.count[at])
 
 
-@jit
+@jit_making_arrays
 def _contact(fixed, motion, contacts, paths, planes, a, b, plane, margin):
     """Write the contact of two balls, or of a ball and a plane, within the margin; returns whether there is one.
 
@@ -132,7 +132,7 @@ def _has_changed(now, i, before):
     return differs and finite
 
 
-@jit
+@jit_making_arrays
 def _members(fixed, book, a, b):
     """The movable ones of two bodies, in order of index."""
     count = 0
@@ -153,7 +153,7 @@ def _comes_back(rebounds, key, time, delta, instant):
     return rebounds.count[last] > 0 or since * rebounds.speed[last] < _CLEAR * delta or since <= _CLEAR * instant
 
 
-@jit
+@jit_making_arrays
 def simple_impact(fixed, motion, book, rebounds, paths, planes, a, b, plane, time):
     """Let bodies a < b, which come to touch at `time` [s], rebound; returns False, with nothing changed, where that is not simple.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse._jit import inlined, jit
+from rigidimpulse._jit import inlined, jit, jit_making_arrays
 from rigidimpulse.detect.touching import world_inverse_inertia
 from rigidimpulse.integrate.course import FIXED, FREE, JERK
 from rigidimpulse.integrate.free_top import BASE, FIXED_AXIS, KIND, RATE, REST, keep_axis
@@ -73,7 +73,7 @@ def bring_ball(motion, i, time):
         world_inverse_inertia(motion.rotation[i], course.inertia[i], now.inv_inertia[i])
 
 
-@jit
+@jit_making_arrays
 def take_free_course(motion, i, time, acceleration):
     """As `course.take` in mode FREE, for a body of equal moments of inertia; acceleration (3,) m/s2."""
     now, course = motion.now, motion.course

@@ -16,7 +16,7 @@ from math import inf
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.events.layout import AT_BOUNDARY, AT_ONCE, CONTACT, OTHER, PLANE
 from rigidimpulse.events.paths import (
     BODY,
@@ -139,7 +139,7 @@ def _add_pairs(apart, table, i, which):
     return True
 
 
-@jit
+@jit_making_arrays
 def fill_table(fixed, table, clock):
     """Find who may meet until the end of the window; returns False if there is no room for all pairs."""
     paths, n = table.paths, len(table.paths)

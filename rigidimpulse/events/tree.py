@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 
 _BITS = 10
 _DIGITS = 1 << _BITS
@@ -45,7 +45,7 @@ def _spread_bits(x):
     return (x | (x << 2)) & 0x9249249
 
 
-@jit
+@jit_making_arrays
 def _curve_places(low, high, bodies, code):
     """Write the place of each body's box along the Z-curve into code (k,)."""
     least, most = np.full(3, inf), np.full(3, -inf)
@@ -63,7 +63,7 @@ def _curve_places(low, high, bodies, code):
             code[at] |= _spread_bits(np.int64(share * (_DIGITS - 1))) << k
 
 
-@jit
+@jit_making_arrays
 def _sort_by_code(bodies, code):
     """Put bodies (k,) into the order of their codes, by counting digit after digit; returns the sorted bodies."""
     other, other_code = np.empty_like(bodies), np.empty_like(code)
@@ -91,7 +91,7 @@ def _join(tree, node):
         tree.high[node, k] = max(tree.high[2 * node, k], tree.high[2 * node + 1, k])
 
 
-@jit
+@jit_making_arrays
 def build_tree(tree, low, high, bodies):
     """Build the tree over the boxes low, high (n, 3) m of bodies (k,)."""
     code = np.empty(len(bodies), np.int64)
@@ -122,7 +122,7 @@ def replace_box(tree, i, low, high):
         _join(tree, node)
 
 
-@jit
+@jit_making_arrays
 def overlapping(tree, i, low, high, found):
     """Write the bodies whose boxes overlap or touch row i of low, high into found (n,), i itself left out; returns their number."""
     stack = np.empty(_DEPTH, np.int64)

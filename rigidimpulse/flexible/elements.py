@@ -22,7 +22,7 @@ from math import atan2, pi, sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.features import along, cross, dot, row, subtract
 
 
@@ -101,7 +101,7 @@ def turned_angle(angle, rest):
     return turn + 2.0 * pi if turn < -pi else turn
 
 
-@jit
+@jit_making_arrays
 def hinge_slope(x, hinge, h, slope):
     """Write grad phi of hinge h to slope (4, 3), zero where a face has no area."""
     a, b, c, d = row(x, hinge[h, 0]), row(x, hinge[h, 1]), row(x, hinge[h, 2]), row(x, hinge[h, 3])
@@ -131,7 +131,7 @@ def hinge_energy(x, hinge, rest, stiffness):
     return energy
 
 
-@jit
+@jit_making_arrays
 def add_hinge_gradient(x, hinge, rest, stiffness, gradient):
     """Add dE/dx to gradient (n, 3)."""
     slope = np.empty((4, 3))
@@ -144,7 +144,7 @@ def add_hinge_gradient(x, hinge, rest, stiffness, gradient):
                     gradient[hinge[h, m], k] += moment * slope[m, k]
 
 
-@jit
+@jit_making_arrays
 def add_hinge_hessian(x, hinge, stiffness, slot, block):
     """Add kappa (grad phi)(grad phi)^T to blocks (b, 3, 3); slot (g, 16): places of the blocks, by row."""
     slope = np.empty((4, 3))

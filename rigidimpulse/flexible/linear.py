@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.copying import copy_matrix
 from rigidimpulse.detect.features import cross, row
 from rigidimpulse.flexible.contact_terms import add_to_ends, miss
@@ -47,7 +47,7 @@ def apply_matrix(first, column, block, free, rigid, contacts, no_aim, D, z, out)
             out[i] = 0.0
 
 
-@jit
+@jit_making_arrays
 def diagonal_inverses(diagonal, block, rigid, contacts, D, node_inverse, rigid_inverse):
     """Write the inverses (n, 3, 3) and (r, 6, 6) of the blocks on the diagonal."""
     for i in range(diagonal.shape[0]):
@@ -71,7 +71,7 @@ def diagonal_inverses(diagonal, block, rigid, contacts, D, node_inverse, rigid_i
         rigid_inverse[b] = np.linalg.inv(rigid_inverse[b])
 
 
-@jit
+@jit_making_arrays
 def _invert(A):
     """Invert a symmetric matrix (3, 3) in place, by cofactors; of one that is not positive definite the mean of its diagonal."""
     a, b, c = row(A, 0), row(A, 1), row(A, 2)
@@ -111,7 +111,7 @@ def _inner(a, b):
     return total
 
 
-@jit
+@jit_making_arrays
 def conjugate_gradients(first, column, block, free, rigid, contacts, no_aim, D, node_inverse, rigid_inverse, r, accuracy, most, z):
     """Write the solution z (n + 2 b, 3) of matrix z = r; r is destroyed. Returns the number of iterations.
 

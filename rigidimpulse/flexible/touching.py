@@ -11,7 +11,7 @@ from math import inf
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.features import dot, row, subtract
 from rigidimpulse.flexible.distance import STACK, first_touch, first_touch_of_triangle, signed_distance
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, Geometry
@@ -31,7 +31,7 @@ def _into_frame(R, x, p):
     )
 
 
-@jit
+@jit_making_arrays
 def vertices_on_bodies(geometry, shape_of_body, radius, x0, R0, x1, R1, start, end, gap, skip, out_int, out_real):
     """Find vertices that come within the gap of bodies; returns their number, which may exceed the room in the output.
 
@@ -84,7 +84,7 @@ def fit_boxes(geometry, start, end, low, high):
             low[node, k], high[node, k] = lowest, highest
 
 
-@jit
+@jit_making_arrays
 def samples_on_faces(geometry, low, high, p0, p1, radius, body, start, end, gap, skip, every, out_int, out_real):
     """Find sample points that come within the gap of faces of nets; returns their number, which may exceed the room in the output.
 

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.integrate.course import state_at
 
 NODES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
 WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 
-@jit
+@jit_making_arrays
 def add_line_integrals(course, i, begin, start, end, rows, value, rate, total):
     """Add J, H, W from `start` to `end` [s] of lines that began at `begin`, to rows of total (k, 7).
 

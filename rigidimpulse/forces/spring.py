@@ -15,7 +15,7 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.errors import SceneError
 from rigidimpulse.forces.force import Force, ForceTable, Instant, body_point, checked_number, checked_vector, end_of, named
 from rigidimpulse.rotation import rotate
@@ -92,7 +92,7 @@ class Line(NamedTuple):
     break_force: float
 
 
-@jit
+@jit_making_arrays
 def _pull(rows, spring_of, end_of_row, ends, arms, table, is_carried, carried, bodies, rotation, out):
     """Force and torque of rows, into out (r, 6); carried (r, 6): place and velocity of an other end on a given path."""
     p, v, arm = np.empty((2, 3)), np.zeros((2, 3)), np.empty((2, 3))

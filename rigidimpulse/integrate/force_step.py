@@ -32,7 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.detect.touching import bring, bring_all
 from rigidimpulse.integrate.course import FORCED, FREE, make_course, take
 from rigidimpulse.respond.impulse import BodyState
@@ -40,7 +40,7 @@ from rigidimpulse.respond.impulse import BodyState
 Stage = tuple[np.ndarray, np.ndarray]
 
 
-@jit
+@jit_making_arrays
 def fly(course, members, elapsed, bodies, steady, wrench, out, rotation, acceleration, angular_acceleration):
     """Where the members (k,) are after elapsed (n,) s under constant wrenches (n, 6) and steady accelerations (n, 3); from `bodies`."""
     zero, pull = np.zeros(3), np.empty(3)
@@ -52,7 +52,7 @@ def fly(course, members, elapsed, bodies, steady, wrench, out, rotation, acceler
         bring(course, i, 0.0, out, rotation, acceleration, angular_acceleration)
 
 
-@jit
+@jit_making_arrays
 def follow(course, members, bodies, steady, value, rate):
     """Let the members (k,) go from `bodies`, at time 0, along lines of force (n, 6) that change by rate (n, 6) a second."""
     pull, jerk = np.empty(3), np.empty(3)

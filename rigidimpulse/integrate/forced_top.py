@@ -18,7 +18,7 @@ methods, Experimental Mathematics 14:99, 2005 (the segment from the last terms).
 
 import math
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.integrate import free_top
 from rigidimpulse.rotation import exponential, from_columns, product, rotated
 
@@ -242,7 +242,7 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out):
     return True
 
 
-@jit
+@jit_making_arrays
 def _last_segment(constants, t):
     """Constants of the segment that holds the time t, and the time since its start (NaN: too many segments)."""
     c = constants.copy()
@@ -267,7 +267,7 @@ def _last_segment(constants, t):
     return c, math.nan
 
 
-@jit
+@jit_making_arrays
 def rotation(constants, t):
     """Quaternion and world angular velocity t seconds after the start, as seven numbers; for rows of free_top too.
 
@@ -298,7 +298,7 @@ def rotation(constants, t):
     return q0, q1, q2, q3, wx + t * ax, wy + t * ay, wz + t * az
 
 
-@jit
+@jit_making_arrays
 def evaluate(constants, t, q_out, w_out):
     """Write quaternion (4,) and world angular velocity (3,) t >= 0 seconds after the start."""
     q_out[0], q_out[1], q_out[2], q_out[3], w_out[0], w_out[1], w_out[2] = rotation(constants, t)

@@ -28,7 +28,7 @@ import math
 
 import numpy as np
 
-from rigidimpulse._jit import inlined, jit
+from rigidimpulse._jit import inlined, jit, jit_making_arrays
 from rigidimpulse.rotation import exponential, product, rotated
 
 # Kinds of rotation, and places in the row of constants.
@@ -391,7 +391,7 @@ def rotation(constants, t):
     return q0, q1, q2, q3, wx, wy, wz
 
 
-@jit
+@jit_making_arrays
 def evaluate(constants, t, q_out, w_out):
     """Write quaternion (4,) and world angular velocity (3,) t >= 0 seconds after the start."""
     q_out[0], q_out[1], q_out[2], q_out[3], w_out[0], w_out[1], w_out[2] = rotation(constants, t)

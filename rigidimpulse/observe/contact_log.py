@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.observe.contacts import CONTACT_DTYPE
 from rigidimpulse.observe.impulses import ImpulseBook
 from rigidimpulse.respond.friction import tangents
 
 
-@jit
+@jit_making_arrays
 def fill_contacts_and_forces(contacts, position, force, point, total):
     """Points (m, 3) and forces on b (m, 3) in the world, of forces (m, 3) in (n, t1, t2) and centres of mass position (n, 3)."""
     t1, t2 = np.empty(3), np.empty(3)

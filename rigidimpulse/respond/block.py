@@ -29,7 +29,7 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.constrain.joint_impact import JointBlock, add_moments, copy_rows
 from rigidimpulse.constrain.newton import solve_newton
 from rigidimpulse.constrain.rows import (
@@ -184,7 +184,7 @@ def solve_block(
     return last
 
 
-@jit
+@jit_making_arrays
 def log_block(bodies, contacts, rows, first_row, frames, u, log, count):
     """Log the impacts of a block, whose velocities before were u (r,); returns the new count."""
     impulse = np.empty(3)

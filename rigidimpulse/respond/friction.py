@@ -28,7 +28,7 @@ from math import hypot, sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.respond.restitution import (
     COMPRESSED,
     J1,
@@ -195,7 +195,7 @@ def _makes_energy(k, start, q):
     return energy_change(k, start, q[JN], q[J1], q[J2]) > ENERGY_ROUND_OFF * moved
 
 
-@jit
+@jit_making_arrays
 def contact_impulse(k, n, u, e, e_t, mu_s, mu_k, law, t1, t2, impulse):
     """The impulse [N s] on body b of one impact, into `impulse` (3,).
 

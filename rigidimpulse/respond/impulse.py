@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.respond.friction import contact_impulse
 
 
@@ -112,7 +112,7 @@ def apply_impulse(bodies, contacts, c, x, y, z):
     _push(bodies, contacts.body_a[c], contacts.arm_a[c], -x, -y, -z)
 
 
-@jit
+@jit_making_arrays
 def resolve_contact(bodies, contacts, c, restitution, law, log, count):
     """One impact at contact c with the given restitution by a law of it; appends a row to log and returns the new count."""
     k = np.empty((3, 3))
@@ -127,7 +127,7 @@ def resolve_contact(bodies, contacts, c, restitution, law, log, count):
     return log_impact(bodies, contacts, c, impulse, approach, log, count)
 
 
-@jit
+@jit_making_arrays
 def log_impact(bodies, contacts, c, impulse, approach, log, count):
     """Row of log: contact, normal impulse, tangential impulse (3), approach speed, separation speed."""
     if count >= log.shape[0]:

@@ -9,11 +9,11 @@ response; it conserves neither momentum nor, where bodies spin, energy.
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.respond.impulse import log_impact, relative_velocity
 
 
-@jit
+@jit_making_arrays
 def respond_kinematic(bodies, contacts, law, together, rest_speed, tolerance, scale, number, joints, log):
     """Each contact once, fastest approach first; arguments (neither law nor together matter) and answer as `respond_sequential`."""
     m = contacts.gap.shape[0]

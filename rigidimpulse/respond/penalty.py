@@ -32,7 +32,7 @@ import math
 import numpy as np
 from scipy.optimize import root_scalar
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.touching import bring_all
 from rigidimpulse.forces.force import ForceTable, Instant
 from rigidimpulse.respond.impulse import BodyState
@@ -76,7 +76,7 @@ def _inverse_mass(inv_mass, inv_inertia, i, r, n):
     return total
 
 
-@jit
+@jit_making_arrays
 def push(real, integer, count, asked, bodies, stiffness, damping, ratio, friction, material_of_body, out, pushes):
     """Add the forces and torques of points (count,) to out (n, 6), where asked (count,); mark those that push in pushes (count,).
 

@@ -11,7 +11,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.features import along, closest_on_segments, cross, dot, edge_normals, in_edge_arc, moved, row, subtract, turned
 from rigidimpulse.detect.inside import point_in_mesh
 from rigidimpulse.geometry import EDGE_HIDDEN
@@ -99,7 +99,7 @@ def crossing_edges(geometry, first, second, bodies, position, rotation, real, in
     return count
 
 
-@jit
+@jit_making_arrays
 def drop_deep_edges(real, integer, first, edges, end):
     """Keep of rows [edges, end) those not much deeper than the corners [first, edges), or than the least deep of them: the way out."""
     if end > real.shape[0] or end == edges:

@@ -10,7 +10,7 @@ from math import inf
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.box_tree import STACK_ROWS
 from rigidimpulse.detect.features import along, dot, row, subtract
 from rigidimpulse.geometry import CYLINDER, EDGE_CAPSULE, EDGE_HIDDEN, ROUND, CompiledShape, Geometry, Primitive, build_geometry
@@ -102,7 +102,7 @@ def box_squared(geometry, node, p):
     return total
 
 
-@jit
+@jit_making_arrays
 def nearest_on_surface(geometry, primitive, p, axis):
     """Nearest point of a surface of triangles to p (x, y, z) in its frame: squared distance, point, triangle.
 

@@ -12,7 +12,7 @@ they differ in which of the physically possible answers a chain of bodies gives.
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.respond.block import rebound_of, solve_block
 from rigidimpulse.respond.impulse import Contacts, relative_velocity, resolve_contact
 
@@ -24,7 +24,7 @@ IMPULSES_PER_ROUND = 8
 COLLAPSED = 1e-3
 
 
-@jit
+@jit_making_arrays
 def _approaching(bodies, contacts, tolerance, rebounding, rest_speed):
     """The fastest approaching contact, or -1; only contacts that rebound if `rebounding` is 1."""
     u = np.empty(3)
@@ -36,7 +36,7 @@ def _approaching(bodies, contacts, tolerance, rebounding, rest_speed):
     return best
 
 
-@jit
+@jit_making_arrays
 def resolve_singles(bodies, contacts, law, rebound, rest_speed, tolerance, cap, log, count):
     """Impacts of pairs with one contact, fastest first, until the fastest is of another pair; `rebound` 1, or 0 for inelastic ones.
 

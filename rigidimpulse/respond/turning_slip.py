@@ -18,7 +18,7 @@ from math import hypot
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.respond.restitution import (
     COMPRESSED,
     J1,
@@ -48,7 +48,7 @@ BISECTIONS = 53
 ROW_S1, ROW_S2, ROW_SLIP, ROW_UN, ROW_P, ROW_J1, ROW_J2, ROW_W = range(8)
 
 
-@jit
+@jit_making_arrays
 def turn(law, e, k, start, mu, q):
     """Go on until the slip is straight or zero (False) or the impact is over (True); arguments as `restitution.go_straight`."""
     scale = hypot(k.n1, k.n2) + mu * (k.t11 + k.t22)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.features import along, subtract
 from rigidimpulse.detect.inside import points_in_shape
 from rigidimpulse.geometry import HALF_SPACE, ROUND
@@ -21,7 +21,7 @@ from rigidimpulse.sweep.impact_time import IMPACT, ImpactTimes, SweepDetector, n
 from rigidimpulse.sweep.linear import measure
 
 
-@jit
+@jit_making_arrays
 def _is_inside(geometry, course, shape_of_body, a, b, t):
     """Tell whether a primitive of one body lies inside the other, for bodies whose surfaces do not cross."""
     position, orientation, axes = np.empty(6), np.empty((2, 4)), np.empty(18)

@@ -18,7 +18,7 @@ from math import inf, nan, sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import along, dot, subtract
 from rigidimpulse.integrate.course import FIXED, place_at
@@ -120,7 +120,7 @@ def ball_time(frame, course, scratch, a, b, shape_a, shape_b, start):
     return s if s != s or s == inf else max(since + s, start)
 
 
-@jit
+@jit_making_arrays
 def write_ball_witness(frame, course, scratch, a, b, shape_a, shape_b, t, witness):
     """Write points on a and b, the normal from a to b and the gap at t [s] into witness (10,); pairs of `is_closed_form`."""
     centre = np.empty((2, 3))

@@ -39,7 +39,7 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.features import along, cross, dot, subtract
 from rigidimpulse.integrate.course import FIXED, FORCED, JERK, PRESCRIBED, STEPPED, TORQUE_RATE, motion_at, rate_of, row_at
@@ -159,7 +159,7 @@ def _write_spin_bounds(moments, torque_world, torque_rate, horizon, row):
     row[JERK_BOUND] = jerk_bound * _WIDEN
 
 
-@jit
+@jit_making_arrays
 def motion_bound(course, i, t, horizon, row):
     """Write the motion of body i at time t, with bounds that hold until t + horizon, into row (MOTION_SIZE,).
 

@@ -19,7 +19,7 @@ cylinder: then nothing of them is compiled.
 
 from __future__ import annotations
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.cylinder_features import (
     cylinder_cylinder_distance,
     cylinder_support,
@@ -161,7 +161,7 @@ def _with_thinned(work, index, normal, threshold, horizon):
     return s
 
 
-@jit
+@jit_making_arrays
 def _closest(work, index, cylinders):
     """Write the closest points and the normal of the two pieces at CLOSEST; return (separation, crossing edges)."""
     if cylinders is not None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import inf, log2
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.features import along, cross, dot, subtract
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE
 from rigidimpulse.integrate.course import pose_at
@@ -102,7 +102,7 @@ def _next_trial(low, above, high, below, truncation, least, left):
     return t if low < t < high else middle
 
 
-@jit
+@jit_making_arrays
 def witness_root(geometry, course, work, index, a, b, low, high, touch, tolerance):
     """Find where the witness of bodies a and b comes down to `touch` between two times.
 

@@ -16,7 +16,7 @@ from math import inf
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.features import along, cross, dot, subtract
 from rigidimpulse.detect.manifold import pair_gap
 from rigidimpulse.integrate.course import Course, motion_at
@@ -27,7 +27,7 @@ from rigidimpulse.sweep.guard_tree import row
 from rigidimpulse.sweep.impact_time import IMPACT, TOUCHING, ImpactTimes, SweepDetector, no_impacts
 
 
-@jit
+@jit_making_arrays
 def measure(geometry, course, shape_of_body, a, b, t, witness):
     """Measure the least gap of two bodies: points, normal and gap to witness (10,); returns the closing speed.
 

@@ -18,7 +18,7 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.copying import copy_matrix, copy_vector
 
 ROUNDS = 80
@@ -67,7 +67,7 @@ def _side(points, radius, sign, n, u, v, d, g, H):
     return energy
 
 
-@jit
+@jit_making_arrays
 def _expand(a, radius_a, b, radius_b, n, u, v, d, g, H):
     """E with its derivatives by the two angles and d, written to g (3,) and the lower half of H (3, 3)."""
     g[:] = 0.0
@@ -98,7 +98,7 @@ def _solve(H, shift, g, s):
     return True
 
 
-@jit
+@jit_making_arrays
 def best_plane(a, radius_a, b, radius_b, n, d):
     """Bring n (3,), in place, and d to the least E nearby; returns d and E.
 
