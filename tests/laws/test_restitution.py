@@ -17,7 +17,7 @@ import pytest
 from impact_process import LAWS, Plane, plane_impact, space_impact
 
 import rigidimpulse as ri
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.respond.friction import contact_impulse
 from rigidimpulse.respond.restitution import LAWS as LAW_NUMBERS
 
@@ -174,7 +174,7 @@ def test_turning_slip_against_a_runge_kutta_method(law: str) -> None:
     assert len(ends) >= 4
 
 
-@jit
+@jit_making_arrays
 def _impulses(k, n, u, e, e_t, static, dynamic, law, out):
     t1, t2 = np.empty(3), np.empty(3)
     for i in range(n.shape[0]):

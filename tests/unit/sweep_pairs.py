@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from contact_scenes import box, capsule, half_space, mesh, prism, sphere
 
-from rigidimpulse._jit import jit
+from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.detect.manifold import pair_gap
 from rigidimpulse.geometry import CYLINDER, CompiledShape, Primitive, build_geometry
 from rigidimpulse.integrate.course import FIXED, FORCED, FREE, PRESCRIBED, begin, make_course, pose_at
@@ -77,7 +77,7 @@ class Pair:
         return gap_at(self.detector.geometry, self.course, *self.shapes, t)
 
 
-@jit
+@jit_making_arrays
 def gap_at(geometry, course, shape_a, shape_b, t):
     """Least gap of bodies 0 and 1 at time t."""
     x, q, axes, points = np.empty((2, 3)), np.empty((2, 4)), np.empty((2, 3, 3)), np.empty(7)
