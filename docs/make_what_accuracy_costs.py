@@ -74,9 +74,9 @@ other on the way. The knobs are `heap_motion`, how far bodies move past each oth
 
 ![heap](heap_costs.png)
 
-Every setting of other engines has one here that is both faster and less deep: at 8 mm `step=1/30, heap_motion=1` takes 0.8 of the
+Every setting of other engines has one here that is both faster and less deep: at 12 mm `step=1/30, heap_motion=1` takes 0.7 of the
 time that Rapier takes at 127 mm, a quarter of a box, with its usual steps of 1/60 s. With steps of 1/240 s PhysX is 9 mm deep and Rapier
-26, in 2.7 and 1.6 times the time of the default here, at 2.9 mm. (The deepest pair of ten frames of any of five falls, of which three stay
+26, in 3.8 and 1.5 times the time of the default here, at 2.9 mm. (The deepest pair of ten frames of any of five falls, of which three stay
 apart with the default; times are the median of the five. One fall of an engine.)
 """
 
