@@ -91,7 +91,7 @@ class _PartLibrary(JITCodeLibrary):
 
 def _holds_array(kind: Any) -> bool:
     """Whether values of a type are arrays, or tuples of such."""
-    return isinstance(kind, types.Array) or (isinstance(kind, types.BaseTuple) and any(map(_holds_array, kind)))
+    return isinstance(kind, types.Array) or any(map(_holds_array, getattr(kind, "types", ())))
 
 
 @register_pass(mutates_CFG=False, analysis_only=True)
