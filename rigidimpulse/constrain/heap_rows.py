@@ -30,6 +30,8 @@ IMPULSE, FRICTION, SEPARATION, ROW_SIZE = 16, 17, 20, 24
 """Offsets in a row: normal impulse, N s; friction impulse (3), N s, world; gap less the held one when the row was last written or read, m.
 A row is three lines of 8, the last of which the solver writes. Row 0 of a pool is none: all 0."""
 
+UNKNOWN = -1
+"""Kind of a pair that is new."""
 OUTSIDE, MEMBER, SUPPORT = 0, 1, 2
 """Parts that a body may play in a step: none, stepped, immovable and near."""
 INVERSE_MASS = 6
@@ -58,10 +60,6 @@ class HeapBodies(NamedTuple):
     drift: np.ndarray  # (8 (n+1),) the same since the steady batches were made
     quick: np.ndarray  # (n+1,) bool, its contacts are in none of these
     mass: np.ndarray  # (8 (n+1),)
-
-
-UNKNOWN = -1
-"""Kind of a pair that is new."""
 
 
 class HeapPairs(NamedTuple):
