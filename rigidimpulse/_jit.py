@@ -16,14 +16,14 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, ClassVar
 
 import numba
 from numba import types
 from numba.core import config
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, DefaultPassBuilder
+from numba.core.compiler import Compiler, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.errors import NumbaError
 from numba.core.typed_passes import NopythonTypeInference
@@ -114,8 +114,45 @@ class _NoArraysMade(AnalysisPass):
         return False
 
 
+class _RememberedTypes:
+    """Numba's typing context for one kernel; what `+` or `x[i, k]` makes of the same types is looked up but once.
+
+    Numba asks all overloads of such a function each time, which is a quarter of the time of compiling.
+    """
+
+    _known: ClassVar[dict[tuple, tuple]] = {}
+
+    def __init__(self, context: Any, counts: bool) -> None:
+        """counts: whether the kernel counts who holds arrays; what is compiled for such is not for others."""
+        self._context = context
+        self._counts = counts
+
+    def __getattr__(self, name: str) -> Any:
+        """All else is numba's."""
+        return getattr(self._context, name)
+
+    def resolve_function_type(self, function: Any, arguments: tuple, keywords: Any) -> Any:
+        """Signature of a call."""
+        kind: Any = self._context._lookup_global(function) or function
+        if keywords or not isinstance(kind, types.Function) or any(isinstance(argument, types.Callable) for argument in arguments):
+            return self._context.resolve_function_type(function, arguments, keywords)
+        key, chosen = (kind, arguments, self._counts), vars(kind)["_impl_keys"]
+        if key not in self._known:
+            signature = self._context.resolve_function_type(function, arguments, keywords)
+            if signature is None:
+                return None
+            self._known[key] = signature, chosen.get(signature.args)
+        signature, implementation = self._known[key]
+        chosen[signature.args] = implementation
+        return signature
+
+
 class _KernelCompiler(Compiler):
-    """Numba's compiler, with that pass."""
+    """Numba's compiler, with that pass and that context."""
+
+    def __init__(self, typing_context: Any, target_context: Any, library: Any, *arguments: Any) -> None:
+        flags: Any = next(argument for argument in arguments if isinstance(argument, Flags))
+        super().__init__(_RememberedTypes(typing_context, flags.nrt), target_context, library, *arguments)
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes."""
@@ -232,6 +269,8 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def is_cached(kernel: Kernel) -> bool:
-    """Whether a kernel of these sources lies in the cache on disk, for whatever types."""
+    """Whether a kernel of these sources is in use, or lies in the cache on disk, for whatever types."""
+    if kernel.entry.overloads:
+        return True
     digest = source_digest(Path(kernel.py_func.__code__.co_filename))
     return any(key[-1] == digest for key in kernel.entry._cache._cache_file._load_index())

@@ -1,7 +1,7 @@
 """The first run on a machine: compile kernels on two cores.
 
 Numba compiles one kernel at a time in a process. So for each kind of kernels that a run needs and that is not in the cache on disk a second
-process compiles one half into the cache (of contacts: motion, sweep, the solver of rows), while this one compiles the other half, and
+process compiles one half into the cache (of contacts: motion, frames and the sweep), while this one compiles the other half, and
 then waits for it. The event kernel is one kernel, which a process of its own compiles.
 """
 
@@ -108,8 +108,9 @@ def _respond_and_detect(context) -> None:
     """Impulses first: by then the other process has what moves bodies in the cache, which detection needs too."""
     from rigidimpulse.constrain.contact_motion import contact_motion
     from rigidimpulse.constrain.drift import needs_lift
+    from rigidimpulse.constrain.newton import solve_newton
     from rigidimpulse.constrain.resting import hold_contacts
-    from rigidimpulse.constrain.rows import change_velocities, changes_of, contact_rows, response_to, row_velocities
+    from rigidimpulse.constrain.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
     from rigidimpulse.detect.touching import bring_gyroscopic, refresh_pose
     from rigidimpulse.detect.window import Window
     from rigidimpulse.observe.contact_log import fill_contacts_and_forces
@@ -136,6 +137,7 @@ def _respond_and_detect(context) -> None:
     motion = contact_motion(
         world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
     )
+    solve_newton(make_rows.py_func(0), 1, 1.0)
     hold_contacts(
         _leave_unsolved, now, contacts, members, motion.turning, np.zeros(1), context.acceleration, context.angular_acceleration,
         1.0, 1.0, context.column, np.zeros((1, 3)), context.wrench,
@@ -149,13 +151,11 @@ def _respond_and_detect(context) -> None:
 
 
 def _leave_unsolved(_rows, _n: int, _target: float) -> float:
-    """In the place of a solver of rows, which the other process compiles."""
+    """In the place of a solver of rows."""
     return 0.0
 
 
-def _move_sweep_and_solve(context) -> None:
-    from rigidimpulse.constrain.newton import solve_newton
-    from rigidimpulse.constrain.rows import make_rows
+def _move_and_sweep(context) -> None:
     from rigidimpulse.detect.touching import bring_all
     from rigidimpulse.detect.window import Window
     from rigidimpulse.integrate.course import FREE, take
@@ -173,7 +173,6 @@ def _move_sweep_and_solve(context) -> None:
     window.find_pairs()
     window.change_course(1, 0.0)
     set_touch_gaps(window.pairs, np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool), 0.0, world.dynamic, window.inside)
-    solve_newton(make_rows.py_func(0), 1, 1.0)
     bisection.sweep(context.detector, state.course, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
 
 
@@ -204,7 +203,6 @@ def _step_heap(context) -> None:
     steady = context.world.steady_acceleration
     arrive(state.course, members, 0.0, steady, now, state.rotation, context.acceleration, context.angular_acceleration)
     depart(state.course, members, 0.0, STEP, now, out.position, out.orientation, out.velocity)
-    context.recorder.flush_all(state.course, members, STEP)
     let_fly(state.course, members, steady)
     mark_slow(now, stepper.inner, 1.0, 1.0, np.array([False, True]))
     most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin, 0.5)
@@ -270,7 +268,7 @@ def _compile_other_half(kind: str, with_cylinder: bool) -> None:
     elif kind == JOINTS:
         _close_and_stop_joints(_box_on_floor(with_cylinder, jointed=True))
     else:
-        _move_sweep_and_solve(_box_on_floor(with_cylinder))
+        _move_and_sweep(_box_on_floor(with_cylinder))
 
 
 if __name__ == "__main__":

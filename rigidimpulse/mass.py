@@ -19,6 +19,7 @@ moment, however unequal they are (J. Demmel & K. Veselic, SIAM J. Matrix Anal. A
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +70,19 @@ def body_mass(body: Body) -> BodyMass:
         return _dynamic_mass(body)
     except SceneError as error:
         raise error.within(f"body {body.name!r}") from None
+
+
+def masses_of(bodies: Iterable[Body]) -> list[BodyMass]:
+    """Return the mass properties of bodies, of those that are alike the same ones; errors are those of `body_mass`."""
+    known: dict[tuple, BodyMass] = {}
+    masses = []
+    for body in bodies:
+        given = (None if value is None else np.asarray(value, float).tobytes() for value in (body.mass, body.inertia, body.center_of_mass))
+        key = (body.shape.key, body.motion, body.becomes_dynamic, body.material.density, *given)
+        if key not in known:
+            known[key] = body_mass(body)
+        masses.append(known[key])
+    return masses
 
 
 def compute_solid(shape: Shape) -> Solid:

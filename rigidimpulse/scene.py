@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rigidimpulse.body import Body, vector
 from rigidimpulse.conventions import STANDARD_GRAVITY
 from rigidimpulse.errors import SceneError, unknown_name
-from rigidimpulse.mass import body_mass
+from rigidimpulse.mass import masses_of
 
 if TYPE_CHECKING:
     from rigidimpulse.io.origin import FileOrigin
@@ -125,4 +125,4 @@ def validate(scene: Scene) -> None:
         raise SceneError("the scene has no bodies", "add one: scene.add(Body('ball', Shape.sphere(0.5)))")
     for body in scene.bodies:
         body.check()
-        body_mass(body)
+    masses_of(scene.bodies)

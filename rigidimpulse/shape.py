@@ -196,6 +196,13 @@ class Shape:
         figures = [getattr(self, name) for name in names.get(self.kind, ("radius", "height"))]
         return f"Shape.{self.kind}({', '.join(str(f.tolist() if isinstance(f, np.ndarray) else f) for f in figures)})"
 
+    @cached_property
+    def key(self) -> tuple:
+        """The same for shapes that are known to be alike: those of one kind with the same lengths, and each with itself."""
+        if self.kind in ("sphere", "box", "capsule", "cylinder"):
+            return self.kind, self.radius, self.height, None if self.size is None else self.size.tobytes()
+        return ("one of its own", id(self))
+
     @property
     def label(self) -> str:
         """What messages call the shape: its kind, and its file if it has one."""

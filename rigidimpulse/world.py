@@ -18,7 +18,7 @@ from rigidimpulse.errors import SceneError
 from rigidimpulse.forces.constant import ConstantForce, push_of_forces
 from rigidimpulse.frames import own_pose
 from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
-from rigidimpulse.mass import BodyMass, body_mass
+from rigidimpulse.mass import BodyMass, masses_of
 from rigidimpulse.material import combine, combine_rolling
 from rigidimpulse.rotation import from_matrix, multiply, rotate
 from rigidimpulse.scene import Scene, validate
@@ -188,7 +188,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
     """
     validate(scene)
     bodies = list(scene.bodies)
-    masses = [body_mass(body) for body in bodies]
+    masses = masses_of(bodies)
     joints = [effect for effect in scene.effects if isinstance(effect, Joint) and "joints" not in left_out]
     dynamic = np.array([body.becomes_dynamic for body in bodies], bool)
     moving = np.array([body.motion == "kinematic" and _is_driven(body) for body in bodies], bool)
@@ -235,8 +235,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         joints_of_scene=joints,
         left_out=left_out,
     )
-    # Bad forces are refused here.
-    if not world.force_tables or world.can_collide or joints:
+    if not world.force_tables or world.can_collide or joints:  # bad forces are refused here
         _refuse_fixed_steps(world.accuracy)
     return world
 
@@ -244,7 +243,8 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
 def _start(bodies: list[Body], masses: list[BodyMass]) -> dict[str, np.ndarray]:
     """Centres of mass and principal axes in the body frames, where these are and how they move at the start; see `World`."""
     offset = np.array([m.center_of_mass for m in masses], float).reshape(-1, 3)
-    turn = np.array([from_matrix(m.axes) for m in masses], float).reshape(-1, 4)
+    turns = {id(m): from_matrix(m.axes) for m in {id(m): m for m in masses}.values()}
+    turn = np.array([turns[id(m)] for m in masses], float).reshape(-1, 4)
     origin = np.array([body.position for body in bodies], float).reshape(-1, 3)
     orientation = np.array([body.unit_orientation() for body in bodies], float).reshape(-1, 4)
     return {
@@ -303,7 +303,7 @@ def _compile_shapes(bodies, masses) -> tuple[list[CompiledShape], np.ndarray]:
     known: dict[tuple, int] = {}
     index = np.zeros(len(bodies), np.int64)
     for i, (body, m) in enumerate(zip(bodies, masses, strict=True)):
-        key = (id(body.shape), m.center_of_mass.tobytes(), m.axes.tobytes())
+        key = (body.shape.key, m.center_of_mass.tobytes(), m.axes.tobytes())
         if key not in known:
             known[key] = len(shapes)
             shapes.append(compile_shape(body.shape, m.center_of_mass, m.axes))

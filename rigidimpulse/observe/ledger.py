@@ -96,14 +96,22 @@ def make_ledger(times, position, orientation, velocity, angular_velocity, mass, 
 
 def _mechanics(position, orientation, velocity, angular_velocity, mass, inertia, steady_acceleration, share):
     """Energies, kinetic and potential (f, n), momentum and angular momentum (f, 3) of frames; share (f, n): mass and inertia left."""
-    mass, inertia = share * mass, share[:, :, None] * inertia
-    spin_body = rotate_inverse(orientation, angular_velocity)
-    angular_body = spin_body * np.where(mass > 0.0, 1.0, 0.0)[:, :, None] * inertia
-    kinetic = 0.5 * (mass * (velocity**2).sum(-1) + (spin_body * angular_body).sum(-1))
-    potential = -(mass[:, :, None] * steady_acceleration * position).sum(-1)
-    momentum = (mass[:, :, None] * velocity).sum(1)
-    angular = (rotate(orientation, angular_body) + cross(position, mass[:, :, None] * velocity)).sum(1)
-    return kinetic, potential, momentum, angular
+    mass, factor = share * mass, share * np.where(mass > 0.0, 1.0, 0.0)
+    spin = (factor * inertia[:, 0])[:, :, None] * angular_velocity
+    turned = np.flatnonzero(np.any(inertia != inertia[:, :1], axis=1))
+    if len(turned):
+        axes = orientation[:, turned]
+        principal = inertia[turned] * rotate_inverse(axes, angular_velocity[:, turned])
+        spin[:, turned] = factor[:, turned, None] * rotate(axes, principal)
+    momenta = mass[:, :, None] * velocity
+    kinetic = 0.5 * (_dot(velocity, momenta) + _dot(angular_velocity, spin))
+    potential = -mass * np.einsum("fnk,nk->fn", position, steady_acceleration)
+    return kinetic, potential, momenta.sum(1), (spin + cross(position, momenta)).sum(1)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Dot products (f, n) of vectors (f, n, 3)."""
+    return np.einsum("fnk,fnk->fn", a, b)
 
 
 def _contact_work(times: np.ndarray, energy: np.ndarray, stretches) -> np.ndarray:

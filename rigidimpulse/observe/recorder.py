@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse._jit import inlined, jit
-from rigidimpulse.integrate.course import FIXED, STEPPED, state_at, stepped_at
+from rigidimpulse.integrate.course import FIXED, STEPPED, motion_at, stepped_at
 
 
 @inlined
@@ -38,29 +38,19 @@ def _write_fixed(course, i, f, position, orientation, velocity, angular_velocity
 
 
 @jit
-def sample_path(course, i, times, first, last, position, orientation, velocity, angular_velocity):
-    """Write frames first ... last - 1 of body i on its present course; times (f,) s, the others (f, n, ...)."""
-    for f in range(first, last):
-        if course.mode[i] == STEPPED:
-            _write_stepped(course, i, times, f, position, orientation, velocity, angular_velocity)
-        elif course.mode[i] == FIXED:
-            _write_fixed(course, i, f, position, orientation, velocity, angular_velocity)
-        else:
-            state_at(course, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
+def sample_paths(course, bodies, times, last, written, position, orientation, velocity, angular_velocity):
+    """Write the frames of these bodies from written[i] to last - 1, on their present courses, and say so in `written`.
 
-
-@jit
-def _sample_all(course, bodies, times, last, written, position, orientation, velocity, angular_velocity):
+    times (f,) s; position, orientation and velocities (f, n, ...).
+    """
     for i in bodies:
-        # The first two here, and not by `sample_path`: heaps have thousands of such.
-        if course.mode[i] == STEPPED:
-            for f in range(written[i], last):
+        for f in range(written[i], last):
+            if course.mode[i] == STEPPED:
                 _write_stepped(course, i, times, f, position, orientation, velocity, angular_velocity)
-        elif course.mode[i] == FIXED:
-            for f in range(written[i], last):
+            elif course.mode[i] == FIXED:
                 _write_fixed(course, i, f, position, orientation, velocity, angular_velocity)
-        elif written[i] < last:
-            sample_path(course, i, times, written[i], last, position, orientation, velocity, angular_velocity)
+            else:
+                motion_at(course, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
         written[i] = max(written[i], last)
 
 
@@ -79,11 +69,11 @@ class Recorder:
         self.velocity = np.zeros((len(times), num_bodies, 3))
         self.angular_velocity = np.zeros((len(times), num_bodies, 3))
         self.written = np.zeros(num_bodies, np.int64)
+        self._everyone = np.arange(num_bodies)
 
     def start(self, course) -> None:
         """Write frame 0, the state as given."""
-        for i in range(len(self.written)):
-            self._write(course, i, 1)
+        self._write(course, self._everyone, 1)
 
     def flush(self, course, i: int, time: float, correction: np.ndarray) -> None:
         """Write the frames of body i before `time`; its course must still be the one that led there.
@@ -92,7 +82,8 @@ class Recorder:
         course was off by: that grew with the square of the time.
         """
         first, last = int(self.written[i]), int(np.searchsorted(self.times, time, side="left"))
-        self._write(course, i, last)
+        if last > first:
+            self._write(course, self._everyone[i : i + 1], last)
         if last > first and np.any(correction):
             share = ((self.times[first:last] - course.start[i]) / (time - course.start[i])) ** 2
             self.velocity[first:last, i] += share[:, None] * correction[:3]
@@ -100,22 +91,14 @@ class Recorder:
 
     def flush_all(self, course, bodies: np.ndarray, time: float) -> None:
         """Write the frames of all these bodies before `time`, as `flush` does."""
-        last = int(np.searchsorted(self.times, time, side="left"))
-        _sample_all(
-            course, bodies, self.times, last, self.written, self.position, self.orientation, self.velocity, self.angular_velocity
-        )
+        self._write(course, bodies, int(np.searchsorted(self.times, time, side="left")))
 
     def finish(self, course) -> None:
         """Write what is left of all bodies."""
-        everyone = np.arange(len(self.written))
         for last in range(int(self.written.min(initial=0)), len(self.times), AT_ONCE):
-            self.flush_all(course, everyone, self.times[last])
-        self.flush_all(course, everyone, np.inf)
+            self.flush_all(course, self._everyone, self.times[last])
+        self.flush_all(course, self._everyone, np.inf)
 
-    def _write(self, course, i: int, last: int) -> None:
-        first = int(self.written[i])
-        if last > first:
-            sample_path(
-                course, i, self.times, first, last, self.position, self.orientation, self.velocity, self.angular_velocity
-            )
-            self.written[i] = last
+    def _write(self, course, bodies: np.ndarray, last: int) -> None:
+        frames = self.position, self.orientation, self.velocity, self.angular_velocity
+        sample_paths(course, bodies, self.times, last, self.written, *frames)

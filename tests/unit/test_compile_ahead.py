@@ -31,7 +31,7 @@ print(len(ahead), "compared")
 @pytest.mark.parametrize(
     ("first", "second", "jointed", "scene"),
     [
-        ("_respond_and_detect", "_move_sweep_and_solve", False, "stack_10"),
+        ("_respond_and_detect", "_move_and_sweep", False, "stack_10"),
         ("_look_at_heap", "_step_heap", False, "pile"),
         ("_start_joints", "_close_and_stop_joints", True, "arm"),
     ],

@@ -21,7 +21,7 @@ from rigidimpulse.errors import SceneError
 from rigidimpulse.fingerprint import fingerprint
 from rigidimpulse.io.cache.file import FRAMES, SUFFIXES, CacheFile, Content, Header, read
 from rigidimpulse.io.cache.freeze import Constants, freeze, thaw
-from rigidimpulse.observe.recorder import sample_path
+from rigidimpulse.observe.recorder import sample_paths
 from rigidimpulse.recording import Recording, RunSettings
 
 if TYPE_CHECKING:
@@ -129,9 +129,8 @@ class Keeper:
     def _fill_in(self, first: int, last: int) -> None:
         """Write frames until the last one that are not written yet, from the present courses; what writes them comes again."""
         recorder, course = self.running.context.recorder, self.running.context.state.course
-        for i in np.flatnonzero(recorder.written < last).tolist():
-            begin = max(int(recorder.written[i]), first)
-            sample_path(course, i, recorder.times, begin, last, *(getattr(recorder, name) for name in FRAMES))
+        behind, frames = np.flatnonzero(recorder.written < last), (getattr(recorder, name) for name in FRAMES)
+        sample_paths(course, behind, recorder.times, last, np.maximum(recorder.written, first), *frames)
 
     def _content(self, frames: int, time: float, state: bytes, tables: dict[str, Any] | None = None) -> Content:
         context = self.running.context
