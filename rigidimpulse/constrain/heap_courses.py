@@ -10,6 +10,8 @@ CALM, PLAY = 0.05, 0.5
 """Speed, in sqrt(g r), and motion, in skins, below which a body is calm."""
 TURN = 2.5
 """Angle by which a body may turn in one course, rad."""
+EVEN = 1e-6
+"""Part of its way by which a body may miss where an even acceleration would have brought it, for its path to be a parabola."""
 
 
 @jit
@@ -36,7 +38,7 @@ def arrive(course, members, time, steady, bodies, rotation, acceleration, angula
             course.position[i, c] = bodies.position[i, c]
             course.velocity[i, c] = course.stepped[i, c] = bodies.velocity[i, c]
             course.angular_velocity[i, c] = course.stepped[i, 3 + c] = bodies.angular_velocity[i, c]
-            course.stepped[i, 6 + c] = course.stepped[i, 9 + c] = 0.0
+            course.stepped[i, 6 + c] = course.stepped[i, 9 + c] = course.acceleration[i, c] = 0.0
             acceleration[i, c], angular_acceleration[i, c] = steady[i, c], 0.0
         begin_straight(course, i)
 
@@ -146,7 +148,10 @@ def count_calm(members, position, orientation, velocity, strength, inner, skin, 
 
 @jit
 def depart(course, members, time, length, bodies, position, orientation, velocity):
-    """Courses from the present poses to the given ones (k, 3), (k, 4), where the velocities are (k, 6)."""
+    """Courses from the present poses to the given ones (k, 3), (k, 4), where the velocities are (k, 6).
+
+    They are straight, but parabolas of bodies that fly freely: their velocities agree with where they come.
+    """
     for k in range(members.shape[0]):
         i = members[k]
         a0, a1, a2, a3 = bodies.orientation[i, 0], bodies.orientation[i, 1], bodies.orientation[i, 2], bodies.orientation[i, 3]
@@ -155,14 +160,20 @@ def depart(course, members, time, length, bodies, position, orientation, velocit
             q0, q1, q2, q3 = -q0, -q1, -q2, -q3
         sine = np.sqrt(q1 * q1 + q2 * q2 + q3 * q3)
         factor = 2.0 * np.arctan2(sine, q0) / (sine * length) if sine > 0.0 else 0.0
+        missed, way = 0.0, 0.0
+        for c in range(3):
+            first, last = bodies.velocity[i, c], velocity[k, c]
+            missed += np.abs(position[k, c] - bodies.position[i, c] - 0.5 * length * (first + last))
+            way += 0.5 * length * (np.abs(first) + np.abs(last))
         course.start[i], course.mode[i] = time, STEPPED
         course.angular_velocity[i, 0] = factor * q1
         course.angular_velocity[i, 1] = factor * q2
         course.angular_velocity[i, 2] = factor * q3
         for c in range(3):
             course.position[i, c] = bodies.position[i, c]
-            course.velocity[i, c] = (position[k, c] - bodies.position[i, c]) / length
-            course.acceleration[i, c] = course.torque[i, c] = 0.0
+            pull = (velocity[k, c] - bodies.velocity[i, c]) / length if missed <= EVEN * way else 0.0
+            course.velocity[i, c] = (position[k, c] - bodies.position[i, c]) / length - 0.5 * length * pull
+            course.acceleration[i, c], course.torque[i, c] = pull, 0.0
             course.stepped[i, c], course.stepped[i, 3 + c] = bodies.velocity[i, c], bodies.angular_velocity[i, c]
             course.stepped[i, 6 + c] = velocity[k, c] - bodies.velocity[i, c]
             course.stepped[i, 9 + c] = velocity[k, 3 + c] - bodies.angular_velocity[i, c]

@@ -54,17 +54,24 @@ def _dot(w, i, j):
     return w[i, 0] * w[j, 0] + w[i, 1] * w[j, 1] + w[i, 2] * w[j, 2]
 
 
-@jit_making_arrays
+@inlined
+def _clear(weight, first):
+    """Set weights to 0 from the first on."""
+    for n in range(first, 4):
+        weight[n] = 0.0
+
+
+@jit
 def _nearest_of_segment(w, i, j, weight):
     """Weights (4,) of the point of the segment nearest to 0."""
-    weight[:] = 0.0
+    _clear(weight, 0)
     along = _dot(w, i, i) - _dot(w, i, j)
     square = along + _dot(w, j, j) - _dot(w, i, j)
     t = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
     weight[i], weight[j] = 1.0 - t, t
 
 
-@jit_making_arrays
+@jit
 def _nearest_of_triangle(w, i, j, k, weight):
     """Weights (4,) of the point of the triangle nearest to 0 (regions of a triangle; Ericson 2005)."""
     ii, ij, ik, jj, jk, kk = _dot(w, i, i), _dot(w, i, j), _dot(w, i, k), _dot(w, j, j), _dot(w, j, k), _dot(w, k, k)
@@ -72,20 +79,15 @@ def _nearest_of_triangle(w, i, j, k, weight):
     d1, d2 = ii - ij, ii - ik
     d3, d4 = ij - jj, ij - jk
     d5, d6 = ik - jk, ik - kk
-    if d1 <= 0.0 and d2 <= 0.0:
-        weight[:] = 0.0
-        weight[i] = 1.0
-        return
-    if d3 >= 0.0 and d4 <= d3:
-        weight[:] = 0.0
-        weight[j] = 1.0
-        return
-    if d6 >= 0.0 and d5 <= d6:
-        weight[:] = 0.0
-        weight[k] = 1.0
-        return
     vc, vb, va = d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4
-    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+    _clear(weight, 0)
+    if d1 <= 0.0 and d2 <= 0.0:
+        weight[i] = 1.0
+    elif d3 >= 0.0 and d4 <= d3:
+        weight[j] = 1.0
+    elif d6 >= 0.0 and d5 <= d6:
+        weight[k] = 1.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
         _nearest_of_segment(w, i, j, weight)
     elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
         _nearest_of_segment(w, i, k, weight)
@@ -93,7 +95,6 @@ def _nearest_of_triangle(w, i, j, k, weight):
         _nearest_of_segment(w, j, k, weight)
     else:
         total = va + vb + vc
-        weight[:] = 0.0
         weight[i], weight[j], weight[k] = va / total, vb / total, vc / total
 
 
@@ -107,7 +108,7 @@ def _square_of(w, weight):
     return square
 
 
-@jit_making_arrays
+@jit
 def _nearest_of_tetrahedron(w, weight, trial):
     """The same of a tetrahedron; whether 0 is outside."""
     best, outside = inf, False
@@ -125,16 +126,16 @@ def _nearest_of_tetrahedron(w, weight, trial):
         square = _square_of(w, trial)
         if square < best:
             best = square
-            weight[:] = trial
+            weight[0], weight[1], weight[2], weight[3] = trial[0], trial[1], trial[2], trial[3]
     return outside
 
 
-@jit_making_arrays
+@jit
 def _reduce(simplex, count):
     """Weights of the point nearest to 0, and the corners that bear it first; returns their number, 5 where 0 is inside."""
     w, corner, weight, trial = simplex
     if count == 1:
-        weight[:] = 0.0
+        _clear(weight, 0)
         weight[0] = 1.0
     elif count == 2:
         _nearest_of_segment(w, 0, 1, weight)
@@ -149,7 +150,7 @@ def _reduce(simplex, count):
                 w[kept, m] = w[n, m]
             corner[kept, 0], corner[kept, 1], weight[kept] = corner[n, 0], corner[n, 1], weight[n]
             kept += 1
-    weight[kept:] = 0.0
+    _clear(weight, kept)
     return kept
 
 

@@ -6,8 +6,8 @@
       PRESCRIBED   q(t) = exp(w0 s) q0, constant velocity and world angular velocity (its acceleration must be 0)
       FREE         no torque: closed form (free_top)
       FORCED       world torque tau0 + tau1 s: power series (forced_top)
-      STEPPED      as PRESCRIBED: a straight way to a pose that a heap's solver found; the body's own velocities run from those
-                   at the start to those at the end of the step
+      STEPPED      as PRESCRIBED, but for a constant acceleration: the way to a pose that a heap's solver found; the body's own
+                   velocities run from those at the start to those at the end of the step
 
 The sweep and the integration both read the path here, so the impact time and the motion cannot disagree. A row is set
 by its owner (all columns, and of `top` the rates at its end), then made ready by `begin`. Evaluation only reads; it may be called
@@ -224,9 +224,9 @@ def stepped_at(course, i, t):
     s = t - course.start[i]
     share = min(s / course.stepped[i, 12], 1.0)
     x = (
-        _moved(course.position[i, 0], course.velocity[i, 0], 0.0, 0.0, s),
-        _moved(course.position[i, 1], course.velocity[i, 1], 0.0, 0.0, s),
-        _moved(course.position[i, 2], course.velocity[i, 2], 0.0, 0.0, s),
+        _moved(course.position[i, 0], course.velocity[i, 0], course.acceleration[i, 0], 0.0, s),
+        _moved(course.position[i, 1], course.velocity[i, 1], course.acceleration[i, 1], 0.0, s),
+        _moved(course.position[i, 2], course.velocity[i, 2], course.acceleration[i, 2], 0.0, s),
     )
     q = (course.orientation[i, 0], course.orientation[i, 1], course.orientation[i, 2], course.orientation[i, 3])
     wx, wy, wz = course.angular_velocity[i, 0], course.angular_velocity[i, 1], course.angular_velocity[i, 2]
