@@ -196,7 +196,7 @@ class Shape:
         figures = [getattr(self, name) for name in names.get(self.kind, ("radius", "height"))]
         return f"Shape.{self.kind}({', '.join(str(f.tolist() if isinstance(f, np.ndarray) else f) for f in figures)})"
 
-    @cached_property
+    @property
     def key(self) -> tuple:
         """The same for shapes that are known to be alike: those of one kind with the same lengths, and each with itself."""
         if self.kind in ("sphere", "box", "capsule", "cylinder"):

@@ -102,8 +102,11 @@ def stirred(first, second, member, restless, bodies, mass, strength, inner):
                 spin += bodies.angular_velocity[i, c] ** 2
             size = np.sqrt(speed) + inner[i] * np.sqrt(spin)
             reach[i] = 1.0 + max(mass[i] * size / (least * max(CALM * np.sqrt(strength[i] * inner[i]), 1e-300)), 1.0)
+    left = 0
+    for i in range(member.shape[0]):
+        left += member[i] and reach[i] < 1.0
     spreads, number, turn = True, first.shape[0], 0
-    while spreads:
+    while spreads and left > 0:
         spreads, turn = False, 1 - turn
         for k in range(number):
             # To and fro: a stir goes far either way.
@@ -114,6 +117,7 @@ def stirred(first, second, member, restless, bodies, mass, strength, inner):
             if reach[a] > reach[b]:
                 a, b = b, a
             if reach[b] - 1.0 > reach[a]:
+                left -= reach[a] < 1.0 <= reach[b] - 1.0
                 reach[a] = reach[b] - 1.0
                 spreads = spreads or reach[a] > 1.0
     return reach >= 1.0

@@ -1,5 +1,6 @@
 """Shapes as people write them: what is kept, what is cleaned, what is refused and with which words."""
 
+import copy
 import os
 import pickle
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rigidimpulse as ri
 from rigidimpulse.errors import SceneError
 from rigidimpulse.shape import Shape, rotation_matrix
 
@@ -281,3 +283,25 @@ def test_representations_say_what_a_shape_is():
     assert repr(Shape.capsule(1, 2)) == "Shape.capsule(1.0, 2.0)"
     assert repr(Shape.mesh(BOX.vertices, BOX.faces)) == "Shape.mesh(8 vertices, 12 faces)"
     assert "1 parts" in repr(Shape.compound([(Shape.sphere(1), (0, 0, 0), NO_TURN)]))
+
+
+def test_shapes_of_the_same_lengths_are_compiled_once_and_meshes_each():
+    def scene(shapes):
+        bodies = [ri.Body(f"body {k}", shape, position=(3.0 * k, 0, 0)) for k, shape in enumerate(shapes)]
+        return ri.compile_scene(ri.Scene(bodies=bodies))
+
+    box = ri.Shape.box(1.0)
+    corners, faces = box.surface().vertices, box.surface().faces
+    meshes = [ri.Shape.mesh(factor * corners, faces) for factor in (1.0, 1.0, 2.0)]
+    boxes = [ri.Shape.box(size) for size in (1.0, (1, 1, 1), 2.0)]
+    world = scene([*boxes, ri.Shape.sphere(1.0), ri.Shape.capsule(1.0, 2.0), *meshes])
+    assert world.shape_of_body.tolist() == [0, 0, 1, 2, 3, 4, 5, 6]
+    np.testing.assert_allclose(world.mass / world.mass[0], [1, 1, 8, 4 / 3 * np.pi, 10 / 3 * np.pi, 1, 1, 8], rtol=1e-12)
+
+
+def test_copies_of_shapes_that_have_been_used_are_no_other_shape():
+    # What a shape is known by must not travel with it into another process, where another shape may be at its place.
+    mesh = ri.Shape.mesh(ri.Shape.box(1.0).surface().vertices, ri.Shape.box(1.0).surface().faces)
+    ri.compile_scene(ri.Scene(bodies=[ri.Body("body", mesh)]))
+    assert pickle.loads(pickle.dumps(mesh)).key != mesh.key
+    assert copy.copy(mesh).key != mesh.key
