@@ -73,7 +73,7 @@ def body_mass(body: Body) -> BodyMass:
 
 
 def masses_of(bodies: Iterable[Body]) -> list[BodyMass]:
-    """Return the mass properties of bodies, of those that are alike the same ones; errors are those of `body_mass`."""
+    """Return the mass properties of bodies, the same for those that are alike; errors are those of `body_mass`."""
     known: dict[tuple, BodyMass] = {}
     masses = []
     for body in bodies:

@@ -196,12 +196,19 @@ class Shape:
         figures = [getattr(self, name) for name in names.get(self.kind, ("radius", "height"))]
         return f"Shape.{self.kind}({', '.join(str(f.tolist() if isinstance(f, np.ndarray) else f) for f in figures)})"
 
-    @property
-    def key(self) -> tuple:
-        """The same for shapes that are known to be alike: those of one kind with the same lengths, and each with itself."""
-        if self.kind in ("sphere", "box", "capsule", "cylinder"):
-            return self.kind, self.radius, self.height, None if self.size is None else self.size.tobytes()
-        return ("one of its own", id(self))
+    @cached_property
+    def key(self) -> bytes:
+        """A digest of all that makes the shape, but for the file that it is from: the same for shapes that are alike."""
+        from hashlib import blake2b
+
+        digest = blake2b(f"{self.kind} {self.radius!r} {self.height!r} {self.offset!r}".encode(), digest_size=16)
+        arrays = [self.size, self.normal, self.vertices, self.faces]
+        for shape, position, orientation in self.parts:
+            digest.update(shape.key)
+            arrays += [position, orientation]
+        for array in arrays:
+            digest.update(b"none" if array is None else repr(array.shape).encode() + array.tobytes())
+        return digest.digest()
 
     @property
     def label(self) -> str:

@@ -285,23 +285,28 @@ def test_representations_say_what_a_shape_is():
     assert "1 parts" in repr(Shape.compound([(Shape.sphere(1), (0, 0, 0), NO_TURN)]))
 
 
-def test_shapes_of_the_same_lengths_are_compiled_once_and_meshes_each():
-    def scene(shapes):
-        bodies = [ri.Body(f"body {k}", shape, position=(3.0 * k, 0, 0)) for k, shape in enumerate(shapes)]
-        return ri.compile_scene(ri.Scene(bodies=bodies))
-
-    box = ri.Shape.box(1.0)
+def test_shapes_that_are_alike_are_compiled_once():
+    box, half = ri.Shape.box(1.0), (1.0, 0.0, 0.0, 0.0)
     corners, faces = box.surface().vertices, box.surface().faces
     meshes = [ri.Shape.mesh(factor * corners, faces) for factor in (1.0, 1.0, 2.0)]
-    boxes = [ri.Shape.box(size) for size in (1.0, (1, 1, 1), 2.0)]
-    world = scene([*boxes, ri.Shape.sphere(1.0), ri.Shape.capsule(1.0, 2.0), *meshes])
-    assert world.shape_of_body.tolist() == [0, 0, 1, 2, 3, 4, 5, 6]
-    np.testing.assert_allclose(world.mass / world.mass[0], [1, 1, 8, 4 / 3 * np.pi, 10 / 3 * np.pi, 1, 1, 8], rtol=1e-12)
+    pairs = [ri.Shape.compound([(ri.Shape.box(1.0), (x, 0, 0), half), (ri.Shape.sphere(0.2), (0, 0, 0), half)]) for x in (1.0, 1.0, 2.0)]
+    shapes = [box, ri.Shape.box((1, 1, 1)), ri.Shape.box(2.0), ri.Shape.sphere(1.0), ri.Shape.capsule(1.0, 2.0), *meshes, *pairs]
+    bodies = [ri.Body(f"body {k}", shape, position=(5.0 * k, 0, 0)) for k, shape in enumerate(shapes)]
+    world = ri.compile_scene(ri.Scene(bodies=bodies))
+    assert world.shape_of_body.tolist() == [0, 0, 1, 2, 3, 4, 4, 5, 6, 6, 7]
+    np.testing.assert_allclose(world.mass[:8] / world.mass[0], [1, 1, 8, 4 / 3 * np.pi, 10 / 3 * np.pi, 1, 1, 8], rtol=1e-12)
 
 
-def test_copies_of_shapes_that_have_been_used_are_no_other_shape():
-    # What a shape is known by must not travel with it into another process, where another shape may be at its place.
+def test_alike_shapes_of_bodies_whose_masses_differ_share_nothing_but_the_shape():
+    alike = [{}, {"mass": 2.0}, {"material": ri.Material(density=10.0)}, {"center_of_mass": (0.1, 0, 0)}, {"motion": "static"}]
+    bodies = [ri.Body(f"body {k}", ri.Shape.box(1.0), position=(3.0 * k, 0, 0), **given) for k, given in enumerate(alike)]
+    world = ri.compile_scene(ri.Scene(bodies=bodies))
+    assert world.mass.tolist() == [1000.0, 2.0, 10.0, 1000.0, np.inf]
+    assert world.offset[3].tolist() == [0.1, 0.0, 0.0]
+    assert world.shape_of_body.tolist() == [0, 0, 0, 1, 0]
+
+
+def test_what_a_shape_is_known_by_travels_with_it():
     mesh = ri.Shape.mesh(ri.Shape.box(1.0).surface().vertices, ri.Shape.box(1.0).surface().faces)
-    ri.compile_scene(ri.Scene(bodies=[ri.Body("body", mesh)]))
-    assert pickle.loads(pickle.dumps(mesh)).key != mesh.key
-    assert copy.copy(mesh).key != mesh.key
+    assert pickle.loads(pickle.dumps(mesh)).key == mesh.key == ri.Shape.mesh(mesh.vertices, mesh.faces).key
+    assert copy.copy(mesh).key == mesh.key
