@@ -222,7 +222,7 @@ def finite_poses(recording: RecordingLike, name: str) -> tuple[np.ndarray, np.nd
 def _shared_meshes(bodies: list[Any]) -> tuple[list[int], list[DisplayMesh]]:
     """Return for each body the number of its display mesh, -1 for none, and the meshes; equal shapes share one."""
     different: dict[Any, Any] = {}
-    keys = [_shape_key(body.shape) for body in bodies]
+    keys = [body.shape.key for body in bodies]
     for key, body in zip(keys, bodies, strict=True):
         different.setdefault(key, body.shape)
     num_round = sum(part.shape.kind in ROUND_KINDS for body in bodies for part in body.shape.parts_flat())
@@ -251,15 +251,6 @@ def _center(position: np.ndarray, orientation: np.ndarray, center: np.ndarray) -
     """Return the centre of mass (3,) m in the frame of a body; exactly zero where it is the body's origin but for round-off."""
     offset = rotation_matrix(orientation).T @ (center - position)
     return np.where(np.abs(offset) > ROUND_OFF * (1.0 + np.abs(center).max()), offset, 0.0).tolist()
-
-
-def _shape_key(shape: Any) -> Any:
-    """Return what is equal for shapes that look alike: figures of primitives, else the object itself."""
-    if shape.kind in ("sphere", "capsule", "cylinder"):
-        return (shape.kind, shape.radius, shape.height)
-    if shape.kind == "box":
-        return (shape.kind, *np.asarray(shape.size).tolist())
-    return id(shape)
 
 
 def _paths(

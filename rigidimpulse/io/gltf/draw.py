@@ -64,14 +64,14 @@ class Drawing:
         """Return the mesh of a body, or of a part of its shape, in the colour of the moving body `index`."""
         shape = body.shape if shape is None else shape
         paint = surface(index % len(PALETTE), body)
-        key = (_key(shape), str(paint))
+        key = (shape.key, str(paint))
         if key not in self._meshes:
             primitive = {**self._primitive(shape), "material": self.paint(paint)}
             self._meshes[key] = self.builder.add("meshes", {"primitives": [primitive]})
         return self._meshes[key]
 
     def _primitive(self, shape: Shape) -> dict[str, Any]:
-        key = _key(shape)
+        key = shape.key
         if key not in self._geometry:
             pieces = [_square(normal, offset, self.half) for normal, offset in display_planes(shape)]
             drawn = display_mesh(shape, SEGMENTS)
@@ -100,13 +100,6 @@ class Drawing:
             finish |= {"metallicFactor": paint["metalness"], "roughnessFactor": paint["roughness"]}
             self._paints[key] = self.builder.add("materials", {"pbrMetallicRoughness": finish, "doubleSided": True})
         return self._paints[key]
-
-
-def _key(shape: Shape) -> Any:
-    """What is equal for shapes that look alike: figures of primitives, else the object itself."""
-    if shape.kind in ("sphere", "capsule", "cylinder"):
-        return (shape.kind, shape.radius, shape.height)
-    return (shape.kind, *np.asarray(shape.size).tolist()) if shape.kind == "box" else id(shape)
 
 
 def _square(normal: np.ndarray, offset: float, half: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -111,7 +111,7 @@ def _solid(shape: Shape, name: str, notes: list[str], known: dict[tuple, Shape])
         shape.solid()
         return "dynamic", shape
     except SceneError as error:
-        key = ("hull", id(shape))
+        key = ("hull", shape.key)
         try:
             if key not in known:
                 known[key] = Shape.convex_hull(shape)

@@ -34,9 +34,9 @@ class Drawing:
     def __init__(self, layer: Layer, half: float, bodies: Iterable[Body]) -> None:
         """half: m, half side of squares. bodies: those that will be drawn."""
         self.layer, self.half = layer, max(half, LEAST_SQUARE)
-        parts = [part.shape for body in bodies for part in body.shape.parts_flat() if part.shape.kind == "mesh"]
-        self._uses = Counter(map(id, parts))
-        self._shared: dict[int, SdfPath] = {}
+        parts = [part.shape.key for body in bodies for part in body.shape.parts_flat() if part.shape.kind == "mesh"]
+        self._uses = Counter(parts)
+        self._shared: dict[bytes, SdfPath] = {}
 
     def body(self, path: SdfPath, body: Body, number: int) -> PrimSpec:
         """Return the prim of a body with its shapes, in the colour of the moving body `number`."""
@@ -53,11 +53,11 @@ class Drawing:
     def _is_placed(self, part: Part) -> bool:
         """Whether the prim of a part has operations, or is an instance."""
         moved = bool(np.any(part.position)) or not np.array_equal(part.rotation, np.eye(3))
-        return moved or part.shape.kind == "box" or self._uses[id(part.shape)] > 1
+        return moved or part.shape.kind == "box" or self._uses[part.shape.key] > 1
 
     def _part(self, path: SdfPath, part: Part) -> None:
         shape = part.shape
-        if shape.kind == "mesh" and self._uses[id(shape)] > 1:
+        if shape.kind == "mesh" and self._uses[shape.key] > 1:
             prim = define(self.layer, path)
             prim.referenceList.Prepend(Sdf.Reference(primPath=self._class(shape)))
             prim.instanceable = True
@@ -75,13 +75,13 @@ class Drawing:
 
     def _class(self, shape: Shape) -> SdfPath:
         """Path of the class of a mesh that several bodies have."""
-        if id(shape) not in self._shared:
+        if shape.key not in self._shared:
             path = Sdf.Path(SHAPES).AppendChild(f"mesh{len(self._shared)}")
             define(self.layer, path)
             self.layer.GetPrimAtPath(SHAPES).specifier = Sdf.SpecifierClass
             self._geometry(path.AppendChild("mesh"), shape)
-            self._shared[id(shape)] = path
-        return self._shared[id(shape)]
+            self._shared[shape.key] = path
+        return self._shared[shape.key]
 
     def _geometry(self, path: SdfPath, shape: Shape) -> PrimSpec:
         """Return the prim of a single shape in its own frame."""
