@@ -73,7 +73,9 @@ class JointState:
         self._joint_of_row = np.repeat(np.arange(len(joints)), np.diff(self.table.first))
         held = (self.table.coordinate < RADIUS) & np.isinf(self.table.stiffness) & np.isinf(self.table.lower) & np.isinf(self.table.upper)
         movable = [(i >= 0) & world.dynamic[i] for i in (self.table.body_a, self.table.body_b)]
-        self._pins = (np.bincount(self._joint_of_row[held], minlength=len(joints)) == 3) & ~(movable[0] & movable[1])
+        held_along = np.bincount(self._joint_of_row[held], minlength=len(joints))
+        self._pins = (held_along == 3) & ~(movable[0] & movable[1])
+        self._slides = (held_along == 1) | (held_along == 2)
         self._limited = bool(np.any((self.table.lower == 0.0) != (self.table.upper == 0.0)))
         self._dynamic = world.dynamic
         self._of_body: dict[int, list[int]] = {}
@@ -177,9 +179,12 @@ class JointState:
         fastest = 0.0
         sways, swings = self._tension_rates(context, group.joints)
         rates = max(sways, self._spring_rate(group.joints))
-        for a, b in zip(self.table.body_a[group.joints].tolist(), self.table.body_b[group.joints].tolist(), strict=True):
+        for j in group.joints.tolist():
+            a, b = int(self.table.body_a[j]), int(self.table.body_b[j])
             spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
             fastest = max(fastest, float(np.linalg.norm(spins[1] - spins[0])))
+            if self._slides[j] and min(a, b) >= 0:
+                fastest = max(fastest, _slide_rate(now, a, b, world.accuracy.step))
         waits = self.release_time[group.joints] - group.time
         h = min(h, float(waits[waits > 0.0].min(initial=np.inf)))
         step = world.accuracy.step
@@ -310,6 +315,18 @@ class JointState:
         """Forces on b at this instant: its impulses over half of the sub-steps on both sides."""
         for j in group.joints.tolist():
             self.reactions.append((group.time, j, self.moment[j] / (0.5 * (self.length[j] + h))))
+
+
+def _slide_rate(now, a: int, b: int, step: float) -> float:
+    """sqrt(w u / r) [1/s] of a body that slides at u in the frame of another, which turns at w, at the distance r; w at most.
+
+    The force of the guide, 2 m w u, turns with the frame: constant over h it makes or loses energy, of the order of (w h)^2 u / r a second.
+    u: what it may be at the end of a step, by w^2 r.
+    """
+    spin, between = now.angular_velocity[a], now.position[b] - now.position[a]
+    turn, distance = float(np.linalg.norm(spin)), float(np.linalg.norm(between))
+    slide = float(np.linalg.norm(now.velocity[b] - now.velocity[a] - np.cross(spin, between))) + turn * turn * distance * step
+    return math.sqrt(turn * min(turn, slide / distance)) if distance > 0.0 else turn
 
 
 def reaction_table(joints: JointState | None, times: np.ndarray) -> dict[str, np.ndarray]:

@@ -192,6 +192,37 @@ def test_rope_is_slack_until_it_is_taut() -> None:
     np.testing.assert_allclose(run.reaction("rope")[-1], (0, 0, G), atol=1e-6)
 
 
+@pytest.mark.parametrize("rate", [2.0, 5.0, 20.0])
+def test_bead_on_a_turning_arm_slides_outwards_as_the_hyperbolic_cosine(rate: float) -> None:
+    """r'' = w^2 r: r = r_0 cosh(w t), whatever w is.
+
+    The guide's force turns with the arm; where sub-steps did not look at that, the way was off by 3.5e-3 of it at 5 rad/s, 0.059 at 20.
+    """
+    scene = ri.Scene(gravity=(0, 0, 0))
+    scene.add(ri.Body("arm", ri.Shape.box((4, 0.05, 0.05)), motion="kinematic", angular_velocity=(0, 0, rate)))
+    flies = {"velocity": (0, 0.2 * rate, 0), "angular_velocity": (0, 0, rate)}
+    scene.add(ri.Body("bead", ri.Shape.sphere(0.1), position=(0.2, 0, 0), mass=1.0, **flies))
+    scene.add(ri.SliderJoint("arm", "bead", (0.2, 0, 0), (1, 0, 0)))
+    run = ri.simulate(scene, 3.0 / rate, 240.0)
+    np.testing.assert_allclose(np.linalg.norm(run.position("bead"), axis=1), 0.2 * np.cosh(rate * run.times), rtol=4e-4)
+
+
+@pytest.mark.parametrize("rate", [5.0, 20.0, 60.0])
+def test_pair_on_a_slider_that_spins_in_free_space_keeps_energy_and_angular_momentum(rate: float) -> None:
+    """A random scene made small (issue 3): at 20 rad/s the pair lost 1 % of its energy and 0.1 % of its angular momentum in a second."""
+    spin = rate * np.array([0.3, 0.2, 1.0])
+    scene = ri.Scene(gravity=(0, 0, 0))
+    for name, shape, x in (("a", ri.Shape.box((0.4, 0.3, 0.3)), -0.5), ("b", ri.Shape.cylinder(0.15, 0.3), 0.5)):
+        flies = {"velocity": np.cross(spin, (x, 0, 0)), "angular_velocity": spin}
+        scene.add(ri.Body(name, shape, position=(x, 0, 0), mass=1.0, **flies))
+    scene.add(ri.SliderJoint("a", "b", (0, 0, 0), (0, 1, 0)))
+    run = ri.simulate(scene, 1.0)
+    assert run.status.ok, run.status.message
+    np.testing.assert_allclose(run.ledger.total / run.ledger.total[0], 1.0, rtol=1e-4)
+    momentum = run.ledger.angular_momentum
+    np.testing.assert_allclose(momentum, np.broadcast_to(momentum[0], momentum.shape), atol=1e-12 * np.linalg.norm(momentum[0]))
+
+
 @pytest.mark.parametrize(
     ("joint", "problem"),
     [
