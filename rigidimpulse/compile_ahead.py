@@ -184,7 +184,8 @@ def _look_at_heap(context) -> None:
     world, state, member = context.world, context.state, np.array([False, True])
     state.now.inv_inertia[1] = np.eye(3)
     stepper = HeapStepper(world)
-    stepper.set_up(context, np.array([1]), np.array([0]), STEP)
+    for _ in range(2):  # The second time there is a cover.
+        stepper.set_up(context, np.array([1]), np.array([0]), STEP)
     stepper.near(context, member, ~member, STEP)
     # Columns of one row only would be another type.
     a, b = np.array([[0, 1], [0, 1]]).T
@@ -194,11 +195,15 @@ def _look_at_heap(context) -> None:
 def _step_heap(context) -> None:
     """The solver of heaps, and what brings bodies from step to step."""
     from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_fly, mark_slow, most_stray
+    from rigidimpulse.constrain.heap_islands import TALL, support_levels
+    from rigidimpulse.constrain.heap_motion import mark_quick
     from rigidimpulse.constrain.heap_stepper import HeapStepper
 
     state, now, members = context.state, context.state.now, np.array([1])
     stepper = HeapStepper(context.world)
     stepper.members = members
+    support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
+    mark_quick(stepper.bodies, STEP, 1.0)
     out = stepper.step(context, 0.0, STEP)
     steady = context.world.steady_acceleration
     arrive(state.course, members, 0.0, steady, now, state.rotation, context.acceleration, context.angular_acceleration)

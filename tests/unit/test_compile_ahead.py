@@ -45,6 +45,29 @@ def test_runs_call_what_was_compiled_ahead(first, second, jointed, scene):
     assert int(compared.split()[0]) > 5
 
 
+FIRST_RUN = """
+import rigidimpulse as ri
+from rigidimpulse import compile_ahead
+from rigidimpulse._jit import KERNELS
+
+def used():
+    return {kernel.name for kernel in KERNELS if kernel.calls or kernel.preparing}
+
+for half in (compile_ahead._respond_and_detect, compile_ahead._move_and_sweep):
+    half(compile_ahead._box_on_floor(False))
+ahead = used()
+floor = ri.Body("floor", ri.Shape.half_space(), motion="static")
+run = ri.simulate(ri.Scene(bodies=[floor, ri.Body("box", ri.Shape.box(0.2), position=(0, 0, 1))]), 1.0)
+assert len(run.impacts) > 1 and len(run.contacts) > 0
+print(*sorted(used() - ahead))
+"""
+
+
+def test_nothing_is_left_to_compile_for_a_box_that_falls_on_a_floor():
+    done = subprocess.run([sys.executable, "-c", FIRST_RUN], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
 def test_only_what_a_scene_needs_and_the_cache_lacks_is_compiled(monkeypatch):
     ball = ri.Body("ball", ri.Shape.sphere(0.1), position=(0, 0, 1))
     flies = compile_scene(ri.Scene(bodies=[ball]))
