@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.errors import SceneError
+from rigidimpulse.files import load_mesh
 from rigidimpulse.surface import Surface, clean_surface
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ class Shape:
         factor = _number("scale", scale)
         if not (np.isfinite(factor) and factor > 0.0):
             raise SceneError(f"scale is {scale}", "give metres per unit of the file, > 0", where)
-        mesh = _load(Path(path), where)
+        mesh = load_mesh(Path(path), where)
         shape = Shape.mesh(np.asarray(mesh.vertices, dtype=np.float64) * factor, mesh.faces)
         return Shape("mesh", vertices=shape.vertices, faces=shape.faces, source=os.fspath(path))
 
@@ -333,32 +334,6 @@ def rotation_matrix(quaternion: ArrayLike) -> np.ndarray:
             [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
         ]
     )
-
-
-def _load(path: Path, where: str) -> Trimesh:
-    """Load a file as one mesh, or say why not."""
-    if not path.is_file():
-        reason = "it is a folder" if path.is_dir() else "there is no such file"
-        raise SceneError(f"{reason} (looked for {path.absolute()})", "check the path", where)
-    import trimesh
-
-    try:
-        # `process=False` keeps trimesh from joining vertices by an absolute distance, which would spoil small meshes.
-        scene = trimesh.load_scene(str(path), process=False)
-        mesh = scene.to_mesh()
-    except ImportError as error:
-        raise SceneError(
-            f"{path.suffix} files need a package that is missing ({error})", "install it, or convert to .obj", where
-        ) from error
-    except Exception as error:  # loaders of third parties raise anything on broken files
-        raise SceneError(
-            f"it could not be read ({type(error).__name__}: {error})",
-            "check that it is a complete mesh file and that its suffix says its format, or export it again as .obj",
-            where,
-        ) from error
-    if len(getattr(mesh, "faces", ())) == 0:
-        raise SceneError("there are no triangles in it", "export the surface as triangles", where)
-    return mesh
 
 
 def _hull(points: np.ndarray) -> Shape:
