@@ -243,7 +243,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
 def _start(bodies: list[Body], masses: list[BodyMass]) -> dict[str, np.ndarray]:
     """Centres of mass and principal axes in the body frames, where these are and how they move at the start; see `World`."""
     offset = np.array([m.center_of_mass for m in masses], float).reshape(-1, 3)
-    turns = {id(m): from_matrix(m.axes) for m in {id(m): m for m in masses}.values()}
+    turns = {key: from_matrix(m.axes) for key, m in {id(m): m for m in masses}.items()}
     turn = np.array([turns[id(m)] for m in masses], float).reshape(-1, 4)
     origin = np.array([body.position for body in bodies], float).reshape(-1, 3)
     orientation = np.array([body.unit_orientation() for body in bodies], float).reshape(-1, 4)
