@@ -16,6 +16,7 @@ from rigidimpulse.constrain.heap_lanes import DEEPEST, TINY, add, along, cross, 
 from rigidimpulse.constrain.heap_records import (
     ARM_A,
     ARM_B,
+    ARM_FIELDS,
     BETWEEN,
     DEPTH,
     FIELDS,
@@ -124,10 +125,10 @@ def _tangents(lanes, n):
 
 @inlined
 def _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
-    """Places and gaps of the points of batch k into its record; returns their mean from the centre of a."""
+    """Places, from the first of them, and gaps of the points of batch k into its record; returns the first and their mean from it."""
     w = width_of(lanes)
     record, zero, one = batches.record, spread(lanes, 0.0), spread(lanes, 1.0)
-    rest, number, mean = one - share, zero, (zero, zero, zero)
+    rest, number, base, mean = one - share, zero, (zero, zero, zero), (zero, zero, zero)
     between = less(linear(pb), linear(pa))
     for c in range(batches.points[k]):
         g = (k * FIELDS + POINT + POINT_SIZE * c) * w
@@ -138,6 +139,10 @@ def _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
         gap = dot(n, less(b, a)) - (first[ROUND_A] + first[ROUND_B]) - second[HELD - ROW]
         a, b = along(a, first[ROUND_A], n), along(b, -first[ROUND_B], n)
         x = (fma(share, a[0], rest * b[0]), fma(share, a[1], rest * b[1]), fma(share, a[2], rest * b[2]))
+        # The first and only point of a patch lies at its centre to the bit: with a lever of round-off any force would hold a twist.
+        if c == 0:
+            base = x
+        x = less(x, base)
         store(record, g + X * w, dot(t, x))
         store(record, g + Y * w, dot(u, x))
         store(record, g + GAP * w, gap)
@@ -146,12 +151,12 @@ def _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
         store(record, g + MASS * w, here)
         number, mean = number + here, along(mean, here, x)
     inverse = one / where_greater(number, zero, number, one)
-    return mean[0] * inverse, mean[1] * inverse, mean[2] * inverse
+    return base, (mean[0] * inverse, mean[1] * inverse, mean[2] * inverse)
 
 
 @inlined
 def _impulses(lanes, batches, k, lines, middle, t, u):
-    """Points from the centre of the patch, and impulses carried over, into the record of batch k."""
+    """Points from the centre of the patch, `middle` from the first, and impulses carried over, into the record of batch k."""
     w = width_of(lanes)
     record, zero = batches.record, spread(lanes, 0.0)
     o, x0, y0 = k * FIELDS * w, dot(t, middle), dot(u, middle)
@@ -192,14 +197,16 @@ def fill(lanes, batches, begin, number, places, mass, lines, soft):
         core_b = add(between, _turned(rb, (second[CORE_B - ROW], second[CORE_B + 1 - ROW], second[CORE_B + 2 - ROW])))
         n = _normal(lanes, first, second, ra, rb, core_a, core_b)
         t, u = _tangents(lanes, n)
-        arm_a = _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u)
+        base, middle = _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u)
+        arm_a = add(base, middle)
         arm_b = less(arm_a, between)
-        _impulses(lanes, batches, k, lines, arm_a, t, u)
+        _impulses(lanes, batches, k, lines, middle, t, u)
         store_three(record, o + NORMAL * w, w, n[0], n[1], n[2])
         store_three(record, o + TANGENT_1 * w, w, t[0], t[1], t[2])
         store_three(record, o + TANGENT_2 * w, w, u[0], u[1], u[2])
-        store_three(record, o + ARM_A * w, w, arm_a[0], arm_a[1], arm_a[2])
-        store_three(record, o + ARM_B * w, w, arm_b[0], arm_b[1], arm_b[2])
+        arms = k * ARM_FIELDS * w
+        store_three(batches.arm, arms + ARM_A * w, w, arm_a[0], arm_a[1], arm_a[2])
+        store_three(batches.arm, arms + ARM_B * w, w, arm_b[0], arm_b[1], arm_b[2])
         store_three(record, o + SHARE * w, w, share, first[ROUND_A], first[ROUND_B])
         store(record, o + MU_STATIC * w, second[STATIC_FRICTION - ROW])
         store(record, o + MU_DYNAMIC * w, second[DYNAMIC_FRICTION - ROW])

@@ -15,6 +15,7 @@ from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_records import (
     ARM_A,
     ARM_B,
+    ARM_FIELDS,
     BETWEEN,
     DEPTH,
     FIELDS,
@@ -116,12 +117,17 @@ def store_three(record, at, w, a, b, c):
 
 
 @inlined
-def _arms(lanes, record, o, xa, xb):
-    """The arms to O, and how far b has moved from a."""
+def _arms(lanes, batches, k):
+    """The arms of batch k as they were when it was made."""
     w = width_of(lanes)
-    share = load(lanes, record, o + SHARE * w)
+    o = k * ARM_FIELDS * w
+    return three(lanes, batches.arm, o + ARM_A * w), three(lanes, batches.arm, o + ARM_B * w)
+
+
+@inlined
+def _moved_arms(lanes, arm_a, arm_b, share, xa, xb):
+    """The arms to O, and how far b has moved from a."""
     d = (xb[0] - xa[0], xb[1] - xa[1], xb[2] - xa[2])
-    arm_a, arm_b = three(lanes, record, o + ARM_A * w), three(lanes, record, o + ARM_B * w)
     return along(arm_a, spread(lanes, 1.0) - share, d), along(arm_b, -share, d), d
 
 
@@ -160,7 +166,8 @@ def warm_start(lanes, batches, begin, number, velocity, moved, mass):
         va, vb = gather(lanes, velocity, batches.first, k * w), gather(lanes, velocity, batches.second, k * w)
         ma, mb = gather(lanes, mass, batches.first, k * w), gather(lanes, mass, batches.second, k * w)
         xa, xb = gather(lanes, moved, batches.first, k * w), gather(lanes, moved, batches.second, k * w)
-        arm_a, arm_b, _ = _arms(lanes, record, o, xa, xb)
+        arm_a, arm_b = _arms(lanes, batches, k)
+        arm_a, arm_b, _ = _moved_arms(lanes, arm_a, arm_b, load(lanes, record, o + SHARE * w), xa, xb)
         press, turn_1, turn_2 = zero, zero, zero
         for c in range(batches.points[k]):
             g = o + (POINT + POINT_SIZE * c) * w
@@ -254,11 +261,12 @@ def solve(lanes, batches, begin, number, velocity, moved, mass, h, relaxing):
         xa, xb = gather(lanes, moved, batches.first, k * w), gather(lanes, moved, batches.second, k * w)
         n = three(lanes, record, o + NORMAL * w)
         t, u = three(lanes, record, o + TANGENT_1 * w), three(lanes, record, o + TANGENT_2 * w)
-        arm_a, arm_b, d = _arms(lanes, record, o, xa, xb)
+        arm_a, arm_b = _arms(lanes, batches, k)
         # How the gap has changed: at O, and from there along t_1 and t_2.
         ga, gb = _turned_normal(angular(xa), n, half), _turned_normal(angular(xb), n, half)
-        core_a = along(three(lanes, record, o + ARM_A * w), -load(lanes, record, o + RADIUS_A * w), n)
-        core_b = along(three(lanes, record, o + ARM_B * w), load(lanes, record, o + RADIUS_B * w), n)
+        core_a = along(arm_a, -load(lanes, record, o + RADIUS_A * w), n)
+        core_b = along(arm_b, load(lanes, record, o + RADIUS_B * w), n)
+        arm_a, arm_b, d = _moved_arms(lanes, arm_a, arm_b, load(lanes, record, o + SHARE * w), xa, xb)
         at_o = dot(n, d) + (dot(gb, core_b) - dot(ga, core_a))
         between = less(gb, ga)
         slope_1, slope_2 = dot(t, between), dot(u, between)

@@ -3,7 +3,8 @@
 A patch is up to four contact points of one pair with one normal. Patches that share no movable body have one colour (greedy, in
 the order of the pairs, with a word of bits for each body) and may be solved at once; a batch is W patches of one colour, those of
 most points first. The record of a batch is an array of fields times lanes: with O the centre of the patch, n its normal, t_1
-and t_2 tangents, t_1 x t_2 = n, a point lies at O + x t_1 + y t_2.
+and t_2 tangents, t_1 x t_2 = n, a point lies at O + x t_1 + y t_2. Records are in single precision (the passes compute in double
+precision): what that takes from an impulse it takes from its effect on both bodies. The arms, which keep the angular momentum, are not.
 """
 
 from __future__ import annotations
@@ -27,21 +28,23 @@ from rigidimpulse.constrain.heap_rows import (
 )
 from rigidimpulse.constrain.lanes import ROW, aligned
 
-NORMAL, TANGENT_1, TANGENT_2, ARM_A, ARM_B = 0, 3, 6, 9, 12
-"""Fields of three: axes; from the centres of the bodies to O, m."""
-SHARE, RADIUS_A, RADIUS_B, MU_STATIC, MU_DYNAMIC, DEPTH = 15, 16, 17, 18, 19, 20
+ARM_A, ARM_B, ARM_FIELDS = 0, 3, 6
+"""Fields of three of the arms: from the centres of the bodies to O, m."""
+NORMAL, TANGENT_1, TANGENT_2 = 0, 3, 6
+"""Fields of three of the record: axes."""
+SHARE, RADIUS_A, RADIUS_B, MU_STATIC, MU_DYNAMIC, DEPTH = 9, 10, 11, 12, 13, 14
 """How much of a's motion O makes; radii of rounded surfaces, m; coefficients; skin, m."""
-STIFF, HARD, SOFT = 21, 22, 23
+STIFF, HARD, SOFT = 15, 16, 17
 """w / a_1 [1/s], a_2 a_3, a_3 of the spring."""
-PUSH_1, PUSH_2, TWIST = 24, 25, 26
+PUSH_1, PUSH_2, TWIST = 18, 19, 20
 """Friction impulse along the tangents, N s, and about n, N m s."""
-STEP_T, STEP_N = 27, 28
+STEP_T, STEP_N = 21, 22
 """1 / largest eigenvalue of the tangents' part of K, and of that about n."""
-TO_NORMAL, TO_TURN_1, TO_TURN_2, TWIST_TO_1, TWIST_TO_2 = 29, 32, 35, 38, 39
+TO_NORMAL, TO_TURN_1, TO_TURN_2, TWIST_TO_1, TWIST_TO_2 = 23, 26, 29, 32, 33
 """How impulses (t_1, t_2, about n) change the speeds along n, about t_1 and about t_2 (three each); a twist those along t_1, t_2."""
-BETWEEN = 40
+BETWEEN = 34
 """How points push each other along n: 01, 02, 03, 12, 13, 23."""
-POINT, POINT_SIZE = 46, 6
+POINT, POINT_SIZE = 40, 6
 X, Y, GAP, MASS, PRESS, LEVER = 0, 1, 2, 3, 4, 5
 """First field of the points, and fields of each: place, m; gap less the held one, m; effective mass, 0: none; impulse; distance from O."""
 FIELDS = POINT + 4 * POINT_SIZE
@@ -68,7 +71,8 @@ class Patches(NamedTuple):
 class Batches(NamedTuple):
     """b batches of W lanes."""
 
-    record: np.ndarray  # (FIELDS b W,)
+    record: np.ndarray  # (FIELDS b W,) single precision
+    arm: np.ndarray  # (ARM_FIELDS b W,)
     first: np.ndarray  # (b W,) body a of each lane
     second: np.ndarray  # (b W,)
     row: np.ndarray  # (4 b W,) first line in the pool of the points of each lane, point by point; 0 for none
@@ -91,8 +95,10 @@ def more_patches(patches: Patches, m: int) -> Patches:
 
 def more_batches(batches: Batches, b: int, width: int) -> Batches:
     """The same with room for b batches."""
-    record, (first, second) = aligned((FIELDS * b * width + ROW - 1) // ROW), np.zeros((2, b * width), np.int64)
-    out = Batches(record, first, second, np.zeros(POINTS * b * width, np.int64), np.zeros(b, np.int64))
+    slots = b * width
+    record, arm = aligned(-(-FIELDS * slots // (2 * ROW))).view(np.float32), aligned(-(-ARM_FIELDS * slots // ROW))
+    first, second = np.zeros((2, slots), np.int64)
+    out = Batches(record, arm, first, second, np.zeros(POINTS * slots, np.int64), np.zeros(b, np.int64))
     for new, old in zip(out, batches, strict=True):
         new[: len(old)] = old
     return out

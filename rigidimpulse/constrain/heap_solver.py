@@ -33,12 +33,13 @@ from math import pi, sqrt
 
 import numpy as np
 
-from rigidimpulse._jit import jit, jit_making_arrays
+from rigidimpulse._jit import inlined, jit, jit_making_arrays
 from rigidimpulse.constrain.heap_lanes import solve, warm_start
 from rigidimpulse.constrain.heap_motion import finish, kick, move
 from rigidimpulse.constrain.heap_records import (
     ARM_A,
     ARM_B,
+    ARM_FIELDS,
     FIELDS,
     GAP,
     MASS,
@@ -87,9 +88,15 @@ def softness(h: float) -> np.ndarray:
     return out
 
 
+@inlined
+def _field(record, at):
+    """A field of the record, in double precision."""
+    return np.float64(record[at])
+
+
 @jit
 def _vector(record, at, width):
-    return record[at], record[at + width], record[at + 2 * width]
+    return _field(record, at), _field(record, at + width), _field(record, at + 2 * width)
 
 
 @jit
@@ -97,22 +104,28 @@ def _cross(ax, ay, az, bx, by, bz):
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
+@inlined
+def _first_arm(s, width):
+    """Place of the first field of the arms of slot s."""
+    return s // width * ARM_FIELDS * width + s % width
+
+
 @jit_making_arrays
 def _arms_to(bodies, batches, s, o, width, c):
     """Bodies of lane s, and the arms from them to its point c (to its centre for c < 0) as they are now."""
-    record, moved = batches.record, bodies.moved
+    record, arm, moved = batches.record, batches.arm, bodies.moved
     a, b = batches.first[s], batches.second[s]
     x, y = 0.0, 0.0
     if c >= 0:
         g = o + (POINT + POINT_SIZE * c) * width
-        x, y = record[g + X * width], record[g + Y * width]
-    share = record[o + SHARE * width]
+        x, y = _field(record, g + X * width), _field(record, g + Y * width)
+    share, q = _field(record, o + SHARE * width), _first_arm(s, width)
     arm_a, arm_b = np.empty(3), np.empty(3)
     for k in range(3):
         d = moved[8 * b + k] - moved[8 * a + k]
-        along = x * record[o + (TANGENT_1 + k) * width] + y * record[o + (TANGENT_2 + k) * width]
-        arm_a[k] = record[o + (ARM_A + k) * width] + (1.0 - share) * d + along
-        arm_b[k] = record[o + (ARM_B + k) * width] - share * d + along
+        along = x * _field(record, o + (TANGENT_1 + k) * width) + y * _field(record, o + (TANGENT_2 + k) * width)
+        arm_a[k] = arm[q + (ARM_A + k) * width] + (1.0 - share) * d + along
+        arm_b[k] = arm[q + (ARM_B + k) * width] - share * d + along
     return a, b, arm_a, arm_b
 
 
@@ -185,14 +198,15 @@ def special_patches(width, bodies, pairs, patches, begin, count, rows, batches, 
 
 
 @jit
-def _turn_balls(width, bodies, pairs, patches, chosen, rows, record):
+def _turn_balls(width, bodies, pairs, patches, chosen, rows, batches):
     """Normals, arms and gaps of two balls where they are now; friction stays across the normal."""
+    record = batches.record
     for m in chosen:
         p, s = patches.pair[m], patches.slot[m]
         a, b = pairs.first[p], pairs.second[p]
         o = (s // width) * FIELDS * width + s % width
-        r, share = patches.row[m, 0], record[o + SHARE * width]
-        f1, f2 = record[o + PUSH_1 * width], record[o + PUSH_2 * width]
+        r, share, q = patches.row[m, 0], _field(record, o + SHARE * width), _first_arm(s, width)
+        f1, f2 = _field(record, o + PUSH_1 * width), _field(record, o + PUSH_2 * width)
         t, u = _vector(record, o + TANGENT_1 * width, width), _vector(record, o + TANGENT_2 * width, width)
         f = (f1 * t[0] + f2 * u[0], f1 * t[1] + f2 * u[1], f1 * t[2] + f2 * u[2])
         n = normal_of(bodies.position, bodies.rotation, rows, r, a, b, pairs.carrier[p])
@@ -206,9 +220,9 @@ def _turn_balls(width, bodies, pairs, patches, chosen, rows, record):
             gap -= n[k] * d
             record[o + (NORMAL + k) * width] = n[k]
             record[o + (TANGENT_1 + k) * width], record[o + (TANGENT_2 + k) * width] = t[k], u[k]
-            record[o + (ARM_A + k) * width] = arm[k] - (1.0 - share) * d
+            batches.arm[q + (ARM_A + k) * width] = arm[k] - (1.0 - share) * d
             between = bodies.position[b, k] - bodies.position[a, k]
-            record[o + (ARM_B + k) * width] = arm[k] - between + share * d
+            batches.arm[q + (ARM_B + k) * width] = arm[k] - between + share * d
         record[o + (POINT + GAP) * width] = gap
 
 
@@ -226,14 +240,14 @@ def _rebound(width, bodies, patches, chosen, batches, target):
                 continue
             a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
             ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
-            p = max(record[g + MASS * width] * (target[m, c] - (ux * n[0] + uy * n[1] + uz * n[2])), 0.0)
+            p = max(_field(record, g + MASS * width) * (target[m, c] - (ux * n[0] + uy * n[1] + uz * n[2])), 0.0)
             work += _push(bodies, b, arm_b, p * n[0], p * n[1], p * n[2]) + _push(bodies, a, arm_a, -p * n[0], -p * n[1], -p * n[2])
             ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
-            un, step = ux * n[0] + uy * n[1] + uz * n[2], record[o + STEP_T * width]
+            un, step = ux * n[0] + uy * n[1] + uz * n[2], _field(record, o + STEP_T * width)
             x, y, z = -step * (ux - un * n[0]), -step * (uy - un * n[1]), -step * (uz - un * n[2])
             size = sqrt(x * x + y * y + z * z)
-            if size > record[o + MU_STATIC * width] * p:
-                factor = record[o + MU_DYNAMIC * width] * p / size
+            if size > _field(record, o + MU_STATIC * width) * p:
+                factor = _field(record, o + MU_DYNAMIC * width) * p / size
                 x, y, z = factor * x, factor * y, factor * z
             work += _push(bodies, b, arm_b, x, y, z) + _push(bodies, a, arm_a, -x, -y, -z)
             target[m, c] = record[g + PRESS * width] = 0.0
@@ -250,12 +264,13 @@ def _work_of(width, bodies, patches, chosen, batches):
         o = (s // width) * FIELDS * width + s % width
         n = _vector(record, o + NORMAL * width, width)
         t, u = _vector(record, o + TANGENT_1 * width, width), _vector(record, o + TANGENT_2 * width, width)
-        f1, f2, f3 = record[o + PUSH_1 * width], record[o + PUSH_2 * width], record[o + TWIST * width]
+        f1, f2, f3 = _vector(record, o + PUSH_1 * width, width)
         press, turn_1, turn_2 = 0.0, 0.0, 0.0
         for c in range(patches.size[m]):
             g = o + (POINT + POINT_SIZE * c) * width
-            p = record[g + PRESS * width]
-            press, turn_1, turn_2 = press + p, turn_1 + p * record[g + Y * width], turn_2 - p * record[g + X * width]
+            p = _field(record, g + PRESS * width)
+            press = press + p
+            turn_1, turn_2 = turn_1 + p * _field(record, g + Y * width), turn_2 - p * _field(record, g + X * width)
         a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, np.int64(-1))
         support, sign, arm = (b, -1.0, arm_b) if bodies.mass[8 * b + INVERSE_MASS] == 0.0 else (a, 1.0, arm_a)
         ux, uy, uz = _velocity_at(bodies, support, arm)
@@ -363,7 +378,7 @@ def advance(
         first = s * (3 * colours + 2)
         for k in range(2 * colours + 2):
             _lead(lanes, bodies, batches, edges, calm, h, deck, shares > 1, first + k)
-        _turn_balls(width, bodies, pairs, patches, lists[0, :balls], rows, batches.record)
+        _turn_balls(width, bodies, pairs, patches, lists[0, :balls], rows, batches)
         for k in range(2 * colours + 2, 3 * colours + 2):
             _lead(lanes, bodies, batches, edges, calm, h, deck, shares > 1, first + k)
         # Whatever a rebound takes from the impulses has acted already.

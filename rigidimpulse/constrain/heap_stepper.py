@@ -122,7 +122,7 @@ class HeapStepper:
         self.cover = Cover(world, self.order, self.inner, least)
         self.lanes = machine_lanes()
         self._patches, self._count, self._steady = empty_patches(64), 0, _NO_STEADY
-        self._batches = Batches(np.zeros(0), *np.zeros((4, 0), np.int64))
+        self._batches = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int64))
         self._begins, self._edges = np.zeros(256, np.int64), np.zeros(1, np.int64)
         self._deck = empty_deck()
         self._places_of_bodies = aligned(n + 1)

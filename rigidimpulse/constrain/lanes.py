@@ -4,6 +4,8 @@
 machines. Vectors have + - * / and negation, and the functions below. No lane ever reads another one, and products are added by
 `fma` or not at all, so the same bits come out at every width.
 
+Arrays that are read and written by `load` and `store` may hold single precision; vectors are of doubles always.
+
 Rows of 8 doubles (one for each body) are read and written for W indices at once, as 8 vectors; a row begins at a multiple of
 64 bytes (`aligned`), so that it is one line of the cache.
 """
@@ -28,7 +30,7 @@ LINE = 64
 """Bytes in a line of the cache."""
 
 intrinsic: Any = extending.intrinsic
-_DOUBLE, _INDEX, _SHORT = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
+_DOUBLE, _SINGLE, _INDEX, _SHORT = ir.DoubleType(), ir.FloatType(), ir.IntType(64), ir.IntType(32)
 
 
 class Lanes:
@@ -167,28 +169,35 @@ def _place(context, builder, kind, array, index, vector):
     return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
 
 
+def _stored(array, width: int) -> tuple[ir.Type, int]:
+    """W values of an array as they lie in memory, and the bytes of one."""
+    single = array.dtype == types.float32
+    return ir.VectorType(_SINGLE if single else _DOUBLE, width), 4 if single else 8
+
+
 @intrinsic
 def load(_typing, lanes, array, index):
-    """W neighbouring values of array (m,) from index on."""
+    """W neighbouring values of array (m,), of single or double precision, from index on."""
     kind = _VectorType(lanes.width)
 
     def lower(context, builder, signature, arguments):
-        vector = ir.VectorType(_DOUBLE, kind.width)
+        vector, size = _stored(array, kind.width)
         read = builder.load(_place(context, builder, signature.args[1], arguments[1], arguments[2], vector))
-        read.align = 8
-        return read
+        read.align = size
+        return read if size == 8 else builder.fpext(read, ir.VectorType(_DOUBLE, kind.width))
 
     return kind(lanes, array, types.intp), lower
 
 
 @intrinsic
 def store(_typing, array, index, value):
-    """Put a vector to array (m,) from index on."""
+    """Put a vector to array (m,), of single or double precision, from index on."""
 
     def lower(context, builder, signature, arguments):
-        vector = ir.VectorType(_DOUBLE, value.width)
-        written = builder.store(arguments[2], _place(context, builder, signature.args[0], arguments[0], arguments[1], vector))
-        written.align = 8
+        vector, size = _stored(array, value.width)
+        stored = arguments[2] if size == 8 else builder.fptrunc(arguments[2], vector)
+        written = builder.store(stored, _place(context, builder, signature.args[0], arguments[0], arguments[1], vector))
+        written.align = size
         return context.get_dummy_value()
 
     return types.void(array, types.intp, value), lower
