@@ -26,12 +26,16 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.errors import NumbaError
-from numba.core.typed_passes import NopythonTypeInference
+from numba.core.typed_passes import InlineOverloads, NopythonRewrites, NopythonTypeInference
+from numba.core.untyped_passes import InlineClosureLikes, InlineInlinables, LiteralPropagationSubPipelinePass, LiteralUnroll, WithLifting
 from numba.extending import typeof_impl
 
 _PACKAGE = Path(__file__).parent
 _njit: Any = numba.njit
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+_NEEDLESS = {
+    InlineClosureLikes, InlineInlinables, InlineOverloads, LiteralPropagationSubPipelinePass, LiteralUnroll, NopythonRewrites, WithLifting,
+}  # fmt: skip
 _IMPORT = re.compile(rb"^\s*from rigidimpulse\.?([\w.]*) import (?:\(|([\w, ]+))", re.MULTILINE)
 
 
@@ -147,17 +151,30 @@ class _RememberedTypes:
         return signature
 
 
-class _KernelCompiler(Compiler):
-    """Numba's compiler, with that pass and that context."""
+class _KernelFlags(Flags):
+    """Numba's flags of a kernel, compared by those that are set: numba does it at each look for an overload, and asks for all of them."""
 
-    def __init__(self, typing_context: Any, target_context: Any, library: Any, *arguments: Any) -> None:
-        flags: Any = next(argument for argument in arguments if isinstance(argument, Flags))
-        super().__init__(_RememberedTypes(typing_context, flags.nrt), target_context, library, *arguments)
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return len(self._values)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Flags) and self._values == other._values
+
+
+class _KernelCompiler(Compiler):
+    """Numba's compiler with these, and without passes for what kernels do not do: `with`, closures, comprehensions, array expressions."""
+
+    def __init__(self, typing_context: Any, target_context: Any, library: Any, arguments: Any, result: Any, flags: Any, local: Any) -> None:
+        remembered = _RememberedTypes(typing_context, flags.nrt)
+        super().__init__(remembered, target_context, library, arguments, result, _KernelFlags(flags), local)
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes."""
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.add_pass_after(_NoArraysMade, NopythonTypeInference)
+        passes.passes[:] = [(kind, name) for kind, name in passes.passes if kind not in _NEEDLESS]
         passes.finalize()
         return [passes]
 

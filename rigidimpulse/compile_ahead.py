@@ -1,8 +1,8 @@
-"""The first run on a machine: compile kernels on two cores.
+"""The first run on a machine: compile kernels on all cores.
 
-Numba compiles one kernel at a time in a process. So for each kind of kernels that a run needs and that is not in the cache on disk a second
-process compiles one half into the cache (of contacts: motion, frames and the sweep), while this one compiles the other half, and
-then waits for it. The event kernel is one kernel, which a process of its own compiles.
+Numba compiles one kernel at a time in a process. So the kernels of each kind that a run needs and that are not in the cache on disk are
+compiled in parts (`PARTS`): the first in this process, each of the others in one of its own, which puts them into the cache. Parts of
+one kind take about as long, and share little that would be compiled twice.
 """
 
 from __future__ import annotations
@@ -41,17 +41,11 @@ def kernels_to_compile(world, with_events: bool, with_heaps: bool) -> list[str]:
 def compile_kernels(world, kinds: list[str]) -> None:
     """Compile kernels of these kinds for a world. Should another process fail, its part is compiled when used."""
     cylinders = [CYLINDERS] if world.cylinders is not None else []
+    mine, *others = [(kind, part) for kind in kinds for part in range(len(PARTS[kind]))]
     with ExitStack() as processes:
-        for kind in kinds:
-            processes.enter_context(_process(kind, *cylinders))
-        with _without_garbage_collection():
-            context = _box_on_floor(bool(cylinders))
-            if CONTACTS in kinds:
-                _respond_and_detect(context)
-            if HEAPS in kinds:
-                _look_at_heap(context)
-            if JOINTS in kinds:
-                _start_joints(_box_on_floor(bool(cylinders), jointed=True))
+        for kind, part in others:
+            processes.enter_context(_process(kind, str(part), *cylinders))
+        _compile(*mine, bool(cylinders))
 
 
 def _process(*arguments: str) -> subprocess.Popen:
@@ -105,16 +99,15 @@ def _contact():
 
 
 def _respond_and_detect(context) -> None:
-    """Impulses first: by then the other process has what moves bodies in the cache, which detection needs too."""
+    """Impulses first: by then the other process has rows and what moves bodies in the cache, which these need too."""
     from rigidimpulse.constrain.contact_motion import contact_motion
     from rigidimpulse.constrain.drift import needs_lift
     from rigidimpulse.constrain.newton import solve_newton
     from rigidimpulse.constrain.resting import hold_contacts
-    from rigidimpulse.constrain.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
+    from rigidimpulse.constrain.rows import make_rows
     from rigidimpulse.detect.touching import bring_gyroscopic, refresh_pose
     from rigidimpulse.detect.window import Window
     from rigidimpulse.observe.contact_log import fill_contacts_and_forces
-    from rigidimpulse.respond.block import log_block
     from rigidimpulse.respond.response import respond_to_impacts
     from rigidimpulse.respond.restitution import LAWS
     from rigidimpulse.respond.simultaneous import respond_sequential
@@ -124,12 +117,6 @@ def _respond_and_detect(context) -> None:
     members = np.array([1])
     now.inv_inertia[1] = np.eye(3)
     respond_sequential(now, contacts, LAWS["auto"], False, one, 1.0, 1.0, context.column, None, context.impact_log)
-    rows, first_row, frames = contact_rows(now, contacts, members, context.column, 0)
-    row_velocities(now, contacts, first_row, frames, rows.bias)
-    response_to(rows, 1, rows.impulse)
-    log_block(now, contacts, rows, first_row, frames, np.zeros(1), context.impact_log, 0)
-    change_velocities(now, members, rows)
-    changes_of(now, members, rows)
     needs_lift(contacts, np.ones(1, bool), one)
     refresh_pose(members, now, state.rotation, state.course.inertia)
     bring_gyroscopic(members, now, state.rotation, state.course.inertia, context.angular_acceleration)
@@ -156,6 +143,26 @@ def _leave_unsolved(_rows, _n: int, _target: float) -> float:
 
 
 def _move_and_sweep(context) -> None:
+    """Rows of contacts, courses, frames and the sweep."""
+    _fill_rows(context)
+    _move(context)
+
+
+def _fill_rows(context) -> None:
+    from rigidimpulse.constrain.rows import change_velocities, changes_of, contact_rows, response_to, row_velocities
+    from rigidimpulse.respond.block import log_block
+
+    now, contacts, members = context.state.now, _contact(), np.array([1])
+    now.inv_inertia[1] = np.eye(3)
+    rows, first_row, frames = contact_rows(now, contacts, members, context.column, 0)
+    row_velocities(now, contacts, first_row, frames, rows.bias)
+    response_to(rows, 1, rows.impulse)
+    log_block(now, contacts, rows, first_row, frames, np.zeros(1), context.impact_log, 0)
+    change_velocities(now, members, rows)
+    changes_of(now, members, rows)
+
+
+def _move(context) -> None:
     from rigidimpulse.detect.touching import bring_all
     from rigidimpulse.detect.window import Window
     from rigidimpulse.integrate.course import FREE, take
@@ -246,8 +253,8 @@ def _close_and_stop_joints(context) -> None:
     stop_rows(joints.table, which, state.now, state.rotation, members, context.column, joints.memory, np.zeros(1))
 
 
-def _fly() -> None:
-    """The event kernel."""
+def _fly(_context) -> None:
+    """The event kernel; it knows balls only."""
     from rigidimpulse.body import Body
     from rigidimpulse.events.run import EventRun
     from rigidimpulse.observe.events import EventLog
@@ -264,18 +271,20 @@ def _fly() -> None:
     EventRun(context).fly(1.0)
 
 
-def _compile_other_half(kind: str, with_cylinder: bool) -> None:
-    """What the process that runs the scene leaves to this one."""
-    if kind == EVENTS:
-        _fly()
-    elif kind == HEAPS:
-        _step_heap(_box_on_floor(with_cylinder))
-    elif kind == JOINTS:
-        _close_and_stop_joints(_box_on_floor(with_cylinder, jointed=True))
-    else:
-        _move_and_sweep(_box_on_floor(with_cylinder))
+PARTS = {
+    CONTACTS: (_respond_and_detect, _move_and_sweep),
+    EVENTS: (_fly,),
+    HEAPS: (_look_at_heap, _step_heap),
+    JOINTS: (_start_joints, _close_and_stop_joints),
+}
+"""What is compiled at once, by kind; each gets a context."""
+
+
+def _compile(kind: str, part: int, with_cylinder: bool) -> None:
+    """Compile one part."""
+    with _without_garbage_collection():
+        PARTS[kind][part](_box_on_floor(with_cylinder, kind == JOINTS))
 
 
 if __name__ == "__main__":
-    with _without_garbage_collection():
-        _compile_other_half(sys.argv[1], CYLINDERS in sys.argv[2:])
+    _compile(sys.argv[1], int(sys.argv[2]), CYLINDERS in sys.argv[3:])

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from rigidimpulse.studies.wishes import Wish
 
 logger = logging.getLogger("rigidimpulse")
-SECONDS_OF_A_KIND = 25
+SECONDS_OF_A_KIND = 20
 """s that compiling one kind of kernels takes, about."""
 
 # Frames whose product with the number of bodies is refused as a slip of the keyboard (about 1e9 poses, 100 GB).
