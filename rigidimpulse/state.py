@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -115,17 +114,13 @@ class StepContext:
         self.wrench = np.zeros((n, 6))
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
+        self.foresight = Foresight(world)
         self.solve_rows = row_solver(world.accuracy.contact_solver)
         self.joints = JointState(world) if world.joints_of_scene else None
         self.forces: VaryingForces | None = None
         self.nets: RunningNets | None = None
         self.triggers: Triggers | None = None
         self.heaps = None if why_no_heaps(world) else Heaps(world)
-
-    @cached_property
-    def foresight(self) -> Foresight:
-        """Made where contacts last: it has room for 2 kB a body."""
-        return Foresight(self.world)
 
     def bring(self, i: int, time: float) -> None:
         """Bring body i to `time` on its course."""

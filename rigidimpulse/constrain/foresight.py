@@ -25,61 +25,65 @@ ALLOWED = 0.1
 
 
 class Foresight:
-    """Room for the state of the bodies at the end of a sub-step."""
+    """The state of some bodies at the end of a sub-step, each in a row of its own."""
 
     def __init__(self, world) -> None:
-        """As many bodies as the world has."""
-        n = world.num_bodies
-        self.course = make_course(n)
-        self.course.inertia[:] = world.inertia
+        """Without room for any yet."""
+        self._world = world
+        self._make_room(0)
+
+    def _make_room(self, k: int) -> None:
+        """Room for k bodies."""
+        self.course = make_course(k)
         self.bodies = BodyState(
-            np.empty((n, 3)), np.empty((n, 4)), np.empty((n, 3)), np.empty((n, 3)), world.inv_mass, np.zeros((n, 3, 3))
+            np.empty((k, 3)), np.empty((k, 4)), np.empty((k, 3)), np.empty((k, 3)), np.empty(k), np.zeros((k, 3, 3))
         )
-        self.rotation = np.empty((n, 3, 3))
-        self.acceleration = np.empty((n, 3))
-        self.angular_acceleration = np.empty((n, 3))
+        self.rotation = np.empty((k, 3, 3))
+        self.acceleration = np.empty((k, 3))
+        self.angular_acceleration = np.empty((k, 3))
 
     def gap_errors(self, context, group, contacts: Contacts, subset: np.ndarray, motion, wrench, h: float) -> np.ndarray:
         """Errors (m,) of the gaps of the held contacts after h [m].
 
         motion: what `contact_motion` said of them; wrench (n, 6): of their forces.
         """
-        world, state, now = context.world, context.state, context.state.now
-        beside = np.zeros(world.num_bodies, bool)
-        beside[contacts.body_a] = beside[contacts.body_b] = True
-        beside[group.members] = False
-        for i in beside.nonzero()[0].tolist():
-            self._copy(state, i)
-        self._bring(now, group.members, context.acceleration, wrench, h)
+        world = self._world
+        touched = np.unique(np.concatenate([group.members, contacts.body_a, contacts.body_b]))
+        if len(touched) > len(self.rotation):
+            self._make_room(2 * len(touched))
+        self._take_over(context, touched)
+        members, a, b = (np.searchsorted(touched, bodies) for bodies in (group.members, contacts.body_a, contacts.body_b))
+        self._bring(members, context.acceleration[group.members], wrench[group.members], h)
         normal = contacts.normal + h * motion.normal_rate
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         ahead = contacts._replace(
-            arm_a=contacts.arm_a + h * motion.arm_rate_a, arm_b=contacts.arm_b + h * motion.arm_rate_b, normal=normal
+            body_a=a, body_b=b, arm_a=contacts.arm_a + h * motion.arm_rate_a, arm_b=contacts.arm_b + h * motion.arm_rate_b, normal=normal
         )
         turning = contact_motion(
-            world.geometry, world.shape_of_body, self.rotation, self.bodies, ahead, group.kinds[subset],
-            group.features[subset],
+            world.geometry, world.shape_of_body[touched], self.rotation, self.bodies, ahead, group.kinds[subset], group.features[subset]
         ).turning
-        a, b = contacts.body_a, contacts.body_b
         point_a = self.acceleration[a] + cross(self.angular_acceleration[a], ahead.arm_a)
         point_b = self.acceleration[b] + cross(self.angular_acceleration[b], ahead.arm_b)
         return np.einsum("ij,ij->i", point_b - point_a + turning, normal) * (h * h / 6.0)
 
-    def _bring(self, now: BodyState, members: np.ndarray, acceleration: np.ndarray, wrench: np.ndarray, h: float) -> None:
-        """The members after h under constant wrenches (n, 6) and accelerations (n, 3)."""
-        course, i = self.course, members
+    def _take_over(self, context, touched: np.ndarray) -> None:
+        """Rows of bodies as they are now; the velocities of those that are no members are constant."""
+        k, now, world = len(touched), context.state.now, self._world
+        for ours, theirs in zip(self.bodies[:4], now[:4], strict=True):
+            ours[:k] = theirs[touched]
+        self.bodies.inv_mass[:k] = world.inv_mass[touched]
+        self.rotation[:k] = context.state.rotation[touched]
+        self.acceleration[:k] = self.angular_acceleration[:k] = 0.0
+        self.course.inertia[:k] = world.inertia[touched]
+
+    def _bring(self, members: np.ndarray, acceleration: np.ndarray, wrench: np.ndarray, h: float) -> None:
+        """The members (m,) rows after h under constant wrenches (m, 6) and accelerations (m, 3)."""
+        course, now, i = self.course, self.bodies, members
         course.position[i], course.orientation[i] = now.position[i], now.orientation[i]
         course.velocity[i], course.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]
-        course.acceleration[i] = acceleration[i] + now.inv_mass[i, None] * wrench[i, :3]
-        course.torque[i] = wrench[i, 3:]
+        course.acceleration[i] = acceleration + now.inv_mass[i, None] * wrench[:, :3]
+        course.torque[i] = wrench[:, 3:]
         course.mode[i] = FORCED
-        for member in members.tolist():
+        for member in i.tolist():
             begin(course, member)
-        bring_all(course, i, h, self.bodies, self.rotation, self.acceleration, self.angular_acceleration)
-
-    def _copy(self, state, i: int) -> None:
-        """Body i as it is now: its velocity is constant."""
-        for ours, theirs in zip(self.bodies[:4], state.now[:4], strict=True):
-            ours[i] = theirs[i]
-        self.rotation[i] = state.rotation[i]
-        self.acceleration[i] = self.angular_acceleration[i] = 0.0
+        bring_all(course, i, h, now, self.rotation, self.acceleration, self.angular_acceleration)

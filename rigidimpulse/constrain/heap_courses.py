@@ -3,7 +3,7 @@
 import numpy as np
 
 from rigidimpulse._jit import jit, jit_making_arrays
-from rigidimpulse.integrate.course import FREE, STEPPED, begin, begin_straight, stepped_at
+from rigidimpulse.integrate.course import FREE, LENGTH, SPEEDS, STEPPED, begin, begin_straight, stepped_at
 from rigidimpulse.rotation import product, quaternion_to_matrix
 
 CALM, PLAY = 0.05, 0.5
@@ -27,7 +27,7 @@ def arrive(course, members, time, steady, bodies, rotation, acceleration, angula
                     x * rotation[i, c, 0] * rotation[i, d, 0] + y * rotation[i, c, 1] * rotation[i, d, 1]
                     + z * rotation[i, c, 2] * rotation[i, d, 2]
                 )
-        course.start[i], course.stepped[i, 12] = time, 1.0
+        course.start[i], course.top[i, LENGTH] = time, 1.0
         bodies.position[i, 0], bodies.position[i, 1], bodies.position[i, 2] = place
         bodies.orientation[i, 0], bodies.orientation[i, 1], bodies.orientation[i, 2], bodies.orientation[i, 3] = q
         bodies.velocity[i, 0], bodies.velocity[i, 1], bodies.velocity[i, 2] = v
@@ -36,9 +36,9 @@ def arrive(course, members, time, steady, bodies, rotation, acceleration, angula
             course.orientation[i, c] = bodies.orientation[i, c]
         for c in range(3):
             course.position[i, c] = bodies.position[i, c]
-            course.velocity[i, c] = course.stepped[i, c] = bodies.velocity[i, c]
-            course.angular_velocity[i, c] = course.stepped[i, 3 + c] = bodies.angular_velocity[i, c]
-            course.stepped[i, 6 + c] = course.stepped[i, 9 + c] = course.acceleration[i, c] = 0.0
+            course.velocity[i, c] = course.top[i, SPEEDS + c] = bodies.velocity[i, c]
+            course.angular_velocity[i, c] = course.top[i, SPEEDS + 3 + c] = bodies.angular_velocity[i, c]
+            course.top[i, SPEEDS + 6 + c] = course.top[i, SPEEDS + 9 + c] = course.acceleration[i, c] = 0.0
             acceleration[i, c], angular_acceleration[i, c] = steady[i, c], 0.0
         begin_straight(course, i)
 
@@ -178,10 +178,10 @@ def depart(course, members, time, length, bodies, position, orientation, velocit
             pull = (velocity[k, c] - bodies.velocity[i, c]) / length if missed <= EVEN * way else 0.0
             course.velocity[i, c] = (position[k, c] - bodies.position[i, c]) / length - 0.5 * length * pull
             course.acceleration[i, c], course.torque[i, c] = pull, 0.0
-            course.stepped[i, c], course.stepped[i, 3 + c] = bodies.velocity[i, c], bodies.angular_velocity[i, c]
-            course.stepped[i, 6 + c] = velocity[k, c] - bodies.velocity[i, c]
-            course.stepped[i, 9 + c] = velocity[k, 3 + c] - bodies.angular_velocity[i, c]
+            course.top[i, SPEEDS + c], course.top[i, SPEEDS + 3 + c] = bodies.velocity[i, c], bodies.angular_velocity[i, c]
+            course.top[i, SPEEDS + 6 + c] = velocity[k, c] - bodies.velocity[i, c]
+            course.top[i, SPEEDS + 9 + c] = velocity[k, 3 + c] - bodies.angular_velocity[i, c]
         for c in range(4):
             course.orientation[i, c] = bodies.orientation[i, c]
-        course.stepped[i, 12] = length
+        course.top[i, LENGTH] = length
         begin_straight(course, i)

@@ -157,7 +157,7 @@ class Cover:
         movable = world.dynamic[self.order]
         count = overlapping_pairs(low, high, movable, self._pairs)
         if count < 0:
-            self._pairs = np.empty((-2 * count, 2), np.int64)
+            self._pairs = np.empty((-count - count // 4, 2), np.int64)
             count = overlapping_pairs(low, high, movable, self._pairs)
         count = _drop_far(self.order, now, self._moves, world.bound_radius, self._slack, self._pairs, count)
         first, second = self._pairs[:count, 0].copy(), self._pairs[:count, 1].copy()

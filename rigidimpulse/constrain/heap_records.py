@@ -81,8 +81,11 @@ class Batches(NamedTuple):
 
 def empty_patches(m: int) -> Patches:
     """Room for m patches."""
-    row = np.zeros((m, POINTS), np.int64)
-    return Patches(pair=np.zeros(m, np.int64), row=row, size=row[:, 0].copy(), colour=row[:, 0].copy(), slot=row[:, 0].copy())
+
+    def numbers() -> np.ndarray:
+        return np.zeros(m, np.int32)
+
+    return Patches(pair=numbers(), row=np.zeros((m, POINTS), np.int32), size=numbers(), colour=numbers(), slot=numbers())
 
 
 def more_patches(patches: Patches, m: int) -> Patches:
@@ -97,8 +100,8 @@ def more_batches(batches: Batches, b: int, width: int) -> Batches:
     """The same with room for b batches."""
     slots = b * width
     record, arm = aligned(-(-FIELDS * slots // (2 * ROW))).view(np.float32), aligned(-(-ARM_FIELDS * slots // ROW))
-    first, second = np.zeros((2, slots), np.int64)
-    out = Batches(record, arm, first, second, np.zeros(POINTS * slots, np.int64), np.zeros(b, np.int64))
+    first, second = np.zeros((2, slots), np.int32)
+    out = Batches(record, arm, first, second, np.zeros(POINTS * slots, np.int32), np.zeros(b, np.int32))
     for new, old in zip(out, batches, strict=True):
         new[: len(old)] = old
     return out

@@ -122,7 +122,7 @@ class HeapStepper:
         self.cover = Cover(world, self.order, self.inner, least)
         self.lanes = machine_lanes()
         self._patches, self._count, self._steady = empty_patches(64), 0, _NO_STEADY
-        self._batches = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int64))
+        self._batches = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
         self._begins, self._edges = np.zeros(256, np.int64), np.zeros(1, np.int64)
         self._deck = empty_deck()
         self._places_of_bodies = aligned(n + 1)
@@ -285,7 +285,7 @@ class HeapStepper:
         first = int(edges[-1])
         count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
         if count < 0:
-            self._patches = more_patches(self._patches, -2 * count)
+            self._patches = more_patches(self._patches, -count - count // 4)
             count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
         self._count = count
         number, colours = colour_patches(width, bodies, table.pairs, self._patches, begin, count, first, self._begins)

@@ -17,11 +17,12 @@ def empty_pairs(k: int) -> HeapPairs:
     """Pairs (k,) of which nothing is known."""
 
     def numbers() -> np.ndarray:
-        return np.zeros(k, np.int64)
+        return np.zeros(k, np.int32)
 
     return HeapPairs(
-        first=numbers(), second=numbers(), carrier=np.zeros(k, bool), round=np.zeros(k, bool), kind=np.full(k, UNKNOWN), start=numbers(),
-        count=numbers(), room=numbers(), known=np.zeros(k, bool), apart=np.zeros(k), held=np.zeros(k), seen=np.zeros((k, 7)),
+        first=numbers(), second=numbers(), carrier=np.zeros(k, bool), round=np.zeros(k, bool), kind=np.full(k, UNKNOWN, np.int8),
+        start=numbers(), count=numbers(), room=numbers(), known=np.zeros(k, bool), apart=np.zeros(k), held=np.zeros(k),
+        seen=np.zeros((k, 7)),
     )  # fmt: skip
 
 

@@ -244,14 +244,14 @@ def _rows(builder, columns, w):
 def _row_place(context, builder, array_type, array, index_type, index, first, lane):
     number = context.make_array(index_type)(context, builder, index).data
     number = builder.load(builder.gep(number, [builder.add(first, ir.Constant(first.type, lane))]))
-    start = builder.shl(number, ir.Constant(_INDEX, 3))
+    start = builder.shl(builder.sext(number, _INDEX), ir.Constant(_INDEX, 3))
     place = _place(context, builder, array_type, array, start, ir.VectorType(_DOUBLE, ROW))
     return place
 
 
 @intrinsic
 def gather(_typing, lanes, array, index, first):
-    """The rows index[first:first + W] of array (8 m,), as 8 vectors. index: int64."""
+    """The rows index[first:first + W] of array (8 m,), as 8 vectors. index: int32."""
     kind = types.UniTuple(_VectorType(lanes.width), ROW)
 
     def lower(context, builder, signature, arguments):
@@ -268,7 +268,7 @@ def gather(_typing, lanes, array, index, first):
 
 @intrinsic
 def scatter(_typing, array, index, first, columns):
-    """Put 8 vectors to the rows index[first:first + W] of array (8 m,). index: int64."""
+    """Put 8 vectors to the rows index[first:first + W] of array (8 m,). index: int32."""
 
     def lower(context, builder, signature, arguments):
         array_type, index_type, _, kind = signature.args

@@ -32,6 +32,8 @@ from rigidimpulse.rotation import exponential, product
 
 FIXED, PRESCRIBED, FREE, FORCED, STEPPED = 0, 1, 2, 3, 4
 
+SPEEDS, LENGTH = 8, 20
+"""Places in a row of `Course.top` in mode STEPPED, after the constants of a fixed axis: see `Course.stepped`."""
 JERK, TORQUE_RATE, TOP_SIZE = max(free_top.FREE_TOP_SIZE, forced_top.FORCED_TOP_SIZE) + np.array([0, 3, 6])
 """Places in a row of `Course.top`, and its length. The constants of the rotation come first."""
 
@@ -58,10 +60,15 @@ class Course(NamedTuple):
     inertia: np.ndarray
     """(n, 3) kg m^2, principal moments; read in modes FREE and FORCED"""
     top: np.ndarray
-    """(n, TOP_SIZE) constants of the rotation, written by `begin`, then jerk and torque rate (an array of their own would cost every
-    kernel that gets a course some 3 % of its time)"""
-    stepped: np.ndarray
-    """(n, 13) velocity and angular velocity at `start`, their changes until the end of the step, and its length, s; read in mode STEPPED"""
+    """(n, TOP_SIZE) constants of the rotation, written by `begin`, and from SPEEDS on those of mode STEPPED, then jerk and torque rate
+    (arrays of their own would cost every kernel that gets a course some 3 % of its time)"""
+    series: np.ndarray
+    """(n, SERIES_SIZE) the rotation in mode FORCED, written by `begin`; rows of others are never touched, so that they take no memory"""
+
+    @property
+    def stepped(self) -> np.ndarray:
+        """(n, 13) velocities at `start` (6), their changes until the step ends (6), and its length, s, a view; read in mode STEPPED"""
+        return self.top[:, SPEEDS : LENGTH + 1]
 
     @property
     def jerk(self) -> np.ndarray:
@@ -93,7 +100,7 @@ def make_course(num_bodies: int) -> Course:
         mode=np.zeros(num_bodies, dtype=np.int64),
         inertia=np.ones((num_bodies, 3)),
         top=np.zeros((num_bodies, TOP_SIZE)),
-        stepped=np.zeros((num_bodies, 13)),
+        series=np.zeros((num_bodies, forced_top.SERIES_SIZE)),
     )
 
 
@@ -108,7 +115,7 @@ def begin(course, i):
         for k in range(TORQUE_RATE if mode == FREE else JERK, TOP_SIZE):
             course.top[i, k] = 0.0
     inertia, q, w, top = course.inertia[i], course.orientation[i], course.angular_velocity[i], course.top[i]
-    if mode == FORCED and forced_top.prepare(inertia, q, w, course.torque[i], top[TORQUE_RATE:], top):
+    if mode == FORCED and forced_top.prepare(inertia, q, w, course.torque[i], top[TORQUE_RATE:], top, course.series[i]):
         return
     if mode == FREE or mode == FORCED:
         free_top.prepare(inertia, q, w, top)
@@ -199,7 +206,7 @@ def pose_at(course, i, t, x_out, q_out):
         for k in range(4):
             q_out[k] = course.orientation[i, k]
     else:
-        q_out[0], q_out[1], q_out[2], q_out[3], _, _, _ = forced_top.rotation(course.top[i], s)
+        q_out[0], q_out[1], q_out[2], q_out[3], _, _, _ = forced_top.rotation(course.top[i], course.series[i], s)
 
 
 @jit
@@ -222,7 +229,8 @@ def stepped_at(course, i, t):
     Heaps have thousands of such: numbers, since a view of an array costs more than what is computed.
     """
     s = t - course.start[i]
-    share = min(s / course.stepped[i, 12], 1.0)
+    top = course.top
+    share = min(s / top[i, LENGTH], 1.0)
     x = (
         _moved(course.position[i, 0], course.velocity[i, 0], course.acceleration[i, 0], 0.0, s),
         _moved(course.position[i, 1], course.velocity[i, 1], course.acceleration[i, 1], 0.0, s),
@@ -235,14 +243,14 @@ def stepped_at(course, i, t):
         norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
         q = product(e0, e1, e2, e3, q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm)
     v = (
-        course.stepped[i, 0] + share * course.stepped[i, 6],
-        course.stepped[i, 1] + share * course.stepped[i, 7],
-        course.stepped[i, 2] + share * course.stepped[i, 8],
+        top[i, SPEEDS] + share * top[i, SPEEDS + 6],
+        top[i, SPEEDS + 1] + share * top[i, SPEEDS + 7],
+        top[i, SPEEDS + 2] + share * top[i, SPEEDS + 8],
     )
     w = (
-        course.stepped[i, 3] + share * course.stepped[i, 9],
-        course.stepped[i, 4] + share * course.stepped[i, 10],
-        course.stepped[i, 5] + share * course.stepped[i, 11],
+        top[i, SPEEDS + 3] + share * top[i, SPEEDS + 9],
+        top[i, SPEEDS + 4] + share * top[i, SPEEDS + 10],
+        top[i, SPEEDS + 5] + share * top[i, SPEEDS + 11],
     )
     return x, q, v, w
 
@@ -261,6 +269,6 @@ def motion_at(course, i, t, x_out, q_out, v_out, w_out):
         for k in range(4):
             q_out[k] = course.orientation[i, k]
     else:
-        q0, q1, q2, q3, wx, wy, wz = forced_top.rotation(course.top[i], s)
+        q0, q1, q2, q3, wx, wy, wz = forced_top.rotation(course.top[i], course.series[i], s)
         q_out[0], q_out[1], q_out[2], q_out[3] = q0, q1, q2, q3
         w_out[0], w_out[1], w_out[2] = wx, wy, wz

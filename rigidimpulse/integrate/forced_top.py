@@ -39,9 +39,11 @@ SEGMENT = 10  # s
 _TORQUE_RATE = 11  # |tau1|
 _RATE_ALONG = 12  # p
 _RATE_ACROSS = 13  # r
-_SERIES = 14  # (ORDER + 1, _STRIDE) coefficients of w, e_1, e_2
+FORCED_TOP_SIZE = 14
 _STRIDE = 9
-FORCED_TOP_SIZE = _SERIES + _STRIDE * (ORDER + 1)
+"""coefficients of one order: of w, e_1, e_2"""
+SERIES_SIZE = _STRIDE * (ORDER + 1)
+"""coefficients in all; few bodies have a series, so that they lie apart from the other constants"""
 
 _PARALLEL = 1e-15
 """sine of the angle between vectors that are taken for parallel: what round-off of their turn to the body leaves"""
@@ -54,7 +56,7 @@ _LAST_TERM = 1e-15
 
 
 @jit
-def _fill_series(c):
+def _fill_series(c, series):
     """Coefficients 1 to ORDER from coefficients 0, and the length of the segment."""
     i1, i2, i3 = c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2]
     k1, k2, k3 = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
@@ -68,38 +70,38 @@ def _fill_series(c):
         w1, w2, w3, a1, a2, a3, b1, b2, b3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         # One loop for all nine sums: apart, each would wait for its own additions.
         for j in range(n + 1):
-            x = _SERIES + _STRIDE * j
-            y = _SERIES + _STRIDE * (n - j)
-            v1, v2, v3 = c[y], c[y + 1], c[y + 2]
-            w1 += c[x + 1] * v3
-            w2 += c[x + 2] * v1
-            w3 += c[x] * v2
-            e1, e2, e3 = c[x + 3], c[x + 4], c[x + 5]
+            x = _STRIDE * j
+            y = _STRIDE * (n - j)
+            v1, v2, v3 = series[y], series[y + 1], series[y + 2]
+            w1 += series[x + 1] * v3
+            w2 += series[x + 2] * v1
+            w3 += series[x] * v2
+            e1, e2, e3 = series[x + 3], series[x + 4], series[x + 5]
             a1 += e2 * v3 - e3 * v2
             a2 += e3 * v1 - e1 * v3
             a3 += e1 * v2 - e2 * v1
-            e1, e2, e3 = c[x + 6], c[x + 7], c[x + 8]
+            e1, e2, e3 = series[x + 6], series[x + 7], series[x + 8]
             b1 += e2 * v3 - e3 * v2
             b2 += e3 * v1 - e1 * v3
             b3 += e1 * v2 - e2 * v1
         share = 1.0 / (n + 1.0)
-        here = _SERIES + _STRIDE * n
-        e1, e2, e3 = c[here + 3], c[here + 4], c[here + 5]
+        here = _STRIDE * n
+        e1, e2, e3 = series[here + 3], series[here + 4], series[here + 5]
         w1, w2, w3 = k1 * w1 + g1 * e1, k2 * w2 + g2 * e2, k3 * w3 + g3 * e3
         if varies and n > 0:
             before = here - _STRIDE
-            w1 += (p * c[before + 3] + r * c[before + 6]) / i1
-            w2 += (p * c[before + 4] + r * c[before + 7]) / i2
-            w3 += (p * c[before + 5] + r * c[before + 8]) / i3
+            w1 += (p * series[before + 3] + r * series[before + 6]) / i1
+            w2 += (p * series[before + 4] + r * series[before + 7]) / i2
+            w3 += (p * series[before + 5] + r * series[before + 8]) / i3
         here += _STRIDE
-        c[here], c[here + 1], c[here + 2] = share * w1, share * w2, share * w3
-        c[here + 3], c[here + 4], c[here + 5] = share * a1, share * a2, share * a3
-        c[here + 6], c[here + 7], c[here + 8] = share * b1, share * b2, share * b3
+        series[here], series[here + 1], series[here + 2] = share * w1, share * w2, share * w3
+        series[here + 3], series[here + 4], series[here + 5] = share * a1, share * a2, share * a3
+        series[here + 6], series[here + 7], series[here + 8] = share * b1, share * b2, share * b3
         # The last terms stay below round-off for x <= (_LAST_TERM / |c_n|)^(1/n); some of them may vanish by symmetry.
         if n >= ORDER - 4:
             largest = 0.0
             for k in range(_STRIDE):
-                largest = max(largest, abs(c[here + k]))
+                largest = max(largest, abs(series[here + k]))
             if largest > 0.0:
                 segment = min(segment, math.exp(math.log(_LAST_TERM / largest) / (n + 1.0)))
     c[SEGMENT] = segment / scale
@@ -128,7 +130,7 @@ def _across(ex, ey, ez, ux, uy, uz):
 
 
 @jit
-def _start_series(c, wx, wy, wz, ex, ey, ez, ux, uy, uz):
+def _start_series(c, series, wx, wy, wz, ex, ey, ez, ux, uy, uz):
     """Begin a series at body angular velocity w and unit directions e of tau0 and u of tau1; set scale and segment.
 
     |tau0| and |tau1| are read; e is u where tau0 is none, and u is not read where tau1 is none.
@@ -141,8 +143,8 @@ def _start_series(c, wx, wy, wz, ex, ey, ez, ux, uy, uz):
         rate += (growth / min(i1, i2, i3)) ** (1.0 / 3.0)
     scale = math.ldexp(1.0, math.frexp(rate)[1])
     c[_TIME_SCALE] = scale
-    c[_SERIES], c[_SERIES + 1], c[_SERIES + 2] = wx / scale, wy / scale, wz / scale
-    c[_SERIES + 3], c[_SERIES + 4], c[_SERIES + 5] = ex, ey, ez
+    series[0], series[1], series[2] = wx / scale, wy / scale, wz / scale
+    series[3], series[4], series[5] = ex, ey, ez
     # d_2 is normal to the torque and to the body axis x or y, whichever is farther from it.
     nx, ny, nz = (0.0, ez, -ey) if abs(ex) <= abs(ey) else (-ez, 0.0, ex)
     size = math.sqrt(nx * nx + ny * ny + nz * nz)
@@ -153,26 +155,26 @@ def _start_series(c, wx, wy, wz, ex, ey, ez, ux, uy, uz):
         else:
             sine = 0.0
         c[_RATE_ALONG], c[_RATE_ACROSS] = growth * cosine, growth * sine
-    c[_SERIES + 6], c[_SERIES + 7], c[_SERIES + 8] = nx / size, ny / size, nz / size
-    _fill_series(c)
+    series[6], series[7], series[8] = nx / size, ny / size, nz / size
+    _fill_series(c, series)
 
 
 @jit
-def _advance(c, t):
+def _advance(c, series, t):
     """The turn since the start of the series, body angular velocity, e_1 and e_2, t seconds after it: 13 numbers."""
     x = t * c[_TIME_SCALE]
     w1, w2, w3, a1, a2, a3, b1, b2, b3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for n in range(ORDER, -1, -1):
-        k = _SERIES + _STRIDE * n
-        u1, u2, u3 = c[k], c[k + 1], c[k + 2]
+        k = _STRIDE * n
+        u1, u2, u3 = series[k], series[k + 1], series[k + 2]
         w1, w2, w3 = w1 * x + u1, w2 * x + u2, w3 * x + u3
-        u1, u2, u3 = c[k + 3], c[k + 4], c[k + 5]
+        u1, u2, u3 = series[k + 3], series[k + 4], series[k + 5]
         a1, a2, a3 = a1 * x + u1, a2 * x + u2, a3 * x + u3
-        u1, u2, u3 = c[k + 6], c[k + 7], c[k + 8]
+        u1, u2, u3 = series[k + 6], series[k + 7], series[k + 8]
         b1, b2, b3 = b1 * x + u1, b2 * x + u2, b3 * x + u3
     # Same directions, seen from the body at the start of the series (p, q, r = p x q) and now (a, b, n = a x b).
-    p1, p2, p3 = c[_SERIES + 3], c[_SERIES + 4], c[_SERIES + 5]
-    q1, q2, q3 = c[_SERIES + 6], c[_SERIES + 7], c[_SERIES + 8]
+    p1, p2, p3 = series[3], series[4], series[5]
+    q1, q2, q3 = series[6], series[7], series[8]
     r1, r2, r3 = p2 * q3 - p3 * q2, p3 * q1 - p1 * q3, p1 * q2 - p2 * q1
     n1, n2, n3 = a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1
     g0, g1, g2, g3 = from_columns(
@@ -198,8 +200,8 @@ def _parallel(ax, ay, az, bx, by, bz):
 
 
 @jit
-def prepare(inertia, q, w_world, torque, torque_rate, constants_out):
-    """Write the constants (FORCED_TOP_SIZE,) of the motion from orientation q (4,) and angular velocity (3,), rad/s.
+def prepare(inertia, q, w_world, torque, torque_rate, constants_out, series_out):
+    """Write constants (FORCED_TOP_SIZE,) and series (SERIES_SIZE,) of the motion from orientation q (4,) and angular velocity (3,), rad/s.
 
     `w_world`, `torque` (3,), N m, and `torque_rate` (3,), N m/s, are in the world; `inertia` (3,): principal moments,
     kg m^2, all > 0. Returns False and writes nothing if torque and rate are none: then the body is a free top.
@@ -238,20 +240,20 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out):
         c[KIND] = FORCED
         c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2] = i1, i2, i3
         c[_TORQUE], c[_TORQUE_RATE] = magnitude, growth
-        _start_series(c, wx, wy, wz, ex, ey, ez, ux, uy, uz)
+        _start_series(c, series_out, wx, wy, wz, ex, ey, ez, ux, uy, uz)
     return True
 
 
 @jit_making_arrays
-def _last_segment(constants, t):
-    """Constants of the segment that holds the time t, and the time since its start (NaN: too many segments)."""
-    c = constants.copy()
+def _last_segment(constants, coefficients, t):
+    """Constants and series of the segment that holds the time t, and the time since its start (NaN: too many segments)."""
+    c, series = constants.copy(), coefficients.copy()
     for _ in range(_MOST_SEGMENTS):
         if not t > c[SEGMENT]:
-            return c, t
+            return c, series, t
         h = c[SEGMENT]
         t -= h
-        g0, g1, g2, g3, wx, wy, wz, ex, ey, ez, fx, fy, fz = _advance(c, h)
+        g0, g1, g2, g3, wx, wy, wz, ex, ey, ez, fx, fy, fz = _advance(c, series, h)
         q0, q1, q2, q3 = c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3]
         q0, q1, q2, q3 = product(q0, q1, q2, q3, g0, g1, g2, g3)
         c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3] = q0, q1, q2, q3
@@ -263,12 +265,12 @@ def _last_segment(constants, t):
             ex, ey, ez, c[_TORQUE] = _direction(now * ex + grown * ux, now * ey + grown * uy, now * ez + grown * uz)
             if c[_TORQUE] == 0.0:
                 ex, ey, ez = ux, uy, uz
-        _start_series(c, wx, wy, wz, ex, ey, ez, ux, uy, uz)
-    return c, math.nan
+        _start_series(c, series, wx, wy, wz, ex, ey, ez, ux, uy, uz)
+    return c, series, math.nan
 
 
 @jit_making_arrays
-def rotation(constants, t):
+def rotation(constants, series, t):
     """Quaternion and world angular velocity t seconds after the start, as seven numbers; for rows of free_top too.
 
     NaN if the body turns so fast, for so long, that it would take more than _MOST_SEGMENTS.
@@ -278,8 +280,8 @@ def rotation(constants, t):
         return free_top.rotation(c, t)
     if c[KIND] == FORCED:
         if t > c[SEGMENT]:
-            c, t = _last_segment(c, t)
-        g0, g1, g2, g3, wx, wy, wz, _, _, _, _, _, _ = _advance(c, t)
+            c, series, t = _last_segment(c, series, t)
+        g0, g1, g2, g3, wx, wy, wz, _, _, _, _, _, _ = _advance(c, series, t)
         q0, q1, q2, q3 = product(c[BASE], c[BASE + 1], c[BASE + 2], c[BASE + 3], g0, g1, g2, g3)
         wx, wy, wz = rotated(q0, q1, q2, q3, wx, wy, wz)
         return q0, q1, q2, q3, wx, wy, wz
@@ -299,6 +301,6 @@ def rotation(constants, t):
 
 
 @jit_making_arrays
-def evaluate(constants, t, q_out, w_out):
+def evaluate(constants, series, t, q_out, w_out):
     """Write quaternion (4,) and world angular velocity (3,) t >= 0 seconds after the start."""
-    q_out[0], q_out[1], q_out[2], q_out[3], w_out[0], w_out[1], w_out[2] = rotation(constants, t)
+    q_out[0], q_out[1], q_out[2], q_out[3], w_out[0], w_out[1], w_out[2] = rotation(constants, series, t)

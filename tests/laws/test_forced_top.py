@@ -36,12 +36,12 @@ class Top:
     def __init__(self, inertia, q, w_world, torque, torque_rate=(0.0, 0.0, 0.0)):
         values = (inertia, q, w_world, torque, torque_rate)
         self.inertia, self.q, self.w, self.torque, self.rate = (np.asarray(value, dtype=float) for value in values)
-        self.constants = np.full(forced_top.FORCED_TOP_SIZE, np.nan)
-        assert forced_top.prepare(self.inertia, self.q, self.w, self.torque, self.rate, self.constants)
+        self.constants, self.series = np.full(forced_top.FORCED_TOP_SIZE, np.nan), np.full(forced_top.SERIES_SIZE, np.nan)
+        assert forced_top.prepare(self.inertia, self.q, self.w, self.torque, self.rate, self.constants, self.series)
 
     def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         q, w = np.empty(4), np.empty(3)
-        forced_top.evaluate(self.constants, float(time), q, w)
+        forced_top.evaluate(self.constants, self.series, float(time), q, w)
         return q, w
 
     @property
@@ -146,9 +146,9 @@ def test_vanishing_torque_is_the_free_top():
 
 
 def test_no_torque_is_left_to_the_free_top():
-    constants = np.full(forced_top.FORCED_TOP_SIZE, 7.0)
-    assert not forced_top.prepare(np.ones(3), UPRIGHT, np.ones(3), np.zeros(3), np.zeros(3), constants)
-    assert (constants == 7.0).all()
+    constants, series = np.full(forced_top.FORCED_TOP_SIZE, 7.0), np.full(forced_top.SERIES_SIZE, 7.0)
+    assert not forced_top.prepare(np.ones(3), UPRIGHT, np.ones(3), np.zeros(3), np.zeros(3), constants, series)
+    assert (constants == 7.0).all() and (series == 7.0).all()
 
 
 def test_endless_turning_is_given_up():

@@ -31,7 +31,7 @@ def test_rows_and_arithmetic(width):
     rows, out = aligned(32), aligned(32)
     assert rows.ctypes.data % 64 == 0
     rows[:] = random.uniform(1.0, 3.0, rows.shape)
-    index = random.permutation(32)[:24].astype(np.int64)
+    index = random.permutation(32)[:24].astype(np.int32)
     _mix_rows(Lanes(width), rows, index, out)
     a, got = rows.reshape(-1, ROW), out.reshape(-1, ROW)
     expected = np.zeros_like(a)
