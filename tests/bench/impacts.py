@@ -1,7 +1,7 @@
 """How fast impacts are: `python tests/bench/impacts.py [scene ...] [--save]`.
 
-Benchmarks, not tests: run them on a machine that does nothing else. Scenes are `gas` (`gas:300` for 300 balls), `bounce`, `break`, `spots`
-and `memory`; without any, all of them with `gas:1000`. Each line has the state hash, so that times are compared only between runs that
+Benchmarks, not tests: run them on a machine that does nothing else. Scenes are `gas` (`gas:300` for 300 balls), `bounce`, `break` and
+`spots`; without any, all of them with `gas:1000`. Each line has the state hash, so that times are compared only between runs that
 computed the same. Warm: kernels are compiled, the least of several runs counts. How cost grows with the number of balls is measured by
 `rigidimpulse study --scaling`. With --save the lines go to tests/bench/<machine>/impacts.csv.
 """
@@ -12,7 +12,6 @@ import argparse
 import csv
 import math
 import sys
-import tracemalloc
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
@@ -119,31 +118,18 @@ def scene_line(name: str) -> Line:
         return measure("break of 15, 20 s", pool_break, 20.0)
     if kind == "spots":
         return measure("spot on spot, 10 s", spots, 10.0)
-    raise SystemExit(f"{name}: give gas:COUNT, bounce, break, spots or memory")
-
-
-def memory_of(count: int) -> float:
-    """Return the bytes a body that the run of a gas allocates at its peak, frames left out; the scene itself is not counted."""
-    scene = gas(count)
-    tracemalloc.start()
-    ri.simulate(scene, 0.1, 1.0)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    return peak / count
+    raise SystemExit(f"{name}: give gas:COUNT, bounce, break or spots")
 
 
 def main() -> int:
     """Measure, print, save if asked to."""
     parser = argparse.ArgumentParser(description="How fast impacts are.")
-    parser.add_argument("scenes", nargs="*", help="gas:COUNT, bounce, break, spots, memory")
+    parser.add_argument("scenes", nargs="*", help="gas:COUNT, bounce, break, spots")
     parser.add_argument("--save", action="store_true", help="write tests/bench/<machine>/impacts.csv")
     arguments = parser.parse_args()
     print(machine())
     ri.simulate(gas(20), 1.0)
-    names = arguments.scenes or ("gas:1000", "bounce", "break", "spots", "memory")
-    lines = [scene_line(name) for name in names if name != "memory"]
-    if "memory" in names:
-        print(f"memory of a run: {memory_of(10_000):.0f} bytes a body")
+    lines = [scene_line(name) for name in arguments.scenes or ("gas:1000", "bounce", "break", "spots")]
     if arguments.save:
         folder = Path(__file__).parent / machine()
         folder.mkdir(exist_ok=True)
