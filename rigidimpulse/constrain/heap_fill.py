@@ -139,7 +139,7 @@ def _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
         gap = dot(n, less(b, a)) - (first[ROUND_A] + first[ROUND_B]) - second[HELD - ROW]
         a, b = along(a, first[ROUND_A], n), along(b, -first[ROUND_B], n)
         x = (fma(share, a[0], rest * b[0]), fma(share, a[1], rest * b[1]), fma(share, a[2], rest * b[2]))
-        # The first and only point of a patch lies at its centre to the bit: with a lever of round-off any force would hold a twist.
+        # A single point lies at the centre of its patch to the bit: with a lever of round-off it would hold a twist, by whatever force.
         if c == 0:
             base = x
         x = less(x, base)
