@@ -22,7 +22,7 @@ from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.constrain.heap_courses import CALM
 from rigidimpulse.constrain.heap_rows import SEPARATION, SKIN, SUPPORT, in_play
 
-MANY, FEW, KEPT = 20, 8, 2
+MANY, FEW, KEPT = 60, 8, 2
 RATIO, REBOUND, TALL = 30.0, 0.5, 12
 FAST, SPIN = 0.5, 2.5 / 16.0
 
