@@ -8,6 +8,7 @@ one kind take about as long, and share little that would be compiled twice.
 from __future__ import annotations
 
 import gc
+import logging
 import subprocess
 import sys
 from contextlib import ExitStack, contextmanager
@@ -17,6 +18,9 @@ import numpy as np
 
 from rigidimpulse._jit import is_cached
 
+logger = logging.getLogger("rigidimpulse")
+SECONDS_OF_A_KIND = 20
+"""s that compiling one kind of kernels takes, about."""
 CYLINDERS, CONTACTS, EVENTS, HEAPS, JOINTS = "cylinders", "contacts", "impacts of balls", "heaps", "joints"
 LAST = {
     CONTACTS: ("detect.touching", "contacts_of_pairs"),
@@ -26,6 +30,15 @@ LAST = {
 }
 """The kernel of each kind that is compiled last."""
 STEP = 1.0 / 60.0
+
+
+def prepare_kernels(world, with_events: bool, with_heaps: bool) -> None:
+    """Say so and compile on several cores what a run needs, where this machine has never run these sources."""
+    missing = kernels_to_compile(world, with_events, with_heaps)
+    if missing:
+        kinds, seconds = ", ".join(missing), SECONDS_OF_A_KIND * len(missing)
+        logger.warning(f"compiling kernels ({kinds}) for the first run on this machine, once: this takes about {seconds} s")
+        compile_kernels(world, missing)
 
 
 def kernels_to_compile(world, with_events: bool, with_heaps: bool) -> list[str]:
@@ -196,7 +209,7 @@ def _look_at_heap(context) -> None:
     stepper.near(context, member, ~member, STEP)
     # Columns of one row only would be another type.
     a, b = np.array([[0, 1], [0, 1]]).T
-    refusals(world, islands(world.num_bodies, a, b, member), member, ~member, member, a, b, True)
+    refusals(world, islands(world.num_bodies, a, b, member), member, ~member, member, np.zeros(world.num_bodies), a, b, True)
 
 
 def _step_heap(context) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import os
 from collections.abc import Callable, Mapping
@@ -13,11 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.compile_ahead import compile_kernels, kernels_to_compile
+from rigidimpulse.compile_ahead import prepare_kernels
 from rigidimpulse.constrain.contact_forces import ContactForces
-from rigidimpulse.constrain.heap import HeapForces
+from rigidimpulse.constrain.heap_islands import only_dear
 from rigidimpulse.constrain.jointed import reaction_table
-from rigidimpulse.constrain.kinds import Friction, JointRows, RollingFriction
+from rigidimpulse.constrain.kinds import Friction, HeapForces, JointRows, RollingFriction
 from rigidimpulse.detect.overlap import resolve_overlaps
 from rigidimpulse.detect.pairs import BroadPhase
 from rigidimpulse.detect.window import Window
@@ -51,10 +50,6 @@ if TYPE_CHECKING:
     from rigidimpulse.forces.force_log import ForceWork
     from rigidimpulse.io.cache.keeper import Cache
     from rigidimpulse.studies.wishes import Wish
-
-logger = logging.getLogger("rigidimpulse")
-SECONDS_OF_A_KIND = 20
-"""s that compiling one kind of kernels takes, about."""
 
 # Frames whose product with the number of bodies is refused as a slip of the keyboard (about 1e9 poses, 100 GB).
 MOST_POSES = 1_000_000_000
@@ -119,7 +114,7 @@ def _simulate(
     if len(times) * world.num_bodies > MOST_POSES:
         raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
     plan = make_plan(world, effects)
-    prepare_kernels(world, plan)
+    prepare_kernels(world, has_effect(plan, EventKernel.name), has_effect(plan, HeapForces.name) and not only_dear(world))
     recorder = Recorder(times, world.num_bodies)
     log = EventLog()
     for name, reason in left_out.items():
@@ -177,16 +172,6 @@ def finish_run(running: Running, plan: Plan, duration: float) -> Recording:
     return make_recording(context, plan, context.recorder.times, duration)
 
 
-def prepare_kernels(world: World, plan: Plan) -> None:
-    """Say so and compile on several cores what the plan needs, where this machine has never run these sources."""
-    heaps = any(line.included for line in plan.lines if line.name == HeapForces.name)
-    missing = kernels_to_compile(world, has_events(plan), heaps)
-    if missing:
-        kinds, seconds = ", ".join(missing), SECONDS_OF_A_KIND * len(missing)
-        logger.warning(f"compiling kernels ({kinds}) for the first run on this machine, once: this takes about {seconds} s")
-        compile_kernels(world, missing)
-
-
 def frame_times(duration: float, fps: float) -> np.ndarray:
     """Times of round(duration * fps) + 1 frames [s].
 
@@ -230,7 +215,7 @@ def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
         Friction(),
         RollingFriction(),
         ContactForces(),
-        HeapForces(accuracy.contact_solver),
+        HeapForces(),
         ImpactTime(accuracy.impact_time),
         EventKernel(),
         ExactFlight(),
@@ -252,14 +237,14 @@ def start_courses(context: StepContext) -> None:
         begin(course, i)
 
 
-def has_events(plan: Plan) -> bool:
-    """Whether the plan has the event kernel in."""
-    return any(line.included for line in plan.lines if line.name == EventKernel.name)
+def has_effect(plan: Plan, name: str) -> bool:
+    """Whether the plan has the effect in."""
+    return any(line.included for line in plan.lines if line.name == name)
 
 
 def make_flight(context: StepContext, plan: Plan) -> EventRun | None:
     """The event kernel, made ready, where the plan has it in."""
-    if not has_events(plan):
+    if not has_effect(plan, EventKernel.name):
         return None
     from rigidimpulse.events.run import EventRun
 

@@ -10,7 +10,8 @@ import numpy as np
 from rigidimpulse.constrain.arrival import PairForce
 from rigidimpulse.constrain.energy_guard import Ground, note_arrival
 from rigidimpulse.constrain.foresight import Foresight
-from rigidimpulse.constrain.heap import Heaps, why_no_heaps
+from rigidimpulse.constrain.heap import Heaps
+from rigidimpulse.constrain.heap_islands import why_no_heaps
 from rigidimpulse.constrain.jointed import JointState
 from rigidimpulse.constrain.qp import row_solver
 from rigidimpulse.detect.contact_buffer import ContactBuffer

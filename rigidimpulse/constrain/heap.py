@@ -11,20 +11,20 @@ the others; a heap whose members are all calm stands still until something touch
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from rigidimpulse.compile_ahead import prepare_kernels
 from rigidimpulse.constrain.energy_guard import note_arrival
 from rigidimpulse.constrain.heap_courses import arrive, count_calm, depart, let_fly, mark_slow, most_stray, stirred
-from rigidimpulse.constrain.heap_islands import FAST, MANY, SPIN, TALL, islands, lively, refusals, support_levels
+from rigidimpulse.constrain.heap_islands import FAST, FEW, SPIN, TALL, TOIL, islands, jointed, lively, only_dear, refusals, support_levels
 from rigidimpulse.constrain.heap_stepper import HeapStepper, Outcome
 from rigidimpulse.detect.groups import Group, empty_contacts
 from rigidimpulse.detect.touching import bring_all
 from rigidimpulse.integrate.course import FIXED, STEPPED
 from rigidimpulse.integrate.flight import book_contact_work
 from rigidimpulse.observe.energy import mechanical_energy
-from rigidimpulse.plan import Bound, Skip
 
 REST = 3.0
 """For how long members must have hardly moved to be calm, in sqrt(r / g), see `heap_courses`."""
@@ -38,40 +38,6 @@ TOUCHES = 5.0
 """Skins within which a body at rest belongs to the heap that comes near it."""
 
 
-@dataclass(frozen=True)
-class HeapForces:
-    """Contact inside heaps."""
-
-    contact_solver: str
-    stage: str = "constrain"
-    name: str = "heaps"
-
-    def bind(self, world) -> Bound | Skip:
-        """In where heaps are possible; the reason is told anew when the run is over."""
-        reason = why_no_heaps(world)
-        return Skip(reason) if reason else Bound(step_heap, "sub-stepped: bodies may heap up")
-
-
-def why_no_heaps(world) -> str:
-    """Why a scene cannot have heaps; empty where it can."""
-    solver = world.accuracy.contact_solver
-    if solver not in ("auto", "substepped"):
-        return f"contact_solver is {solver!r}"
-    if not world.can_collide or not world.can_press:
-        return "nothing presses bodies together"
-    if world.force_tables:
-        return "forces vary"
-    if solver == "auto" and np.count_nonzero(world.dynamic) < MANY:
-        return f"fewer than {MANY} movable bodies"
-    return ""
-
-
-def step_heap(context, window, group: Group) -> None:
-    """Step the heap of a group to the end of the window."""
-    if group.heap is not None:
-        context.heaps.step(context, window, group)
-
-
 class Heaps:
     """The heaps of a run.
 
@@ -79,29 +45,37 @@ class Heaps:
         label: (n,) the heap that a body belongs to, -1 for none; heaps at rest keep theirs.
         calm: (n,) s, for how long a member has hardly moved.
         asleep: (n,) bool, members that stand still while others of their heap move.
-        stepper: the solver and its contacts.
+        toil: (n,) how often the exact solver has dealt with each body in the step.
 
     """
 
     def __init__(self, world) -> None:
         """No heaps yet."""
-        self.stepper = HeapStepper(world)
+        self._world, self._only_dear = world, only_dear(world)
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.calm = np.zeros(world.num_bodies)
         self.asleep = np.zeros(world.num_bodies, bool)
         self._stood = np.full((world.num_bodies, 7), np.inf)
         self._taken = np.zeros(world.num_bodies, bool)
         self._auto = world.accuracy.contact_solver == "auto"
-        self._jointed = np.zeros(world.num_bodies, bool)
+        self._jointed = jointed(world)
+        self.toil, self._step_end = np.zeros(world.num_bodies), 0.0
         self._ends: dict[int, float] = {}
         self._began: dict[int, tuple[float, np.ndarray, float]] = {}
         self._outcome: Outcome | None = None
         self._outcome_end = 0.0
         self._most = self._steps = 0
         self._refused: dict[str, int] = {}
-        if world.joints_of_scene:
-            ends = np.concatenate([world.joints.body_a, world.joints.body_b])
-            self._jointed[ends[ends >= 0]] = True
+
+    @cached_property
+    def stepper(self) -> HeapStepper:
+        """The solver and its contacts; its kernels are compiled here where they were not needed at the start."""
+        prepare_kernels(self._world, with_events=False, with_heaps=True)
+        return HeapStepper(self._world)
+
+    def is_idle(self) -> bool:
+        """Whether no heap is there and none may begin."""
+        return self._only_dear and self.toil.sum() <= FEW * TOIL and bool(np.all(self.label < 0))
 
     def summary(self) -> str:
         """What became of heaps in the run."""
@@ -111,10 +85,15 @@ class Heaps:
 
     def gather(self, context, window) -> None:
         """Choose the heaps of the step: `window.inside` marks their bodies, `window.still` those at rest."""
+        idle, toil = self.is_idle(), self.toil
+        if window.end > self._step_end:
+            self.toil, self._step_end = np.zeros_like(toil), window.end
+        if idle:
+            return
         world, course, time = context.world, context.state.course, window.begin
         ended = course.mode == STEPPED
         self._end_courses(context, np.flatnonzero(ended), time)
-        chosen = self._choose(context, window, ended) if window.end > time else np.zeros_like(ended)
+        chosen = self._choose(context, window, ended, toil) if window.end > time else np.zeros_like(ended)
         left = np.flatnonzero(ended & ~chosen & (course.mode == STEPPED))
         let_fly(course, left, world.steady_acceleration)
         self.calm[left] = 0.0
@@ -123,7 +102,7 @@ class Heaps:
         window.inside |= chosen
         window.still |= (self.label >= 0) & (course.mode == FIXED)
 
-    def _choose(self, context, window, brought: np.ndarray) -> np.ndarray:
+    def _choose(self, context, window, brought: np.ndarray, toil: np.ndarray) -> np.ndarray:
         """Which bodies (n,) bool are stepped; those `brought` are at the begin of the window already."""
         world, course, time = context.world, context.state.course, window.begin
         member = world.dynamic & ((course.mode != FIXED) | self.asleep)
@@ -143,7 +122,7 @@ class Heaps:
         root = islands(world.num_bodies, a, b, member)
         root[~member] = -1
         moves = lively(context.state.now, world.steady_strength, self.stepper.inner)
-        refused = refusals(world, root, self.label >= 0, self._jointed, moves, a, b, self._auto)
+        refused = refusals(world, root, self.label >= 0, self._jointed, moves, toil, a, b, self._auto)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         chosen = self._low(context, window, chosen, root, refused)
         for reason in refused.values():
@@ -254,12 +233,16 @@ class Heaps:
     def close(self, context, time: float) -> None:
         """Book what the steps under way take until `time`, the end of the run."""
         members = np.flatnonzero(context.state.course.mode == STEPPED)
+        if not len(members):
+            return
         self._end_courses(context, members, time)
         self.stepper.report_crossed(context, members, time)
         let_fly(context.state.course, members, context.world.steady_acceleration)
 
     def join(self, context, window, time: float, groups: list[Group]) -> list[Group]:
         """The groups at `time` with the heaps that they touch; at the start of a step all of its heaps."""
+        for group in groups:
+            self.toil[group.members] += 1.0
         if window.end <= window.begin:  # the end of the run: there is no time to step a heap over
             return [group for group in groups if np.all(self.label[group.members] < 0)]
         first = not window.heaps_begun
@@ -318,6 +301,8 @@ class Heaps:
             mine = members[self.label[members] == label]
             self._ends[label] = end
             self._began[label] = group.time, mine, mechanical_energy(context.state.now, world, mine)
+        if len(fresh):
+            self.stepper.part(context, fresh)
         self._outcome = self.stepper.step(context, group.time, end)
         self._outcome_end = end
         if end < window.end:
@@ -335,9 +320,9 @@ class Heaps:
 
     def _end_of(self, context, window, time: float, members: np.ndarray) -> float:
         """When the courses of members end: before the step does where bodies are tiny, spin fast, or stray from their straight ways."""
-        stepper, accuracy = self.stepper, context.world.accuracy
-        step, allowed = accuracy.step, STRAY * accuracy.heap_motion
-        stray = most_stray(context.state.now, members, stepper.pressed, stepper.reach, stepper.skin, allowed)
+        stepper = self.stepper
+        step, allowed, pressed = stepper.step_length, STRAY * stepper.motion, stepper.pressed | self._only_dear
+        stray = most_stray(context.state.now, members, pressed, stepper.reach, stepper.skin, allowed)
         spans = max(math.ceil(step / stepper.span(members) - 1e-9), 1)
         pieces = max(min(math.ceil(stray * step), MOST_PIECES * spans), spans)
         left = max(math.ceil((window.end - time) * pieces / step - 1e-6), 1)

@@ -11,9 +11,9 @@ import numpy as np
 
 from rigidimpulse._jit import jit, jit_making_arrays
 from rigidimpulse.constrain.contact_motion import only_primitive, side_radius
+from rigidimpulse.constrain.heap_closest import make_simplex
 from rigidimpulse.constrain.heap_cores import put_back
 from rigidimpulse.constrain.heap_depth import make_polytope
-from rigidimpulse.constrain.heap_hulls import make_simplex
 from rigidimpulse.constrain.heap_narrow import note_seen
 from rigidimpulse.constrain.heap_new_rows import NEAR, hand_over, take_up, write_row
 from rigidimpulse.constrain.heap_overlap import gap_along, overlap_contacts, support

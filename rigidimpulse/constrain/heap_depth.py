@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse._jit import jit, jit_making_arrays
+from rigidimpulse.constrain.heap_closest import farthest_of_both, reduce_simplex
 
 MOST_CORNERS, MOST_FACES = 64, 192
 EXACT = 1e-3
@@ -43,7 +44,7 @@ def make_polytope():
 
 
 @jit
-def start(polytope, simplex):
+def _start(polytope, simplex):
     """Begin with the tetrahedron of a simplex; returns the number of faces, 0 where it is flat or not about 0."""
     w, inside = polytope.w, polytope.inside
     for m in range(3):
@@ -79,7 +80,7 @@ def _set_face(polytope, f, i, j, k):
 
 
 @jit
-def nearest_face(polytope, faces):
+def _nearest_face(polytope, faces):
     """The face nearest to 0."""
     best = 0
     for f in range(1, faces):
@@ -89,7 +90,7 @@ def nearest_face(polytope, faces):
 
 
 @jit
-def add_corner(polytope, corners, faces):
+def _add_corner(polytope, corners, faces):
     """Take corner number `corners` in; returns the number of faces, 0 where there is no more room."""
     w, face, plane, rim = polytope.w, polytope.face, polytope.plane, polytope.rim
     edges, f = 0, 0
@@ -122,3 +123,34 @@ def _toggle(rim, edges, i, j):
             return edges - 1
     rim[edges, 0], rim[edges, 1] = i, j
     return edges + 1
+
+
+@jit
+def least_deep(shapes, s, t, d, c, small, exact, simplex, polytope):
+    """Axis of the least depth of bodies inside each other, as `closest` gives it, from its simplex; 5 corners where there is none."""
+    corner, w = shapes.corner, polytope.w
+    a0, a1, b0, b1 = shapes.corner_first[s], shapes.corner_first[s + 1], shapes.corner_first[t], shapes.corner_first[t + 1]
+    faces, gap = _start(polytope, simplex), 0.0
+    f = _nearest_face(polytope, faces)
+    for corners in range(4, MOST_CORNERS + 1):
+        if faces == 0:
+            return 1.0, 0.0, 0.0, 0.0, np.int64(5)
+        f = _nearest_face(polytope, faces)
+        x, y, z = -polytope.plane[f, 0], -polytope.plane[f, 1], -polytope.plane[f, 2]
+        i, high, j, low = farthest_of_both(corner, a0, a1, b0, b1, c, x, y, z)
+        middle = d[0] * x + d[1] * y + d[2] * z
+        gap = middle - low - high
+        if corners == MOST_CORNERS or -(middle - small * (low + high)) <= polytope.plane[f, 3] + exact:
+            break
+        for m in range(3):
+            turned_b = c[m, 0] * corner[j, 0] + c[m, 1] * corner[j, 1] + c[m, 2] * corner[j, 2]
+            w[corners, m] = d[m] + small * (turned_b - corner[i, m])
+        polytope.corner[corners, 0], polytope.corner[corners, 1] = i, j
+        faces = _add_corner(polytope, corners, faces)
+    for n in range(3):
+        k = polytope.face[f, n]
+        for m in range(3):
+            simplex.w[n, m] = w[k, m]
+        simplex.corner[n, 0], simplex.corner[n, 1] = polytope.corner[k, 0], polytope.corner[k, 1]
+    count = reduce_simplex(simplex, 3)
+    return -polytope.plane[f, 0], -polytope.plane[f, 1], -polytope.plane[f, 2], gap, count

@@ -4,14 +4,17 @@ The exact solver is the better one wherever it can be afforded. "auto" takes an 
 
     many        at least MANY movable bodies, or FEW that move (faster than what is calm, see `heap_courses`) in a scene of MANY;
                 KEPT for one that is a heap already
+    or dear     at least FEW, each of which the exact solver dealt with more than TOIL times in the last step, in the mean: what rests
+                takes 2 to 4, a fall of boxes 10 to 20, each about as long as a step of a small heap
     no joints   they want exact rows
 and, where a heap begins (who comes near one later is taken in):
     alike       no two neighbours of masses beyond RATIO : 1
     dull        no restitution above REBOUND: a rebound is found at the end of the step only
     low         no body more than TALL others above a support: long columns want exact rows
 
-"substepped" takes every island without joints. Bodies that move farther than FAST of their inner radius in a sub-step, or turn
-by more than SPIN rad, are no part of any: they are swept.
+Scenes of fewer than SOME have no heaps. "substepped" takes every island without
+joints. Bodies that move farther than FAST of their inner radius in a sub-step, or turn by more than SPIN rad, are no part of any: they
+are swept.
 """
 
 from __future__ import annotations
@@ -22,9 +25,48 @@ from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.constrain.heap_courses import CALM
 from rigidimpulse.constrain.heap_rows import SEPARATION, SKIN, SUPPORT, in_play
 
-MANY, FEW, KEPT = 60, 8, 2
+MANY, SOME, FEW, KEPT = 60, 20, 8, 2
+TOIL = 6.0
 RATIO, REBOUND, TALL = 30.0, 0.5, 12
 FAST, SPIN = 0.5, 2.5 / 16.0
+
+
+def why_no_heaps(world) -> str:
+    """Why a scene cannot have heaps; empty where it can."""
+    solver = world.accuracy.contact_solver
+    if solver not in ("auto", "substepped"):
+        return f"contact_solver is {solver!r}"
+    if not world.can_collide or not world.can_press:
+        return "nothing presses bodies together"
+    if world.force_tables:
+        return "forces vary"
+    if solver == "substepped":
+        return ""
+    if _number(world) < SOME:
+        return f"fewer than {SOME} movable bodies without joints"
+    used, movable = np.unique(world.material_of_body), np.unique(world.material_of_body[world.dynamic])
+    if np.all(world.coefficients[np.ix_(movable, used)][:, :, 0] > REBOUND):
+        return f"all bodies rebound by more than {REBOUND}"
+    return ""
+
+
+def only_dear(world) -> bool:
+    """Whether heaps begin only where the exact solver has become dear: the scene has not MANY bodies."""
+    return world.accuracy.contact_solver == "auto" and _number(world) < MANY
+
+
+def jointed(world) -> np.ndarray:
+    """Which bodies (n,) bool have joints."""
+    out = np.zeros(world.num_bodies, bool)
+    if world.joints_of_scene:
+        ends = np.concatenate([world.joints.body_a, world.joints.body_b])
+        out[ends[ends >= 0]] = True
+    return out
+
+
+def _number(world) -> int:
+    """Movable bodies without joints."""
+    return int(np.count_nonzero(world.dynamic & ~jointed(world)))
 
 
 @jit_making_arrays
@@ -89,14 +131,16 @@ def lively(now, strength: np.ndarray, inner: np.ndarray) -> np.ndarray:
 
 
 def refusals(
-    world, root: np.ndarray, heap_before: np.ndarray, jointed: np.ndarray, moves: np.ndarray, a: np.ndarray, b: np.ndarray, auto: bool
-) -> dict[int, str]:
+    world, root: np.ndarray, heap_before: np.ndarray, joined: np.ndarray, moves: np.ndarray, toil: np.ndarray, a: np.ndarray, b: np.ndarray,
+    auto: bool,
+) -> dict[int, str]:  # fmt: skip
     """Why islands are no heaps, by their root; what holds of contacts (`low`) is not looked at here.
 
     Args:
         world: the compiled scene.
         root: (n,) of every body; -1 for those in no island.
-        heap_before: (n,) bool, members of heaps. jointed, moves: (n,) bool.
+        heap_before: (n,) bool, members of heaps. joined, moves: (n,) bool.
+        toil: (n,) how often the exact solver dealt with each body in the last step.
         a: (k,) bodies of the pairs that may touch in the step; likewise b.
         auto: False where every island without joints is taken.
 
@@ -106,7 +150,7 @@ def refusals(
     size = np.bincount(root[members], minlength=len(root))
     was_heap = np.zeros(len(root), bool)
     was_heap[root[members[heap_before[members]]]] = True
-    for r in np.unique(root[members[jointed[members]]]).tolist():
+    for r in np.unique(root[members[joined[members]]]).tolist():
         out[r] = "joints"
     owner = np.where(root[a] >= 0, root[a], root[b])
     if not auto:
@@ -114,7 +158,9 @@ def refusals(
         out.update(dict.fromkeys(alone.tolist(), "alone"))
         return out
     stir = np.bincount(root[members[moves[members]]], minlength=len(root))
-    least = np.where(was_heap, KEPT, np.where(stir >= FEW, FEW, MANY))
+    dear = np.bincount(root[members], weights=toil[members], minlength=len(root)) > TOIL * size
+    lively_enough = dear if only_dear(world) else dear | (stir >= FEW)
+    least = np.where(was_heap, KEPT, np.where(lively_enough, FEW, MANY))
     for r in np.flatnonzero((size > 0) & (size < least)).tolist():
         out[r] = "few bodies"
     begins = ~was_heap[owner]

@@ -17,8 +17,9 @@ import numpy as np
 
 from rigidimpulse._jit import inlined, jit
 from rigidimpulse.constrain.heap_boxes import box_axis, edge_contact, face_along, face_contacts
+from rigidimpulse.constrain.heap_closest import Simplex, closest, make_simplex
 from rigidimpulse.constrain.heap_depth import Polytope, make_polytope
-from rigidimpulse.constrain.heap_hulls import Simplex, closest, hull_contacts, make_simplex, seen_from
+from rigidimpulse.constrain.heap_hulls import hull_contacts, seen_from
 from rigidimpulse.constrain.heap_new_rows import NEAR, hand_over, take_up, write_row
 from rigidimpulse.constrain.heap_polyhedra import ALIKE, POINTS, Scratch, along_edges, copy_contact, half_space_contacts, make_scratch
 from rigidimpulse.constrain.heap_rows import IMPULSE, ROW_SIZE, UNKNOWN, closing_speed, in_play, turned, turned_back

@@ -1,8 +1,8 @@
 """New rows of contacts, their impulses from the ones they replace, and the gap at which the contacts of a pair are held.
 
 That gap is the skin, which soft contact may sink into. Pairs that are closer when they first have contacts, flush or inside each
-other, are held where they are, apart from what they overlap: driven out of the skin at once, a block that slides would hop. They
-are then led apart, slowly, as far as loads press the skin in.
+other, are held where they are, but no closer than LEAST_HELD skins: driven out of the skin, a block that slides would hop, and a flush
+wall would rise. Bodies that come to a heap closer than that are moved apart at once, without speed (`HeapStepper.part`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from rigidimpulse.constrain.heap_rows import (
 NEAR = 0.2
 """Inner radii within which an old contact hands its impulse to a new one of other features."""
 LEAST_HELD = 0.25
-"""Skins that pairs are held apart at last, however close they were: as far as a column presses them in."""
+"""Skins that pairs are held apart, however close they were: as far as a column presses them in."""
 
 
 @inlined
@@ -62,11 +62,10 @@ def write_row(
 
 @jit
 def take_up(held, p, rows, begin, end):
-    """Hold pair p, whose first contacts are those from `begin` to `end`, where it is, if that is closer than the skin."""
+    """Hold pair p, whose first contacts are those from `begin` to `end`, where it is, if that is between LEAST_HELD and the skin."""
     closer = 0.0
     for r in range(begin, end):
-        closer = max(closer, -rows[r, SEPARATION])
-    closer = min(closer, held[p])
+        closer = max(closer, min(-rows[r, SEPARATION], held[p] - LEAST_HELD * rows[r, SKIN]))
     if closer > 0.0:
         held[p] -= closer
         for r in range(begin, end):
@@ -75,16 +74,14 @@ def take_up(held, p, rows, begin, end):
 
 
 @jit
-def widen(bodies, pairs, rows, by):
-    """Hold pairs in play that are held closer than LEAST_HELD skins farther apart, by `by` m at most."""
+def closest_of(bodies, pairs, rows):
+    """Least separation of pairs in play from the gap that they are held at, in skins."""
+    least = 0.0
     for p in range(pairs.first.shape[0]):
-        a, b = pairs.first[p], pairs.second[p]
-        skin = min(bodies.skin[a], bodies.skin[b])
-        if pairs.count[p] == 0 or pairs.held[p] >= LEAST_HELD * skin or not in_play(bodies.part, a, b):
-            continue
-        pairs.held[p] = min(pairs.held[p] + by, LEAST_HELD * skin)
-        for r in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
-            rows[r, HELD] = pairs.held[p]
+        if in_play(bodies.part, pairs.first[p], pairs.second[p]):
+            for r in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
+                least = min(least, rows[r, SEPARATION] / rows[r, SKIN])
+    return least
 
 
 @inlined

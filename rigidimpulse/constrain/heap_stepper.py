@@ -12,9 +12,10 @@ from rigidimpulse.constrain.heap_contacts import FARTHER, convex_polyhedra, inne
 from rigidimpulse.constrain.heap_cores import cores
 from rigidimpulse.constrain.heap_cover import Cover
 from rigidimpulse.constrain.heap_fill import fill, keep_impulses, place_bodies
+from rigidimpulse.constrain.heap_islands import only_dear
 from rigidimpulse.constrain.heap_motion import energies, mark_quick, note_pressed, slow_down
 from rigidimpulse.constrain.heap_narrow import classify, look, make_room, most_motion, share_of
-from rigidimpulse.constrain.heap_new_rows import widen
+from rigidimpulse.constrain.heap_new_rows import closest_of
 from rigidimpulse.constrain.heap_overlap import solids
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
 from rigidimpulse.constrain.heap_records import (
@@ -28,7 +29,7 @@ from rigidimpulse.constrain.heap_records import (
     more_patches,
     place_patches,
 )
-from rigidimpulse.constrain.heap_rows import MEMBER, OUTSIDE, SUPPORT, HeapBodies, load_bodies
+from rigidimpulse.constrain.heap_rows import IMPULSE, MEMBER, OUTSIDE, SEPARATION, SUPPORT, HeapBodies, load_bodies
 from rigidimpulse.constrain.heap_solver import FREQUENCY, advance, softness, special_patches
 from rigidimpulse.constrain.heap_table import HeapTable
 from rigidimpulse.constrain.heap_team import empty_deck
@@ -36,6 +37,7 @@ from rigidimpulse.constrain.lanes import ROW, aligned, machine_lanes
 from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.contact_buffer import ContactBuffer, find_together
 from rigidimpulse.detect.manifold import pair_gap
+from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.rotation import to_matrix
 
 COLUMN = 20.0
@@ -60,12 +62,15 @@ MOSTLY = 0.3
 """Part of the bodies that are quick beyond which all count as such."""
 WORTHWHILE, WORTHWHILE_GENERAL = 400, 16
 """Pairs, all and general ones, beyond which several cores look at them: some tens of microseconds are lost by it."""
-WIDENING = 0.01
-"""Part of their weight by which pairs that began closer than the skin are driven apart: friction is that much too large meanwhile."""
 WORTHWHILE_BATCHES, MOST_SOLVERS = 2000, 2
 """Batches, each counted in every sub-step, beyond which two cores solve them."""
 _NO_STEADY = 0, np.zeros(1, np.int64)
 """Patches, and edges of the colours of batches, that were made before the last look."""
+FINER_STEP, FINER_MOTION = 1.0 / 16.0, 1.0 / 20.0
+"""Parts of `Accuracy.step` and `Accuracy.heap_motion` that scenes of few bodies are stepped with: they can afford it."""
+PARTING, MOST_PARTINGS, PARTED = 32, 32, 0.01
+"""Sub-steps without speed between two looks at what comes to a heap too close, each of which takes 7 % of what is missing (`softness`);
+how often; and skins that may be missing at last."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -86,6 +91,7 @@ class HeapStepper:
     Attributes:
         order: (n,) bodies by their places at the start of the run; rank: (n,) place of each in it.
         inner: (n,) m, distance from the centre of mass to the nearest face; inf for what cannot be moved. skin: (n,) m.
+        step_length: s, that is stepped at once at most; motion: inner radii, see `Accuracy.heap_motion`.
         kept: inner radii that a pair may come past each other with the contacts it has, in the middle of a step.
         bodies: by rank. table: pairs and contact points. pressed: (n,) bool, contacts acted on the body when it was last stepped.
 
@@ -127,8 +133,10 @@ class HeapStepper:
         self._deck = empty_deck()
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
-        self._motion = world.accuracy.heap_motion
-        self.kept = KEPT * self._motion
+        finer = only_dear(world)
+        self.step_length = world.accuracy.step * (FINER_STEP if finer else 1.0)
+        self.motion = world.accuracy.heap_motion * (FINER_MOTION if finer else 1.0)
+        self.kept = KEPT * self.motion
         self._all_quick = bool(world.moving.any() or world.ball.any())
         self._special = self._all_quick or bool(world.coefficients[:, :, 0].any())
         self.pressed = np.zeros(n, bool)
@@ -155,7 +163,7 @@ class HeapStepper:
     def sub_step(self, members: np.ndarray) -> float:
         """Length of a sub-step, s: short enough for the load of a column, so that it scales with the size of bodies."""
         strength = float(self.world.steady_strength[members].max())
-        step = self.world.accuracy.step
+        step = self.step_length
         pieces = LEAST_SUB_STEPS
         if strength > 0.0:
             h = 2.0 * math.pi * FREQUENCY * math.sqrt(PRESSED * float(self.skin[members].min()) / (COLUMN * strength))
@@ -164,7 +172,7 @@ class HeapStepper:
 
     def span(self, members: np.ndarray) -> float:
         """Longest time that members are stepped at once, s: bodies may fall by half an inner radius in it."""
-        strength, step = float(self.world.steady_strength[members].max()), self.world.accuracy.step
+        strength, step = float(self.world.steady_strength[members].max()), self.step_length
         return min(step, SPAN * math.sqrt(float(self.inner[members].min()) / strength)) if strength > 0.0 else step
 
     def find_pairs(self, context, members: np.ndarray, others: np.ndarray, ahead: float) -> None:
@@ -190,10 +198,8 @@ class HeapStepper:
         needed = math.ceil(motion / COARSEST)
         self._sub_steps = max(math.ceil(ahead / self.sub_step(members) - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
         most = max(self._sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
-        self._parts = min(max(math.ceil(motion / self._motion), 1), most)
+        self._parts = min(max(math.ceil(motion / self.motion), 1), most)
         self.ahead = ahead / self._parts
-        strength = float(self.world.steady_strength[members].max())
-        widen(self.bodies, self.table.pairs, self.table.rows, WIDENING * strength * ahead * ahead / self._sub_steps)
         self._look(context, kept)
 
     def _look(self, context, kept: float) -> None:
@@ -206,7 +212,7 @@ class HeapStepper:
         while True:
             outcome = look.together([
                 (
-                    self.shapes, self._solids, self._inset, self.bodies, table.pairs, share, shares, self.ahead, SAME * self._motion, kept,
+                    self.shapes, self._solids, self._inset, self.bodies, table.pairs, share, shares, self.ahead, SAME * self.motion, kept,
                     self._places, self._margins, table.rows, table.ids, table.free, self.world.coefficients, self._rooms[share],
                 )
                 for share in range(shares)
@@ -300,6 +306,33 @@ class HeapStepper:
         fill(self.lanes, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
         return number
 
+    def part(self, context, fresh: np.ndarray) -> None:
+        """Move members that are fresh apart from each other and from all else to the gaps that contacts are held at; their speeds pay."""
+        bodies, rows, part = self.bodies, self.table.rows, self.bodies.part.copy()
+        mine = np.zeros(len(part), bool)
+        mine[self.rank[fresh]] = True
+        bodies.part[(part == MEMBER) & ~mine] = SUPPORT
+        if closest_of(bodies, self.table.pairs, rows) > -PARTED:
+            bodies.part[:] = part
+            return
+        _, before = energies(bodies, self._masses, self._pull)
+        kept = bodies.velocity.copy(), bodies.gravity.copy(), bodies.mass.copy(), bodies.quick.copy(), rows[:, IMPULSE:SEPARATION].copy()
+        bodies.velocity[:], bodies.gravity[:], self._steady = 0.0, 0.0, _NO_STEADY
+        bodies.mass.reshape(-1, ROW)[~mine] = 0.0
+        for _ in range(MOST_PARTINGS):
+            bodies.quick[:], rows[:, IMPULSE:SEPARATION] = True, 0.0
+            self._advance(PARTING, self.ahead)
+            if closest_of(bodies, self.table.pairs, rows) > -PARTED:
+                break
+        bodies.velocity[:], bodies.gravity[:], bodies.mass[:], bodies.quick[:], rows[:, IMPULSE:SEPARATION] = kept
+        self._take_off(before)
+        bodies.part[:], bodies.drift[:] = part, 0.0
+        now, at = context.state.now, self.rank[fresh]
+        speed = bodies.velocity.reshape(-1, ROW)[at]
+        now.position[fresh], now.orientation[fresh] = bodies.position[at], bodies.orientation[at]
+        now.velocity[fresh], now.angular_velocity[fresh] = speed[:, :3], speed[:, 3:6]
+        refresh_pose(fresh, now, context.state.rotation, self.world.inertia)
+
     def step(self, context, time: float, end: float) -> Outcome:
         """Step what `set_up` put before the kernels from `time` to `end`."""
         bodies, members = self.bodies, self.members
@@ -315,13 +348,15 @@ class HeapStepper:
             work += self._advance(some, h)
             done += some
         note_pressed(bodies, self.order, self.pressed)
-        kinetic, after = energies(bodies, self._masses, self._pull)
-        # What the step gained beyond the work of moving supports is taken off the speeds.
-        gained = after - before - work
-        if gained > 0.0 and kinetic > 0.0:
-            slow_down(bodies, math.sqrt(max(1.0 - gained / kinetic, 0.0)))
+        self._take_off(before + work)
         at = self.rank[members]
         return Outcome(members, bodies.position[at], bodies.orientation[at], bodies.velocity.reshape(-1, ROW)[at, :6])
+
+    def _take_off(self, allowed: float) -> None:
+        """Take what members have gained beyond `allowed` J off their speeds."""
+        kinetic, total = energies(self.bodies, self._masses, self._pull)
+        if total > allowed and kinetic > 0.0:
+            slow_down(self.bodies, math.sqrt(max(1.0 - (total - allowed) / kinetic, 0.0)))
 
     def _advance(self, sub_steps: int, h: float) -> float:
         """Sub-steps of h s with the contacts as they are known; returns the work of moving supports, J."""

@@ -1,4 +1,4 @@
-"""What the stage constrain works on, each a line of the plan: joints, friction, rolling friction."""
+"""What the stage constrain works on, each a line of the plan: joints, friction, rolling friction, heaps."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigidimpulse.constrain.heap_islands import MANY, only_dear, why_no_heaps
 from rigidimpulse.plan import Bound, Skip
 
 
@@ -50,3 +51,25 @@ class RollingFriction:
         if world.rolling is None or not world.can_collide:
             return Skip("no material asks for it")
         return Bound(None, f"lengths up to {float(np.max(world.rolling)):g} m")
+
+
+@dataclass(frozen=True)
+class HeapForces:
+    """Contact inside heaps."""
+
+    stage: str = "constrain"
+    name: str = "heaps"
+
+    def bind(self, world) -> Bound | Skip:
+        """In where heaps are possible; the reason is told anew when the run is over."""
+        reason = why_no_heaps(world)
+        if reason:
+            return Skip(reason)
+        when = f"once exact contact gets dear: fewer than {MANY} bodies" if only_dear(world) else "bodies may heap up"
+        return Bound(step_heap, f"sub-stepped: {when}")
+
+
+def step_heap(context, window, group) -> None:
+    """Step the heap of a group to the end of the window."""
+    if group.heap is not None:
+        context.heaps.step(context, window, group)

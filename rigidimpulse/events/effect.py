@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.constrain.heap import why_no_heaps
-from rigidimpulse.constrain.heap_islands import REBOUND
+from rigidimpulse.constrain.heap_islands import only_dear, why_no_heaps
 from rigidimpulse.events.layout import BALL, OTHER, PLANE
 from rigidimpulse.geometry import HALF_SPACE
 from rigidimpulse.plan import Bound, Skip
@@ -49,14 +48,7 @@ def why_not(world) -> str:
         return "triggers are looked at after every step"
     if accuracy.impact_time not in ("bisection", "conservative") or accuracy.response == "kinematic":
         return f"{accuracy.impact_time}, {accuracy.response}"
-    return "" if why_no_heaps(world) or _all_rebound(world) else "bodies may heap up"
-
-
-def _all_rebound(world) -> bool:
-    """Whether no heap ever begins, since all materials rebound too well."""
-    used = np.unique(world.material_of_body)
-    movable = np.unique(world.material_of_body[world.dynamic])
-    return world.accuracy.contact_solver == "auto" and bool(np.all(world.coefficients[np.ix_(movable, used)][:, :, 0] > REBOUND))
+    return "" if why_no_heaps(world) or only_dear(world) else "bodies may heap up"
 
 
 def kinds(world) -> np.ndarray:

@@ -71,7 +71,9 @@ class EventRun:
     def may_fly(self) -> bool:
         """Whether to try the kernel now: not where contacts last, and not at once again where it did not get on."""
         waits, self._waits = self._waits > 0, max(self._waits - 1, 0)
-        return not waits and not self._context.state.under_contact.any() and self._context.nets is None
+        context = self._context
+        calm = context.heaps is None or context.heaps.is_idle()
+        return not waits and calm and not context.state.under_contact.any() and context.nets is None
 
     def fly(self, end: float, at_boundary: bool = True) -> tuple[int, float, float]:
         """Carry the scene from a boundary of steps, or from the middle of one, towards `end` [s] as far as what happens is simple.

@@ -14,7 +14,7 @@ from rigidimpulse.constrain.heap_rows import CORE_A, CORE_B, HELD, SEPARATION
 from rigidimpulse.constrain.heap_stepper import HeapStepper
 from rigidimpulse.observe.events import EventLog
 from rigidimpulse.observe.recorder import Recorder
-from rigidimpulse.rotation import to_matrix
+from rigidimpulse.rotation import multiply, rotate, to_matrix
 from rigidimpulse.state import StepContext
 from rigidimpulse.world import compile_scene
 
@@ -43,13 +43,30 @@ def gap_by_axes(corners: list[np.ndarray], shapes: list[ri.Shape], turns: np.nda
 
 
 def stepper_at(seed: int, wanted: float):
-    """Stepper with two hulls, moved along the line of their centres until their gap is `wanted` m; and the gap."""
+    """Stepper with two hulls, moved along the line of their centres until their gap is `wanted` m; and its world."""
     random = np.random.default_rng(seed)
     corners = [hull(random) for _ in range(2)]
-    shapes = [ri.Shape.convex_hull(c) for c in corners]
     q, way = random.normal(size=(2, 4)), random.normal(size=3)
     q /= np.linalg.norm(q, axis=1)[:, None]
-    way *= 1.5 / np.linalg.norm(way)
+    return moved_together(corners, q, 1.5 * way / np.linalg.norm(way), wanted)
+
+
+def with_parallel_edges(seed: int, wanted: float):
+    """The same of two tetrahedra, an edge of each along one line."""
+    random = np.random.default_rng(seed)
+    corners = 0.35 / np.sqrt(8.0) * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], float)
+    along = np.array([0.0, 1.0, 1.0]) / np.sqrt(2.0)  # of the edge from the second corner to the first
+    across, turn = np.cross(random.normal(size=3), along), random.normal(size=4)
+    half = random.uniform(0.0, np.pi, 2)
+    about = [np.concatenate([[np.cos(angle)], np.sin(angle) * along]) for angle in half]
+    q = np.stack([multiply(turn / np.linalg.norm(turn), spin) for spin in about])
+    way = across / np.linalg.norm(across) + 0.2 * random.normal() * along
+    return moved_together([corners, corners], q, rotate(turn / np.linalg.norm(turn), way), wanted)
+
+
+def moved_together(corners: list[np.ndarray], q: np.ndarray, way: np.ndarray, wanted: float):
+    """Stepper with two hulls, the second moved back along `way` until their gap is `wanted` m; and its world."""
+    shapes = [ri.Shape.convex_hull(c) for c in corners]
     turns = np.stack([to_matrix(q[k]) for k in range(2)])
     low, high = 0.0, 1.0
     for _ in range(50):
@@ -95,6 +112,20 @@ def test_contacts_are_at_the_gap_of_the_best_axis(wanted):
             continue
         assert min(gaps) == pytest.approx(wanted, abs=slack + 1e-9)
     assert beside <= 1
+
+
+@pytest.mark.parametrize("wanted", [3e-3, 6e-4, 1e-5])
+def test_issue_005_parallel_edges_do_not_lead_astray(wanted):
+    # Corners that tie make flat simplices. Where which side of them 0 is on is left to round-off, the axis of one pair in 300 (the first
+    # four seeds here) is any other: contacts 0.1 m deep, or 0.4 mm apart too much. The gap must be that of the best axis, but for what an
+    # edge must win over faces by.
+    for seed in (55, 128, 552, 582, *range(30)):
+        stepper, _ = with_parallel_edges(seed, wanted)
+        pairs, rows = stepper.table.pairs, stepper.table.rows
+        start, count = int(pairs.start[0]), int(pairs.count[0])
+        gaps = rows[start : start + count, SEPARATION] + rows[start : start + count, HELD]
+        assert count > 0
+        assert gaps.min() == pytest.approx(wanted, abs=EDGE_WINS * float(stepper.inner.min()) + 1e-9)
 
 
 def test_issue_005_corner_beside_the_face_that_bears_it_has_a_contact():
