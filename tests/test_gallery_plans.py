@@ -37,7 +37,7 @@ CALLS_FOR = {
     "pile": "contact detection, gravity, friction, contact forces, heaps",
     "penalty_bounce": "penalty forces",
     "smoothed_path": "contact detection, gravity, gyroscopic term, friction, contact forces",
-    "settled_layout": "contact detection, gravity, gyroscopic term, friction, contact forces",
+    "settled_layout": "contact detection, gravity, gyroscopic term, friction, contact forces, heaps",
     "emergency_stop": "contact detection, gravity, gyroscopic term, friction, contact forces",
     "rear_end_crash": "contact detection, gravity, gyroscopic term, friction, contact forces",
     "pendulum": "contact detection, gravity, joints, friction, contact forces",

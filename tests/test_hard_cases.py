@@ -29,7 +29,7 @@ HOLD = (
     "heavy_on_light_1e3", "heavy_on_light_1e6", "heavy_dropped_1e6", "ball_onto_stack", "squeezed_ball", "squeezed_box",
     "plate_of_balls", "motor_hinge", "chain_hanging", "cube_in_hole", "deep_overlap", "ball_in_ball", "renamed", "dirty_mesh",
     "flipped_floor", "inside_out", "needle", "plate", "stopping", "sliding_to_rolling", "ladder", "ball_off_ball",
-    "rimless_wheel", "rocking_block", "coin", "spikes",
+    "rimless_wheel", "rocking_block", "coin", "spikes", "dominoes", "tetrahedra_in_pit",
 )  # fmt: skip
 """Cases that pass and take no more than a few seconds; `rigidimpulse hardcases` runs all."""
 

@@ -302,7 +302,7 @@ class Heaps:
             self._ends[label] = end
             self._began[label] = group.time, mine, mechanical_energy(context.state.now, world, mine)
         if len(fresh):
-            self.stepper.part(context, fresh)
+            self.stepper.move_apart(context, fresh)
         self._outcome = self.stepper.step(context, group.time, end)
         self._outcome_end = end
         if end < window.end:

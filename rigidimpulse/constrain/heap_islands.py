@@ -25,7 +25,7 @@ from rigidimpulse._jit import jit_making_arrays
 from rigidimpulse.constrain.heap_courses import CALM
 from rigidimpulse.constrain.heap_rows import SEPARATION, SKIN, SUPPORT, in_play
 
-MANY, SOME, FEW, KEPT = 60, 20, 8, 2
+MANY, SOME, FEW, KEPT = 60, 12, 8, 2
 TOIL = 6.0
 RATIO, REBOUND, TALL = 30.0, 0.5, 12
 FAST, SPIN = 0.5, 2.5 / 16.0

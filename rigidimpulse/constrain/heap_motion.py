@@ -8,7 +8,7 @@ from rigidimpulse.rotation import exponential, product, quaternion_to_matrix
 
 
 @inlined
-def _set_orientation(bodies, i, x, y, z):
+def set_orientation(bodies, i, x, y, z):
     """Turn body i by the vector (x, y, z), rad."""
     q = bodies.orientation[i]
     t0, t1, t2, t3 = exponential(x, y, z)
@@ -49,7 +49,7 @@ def _turn_freely(bodies, i, h):
     m1 = 0.5 * (x1 + y1) + twelfth * (a1 - e1) + twelfth * (x2 * y0 - x0 * y2)
     m2 = 0.5 * (x2 + y2) + twelfth * (a2 - e2) + twelfth * (x0 * y1 - x1 * y0)
     wx, wy, wz = turned(bodies.rotation, i, m0, m1, m2)
-    _set_orientation(bodies, i, h * wx, h * wy, h * wz)
+    set_orientation(bodies, i, h * wx, h * wy, h * wz)
     set_inverse_inertia(bodies, i)
     m, o = bodies.mass, 8 * i
     bodies.velocity[v] = m[o] * lx + m[o + 1] * ly + m[o + 2] * lz
@@ -126,7 +126,7 @@ def finish(bodies):
     for i in range(bodies.part.shape[0]):
         if bodies.part[i] != OUTSIDE and (bodies.part[i] != MEMBER or bodies.alike[i]):
             o = 8 * i + 3
-            _set_orientation(bodies, i, bodies.moved[o], bodies.moved[o + 1], bodies.moved[o + 2])
+            set_orientation(bodies, i, bodies.moved[o], bodies.moved[o + 1], bodies.moved[o + 2])
         for k in range(8 * i, 8 * i + 6):
             bodies.moved[k] = 0.0
 

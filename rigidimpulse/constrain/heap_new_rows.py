@@ -2,7 +2,7 @@
 
 That gap is the skin, which soft contact may sink into. Pairs that are closer when they first have contacts, flush or inside each
 other, are held where they are, but no closer than LEAST_HELD skins: driven out of the skin, a block that slides would hop, and a flush
-wall would rise. Bodies that come to a heap closer than that are moved apart at once, without speed (`HeapStepper.part`).
+wall would rise. Bodies that come to a heap closer than that are moved apart at once, without speed (`heap_parting`).
 """
 
 from __future__ import annotations
@@ -22,13 +22,12 @@ from rigidimpulse.constrain.heap_rows import (
     SEPARATION,
     SKIN,
     STATIC_FRICTION,
-    in_play,
     turned_back,
 )
 
 NEAR = 0.2
 """Inner radii within which an old contact hands its impulse to a new one of other features."""
-LEAST_HELD = 0.25
+LEAST_HELD = 0.2
 """Skins that pairs are held apart, however close they were: as far as a column presses them in."""
 
 
@@ -71,17 +70,6 @@ def take_up(held, p, rows, begin, end):
         for r in range(begin, end):
             rows[r, HELD] -= closer
             rows[r, SEPARATION] += closer
-
-
-@jit
-def closest_of(bodies, pairs, rows):
-    """Least separation of pairs in play from the gap that they are held at, in skins."""
-    least = 0.0
-    for p in range(pairs.first.shape[0]):
-        if in_play(bodies.part, pairs.first[p], pairs.second[p]):
-            for r in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
-                least = min(least, rows[r, SEPARATION] / rows[r, SKIN])
-    return least
 
 
 @inlined

@@ -15,8 +15,8 @@ from rigidimpulse.constrain.heap_fill import fill, keep_impulses, place_bodies
 from rigidimpulse.constrain.heap_islands import only_dear
 from rigidimpulse.constrain.heap_motion import energies, mark_quick, note_pressed, slow_down
 from rigidimpulse.constrain.heap_narrow import classify, look, make_room, most_motion, share_of
-from rigidimpulse.constrain.heap_new_rows import closest_of
 from rigidimpulse.constrain.heap_overlap import solids
+from rigidimpulse.constrain.heap_parting import move_apart
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
 from rigidimpulse.constrain.heap_records import (
     POINTS,
@@ -29,7 +29,7 @@ from rigidimpulse.constrain.heap_records import (
     more_patches,
     place_patches,
 )
-from rigidimpulse.constrain.heap_rows import IMPULSE, MEMBER, OUTSIDE, SEPARATION, SUPPORT, HeapBodies, load_bodies
+from rigidimpulse.constrain.heap_rows import MEMBER, OUTSIDE, SUPPORT, HeapBodies, load_bodies
 from rigidimpulse.constrain.heap_solver import FREQUENCY, advance, softness, special_patches
 from rigidimpulse.constrain.heap_table import HeapTable
 from rigidimpulse.constrain.heap_team import empty_deck
@@ -66,11 +66,8 @@ WORTHWHILE_BATCHES, MOST_SOLVERS = 2000, 2
 """Batches, each counted in every sub-step, beyond which two cores solve them."""
 _NO_STEADY = 0, np.zeros(1, np.int64)
 """Patches, and edges of the colours of batches, that were made before the last look."""
-FINER_STEP, FINER_MOTION = 1.0 / 16.0, 1.0 / 20.0
+FINER_STEP, FINER_MOTION = 1.0 / 32.0, 1.0 / 20.0
 """Parts of `Accuracy.step` and `Accuracy.heap_motion` that scenes of few bodies are stepped with: they can afford it."""
-PARTING, MOST_PARTINGS, PARTED = 32, 32, 0.01
-"""Sub-steps without speed between two looks at what comes to a heap too close, each of which takes 7 % of what is missing (`softness`);
-how often; and skins that may be missing at last."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -306,31 +303,19 @@ class HeapStepper:
         fill(self.lanes, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
         return number
 
-    def part(self, context, fresh: np.ndarray) -> None:
+    def move_apart(self, context, fresh: np.ndarray) -> None:
         """Move members that are fresh apart from each other and from all else to the gaps that contacts are held at; their speeds pay."""
-        bodies, rows, part = self.bodies, self.table.rows, self.bodies.part.copy()
-        mine = np.zeros(len(part), bool)
-        mine[self.rank[fresh]] = True
-        bodies.part[(part == MEMBER) & ~mine] = SUPPORT
-        if closest_of(bodies, self.table.pairs, rows) > -PARTED:
-            bodies.part[:] = part
+        bodies, now, at = self.bodies, context.state.now, self.rank[fresh]
+        mine = np.zeros(len(bodies.part), bool)
+        mine[at] = True
+        before = self._energies()[1]
+        if not move_apart(bodies, self.table.pairs, self.table.rows, mine):
             return
-        _, before = energies(bodies, self._masses, self._pull)
-        kept = bodies.velocity.copy(), bodies.gravity.copy(), bodies.mass.copy(), bodies.quick.copy(), rows[:, IMPULSE:SEPARATION].copy()
-        bodies.velocity[:], bodies.gravity[:], self._steady = 0.0, 0.0, _NO_STEADY
-        bodies.mass.reshape(-1, ROW)[~mine] = 0.0
-        for _ in range(MOST_PARTINGS):
-            bodies.quick[:], rows[:, IMPULSE:SEPARATION] = True, 0.0
-            self._advance(PARTING, self.ahead)
-            if closest_of(bodies, self.table.pairs, rows) > -PARTED:
-                break
-        bodies.velocity[:], bodies.gravity[:], bodies.mass[:], bodies.quick[:], rows[:, IMPULSE:SEPARATION] = kept
         self._take_off(before)
-        bodies.part[:], bodies.drift[:] = part, 0.0
-        now, at = context.state.now, self.rank[fresh]
-        speed = bodies.velocity.reshape(-1, ROW)[at]
+        members = self.rank[self.members]
         now.position[fresh], now.orientation[fresh] = bodies.position[at], bodies.orientation[at]
-        now.velocity[fresh], now.angular_velocity[fresh] = speed[:, :3], speed[:, 3:6]
+        now.velocity[self.members] = bodies.velocity.reshape(-1, ROW)[members, :3]
+        now.angular_velocity[self.members] = bodies.velocity.reshape(-1, ROW)[members, 3:6]
         refresh_pose(fresh, now, context.state.rotation, self.world.inertia)
 
     def step(self, context, time: float, end: float) -> Outcome:
@@ -338,7 +323,7 @@ class HeapStepper:
         bodies, members = self.bodies, self.members
         sub_steps = self._sub_steps
         h = (end - time) / sub_steps
-        _, before = energies(bodies, self._masses, self._pull)
+        before = self._energies()[1]
         work, done = 0.0, 0
         self._steady = _NO_STEADY
         for part in range(self._parts):
@@ -352,9 +337,13 @@ class HeapStepper:
         at = self.rank[members]
         return Outcome(members, bodies.position[at], bodies.orientation[at], bodies.velocity.reshape(-1, ROW)[at, :6])
 
+    def _energies(self) -> tuple[float, float]:
+        """Kinetic energy of the members, and all of it, J."""
+        return energies(self.bodies, self._masses, self._pull)
+
     def _take_off(self, allowed: float) -> None:
         """Take what members have gained beyond `allowed` J off their speeds."""
-        kinetic, total = energies(self.bodies, self._masses, self._pull)
+        kinetic, total = self._energies()
         if total > allowed and kinetic > 0.0:
             slow_down(self.bodies, math.sqrt(max(1.0 - (total - allowed) / kinetic, 0.0)))
 
