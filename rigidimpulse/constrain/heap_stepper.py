@@ -66,8 +66,8 @@ WORTHWHILE_BATCHES, MOST_SOLVERS = 2000, 2
 """Batches, each counted in every sub-step, beyond which two cores solve them."""
 _NO_STEADY = 0, np.zeros(1, np.int64)
 """Patches, and edges of the colours of batches, that were made before the last look."""
-FINER_STEP, FINER_MOTION = 1.0 / 32.0, 1.0 / 20.0
-"""Parts of `Accuracy.step` and `Accuracy.heap_motion` that scenes of few bodies are stepped with: they can afford it."""
+FINER_STEP, FINER_SUB_STEP, FINER_MOTION = 1.0 / 8.0, 1.0 / 32.0, 1.0 / 10.0
+"""Parts of `Accuracy.step`, of sub-steps and of `Accuracy.heap_motion` that scenes of few bodies are stepped with: they can afford it."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -132,6 +132,7 @@ class HeapStepper:
         self._part = np.zeros(n, np.int64)
         finer = only_dear(world)
         self.step_length = world.accuracy.step * (FINER_STEP if finer else 1.0)
+        self._least_sub_steps = LEAST_SUB_STEPS / (FINER_SUB_STEP if finer else 1.0)
         self.motion = world.accuracy.heap_motion * (FINER_MOTION if finer else 1.0)
         self.kept = KEPT * self.motion
         self._all_quick = bool(world.moving.any() or world.ball.any())
@@ -160,8 +161,7 @@ class HeapStepper:
     def sub_step(self, members: np.ndarray) -> float:
         """Length of a sub-step, s: short enough for the load of a column, so that it scales with the size of bodies."""
         strength = float(self.world.steady_strength[members].max())
-        step = self.step_length
-        pieces = LEAST_SUB_STEPS
+        step, pieces = self.world.accuracy.step, self._least_sub_steps
         if strength > 0.0:
             h = 2.0 * math.pi * FREQUENCY * math.sqrt(PRESSED * float(self.skin[members].min()) / (COLUMN * strength))
             pieces = max(math.ceil(step / h), pieces)
