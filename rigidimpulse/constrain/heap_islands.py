@@ -12,9 +12,8 @@ and, where a heap begins (who comes near one later is taken in):
     dull        no restitution above REBOUND: a rebound is found at the end of the step only
     low         no body more than TALL others above a support: long columns want exact rows
 
-Scenes of fewer than SOME have no heaps. "substepped" takes every island without
-joints. Bodies that move farther than FAST of their inner radius in a sub-step, or turn by more than SPIN rad, are no part of any: they
-are swept.
+Scenes of fewer than SOME have no heaps. "substepped" takes every island without joints. Bodies that move farther than FAST of their inner
+radius in a sub-step, or turn by more than SPIN rad, are no part of any: they are swept.
 """
 
 from __future__ import annotations
