@@ -33,6 +33,8 @@ FAST, SPIN = 0.5, 2.5 / 16.0
 def why_no_heaps(world) -> str:
     """Why a scene cannot have heaps; empty where it can."""
     solver = world.accuracy.contact_solver
+    if "heaps" in world.left_out:
+        return "left out by the caller"
     if solver not in ("auto", "substepped"):
         return f"contact_solver is {solver!r}"
     if not world.can_collide or not world.can_press:

@@ -74,6 +74,20 @@ def test_bodies_that_all_rebound_are_no_heap() -> None:
     assert lines["event kernel"].included
 
 
+def test_heaps_can_be_left_out() -> None:
+    """A row of boxes on the floor is a heap; without heaps it is solved exactly, to the bit as "newton" does, and the status says so."""
+    stone = ri.Material(density=900, static_friction=0.4, dynamic_friction=0.4)
+    scene = ri.Scene(gravity=(0.0, 0.0, -9.81))
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=stone))
+    for k in range(62):
+        scene.add(ri.Body(f"box {k}", ri.Shape.box(0.1), position=(0.1005 * k, 0.0, 0.05), velocity=(1.0, 0.0, 0.0), material=stone))
+    assert heap_steps(ri.simulate(scene, 0.05)) > 0
+    run = ri.simulate(scene, 0.05, effects={"heaps": False})
+    assert heap_steps(run) == 0 and not next(line for line in run.plan.lines if line.name == "heaps").included
+    assert "effect left out" in {event.kind for event in run.status.events}
+    assert run.state_hash() == ri.simulate(scene, 0.05, accuracy=ri.Accuracy(contact_solver="newton")).state_hash()
+
+
 def test_what_exact_contact_left_too_close_is_moved_apart_without_speed() -> None:
     """Blocks that slide side by side, flush on the floor, are moved up to a fifth of the skin at the start; they slide and stop as far.
 
