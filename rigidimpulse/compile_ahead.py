@@ -203,7 +203,7 @@ def _look_at_heap(context) -> None:
 
     world, state, member = context.world, context.state, np.array([False, True])
     state.now.inv_inertia[1] = np.eye(3)
-    stepper = HeapStepper(world)
+    stepper = HeapStepper(world, world.dynamic, finer=False)
     for _ in range(2):  # The second time there is a cover.
         stepper.set_up(context, np.array([1]), np.array([0]), STEP)
     stepper.near(context, member, ~member, STEP)
@@ -220,7 +220,7 @@ def _step_heap(context) -> None:
     from rigidimpulse.constrain.heap_stepper import HeapStepper
 
     state, now, members = context.state, context.state.now, np.array([1])
-    stepper = HeapStepper(context.world)
+    stepper = HeapStepper(context.world, context.world.dynamic, finer=False)
     stepper.members = members
     support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
     mark_quick(stepper.bodies, STEP, 1.0)

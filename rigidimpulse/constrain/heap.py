@@ -51,7 +51,7 @@ class Heaps:
 
     def __init__(self, world) -> None:
         """No heaps yet."""
-        self._world, self._only_dear = world, only_dear(world)
+        self._world, self._only_dear, self._movable = world, only_dear(world), world.dynamic.copy()
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.calm = np.zeros(world.num_bodies)
         self.asleep = np.zeros(world.num_bodies, bool)
@@ -71,7 +71,7 @@ class Heaps:
     def stepper(self) -> HeapStepper:
         """The solver and its contacts; its kernels are compiled here where they were not needed at the start."""
         prepare_kernels(self._world, with_events=False, with_heaps=True)
-        return HeapStepper(self._world)
+        return HeapStepper(self._world, self._movable, self._only_dear)
 
     def is_idle(self) -> bool:
         """Whether no heap is there and none may begin."""

@@ -12,7 +12,6 @@ from rigidimpulse.constrain.heap_contacts import FARTHER, convex_polyhedra, inne
 from rigidimpulse.constrain.heap_cores import cores
 from rigidimpulse.constrain.heap_cover import Cover
 from rigidimpulse.constrain.heap_fill import fill, keep_impulses, place_bodies
-from rigidimpulse.constrain.heap_islands import only_dear
 from rigidimpulse.constrain.heap_motion import energies, mark_quick, note_pressed, slow_down
 from rigidimpulse.constrain.heap_narrow import classify, look, make_room, most_motion, share_of
 from rigidimpulse.constrain.heap_overlap import solids
@@ -94,15 +93,22 @@ class HeapStepper:
 
     """
 
-    def __init__(self, world) -> None:
-        """Make the arrays of the bodies; shrink the shapes for the contact kernels."""
+    def __init__(self, world, movable: np.ndarray, finer: bool) -> None:
+        """Make the arrays of the bodies; shrink the shapes for the contact kernels.
+
+        Args:
+            world: the compiled scene.
+            movable: (n,) bool, bodies that are dynamic, or will be when they are let go.
+            finer: for scenes of few bodies.
+
+        """
         n = world.num_bodies
         self.world = world
         self.order = np.lexsort(np.column_stack([np.arange(n), world.position[:, ::-1]]).T)
         self.rank = np.argsort(self.order, kind="stable")
         dynamic_shapes = np.zeros(len(world.geometry.shape_first) - 1, bool)
-        dynamic_shapes[world.shape_of_body[world.dynamic]] = True
-        self.inner = np.where(world.dynamic, inner_radii(world.geometry)[world.shape_of_body], np.inf)
+        dynamic_shapes[world.shape_of_body[movable]] = True
+        self.inner = np.where(movable, inner_radii(world.geometry)[world.shape_of_body], np.inf)
         self.skin = TOLERANCES.skin * self.inner
         self.reach = np.where(world.ball, 0.0, world.bound_radius)
         convex = convex_polyhedra(world.geometry)
@@ -121,7 +127,7 @@ class HeapStepper:
         self._rooms = [make_room() for _ in range(self._shares)]
         self._more_buffers: list[ContactBuffer] = []
         self.table = HeapTable(self._shares)
-        least = CLEAR * np.where(world.dynamic, self.inner, 0.0)
+        least = CLEAR * np.where(movable, self.inner, 0.0)
         self.cover = Cover(world, self.order, self.inner, least)
         self.lanes = machine_lanes()
         self._patches, self._count, self._steady = empty_patches(64), 0, _NO_STEADY
@@ -130,7 +136,6 @@ class HeapStepper:
         self._deck = empty_deck()
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
-        finer = only_dear(world)
         self.step_length = world.accuracy.step * (FINER_STEP if finer else 1.0)
         self._least_sub_steps = LEAST_SUB_STEPS / (FINER_SUB_STEP if finer else 1.0)
         self.motion = world.accuracy.heap_motion * (FINER_MOTION if finer else 1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from heap_pit import inside_each_other, pit
+from heap_pit import STONE, inside_each_other, pit
 
 import rigidimpulse as ri
 
@@ -72,6 +72,19 @@ def test_bodies_that_all_rebound_are_no_heap() -> None:
     lines = {line.name: line for line in ri.simulate(scene, 0.01).plan.lines}
     assert not lines["heaps"].included and "rebound" in lines["heaps"].reason
     assert lines["event kernel"].included
+
+
+def test_a_body_that_is_let_go_joins_the_heap() -> None:
+    """A lid that is carried above a fall of boxes, and let go when they have long been a heap, comes to rest on them."""
+    scene = part_of_pit(STONES["boxes"], 12, 24)
+    lid = ri.Body("lid", ri.Shape.box((0.5, 0.5, 0.05)), position=(0, 0, 1.0), motion="kinematic", release_time=0.8, material=STONE)
+    scene.add(lid)
+    run = ri.simulate(scene, 3.2)
+    assert run.status.ok and heap_steps(run) > 100
+    height = run.position("lid")[:, 2]
+    np.testing.assert_array_equal(height[run.times <= 0.8], 1.0)
+    assert 0.05 < height[-1] < 0.6 and np.abs(run.velocities[-1]).max() < 1e-3
+    assert inside_each_other(scene, run, len(run.times) - 1, 1e-6) == []
 
 
 def test_heaps_can_be_left_out() -> None:

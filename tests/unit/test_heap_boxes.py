@@ -42,7 +42,7 @@ def stepper_of(seed: int, wanted: float):
         scene.add(ri.Body(f"{k}", ri.Shape.box(SIDES[k]), position=k * direction / np.linalg.norm(direction) * 3.0, orientation=q[k]))
     world = compile_scene(scene, ri.Accuracy(contact_solver="substepped"))
     context = StepContext(world, Recorder(np.zeros(1), 2), EventLog())
-    stepper, now = HeapStepper(world), context.state.now
+    stepper, now = HeapStepper(world, world.dynamic, finer=False), context.state.now
     order = stepper.order
     stepper.set_up(context, np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
     low, high = 0.0, 3.0
