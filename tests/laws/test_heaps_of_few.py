@@ -33,10 +33,10 @@ def heap_steps(run: ri.Recording) -> int:
 def test_a_fall_of_some_dozen_bodies_is_stepped_finely(kind: str, seed: int, number: int) -> None:
     """Solved exactly 40 boxes take more than a minute for these 2 s. Here bodies stay apart, too, and energy never grows.
 
-    Contacts that were exact ones are held at a fifth of the skin (0.8 % of 3 to 5 cm, 0.06 mm) and more: not one pair of the seven runs with
-    which this was tried was inside another by 1e-7 m at these frames. Stepped as coarsely as heaps of thousands, two pairs of the boxes and
-    one of the mix are inside each other by 0.1 mm, and the boxes gain 4e-6 of their energy. Here it is 2e-9: what lifts take is taken off
-    the speeds, to second order.
+    Contacts that were exact ones are held at a fifth of the skin (0.8 % of 3 to 5 cm, 0.06 mm) and more: not one pair of the seven runs
+    with which this was tried was inside another by 1e-7 m at these frames. Stepped as coarsely as heaps of thousands, two pairs of the
+    boxes and one of the mix are inside each other by 0.1 mm, and the boxes gain 4e-6 of their energy. Here it is 2e-9: what lifts take is
+    taken off the speeds, to second order.
     """
     scene = part_of_pit(STONES[kind], seed, number)
     run = ri.simulate(scene, 2.0)
