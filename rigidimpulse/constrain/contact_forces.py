@@ -16,7 +16,7 @@ from rigidimpulse.constrain.joint_forces import UNSOLVED
 from rigidimpulse.constrain.resting import Held, hold_contacts
 from rigidimpulse.constrain.rolling import rolling_of
 from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.groups import MARGIN, Group, collect, make_group
+from rigidimpulse.detect.groups import Group, collect, make_group, near_contacts
 from rigidimpulse.detect.touching import refresh_pose
 from rigidimpulse.observe.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.plan import Bound, Skip
@@ -36,8 +36,6 @@ SHORTEST = 1e-5
 """Part of a step that is not split."""
 SHORTEST_STOP = 1e-3
 """Part of a step within which it does not matter when a contact stops."""
-LIFT_MARGIN = 30.0
-"""Held gaps within which contacts are looked for that a lift may close."""
 STEADY = 1e-9
 """rad in a step; what turns less does not."""
 
@@ -112,8 +110,6 @@ def hold(context, window, group: Group) -> None:
         context.joints.log_rest(group)
     if h < rest and not group.rests:
         window.wake[group.members] = group.time + h
-    if group.shift > 0.0:
-        window.look_around(group.members, group.time, group.shift)
 
 
 def _makes_energy(context, group: Group, h: float) -> bool:
@@ -204,30 +200,25 @@ def sub_step(rate: float, step: float, rest: float) -> float:
 def _lift(context, window, group: Group) -> None:
     """Bring sunken contacts back to their gap and look at the group's contacts again.
 
-    A light body turns far to make room for a heavy one: what it may come near is looked for farther away.
+    A light body turns far to make room for a heavy one: what it may come near is looked for farther away, and what does not belong to the
+    group stands meanwhile.
     """
     state, now = context.state, context.state.now
-    place, turn = now.position[group.members].copy(), now.orientation[group.members].copy()
+    place = now.position[group.members].copy()
     before = mechanical_energy(now, context.world, group.members)
-    around, held = _look(context, window, group, LIFT_MARGIN), dict(zip(group.keys, group.slow().tolist(), strict=True))
-    lifted = np.array([held.get(key, False) for key in around.keys], bool)
-    lift_contacts(now, around.contacts, lifted, around.delta, group.members, context.column)
+    held = dict(zip(group.keys, group.slow().tolist(), strict=True))
+    around, delta, keys = near_contacts(context, window, group.members, group.time)
+    lifted = np.array([held.get(key, False) for key in keys], bool)
+    lift_contacts(now, around, lifted, delta, group.members, context.column)
     refresh_pose(group.members, now, state.rotation, state.course.inertia)
     context.log.book(group.time, "lift", mechanical_energy(now, context.world, group.members) - before)
-    guard_lift(context, group, around.contacts, now.position[group.members] - place, float(around.delta.max()))
+    guard_lift(context, group, around, now.position[group.members] - place, float(delta.max()))
     group.moved = True
-    reach = 2.0 * context.world.bound_radius[group.members] * np.linalg.norm(now.orientation[group.members] - turn, axis=1)
-    group.shift = float((np.linalg.norm(now.position[group.members] - place, axis=1) + reach).max())
-    again = _look(context, window, group, MARGIN)
+    real, integer = collect(context, window, group.pairs, group.time)
+    again = make_group(context, window, group.time, real, integer, np.ones(len(real), bool), group.joints, group.members)
     for name in ("contacts", "place", "kinds", "features", "keys", "delta", "approach", "rest_speed", "live"):
         setattr(group, name, getattr(again, name))
     group.held = group.slow()
-
-
-def _look(context, window, group: Group, margin: float) -> Group:
-    """The same group with its contacts at the present poses, within so many held gaps."""
-    real, integer = collect(context, window, group.pairs, group.time, margin)
-    return make_group(context, window, group.time, real, integer, np.ones(len(real), bool), group.joints, group.members)
 
 
 def _rests(context, group: Group, h: float) -> bool:

@@ -28,9 +28,12 @@ def needs_lift(contacts, held, delta):
 
 
 def lift_contacts(bodies, contacts, held, delta, members, number) -> None:
-    """Move the bodies of the group so that held contacts have their gap delta again."""
+    """Move the bodies of the group so that held contacts have their gap delta again; others stand."""
     rows, first_row, _ = contact_rows(bodies, contacts, members, number, 0)
     rows = take_rows(rows, first_row)
+    for body, end, half in ((contacts.body_a, rows.first, slice(6)), (contacts.body_b, rows.second, slice(6, 12))):
+        stands = ~np.isin(body, members)
+        end[stands], rows.jacobian[stands, half] = -1, 0.0
     target = np.where(held, delta, np.minimum(contacts.gap, KEPT * delta))
     rows.bias[:] = contacts.gap - target
     solve_newton(rows, len(members), SOLVE_TOLERANCE * float(delta.max()))

@@ -18,8 +18,8 @@ from rigidimpulse.respond.impulse import Contacts
 if TYPE_CHECKING:
     from rigidimpulse.constrain.jointed import JointState
 
-MARGIN = 2.0
-"""Contacts are looked for within this many delta."""
+MARGIN, FAR_MARGIN = 2.0, 30.0
+"""Contacts are looked for within this many delta, and those that a lift of bodies may close."""
 NO_FORCE = np.zeros(3)
 LIFTED = 10.0
 """Approach speed that a lift may make, in held gaps of turning (gap over size) times the speed: arms and normals turn a little."""
@@ -41,7 +41,7 @@ class Group:
         rest_speed: (m,) a slower rebound is none, m/s.
         live: (m,) bool, near enough for an impact now.
         velocity, angular_velocity, position: of the members as they arrived.
-        moved: whether a lift has changed poses. shift: m, how far it moved points of the members at most.
+        moved: whether a lift has changed poses.
         held: (m,) bool, contacts that carry forces. rests: whether all members stand still.
         still: m/s, approach speed that counts as none. scale: m/s, largest speed of a contact point.
         joints: the joints of the members.
@@ -66,7 +66,6 @@ class Group:
     velocity: np.ndarray
     angular_velocity: np.ndarray
     moved: bool = False
-    shift: float = 0.0
     held: np.ndarray | None = None
     rests: bool = False
     still: float = 0.0
@@ -124,7 +123,7 @@ def touching_groups(context, window, time: float, bodies: np.ndarray) -> tuple[l
     reals, integers = [], []
     while len(frontier):
         reached[frontier] = True
-        pairs = near[: near_pairs(state.course, time, window.pairs, MARGIN, world.bound_radius, frontier, seen, near)]
+        pairs = near[: near_pairs(state.course, time, window.pairs, FAR_MARGIN, world.bound_radius, frontier, seen, near)]
         partners = _partners(context, frontier)
         mark = np.zeros(world.num_bodies, bool)
         mark[frontier] = mark[window.a[pairs]] = mark[window.b[pairs]] = mark[partners] = True
@@ -239,11 +238,7 @@ def make_group(
 ) -> Group:
     """The group of the contacts marked in `which`, sorted by pair, of the given joints, and of the bodies tied to them by forces."""
     world, state = context.world, context.state
-    rows = which.nonzero()[0]
-    if len(rows) > 1:
-        rows = rows[np.lexsort((integer[rows, 4], integer[rows, 3], integer[rows, 2], integer[rows, 1], integer[rows, 0]))]
-    contacts = empty_contacts(len(rows))
-    fill_contacts(state.now, real, integer, rows, world.material_of_body, world.coefficients, contacts)
+    rows, contacts = _sorted_contacts(context, real, integer, which.nonzero()[0])
     mark = np.zeros(world.num_bodies, bool)
     mark[contacts.body_a] = mark[contacts.body_b] = True
     if len(joints):
@@ -270,6 +265,25 @@ def make_group(
     )
     classify(context, group)
     return group
+
+
+def _sorted_contacts(context, real: np.ndarray, integer: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, Contacts]:
+    """The rows (m,) of the contact buffer sorted by pair, and their contacts."""
+    if len(rows) > 1:
+        rows = rows[np.lexsort((integer[rows, 4], integer[rows, 3], integer[rows, 2], integer[rows, 1], integer[rows, 0]))]
+    world, contacts = context.world, empty_contacts(len(rows))
+    fill_contacts(context.state.now, real, integer, rows, world.material_of_body, world.coefficients, contacts)
+    return rows, contacts
+
+
+def near_contacts(context, window, members: np.ndarray, time: float) -> tuple[Contacts, np.ndarray, list[tuple[int, ...]]]:
+    """What a lift of the members of a group may close: contacts with all that is near at `time`, held gaps [m], and keys."""
+    near = np.empty(len(window.a), np.int64)
+    seen = np.zeros(len(window.a), bool)
+    count = near_pairs(context.state.course, time, window.pairs, FAR_MARGIN, context.world.bound_radius, members, seen, near)
+    real, integer = collect(context, window, near[:count], time, FAR_MARGIN)
+    rows, contacts = _sorted_contacts(context, real, integer, np.arange(len(real)))
+    return contacts, window.delta[window.find(contacts.body_a, contacts.body_b)], [contact_key(*row) for row in integer[rows].tolist()]
 
 
 def contact_key(a: int, b: int, kind: int, feature_a: int, feature_b: int) -> tuple[int, ...]:

@@ -38,7 +38,6 @@ class Window:
         self.begin, self.end = context.state.time, end
         self._take(new_pairs(context.world, np.zeros(0, np.int64), np.zeros(0, np.int64), self.begin))
         self.wake = np.full(context.world.num_bodies, np.inf)
-        self._looked_around = np.full(context.world.num_bodies, -np.inf)
         self.inside = np.zeros(context.world.num_bodies, bool)
         self.still = ~(context.world.dynamic | context.world.moving)
         self.heaps_begun = False
@@ -188,14 +187,6 @@ class Window:
         mark &= self.context.world.dynamic
         mark |= self.wake <= time
         return mark.nonzero()[0]
-
-    def look_around(self, bodies: np.ndarray, time: float, shift: float) -> None:
-        """Call bodies that a lift moved by `shift` [m] once more at `time`, where that may bring them to others that it did not know of."""
-        fresh = bodies[self._looked_around[bodies] < time]
-        mark = np.zeros(len(self.wake), bool)
-        mark[fresh] = True
-        if shift > self.delta[mark[self.a] | mark[self.b]].min(initial=np.inf):
-            self._looked_around[fresh] = self.wake[fresh] = time
 
     def find(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Places of the pairs (a, b)."""
