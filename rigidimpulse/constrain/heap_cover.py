@@ -133,10 +133,10 @@ class Cover:
         self._inner = inner
         self._covered = np.zeros(n, bool)
         self._centre, self._slack = np.zeros((n, 3)), np.zeros(n)
-        self._pairs = np.empty((max(64, 16 * n), 2), np.int64)
+        self._most = max(64, 16 * n)
 
     def renewed(self, now, acceleration, members: np.ndarray, others: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray] | None:
-        """Ranks of pairs that may meet, ascending, where they had to be found anew; None where the known ones hold.
+        """Ranks (k,) int32 of pairs that may meet, ascending, where they had to be found anew; None where the known ones hold.
 
         members: (k,) bodies that move; others: (m,) more bodies that are to be covered where they are.
         """
@@ -155,12 +155,14 @@ class Cover:
             self._inner, self._covered, self._centre, self._slack, low, high,
         )  # fmt: skip
         movable = world.dynamic[self.order]
-        count = overlapping_pairs(low, high, movable, self._pairs)
+        pairs = np.empty((self._most, 2), np.int64)
+        count = overlapping_pairs(low, high, movable, pairs)
         if count < 0:
-            self._pairs = np.empty((-count - count // 4, 2), np.int64)
-            count = overlapping_pairs(low, high, movable, self._pairs)
-        count = _drop_far(self.order, now, self._moves, world.bound_radius, self._slack, self._pairs, count)
-        first, second = self._pairs[:count, 0].copy(), self._pairs[:count, 1].copy()
+            self._most = -count - count // 4
+            pairs = np.empty((self._most, 2), np.int64)
+            count = overlapping_pairs(low, high, movable, pairs)
+        count = _drop_far(self.order, now, self._moves, world.bound_radius, self._slack, pairs, count)
+        first, second = pairs[:count].T.astype(np.int32, order="C")
         if len(world.apart):
             a, b = self.order[first], self.order[second]
             may = world.may_collide(np.minimum(a, b), np.maximum(a, b))

@@ -27,6 +27,7 @@ from rigidimpulse.constrain.heap_rows import (
     turned,
 )
 from rigidimpulse.constrain.lanes import ROW, aligned
+from rigidimpulse.reserve import reserve
 
 ARM_A, ARM_B, ARM_FIELDS = 0, 3, 6
 """Fields of three of the arms: from the centres of the bodies to O, m."""
@@ -52,6 +53,8 @@ POINTS, LINES = 4, 3
 """Points of a patch at most; lines of 8 of a row of the pool."""
 REGIONS = 2
 """Parts of the heap, by the places of bodies at the start: each core works in one of them as long as it can."""
+PATCHES_OF_A_BODY = 8
+"""For so many there is room at first: what is reserved takes no memory before it is touched."""
 COLOURS = 62
 """Patches that find no colour among these have a batch each."""
 ONE_WALL = 1.0 - 1e-8
@@ -82,10 +85,10 @@ class Batches(NamedTuple):
 def empty_patches(m: int) -> Patches:
     """Room for m patches."""
 
-    def numbers() -> np.ndarray:
-        return np.zeros(m, np.int32)
+    def numbers(*shape: int) -> np.ndarray:
+        return reserve(shape, np.int32)
 
-    return Patches(pair=numbers(), row=np.zeros((m, POINTS), np.int32), size=numbers(), colour=numbers(), slot=numbers())
+    return Patches(pair=numbers(m), row=numbers(m, POINTS), size=numbers(m), colour=numbers(m), slot=numbers(m))
 
 
 def more_patches(patches: Patches, m: int) -> Patches:
@@ -100,8 +103,8 @@ def more_batches(batches: Batches, b: int, width: int) -> Batches:
     """The same with room for b batches."""
     slots = b * width
     record, arm = aligned(-(-FIELDS * slots // (2 * ROW))).view(np.float32), aligned(-(-ARM_FIELDS * slots // ROW))
-    first, second = np.zeros((2, slots), np.int32)
-    out = Batches(record, arm, first, second, np.zeros(POINTS * slots, np.int32), np.zeros(b, np.int32))
+    first, second, row = reserve((slots,), np.int32), reserve((slots,), np.int32), reserve((POINTS * slots,), np.int32)
+    out = Batches(record, arm, first, second, row, np.zeros(b, np.int32))
     for new, old in zip(out, batches, strict=True):
         new[: len(old)] = old
     return out

@@ -18,6 +18,7 @@ from rigidimpulse.constrain.heap_overlap import solids
 from rigidimpulse.constrain.heap_parting import move_apart
 from rigidimpulse.constrain.heap_polyhedra import make_polyhedra
 from rigidimpulse.constrain.heap_records import (
+    PATCHES_OF_A_BODY,
     POINTS,
     Batches,
     colour_patches,
@@ -37,6 +38,7 @@ from rigidimpulse.conventions import TOLERANCES
 from rigidimpulse.detect.contact_buffer import ContactBuffer, find_together
 from rigidimpulse.detect.manifold import pair_gap
 from rigidimpulse.detect.touching import refresh_pose
+from rigidimpulse.reserve import reserve
 from rigidimpulse.rotation import to_matrix
 
 COLUMN = 20.0
@@ -126,12 +128,13 @@ class HeapStepper:
         self._shares, self._looked_at = number_of_cores(), 0
         self._rooms = [make_room() for _ in range(self._shares)]
         self._more_buffers: list[ContactBuffer] = []
-        self.table = HeapTable(self._shares)
+        self.table = HeapTable(self._shares, n)
         least = CLEAR * np.where(movable, self.inner, 0.0)
         self.cover = Cover(world, self.order, self.inner, least)
         self.lanes = machine_lanes()
-        self._patches, self._count, self._steady = empty_patches(64), 0, _NO_STEADY
-        self._batches = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
+        self._patches, self._count, self._steady = empty_patches(PATCHES_OF_A_BODY * n), 0, _NO_STEADY
+        none = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
+        self._batches = more_batches(none, PATCHES_OF_A_BODY * n // self.lanes.width + 1, self.lanes.width)
         self._begins, self._edges = np.zeros(256, np.int64), np.zeros(1, np.int64)
         self._deck = empty_deck()
         self._places_of_bodies = aligned(n + 1)
@@ -210,7 +213,7 @@ class HeapStepper:
         shares = self._shares if self._looked_at > WORTHWHILE else 1
         room = share_of(number, shares, shares)
         if room > len(self._places):
-            self._places, self._margins = np.zeros(2 * room, np.int64), np.zeros(2 * room)
+            self._places, self._margins = reserve((2 * room,), np.int64), reserve((2 * room,), np.float64)
         while True:
             outcome = look.together([
                 (
@@ -221,7 +224,7 @@ class HeapStepper:
             ])  # fmt: skip
             if min(waiting for _, waiting in outcome) >= 0:
                 break
-            table.make_room(len(table.rows) // (4 * self._shares))
+            table.make_room(POINTS)
         self._looked_at = sum(looked_at for looked_at, _ in outcome)
         begins = [share_of(number, share, shares) for share in range(shares)]
         waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
@@ -293,7 +296,7 @@ class HeapStepper:
         first = int(edges[-1])
         count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
         if count < 0:
-            self._patches = more_patches(self._patches, -count - count // 4)
+            self._patches = more_patches(self._patches, -2 * count)
             count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
         self._count = count
         number, colours = colour_patches(width, bodies, table.pairs, self._patches, begin, count, first, self._begins)
@@ -301,7 +304,7 @@ class HeapStepper:
             self._begins = np.zeros(1 - 2 * colours, np.int64)
             number, colours = colour_patches(width, bodies, table.pairs, self._patches, begin, count, first, self._begins)
         if number > len(self._batches.points):
-            self._batches = more_batches(self._batches, number + number // 4, width)
+            self._batches = more_batches(self._batches, 2 * number, width)
         self._edges = np.concatenate([edges[:-1], self._begins[: colours + 1]])
         place_patches(width, bodies, table.pairs, self._patches, begin, count, self._batches, first, number)
         place_bodies(bodies, self._places_of_bodies)

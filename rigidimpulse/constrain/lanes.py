@@ -24,6 +24,8 @@ from numba.core import cgutils
 from numba.core.imputils import lower_constant
 from numba.extending import NativeValue, lower_builtin, models, register_model, type_callable, typeof_impl, unbox
 
+from rigidimpulse.reserve import reserve
+
 ROW = 8
 """Doubles in a row."""
 LINE = 64
@@ -50,10 +52,7 @@ def machine_lanes() -> Lanes:
 
 def aligned(rows: int) -> np.ndarray:
     """Zeros (8 rows,) that begin at a line of the cache."""
-    size = rows * ROW * 8
-    raw = np.zeros(size + LINE, np.uint8)
-    first = -raw.ctypes.data % LINE
-    return raw[first : first + size].view(np.float64)
+    return reserve((rows * ROW,), np.float64)
 
 
 class _LanesType(types.Type):

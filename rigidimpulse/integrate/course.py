@@ -28,6 +28,7 @@ import numpy as np
 
 from rigidimpulse._jit import inlined, jit
 from rigidimpulse.integrate import forced_top, free_top
+from rigidimpulse.reserve import reserve
 from rigidimpulse.rotation import exponential, product
 
 FIXED, PRESCRIBED, FREE, FORCED, STEPPED = 0, 1, 2, 3, 4
@@ -100,7 +101,7 @@ def make_course(num_bodies: int) -> Course:
         mode=np.zeros(num_bodies, dtype=np.int64),
         inertia=np.ones((num_bodies, 3)),
         top=np.zeros((num_bodies, TOP_SIZE)),
-        series=np.zeros((num_bodies, forced_top.SERIES_SIZE)),
+        series=reserve((num_bodies, forced_top.SERIES_SIZE), np.float64),  # of most bodies never touched
     )
 
 
