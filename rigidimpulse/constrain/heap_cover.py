@@ -155,14 +155,14 @@ class Cover:
             self._inner, self._covered, self._centre, self._slack, low, high,
         )  # fmt: skip
         movable = world.dynamic[self.order]
-        pairs = np.empty((self._most, 2), np.int64)
+        pairs = np.empty((self._most, 2), np.int32)
         count = overlapping_pairs(low, high, movable, pairs)
         if count < 0:
             self._most = -count - count // 4
-            pairs = np.empty((self._most, 2), np.int64)
+            pairs = np.empty((self._most, 2), np.int32)
             count = overlapping_pairs(low, high, movable, pairs)
         count = _drop_far(self.order, now, self._moves, world.bound_radius, self._slack, pairs, count)
-        first, second = pairs[:count].T.astype(np.int32, order="C")
+        first, second = np.ascontiguousarray(pairs[:count].T)
         if len(world.apart):
             a, b = self.order[first], self.order[second]
             may = world.may_collide(np.minimum(a, b), np.maximum(a, b))

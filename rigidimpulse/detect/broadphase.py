@@ -131,7 +131,7 @@ def _strip_lists(order, num_strips, reach):
 @jit_making_arrays
 def _sort_pairs(pairs, count, num_bodies):
     """Put the first `count` pairs into ascending order, by a counting sort on the second, then on the first column."""
-    other = np.empty((count, 2), np.int64)
+    other = np.empty((count, 2), pairs.dtype)
     for column in range(1, -1, -1):
         place = np.zeros(num_bodies + 1, np.int64)
         for k in range(count):
@@ -198,7 +198,7 @@ def overlapping_pairs(box_min, box_max, movable, pairs_out):
     Args:
         box_min, box_max: (n, 3) m, box of each body, widened as the caller needs; may be -inf, inf.
         movable: (n,) bool; a pair of which neither can move is left out.
-        pairs_out: (cap, 2) int64, written.
+        pairs_out: (cap, 2) int32, written.
 
     Returns:
         The number of pairs; minus the number needed if there are more than `cap`, and then `pairs_out` means nothing.

@@ -66,12 +66,13 @@ class Window:
         path_boxes(course, members, self.begin, self.end, world.bound_radius, box_min, box_max)
         box_min[members] -= MARGIN * world.largest_delta
         box_max[members] += MARGIN * world.largest_delta
-        pairs = np.empty((max(64, 8 * world.num_bodies), 2), np.int64)
+        pairs = np.empty((max(64, 8 * world.num_bodies), 2), np.int32)
         count = overlapping_pairs(box_min, box_max, self._moves, pairs)
         if count < 0:
-            pairs = np.empty((-count, 2), np.int64)
+            pairs = np.empty((-count, 2), np.int32)
             count = overlapping_pairs(box_min, box_max, self._moves, pairs)
-        self._append(pairs[:count, 0], pairs[:count, 1], self.begin)
+        first, second = pairs[:count].T.astype(np.int64)
+        self._append(first, second, self.begin)
 
     def recall(self, begin: float) -> None:
         """Let pairs be as if the window had begun at `begin`, where the step did [s], all bodies having flown freely since.
@@ -158,16 +159,17 @@ class Window:
         )
         context.box_min[bodies] -= MARGIN * context.world.largest_delta
         context.box_max[bodies] += MARGIN * context.world.largest_delta
-        pairs = np.empty((len(bodies) + 64, 2), np.int64)
+        pairs = np.empty((len(bodies) + 64, 2), np.int32)
         low, high = context.box_min.copy(), context.box_max.copy()
         low[~(moved | free)], high[~(moved | free)] = np.inf, -np.inf
         count = overlapping_pairs(low, high, free, pairs)
         if count < 0:
-            pairs = np.empty((-count, 2), np.int64)
+            pairs = np.empty((-count, 2), np.int32)
             count = overlapping_pairs(low, high, free, pairs)
         n = context.world.num_bodies
-        fresh = ~np.isin(pairs[:count, 0] * n + pairs[:count, 1], self.a * n + self.b)
-        self._append(pairs[:count, 0][fresh], pairs[:count, 1][fresh], time)
+        first, second = pairs[:count].T.astype(np.int64)
+        fresh = ~np.isin(first * n + second, self.a * n + self.b)
+        self._append(first[fresh], second[fresh], time)
 
     def active_bodies(self) -> np.ndarray:
         """Bodies that move or that a net presses, but for those in heaps."""

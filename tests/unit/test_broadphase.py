@@ -17,7 +17,7 @@ def brute(box_min, box_max, movable):
 
 
 def found(box_min, box_max, movable):
-    out = np.empty((len(movable) ** 2 + 1, 2), dtype=np.int64)
+    out = np.empty((len(movable) ** 2 + 1, 2), dtype=np.int32)
     return out[: overlapping_pairs(box_min, box_max, movable, out)]
 
 
@@ -83,8 +83,8 @@ def test_tells_how_much_room_it_needs(n):
     box_min, box_max = boxes("cube", n)
     movable = np.ones(n, dtype=bool)
     needed = len(brute(box_min, box_max, movable))
-    assert overlapping_pairs(box_min, box_max, movable, np.empty((needed - 1, 2), dtype=np.int64)) == -needed
-    assert overlapping_pairs(box_min, box_max, movable, np.empty((needed, 2), dtype=np.int64)) == needed
+    assert overlapping_pairs(box_min, box_max, movable, np.empty((needed - 1, 2), dtype=np.int32)) == -needed
+    assert overlapping_pairs(box_min, box_max, movable, np.empty((needed, 2), dtype=np.int32)) == needed
 
 
 def test_one_body_against_all():
