@@ -110,6 +110,8 @@ def hold(context, window, group: Group) -> None:
         context.joints.log_rest(group)
     if h < rest and not group.rests:
         window.wake[group.members] = group.time + h
+    if group.shift > 0.0:
+        window.look_around(group.members, group.time, group.shift)
 
 
 def _makes_energy(context, group: Group, h: float) -> bool:
@@ -204,7 +206,7 @@ def _lift(context, window, group: Group) -> None:
     group stands meanwhile.
     """
     state, now = context.state, context.state.now
-    place = now.position[group.members].copy()
+    place, turn = now.position[group.members].copy(), now.orientation[group.members].copy()
     before = mechanical_energy(now, context.world, group.members)
     held = dict(zip(group.keys, group.slow().tolist(), strict=True))
     around, delta, keys = near_contacts(context, window, group.members, group.time)
@@ -214,6 +216,8 @@ def _lift(context, window, group: Group) -> None:
     context.log.book(group.time, "lift", mechanical_energy(now, context.world, group.members) - before)
     guard_lift(context, group, around, now.position[group.members] - place, float(delta.max()))
     group.moved = True
+    reach = 2.0 * context.world.bound_radius[group.members] * np.linalg.norm(now.orientation[group.members] - turn, axis=1)
+    group.shift = float((np.linalg.norm(now.position[group.members] - place, axis=1) + reach).max())
     real, integer = collect(context, window, group.pairs, group.time)
     again = make_group(context, window, group.time, real, integer, np.ones(len(real), bool), group.joints, group.members)
     for name in ("contacts", "place", "kinds", "features", "keys", "delta", "approach", "rest_speed", "live"):

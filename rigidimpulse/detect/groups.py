@@ -41,7 +41,7 @@ class Group:
         rest_speed: (m,) a slower rebound is none, m/s.
         live: (m,) bool, near enough for an impact now.
         velocity, angular_velocity, position: of the members as they arrived.
-        moved: whether a lift has changed poses.
+        moved: whether a lift has changed poses. shift: m, how far it moved points of the members at most.
         held: (m,) bool, contacts that carry forces. rests: whether all members stand still.
         still: m/s, approach speed that counts as none. scale: m/s, largest speed of a contact point.
         joints: the joints of the members.
@@ -66,6 +66,7 @@ class Group:
     velocity: np.ndarray
     angular_velocity: np.ndarray
     moved: bool = False
+    shift: float = 0.0
     held: np.ndarray | None = None
     rests: bool = False
     still: float = 0.0

@@ -40,6 +40,7 @@ class Window:
         self.wake = np.full(context.world.num_bodies, np.inf)
         self.inside = np.zeros(context.world.num_bodies, bool)
         self.still = ~(context.world.dynamic | context.world.moving)
+        self._looked_around = np.full(context.world.num_bodies, -np.inf)
         self.heaps_begun = False
         self._moves = (context.state.course.mode != FIXED) | context.world.dynamic
 
@@ -189,6 +190,14 @@ class Window:
         mark &= self.context.world.dynamic
         mark |= self.wake <= time
         return mark.nonzero()[0]
+
+    def look_around(self, bodies: np.ndarray, time: float, shift: float) -> None:
+        """Call bodies that a lift moved by `shift` [m] once more at `time`, where others that their group does not know of may touch them now."""
+        fresh = bodies[self._looked_around[bodies] < time]
+        mark = np.zeros(len(self.wake), bool)
+        mark[fresh] = True
+        if shift > self.delta[mark[self.a] | mark[self.b]].min(initial=np.inf):
+            self._looked_around[fresh] = self.wake[fresh] = time
 
     def find(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Places of the pairs (a, b)."""
