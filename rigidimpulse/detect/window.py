@@ -192,7 +192,7 @@ class Window:
         return mark.nonzero()[0]
 
     def look_around(self, bodies: np.ndarray, time: float, shift: float) -> None:
-        """Call bodies that a lift moved by `shift` [m] once more at `time`, where others that their group does not know of may touch them now."""
+        """Call bodies that a lift moved by `shift` [m] once more at `time`, where others that their group does not know may be near now."""
         fresh = bodies[self._looked_around[bodies] < time]
         mark = np.zeros(len(self.wake), bool)
         mark[fresh] = True
