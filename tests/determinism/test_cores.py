@@ -51,9 +51,12 @@ def test_heaps_have_the_same_bits_on_one_core_and_on_several(monkeypatch, shapes
     monkeypatch.setattr(look, "together", together, raising=False)
     monkeypatch.setattr(heap_stepper, "WORTHWHILE", 20)
     monkeypatch.setattr(heap_stepper, "WORTHWHILE_GENERAL", 4)
-    for cores, rows in ((1, 1024), (2, 1024), (3, 48)):
+    # The third has so little room at first that rows, patches and batches are moved when they become more.
+    for cores, rows, rows_of_a_body, patches_of_a_body in ((1, 1024, 32, 8), (2, 1024, 32, 8), (3, 48, 0, 0)):
         monkeypatch.setattr(heap_stepper, "number_of_cores", lambda cores=cores: cores)
         monkeypatch.setattr(heap_table, "FIRST_ROWS", rows)
+        monkeypatch.setattr(heap_table, "ROWS_OF_A_BODY", rows_of_a_body)
+        monkeypatch.setattr(heap_stepper, "PATCHES_OF_A_BODY", patches_of_a_body)
         dealt.clear()
         run = ri.simulate(cloud(shapes, number), duration)
         hashes.add(run.state_hash())
