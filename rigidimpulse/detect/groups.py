@@ -124,6 +124,7 @@ def touching_groups(context, window, time: float, bodies: np.ndarray) -> tuple[l
     reals, integers = [], []
     while len(frontier):
         reached[frontier] = True
+        # All that a lift may come near is brought to `time` with what touches.
         pairs = near[: near_pairs(state.course, time, window.pairs, FAR_MARGIN, world.bound_radius, frontier, seen, near)]
         partners = _partners(context, frontier)
         mark = np.zeros(world.num_bodies, bool)
