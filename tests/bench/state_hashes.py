@@ -1,0 +1,101 @@
+"""The state hash of every gallery scene, hard case and of some random scenes: what must stay when code is only moved.
+
+    python tests/bench/state_hashes.py > after.txt                 all of them, one line each: name, hash, processor seconds
+    python tests/bench/state_hashes.py --against before.txt        the same, and which differ from a file that was written before
+    python tests/bench/state_hashes.py spot pile --seeds 0 20      some
+
+A hash depends on the processor, on numpy and on numba, so two files are compared only where both were written on one machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import multiprocessing.connection
+import resource
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from time import process_time
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "invariants"))
+
+from scene_plans import Dice, make_plan, make_scene
+
+import rigidimpulse as ri
+from rigidimpulse import gallery
+
+SEED = "random_"
+
+
+def hash_of(name: str) -> tuple[str, str, float]:
+    """Name, state hash or error, and processor seconds of one scene."""
+    start = process_time()
+    try:
+        if name.startswith(SEED):
+            plan = make_plan(Dice(int(name.removeprefix(SEED))))
+            run = ri.simulate(make_scene(plan), plan.duration)
+        else:
+            entry = gallery.load(name)
+            run = ri.simulate(entry.scene(), entry.duration, entry.fps, accuracy=entry.accuracy)
+        result = run.state_hash()[:16]
+    except Exception as error:
+        result = type(error).__name__
+    return name, result, process_time() - start
+
+
+def _answer(sender, name: str, limit: int) -> None:
+    """Send the hash of a scene from a process that the system ends after `limit` s of processor time."""
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+    sender.send(hash_of(name))
+
+
+def hashes(names: list[str], jobs: int, limit: int) -> Iterator[tuple[str, str, float]]:
+    """The hashes of scenes, each from a process of its own, in the order in which they end."""
+    context = multiprocessing.get_context("fork")
+    waiting, running = list(names), []
+    while waiting or running:
+        while waiting and len(running) < jobs:
+            receiver, sender = context.Pipe(duplex=False)
+            name = waiting.pop(0)
+            process = context.Process(target=_answer, args=(sender, name, limit))
+            process.start()
+            sender.close()
+            running.append((name, process, receiver))
+        ready = multiprocessing.connection.wait([receiver for _, _, receiver in running])
+        for entry in [entry for entry in running if entry[2] in ready]:
+            name, process, receiver = entry
+            running.remove(entry)
+            try:
+                yield receiver.recv()
+            except EOFError:
+                yield name, f"not_done_in_{limit}_s", float(limit)
+            process.join()
+
+
+def main() -> int:
+    """Print the hashes; the exit code is 1 where one differs from the file of before."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", help="scenes; all if none is named")
+    parser.add_argument("--seeds", nargs=2, type=int, metavar=("FIRST", "END"), help="random scenes of these seeds, END not among them")
+    parser.add_argument("--against", type=Path, help="a file that was written before")
+    parser.add_argument("--jobs", type=int, default=2, help="processes at once")
+    parser.add_argument("--limit", type=int, default=300, help="s of processor time that a scene may take")
+    options = parser.parse_args()
+    names = options.names or ([] if options.seeds else [*gallery.names(), *gallery.hard_names()])
+    names = names + [f"{SEED}{seed}" for seed in range(*(options.seeds or (0, 0)))]
+    before = {}
+    if options.against:
+        before = dict(line.split()[:2] for line in options.against.read_text().splitlines())
+    differ = []
+    for name, result, seconds in hashes(names, options.jobs, options.limit):
+        changed = name in before and before[name] != result
+        print(f"{name:32} {result:16} {seconds:8.2f}{f'  was {before[name]}' if changed else ''}", flush=True)
+        differ += [name] if changed else []
+    if before:
+        print(f"{len(differ)} of {len(names)} differ: {', '.join(differ)}", file=sys.stderr)
+    return bool(differ)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
