@@ -1,5 +1,5 @@
 """`python -m rigidimpulse`: the command line."""
 
-from rigidimpulse.cli import main
+from rigidimpulse.cli.cli import main
 
 main(prog_name="rigidimpulse")

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.errors import SceneError
-from rigidimpulse.recording import Recording
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.recording.recording import Recording
 
 ROUNDING = 1e-12
 """Of the energy that moves."""
@@ -63,7 +63,7 @@ def _lifts(run: Recording) -> float:
     """Work against gravity of lifting every dynamic body by its held gap and those of all below it, J."""
     if run.scene is None:
         return 0.0
-    from rigidimpulse.world import compile_scene
+    from rigidimpulse.model.world import compile_scene
 
     world = compile_scene(run.scene)
     weight = np.where(world.dynamic, world.mass, 0.0) * np.linalg.norm(world.steady_acceleration, axis=1)
@@ -79,8 +79,8 @@ def assert_no_penetration(run: Recording, depth: float | None = None) -> None:
         depth: m, allowed; 1e-6 of the smallest dynamic body's size by default.
 
     """
+    from rigidimpulse.model.world import compile_scene
     from rigidimpulse.studies.measures import penetration
-    from rigidimpulse.world import compile_scene
 
     world = compile_scene(_scene_of(run))
     allowed = depth if depth is not None else DEPTH * float(world.size[world.dynamic].min(initial=1.0))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.cli import main
+from rigidimpulse.cli.cli import main
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"

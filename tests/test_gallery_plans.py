@@ -9,9 +9,9 @@ from __future__ import annotations
 import pytest
 
 from rigidimpulse import gallery
-from rigidimpulse.forces import KINDS
-from rigidimpulse.simulation import make_plan
-from rigidimpulse.world import compile_scene
+from rigidimpulse.dynamics.forces import KINDS
+from rigidimpulse.engine.simulate import make_plan
+from rigidimpulse.model.world import compile_scene
 
 CALLS_FOR = {
     "spot": "contact detection, gravity, gyroscopic term, friction, contact forces",

@@ -17,7 +17,7 @@ from click.testing import CliRunner
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
-from rigidimpulse.cli import BAD_SCENE, CHECK_FAILED, main
+from rigidimpulse.cli.cli import BAD_SCENE, CHECK_FAILED, main
 from rigidimpulse.gallery.hard import FAMILIES, friction, jointed, stacks
 from rigidimpulse.studies import hard_cases
 from rigidimpulse.studies.hard_cases import CRASHED, HUNG, PASSED, CaseResult, run_apart, run_case, run_suite, write_results

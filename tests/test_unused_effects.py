@@ -1,7 +1,7 @@
 """An effect that a scene does not call for is not in its plan and leaves no trace.
 
 For every effect there is a scene that calls for it and a plain one that does not (`EFFECTS`; forces join by being registered in
-`rigidimpulse.forces.KINDS`). In a fresh process the plain scene
+`rigidimpulse.dynamics.forces.KINDS`). In a fresh process the plain scene
 
     (a) has the effect out of its plan, and the other scene has it in,
     (b) gives the same bits as in a process that ran the other scene first,
@@ -21,7 +21,7 @@ from pathlib import Path
 
 import pytest
 
-from rigidimpulse.forces import KINDS
+from rigidimpulse.dynamics.forces import KINDS
 
 FLIGHT = '''
 scene = ri.Scene(gravity=(0, 0, -9.81))
@@ -44,55 +44,55 @@ for k in range(2):
 PLAIN = {"flight": FLIGHT, "balls": BALLS, "ground": GROUND}
 
 EFFECTS = {
-    "forces at points": ("ground", 'scene.add(ri.ConstantForce("a", (0, 0, 1), point=(0.1, 0, 0.3)))', ["rigidimpulse.forces.timed"]),
-    "drag": ("flight", "scene.add(ri.Drag(0.1))", ["rigidimpulse.forces.drag"]),
+    "forces at points": ("ground", 'scene.add(ri.ConstantForce("a", (0, 0, 1), point=(0.1, 0, 0.3)))', ["dynamics.forces.timed"]),
+    "drag": ("flight", "scene.add(ri.Drag(0.1))", ["dynamics.forces.drag"]),
     "energy terms": (
-        "ground", 'scene.add(ri.EnergyForce(ri.PinPoints("a", "b", (0, 0, 0.3), (0.5, 0, 0.3), 9.0)))', ["rigidimpulse.forces.energy"]
+        "ground", 'scene.add(ri.EnergyForce(ri.PinPoints("a", "b", (0, 0, 0.3), (0.5, 0, 0.3), 9.0)))', ["dynamics.forces.energy"]
     ),
-    "force fields": ("ground", "scene.add(ri.ForceField(lambda t, x, v: -v))", ["rigidimpulse.forces.field"]),
-    "PD controllers": ("flight", 'scene.add(ri.PDController("a", velocity=(1, 0, 0), damping=1.0))', ["rigidimpulse.forces.pd"]),
-    "attractors": ("balls", "scene.add(ri.PointAttractor((0, 0, 9), 1.0))", ["rigidimpulse.forces.field"]),
-    "springs": ("ground", 'scene.add(ri.Spring("a", "b", (0, 0, 0.3), (0.5, 0, 0.3), 9.0))', ["rigidimpulse.forces.spring"]),
-    "thrusters": ("flight", 'scene.add(ri.Thruster("a", 10.0, 0.1, (0, 0, 1), 1.0))', ["rigidimpulse.forces.thruster"]),
-    "harmonic forces": ("ground", 'scene.add(ri.HarmonicForce("a", 1.0, 2.0, (1, 0, 0)))', ["rigidimpulse.forces.harmonic"]),
-    "sampled forces": ("balls", 'scene.add(ri.SampledForce("a", [0, 1], [(0, 0, 1), (0, 0, 0)]))', ["rigidimpulse.forces.sampled"]),
+    "force fields": ("ground", "scene.add(ri.ForceField(lambda t, x, v: -v))", ["dynamics.forces.field"]),
+    "PD controllers": ("flight", 'scene.add(ri.PDController("a", velocity=(1, 0, 0), damping=1.0))', ["dynamics.forces.pd"]),
+    "attractors": ("balls", "scene.add(ri.PointAttractor((0, 0, 9), 1.0))", ["dynamics.forces.field"]),
+    "springs": ("ground", 'scene.add(ri.Spring("a", "b", (0, 0, 0.3), (0.5, 0, 0.3), 9.0))', ["dynamics.forces.spring"]),
+    "thrusters": ("flight", 'scene.add(ri.Thruster("a", 10.0, 0.1, (0, 0, 1), 1.0))', ["dynamics.forces.thruster"]),
+    "harmonic forces": ("ground", 'scene.add(ri.HarmonicForce("a", 1.0, 2.0, (1, 0, 0)))', ["dynamics.forces.harmonic"]),
+    "sampled forces": ("balls", 'scene.add(ri.SampledForce("a", [0, 1], [(0, 0, 1), (0, 0, 0)]))', ["dynamics.forces.sampled"]),
     "flexible bodies": (
         "flight", 'scene.add(ri.FlexibleBody("net", [(5, 0, 0), (6, 0, 0), (5, 1, 0)], [(0, 1, 2)], mass=0.1, stiffness=100.0))',
-        ["rigidimpulse.flexible"],
+        ["dynamics.soft_body"],
     ),
     "constant forces": ("ground", 'scene.add(ri.ConstantForce("a", (1, 0, 0)))', []),
     "gravity": ("balls", "scene.gravity = (0, 0, -1)", []),
-    "joints": ("ground", 'scene.add(ri.BallJoint("a", "b", (0.25, 0, 0.3)))', ["rigidimpulse.constrain.joint_forces"]),
+    "joints": ("ground", 'scene.add(ri.BallJoint("a", "b", (0.25, 0, 0.3)))', ["dynamics.constraints.joint_sub_step"]),
     "friction": ("balls", 'scene.add(ri.Body("d", ri.Shape.sphere(0.1), position=(9, 9, 9), material=ri.Material(static_friction=1)))', []),
     "rolling friction": (
         "ground", 'scene.add(ri.Body("c", ri.Shape.sphere(0.1), position=(2, 0, 0.2), material=ri.Material(rolling_friction=0.01)))',
-        ["rigidimpulse.constrain.rolling"],
+        ["dynamics.constraints.rolling_friction"],
     ),
-    "heaps": ("ground", "settings = {'accuracy': ri.Accuracy(contact_solver='substepped')}", ["rigidimpulse.constrain.heap_solver"]),
+    "heaps": ("ground", "settings = {'accuracy': ri.Accuracy(contact_solver='substepped')}", ["dynamics.solvers.tgs_soft.solver"]),
     "contact forces": (
         "balls", 'scene.gravity = (0, 0, -1)\nscene.add(ri.Body("floor", ri.Shape.half_space(offset=-0.1), motion="static"))',
-        ["rigidimpulse.constrain.newton"],
+        ["dynamics.solvers.newton"],
     ),
     "contact detection": (
-        "flight", 'scene.add(ri.Body("b", ri.Shape.box(1), position=(0, 0, -9)))', ["rigidimpulse.detect.broadphase", "rigidimpulse.sweep"]
+        "flight", 'scene.add(ri.Body("b", ri.Shape.box(1), position=(0, 0, -9)))', ["collision.broad_phase", "collision.time_of_impact"]
     ),
     "event kernel": (
-        "ground", 'scene.add(ri.Body("c", ri.Shape.sphere(0.1), position=(9, 9, 2), material=rough))', ["rigidimpulse.events"]
+        "ground", 'scene.add(ri.Body("c", ri.Shape.sphere(0.1), position=(9, 9, 2), material=rough))', ["engine.spheres"]
     ),
-    "triggers": ("flight", 'scene.add(ri.Trigger("gate", ri.Shape.box(1), position=(0, 0, 2)))', ["rigidimpulse.observe.trigger"]),
+    "triggers": ("flight", 'scene.add(ri.Trigger("gate", ri.Shape.box(1), position=(0, 0, 2)))', ["engine.triggers"]),
     "gyroscopic term": ("balls", 'scene.add(ri.Body("d", ri.Shape.box((1, 2, 3)), position=(9, 9, 9)))', []),
 }
-"""Name in the plan: the plain scene, what calls for the effect, modules whose kernels are the effect's."""
+"""Name in the plan: the plain scene, what calls for the effect, modules of the package whose kernels are the effect's."""
 KERNELS = {"springs", "joints", "rolling friction", "heaps", "contact forces", "contact detection", "event kernel"}
 """Effects with kernels of their own."""
-ASKED_FOR = ("rigidimpulse.forces.", "rigidimpulse.flexible", "rigidimpulse.io", "rigidimpulse.observe.trigger")
+ASKED_FOR = ("rigidimpulse.dynamics.forces.", "rigidimpulse.dynamics.soft_body", "rigidimpulse.io", "rigidimpulse.engine.triggers")
 """Modules that are imported where a scene asks for them only, but for those of forces that do not vary."""
-ALWAYS = {"rigidimpulse.forces.gravity", "rigidimpulse.forces.constant", "rigidimpulse.forces.kinds"}
+ALWAYS = {"rigidimpulse.dynamics.forces.gravity", "rigidimpulse.dynamics.forces.constant", "rigidimpulse.dynamics.forces.kinds"}
 OPTIONAL = {"clarabel", "defusedxml", "meshcat", "mujoco", "pybullet", "dask", "h5py", "pxr", "matplotlib", "playwright"}
 
 REPORT = '''
 import gc, json, sys
-from rigidimpulse._jit import Kernel
+from rigidimpulse.core.kernels import Kernel
 called = {k.__module__ for k in gc.get_objects() if type(k) is Kernel and "entry" in k.__dict__ and k.entry.signatures}
 plan = {line.name: line.included for line in run.plan.lines}
 used = {line.name for line in first.plan.lines if line.included}
@@ -128,7 +128,8 @@ def test_unused_effect_leaves_no_trace(name: str) -> None:
     assert after["hash"] == without["hash"]
     asked = [m for m in without["modules"] if m.startswith(ASKED_FOR) and m not in ALWAYS]
     assert not asked and not OPTIONAL.intersection(without["modules"])
-    called = [{kernel for kernel in run["kernels"] if kernel.startswith(tuple(modules))} for run in (without, after)]
+    names = tuple(f"rigidimpulse.{module}" for module in modules)
+    called = [{kernel for kernel in run["kernels"] if kernel.startswith(names)} for run in (without, after)]
     assert not modules or not called[0]
     # The list has teeth: the scene that calls for the effect does call its kernels, where it has some.
     assert name not in KERNELS or called[1]

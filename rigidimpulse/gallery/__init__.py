@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from rigidimpulse.errors import unknown_name
+from rigidimpulse.core.errors import unknown_name
 from rigidimpulse.gallery.hard import FAMILIES
 from rigidimpulse.gallery.record import asset_path
 

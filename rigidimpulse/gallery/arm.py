@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.six_axis import Limit, SixAxisJoint
+from rigidimpulse.core.quaternion import conjugate, multiply
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import conjugate, multiply
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint_six_axis import Limit, SixAxisJoint
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY = 9.81
 CONE, BEND = 1.0, (0.0, 2.2)

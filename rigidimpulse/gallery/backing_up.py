@@ -23,14 +23,14 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.body import Body
+from rigidimpulse.core.quaternion import quaternion_from_axis_angle
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import quaternion_from_axis_angle
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY, LENGTH, RADIUS, DENSITY = 9.81, 0.6, 0.07, 700.0
 BATONS = {"slow": (1.0, -3.0, 2.0, 0.5), "quick": (1.3, -5.0, 9.0, 0.3), "whirling": (1.6, -4.0, 17.0, 1.0), "fast": (1.9, -12.0, 6.0, 0.2)}

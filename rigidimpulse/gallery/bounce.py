@@ -13,12 +13,12 @@ import math
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most, equal
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY, RADIUS, HEIGHT = 9.81, 0.5, 9.5
 """m/s^2; m: the ball, and its foot above the floor."""

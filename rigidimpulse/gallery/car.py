@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rigidimpulse.body import Body
-from rigidimpulse.material import Material
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY = 9.81
 LENGTH = 4.4

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.flexible.body import FlexibleBody
+from rigidimpulse.dynamics.soft_body.body import FlexibleBody
 from rigidimpulse.gallery.flexible import GRAVITY, laws_of_energy, square_sheet
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SIDE, CELLS = 1.6, 22
 AREA_DENSITY, STIFFNESS, BENDING, DAMPING = 0.3, 150.0, 2e-3, 0.1

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.forces.spring import Spring
+from rigidimpulse.dynamics.forces.spring import Spring
 from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 MASS, STIFFNESS, COUNT, SPACING, ROW = 1.0, 30.0, 3, 1.0, 0.6
 SIZE = (0.3, 0.3, 0.3)

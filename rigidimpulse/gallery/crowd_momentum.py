@@ -16,13 +16,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.joint import BallJoint
 from rigidimpulse.gallery.record import Check, GalleryScene, asset_path, at_least, at_most
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint import BallJoint
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY = 1.62
 COUNT, SHELL, INWARD, UPWARD = 26, 1.6, 1.4, 2.4
@@ -61,7 +61,7 @@ def scene() -> Scene:
 
 def check(run: Recording) -> list[Check]:
     """Compare momentum, centre of mass and angular momentum at every frame with the closed forms."""
-    from rigidimpulse.mass import body_mass
+    from rigidimpulse.scene.mass import body_mass
 
     assert run.ledger is not None and run.scene is not None
     t, g = run.times[:, None], np.array([0.0, 0.0, -GRAVITY])

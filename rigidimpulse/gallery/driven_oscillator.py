@@ -11,13 +11,13 @@ import math
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.forces.harmonic import HarmonicForce
-from rigidimpulse.forces.spring import Spring
+from rigidimpulse.dynamics.forces.harmonic import HarmonicForce
+from rigidimpulse.dynamics.forces.spring import Spring
 from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 MASS, FORCE, STIFFNESS = 1.0, 2.0, 40.0
 NATURAL = math.sqrt(STIFFNESS / MASS)

@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.body import Body
+from rigidimpulse.core.quaternion import multiply, quaternion_from_axis_angle, rotate
 from rigidimpulse.gallery.car import AXLE, CENTRE_HEIGHT, GRAVITY, LENGTH, make_car, road
 from rigidimpulse.gallery.record import Check, GalleryScene, asset_path, at_least, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import multiply, quaternion_from_axis_angle, rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SPEED, FRICTION, MASS = 29.0, 0.8, 1400.0
 PRINTED_TIME = 3.695

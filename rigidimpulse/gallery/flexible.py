@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.gallery.record import Check, at_most
-from rigidimpulse.recording import Recording
+from rigidimpulse.recording.recording import Recording
 
 GRAVITY = 9.81
 

@@ -18,12 +18,12 @@ from functools import partial
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 RADIUS = 0.125
 GROWTH = 0.0625

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.forces.spring import Spring
+from rigidimpulse.dynamics.forces.spring import Spring
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 STIFFNESS = 200.0
 BULLET_MASS, BULLET_SPEED, CALIBER = 0.0075, 350.0, 0.009

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.flexible.body import FlexibleBody
+from rigidimpulse.dynamics.soft_body.body import FlexibleBody
 from rigidimpulse.gallery.flexible import GRAVITY, cube_surface, enclosed_volume, laws_of_energy
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SIDE, CELLS = 0.4, 5
 DENSITY, STIFFNESS, INNER, DAMPING = 600.0, 400.0, 4e4, 0.02

@@ -19,13 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY, RADIUS, HEIGHT = 9.81, 0.08, 1.2
 LANES = {"k = 0.5": 0.5, "k = 0.7": 0.7, "k = 0.85": 0.85, "k = 1": 1.0}

@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.joint import FixedJoint
-from rigidimpulse.forces.thruster import Thruster
+from rigidimpulse.dynamics.forces.thruster import Thruster
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most, equal
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint import FixedJoint
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SLOWER = 1e-3
 GRAVITY = 9.81

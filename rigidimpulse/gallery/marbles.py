@@ -16,15 +16,15 @@ import itertools
 
 import numpy as np
 
-from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.body import Body
-from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.inside import contains
+from rigidimpulse.collision.containment import contains
+from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 PITCH, RADIUS = 0.25, 0.1
 """m between marbles, and their radius."""

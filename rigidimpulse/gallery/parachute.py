@@ -11,13 +11,13 @@ import math
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.joint import DistanceJoint
-from rigidimpulse.forces.drag import Drag
+from rigidimpulse.dynamics.forces.drag import Drag
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint import DistanceJoint
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY = 9.81
 MASSES = {"stone": 8.0, "crate": 6.0, "crate on a parachute": 6.0, "canopy": 0.5}

@@ -11,14 +11,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import root_scalar
 
-from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.keyframes import Keyframes
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.keyframes import Keyframes
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 RADIUS, HEIGHT, SPEED, STIFFNESS = 0.2, 0.6, 2.0, 2000.0
 BALLS = {"1 kg": (1.0, 1.0), "4 kg": (4.0, 1.0), "9 kg": (9.0, 1.0), "4 kg, dull": (4.0, 0.5)}

@@ -20,13 +20,13 @@ import math
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.joint import HingeJoint
+from rigidimpulse.core.quaternion import quaternion_from_axis_angle, rotate
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import quaternion_from_axis_angle, rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint import HingeJoint
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY, LENGTH, MASS = 9.81, 1.0, 2.0
 SWINGS = {"narrow": 15.0, "notes": 45.0, "wide": 100.0}

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.joint import BallJoint
+from rigidimpulse.core.quaternion import quaternion_from_axis_angle, rotate
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import quaternion_from_axis_angle, rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint import BallJoint
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY, LINKS, LINK, RADIUS, MASS = 9.81, 2, 0.7, 0.06, 1.0
 NUDGE = 0.4

@@ -12,14 +12,14 @@ import math
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.heap_islands import TALL
-from rigidimpulse.conventions import TOLERANCES
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.engine.regime import TALL
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SIDE, PITCH, LAYERS = 0.5, 0.9, 8
 GRAVITY = 9.81
@@ -71,9 +71,9 @@ def check(run: Recording) -> list[Check]:
 
 def overlaps(run: Recording) -> int:
     """Pairs of bodies that are inside each other in the last frame, asked of FCL."""
-    from rigidimpulse.detect.narrowphase import Narrowphase
-    from rigidimpulse.rotation import multiply
-    from rigidimpulse.world import compile_scene
+    from rigidimpulse.collision.distance.fcl import Narrowphase
+    from rigidimpulse.core.quaternion import multiply
+    from rigidimpulse.model.world import compile_scene
 
     assert run.scene is not None
     world = compile_scene(run.scene)

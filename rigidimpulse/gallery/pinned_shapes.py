@@ -10,16 +10,16 @@ import itertools
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.forces.drag import Drag
-from rigidimpulse.forces.energy.force import EnergyForce
-from rigidimpulse.forces.energy.pin import PinPoints
-from rigidimpulse.forces.energy.restore import RestoreShape
+from rigidimpulse.dynamics.forces.drag import Drag
+from rigidimpulse.dynamics.forces.energy.force import EnergyForce
+from rigidimpulse.dynamics.forces.energy.pin import PinPoints
+from rigidimpulse.dynamics.forces.energy.restore import RestoreShape
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY = 9.81
 BLOCK, SPACING, WEIGHT = 0.2, 0.3, 300.0
@@ -67,8 +67,8 @@ def scene() -> Scene:
 
 def hanging() -> dict[str, np.ndarray]:
     """Return the places of the bars at the minimum of their energies."""
-    from rigidimpulse.forces.energy.layout import settle
-    from rigidimpulse.forces.energy.potential import GravityPotential
+    from rigidimpulse.dynamics.forces.energy.layout import settle
+    from rigidimpulse.dynamics.forces.energy.potential import GravityPotential
 
     scene = Scene(gravity=(0.0, 0.0, -GRAVITY))
     settled = settle(scene, [*chain(scene), GravityPotential()]).scene

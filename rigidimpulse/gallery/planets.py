@@ -11,12 +11,12 @@ import math
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.forces.field import PointAttractor
+from rigidimpulse.dynamics.forces.field import PointAttractor
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 STRENGTH = 4.0 * math.pi**2
 """m^3/s^2: a planet at 1 m takes 1 s."""

@@ -32,8 +32,8 @@ import numpy as np
 
 from rigidimpulse.gallery.pool_table import CUE, OBJECT, POCKETS, RADIUS, RESTITUTION, add_ball, in_pocket, table
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.scene import Scene
 
 GRAVITY, CLOTH = 9.81, 0.2
 BOUND = 1e-9

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.event_driven import DisksInRectangle
 from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most, equal
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 RADIUS = 0.5 * 57.15e-3
 MASS = 0.17

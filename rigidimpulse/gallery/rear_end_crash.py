@@ -20,8 +20,8 @@ import numpy as np
 
 from rigidimpulse.gallery.car import GRAVITY, LENGTH, make_car, road
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.scene import Scene
 
 MASS_A, MASS_B = 1600.0, 1100.0
 SPEED, FRICTION = 15.0, 0.7

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
 
 if TYPE_CHECKING:
-    from rigidimpulse.accuracy import Accuracy
-    from rigidimpulse.recording import Recording
-    from rigidimpulse.scene import Scene
+    from rigidimpulse.recording.recording import Recording
+    from rigidimpulse.scene.accuracy import Accuracy
+    from rigidimpulse.scene.scene import Scene
 
 PACKAGE = Path(__file__).resolve().parent.parent
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.forces.thruster import Thruster
+from rigidimpulse.dynamics.forces.thruster import Thruster
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 MOON_GRAVITY, EARTH_GRAVITY = 1.62, 9.80665
 MASS, PROPELLANT, FLOW = 5.0, 3.2, 0.5

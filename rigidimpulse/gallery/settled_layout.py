@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidimpulse.body import Body
+from rigidimpulse.core.quaternion import rotate
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most, equal
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 if TYPE_CHECKING:
-    from rigidimpulse.forces.energy.pin import PinPoints
+    from rigidimpulse.dynamics.forces.energy.pin import PinPoints
 
 GRAVITY = 9.81
 WOOD = Material(density=600.0, restitution=0.0, static_friction=0.6, dynamic_friction=0.6)
@@ -64,10 +64,10 @@ def heap() -> Scene:
 
 def settled() -> tuple[Scene, float]:
     """Return the heap settled, and the largest distance of pinned points, m."""
-    from rigidimpulse.forces.energy.layout import settle
-    from rigidimpulse.forces.energy.overlap import NoOverlap
-    from rigidimpulse.forces.energy.potential import GravityPotential
-    from rigidimpulse.forces.energy.restore import RestoreShape
+    from rigidimpulse.dynamics.forces.energy.layout import settle
+    from rigidimpulse.dynamics.forces.energy.overlap import NoOverlap
+    from rigidimpulse.dynamics.forces.energy.potential import GravityPotential
+    from rigidimpulse.dynamics.forces.energy.restore import RestoreShape
 
     flat, legs = [*FURNITURE, *BOOKS], [name for name in parts() if "leg" in name]
     layout, upright = [(*PLACES[name], _height(name)) for name in flat], [(1.0, 0.0, 0.0, 0.0)] * len(flat)
@@ -83,7 +83,7 @@ def settled() -> tuple[Scene, float]:
 
 def _pins(scene: Scene) -> list[PinPoints]:
     """Return the pins of legs to tops, and three soft ones of the table to its place in the world, which tell where up is."""
-    from rigidimpulse.forces.energy.pin import PinPoints
+    from rigidimpulse.dynamics.forces.energy.pin import PinPoints
 
     pins = []
     for piece, (top, leg) in FURNITURE.items():
@@ -115,8 +115,8 @@ def _there(body: Body, point: np.ndarray) -> np.ndarray:
 
 def scene() -> Scene:
     """Return the settled pieces, each glued to one body, and beside them the heap, moved out of itself."""
-    from rigidimpulse.forces.energy.layout import settle
-    from rigidimpulse.forces.energy.overlap import NoOverlap
+    from rigidimpulse.dynamics.forces.energy.layout import settle
+    from rigidimpulse.dynamics.forces.energy.overlap import NoOverlap
 
     parted, _ = settled()
     scene = Scene(parted.gravity, [parted["floor"], *(parted[name] for name in BOOKS)])

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
-from rigidimpulse.keyframes import Keyframes
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.keyframes import Keyframes
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY = 9.81
 KEYS = np.array([[0.0, 0.0, 0.0], [0.7, 0.35, 0.0], [1.4, -0.35, 0.0], [2.1, 0.35, 0.0], [2.8, 0.0, 0.0]])
@@ -39,7 +39,7 @@ LANES = {"zig-zag": 0.5 * APART, "smooth": -0.5 * APART}
 
 def path(name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return times (f,) s and positions (f, 3) m of the frames of a tray."""
-    from rigidimpulse.forces.energy.path import Curvature, PinFrame, smooth_path
+    from rigidimpulse.dynamics.forces.energy.path import Curvature, PinFrame, smooth_path
 
     per_key = round(SEGMENT * RATE)
     times = np.arange((len(KEYS) - 1) * per_key + 1) / RATE

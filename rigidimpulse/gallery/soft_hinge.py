@@ -14,13 +14,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import expm
 
-from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.six_axis import Limit, SixAxisJoint
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint_six_axis import Limit, SixAxisJoint
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 DOOR, MASS = (0.9, 0.06, 1.8), 20.0
 INERTIA = MASS * (DOOR[0] ** 2 + DOOR[1] ** 2) / 12.0

@@ -10,12 +10,12 @@ import math
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.record import Check, GalleryScene, asset_path, at_most
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SCALE = 0.5
 """Metres per unit of the model, which is 1.7 units tall."""

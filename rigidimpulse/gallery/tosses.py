@@ -28,22 +28,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import angle_between, conjugate, multiply, quaternion_from_rotation_vector, rotation_vector, to_matrix
 from rigidimpulse.gallery.record import Check, Exact, GalleryScene, asset_path, at_most
-from rigidimpulse.keyframes import Keyframes
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import (
-    angle_between,
-    conjugate,
-    multiply,
-    quaternion_from_rotation_vector,
-    rotation_vector,
-    to_matrix,
-)
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.keyframes import Keyframes
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 FPS = 148.0
 GRAVITY = 9.61
@@ -185,7 +178,7 @@ def roll_out(toss: Toss, cube: Cube = FITTED, state: Flight | None = None) -> tu
         The state at the start and the run.
 
     """
-    from rigidimpulse.simulation import simulate
+    from rigidimpulse.engine.simulate import simulate
 
     state = flight(toss) if state is None else state
     return state, simulate(toss_scene(state, cube), (len(toss.position) - 1 - state.start) / FPS, FPS)

@@ -10,15 +10,15 @@ import math
 
 import numpy as np
 
-from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.body import Body
-from rigidimpulse.flexible.body import FlexibleBody
+from rigidimpulse.dynamics.soft_body.body import FlexibleBody
 from rigidimpulse.gallery.flexible import GRAVITY, laws_of_energy, square_sheet
 from rigidimpulse.gallery.record import Check, GalleryScene, asset_path, at_least, at_most
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SIDE, CELLS = 2.4, 14
 HEIGHT = 1.0

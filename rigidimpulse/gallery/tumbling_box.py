@@ -14,12 +14,12 @@ from functools import cache
 
 import numpy as np
 
-from rigidimpulse.body import Body
+from rigidimpulse.core.quaternion import angle_between
 from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import angle_between
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY = np.array([0.0, 0.0, -9.8])
 SIZE, MASS = np.array([0.1, 0.4, 0.9]), 10.0

@@ -23,11 +23,11 @@ import math
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most, equal
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 C, B, A = INERTIA = (1.0, 2.0, 3.0)
 """kg m^2, about the handle, the stem, and across both."""

@@ -10,12 +10,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.six_axis import AXES, Limit
-from rigidimpulse.detect.narrowphase import Narrowphase
-from rigidimpulse.geometry import compile_shape
-from rigidimpulse.observe.trigger import extent
-from rigidimpulse.shape import Shape
+from rigidimpulse.collision.distance.fcl import Narrowphase
+from rigidimpulse.collision.geometry import compile_shape
+from rigidimpulse.engine.triggers import extent
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint_six_axis import AXES, Limit
+from rigidimpulse.scene.shape import Shape
 
 NEAR = 1e-3
 """Distance of a joint from a surface, relative to the size of the body, at which it is on it: figures of files are rounded."""

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.rotation import (
+from rigidimpulse.core.quaternion import (
     angle_between,
     conjugate,
     multiply,

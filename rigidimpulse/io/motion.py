@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.io.keys import Keys, Path, reduced
 
 if TYPE_CHECKING:
-    from rigidimpulse.body import Body
-    from rigidimpulse.recording import Recording
-    from rigidimpulse.scene import Scene
+    from rigidimpulse.recording.recording import Recording
+    from rigidimpulse.scene.body import Body
+    from rigidimpulse.scene.scene import Scene
 
 MOST_SAMPLES = 1000
 """Keys a frame that make sense."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.files import write_renamed
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.files import write_renamed
 from rigidimpulse.io.motion import MotionOptions
 
 if TYPE_CHECKING:
-    from rigidimpulse.recording import Recording
+    from rigidimpulse.recording.recording import Recording
 
 
 def write_motion(run: Recording, path: Path, options: MotionOptions) -> Path:

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision_filter import CollisionFilter
-from rigidimpulse.errors import SceneError
-from rigidimpulse.material import Material
-from rigidimpulse.rotation import from_matrix, rotate
-from rigidimpulse.shape import Shape
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import from_matrix, rotate
+from rigidimpulse.scene.collision_filter import CollisionFilter
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.shape import Shape
 
 GHOST_RADIUS = 0.05
 """m, of the sphere that stands for a body without colliders, which touches nothing."""

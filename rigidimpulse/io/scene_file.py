@@ -8,8 +8,8 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.scene import Scene
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.scene.scene import Scene
 
 logger = logging.getLogger("rigidimpulse")
 
@@ -73,7 +73,7 @@ def write_scene(scene: Scene, path: Path) -> Path:
     """Write a scene as a file with physics; see `Scene.export`."""
     if path.suffix not in GLTF_SUFFIXES:
         raise SceneError(f"cannot write a scene to {path.name!r}", f"use a name that ends in {' or '.join(GLTF_SUFFIXES)}")
-    from rigidimpulse.files import write_renamed
+    from rigidimpulse.core.files import write_renamed
     from rigidimpulse.io.gltf.write import write_physics
 
     left_out: list[str] = []

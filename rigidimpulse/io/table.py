@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from rigidimpulse.recording import Recording
+    from rigidimpulse.recording.recording import Recording
 
 COLUMNS = (
     "time [s]", "frame", "body",

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.plan import STAGES
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.engine.plan import STAGES
 from rigidimpulse.studies.row import ERRORS, Row
 
 TITLES = {

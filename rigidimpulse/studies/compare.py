@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rigidimpulse.accuracy import PRESETS
-from rigidimpulse.errors import SceneError, unknown_name
-from rigidimpulse.files import write_renamed
-from rigidimpulse.recording import Recording
+from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.files import write_renamed
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.accuracy import PRESETS
 from rigidimpulse.studies.deviation import Deviation, deviation
 
 if TYPE_CHECKING:
@@ -161,7 +161,7 @@ class Comparison:
         """Largest extents, m, by name; empty without a scene."""
         if self.run_a.scene is None:
             return {}
-        from rigidimpulse.world import compile_scene
+        from rigidimpulse.model.world import compile_scene
 
         sizes = dict(zip(self.run_a.names, compile_scene(self.run_a.scene).size.tolist(), strict=True))
         for track in self.run_a.nets:

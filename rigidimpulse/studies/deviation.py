@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import angle_between
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import angle_between
+from rigidimpulse.recording.recording import Recording
 
 
 class Deviation(NamedTuple):

@@ -89,7 +89,7 @@ def run_suite(
         SceneError: an unknown name, or a limit that is not above 0.
 
     """
-    from rigidimpulse.errors import SceneError, unknown_name
+    from rigidimpulse.core.errors import SceneError, unknown_name
 
     if not limit > 0.0:
         raise SceneError(f"limit is {limit}", "give seconds for a case, > 0")
@@ -168,7 +168,7 @@ def _end(process: subprocess.Popen) -> None:
 
 def run_case(name: str) -> CaseResult:
     """Run a case in this process."""
-    from rigidimpulse.simulation import simulate
+    from rigidimpulse.engine.simulate import simulate
 
     entry = gallery.load(name)
     start = perf_counter()
@@ -186,9 +186,9 @@ def run_case(name: str) -> CaseResult:
 
 def cheaper_fails(entry: GalleryScene) -> Check:
     """Return the check that the scene's cheaper settings are not enough: the option makes the difference."""
-    from rigidimpulse.accuracy import Accuracy
+    from rigidimpulse.engine.simulate import simulate
     from rigidimpulse.gallery.record import at_least
-    from rigidimpulse.simulation import simulate
+    from rigidimpulse.scene.accuracy import Accuracy
 
     assert entry.cheaper is not None
     run = simulate(entry.scene(), entry.duration, entry.fps, accuracy=entry.cheaper)

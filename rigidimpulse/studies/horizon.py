@@ -15,12 +15,12 @@ import math
 
 import numpy as np
 
-from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.recording import Recording
-from rigidimpulse.simulation import simulate
+from rigidimpulse.engine.simulate import simulate
+from rigidimpulse.model.world import compile_scene
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.studies.deviation import agree_until, deviation
 from rigidimpulse.studies.reference import TOLERANCE, perturbed
-from rigidimpulse.world import compile_scene
 
 LEAST, MOST = 1e-15, 1e-2
 """Tolerances of impact times that there are."""

@@ -17,12 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.detect.narrowphase import Narrowphase
-from rigidimpulse.observe.events import EventLog
-from rigidimpulse.observe.ledger import make_ledger
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import angle_between, multiply, rotate
-from rigidimpulse.world import World
+from rigidimpulse.collision.distance.fcl import Narrowphase
+from rigidimpulse.core.quaternion import angle_between, multiply, rotate
+from rigidimpulse.model.world import World
+from rigidimpulse.recording.events import EventLog
+from rigidimpulse.recording.ledger import make_ledger
+from rigidimpulse.recording.recording import Recording
 
 MOST_FRAMES = 120
 """Frames at most in which penetration is looked for, evenly spread."""

@@ -18,16 +18,16 @@ from time import perf_counter
 
 import numpy as np
 
-from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.engine.simulate import frame_times, simulate
 from rigidimpulse.gallery.record import GalleryScene
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.simulation import frame_times, simulate
+from rigidimpulse.model.world import World
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.deviation import agree_until, deviation
 from rigidimpulse.studies.measures import Truth, mechanical_energy, truth_of
 from rigidimpulse.studies.settings import TIGHT, rung
-from rigidimpulse.world import World
 
 AGREED = 1e-9
 TOLERANCE = 1e-3

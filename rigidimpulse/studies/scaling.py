@@ -13,15 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.engine.plan import STAGES
+from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.gallery.pile import pile
-from rigidimpulse.material import Material
-from rigidimpulse.plan import STAGES
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
-from rigidimpulse.simulation import simulate
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SIZES = (10, 30, 100, 300, 1_000, 3_000, 10_000, 20_000)
 FEWEST = 100

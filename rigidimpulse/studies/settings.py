@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rigidimpulse.accuracy import PRESETS, Accuracy
+from rigidimpulse.scene.accuracy import PRESETS, Accuracy
 
 COARSEST = 1.0 / 30.0
 """s, step of the lowest rung."""

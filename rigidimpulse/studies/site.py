@@ -48,7 +48,7 @@ def make_site(
         SceneError: an unknown name, or no scene may run at a time.
 
     """
-    from rigidimpulse.errors import SceneError
+    from rigidimpulse.core.errors import SceneError
     from rigidimpulse.studies.site_pages import index_page, scene_page
 
     if jobs < 1:
@@ -99,7 +99,7 @@ def _run_apart(folder: Path, name: str, limit: float) -> CaseResult:
 
 def run_scene(name: str, folder: Path) -> CaseResult:
     """Run a scene in this process and write its page, its still and, last, its result."""
-    from rigidimpulse.simulation import simulate
+    from rigidimpulse.engine.simulate import simulate
     from rigidimpulse.view import write_html
     from rigidimpulse.view.picture import draw_picture, png
 

@@ -23,18 +23,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.files import write_renamed
-from rigidimpulse.fingerprint import fingerprint
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.files import write_renamed
+from rigidimpulse.engine.fingerprint import fingerprint
+from rigidimpulse.engine.simulate import frame_times
 from rigidimpulse.gallery.record import GalleryScene
-from rigidimpulse.scene import Scene
-from rigidimpulse.simulation import frame_times
-from rigidimpulse.studies.desk import Desk, TimeUp, peer_setting
-from rigidimpulse.studies.kept import KeptRows, kept_reference
+from rigidimpulse.model.world import World, compile_scene
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.studies.measured_runs import Desk, TimeUp, peer_setting
 from rigidimpulse.studies.reference import Reference, converged_reference, exact_reference
 from rigidimpulse.studies.row import ERRORS, Row
 from rigidimpulse.studies.settings import Setting, grid
-from rigidimpulse.world import World, compile_scene
+from rigidimpulse.studies.stored_rows import KeptRows, kept_reference
 
 BUDGET, FULL_BUDGET = 60.0, 3600.0
 """s, of a study and of one of all settings."""

@@ -26,15 +26,15 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.shape import rotation_matrix
+from rigidimpulse.scene.shape import rotation_matrix
 from rigidimpulse.view.arrows import arrow_rows, fade_time, longest_arrow
 from rigidimpulse.view.camera import Framing, Path, frame_action, up_axis
 from rigidimpulse.view.display import SEGMENTS, DisplayMesh, display_mesh, display_planes
 from rigidimpulse.view.history import contact_rows, energy_span, impact_marks, ledger_curves
 from rigidimpulse.view.materials import ROUND_KINDS, net_surface, surface
-from rigidimpulse.view.nets import is_closed, net_messages
 from rigidimpulse.view.protocol import NetLike, RecordingLike
 from rigidimpulse.view.rendered import rendered_meshes
+from rigidimpulse.view.soft_bodies import is_closed, net_messages
 from rigidimpulse.view.tracks import animation_message, body_tracks, pack_bytes, pack_float32, quaternion_keys
 
 MANY_SHAPES = 50
@@ -173,7 +173,7 @@ def glb_file(recording: Any) -> bytes:
 
     from rigidimpulse.io.gltf.animate import write_motion
     from rigidimpulse.io.motion import MotionOptions
-    from rigidimpulse.scene import Scene
+    from rigidimpulse.scene.scene import Scene
 
     plain = replace(recording, scene=Scene(recording.scene.gravity, recording.scene.bodies), nets=[])
     with TemporaryDirectory() as folder:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.shape import Shape
 
 CREASE = np.radians(35.0)
 SEGMENTS = 64

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigidimpulse.shape import rotation_matrix
+from rigidimpulse.scene.shape import rotation_matrix
 from rigidimpulse.view.camera import Framing, stage_rotation, up_axis
 from rigidimpulse.view.contents import page_scene
 from rigidimpulse.view.display import shade

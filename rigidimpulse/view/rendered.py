@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.view.display import DisplayMesh, shade
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def _pieces(meshes: Meshes, body: int, bodies: set[int]) -> list[tuple[np.ndarra
             vertices, faces = meshes.of_node(node)
         except SceneError:  # no mesh, or none that can be read: the loader has said so where it matters
             continue
-        from rigidimpulse.rotation import to_matrix
+        from rigidimpulse.core.quaternion import to_matrix
 
         position, rotation, stretch = hierarchy.scale_seen_from(node, body)
         linear = to_matrix(rotation) @ stretch

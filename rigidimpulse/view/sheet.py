@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.fingerprint import digest_of
-from rigidimpulse.recording import Recording
-from rigidimpulse.shape import rotation_matrix
+from rigidimpulse.engine.fingerprint import digest_of
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.shape import rotation_matrix
 from rigidimpulse.view.camera import Path as Way
 from rigidimpulse.view.camera import frame_action, up_axis
 from rigidimpulse.view.display import DisplayMesh, display_mesh, display_planes

@@ -21,7 +21,7 @@ FLOAT32_EXTENSION, BYTES_EXTENSION = 0x17, 0x12  # meshcat's msgpack extension c
 
 def quaternion_keys(orientation: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:
     """Return orientations (f, 4) wxyz as keys (f, 4) xyzw whose sign never jumps."""
-    from rigidimpulse.rotation import quaternion_continuity
+    from rigidimpulse.core.quaternion import quaternion_continuity
 
     return quaternion_continuity(np.asarray(orientation, dtype=np.float64))[:, [1, 2, 3, 0]]
 

@@ -19,10 +19,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.core import config
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.rotation import from_matrix
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Part
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import from_matrix
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Part
 from rigidimpulse.studies.peers import load_peer
 from rigidimpulse.studies.peers.common import PeerBody, read_scene
 
@@ -81,7 +81,7 @@ def _as_box(part: Part) -> Part:
     """A half space as a box; every other part as it is."""
     if part.shape.kind != "half_space":
         return part
-    from rigidimpulse.shape import Shape
+    from rigidimpulse.scene.shape import Shape
 
     normal, offset = part.shape.plane()
     normal = part.rotation @ normal

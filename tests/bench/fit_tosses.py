@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 import rigidimpulse as ri
-from rigidimpulse import rotation
+from rigidimpulse.core import quaternion as rotation
 from rigidimpulse.gallery import tosses as data
 
 FRICTIONS = (0.165, 0.175, 0.185, 0.195)

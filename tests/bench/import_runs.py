@@ -12,8 +12,8 @@ import numpy as np
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import from_matrix, to_matrix
+from rigidimpulse.core.quaternion import from_matrix, to_matrix
+from rigidimpulse.recording.recording import Recording
 from rigidimpulse.view.camera import stage_rotation, up_axis
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "io"))

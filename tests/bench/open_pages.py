@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import rigidimpulse as ri
-from rigidimpulse.observe.events import IMPACT_DTYPE
+from rigidimpulse.recording.events import IMPACT_DTYPE
 from rigidimpulse.view import contents, write_html
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "browser"))

@@ -23,8 +23,8 @@ import trimesh
 from bench_scenes import machine
 
 import rigidimpulse as ri
-from rigidimpulse._jit import number_of_cores
-from rigidimpulse.rotation import to_matrix
+from rigidimpulse.core.kernels import number_of_cores
+from rigidimpulse.core.quaternion import to_matrix
 
 SIDE, PITCH, MASS = 0.5, 0.9, 1.0
 STEPS, FPS = 300, 60.0

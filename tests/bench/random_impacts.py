@@ -9,8 +9,8 @@ from __future__ import annotations
 import sys
 from time import perf_counter
 
+from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.gallery.hard.crowds import CLOUD_FPS, CLOUD_TIME, check_random, cloud
-from rigidimpulse.simulation import simulate
 
 
 def main() -> int:

@@ -43,7 +43,7 @@ def bullet_scene(seed: int, wall_motion: str, speed: float = 1000.0) -> ri.Scene
 
 def passed(run: ri.Recording) -> bool:
     """Whether the bullet ends on the far side of the wall's plane, as the wall lies there."""
-    from rigidimpulse.rotation import rotate
+    from rigidimpulse.core.quaternion import rotate
 
     normal = rotate(run.orientation("wall"), np.array([1.0, 0.0, 0.0]))
     side = ((run.position("bullet") - run.position("wall")) * normal).sum(1)

@@ -15,8 +15,8 @@ from chromium import Opened, open_page
 from test_html import FLOAT32_ROUNDING, STRANGE_NAME, recording
 
 import rigidimpulse as ri
-from rigidimpulse.flexible.track import FlexibleTrack
-from rigidimpulse.rotation import multiply
+from rigidimpulse.core.quaternion import multiply
+from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
 
 pytestmark = pytest.mark.browser
 

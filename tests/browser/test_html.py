@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from chromium import Opened, open_page
 
-from rigidimpulse.body import Body
-from rigidimpulse.material import Material
-from rigidimpulse.observe.events import IMPACT_DTYPE
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.events import IMPACT_DTYPE
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 from rigidimpulse.view import show, write_html
 
 pytestmark = pytest.mark.browser

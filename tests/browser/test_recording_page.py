@@ -15,9 +15,9 @@ from test_compare_page import changed
 from test_html import FLOAT32_ROUNDING, FPS, STRANGE_NAME, recording
 
 import rigidimpulse as ri
-from rigidimpulse.observe.contacts import CONTACT_DTYPE
-from rigidimpulse.observe.ledger import Ledger
-from rigidimpulse.rotation import rotate
+from rigidimpulse.core.quaternion import rotate
+from rigidimpulse.recording.contacts import CONTACT_DTYPE
+from rigidimpulse.recording.ledger import Ledger
 from rigidimpulse.view import contents, write_html
 from rigidimpulse.view.display import display_mesh
 

@@ -12,11 +12,12 @@ import pytest
 import trimesh
 
 import rigidimpulse as ri
-from rigidimpulse._jit import MOST_CORES, number_of_cores
-from rigidimpulse.constrain import heap_stepper, heap_table
-from rigidimpulse.constrain.heap_narrow import BLOCK, look, share_of
-from rigidimpulse.constrain.heap_solver import BATCHES_EACH, advance
-from rigidimpulse.detect.contact_buffer import ContactBuffer
+from rigidimpulse.collision import contact_table as heap_table
+from rigidimpulse.collision.contact_buffer import ContactBuffer
+from rigidimpulse.collision.contact_cache import BLOCK, look, share_of
+from rigidimpulse.core.kernels import MOST_CORES, number_of_cores
+from rigidimpulse.dynamics.solvers.tgs_soft.solver import BATCHES_EACH, advance
+from rigidimpulse.engine.substepped import contact_forces as heap_stepper
 
 ROUGH = ri.Material(density=500, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
 
@@ -141,7 +142,7 @@ def test_processes_of_a_pool_use_one_core_each_and_threads_of_their_own(method: 
 
 @pytest.mark.parametrize(("threads", "cores"), [("1", 1), ("3", 3), ("64", MOST_CORES)])
 def test_the_number_of_cores_is_that_of_numba(threads: str, cores: int) -> None:
-    code = "from rigidimpulse._jit import number_of_cores; print(number_of_cores())"
+    code = "from rigidimpulse.core.kernels import number_of_cores; print(number_of_cores())"
     environment = {**os.environ, "NUMBA_NUM_THREADS": threads}
     answer = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert int(answer.stdout) == cores

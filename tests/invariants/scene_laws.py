@@ -17,10 +17,10 @@ import numpy as np
 from scene_plans import ScenePlan, make_scene
 
 import rigidimpulse as ri
-from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.detect.narrowphase import Narrowphase
-from rigidimpulse.mass import body_mass
-from rigidimpulse.rotation import multiply, rotate
+from rigidimpulse.collision.distance.fcl import Narrowphase
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.quaternion import multiply, rotate
+from rigidimpulse.scene.mass import body_mass
 
 DEPTH = 1e-6
 ENERGY, JOINT_ENERGY = 1e-6, 1e-3

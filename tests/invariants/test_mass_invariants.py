@@ -9,9 +9,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigidimpulse.body import Body
-from rigidimpulse.mass import body_mass, principal_axes
-from rigidimpulse.shape import Shape, rotation_matrix
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.mass import body_mass, principal_axes
+from rigidimpulse.scene.shape import Shape, rotation_matrix
 
 RELATIVE = 1e-13
 seeds = st.integers(0, 2**32 - 1)

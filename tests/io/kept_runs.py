@@ -15,7 +15,7 @@ import time
 import numpy as np
 
 import rigidimpulse as ri
-from rigidimpulse.io.cache import keeper
+from rigidimpulse.io.cache import checkpointer as keeper
 
 
 def heap() -> ri.Scene:

@@ -15,8 +15,8 @@ from kept_runs import SCENES, gas, heap, run
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
-from rigidimpulse.cli import BAD_SCENE, main
-from rigidimpulse.io.cache import keeper
+from rigidimpulse.cli.cli import BAD_SCENE, main
+from rigidimpulse.io.cache import checkpointer as keeper
 
 h5py = pytest.importorskip("h5py")
 DURATIONS = {"heap": 0.5, "gas": 40.0, "forces": 0.4}
@@ -215,7 +215,7 @@ class RunsAFile:
     """Pickled, it would have the library run a scene file."""
 
     def __reduce__(self):
-        from rigidimpulse.jobs import find_job
+        from rigidimpulse.cli.jobs import find_job
 
         return find_job, ("harmful.py",)
 

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from gltf_files import BOX, channels, physics, shaped, unpack, with_physics
 from player import check_structure
 
-from rigidimpulse.cli import main
+from rigidimpulse.cli.cli import main
 
 
 def call(*arguments):

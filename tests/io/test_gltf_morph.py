@@ -12,7 +12,7 @@ from gltf_files import unpack, values
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
-from rigidimpulse.flexible.track import FlexibleTrack
+from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
 from rigidimpulse.io.gltf.morph import kept_frames
 
 

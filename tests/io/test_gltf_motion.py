@@ -15,9 +15,9 @@ from gltf_files import BOX, CUBE, Gltf, channels, physics, shaped, unpack, with_
 from player import Player, check_structure, rotation
 
 import rigidimpulse as ri
-from rigidimpulse.observe.events import IMPACT_DTYPE
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import multiply
+from rigidimpulse.core.quaternion import multiply
+from rigidimpulse.recording.events import IMPACT_DTYPE
+from rigidimpulse.recording.recording import Recording
 
 SINGLE = 2e-6
 HALF = np.sqrt(0.5)

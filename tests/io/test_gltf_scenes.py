@@ -10,8 +10,8 @@ import pytest
 from gltf_files import BALL, BOX, CUBE, CUBE_FACES, Gltf, physics, shaped, with_physics
 
 import rigidimpulse as ri
-from rigidimpulse.mass import body_mass
-from rigidimpulse.world import compile_scene
+from rigidimpulse.model.world import compile_scene
+from rigidimpulse.scene.mass import body_mass
 
 TURN = [0.0, 0.0, 0.6, 0.8]
 """Rotation (x, y, z, w) about Z by 2 atan(3/4)."""

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.mass import body_mass
-from rigidimpulse.rotation import to_matrix
+from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.scene.mass import body_mass
 
 pytest.importorskip("defusedxml")
 

@@ -186,7 +186,7 @@ def test_on_the_command_line(tmp_path: Path) -> None:
     """A file in, a file out, from frame 1001 on, with two samples a frame; what is not read is printed."""
     from click.testing import CliRunner
 
-    from rigidimpulse.cli import main
+    from rigidimpulse.cli.cli import main
 
     file = File("Y", unit=0.01)
     file.body("/ball", at=(0, 100, 0)).AddAppliedSchema("PhysxRigidBodyAPI")

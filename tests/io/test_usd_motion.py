@@ -14,7 +14,7 @@ import pytest
 from test_gltf_motion import recorded, smooth, turned
 
 import rigidimpulse as ri
-from rigidimpulse.flexible.track import FlexibleTrack
+from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
 
 pytest.importorskip("pxr")
 from pxr import Usd, UsdGeom
@@ -240,8 +240,8 @@ def test_the_validators_of_usd_find_nothing(tmp_path: Path) -> None:
 
 def test_a_thousand_bodies(tmp_path: Path) -> None:
     """240 frames of 1,000 bodies: all samples are there, 56 bytes a pose: 24 + 16, and 16 that say where."""
-    from rigidimpulse.observe.events import IMPACT_DTYPE
-    from rigidimpulse.recording import Recording
+    from rigidimpulse.recording.events import IMPACT_DTYPE
+    from rigidimpulse.recording.recording import Recording
 
     rng, frames, count = np.random.default_rng(1), 240, 1000
     box = ri.Shape.box(1)

@@ -127,7 +127,7 @@ def test_masses(tmp_path: Path) -> None:
     two = file.body("/two")
     for k, mass in enumerate((1000.0, 3000.0)):
         file.mass(file.collider(f"/two/c{k}", "Cube", size=10.0, at=(20 * k, 0, 0)), mass=mass)
-    from rigidimpulse.mass import body_mass
+    from rigidimpulse.scene.mass import body_mass
 
     scene = file.load(tmp_path)
     assert two

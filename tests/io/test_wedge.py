@@ -18,7 +18,7 @@ from click.testing import CliRunner
 from wedge_scenes import drop, fragile
 
 import rigidimpulse as ri
-from rigidimpulse.cli import BAD_SCENE, CHECK_FAILED, main
+from rigidimpulse.cli.cli import BAD_SCENE, CHECK_FAILED, main
 from rigidimpulse.studies.wedges.vary import combinations, parse_vary, with_parameter, with_seed
 
 pytest.importorskip("h5py")

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import rigidimpulse as ri
-from rigidimpulse.flexible import FlexibleBody, Flexibles, FlexibleStep, RigidMotion
-from rigidimpulse.flexible.net import Net
-from rigidimpulse.rotation import quaternion_from_rotation_vector, to_matrix
+from rigidimpulse.core.quaternion import quaternion_from_rotation_vector, to_matrix
+from rigidimpulse.dynamics.soft_body import FlexibleBody, Flexibles, FlexibleStep, RigidMotion
+from rigidimpulse.dynamics.soft_body.mass_spring import Net
 
 
 def sheet_mesh(n: int, length: float = 1.0) -> tuple[np.ndarray, np.ndarray]:

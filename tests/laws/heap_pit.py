@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import rigidimpulse as ri
-from rigidimpulse.detect.narrowphase import Narrowphase
-from rigidimpulse.rotation import multiply, rotate
+from rigidimpulse.collision.distance.fcl import Narrowphase
+from rigidimpulse.core.quaternion import multiply, rotate
 
 STONE = ri.Material(density=900, restitution=0.1, static_friction=0.4, dynamic_friction=0.4)
 

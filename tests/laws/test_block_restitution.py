@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidimpulse.respond.impulse import BodyState, Contacts
-from rigidimpulse.respond.restitution import LAWS
-from rigidimpulse.respond.simultaneous import respond_simultaneous
+from rigidimpulse.dynamics.impact.point import BodyState, Contacts
+from rigidimpulse.dynamics.impact.restitution import LAWS
+from rigidimpulse.dynamics.impact.sequence import respond_simultaneous
 
 
 def state(masses, inertias, velocity, spin) -> BodyState:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.conventions import TOLERANCES
+from rigidimpulse.core.conventions import TOLERANCES
 
 RADIUS, HEIGHT, G = 0.5, 2.5, 9.81
 

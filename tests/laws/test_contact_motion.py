@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.constrain.contact_motion import contact_motion
-from rigidimpulse.detect.touching import bring_all, fill_contacts
-from rigidimpulse.integrate.course import begin
-from rigidimpulse.observe.events import EventLog
-from rigidimpulse.observe.recorder import Recorder
-from rigidimpulse.respond.impulse import Contacts
-from rigidimpulse.rotation import multiply, quaternion_from_axis_angle
-from rigidimpulse.simulation import start_courses
-from rigidimpulse.state import StepContext
-from rigidimpulse.world import compile_scene
+from rigidimpulse.core.quaternion import multiply, quaternion_from_axis_angle
+from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
+from rigidimpulse.dynamics.impact.point import Contacts
+from rigidimpulse.engine.simulate import start_courses
+from rigidimpulse.engine.touching import bring_all, fill_contacts
+from rigidimpulse.model.state import StepContext
+from rigidimpulse.model.world import compile_scene
+from rigidimpulse.motion.trajectory import begin
+from rigidimpulse.recording.events import EventLog
+from rigidimpulse.recording.recorder import Recorder
 
 STEP, GAP, MARGIN = 1e-4, 1e-6, 1e-2
 EDGE = np.sqrt(0.5)
@@ -82,7 +82,7 @@ def _tilt() -> np.ndarray:
 
 def _lowest() -> float:
     """Height of the centre of the tilted box over its lowest corner."""
-    from rigidimpulse.rotation import rotate
+    from rigidimpulse.core.quaternion import rotate
 
     corners = 0.5 * np.array([[x, y, z] for x in (-0.2, 0.2) for y in (-0.3, 0.3) for z in (-0.4, 0.4)])
     return -float(rotate(np.tile(_tilt(), (8, 1)), corners)[:, 2].min())

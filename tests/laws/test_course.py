@@ -10,21 +10,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rigidimpulse.detect.touching import bring
-from rigidimpulse.integrate.course import (
-    FIXED,
-    FORCED,
-    FREE,
-    PRESCRIBED,
-    STEPPED,
-    Course,
-    begin,
-    make_course,
-    pose_at,
-    state_at,
-)
-from rigidimpulse.respond.impulse import BodyState
-from rigidimpulse.rotation import angle_between, multiply, quaternion_from_rotation_vector, rotate, rotate_inverse
+from rigidimpulse.core.quaternion import angle_between, multiply, quaternion_from_rotation_vector, rotate, rotate_inverse
+from rigidimpulse.dynamics.impact.point import BodyState
+from rigidimpulse.engine.touching import bring
+from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, PRESCRIBED, STEPPED, Course, begin, make_course, pose_at, state_at
 
 EPS = np.finfo(float).eps
 TILTED = np.array([0.3, -0.5, 0.7, 0.4]) / np.linalg.norm([0.3, -0.5, 0.7, 0.4])

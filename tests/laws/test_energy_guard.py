@@ -20,8 +20,8 @@ import pytest
 import trimesh
 
 import rigidimpulse as ri
-from rigidimpulse.constrain import energy_guard
-from rigidimpulse.respond.impulse import BodyState
+from rigidimpulse.dynamics.constraints import energy_limit as energy_guard
+from rigidimpulse.dynamics.impact.point import BodyState
 
 G = 9.81
 BODIES = 6

@@ -20,10 +20,10 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import rigidimpulse as ri
-from rigidimpulse.detect.narrowphase import Narrowphase
-from rigidimpulse.forces.energy.layout import compile_energies, expanded
-from rigidimpulse.forces.energy.term import poses
-from rigidimpulse.rotation import angle_between, multiply, quaternion_from_rotation_vector, rotate
+from rigidimpulse.collision.distance.fcl import Narrowphase
+from rigidimpulse.core.quaternion import angle_between, multiply, quaternion_from_rotation_vector, rotate
+from rigidimpulse.dynamics.forces.energy.layout import compile_energies, expanded
+from rigidimpulse.dynamics.forces.energy.term import poses
 
 G = 9.81
 SHAPES = {

@@ -16,9 +16,9 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import rigidimpulse as ri
-from rigidimpulse.forces.energy.path import SmoothPath
-from rigidimpulse.forces.energy.path_rows import Frames, Weights, rotation_terms
-from rigidimpulse.rotation import angle_between, conjugate, multiply, normalize, quaternion_from_rotation_vector, rotation_vector
+from rigidimpulse.core.quaternion import angle_between, conjugate, multiply, normalize, quaternion_from_rotation_vector, rotation_vector
+from rigidimpulse.dynamics.forces.energy.path import SmoothPath
+from rigidimpulse.dynamics.forces.energy.path_rows import Frames, Weights, rotation_terms
 
 REST = (0.0, 0.0, 0.0)
 ENDS = [ri.PinFrame(0), ri.PinFrame(-1)]
@@ -222,5 +222,5 @@ def test_import_does_not_load_the_minimisers() -> None:
 
     code = "import sys, rigidimpulse as ri; ri.Scene; ri.simulate; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert "rigidimpulse.simulation" in loaded
-    assert not [name for name in loaded if name.startswith(("scipy.optimize", "rigidimpulse.forces.energy"))]
+    assert "rigidimpulse.engine.simulate" in loaded
+    assert not [name for name in loaded if name.startswith(("scipy.optimize", "rigidimpulse.dynamics.forces.energy"))]

@@ -11,8 +11,8 @@ import pytest
 from flexible_scene import Run, cube_mesh, sheet_mesh, volume
 
 import rigidimpulse as ri
-from rigidimpulse.flexible import FlexibleBody
-from rigidimpulse.rotation import quaternion_from_axis_angle, rotate
+from rigidimpulse.core.quaternion import quaternion_from_axis_angle, rotate
+from rigidimpulse.dynamics.soft_body import FlexibleBody
 
 G = 9.81
 

@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import fsolve
 
-from rigidimpulse.flexible import FlexibleBody
-from rigidimpulse.flexible.net import sheet
+from rigidimpulse.dynamics.soft_body import FlexibleBody
+from rigidimpulse.dynamics.soft_body.mass_spring import sheet
 
 N, K, M = 5, 100.0, 0.5
 

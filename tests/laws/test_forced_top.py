@@ -13,8 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from top_reference import reference
 
-from rigidimpulse.integrate import forced_top, free_top
-from rigidimpulse.rotation import (
+from rigidimpulse.core.quaternion import (
     angle_between,
     conjugate,
     multiply,
@@ -23,6 +22,8 @@ from rigidimpulse.rotation import (
     rotate_inverse,
     rotation_vector,
 )
+from rigidimpulse.motion import forced_rotation as forced_top
+from rigidimpulse.motion import free_rotation as free_top
 
 EPS = np.finfo(float).eps
 ROUND_OFF = 64.0

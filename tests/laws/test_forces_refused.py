@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.forces import KINDS
+from rigidimpulse.dynamics.forces import KINDS
 
 NAN, INF = float("nan"), float("inf")
 KEYS = ri.Keyframes([0, 1], [(0, 0, 0), (1, 0, 0)])
@@ -137,7 +137,7 @@ scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static"))
 scene.add(ri.Body("ball", ri.Shape.sphere(0.2), position=(0, 0, 0.3)))
 scene.add(ri.ConstantForce("ball", (1, 0, 0)))
 run = ri.simulate(scene, 0.3)
-print(sorted(m for m in sys.modules if m.startswith("rigidimpulse.forces") or m.endswith("force_step")))
+print(sorted(m for m in sys.modules if m.startswith("rigidimpulse.dynamics.forces") or m.endswith("force_step")))
 print(run.plan.explain())
 """
 
@@ -145,7 +145,7 @@ print(run.plan.explain())
 def test_a_scene_without_varying_forces_imports_none_of_their_modules() -> None:
     done = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True, check=True)
     modules, *plan = done.stdout.splitlines()
-    assert modules == str([f"rigidimpulse.forces{name}" for name in ("", ".constant", ".gravity", ".kinds")])
+    assert modules == str([f"rigidimpulse.dynamics.forces{name}" for name in ("", ".constant", ".gravity", ".kinds")])
     for kind in (*KINDS.values(), "forced flight"):
         line = next(line for line in plan if f" {kind} " in line)
         assert " out " in line, line

@@ -15,8 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from top_reference import reference
 
-from rigidimpulse.integrate import free_top
-from rigidimpulse.rotation import (
+from rigidimpulse.core.quaternion import (
     angle_between,
     conjugate,
     multiply,
@@ -26,6 +25,7 @@ from rigidimpulse.rotation import (
     rotate_inverse,
     rotation_vector,
 )
+from rigidimpulse.motion import free_rotation as free_top
 
 EPS = np.finfo(float).eps
 ROUND_OFF = 32.0

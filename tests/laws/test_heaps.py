@@ -10,8 +10,8 @@ import pytest
 from heap_pit import pit
 
 import rigidimpulse as ri
-from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.rotation import to_matrix
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.quaternion import to_matrix
 
 GRAVITY = 9.81
 HEAPS = ri.Accuracy(contact_solver="substepped")
@@ -129,7 +129,7 @@ def test_a_heap_that_must_not_stand_still_comes_to_rest_by_itself(monkeypatch):
 
     With places of the points off by round-off of where their bodies are, single points hold twists, and boxes creep at 2e-3 m/s for ever.
     """
-    from rigidimpulse.constrain import heap
+    from rigidimpulse.engine.substepped import advance as heap
     from rigidimpulse.gallery.pile import pile
 
     monkeypatch.setattr(heap, "REST", np.inf)
@@ -234,8 +234,8 @@ def test_pile_rests_with_positive_gaps():
 def test_same_bits_at_every_width_of_lanes(monkeypatch):
     # Lanes never read each other and products are added by fma, so batches of 2 give the bits of the machine's own width; patches
     # solved in another order, or sums rounded otherwise, would lie centimetres apart after 2 s.
-    from rigidimpulse.constrain import heap_stepper
-    from rigidimpulse.constrain.lanes import Lanes
+    from rigidimpulse.core.simd import Lanes
+    from rigidimpulse.engine.substepped import contact_forces as heap_stepper
 
     first = ri.simulate(mixed(False, ""), 2.0, accuracy=HEAPS)
     monkeypatch.setattr(heap_stepper, "machine_lanes", lambda: Lanes(2))

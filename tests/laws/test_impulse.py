@@ -20,7 +20,7 @@ import pytest
 import trimesh
 
 import rigidimpulse as ri
-from rigidimpulse.rotation import to_matrix
+from rigidimpulse.core.quaternion import to_matrix
 
 PAIRS_PER_SCENE = 50
 SPACING = 40.0

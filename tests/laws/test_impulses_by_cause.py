@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.rotation import quaternion_from_axis_angle
+from rigidimpulse.core.quaternion import quaternion_from_axis_angle
 
 G = 9.81
 SMOOTH = ri.Material(static_friction=0.0, dynamic_friction=0.0, restitution=0.6)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.detect.narrowphase import Narrowphase
+from rigidimpulse.collision.distance.fcl import Narrowphase
 
 G = 9.81
 FLOOR = {"shape": ri.Shape.half_space(), "motion": "static"}

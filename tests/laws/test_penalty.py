@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.rotation import rotate
+from rigidimpulse.core.quaternion import rotate
 
 G, RADIUS, SPEED, GAP = 9.81, 0.1, 2.0, 0.05
 START = GAP / SPEED

@@ -55,7 +55,7 @@ def test_joints_stay_closed_over_many_swings() -> None:
     scene.add(ri.HingeJoint(None, "upper", (0, 0, 0), (1, 0, 0)))
     scene.add(ri.HingeJoint("upper", "lower", (0, 0, 1), (1, 0, 0)))
     run = ri.simulate(scene, 10.0)
-    from rigidimpulse.rotation import rotate
+    from rigidimpulse.core.quaternion import rotate
 
     half = np.array([0, 0, 0.5])
     ends = {name: [run.position(name) + sign * rotate(run.orientation(name), half) for sign in (-1, 1)] for name in ("upper", "lower")}

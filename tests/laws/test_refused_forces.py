@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse import state
-from rigidimpulse.constrain.newton import solve_newton
-from rigidimpulse.conventions import TOLERANCES
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.model import state
 
 G, SIZE, SPEED = 9.81, 0.2, 2.0
 GAP = 2.0 * TOLERANCES.contact_gap * SIZE

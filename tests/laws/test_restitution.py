@@ -17,9 +17,9 @@ import pytest
 from impact_process import LAWS, Plane, plane_impact, space_impact
 
 import rigidimpulse as ri
-from rigidimpulse._jit import jit_making_arrays
-from rigidimpulse.respond.friction import contact_impulse
-from rigidimpulse.respond.restitution import LAWS as LAW_NUMBERS
+from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.dynamics.impact.friction import contact_impulse
+from rigidimpulse.dynamics.impact.restitution import LAWS as LAW_NUMBERS
 
 NORMAL = np.array([0.48, 0.6, 0.64])
 FRAME = np.array([NORMAL, [0.8, 0.0, -0.6], np.cross(NORMAL, [0.8, 0.0, -0.6])])

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse import rotation
+from rigidimpulse.core import quaternion as rotation
 from rigidimpulse.gallery import tosses
 
 POSITION_BOUND, ROTATION_BOUND = 0.15, np.radians(22.0)

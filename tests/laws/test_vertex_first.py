@@ -17,7 +17,7 @@ import pytest
 from scipy.optimize import brentq
 
 import rigidimpulse as ri
-from rigidimpulse.rotation import multiply, quaternion_from_rotation_vector, rotate
+from rigidimpulse.core.quaternion import multiply, quaternion_from_rotation_vector, rotate
 
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 ORIENTATIONS = [

@@ -32,7 +32,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import rigidimpulse as ri
-from rigidimpulse.rotation import quaternion_from_axis_angle, rotate, to_matrix
+from rigidimpulse.core.quaternion import quaternion_from_axis_angle, rotate, to_matrix
 
 G = 9.81
 STEPS = 1.0 / np.array([120.0, 240.0, 480.0, 960.0, 1920.0])

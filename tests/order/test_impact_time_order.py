@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from rigidimpulse.geometry import HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
-from rigidimpulse.integrate.course import FREE, begin, make_course, state_at
-from rigidimpulse.sweep import bisection, conservative, linear
-from rigidimpulse.sweep.guard import make_scratch
+from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
+from rigidimpulse.collision.time_of_impact import bisection, conservative, linear
+from rigidimpulse.collision.time_of_impact.safe_step import make_scratch
+from rigidimpulse.motion.trajectory import FREE, begin, make_course, state_at
 
 BOX = trimesh.creation.box((1.0, 0.6, 0.4))
 GEOMETRY = build_geometry(

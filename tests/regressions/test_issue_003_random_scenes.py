@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.conventions import TOLERANCES
-from rigidimpulse.rotation import rotate
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.quaternion import rotate
 
 G = 9.81
 SMOOTH = ri.Material(restitution=0.0, static_friction=0.0, dynamic_friction=0.0)

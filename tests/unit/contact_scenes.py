@@ -10,8 +10,8 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from rigidimpulse.detect.manifold import SCRATCH_ROWS, pair_contacts, pair_gap, reduce_contacts
-from rigidimpulse.geometry import HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
+from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
+from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS, pair_contacts, pair_gap, reduce_contacts
 
 ROUND_OFF = 2e-14
 VERTEX_FACE, FACE_VERTEX, EDGE_EDGE, CORNER, PLANE = range(5)

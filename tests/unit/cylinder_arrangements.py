@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from rigidimpulse._jit import jit
-from rigidimpulse.detect.cylinder import (
+from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
+from rigidimpulse.collision.manifold.cylinder import (
     cylinder_cylinder_contacts,
     cylinder_cylinder_gap,
     cylinder_half_space_contacts,
@@ -14,7 +14,7 @@ from rigidimpulse.detect.cylinder import (
     cylinder_round_contacts,
     cylinder_round_gap,
 )
-from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
+from rigidimpulse.core.kernels import jit
 
 Z = np.array([0.0, 0.0, 1.0])
 

@@ -7,14 +7,14 @@ import pytest
 import trimesh
 from contact_scenes import box, capsule, half_space, mesh, prism, sphere
 
-from rigidimpulse._jit import jit, jit_making_arrays
-from rigidimpulse.detect.manifold import pair_gap
-from rigidimpulse.geometry import CYLINDER, CompiledShape, Primitive, build_geometry
-from rigidimpulse.integrate.course import FIXED, FORCED, FREE, PRESCRIBED, begin, make_course, pose_at
-from rigidimpulse.rotation import quaternion_to_matrix
-from rigidimpulse.sweep import bisection, conservative
-from rigidimpulse.sweep.guard import make_scratch
-from rigidimpulse.sweep.impact_time import IMPACT, SEPARATE
+from rigidimpulse.collision.geometry import CYLINDER, CompiledShape, Primitive, build_geometry
+from rigidimpulse.collision.manifold.dispatch import pair_gap
+from rigidimpulse.collision.time_of_impact import bisection, conservative
+from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE
+from rigidimpulse.collision.time_of_impact.safe_step import make_scratch
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.quaternion import quaternion_to_matrix
+from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, PRESCRIBED, begin, make_course, pose_at
 
 ROUND_OFF = 1e-13
 STEP = 1.0 / 60.0

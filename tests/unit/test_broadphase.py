@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rigidimpulse.detect.broadphase import FEW, overlapping_pairs, overlapping_with
-from rigidimpulse.detect.pair_table import path_box
-from rigidimpulse.integrate.course import FIXED, FREE, PRESCRIBED, begin, make_course, pose_at
+from rigidimpulse.collision.broad_phase import FEW, overlapping_pairs, overlapping_with
+from rigidimpulse.engine.pair_table import path_box
+from rigidimpulse.motion.trajectory import FIXED, FREE, PRESCRIBED, begin, make_course, pose_at
 
 SIZES = [0, 1, 2, 7, FEW, FEW + 1, 150, 900]
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimpulse.sweep.features import FeaturePath, first_contact
+from rigidimpulse.collision.time_of_impact.feature_paths import FeaturePath, first_contact
 
 DATA = Path(__file__).parents[1] / "data" / "ccd"
 

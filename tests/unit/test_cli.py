@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
-from rigidimpulse.cli import BAD_SCENE, CHECK_FAILED, main
+from rigidimpulse.cli.cli import BAD_SCENE, CHECK_FAILED, main
 
 SCENE_FILE = """
 import rigidimpulse as ri
@@ -42,7 +42,7 @@ def test_help_imports_nothing_heavy():
     # `--help` answers in 0.3 s only if nothing beyond click is imported.
     code = (
         "import sys\n"
-        "from rigidimpulse.cli import main\n"
+        "from rigidimpulse.cli.cli import main\n"
         "try:\n"
         "    main(['--help'])\n"
         "except SystemExit:\n"

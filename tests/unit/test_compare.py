@@ -18,11 +18,11 @@ import umsgpack
 from click.testing import CliRunner
 
 import rigidimpulse as ri
-from rigidimpulse.cli import BAD_SCENE, main
-from rigidimpulse.flexible.track import FlexibleTrack
-from rigidimpulse.observe.events import IMPACT_DTYPE
-from rigidimpulse.rotation import multiply
-from rigidimpulse.simulation import frame_times
+from rigidimpulse.cli.cli import BAD_SCENE, main
+from rigidimpulse.core.quaternion import multiply
+from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
+from rigidimpulse.engine.simulate import frame_times
+from rigidimpulse.recording.events import IMPACT_DTYPE
 from rigidimpulse.studies.compare import frames_of, labels_of
 from rigidimpulse.view import render_page
 from rigidimpulse.view.comparison import COMPARISON_SCRIPTS, render_comparison

@@ -6,14 +6,14 @@ import sys
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse import compile_ahead
+from rigidimpulse.engine import warm_up as compile_ahead
 from rigidimpulse.gallery import load
-from rigidimpulse.world import compile_scene
+from rigidimpulse.model.world import compile_scene
 
 PROGRAM = """
 import rigidimpulse as ri
 from rigidimpulse import compile_ahead
-from rigidimpulse._jit import KERNELS
+from rigidimpulse.core.kernels import KERNELS
 from rigidimpulse.gallery import load
 
 for half in (compile_ahead.{first}, compile_ahead.{second}):
@@ -48,7 +48,7 @@ def test_runs_call_what_was_compiled_ahead(first, second, jointed, scene):
 FIRST_RUN = """
 import rigidimpulse as ri
 from rigidimpulse import compile_ahead
-from rigidimpulse._jit import KERNELS
+from rigidimpulse.core.kernels import KERNELS
 
 def used():
     return {kernel.name for kernel in KERNELS if kernel.calls or kernel.preparing}

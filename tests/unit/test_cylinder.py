@@ -27,7 +27,7 @@ from cylinder_arrangements import (
 )
 from scipy.spatial.transform import Rotation
 
-from rigidimpulse.geometry import CYLINDER, ROUND, CompiledShape, Primitive, build_geometry
+from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Primitive, build_geometry
 
 EIGHTHS = 2.0 * np.pi * np.arange(8) / 8
 GAP = 1e-5

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from cylinder_arrangements import Z, outside, support, unit
 
-from rigidimpulse.detect.cylinder import cylinder_cylinder_distance, cylinder_triangle_distance
+from rigidimpulse.collision.manifold.cylinder import cylinder_cylinder_distance, cylinder_triangle_distance
 
 CERTAIN = 1e-12  # relative to the size of the arrangement
 

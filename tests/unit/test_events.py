@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import rigidimpulse as ri
-from rigidimpulse.events.queue import make_queue, schedule
-from rigidimpulse.events.tree import build_tree, make_tree, overlapping, replace_box
+from rigidimpulse.engine.spheres.queue import make_queue, schedule
+from rigidimpulse.engine.spheres.tree import build_tree, make_tree, overlapping, replace_box
 
 
 def test_queue_gives_the_earliest_entry_after_any_changes() -> None:

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigidimpulse.detect.features import arc_miss, closest_on_segments, over_triangle, pierces_triangle
-from rigidimpulse.geometry import EDGE_BOUNDARY, EDGE_CAPSULE, EDGE_CONVEX, EDGE_HIDDEN
+from rigidimpulse.collision.distance.simplices import arc_miss, closest_on_segments, over_triangle, pierces_triangle
+from rigidimpulse.collision.geometry import EDGE_BOUNDARY, EDGE_CAPSULE, EDGE_CONVEX, EDGE_HIDDEN
 
 coordinate = st.floats(-1.0, 1.0, width=32)
 point = st.tuples(coordinate, coordinate, coordinate)

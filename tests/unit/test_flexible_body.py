@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.errors import SceneError
-from rigidimpulse.flexible import FlexibleBody, Flexibles, FlexibleTrack
-from rigidimpulse.flexible.distance import STACK, first_touch, first_touch_of_triangle, signed_distance
-from rigidimpulse.flexible.track import tracks_in
-from rigidimpulse.rotation import rotate_inverse
-from rigidimpulse.view.nets import net_messages
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import rotate_inverse
+from rigidimpulse.dynamics.soft_body import FlexibleBody, Flexibles, FlexibleTrack
+from rigidimpulse.dynamics.soft_body.distance import STACK, first_touch, first_touch_of_triangle, signed_distance
+from rigidimpulse.dynamics.soft_body.track import tracks_in
+from rigidimpulse.view.soft_bodies import net_messages
 
 TRIANGLE = {"mesh": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
 

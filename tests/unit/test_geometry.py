@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimpulse.geometry import (
+from rigidimpulse.collision.geometry import (
     CYLINDER,
     EDGE_BOUNDARY,
     EDGE_CAPSULE,
@@ -20,7 +20,7 @@ from rigidimpulse.geometry import (
     build_geometry,
     compile_shape,
 )
-from rigidimpulse.shape import Shape, rotation_matrix
+from rigidimpulse.scene.shape import Shape, rotation_matrix
 
 SPOT = Path(__file__).parents[2] / "assets" / "meshes" / "spot.obj"
 

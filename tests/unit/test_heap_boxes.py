@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.constrain.heap_narrow import review
-from rigidimpulse.constrain.heap_polyhedra import EDGE_WINS
-from rigidimpulse.constrain.heap_rows import CORE_A, CORE_B, HELD, SEPARATION
-from rigidimpulse.constrain.heap_stepper import HeapStepper
-from rigidimpulse.observe.events import EventLog
-from rigidimpulse.observe.recorder import Recorder
-from rigidimpulse.state import StepContext
-from rigidimpulse.world import compile_scene
+from rigidimpulse.collision.contact_cache import review
+from rigidimpulse.collision.contact_records import CORE_A, CORE_B, HELD, SEPARATION
+from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
+from rigidimpulse.engine.substepped.contact_forces import HeapStepper
+from rigidimpulse.model.state import StepContext
+from rigidimpulse.model.world import compile_scene
+from rigidimpulse.recording.events import EventLog
+from rigidimpulse.recording.recorder import Recorder
 
 SIDES = 2.0 * np.array([[0.5, 0.4, 0.3], [0.3, 0.6, 0.45]])
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from rigidimpulse.constrain.heap_cores import DEPTH, cores
-from rigidimpulse.geometry import build_geometry, compile_shape
-from rigidimpulse.shape import Shape
+from rigidimpulse.collision.geometry import build_geometry, compile_shape
+from rigidimpulse.collision.manifold.inset_surface import DEPTH, cores
+from rigidimpulse.scene.shape import Shape
 
 
 def core_of(shape: Shape) -> tuple[np.ndarray, np.ndarray, float]:

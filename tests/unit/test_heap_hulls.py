@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.constrain.heap_depth import EXACT
-from rigidimpulse.constrain.heap_hulls import SHRINK
-from rigidimpulse.constrain.heap_narrow import HULLS
-from rigidimpulse.constrain.heap_polyhedra import EDGE_WINS
-from rigidimpulse.constrain.heap_rows import CORE_A, CORE_B, HELD, SEPARATION
-from rigidimpulse.constrain.heap_stepper import HeapStepper
-from rigidimpulse.observe.events import EventLog
-from rigidimpulse.observe.recorder import Recorder
-from rigidimpulse.rotation import multiply, rotate, to_matrix
-from rigidimpulse.state import StepContext
-from rigidimpulse.world import compile_scene
+from rigidimpulse.collision.contact_cache import HULLS
+from rigidimpulse.collision.contact_records import CORE_A, CORE_B, HELD, SEPARATION
+from rigidimpulse.collision.distance.epa import EXACT
+from rigidimpulse.collision.manifold.convex_convex import SHRINK
+from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
+from rigidimpulse.core.quaternion import multiply, rotate, to_matrix
+from rigidimpulse.engine.substepped.contact_forces import HeapStepper
+from rigidimpulse.model.state import StepContext
+from rigidimpulse.model.world import compile_scene
+from rigidimpulse.recording.events import EventLog
+from rigidimpulse.recording.recorder import Recorder
 
 
 def hull(random: np.random.Generator) -> np.ndarray:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.constrain import heap_stepper
-from rigidimpulse.constrain.heap_records import LINES, POINTS
-from rigidimpulse.constrain.heap_rows import in_play
+from rigidimpulse.collision.contact_records import in_play
+from rigidimpulse.dynamics.solvers.tgs_soft.records import LINES, POINTS
+from rigidimpulse.engine.substepped import contact_forces as heap_stepper
 
 
 def pile(number: int) -> ri.Scene:

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigidimpulse.constrain.heap_rows import UNKNOWN
-from rigidimpulse.constrain.heap_table import FIRST_ROWS, ROWS_OF_A_BODY, HeapTable
-from rigidimpulse.reserve import reserve
+from rigidimpulse.collision.contact_records import UNKNOWN
+from rigidimpulse.collision.contact_table import FIRST_ROWS, ROWS_OF_A_BODY, HeapTable
+from rigidimpulse.core.memory import reserve
 
 BODIES = 40
 fixed = settings(deadline=None, derandomize=True)  # no deadline: the first call compiles

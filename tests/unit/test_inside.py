@@ -17,8 +17,8 @@ import pytest
 import trimesh
 
 import rigidimpulse as ri
-from rigidimpulse.detect.inside import plane_orientation, point_in_convex, points_inside, space_orientation
-from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
+from rigidimpulse.collision.containment import plane_orientation, point_in_convex, points_inside, space_orientation
+from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
 
 SPOT = Path(__file__).parents[2] / "assets" / "meshes" / "spot.obj"
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
-from rigidimpulse._jit import jit, jit_making_arrays
+from rigidimpulse.core.kernels import jit, jit_making_arrays
 
 
 @jit_making_arrays

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidimpulse._jit import jit
-from rigidimpulse.constrain.lanes import ROW, Lanes, aligned, fma, gather, load, root, scatter, spread, store, where_greater, width_of
+from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.simd import ROW, Lanes, aligned, fma, gather, load, root, scatter, spread, store, where_greater, width_of
 
 
 @jit

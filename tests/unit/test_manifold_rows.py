@@ -5,9 +5,9 @@ import pytest
 import trimesh
 from contact_scenes import IDENTITY, ROUND_OFF, SQUARE, Scene, approached, box, half_space, matched, mesh, sphere, turn
 
-from rigidimpulse.detect.box_tree import STACK_ROWS
-from rigidimpulse.detect.manifold import pair_contacts, reduce_contacts
-from rigidimpulse.geometry import CYLINDER, Primitive
+from rigidimpulse.collision.bvh import STACK_ROWS
+from rigidimpulse.collision.geometry import CYLINDER, Primitive
+from rigidimpulse.collision.manifold.dispatch import pair_contacts, reduce_contacts
 
 
 def test_open_sheet_is_touched_from_both_sides():

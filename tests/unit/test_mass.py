@@ -12,11 +12,11 @@ import mpmath
 import numpy as np
 import pytest
 
-from rigidimpulse.body import Body
-from rigidimpulse.errors import SceneError
-from rigidimpulse.mass import body_mass, principal_axes
-from rigidimpulse.material import Material
-from rigidimpulse.shape import Shape, rotation_matrix
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.mass import body_mass, principal_axes
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.shape import Shape, rotation_matrix
 
 SPOT = Path(__file__).parents[2] / "assets" / "meshes" / "spot.obj"
 BOX = Shape.box((1, 2, 3)).surface()

@@ -4,8 +4,8 @@ import itertools
 
 import pytest
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.material import COMBINE_MODES, Material, combine
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.scene.material import COMBINE_MODES, Material, combine
 
 OPERATION = {
     "average": lambda a, b: (a + b) / 2,

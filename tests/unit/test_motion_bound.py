@@ -8,10 +8,7 @@ travelled; a wrong y' or y'' would show as an error of first or second order in 
 import numpy as np
 import pytest
 
-from rigidimpulse._jit import jit
-from rigidimpulse.integrate.course import FIXED, FORCED, FREE, PRESCRIBED, begin, make_course, pose_at, state_at
-from rigidimpulse.rotation import to_matrix
-from rigidimpulse.sweep.bound import (
+from rigidimpulse.collision.time_of_impact.motion_bound import (
     AXES,
     JERK_BOUND,
     MOTION_SIZE,
@@ -27,6 +24,9 @@ from rigidimpulse.sweep.bound import (
     seen_motion,
     stop_turning,
 )
+from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, PRESCRIBED, begin, make_course, pose_at, state_at
 
 ROUND_OFF = 3e-13
 

@@ -18,10 +18,10 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from rigidimpulse.detect.cylinder import cylinder_triangle_distance
-from rigidimpulse.detect.narrowphase import Narrowphase
-from rigidimpulse.errors import SceneError
-from rigidimpulse.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Primitive
+from rigidimpulse.collision.distance.fcl import Narrowphase
+from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Primitive
+from rigidimpulse.collision.manifold.cylinder import cylinder_triangle_distance
+from rigidimpulse.core.errors import SceneError
 
 EXACT = 1e-13
 PACKAGE = Path(__file__).parents[2] / "rigidimpulse"
@@ -378,7 +378,7 @@ def test_only_the_narrowphase_touches_fcl_and_only_its_safe_part():
                 imported |= {name.name.split(".")[0] for name in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
                 imported.add(node.module.split(".")[0])
-        assert ("fcl" in imported) == (path.relative_to(PACKAGE).as_posix() == "detect/narrowphase.py"), path
+        assert ("fcl" in imported) == (path.relative_to(PACKAGE).as_posix() == "collision/distance/fcl.py"), path
         assert "trimesh.collision" not in path.read_text()
     tree = ast.parse((PACKAGE / "detect" / "narrowphase.py").read_text())
     used = {

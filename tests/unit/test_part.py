@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
-from rigidimpulse.cli import main
+from rigidimpulse.cli.cli import main
 
 
 @pytest.fixture(scope="module")

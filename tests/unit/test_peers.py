@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 import rigidimpulse as ri
-from rigidimpulse.rotation import angle_between
+from rigidimpulse.core.quaternion import angle_between
 from rigidimpulse.studies.peers import PEERS, load_peer, run_peer
 
 G, FPS, STEPS = 9.81, 60, 64

@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 from test_view import ball_run, impacts_of, recording
 
-from rigidimpulse.body import Body
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 from rigidimpulse.view.contents import page_scene
 from rigidimpulse.view.picture import HALF_TALL, SUPERSAMPLING, _camera, draw_picture, png, telling_frame
 

@@ -12,6 +12,6 @@ def test_no_module_hides_a_public_name() -> None:
 
 
 def test_every_public_name_is_there() -> None:
-    importlib.import_module("rigidimpulse.simulation")
+    importlib.import_module("rigidimpulse.engine.simulate")
     for name in ri.__all__:
         assert callable(getattr(ri, name)), name

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.constrain.newton import solve_newton
-from rigidimpulse.constrain.qp import solve_qp
-from rigidimpulse.constrain.rows import BOUNDED, DISC, DISC_SECOND, make_rows
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, DISC_SECOND, make_rows
+from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.dynamics.solvers.qp import solve_qp
 
 
 def random_rows(seed: int, contacts: int, slides: float):

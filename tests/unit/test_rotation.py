@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from rigidimpulse import rotation
+from rigidimpulse.core import quaternion as rotation
 
 EPS = np.finfo(float).eps
 TOLERANCE = 16 * EPS

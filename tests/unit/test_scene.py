@@ -5,12 +5,12 @@ import pickle
 import numpy as np
 import pytest
 
-from rigidimpulse.body import Body
-from rigidimpulse.errors import SceneError, unknown_name
-from rigidimpulse.keyframes import Keyframes
-from rigidimpulse.material import Material
-from rigidimpulse.scene import Scene, validate
-from rigidimpulse.shape import Shape
+from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.keyframes import Keyframes
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene, validate
+from rigidimpulse.scene.shape import Shape
 
 BALL = Shape.sphere(0.5)
 BOX = Shape.box(1).surface()

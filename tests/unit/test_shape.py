@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.errors import SceneError
-from rigidimpulse.shape import Shape, rotation_matrix
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.scene.shape import Shape, rotation_matrix
 
 SPOT = Path(__file__).parents[2] / "assets" / "meshes" / "spot.obj"
 BOX = Shape.box((1, 2, 3)).surface()
@@ -28,7 +28,7 @@ def volume(shape: Shape) -> float:
 
 def test_importing_shapes_and_scenes_loads_no_heavy_package():
     code = (
-        "import sys, rigidimpulse.scene, rigidimpulse.geometry;"
+        "import sys, rigidimpulse.scene.scene, rigidimpulse.collision.geometry;"
         "heavy = {'trimesh', 'fcl', 'numba', 'meshcat', 'matplotlib', 'scipy'} & set(sys.modules);"
         "sys.exit(str(heavy) if heavy else 0)"
     )

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
-from rigidimpulse.cli import BAD_SCENE, CHECK_FAILED, main
+from rigidimpulse.cli.cli import BAD_SCENE, CHECK_FAILED, main
 from rigidimpulse.studies import site
 from rigidimpulse.studies.hard_cases import FAILED, HUNG, PASSED
 from rigidimpulse.studies.site import make_site, run_scene

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
-from rigidimpulse.fingerprint import fingerprint
-from rigidimpulse.rotation import quaternion_from_rotation_vector, rotate
+from rigidimpulse.core.quaternion import quaternion_from_rotation_vector, rotate
+from rigidimpulse.engine.fingerprint import fingerprint
+from rigidimpulse.model.world import compile_scene
 from rigidimpulse.studies.measures import penetration
 from rigidimpulse.studies.peers import PEERS
 from rigidimpulse.studies.reference import CLOSED_FORM, NONE, SELF_CONVERGED, Reference
 from rigidimpulse.studies.row import Errors, Row
 from rigidimpulse.studies.settings import grid, rung
 from rigidimpulse.studies.work_precision import Study
-from rigidimpulse.world import compile_scene
 
 PRESETS = [setting for setting in grid() if setting.family == "presets"]
 

@@ -10,11 +10,12 @@ import trimesh
 from contact_scenes import box, capsule, half_space, mesh, sphere
 from sweep_pairs import ROUND_OFF, SHAPES, Pair, check_random_pairs, cylinder, random_pair, shape
 
-from rigidimpulse.geometry import ROUND, CompiledShape, Primitive, build_geometry
-from rigidimpulse.integrate.course import FIXED, FREE, PRESCRIBED
-from rigidimpulse.sweep import after, bisection, conservative, linear
-from rigidimpulse.sweep.guard import make_scratch
-from rigidimpulse.sweep.impact_time import IMPACT, SEPARATE, TOUCHING
+from rigidimpulse.collision.geometry import ROUND, CompiledShape, Primitive, build_geometry
+from rigidimpulse.collision.time_of_impact import bisection, conservative, linear
+from rigidimpulse.collision.time_of_impact import end_of_step as after
+from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE, TOUCHING
+from rigidimpulse.collision.time_of_impact.safe_step import make_scratch
+from rigidimpulse.motion.trajectory import FIXED, FREE, PRESCRIBED
 
 GUARDED = [bisection, conservative]
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from sweep_pairs import Pair, check_random_pairs
 
-from rigidimpulse.integrate.course import FREE
-from rigidimpulse.sweep import bisection, conservative
-from rigidimpulse.sweep.impact_time import IMPACT, SEPARATE
+from rigidimpulse.collision.time_of_impact import bisection, conservative
+from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE
+from rigidimpulse.motion.trajectory import FREE
 
 GUARDED = [bisection, conservative]
 

@@ -20,12 +20,12 @@ import umsgpack
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigidimpulse.body import Body
-from rigidimpulse.material import Material
-from rigidimpulse.observe.events import IMPACT_DTYPE
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.events import IMPACT_DTYPE
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 from rigidimpulse.view import camera as framing
 from rigidimpulse.view import render_page, show, write_html
 from rigidimpulse.view.arrows import LEAST_LENGTH, MOST_ROWS, arrow_rows, fade_time

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from test_view import QUARTER_TURN, ball_run, impacts_of, manifest_of
 
-from rigidimpulse.body import Body
 from rigidimpulse.io.scene_file import load_scene
-from rigidimpulse.observe.contacts import CONTACT_DTYPE
-from rigidimpulse.observe.ledger import Ledger
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.contacts import CONTACT_DTYPE
+from rigidimpulse.recording.ledger import Ledger
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 from rigidimpulse.view import render_page
 from rigidimpulse.view.display import display_mesh
 from rigidimpulse.view.history import MARK_BINS, contact_rows, energy_span, impact_marks, ledger_curves

@@ -28,12 +28,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.hard.parts import DELTA, GRAVITY, above_floor, dull, energy_never_grows, finite, floor_scene, turned, undisturbed
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 HEIGHT, RADIUS = 1.0, 0.1
 RESTITUTIONS = (0.5, 0.8, 0.9)
@@ -98,7 +98,7 @@ def rocking() -> Scene:
 
 def check_rocking(run: Recording) -> list[Check]:
     """Compare the energies of successive half rocks."""
-    from rigidimpulse.mass import body_mass
+    from rigidimpulse.scene.mass import body_mass
 
     assert run.ledger is not None and run.scene is not None
     slender = math.atan2(BLOCK[0], BLOCK[2])

@@ -22,14 +22,14 @@ from functools import partial
 
 import numpy as np
 
-from rigidimpulse.body import Body
+from rigidimpulse.core.quaternion import rotate
+from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.gallery.hard.parts import above_floor, apart, dull, energy_never_grows, finite, floor_scene, turned
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most, equal
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
-from rigidimpulse.simulation import simulate
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SIDE, RADIUS, MASS, PITCH, LOWEST, NOISE = 6, 0.1, 10.0, 0.21, 0.101, 1e-3
 CLOUD, CLOUD_TIME, CLOUD_FPS = 60, 0.5, 20_000.0

@@ -17,13 +17,13 @@ import math
 
 import numpy as np
 
-from rigidimpulse.accuracy import Accuracy
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.hard.parts import dull, energy_never_grows, finite, undisturbed
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most, equal
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 BULLET_SPEED, PAPER_SPEED = 1000.0, 50.0
 BULLET_RADIUS, BULLET_MASS = 0.005, 0.004

@@ -27,16 +27,16 @@ import math
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.forces.constant import ConstantForce
+from rigidimpulse.core.quaternion import quaternion_from_axis_angle, rotate
+from rigidimpulse.dynamics.forces.constant import ConstantForce
 from rigidimpulse.gallery.hard.parts import GRAVITY, dull, energy_never_grows, farthest, finite, floor_scene, undisturbed, weight
 from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_least, at_most
-from rigidimpulse.mass import body_mass
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import quaternion_from_axis_angle, rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.mass import body_mass
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SLOPE = math.atan(0.5)
 TENTH = math.radians(0.1)

@@ -17,13 +17,13 @@ from functools import partial
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.hard.parts import GRAVITY, dull, energy_never_grows, finite, undisturbed
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 BOX, BALL = 0.3, 0.15
 VELOCITY = np.array([4.0, 0.7, 0.0])

@@ -16,12 +16,12 @@ from functools import partial
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.hard.parts import GRAVITY, apart, dull, finite, floor_scene
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SIZE = 0.5
 CLOSING = 0.5

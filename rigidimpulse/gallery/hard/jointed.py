@@ -36,14 +36,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.joint import BallJoint, HingeJoint, Motor
+from rigidimpulse.core.quaternion import quaternion_from_axis_angle, rotate
 from rigidimpulse.gallery.hard.parts import GRAVITY, energy_never_grows, finite, undisturbed
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import quaternion_from_axis_angle, rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint import BallJoint, HingeJoint, Motor
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 ARM, ARM_MASS = (1.0, 0.1, 0.1), 2.0
 REACH = 0.5 * ARM[0]

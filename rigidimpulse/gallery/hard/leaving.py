@@ -24,12 +24,12 @@ import math
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.hard.parts import GRAVITY, dull, energy_never_grows, finite, floor_scene, turned
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 LENGTH, THICK, WIDE = 2.0, 1e-3, 0.3
 START = math.radians(20.0)
@@ -139,7 +139,7 @@ def check_wheel(run: Recording) -> list[Check]:
 
     Between impacts motion is of second order in the angle of a sub-step, 0.01 rad at most: the bound is its square, 1e-4.
     """
-    from rigidimpulse.mass import body_mass
+    from rigidimpulse.scene.mass import body_mass
 
     assert run.ledger is not None and run.scene is not None
     properties = body_mass(run.scene["wheel"])

@@ -14,12 +14,12 @@ from functools import partial
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.hard.parts import GRAVITY, dull, energy_never_grows, farthest, finite, floor_scene, last_speed, undisturbed
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 DROP = 0.5
 SINK = 1e-4

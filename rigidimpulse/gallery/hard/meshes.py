@@ -17,8 +17,8 @@ from functools import partial
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.gallery.hard.parts import (
     GRAVITY,
     above_floor,
@@ -31,10 +31,10 @@ from rigidimpulse.gallery.hard.parts import (
     undisturbed,
 )
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
-from rigidimpulse.simulation import simulate
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SIDE = 0.5
 DURATION = 1.0

@@ -14,14 +14,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.conventions import TOLERANCES
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.quaternion import quaternion_from_axis_angle, rotate
 from rigidimpulse.gallery.record import Check, at_most, equal
-from rigidimpulse.material import Material
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import quaternion_from_axis_angle, rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 GRAVITY = 9.81
 DELTA = TOLERANCES.contact_gap
@@ -74,7 +74,7 @@ def energy_never_grows(run: Recording, size: float, levels: float = 1.0) -> Chec
 
 def weight(run: Recording) -> float:
     """Return the weight of all dynamic bodies, N."""
-    from rigidimpulse.mass import body_mass
+    from rigidimpulse.scene.mass import body_mass
 
     assert run.scene is not None
     strength = float(np.linalg.norm(np.asarray(run.scene.gravity, float)))
@@ -112,9 +112,9 @@ def above_floor(run: Recording, bound: float = 1e-9) -> Check:
 
 def apart(run: Recording, num_frames: int = 20) -> Check:
     """Return the check that no two bodies are inside each other, at some frames after the given one, asked of FCL."""
-    from rigidimpulse.detect.narrowphase import Narrowphase
-    from rigidimpulse.rotation import multiply
-    from rigidimpulse.world import compile_scene
+    from rigidimpulse.collision.distance.fcl import Narrowphase
+    from rigidimpulse.core.quaternion import multiply
+    from rigidimpulse.model.world import compile_scene
 
     assert run.scene is not None
     world = compile_scene(run.scene)

@@ -19,14 +19,14 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.body import Body
+from rigidimpulse.core.quaternion import conjugate, multiply, rotate
+from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.gallery.hard.parts import GRAVITY, dull, finite
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import conjugate, multiply, rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
-from rigidimpulse.simulation import simulate
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 SIZE = 0.4
 SHIFT = 1e4 * SIZE * np.array([1.0, -0.5, 0.0])

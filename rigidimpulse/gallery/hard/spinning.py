@@ -29,13 +29,13 @@ import math
 
 import numpy as np
 
-from rigidimpulse.body import Body
+from rigidimpulse.core.quaternion import rotate
 from rigidimpulse.gallery.hard.parts import GRAVITY, above_floor, dull, energy_never_grows, finite, floor_scene, turned, undisturbed
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.rotation import rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 DISK, THICKNESS = 0.0381, 0.0128
 """m: the toy sold under this name."""

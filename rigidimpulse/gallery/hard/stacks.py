@@ -23,12 +23,12 @@ from functools import partial
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.hard.parts import dull, energy_never_grows, farthest, finite, floor_scene, turned, undisturbed
 from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_least, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 STILL = "statics: forces in the cones balance every block"
 BRICK = (0.24, 0.115, 0.071)

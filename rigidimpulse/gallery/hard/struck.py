@@ -15,12 +15,12 @@ from functools import partial
 
 import numpy as np
 
-from rigidimpulse.body import Body
 from rigidimpulse.gallery.hard.parts import GRAVITY, above_floor, apart, dull, energy_never_grows, finite, floor_scene, last_speed
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
-from rigidimpulse.recording import Recording
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 BOXES = 5
 THROWN = 0.6

@@ -27,9 +27,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.files import write_renamed
-from rigidimpulse.observe.events import ROW_LENGTH
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.files import write_renamed
+from rigidimpulse.recording.events import ROW_LENGTH
 
 FORMAT = "rigidimpulse cache 1"
 SUFFIXES = (".h5", ".hdf5")

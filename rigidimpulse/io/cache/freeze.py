@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse._jit import Kernel
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.kernels import Kernel
 
 ATOMS = (str, bytes, int, float, bool, complex, type(None), type)
 CONTAINERS: dict[str, tuple[Any, ...]] = {

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from rigidimpulse.flexible.track import tracks_in
-from rigidimpulse.frames import own_frames
+from rigidimpulse.dynamics.soft_body.track import tracks_in
 from rigidimpulse.io.cache.file import Content, Header, read
-from rigidimpulse.observe.contacts import CONTACT_DTYPE
-from rigidimpulse.observe.events import impact_table
-from rigidimpulse.recording import Recording, Status
+from rigidimpulse.recording.contacts import CONTACT_DTYPE
+from rigidimpulse.recording.events import impact_table
+from rigidimpulse.recording.recording import Recording, Status
+from rigidimpulse.scene.frames import own_frames
 
 
 def load_cache(path: Path) -> Recording:

@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import angle_between, conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
 from rigidimpulse.io.gltf.container import Builder
 from rigidimpulse.io.gltf.draw import Drawing, new_file, node_pose, stage
 from rigidimpulse.io.gltf.morph import add_nets
@@ -31,10 +32,9 @@ from rigidimpulse.io.gltf.origin import Origin
 from rigidimpulse.io.keys import Keys
 from rigidimpulse.io.keys import Path as BodyPath
 from rigidimpulse.io.motion import Motion, MotionOptions
-from rigidimpulse.rotation import angle_between, conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
 
 if TYPE_CHECKING:
-    from rigidimpulse.recording import Recording
+    from rigidimpulse.recording.recording import Recording
 
 logger = logging.getLogger("rigidimpulse")
 

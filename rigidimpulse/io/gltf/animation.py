@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.core.quaternion import multiply, quaternion_continuity, to_matrix
 from rigidimpulse.io.gltf.nodes import Hierarchy, Local
 from rigidimpulse.io.keys import Keys
-from rigidimpulse.keyframes import Keyframes
-from rigidimpulse.rotation import multiply, quaternion_continuity, to_matrix
+from rigidimpulse.scene.keyframes import Keyframes
 
 BETWEEN = 1.0 / 60.0
 MOST_KEYS = 1_000_000

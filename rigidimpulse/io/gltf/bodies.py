@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.collision_filter import CollisionFilter
-from rigidimpulse.constrain.joint import FixedJoint
-from rigidimpulse.constrain.six_axis import AXES, Limit, SixAxisJoint
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import rotate, to_matrix
 from rigidimpulse.io.gltf.animation import Animations
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.schema import LARGEST, Motion
 from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, fill_mass, joined
-from rigidimpulse.rotation import rotate, to_matrix
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.collision_filter import CollisionFilter
+from rigidimpulse.scene.joint import FixedJoint
+from rigidimpulse.scene.joint_six_axis import AXES, Limit, SixAxisJoint
+from rigidimpulse.scene.shape import Shape
 
 
 class BodyMaker:

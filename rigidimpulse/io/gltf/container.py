@@ -19,7 +19,7 @@ from urllib.parse import unquote
 import numpy as np
 from pydantic import ValidationError
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.io.gltf.schema import LARGEST, Accessor, Document
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.body import Body
+from rigidimpulse.core.quaternion import from_matrix
 from rigidimpulse.io.gltf.container import Builder
-from rigidimpulse.rotation import from_matrix
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.shape import Shape
 from rigidimpulse.view.camera import stage_rotation, up_axis
 from rigidimpulse.view.display import display_mesh, display_planes
 from rigidimpulse.view.materials import PALETTE, surface

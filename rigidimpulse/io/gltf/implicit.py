@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import multiply
 from rigidimpulse.io.gltf.container import GltfFile
 from rigidimpulse.io.gltf.geometry import Meshes, stays_finite
 from rigidimpulse.io.gltf.schema import Geometry, ImplicitShape, Tapered
 from rigidimpulse.io.pieces import EQUAL, rim_points, sphere_points
-from rigidimpulse.rotation import multiply
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.shape import Shape
 
 Y_FROM_Z = np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0])
 """Quaternion wxyz that takes z to Y."""

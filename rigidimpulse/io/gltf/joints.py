@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.six_axis import AXES, Drive, Limit, SixAxisJoint
+from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.io.gltf import schema
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.jointed import touch_at_joint
-from rigidimpulse.rotation import to_matrix
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint_six_axis import AXES, Drive, Limit, SixAxisJoint
 
 
 def read_joints(

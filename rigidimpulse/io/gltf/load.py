@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.collision_filter import CollisionFilter
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.engine.triggers import Trigger
 from rigidimpulse.io.gltf import schema
 from rigidimpulse.io.gltf.animation import Animations
 from rigidimpulse.io.gltf.bodies import BodyMaker, Piece
@@ -30,10 +30,10 @@ from rigidimpulse.io.gltf.origin import Origin
 from rigidimpulse.io.gltf.own_materials import NOTE, STATIC, own_figures
 from rigidimpulse.io.gltf.plain import plain_pieces
 from rigidimpulse.io.scene_file import GLTF_GRAVITY
-from rigidimpulse.material import Material
-from rigidimpulse.observe.trigger import Trigger
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.collision_filter import CollisionFilter
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 KNOWN = {schema.RIGID_BODIES, schema.IMPLICIT_SHAPES, "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"}
 """Extensions that are read, or that have no say in how bodies move; materials and textures are among those, too."""

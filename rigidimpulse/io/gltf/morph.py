@@ -14,10 +14,10 @@ import numpy as np
 
 from rigidimpulse.io.gltf.draw import INDICES, VERTICES, Drawing, stage
 from rigidimpulse.view.materials import net_surface
-from rigidimpulse.view.nets import is_closed
+from rigidimpulse.view.soft_bodies import is_closed
 
 if TYPE_CHECKING:
-    from rigidimpulse.flexible.track import FlexibleTrack
+    from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
     from rigidimpulse.io.gltf.container import Builder
 
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.core.quaternion import from_matrix, multiply, to_matrix
 from rigidimpulse.io.gltf.container import GltfFile
 from rigidimpulse.io.gltf.schema import LARGEST, Node
-from rigidimpulse.rotation import from_matrix, multiply, to_matrix
 
 SNAP = 1e-12
 """Entries of K nearer to 0 and 1 than this, relative to the largest, are 0 and 1: round-off of rotations."""

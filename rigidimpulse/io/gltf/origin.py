@@ -9,7 +9,7 @@ from typing import Any
 
 from rigidimpulse.io.gltf.animation import Animations
 from rigidimpulse.io.gltf.container import Builder
-from rigidimpulse.io.origin import FileOrigin
+from rigidimpulse.scene.origin import FileOrigin
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rigidimpulse.material import DEFAULT_FRICTION, DEFAULT_RESTITUTION, Material
+from rigidimpulse.scene.material import DEFAULT_FRICTION, DEFAULT_RESTITUTION, Material
 
 NOTE = "rigidimpulse"
 """Key in `extras` of what only we read."""

@@ -15,15 +15,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.io.gltf.animation import Animations
 from rigidimpulse.io.gltf.bodies import Piece, release_of
 from rigidimpulse.io.gltf.geometry import Meshes, stays_finite
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.schema import LARGEST, Motion
 from rigidimpulse.io.pieces import STATIC_WORDS
-from rigidimpulse.material import Material
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.shape import Shape
 
 MOTIONS = ("dynamic", "kinematic", "static", "none")
 SHAPES = ("mesh", "convex_hull", "box", "sphere")

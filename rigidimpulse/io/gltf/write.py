@@ -15,20 +15,20 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.collision_filter import CollisionFilter
-from rigidimpulse.constrain.joint import Joint
+from rigidimpulse.core.quaternion import conjugate, from_matrix, multiply, rotate, rotate_inverse
+from rigidimpulse.engine.triggers import Trigger
 from rigidimpulse.io.gltf.container import Builder
 from rigidimpulse.io.gltf.draw import Drawing, new_file, node_pose, stage
 from rigidimpulse.io.gltf.implicit import Y_FROM_Z
 from rigidimpulse.io.gltf.own_materials import NOTE, STATIC, material_entry
 from rigidimpulse.io.gltf.schema import IMPLICIT_SHAPES, RIGID_BODIES
 from rigidimpulse.io.gltf.write_joints import joint_entry
-from rigidimpulse.mass import body_mass
-from rigidimpulse.observe.trigger import Trigger
-from rigidimpulse.rotation import conjugate, from_matrix, multiply, rotate, rotate_inverse
-from rigidimpulse.scene import Scene, validate
-from rigidimpulse.shape import Part, Shape
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.collision_filter import CollisionFilter
+from rigidimpulse.scene.joint import Joint
+from rigidimpulse.scene.mass import body_mass
+from rigidimpulse.scene.scene import Scene, validate
+from rigidimpulse.scene.shape import Part, Shape
 
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -192,7 +192,7 @@ class _Writer:
             self._leave_out(f"{type(effect).__name__} cannot be said in glTF: not written")
 
     def _add_joint(self, joint: Joint) -> None:
-        from rigidimpulse.world import compile_scene
+        from rigidimpulse.model.world import compile_scene
 
         if not hasattr(self, "_world"):
             self._world = compile_scene(self.scene)

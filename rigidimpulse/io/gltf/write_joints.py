@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.constrain.joint import BallJoint, DistanceJoint, FixedJoint, HingeJoint, Joint, Motor, SliderJoint
-from rigidimpulse.constrain.six_axis import AXES, SixAxisJoint
+from rigidimpulse.scene.joint import BallJoint, DistanceJoint, FixedJoint, HingeJoint, Joint, Motor, SliderJoint
+from rigidimpulse.scene.joint_six_axis import AXES, SixAxisJoint
 
 ALL = [0, 1, 2]
 

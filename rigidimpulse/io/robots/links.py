@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.collision_filter import CollisionFilter
-from rigidimpulse.constrain.six_axis import Drive, Limit, SixAxisJoint
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.io.pieces import GHOST, Piece, Weight, fill_mass, joined
-from rigidimpulse.mass import body_mass
-from rigidimpulse.rotation import multiply, rotate
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.collision_filter import CollisionFilter
+from rigidimpulse.scene.joint_six_axis import Drive, Limit, SixAxisJoint
+from rigidimpulse.scene.mass import body_mass
 
 CREEP = 1e-4
 """rad/s or m/s, speed below which dry friction of joints gives way in proportion."""

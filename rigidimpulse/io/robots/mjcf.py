@@ -19,17 +19,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.constrain.joint import BallJoint
-from rigidimpulse.constrain.six_axis import AXES, Drive, Limit, SixAxisJoint
-from rigidimpulse.errors import SceneError
-from rigidimpulse.io.origin import FileOrigin
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.io.pieces import Piece, Weight, sphere_points
 from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, filters, fixed
 from rigidimpulse.io.robots.xml import read_xml
-from rigidimpulse.material import Material
-from rigidimpulse.rotation import to_matrix
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.joint import BallJoint
+from rigidimpulse.scene.joint_six_axis import AXES, Drive, Limit, SixAxisJoint
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.origin import FileOrigin
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 FREE, BALL, SLIDE, HINGE = range(4)
 PLANE, FIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)

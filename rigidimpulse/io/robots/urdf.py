@@ -16,19 +16,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.constrain.six_axis import Limit, SixAxisJoint
-from rigidimpulse.conventions import STANDARD_GRAVITY
-from rigidimpulse.detect.narrowphase import Narrowphase
-from rigidimpulse.errors import SceneError
-from rigidimpulse.geometry import compile_shape
-from rigidimpulse.io.origin import FileOrigin
+from rigidimpulse.collision.distance.fcl import Narrowphase
+from rigidimpulse.collision.geometry import compile_shape
+from rigidimpulse.core.conventions import STANDARD_GRAVITY
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import multiply, quaternion_from_rotation_vector, rotate, to_matrix
 from rigidimpulse.io.pieces import Piece, Weight, joined
 from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, filters, fixed
 from rigidimpulse.io.robots.xml import file_inside, read_xml
-from rigidimpulse.material import Material
-from rigidimpulse.rotation import multiply, quaternion_from_rotation_vector, rotate, to_matrix
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.joint_six_axis import Limit, SixAxisJoint
+from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.origin import FileOrigin
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
 
 LARGEST = 1e9
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")

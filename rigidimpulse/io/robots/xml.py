@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
 
 
 def read_xml(path: Path) -> Any:

@@ -16,18 +16,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import from_matrix
 from rigidimpulse.io.motion import Motion, MotionOptions
 from rigidimpulse.io.usd.draw import Drawing, draw_net
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place, quaternions, sample, valid_name, vectors
 from rigidimpulse.io.usd.library import Gf, Sdf, UsdUtils
 from rigidimpulse.io.usd.origin import UsdOrigin
-from rigidimpulse.rotation import from_matrix
 from rigidimpulse.view.camera import stage_rotation, up_axis
 from rigidimpulse.view.materials import color
 
 if TYPE_CHECKING:
-    from rigidimpulse.recording import Recording
+    from rigidimpulse.recording.recording import Recording
 
 NEAR = 1e-9
 """Share of a frame within which a key is at that frame: times are sums of rounded numbers."""

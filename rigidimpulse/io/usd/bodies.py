@@ -15,17 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import from_matrix, multiply
+from rigidimpulse.engine.triggers import Trigger
 from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, fill_mass, joined, weighed
 from rigidimpulse.io.usd.frames import Frames, snapped
 from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
 from rigidimpulse.io.usd.materials import Filters, Units, given_mass, positive, read_material
 from rigidimpulse.io.usd.shapes import Shapes
-from rigidimpulse.keyframes import Keyframes
-from rigidimpulse.material import Material
-from rigidimpulse.observe.trigger import Trigger
-from rigidimpulse.rotation import from_matrix, multiply
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.keyframes import Keyframes
+from rigidimpulse.scene.material import Material
 
 BETWEEN = 1.0 / 60.0
 """s, longest time from key to key of keyframed bodies."""

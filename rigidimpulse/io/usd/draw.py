@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.body import Body
+from rigidimpulse.core.quaternion import from_matrix
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, extent, mesh, order, paint, place
 from rigidimpulse.io.usd.library import Gf, Layer, PrimSpec, Sdf, SdfPath, Vt
-from rigidimpulse.rotation import from_matrix
-from rigidimpulse.shape import Part, Shape
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.shape import Part, Shape
 from rigidimpulse.view.display import display_mesh
 from rigidimpulse.view.materials import PALETTE, surface
 

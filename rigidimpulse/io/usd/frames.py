@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import from_matrix, quaternion_continuity
 from rigidimpulse.io.usd.library import Prim, Stage, Usd, UsdGeom
-from rigidimpulse.rotation import from_matrix, quaternion_continuity
 
 EVEN = 1e-6
 """Unevenness of a scale, relative, that is none."""

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.six_axis import AXES, Drive, Limit, SixAxisJoint
+from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.io.jointed import touch_at_joint
 from rigidimpulse.io.usd.bodies import BodyReader
 from rigidimpulse.io.usd.library import Prim, SdfPath, UsdPhysics
-from rigidimpulse.rotation import to_matrix
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint_six_axis import AXES, Drive, Limit, SixAxisJoint
 
 UNBOUNDED = 1e30
 """Bounds beyond this are none: some writers say so for infinity."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
 
 try:
     from pxr import Gf as _Gf

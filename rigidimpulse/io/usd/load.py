@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.io.usd.bodies import TRIGGER, BodyReader
 from rigidimpulse.io.usd.frames import Frames
 from rigidimpulse.io.usd.joints import JointReader
 from rigidimpulse.io.usd.library import SdfPath, Stage, Tf, Usd, UsdGeom, UsdPhysics
 from rigidimpulse.io.usd.origin import UsdOrigin
 from rigidimpulse.io.usd.plain import plain_bodies
-from rigidimpulse.scene import Scene
+from rigidimpulse.scene.scene import Scene
 
 EARTH = 9.81
 """m/s^2, where the file does not say."""

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.collision_filter import CollisionFilter
+from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.io.usd.library import Prim, SdfPath, Stage, UsdPhysics
-from rigidimpulse.material import Material
-from rigidimpulse.rotation import to_matrix
+from rigidimpulse.scene.collision_filter import CollisionFilter
+from rigidimpulse.scene.material import Material
 
 COMBINE = {"average": "average", "min": "minimum", "max": "maximum", "multiply": "multiply"}
 """Combine modes of PhysxMaterialAPI."""

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
 from rigidimpulse.io.keys import Keys
 from rigidimpulse.io.motion import Motion
-from rigidimpulse.io.origin import FileOrigin
 from rigidimpulse.io.usd.frames import Frames, is_even
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place
 from rigidimpulse.io.usd.library import Gf, Layer, Prim, PrimSpec, Sdf, SdfPath, Stage, UsdGeom
-from rigidimpulse.rotation import conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
+from rigidimpulse.scene.origin import FileOrigin
 
 DISPLACED = 1e-6
 """Relative to places, and of matrices of rotation, by which a body is off its prim that someone has moved."""

@@ -13,12 +13,12 @@ import re
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.io.pieces import STATIC_WORDS
 from rigidimpulse.io.usd.frames import Frames
 from rigidimpulse.io.usd.library import Prim, Sdf, SdfPath, UsdGeom
 from rigidimpulse.io.usd.shapes import Shapes
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.shape import Shape
 
 KINDS = {"Mesh", "Sphere", "Cube", "Capsule", "Capsule_1", "Cylinder", "Cylinder_1", "Cone", "Plane"}
 SEEN = {"default", "render"}

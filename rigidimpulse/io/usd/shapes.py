@@ -16,10 +16,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.io.pieces import EQUAL, rim_points, sphere_points
 from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
-from rigidimpulse.shape import Shape
+from rigidimpulse.scene.shape import Shape
 
 HALF = np.sqrt(0.5)
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError, unknown_name
+from rigidimpulse.core.errors import SceneError, unknown_name
 
 if TYPE_CHECKING:
-    from rigidimpulse.recording import Recording
-    from rigidimpulse.scene import Scene
+    from rigidimpulse.recording.recording import Recording
+    from rigidimpulse.scene.scene import Scene
     from rigidimpulse.studies.peers.common import Peer
 
 PEERS = ("mujoco", "pybullet")
@@ -58,7 +58,7 @@ def run_peer(name: str, scene: Scene, duration: float, fps: float, steps_a_frame
     """
     from time import process_time
 
-    from rigidimpulse.recording import Recording
+    from rigidimpulse.recording.recording import Recording
 
     times = np.arange(round(duration * fps) + 1) / fps
     peer = load_peer(name, scene, 1.0 / (fps * steps_a_frame))

@@ -6,14 +6,14 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from rigidimpulse.body import Body
-from rigidimpulse.constrain.joint import BallJoint, HingeJoint
-from rigidimpulse.errors import SceneError
-from rigidimpulse.forces.constant import ConstantForce
-from rigidimpulse.mass import BodyMass, body_mass
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Part
-from rigidimpulse.world import compile_scene
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.dynamics.forces.constant import ConstantForce
+from rigidimpulse.model.world import compile_scene
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint import BallJoint, HingeJoint
+from rigidimpulse.scene.mass import BodyMass, body_mass
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Part
 
 
 class PeerBody(NamedTuple):

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.rotation import conjugate, cross, from_matrix, rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Part
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import conjugate, cross, from_matrix, rotate
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Part
 from rigidimpulse.studies.peers.common import PeerBody, PeerJoint, read_scene
 
 mujoco: Any = import_module("mujoco")

@@ -11,10 +11,10 @@ from math import sqrt
 import numpy as np
 import pybullet
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.rotation import conjugate, from_matrix, multiply, rotate
-from rigidimpulse.scene import Scene
-from rigidimpulse.shape import Part
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import conjugate, from_matrix, multiply, rotate
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Part
 from rigidimpulse.studies.peers.common import PeerBody, PeerJoint, read_scene
 
 ITERATIONS = 200

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.files import write_renamed
-from rigidimpulse.scene import Scene
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.files import write_renamed
+from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.wedges.vary import is_of_run, run_settings, with_parameter
 
 DONE, REPORTED, FAILED = "ok", "reported", "failed"
@@ -71,7 +71,7 @@ def make_scene(scene: str | Scene | Callable[..., Scene], parameters: dict[str, 
         SceneError: no such scene, or nothing of it has a parameter's name.
 
     """
-    from rigidimpulse.jobs import find_job
+    from rigidimpulse.cli.jobs import find_job
 
     made = scene
     left = {name: value for name, value in parameters.items() if not is_of_run(name)}
@@ -93,8 +93,8 @@ def run_take(job: TakeJob) -> Take:
 
 
 def _run(job: TakeJob) -> Take:
-    from rigidimpulse.fingerprint import fingerprint
-    from rigidimpulse.simulation import simulate
+    from rigidimpulse.engine.fingerprint import fingerprint
+    from rigidimpulse.engine.simulate import simulate
 
     start = perf_counter()
     settings = run_settings(job.settings, job.parameters)

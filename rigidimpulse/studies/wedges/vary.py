@@ -22,10 +22,10 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.accuracy import Accuracy, resolve_accuracy
-from rigidimpulse.body import Body
-from rigidimpulse.errors import SceneError
-from rigidimpulse.scene import Scene
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.scene.accuracy import Accuracy, resolve_accuracy
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.scene import Scene
 
 RUN = ("duration", "fps", "accuracy")
 AXES = "xyz"
@@ -212,6 +212,6 @@ def with_seed(scene: Scene, seed: int) -> Scene:
 
 def _size(body: Body) -> float:
     """Largest side of a body's shape, m."""
-    from rigidimpulse.observe.trigger import extent
+    from rigidimpulse.engine.triggers import extent
 
     return extent(body.shape)

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rigidimpulse.errors import SceneError
-from rigidimpulse.files import write_renamed
-from rigidimpulse.recording import Recording, load_recording
-from rigidimpulse.scene import Scene
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.files import write_renamed
+from rigidimpulse.recording.recording import Recording, load_recording
+from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.wedges.take import FAILED, Take, TakeJob, make_scene
 from rigidimpulse.studies.wedges.vary import UnknownParameter, combinations
 from rigidimpulse.studies.wedges.workers import run_dask, run_here, run_pool
@@ -103,7 +103,7 @@ def wedge(
         SceneError: no such scene, nothing to vary, or the folder has another wedge in it.
 
     """
-    from rigidimpulse.jobs import DEFAULT_DURATION, DEFAULT_FPS, find_job
+    from rigidimpulse.cli.jobs import DEFAULT_DURATION, DEFAULT_FPS, find_job
 
     named = os.fspath(scene) if isinstance(scene, str | os.PathLike) else None
     job = find_job(named) if named is not None else None

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from rigidimpulse.errors import SceneError
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.studies.wedges.take import FAILED, Take, TakeJob, run_take
 
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}

@@ -1,0 +1,202 @@
+"""The command line. Only click is imported here; commands import what they use, so that `--help` answers at once."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import rigidimpulse
+from rigidimpulse.cli.jobs import (
+    BAD_SCENE,
+    CHECK_FAILED,
+    RECORDING_SUFFIXES,
+    find_job,
+    given_options,
+    job_of,
+    print_table,
+    recording_with_shapes,
+    run_job,
+    show,
+    size_of,
+)
+from rigidimpulse.cli.site import gallery as gallery_pages
+from rigidimpulse.cli.studies import compare, hardcases, study
+from rigidimpulse.cli.wedge import wedge
+from rigidimpulse.core.files import ANIMATED_SUFFIXES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rigidimpulse.gallery.record import Check
+    from rigidimpulse.recording.recording import Recording
+
+
+class Failure(click.ClickException):
+    """A message for the user, without a traceback."""
+
+    exit_code = BAD_SCENE
+
+
+class Commands(click.Group):
+    """Commands whose `SceneError` ends the program with its message."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except ValueError as error:
+            from rigidimpulse.core.errors import SceneError
+
+            if isinstance(error, SceneError):
+                raise Failure(str(error)) from None
+            raise
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(rigidimpulse.__version__, prog_name="rigidimpulse")
+def main() -> None:
+    """Rigid bodies that collide exactly: mesh scenes in, accurate motion for animation out.
+
+    SCENE is the name of a gallery scene (`rigidimpulse demo` lists them), a .glb, .gltf, .usd, .urdf or .xml (MJCF) file, or a
+    file.py that defines scene().
+    """
+
+
+def run_options(command: Callable) -> Callable:
+    """Add the options of commands that simulate."""
+    for option in (
+        click.option("--view", is_flag=True, help="Open the result in the browser."),
+        click.option("--cache", type=click.Path(), help="Keep the run in this .h5 file while it goes on; go on from there if it is there."),
+        click.option("--profile", is_flag=True, help="Print where the time went, by stage and by kernel."),
+        click.option("--fps", type=float, help="Frames per second; changes what is recorded, never what happens."),
+        click.option("--duration", type=float, help="Time to simulate, s."),
+        click.option("--per-frame", type=float, help="Instead of --accuracy: the finest setting that takes so long for a frame, s."),
+        click.option("--within", type=float, help="Instead of --accuracy: the cheapest setting whose places are right to so much, m."),
+        click.option("--accuracy", help="preview, standard or exact."),
+    ):
+        command = option(command)
+    return command
+
+
+def export_options(command: Callable) -> Callable:
+    """Add the options of commands that write recordings."""
+    for option in (
+        click.option("--pre-roll", type=click.IntRange(min=0), default=0, help="Frames at the beginning that are not written."),
+        click.option("--up-axis", type=click.Choice(["y", "z"]), help="Of USD files; by default that of the scene."),
+        click.option("--unit", type=float, default=1.0, help="Of USD files: metres in a unit, 0.01 for centimetres."),
+        click.option("--samples", type=int, default=1, help="Keys a frame in glTF and USD files, for motion blur."),
+        click.option("--impact-keys", is_flag=True, help="Have keys at impacts between frames in glTF and USD files, too."),
+        click.option("--tolerance", type=float, help="Leave out keys in glTF and USD files that no point misses by more, m."),
+        click.option("--start-frame", type=float, default=0.0, help="Number of the first frame in glTF and USD files: 1001."),
+    ):
+        command = option(command)
+    return command
+
+
+@main.command()
+@click.argument("name", required=False)
+@click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html, .npz, .csv, .glb, .gltf or .usd.")
+@export_options
+@run_options
+def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, cache: str | None, **settings: Any) -> None:
+    """Run a gallery scene and its checks; without NAME, list the scenes."""
+    from rigidimpulse import gallery
+
+    if name is None:
+        width = max(map(len, gallery.names() + gallery.hard_names()))
+        for title, known in (("Gallery", gallery.names()), ("Hard cases", gallery.hard_names())):
+            click.echo(f"{title}:")
+            for entry_name in known:
+                click.echo(f"  {entry_name.ljust(width)}  {gallery.load(entry_name).description}")
+        return
+    entry, keys = gallery.load(name), _export_settings(settings)
+    job = job_of(entry)._replace(**given_options(settings))
+    click.echo(f"{entry.name}: {entry.description}")
+    run = run_job(job, output, profile, cache)
+    passed = True
+    if job.duration == entry.duration:
+        passed = _print_checks(entry.check(run))
+    else:
+        click.echo(f"checks left out: they are for the scene's own duration, {entry.duration:g} s")
+    _hand_over(run, output, view, keys)
+    if not passed:
+        sys.exit(CHECK_FAILED)
+
+
+@main.command()
+@click.argument("scene")
+@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name in .html, .npz, .csv, .glb, .gltf or .usd.")
+@export_options
+@run_options
+def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, cache: str | None, **settings: Any) -> None:
+    """Simulate SCENE and write the recording."""
+    keys = _export_settings(settings)
+    job = find_job(scene)._replace(**given_options(settings))
+    _hand_over(run_job(job, output, profile, cache), output, view, keys)
+
+
+@main.command()
+@click.argument("file", type=click.Path())
+@click.option("--scene", help="SCENE that an .npz recording or a cache was made of: it has the motion, the scene has the shapes.")
+def view(file: str, scene: str | None) -> None:
+    """Open FILE, an .html or .npz recording or the .h5 cache of a run, in the browser."""
+    from rigidimpulse.core.errors import SceneError
+
+    path = Path(file)
+    if not path.is_file():
+        raise SceneError(f"there is no file {file!r}", "check the path")
+    if path.suffix == ".html":
+        click.launch(path.resolve().as_uri())
+    elif path.suffix in RECORDING_SUFFIXES:
+        show(recording_with_shapes(path, scene))
+    else:
+        raise SceneError(f"cannot view {path.name!r}", f"give a recording, a file that ends in .html or {' or '.join(RECORDING_SUFFIXES)}")
+
+
+@main.command()
+@click.argument("scene")
+@click.option("--duration", type=float, help="Also simulate for this time [s], to see each effect's share of the work.")
+@click.option("--accuracy", help="preview, standard or exact.")
+def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
+    """Say which effects SCENE calls for, which not, and why."""
+    from rigidimpulse.engine.simulate import make_plan
+    from rigidimpulse.model.world import compile_scene
+
+    job = find_job(scene)._replace(**given_options({"accuracy": accuracy, "duration": duration}))
+    if duration is None:
+        plan = make_plan(compile_scene(job.make(), accuracy or (job.entry.accuracy if job.entry is not None else "standard")))
+    else:
+        plan = run_job(job, ()).plan
+        assert plan is not None
+    click.echo(plan.explain())
+
+
+def _export_settings(settings: dict[str, Any]) -> dict[str, Any]:
+    """Take out and return the options of `export_options`."""
+    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys", "samples", "up_axis", "unit", "pre_roll")}
+
+
+def _print_checks(checks: Sequence[Check]) -> bool:
+    """Print a table of checks; return whether all hold."""
+    from rigidimpulse.gallery.record import figure
+
+    rows = [("ok" if check.passed else "FAILED", check.what, figure(check.value), figure(check.bound), check.law) for check in checks]
+    print_table([("", "check", "value", "bound", "law"), *rows], right=(2, 3))
+    return all(check.passed for check in checks)
+
+
+def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str, Any]) -> None:
+    """Write the recording where it was asked for, and open it; keys: options of animated nodes, and the pre-roll."""
+    run = run.part(keys.pop("pre_roll"))
+    for target in output:
+        path = run.export(target, **(keys if Path(target).suffix in ANIMATED_SUFFIXES else {}))
+        click.echo(f"wrote {path} ({size_of(path)})")
+    if view:
+        show(run)
+
+
+for command in (hardcases, study, compare, wedge, gallery_pages):
+    main.add_command(command)

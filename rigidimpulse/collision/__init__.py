@@ -1,0 +1,1 @@
+"""Geometric questions about posed shapes: pairs, distance, contacts, time of impact."""

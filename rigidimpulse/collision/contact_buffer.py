@@ -1,0 +1,53 @@
+"""Room for what `contacts_of_pairs` finds, which grows when it is too little."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.engine.touching import contacts_of_pairs
+
+CONTACT_CAPACITY, PAIR_CAPACITY = 1024, 4096
+
+
+class ContactBuffer:
+    """Contacts as they are found.
+
+    Attributes:
+        real: (c, 10) and integer: (c, 5), a row for each contact, see `detect.manifold`. scratch: (p, 2) pairs of primitives on the way.
+
+    """
+
+    def __init__(self) -> None:
+        """Room for a small scene."""
+        self.real, self.integer = np.empty((CONTACT_CAPACITY, 10)), np.empty((CONTACT_CAPACITY, 5), np.int64)
+        self.scratch = np.empty((PAIR_CAPACITY, 2), np.int64)
+
+    def find(self, *question) -> int:
+        """Find the contacts of pairs, see `arguments`; returns their number."""
+        count = contacts_of_pairs(*self.arguments(*question))
+        while count < 0:
+            self.grow(-count)
+            count = contacts_of_pairs(*self.arguments(*question))
+        return count
+
+    def grow(self, needed: int) -> None:
+        """Make room for at least so many contacts, and for twice as many as before."""
+        capacity = max(needed, 2 * len(self.real))
+        self.real, self.integer = np.empty((capacity, 10)), np.empty((capacity, 5), np.int64)
+        self.scratch = np.empty((4 * capacity, 2), np.int64)
+
+    def arguments(self, geometry, world, bodies, rotation, a: np.ndarray, b: np.ndarray, margin: np.ndarray) -> tuple:
+        """Of `contacts_of_pairs`: contacts of bodies a with bodies b (k,) at their poses, within margins (k,) m."""
+        places = bodies, rotation, a, b, margin
+        return geometry, world.shape_of_body, *places, self.scratch, self.real, self.integer, world.cylinders
+
+
+def find_together(buffers: list[ContactBuffer], questions: list[tuple]) -> list[int]:
+    """Numbers of contacts found for each question, see `ContactBuffer.arguments`, in the buffer of the same place; on several cores."""
+    asked = list(zip(buffers, questions, strict=True))
+    counts = contacts_of_pairs.together([buffer.arguments(*question) for buffer, question in asked])
+    for k, (buffer, question) in enumerate(asked):
+        if counts[k] < 0:
+            buffer.grow(-counts[k])
+            counts[k] = buffer.find(*question)
+    return counts

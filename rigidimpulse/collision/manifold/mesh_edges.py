@@ -1,0 +1,182 @@
+"""Contacts of the edges of two ROUND primitives: crossing edges, and nearly parallel ones (see `triangles`)."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from rigidimpulse.collision.bvh import STACK_ROWS
+from rigidimpulse.collision.distance.simplices import (
+    CORNER,
+    EDGE_EDGE,
+    along,
+    arc_miss,
+    cross,
+    dot,
+    edge_normals,
+    inner,
+    moved,
+    row,
+    subtract,
+    turned,
+)
+from rigidimpulse.collision.geometry import EDGE_HIDDEN
+from rigidimpulse.collision.manifold.contact_points import INSIDE, MERGE, PENETRATION, ROUND_OFF, STRICT, TILT, append_contact, outside_box
+
+CROSSING = 1e-7
+"""Least sine of the angle of two edges that are taken to cross at one point."""
+NEARLY_PARALLEL = 0.02
+"""Greatest sine of the angle of two edges that may touch along a length."""
+SIDEWAYS = 0.5
+"""Greatest offset across the normal, relative to the distance, of the ends of such a length."""
+
+
+@inner
+def _arcs_miss(edge_normal, edge_kind, R_back, R, edge_a, edge_b, d, e, normal):
+    """Return (miss, end) of the edge whose arc a normal from a to b misses by more (see `arc_miss`).
+
+    d, e: vectors of the edges; they, the normal and the end, which points from a to b too, are in the frame of a.
+    """
+    length = sqrt(dot(d, d))
+    direction = (d[0] / length, d[1] / length, d[2] / length)
+    normal_0, normal_1 = edge_normals(edge_normal, edge_a)
+    miss_a, end_a = arc_miss(normal, direction, normal_0, normal_1, edge_kind[edge_a])
+    length = sqrt(dot(e, e))
+    direction = turned(R_back, (e[0] / length, e[1] / length, e[2] / length))
+    outward = turned(R_back, (-normal[0], -normal[1], -normal[2]))
+    normal_0, normal_1 = edge_normals(edge_normal, edge_b)
+    miss_b, end_b = arc_miss(outward, direction, normal_0, normal_1, edge_kind[edge_b])
+    end_b = turned(R, end_b)
+    return (miss_a, end_a) if miss_a > miss_b else (miss_b, (-end_b[0], -end_b[1], -end_b[2]))
+
+
+@inner
+def _crossing(p, d, q, e, core):
+    """Return (near, point_a, point_b, c, distance) for the common normal c of two edges p + s d, q + t e.
+
+    `near`: both closest points lie on the edges and are at most `core` apart; c points from a to b.
+    """
+    c = cross(d, e)
+    c_squared = dot(c, c)
+    between = subtract(q, p)
+    s = dot(cross(between, e), c) / c_squared
+    t = dot(cross(between, d), c) / c_squared
+    point_a = along(p, s, d)
+    point_b = along(q, t, e)
+    distance = dot(subtract(point_b, point_a), c) / sqrt(c_squared)
+    if distance < 0.0:
+        distance = -distance
+        c = (-c[0], -c[1], -c[2])
+    inside = -INSIDE <= s <= 1.0 + INSIDE and -INSIDE <= t <= 1.0 + INSIDE
+    return inside and distance <= core, point_a, point_b, c, distance
+
+
+@inner
+def _crossing_contact(edge_normal, edge_kind, view, rows, count, edge_a, edge_b, p, d, q, e):
+    """Append the contact of two edges p + s d and q + t e if they cross (frame of the first body)."""
+    near, point_a, point_b, c, distance = _crossing(p, d, q, e, view.core)
+    if not near:
+        return count
+    c_length = sqrt(dot(c, c))
+    spread = sqrt(dot(d, d) * dot(e, e)) / c_length  # 1 / sine: how much the normal leans where an edge leans
+    size = sqrt(min(dot(d, d), dot(e, e)))
+    tolerance = STRICT + ROUND_OFF * spread + min(TILT, view.margin * spread / size)
+    sense = 1.0
+    # At a distance within round-off its sign tells nothing, and both senses of the normal are tried.
+    for _ in range(2 if distance <= PENETRATION * size else 1):
+        scale = sense / c_length
+        normal = (c[0] * scale, c[1] * scale, c[2] * scale)
+        miss, end = _arcs_miss(edge_normal, edge_kind, view.R_back, view.R, edge_a, edge_b, d, e, normal)
+        if miss <= tolerance + view.leeway:
+            if 0.0 < miss <= tolerance:
+                normal = end
+            surface_a = along(point_a, view.radius_t, normal)
+            surface_b = along(point_b, -view.radius_v, normal)
+            gap = dot(subtract(surface_b, surface_a), normal)
+            return append_contact(
+                rows, count, surface_a, surface_b, normal, gap, EDGE_EDGE, edge_a, edge_b, MERGE * size
+            )
+        sense = -sense
+    return count
+
+
+@inner
+def _overlap(p, d, q, e):
+    """Return (low, high, start, speed) of the overlap of two nearly parallel edges along d, in units of length.
+
+    The point of p + s d at `place` has the point q + e (place - start) / speed beside it.
+    """
+    length = sqrt(dot(d, d))
+    speed = dot(e, d) / length
+    start = dot(subtract(q, p), d) / length
+    return max(0.0, min(start, start + speed)), min(length, max(start, start + speed)), start, speed
+
+
+@inner
+def _parallel_contacts(edge, edge_normal, edge_kind, view, rows, count, edge_a, edge_b, p, d, q, e):
+    """Append both ends of the overlap of two nearly parallel edges of meshes (frame of the first body)."""
+    length = sqrt(dot(d, d))
+    u = (d[0] / length, d[1] / length, d[2] / length)
+    low, high, start, speed = _overlap(p, d, q, e)
+    middle = 0.5 * (low + high)
+    between = subtract(along(q, (middle - start) / speed, e), along(p, middle, u))
+    distance = sqrt(dot(between, between))
+    if high - low <= MERGE * length or distance > view.core or distance <= ROUND_OFF * length:
+        return count
+    normal = (between[0] / distance, between[1] / distance, between[2] / distance)
+    tolerance = STRICT + view.leeway + ROUND_OFF * (length + abs(p[0]) + abs(p[1]) + abs(p[2])) / distance
+    if _arcs_miss(edge_normal, edge_kind, view.R_back, view.R, edge_a, edge_b, d, e, normal)[0] > tolerance:
+        return count
+    for end in range(2):
+        place = high if end == 1 else low
+        point_a = along(p, place, u)
+        point_b = along(q, (place - start) / speed, e)
+        between = subtract(point_b, point_a)
+        gap = dot(between, normal)
+        sideways = along(between, -gap, normal)
+        if not 0.0 < gap <= view.core or dot(sideways, sideways) > (SIDEWAYS * gap) ** 2:
+            continue
+        # The end is a vertex of one edge, beside the other edge.
+        of_a = place == 0.0 or place == length
+        feature_a = 2 * edge[edge_a, end] if of_a else 2 * edge_a + 1
+        feature_b = 2 * edge_b + 1 if of_a else 2 * edge[edge_b, end if speed > 0.0 else 1 - end]
+        count = append_contact(rows, count, point_a, point_b, normal, gap, CORNER, feature_a, feature_b, MERGE * length)
+    return count
+
+
+@inner
+def edge_contacts(geometry, view, pairs, end, rows, count):
+    """Append the contacts of the edges in both nodes of each pair; `view` is that of the second body's vertices."""
+    vertex, edge, kind = geometry.vertex, geometry.edge, geometry.edge_kind
+    owns, triangle_edge, normal = geometry.triangle_owns, geometry.triangle_edge, geometry.edge_normal
+    meshes = view.radius_v == 0.0 and view.radius_t == 0.0
+    for pair in range(STACK_ROWS, end):
+        a, b = pairs[pair, 0], pairs[pair, 1]
+        low, high = row(geometry.node_min, a), row(geometry.node_max, a)
+        start_a, count_a = geometry.node_start[a], geometry.node_count[a]
+        start_b, count_b = geometry.node_start[b], geometry.node_count[b]
+        for j in range(3 * start_b, 3 * (start_b + count_b)):
+            edge_b = triangle_edge[j // 3, j % 3]
+            if not owns[j // 3] >> (3 + j % 3) & 1 or kind[edge_b] == EDGE_HIDDEN:
+                continue
+            q = moved(view.R, view.t, row(vertex, edge[edge_b, 0]))
+            q_end = moved(view.R, view.t, row(vertex, edge[edge_b, 1]))
+            if outside_box(q, q_end, low, high, view.core):
+                continue
+            e = subtract(q_end, q)
+            for i in range(3 * start_a, 3 * (start_a + count_a)):
+                edge_a = triangle_edge[i // 3, i % 3]
+                if not owns[i // 3] >> (3 + i % 3) & 1 or kind[edge_a] == EDGE_HIDDEN:
+                    continue
+                p, p_end = row(vertex, edge[edge_a, 0]), row(vertex, edge[edge_a, 1])
+                least = (min(p[0], p_end[0]), min(p[1], p_end[1]), min(p[2], p_end[2]))
+                most = (max(p[0], p_end[0]), max(p[1], p_end[1]), max(p[2], p_end[2]))
+                if outside_box(q, q_end, least, most, view.core):
+                    continue
+                d = subtract(p_end, p)
+                c = cross(d, e)
+                sine_squared = dot(c, c) / (dot(d, d) * dot(e, e))
+                if sine_squared > CROSSING * CROSSING:
+                    count = _crossing_contact(normal, kind, view, rows, count, edge_a, edge_b, p, d, q, e)
+                if meshes and sine_squared < NEARLY_PARALLEL * NEARLY_PARALLEL:
+                    count = _parallel_contacts(edge, normal, kind, view, rows, count, edge_a, edge_b, p, d, q, e)
+    return count

@@ -1,0 +1,292 @@
+"""Contacts of two ROUND primitives: triangles, a segment or a point, grown by a radius.
+
+The features of two cores at distance d <= margin + r_a + r_b that are locally closest make the contacts; the radii are
+then taken off along the normal: gap = d - r_a - r_b.
+- vertex - face: the vertex projects into the face, and no edge that leaves it dives below by more than the margin
+  (else the vertex of a box that stands flush on another one would meet its side). All corners within the margin
+  count: a flat contact gives its corners.
+- edge - edge (see `edges`): the common normal meets both edges and lies in the Gauss arcs of both. Nearly parallel
+  edges have both ends of their overlap, with the normal at its middle.
+- vertex - edge, vertex - vertex: the normal n runs between the points; it must lie in the arc of the edge and in the
+  cone of each vertex: u . n <= 0 for every edge u that leaves it (n away from its body).
+Normals of faces and crossing edges come from the surfaces, not from the difference of two points, and stay exact
+however small the gap is; the others carry an error of round-off / d. Each vertex and edge is owned by one triangle,
+so a pair of features is met once; flat or concave edges and vertices without a convex edge are left out (see
+`geometry`).
+
+Contacts that miss being locally closest by less than the margin are kept in two cases: crossing edges, which are
+corners of faces that lie on each other and get the normal at the end of the arc, and capsules, whose contacts at both
+ends of a line are wanted though one end is a little farther away.
+
+Both box trees are walked at once; pairs of leaves are gathered in chunks, so that no scene needs a larger buffer.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from rigidimpulse.collision.bvh import STACK_ROWS, gather_leaf_pairs
+from rigidimpulse.collision.distance.simplices import (
+    CORNER,
+    FACE_VERTEX,
+    VERTEX_FACE,
+    along,
+    dot,
+    edge_normals,
+    in_edge_arc,
+    inner,
+    moved,
+    over_triangle,
+    row,
+    subtract,
+    turned,
+)
+from rigidimpulse.collision.geometry import EDGE_HIDDEN
+from rigidimpulse.collision.manifold.contact_points import (
+    ANY,
+    INSIDE,
+    MERGE,
+    PENETRATION,
+    ROUND_OFF,
+    STRICT,
+    TILT,
+    View,
+    append_contact,
+    outside_box,
+)
+from rigidimpulse.collision.manifold.mesh_edges import edge_contacts
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.kernels import jit_making_arrays
+
+CREASE = 2.0 * TOLERANCES.flat_angle
+"""How far outside a face beyond a hidden edge a point still counts as inside, relative to its height."""
+
+
+@inner
+def _append_vertex(view, rows, count, core_v, core_t, normal, distance, kind, feature_v, feature_t, merge):
+    """Append a contact of a vertex (core point `core_v`) with a triangle (`core_t`), given in the triangle's frame."""
+    gap = distance - view.radius_v - view.radius_t
+    point_v = along(core_v, view.radius_v, normal)
+    point_t = along(core_t, -view.radius_t, normal)
+    if view.flipped:
+        normal = (-normal[0], -normal[1], -normal[2])
+        return append_contact(rows, count, point_t, point_v, normal, gap, kind, feature_t, feature_v, merge)
+    point_v = moved(view.R_back, view.t_back, point_v)
+    point_t = moved(view.R_back, view.t_back, point_t)
+    normal = turned(view.R_back, normal)
+    return append_contact(rows, count, point_v, point_t, normal, gap, kind, feature_v, feature_t, merge)
+
+
+@inner
+def _in_vertex_cone(vertex, edge, vertex_edge_first, vertex_edge, corner, direction, slack, tolerance):
+    """Tell whether no edge that leaves a vertex runs along the direction, but for a length `slack` [m] or an angle."""
+    origin = row(vertex, corner)
+    for i in range(vertex_edge_first[corner], vertex_edge_first[corner + 1]):
+        leaving = subtract(row(vertex, edge[vertex_edge[i], 0] + edge[vertex_edge[i], 1] - corner), origin)
+        length = sqrt(dot(leaving, leaving))
+        if dot(direction, leaving) > tolerance * length + min(slack, TILT * length):
+            return False
+    return True
+
+
+@inner
+def _face_contact(geometry, view, rows, count, vertex, p, triangle, corners, normal, height, hidden):
+    """Append the contact of a vertex at `p` with a face if it lies over it; `hidden`: which sides are hidden edges."""
+    a, b, c = corners
+    side = subtract(b, a)
+    size = sqrt(dot(side, side))
+    # Across a hidden edge the faces may meet at up to the flat angle: their prisms overlap, so that no gap is between.
+    crease = CREASE * abs(height)
+    slack_ab = INSIDE * size + (crease if hidden[0] else 0.0)
+    slack_bc = INSIDE * size + (crease if hidden[1] else 0.0)
+    slack_ca = INSIDE * size + (crease if hidden[2] else 0.0)
+    behind = height < 0.0
+    if (behind and not view.two_sided and height < -PENETRATION * size) or not over_triangle(
+        p, a, b, c, normal, slack_ab, slack_bc, slack_ca
+    ):
+        return count
+    foot = along(p, -height, normal)
+    if behind and view.two_sided:
+        height = -height
+    else:
+        normal = (-normal[0], -normal[1], -normal[2])
+    if not _in_vertex_cone(
+        geometry.vertex, geometry.edge, geometry.vertex_edge_first, geometry.vertex_edge, vertex,
+        turned(view.R_back, normal), view.core, TILT,
+    ):
+        return count
+    kind = FACE_VERTEX if view.flipped else VERTEX_FACE
+    merge = MERGE * size + 2.0 * crease
+    return _append_vertex(view, rows, count, p, foot, normal, height, kind, vertex, triangle, merge)
+
+
+@inner
+def _face_contacts(geometry, view, pairs, end, rows, count):
+    """Append the contacts of the corners in one node of each pair with the faces in the other."""
+    vertex, triangle, owns = geometry.vertex, geometry.triangle, geometry.triangle_owns
+    for pair in range(STACK_ROWS, end):
+        node_v = pairs[pair, 1] if view.flipped else pairs[pair, 0]
+        node_t = pairs[pair, 0] if view.flipped else pairs[pair, 1]
+        low, high = row(geometry.node_min, node_t), row(geometry.node_max, node_t)
+        start_t, count_t = geometry.node_start[node_t], geometry.node_count[node_t]
+        start_v, count_v = geometry.node_start[node_v], geometry.node_count[node_v]
+        for owner in range(start_v, start_v + count_v):
+            for k in range(3):
+                corner = triangle[owner, k]
+                if not (owns[owner] >> k & 1 and geometry.vertex_corner[corner]):
+                    continue
+                p = moved(view.R, view.t, row(vertex, corner))
+                if outside_box(p, p, low, high, view.core):
+                    continue
+                for face in range(start_t, start_t + count_t):
+                    a = row(vertex, triangle[face, 0])
+                    normal = row(geometry.triangle_normal, face)
+                    height = dot(subtract(p, a), normal)
+                    if abs(height) > view.core or triangle[face, 1] == triangle[face, 2]:
+                        continue
+                    corners = (a, row(vertex, triangle[face, 1]), row(vertex, triangle[face, 2]))
+                    hidden = (
+                        geometry.edge_kind[geometry.triangle_edge[face, 0]] == EDGE_HIDDEN,
+                        geometry.edge_kind[geometry.triangle_edge[face, 1]] == EDGE_HIDDEN,
+                        geometry.edge_kind[geometry.triangle_edge[face, 2]] == EDGE_HIDDEN,
+                    )
+                    count = _face_contact(geometry, view, rows, count, corner, p, face, corners, normal, height, hidden)
+    return count
+
+
+@inner
+def _corner_contact(geometry, view, rows, count, corner, p, foot, feature, size):
+    """Append the contact of a vertex at `p` with the point `foot` of an edge or a vertex if it is locally closest."""
+    vertex, edge = geometry.vertex, geometry.edge
+    first_edge, around = geometry.vertex_edge_first, geometry.vertex_edge
+    between = subtract(foot, p)
+    distance = sqrt(dot(between, between))
+    if distance <= ROUND_OFF * size:
+        return count
+    normal = (between[0] / distance, between[1] / distance, between[2] / distance)
+    outward = (-normal[0], -normal[1], -normal[2])
+    tolerance = STRICT + view.leeway + ROUND_OFF * (size + abs(p[0]) + abs(p[1]) + abs(p[2])) / distance
+    other = feature // 2
+    if feature % 2 == 1:
+        direction = subtract(row(vertex, edge[other, 1]), row(vertex, edge[other, 0]))
+        direction = (direction[0] / size, direction[1] / size, direction[2] / size)
+        normal_0, normal_1 = edge_normals(geometry.edge_normal, other)
+        tilt = tolerance + min(TILT, view.slack / size)
+        if not in_edge_arc(outward, direction, normal_0, normal_1, geometry.edge_kind[other], tilt):
+            return count
+    elif not _in_vertex_cone(vertex, edge, first_edge, around, other, outward, view.slack, tolerance):
+        return count
+    if not _in_vertex_cone(
+        vertex, edge, first_edge, around, corner, turned(view.R_back, normal), view.slack, tolerance
+    ):
+        return count
+    return _append_vertex(view, rows, count, p, foot, normal, distance, CORNER, 2 * corner, feature, MERGE * size)
+
+
+@inner
+def _corner_contacts(geometry, view, pairs, end, rows, count):
+    """Append the contacts of the corners in one node of each pair with the edges and corners in the other."""
+    vertex, triangle, owns, edge = geometry.vertex, geometry.triangle, geometry.triangle_owns, geometry.edge
+    core_squared = view.core * view.core
+    for pair in range(STACK_ROWS, end):
+        node_v = pairs[pair, 1] if view.flipped else pairs[pair, 0]
+        node_t = pairs[pair, 0] if view.flipped else pairs[pair, 1]
+        low, high = row(geometry.node_min, node_t), row(geometry.node_max, node_t)
+        start_t, count_t = geometry.node_start[node_t], geometry.node_count[node_t]
+        start_v, count_v = geometry.node_start[node_v], geometry.node_count[node_v]
+        for owner in range(start_v, start_v + count_v):
+            for k in range(3):
+                corner = triangle[owner, k]
+                if not (owns[owner] >> k & 1 and geometry.vertex_corner[corner]):
+                    continue
+                p = moved(view.R, view.t, row(vertex, corner))
+                if outside_box(p, p, low, high, view.core):
+                    continue
+                for slot in range(3 * start_t, 3 * (start_t + count_t)):
+                    face = slot // 3
+                    m = slot - 3 * face
+                    e = geometry.triangle_edge[face, m]
+                    if owns[face] >> (3 + m) & 1 and geometry.edge_kind[e] != EDGE_HIDDEN:
+                        a = row(vertex, edge[e, 0])
+                        side = subtract(row(vertex, edge[e, 1]), a)
+                        length_squared = dot(side, side)
+                        s = dot(subtract(p, a), side) / length_squared
+                        foot = along(a, s, side)
+                        off = subtract(foot, p)
+                        if -INSIDE <= s <= 1.0 + INSIDE and dot(off, off) <= core_squared:
+                            size = sqrt(length_squared)
+                            count = _corner_contact(geometry, view, rows, count, corner, p, foot, 2 * e + 1, size)
+                    v = triangle[face, m]
+                    if not view.flipped and owns[face] >> m & 1 and geometry.vertex_corner[v]:
+                        foot = row(vertex, v)
+                        off = subtract(foot, p)
+                        if dot(off, off) <= core_squared:
+                            size = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(foot[0]) + abs(foot[1]) + abs(foot[2])
+                            count = _corner_contact(geometry, view, rows, count, corner, p, foot, 2 * v, size)
+    return count
+
+
+@jit_making_arrays
+def _pose_back(R, t):
+    """Return the inverse (R^T, -R^T t) of a pose."""
+    R_back = np.empty((3, 3))
+    t_back = np.empty(3)
+    for i in range(3):
+        t_back[i] = -(R[0, i] * t[0] + R[1, i] * t[1] + R[2, i] * t[2])
+        for j in range(3):
+            R_back[i, j] = R[j, i]
+    return R_back, t_back
+
+
+@inner
+def _keep_closest(contact_real, contact_int, first_row, end):
+    """Keep the contact of least gap of rows [first_row, end); return the new count."""
+    closest = first_row
+    for other in range(first_row + 1, min(end, contact_real.shape[0])):
+        if contact_real[other, 9] < contact_real[closest, 9]:
+            closest = other
+    if closest > first_row:
+        for column in range(contact_real.shape[1]):
+            contact_real[first_row, column] = contact_real[closest, column]
+        for column in range(contact_int.shape[1]):
+            contact_int[first_row, column] = contact_int[closest, column]
+    return min(end, first_row + 1)
+
+
+@jit_making_arrays
+def round_round_contacts(geometry, first, second, R, t, margin, pairs, contact_real, contact_int, count):
+    """Append the contacts of two ROUND primitives with gap <= margin, in the first one's frame; return the new count.
+
+    R, t: pose of the second body in the frame of the first; `pairs`: scratch, more than `STACK_ROWS` rows.
+    Where round-off lets no normal pass, the closest pair of features is the one contact.
+    """
+    R_back, t_back = _pose_back(R, t)
+    radius_a, radius_b = geometry.radius[first], geometry.radius[second]
+    core = margin + radius_a + radius_b
+    edges_a = geometry.edge_first[first + 1] - geometry.edge_first[first]
+    edges_b = geometry.edge_first[second + 1] - geometry.edge_first[second]
+    slack = margin if edges_a > 0 and edges_b > 0 and radius_a + radius_b > 0.0 else 0.0
+    open_a, open_b = not geometry.closed[first], not geometry.closed[second]
+    rows = (contact_real, contact_int, count)
+    first_row = count
+    for leeway in (0.0, ANY):
+        of_a = View(False, R_back, t_back, R, t, radius_a, radius_b, margin, core, slack, leeway, open_b)
+        of_b = View(True, R, t, R_back, t_back, radius_b, radius_a, margin, core, slack, leeway, open_a)
+        pairs[0, 0] = geometry.node_first[first]
+        pairs[0, 1] = geometry.node_first[second]
+        depth = np.int64(1)  # (a literal would compile the walk twice)
+        while depth > 0:
+            depth, end = gather_leaf_pairs(
+                geometry.node_min, geometry.node_max, geometry.node_child, R, t, core, pairs, depth
+            )
+            count = edge_contacts(geometry, of_b, pairs, end, rows, count)
+            for view in (of_a, of_b):
+                count = _face_contacts(geometry, view, pairs, end, rows, count)
+                count = _corner_contacts(geometry, view, pairs, end, rows, count)
+        if leeway == ANY:
+            return _keep_closest(contact_real, contact_int, first_row, count)
+        if count > first_row:
+            return count
+    return count

@@ -1,0 +1,96 @@
+"""Convex bodies of a heap that have sunk into each other farther than the contact kernels bear: polyhedra, and prisms for cylinders.
+
+The gap of two convex bodies along a unit normal n from a to b is  s(n) = min_b n.x - max_a n.x;  they are apart just if some s is
+above 0, and the contacts of bodies apart have one such normal. Where there is none `heap_hulls` tells how to push them apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, sqrt
+
+import numpy as np
+
+from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
+from rigidimpulse.collision.manifold.convex_convex import hull_contacts
+from rigidimpulse.collision.manifold.polyhedra import Polyhedra, make_polyhedra
+from rigidimpulse.core.kernels import jit
+from rigidimpulse.scene.shape import Shape
+
+FLUSH = 0.02
+"""Gap, in inner radii, below which points of a face press, too."""
+SIDES = 32
+"""Of the prism in a cylinder: 0.5 % of the radius inside it, less than what cylinders are made smaller by for the contact kernels."""
+
+
+def solids(
+    shapes: Sequence[CompiledShape], geometry: Geometry, convex: np.ndarray, polyhedra: Polyhedra
+) -> tuple[Polyhedra, np.ndarray, np.ndarray]:
+    """Polyhedra in the shapes: `convex` ones (s,) bool, whose tables are there; prisms in cylinders, axes of capsules, centres of balls.
+
+    Returns them, which shapes are cylinders (s,) bool, and how far each is inside its shape at most (s,), m. Others have no corners.
+    """
+    first = geometry.shape_first
+    single, kind, radius = np.diff(first) == 1, geometry.kind[first[:-1]], geometry.radius[first[:-1]]
+    drum, ball = single & (kind == CYLINDER), single & (kind == ROUND) & (radius > 0.0)
+    inset = np.where(drum, (1.0 - np.cos(np.pi / SIDES)) * radius, np.where(ball, radius, 0.0))
+    if not inset.any():
+        return polyhedra, drum, inset
+    none = compile_shape(Shape.box(1.0), np.zeros(3), np.eye(3))
+    known = [_prism(geometry, int(first[s])) if drum[s] else shape if convex[s] or ball[s] else none for s, shape in enumerate(shapes)]
+    return make_polyhedra(build_geometry(known), convex | drum, ball), drum, inset
+
+
+def _prism(geometry: Geometry, p: int) -> CompiledShape:
+    """The prism of SIDES in a cylinder."""
+    centre, axis, half = geometry.frame[p, :3], geometry.frame[p, 3:6], geometry.frame[p, 6]
+    u, v = np.linalg.svd(axis[None])[2][1:]
+    turn = 2.0 * np.pi * np.arange(SIDES)[:, None] / SIDES
+    rim = centre + geometry.radius[p] * (np.cos(turn) * u + np.sin(turn) * v)
+    return compile_shape(Shape.convex_hull(np.vstack([rim - half * axis, rim + half * axis])), np.zeros(3), np.eye(3))
+
+
+@jit
+def support(geometry, p, x, r, n, sign):
+    """Largest sign n.x over the polyhedron or cylinder p at the pose x, r."""
+    a = sign * (r[0, 0] * n[0] + r[1, 0] * n[1] + r[2, 0] * n[2])
+    b = sign * (r[0, 1] * n[0] + r[1, 1] * n[1] + r[2, 1] * n[2])
+    c = sign * (r[0, 2] * n[0] + r[1, 2] * n[1] + r[2, 2] * n[2])
+    best = -inf
+    if geometry.kind[p] == CYLINDER:
+        f = geometry.frame
+        along = a * f[p, 3] + b * f[p, 4] + c * f[p, 5]
+        across = geometry.radius[p] * sqrt(max(a * a + b * b + c * c - along * along, 0.0))
+        best = a * f[p, 0] + b * f[p, 1] + c * f[p, 2] + f[p, 6] * abs(along) + across
+    for v in range(geometry.vertex_first[p], geometry.vertex_first[p + 1]):
+        best = max(best, a * geometry.vertex[v, 0] + b * geometry.vertex[v, 1] + c * geometry.vertex[v, 2])
+    return best + sign * (n[0] * x[0] + n[1] * x[1] + n[2] * x[2])
+
+
+@jit
+def gap_along(geometry, bodies, a, b, p, q, n):
+    """s(n) of bodies a and b with the primitives p and q, m."""
+    low = -support(geometry, q, bodies.position[b], bodies.rotation[b], n, -1.0)
+    return low - support(geometry, p, bodies.position[a], bodies.rotation[a], n, 1.0)
+
+
+@jit
+def overlap_contacts(polyhedra, bodies, a, b, size, work, real, ids):
+    """Contacts into real (5, 10), in the world, and ids (5, 3) of two bodies that have sunk into each other; their number.
+
+    polyhedra: with prisms for cylinders; size: smaller inner radius, m; work: room for `hull_contacts`.
+    """
+    between, origin, c, simplex, polytope, scratch = work
+    for k in range(3):
+        between[k] = bodies.position[b, k] - bodies.position[a, k]
+    count, gap = hull_contacts(
+        polyhedra, bodies.velocity, bodies.rotation, a, b, bodies.shape[a], bodies.shape[b], between, origin, size, FLUSH * size, 0.0, c,
+        simplex, polytope, scratch, real, ids,
+    )  # fmt: skip
+    if gap > 0.0:
+        return np.int64(0)
+    for n in range(count):
+        for k in range(3):
+            real[n, k] += bodies.position[a, k]
+            real[n, 3 + k] += bodies.position[a, k]
+    return count

@@ -1,0 +1,248 @@
+"""Safe time of two convex pieces: simplices (points, segments, triangles) and cylinders, grown by the threshold.
+
+Several directions n are tried and the best counts: the normal of either face, carried by its body; the direction of
+the closest features, carried by either body; and, for crossing edges, n turning with both of them. For a carried n
+every corner has its own offset and speed (`guard_root`): one offset with the largest speed would stall a body that
+rolls or slides.
+
+n turning with both edges e_a (at rest in A) and e_b, seen from A: n stays across both to first order if n' = m,
+
+    m = f (n x e_a),   f = -n.(w x e_b) / ((n x e_a).e_b),     n(s) = n cos(nu s) + (m / nu) sin(nu s),   nu = |m|
+
+and for D the vector from a corner of A to one of B, f_ij = n.D:   f' = m.D + n.y',   f'' = -nu^2 n.D + 2 m.y' + n.y'',
+|f'''| <= J + 3 nu |y''| + 3 nu^2 |y'| + nu^3 |D|, the lengths bounded over [0, h]. A cylinder whose side touches takes part as its axis, an
+edge grown by its radius: no point of it is outside of that.
+
+Records lie in the arrays `work` and `index` (`guard_layout`). The argument `cylinders` is None where no shape is a
+cylinder: then nothing of them is compiled.
+"""
+
+from __future__ import annotations
+
+from rigidimpulse.collision.distance.cylinder import cylinder_cylinder_distance, cylinder_support, cylinder_triangle_distance
+from rigidimpulse.collision.distance.simplices import along, cross, dot, subtract
+from rigidimpulse.collision.time_of_impact.closest_direction import NO_EDGES, closest_simplices, farthest
+from rigidimpulse.collision.time_of_impact.motion_bound import (
+    SEEN_ARM_JERK,
+    SEEN_JERK,
+    SEEN_SIZE,
+    SEEN_SPIN,
+    length,
+    put,
+    scaled,
+    seen_motion,
+    vector,
+)
+from rigidimpulse.collision.time_of_impact.scratch_layout import (
+    CARRIER,
+    CLOSEST,
+    CORNER,
+    COUNT,
+    CYLINDER,
+    CYLINDER_AXIS,
+    CYLINDER_HEIGHT,
+    CYLINDER_RADIUS,
+    CYLINDER_SIZE,
+    DIRECTION,
+    FACE,
+    FIRST,
+    GAP,
+    LIMIT,
+    LIMIT_VIEW,
+    NORMAL,
+    ORIGIN,
+    OTHER_VIEW,
+    POINT_FIRST,
+    POINT_SECOND,
+    SECOND,
+    SEEN,
+    THINNED,
+)
+from rigidimpulse.collision.time_of_impact.separating_quadratic import cylinder_safe_until, safe_until, viewed_safe_until, write_view
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+
+_ON_SIDE = 1e-6  # cosine to the axis below which a normal is one of the side of a cylinder
+_TURN = 0.5  # rad, angle that a direction turns at most: beyond it the third derivatives take over
+
+
+@jit
+def _cylinder_record(work, side):
+    """Return centre, axis, half height and radius of the cylinder of the first (0) or second (1) piece."""
+    at = CYLINDER + CYLINDER_SIZE * side
+    return vector(work, at), vector(work, at + CYLINDER_AXIS), work[at + CYLINDER_HEIGHT], work[at + CYLINDER_RADIUS]
+
+
+@jit
+def _top(work, index, side, normal, cylinders):
+    """Return the greatest normal . p over the first (0) or second (1) piece."""
+    if cylinders is not None:
+        if index[COUNT + side] == 0:
+            centre, axis, half_height, radius = _cylinder_record(work, side)
+            return dot(normal, centre) + cylinder_support(axis, half_height, radius, normal)
+    return farthest(work, CORNER + 9 * side, index[COUNT + side], normal)
+
+
+@jit
+def _carried(work, index, side, normal, view, level, horizon, cylinders):
+    """Safe time of the other piece above a level along a normal, with its view, that the body of one side carries."""
+    other = 1 - side
+    seen, origin = SEEN + SEEN_SIZE * side, vector(work, ORIGIN + 3 * other)
+    if cylinders is not None:
+        if index[COUNT + other] == 0:
+            centre, axis, half_height, radius = _cylinder_record(work, other)
+            gap = dot(normal, centre) - cylinder_support(axis, half_height, radius, normal) - level
+            arm = subtract(centre, origin)
+            return cylinder_safe_until(work, seen, normal, arm, axis, half_height, radius, gap, horizon)
+    for k in range(index[COUNT + other]):
+        point = vector(work, CORNER + 9 * other + 3 * k)
+        gap = dot(normal, point) - level
+        arm = subtract(point, origin)
+        horizon = viewed_safe_until(work, seen, view, 1.0, arm, length(arm), 0.0, gap, horizon)
+    return horizon
+
+
+@jit
+def _with_edges(work, index, edges, normal, threshold, horizon):
+    """Safe time of two simplices along n turning with both crossing edges."""
+    k, j = edges // 3, edges % 3
+    num_first, num_second = index[COUNT], index[COUNT + 1]
+    edge_first = subtract(vector(work, CORNER + 3 * ((k + 1) % num_first)), vector(work, CORNER + 3 * k))
+    edge_second = subtract(vector(work, CORNER + 9 + 3 * ((j + 1) % num_second)), vector(work, CORNER + 9 + 3 * j))
+    m = cross(normal, edge_first)
+    wanted, available = -dot(normal, cross(vector(work, SEEN + SEEN_SPIN), edge_second)), dot(m, edge_second)
+    if available == 0.0:
+        return 0.0
+    m = scaled(m, wanted / available)
+    nu = length(m)
+    if nu * horizon > _TURN:
+        horizon = _TURN / nu
+    for j in range(num_second):
+        point = vector(work, CORNER + 9 + 3 * j)
+        arm = subtract(point, vector(work, ORIGIN + 3))
+        velocity, acceleration = seen_motion(work, SEEN, arm)
+        jerk = work[SEEN + SEEN_JERK] + work[SEEN + SEEN_ARM_JERK] * length(arm)
+        bend_bound = length(acceleration) + horizon * jerk
+        speed_bound = length(velocity) + horizon * bend_bound
+        for k in range(num_first):
+            between = subtract(point, vector(work, CORNER + 3 * k))
+            reach = length(between) + horizon * speed_bound
+            rest = jerk + nu * (3.0 * bend_bound + nu * (3.0 * speed_bound + nu * reach))
+            gap = dot(normal, between)
+            closing = -dot(m, between) - dot(normal, velocity)
+            bend = nu * nu * gap - 2.0 * dot(m, velocity) - dot(normal, acceleration) + rest * horizon / 3.0
+            horizon = safe_until(gap - threshold, closing, bend, horizon)
+    return horizon
+
+
+@jit
+def _with_thinned(work, index, normal, threshold, horizon):
+    """Safe time of the two pieces along n turning with crossing edges, the sides of cylinders among them; 0 if none cross."""
+    is_side = True
+    for side in range(2):
+        if index[COUNT + side] == 0:
+            centre, axis, half_height, radius = _cylinder_record(work, side)
+            is_side = is_side and abs(dot(normal, axis)) < _ON_SIDE
+            put(work, CORNER + 9 * side, along(centre, -half_height, axis))
+            put(work, CORNER + 9 * side + 3, along(centre, half_height, axis))
+            threshold += radius
+    if not is_side:
+        return 0.0
+    first, second = index[COUNT], index[COUNT + 1]
+    index[COUNT], index[COUNT + 1] = first if first else 2, second if second else 2
+    _, edges = closest_simplices(work, index, THINNED)
+    s = 0.0
+    if edges >= 0:
+        s = _with_edges(work, index, edges, vector(work, THINNED + NORMAL), threshold, horizon)
+    index[COUNT], index[COUNT + 1] = first, second
+    return s
+
+
+@jit_making_arrays
+def _closest(work, index, cylinders):
+    """Write the closest points and the normal of the two pieces at CLOSEST; return (separation, crossing edges)."""
+    if cylinders is not None:
+        if index[COUNT + 1] == 0:
+            centre, axis, half_height, radius = _cylinder_record(work, SECOND)
+            points = work[CLOSEST : CLOSEST + GAP]
+            if index[COUNT] == 0:
+                other, axis_other, height_other, radius_other = _cylinder_record(work, FIRST)
+                cylinder_cylinder_distance(
+                    centre, axis, half_height, radius, other, axis_other, height_other, radius_other, points
+                )
+            else:
+                corners = work[CORNER : CORNER + 9].reshape((3, 3))
+                cylinder_triangle_distance(centre, axis, half_height, radius, corners, points)
+            on_cylinder, normal = vector(work, CLOSEST), scaled(vector(work, CLOSEST + NORMAL), -1.0)
+            put(work, CLOSEST + POINT_FIRST, vector(work, CLOSEST + POINT_SECOND))
+            put(work, CLOSEST + POINT_SECOND, on_cylinder)
+            put(work, CLOSEST + NORMAL, normal)
+            top = _top(work, index, FIRST, normal, cylinders)
+            return -_top(work, index, SECOND, scaled(normal, -1.0), cylinders) - top, NO_EDGES
+    return closest_simplices(work, index, CLOSEST)
+
+
+@jit
+def _face_direction(work, index, side):
+    """Return the normal of a face, turned from the first piece to the second."""
+    normal = vector(work, FACE + 3 * side)
+    other = vector(work, CORNER + 9) if index[COUNT + 1] > 0 else vector(work, CYLINDER + CYLINDER_SIZE)
+    return normal if dot(normal, subtract(other, vector(work, CORNER))) > 0.0 else scaled(normal, -1.0)
+
+
+@jit
+def pieces_safe_until(work, index, threshold, horizon, cylinders):
+    """Safe time of the two convex pieces at COUNT and CORNER, FACE or CYLINDER.
+
+    Of a simplex and a cylinder the cylinder is the second. If the result is short of the horizon, the record at CLOSEST
+    tells what limits it. Of the record at LIMIT the direction is tried first (zeros if there is none).
+
+    Args:
+        work, index: see `guard_layout`.
+        threshold: m, radii of the pieces included.
+        horizon: s.
+        cylinders: None, or an int where there are cylinders.
+
+    Returns:
+        (s, the side that carries the best direction: 0 first, 1 second).
+
+    """
+    best, carrier, separation = 0.0, 0, 0.0
+    edges = NO_EDGES
+    normal = direction = vector(work, LIMIT + DIRECTION)
+    # The limit so far, the faces of first and second, and the closest features carried by first and second.
+    for trial in range(5):
+        side = index[CARRIER] if trial == 0 else (trial - 1) % 2
+        if trial == 0 and dot(normal, normal) == 0.0:
+            continue
+        if trial == 1 or trial == 2:
+            if index[COUNT + side] < 3:
+                continue
+            normal = _face_direction(work, index, side)
+        elif trial == 3:
+            separation, edges = _closest(work, index, cylinders)
+            normal = vector(work, CLOSEST + NORMAL)
+            if separation <= 0.0:
+                break
+        outward = normal if side == 0 else scaled(normal, -1.0)
+        level = _top(work, index, side, outward, cylinders) + threshold
+        if trial < 3 and -_top(work, index, 1 - side, scaled(outward, -1.0), cylinders) <= level:
+            continue
+        if trial > 0:
+            write_view(work, SEEN + SEEN_SIZE * side, outward, OTHER_VIEW)
+        view = OTHER_VIEW if trial > 0 else LIMIT_VIEW
+        s = _carried(work, index, side, outward, view, level, horizon, cylinders)
+        if s >= horizon:
+            return horizon, side
+        if s > best or (trial == 3 and best == 0.0):
+            best, carrier, direction = s, side, normal
+    if separation <= 0.0:
+        best = 0.0
+        put(work, CLOSEST + NORMAL, (0.0, 0.0, 0.0))
+    elif edges >= 0:
+        best = max(best, _with_edges(work, index, edges, normal, threshold, horizon))
+    elif cylinders is not None:
+        if index[COUNT + 1] == 0:
+            best = max(best, _with_thinned(work, index, normal, threshold, horizon))
+    work[CLOSEST + GAP] = separation
+    put(work, CLOSEST + DIRECTION, direction)
+    return best, carrier

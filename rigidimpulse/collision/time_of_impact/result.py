@@ -1,0 +1,55 @@
+"""What every sweep answers.
+
+A sweep looks for the first time in [start, end] at which the gap of a pair of bodies comes down to `touch`. Its
+answer is a status and a time:
+
+    SEPARATE   the pair stays apart: time inf
+    IMPACT     the gap comes down to `touch` at `time`
+    TOUCHING   the gap is at or below `touch` at the start and shrinks: time = start
+    STALLED    the budget of queries is used up; until `time` there is no contact
+
+Methods, one module each with the same function `sweep`: `bisection` (the default) and `conservative` never pass a
+contact and leave a gap in [touch - round-off, touch + tolerance]; `linear` and `after` are cheaper and may miss one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from rigidimpulse.collision.geometry import Geometry
+from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch
+
+SEPARATE, IMPACT, TOUCHING, STALLED = 0, 1, 2, 3
+"""Statuses, see the head of the file."""
+
+
+class ImpactTimes(NamedTuple):
+    """Answers for k pairs."""
+
+    time: np.ndarray  # (k,) s, inf where SEPARATE
+    status: np.ndarray  # (k,) int64
+    queries: np.ndarray  # (k,) int64, gap evaluations used
+    witness: (
+        np.ndarray
+    )  # (k, 10) m, points on a and b, normal from a to b (zeros if unknown) and gap where contact is made
+
+
+class SweepDetector(Protocol):
+    """What a sweep needs to know of the scene."""
+
+    geometry: Geometry
+    shape_of_body: np.ndarray  # (n,) int64
+    sweep_scratch: SweepScratch
+    max_queries: int  # gap evaluations that a pair may use in an interval
+
+
+def no_impacts(num_pairs: int) -> ImpactTimes:
+    """Answers for pairs that stay apart; the kernels overwrite them."""
+    return ImpactTimes(
+        time=np.full(num_pairs, np.inf),
+        status=np.full(num_pairs, SEPARATE, np.int64),
+        queries=np.zeros(num_pairs, np.int64),
+        witness=np.zeros((num_pairs, 10)),
+    )

@@ -1,0 +1,159 @@
+"""The search that both guarded sweeps share: safe steps until the gap is at `touch`.
+
+Each step asks the bounding spheres, then the shapes (`guard`). If the shapes limit the step by features that are at
+`touch` already and approach, the pair is in contact. Features at `touch` that hover (they approach by less than
+rounding until the end), slide or leave are let go: they may come closer by the slack for rounding, so that neither
+lasting contact nor a rebound is taken for an impact. Surfaces that cross are in contact however they move.
+
+Balls, and balls and planes that stand, have their time in closed form (`ball_time`), but where they hover.
+
+With `ahead`, the time at which the limiting features come down to `touch` is found by bisection
+(`guard_witness`); the steps then only have to confirm that nothing is earlier. Without it, they are repeated until
+they are there (conservative advancement).
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from rigidimpulse.collision.time_of_impact.bvh_walk import row
+from rigidimpulse.collision.time_of_impact.free_flight import plane_safe_until, relative_flight, rounding_slack, spheres_safe_until
+from rigidimpulse.collision.time_of_impact.motion_bound import MOTION_SIZE, length, motion_bound, stop_turning
+from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE, STALLED, TOUCHING
+from rigidimpulse.collision.time_of_impact.safe_step import safe_time
+from rigidimpulse.collision.time_of_impact.scratch_layout import GAP, MOTION, WITNESS
+from rigidimpulse.collision.time_of_impact.spheres import ball_time, is_closed_form, write_ball_witness
+from rigidimpulse.collision.time_of_impact.witness import closing_speed, witness_root
+from rigidimpulse.core.kernels import jit
+from rigidimpulse.motion.trajectory import FIXED
+
+_TURN = 0.5  # rad, angle that a body turns at most in one step: beyond it the third derivatives take over
+_WORTHWHILE = 0.25  # part of the horizon that bounding spheres must clear to save a look at the shapes
+_GROWTH = 4.0  # how much longer a step is tried after a free one
+_EPSILON = 2.0**-52
+
+
+@jit
+def _later(t, s):
+    """Return t + s rounded down: never later than that."""
+    result = t + s
+    return result - _EPSILON * abs(result) if result - t > s else result
+
+
+@jit
+def _flight_safe_until(frame, course, scratch, a, b, shape_a, shape_b, t, threshold, horizon):
+    """Return (safe time of the bounding spheres or planes, whether it is exact for the shapes)."""
+    x, v, acceleration, jerk = relative_flight(course, a, b, t)
+    plane_a, plane_b = scratch.plane[shape_a], scratch.plane[shape_b]
+    if plane_a >= 0 or plane_b >= 0:
+        i, plane, other = a if plane_a >= 0 else b, max(plane_a, plane_b), shape_b if plane_a >= 0 else shape_a
+        if course.mode[i] != FIXED and length(row(course.angular_velocity, i)) > 0.0:
+            return 0.0, False
+        sign, ball = 1.0 if plane_a >= 0 else -1.0, scratch.ball[other]
+        n0, n1, n2 = sign * frame[plane, 0], sign * frame[plane, 1], sign * frame[plane, 2]
+        level = frame[plane, 3] + scratch.reach[other] + threshold
+        return plane_safe_until(course, i, n0, n1, n2, level, ball, x, v, acceleration, jerk, horizon), ball
+    reach = scratch.reach[shape_a] + scratch.reach[shape_b] + threshold
+    if reach == inf:
+        return 0.0, False
+    exact = scratch.ball[shape_a] and scratch.ball[shape_b]
+    return spheres_safe_until(x, v, acceleration, jerk, reach, exact, horizon), exact
+
+
+@jit
+def _bring_motions(course, scratch, a, b, shape_a, shape_b, t, horizon):
+    """Write the motions of a pair at time t, over a horizon in which neither turns too far; returns that horizon."""
+    for side in range(2):
+        i, shape = b if side else a, shape_b if side else shape_a
+        if not scratch.ball[shape] and course.mode[i] != FIXED:
+            spin = length(row(course.angular_velocity, i))
+            if spin * horizon > _TURN:
+                horizon = _TURN / spin
+    for side in range(2):
+        i, shape = b if side else a, shape_b if side else shape_a
+        motion = MOTION + MOTION_SIZE * side
+        motion_bound(course, i, t, horizon, scratch.work[motion : motion + MOTION_SIZE])
+        if scratch.ball[shape]:
+            stop_turning(scratch.work[motion : motion + MOTION_SIZE])
+    return horizon
+
+
+@jit
+def _record(result, k, time, status, queries, work):
+    """Write row k of the answer; the witness only where contact is made."""
+    result.time[k], result.status[k], result.queries[k] = time, status, queries
+    if status == IMPACT or status == TOUCHING:
+        for i in range(result.witness.shape[1]):
+            result.witness[k, i] = work[WITNESS + i]
+
+
+@jit
+def _record_ball(frame, course, scratch, a, b, shape_a, shape_b, t, start, end, result, k):
+    """Write row k of the answer for a pair that meets at t [s]."""
+    result.time[k], result.status[k], result.queries[k] = t if t < end else inf, SEPARATE, 1
+    if t < end:
+        result.status[k] = IMPACT if t > start else TOUCHING
+        write_ball_witness(frame, course, scratch, a, b, shape_a, shape_b, t, result.witness[k])
+
+
+@jit
+def first_contacts(
+    geometry, course, scratch, shape_of_body, pairs_a, pairs_b, start, end, touch, tolerance, ahead, max_queries, cylinders, result
+):
+    """Fill in `result` (`ImpactTimes`); arguments as for `bisection.sweep`.
+
+    ahead: how far past a safe step the root is looked for, relative to the step; 0 for safe steps only.
+    max_queries: gap evaluations a pair may use.
+    cylinders: None where no shape is a cylinder, else any int.
+    """
+    work, index = scratch.work, scratch.index
+    for k in range(pairs_a.shape[0]):
+        a, b = pairs_a[k], pairs_b[k]
+        shape_a, shape_b = shape_of_body[a], shape_of_body[b]
+        if is_closed_form(course, scratch, a, b, shape_a, shape_b, touch[k]):
+            t = ball_time(geometry.frame, course, scratch, a, b, shape_a, shape_b, start[k])
+            if t == t:
+                _record_ball(geometry.frame, course, scratch, a, b, shape_a, shape_b, t, start[k], end, result, k)
+                continue
+        slack = rounding_slack(course, scratch.reach, a, b, shape_a, shape_b, end)
+        above = max(tolerance[k], slack)
+        t, target, trial, floor = start[k], end, end - start[k], touch[k]
+        status, queries, is_let_go = STALLED, 0, False
+        while queries < max_queries:
+            rest = target - t
+            horizon = rest if is_let_go else min(rest, trial)
+            queries += 1
+            s, exact = _flight_safe_until(geometry.frame, course, scratch, a, b, shape_a, shape_b, t, floor, horizon)
+            is_free = s >= horizon or (not exact and s > _WORTHWHILE * horizon)
+            if not is_free:
+                span = _bring_motions(course, scratch, a, b, shape_a, shape_b, t, horizon)
+                guarded = safe_time(geometry, shape_a, shape_b, work, index, floor, span, cylinders)
+                is_free = guarded >= span
+                s = s if exact and not is_free else guarded
+            if is_free:
+                if s >= rest and target == end:
+                    t, status = inf, SEPARATE
+                    break
+                t, target = target if s >= rest else _later(t, s), end if s >= rest else target
+                trial, floor, is_let_go = max(_GROWTH * s, trial), touch[k], False
+                continue
+            gap, closing = work[WITNESS + GAP], closing_speed(work)
+            near = gap <= touch[k] + above
+            if near and closing * (end - t) > slack:
+                status = TOUCHING if t == start[k] and gap <= touch[k] else IMPACT
+                break
+            if near and not is_let_go:
+                floor, is_let_go, target = min(gap, touch[k]) - slack, True, end
+                continue
+            if near and closing < 0.0:
+                s *= 0.5  # it leaves: look again half way to its return
+            now, t = t, _later(t, s)
+            if t <= now:
+                status = IMPACT
+                break
+            trial, floor, is_let_go = 2.0 * s, touch[k], False
+            probe = min(target, t + ahead * s)
+            if probe > t and not exact:
+                root, used = witness_root(geometry, course, work, index, a, b, t, probe, touch[k], above)
+                target, queries = min(target, root), queries + used
+        _record(result, k, t, status, queries, work)

@@ -1,1 +1,0 @@
-"""Stage constrain: forces of contacts that last."""

@@ -1,0 +1,1 @@
+"""What every layer stands on: compiled kernels, vectors, quaternions, tolerances, errors."""

@@ -1,0 +1,280 @@
+"""Explicit SIMD in kernels: vectors of W doubles, one lane for each of W things that are worked on at once.
+
+`Lanes(W)` is handed to a kernel, which makes its vectors by it; the width is part of its type, so that one source serves all
+machines. Vectors have + - * / and negation, and the functions below. No lane ever reads another one, and products are added by
+`fma` or not at all, so the same bits come out at every width.
+
+Arrays that are read and written by `load` and `store` may hold single precision; vectors are of doubles always.
+
+Rows of 8 doubles (one for each body) are read and written for W indices at once, as 8 vectors; a row begins at a multiple of
+64 bytes (`aligned`), so that it is one line of the cache.
+"""
+
+from __future__ import annotations
+
+import operator
+from functools import cache
+from typing import Any
+
+import llvmlite.binding
+import numpy as np
+from llvmlite import ir
+from numba import extending, types
+from numba.core import cgutils
+from numba.core.imputils import lower_constant
+from numba.extending import NativeValue, lower_builtin, models, register_model, type_callable, typeof_impl, unbox
+
+from rigidimpulse.core.memory import reserve
+
+ROW = 8
+"""Doubles in a row."""
+LINE = 64
+"""Bytes in a line of the cache."""
+
+intrinsic: Any = extending.intrinsic
+_DOUBLE, _SINGLE, _INDEX, _SHORT = ir.DoubleType(), ir.FloatType(), ir.IntType(64), ir.IntType(32)
+
+
+class Lanes:
+    """How many lanes a kernel is to work with, 2, 4 or 8."""
+
+    def __init__(self, width: int) -> None:
+        """width: 2, 4 or 8."""
+        self.width = width
+
+
+@cache
+def machine_lanes() -> Lanes:
+    """Return the lanes of this machine's widest vector unit."""
+    features = llvmlite.binding.get_host_cpu_features()
+    return Lanes(8 if features.get("avx512f") else 4 if features.get("avx2") else 2)
+
+
+def aligned(rows: int) -> np.ndarray:
+    """Zeros (8 rows,) that begin at a line of the cache."""
+    return reserve((rows * ROW,), np.float64)
+
+
+class _LanesType(types.Type):
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Lanes({width})")
+
+
+class _VectorType(types.Type):
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Vector({width})")
+
+
+register_model(_LanesType)(models.OpaqueModel)
+
+
+@register_model(_VectorType)
+class _VectorModel(models.PrimitiveModel):
+    def __init__(self, manager, kind) -> None:
+        super().__init__(manager, kind, ir.VectorType(_DOUBLE, kind.width))
+
+
+@typeof_impl.register(Lanes)
+def _type_of_lanes(lanes: Lanes, _context) -> types.Type:
+    return _LanesType(lanes.width)
+
+
+@unbox(_LanesType)
+def _unbox_lanes(_type, _object, context):
+    return NativeValue(context.context.get_dummy_value())
+
+
+@lower_constant(_LanesType)
+def _constant_lanes(context, _builder, _type, _value):
+    return context.get_dummy_value()
+
+
+def _define_operator(python, instruction: str) -> None:
+    @type_callable(python)
+    def type_of(_context):
+        return lambda a, b: a if isinstance(a, _VectorType) and a == b else None
+
+    @lower_builtin(python, _VectorType, _VectorType)
+    def lower(_context, builder, _signature, arguments):
+        return getattr(builder, instruction)(*arguments)
+
+
+for _python, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv")):
+    _define_operator(_python, _instruction)
+
+
+@type_callable(operator.neg)
+def _type_of_negated(_context):
+    return lambda a: a if isinstance(a, _VectorType) else None
+
+
+@lower_builtin(operator.neg, _VectorType)
+def _lower_negated(_context, builder, _signature, arguments):
+    return builder.fneg(arguments[0])
+
+
+def _by_machine(builder, name: str, kind: _VectorType, arguments):
+    vector = ir.VectorType(_DOUBLE, kind.width)
+    function = ir.FunctionType(vector, [vector] * len(arguments))
+    return builder.call(cgutils.get_or_insert_function(builder.module, function, f"llvm.{name}.v{kind.width}f64"), arguments)
+
+
+@intrinsic
+def width_of(_typing, lanes):
+    """W."""
+    return types.int64(lanes), lambda _context, _builder, _signature, _arguments: ir.Constant(_INDEX, lanes.width)
+
+
+@intrinsic
+def fma(_typing, a, b, c):
+    """a b + c, rounded once."""
+    return a(a, b, c), lambda _context, builder, _signature, arguments: _by_machine(builder, "fma", a, arguments)
+
+
+@intrinsic
+def root(_typing, a):
+    """Square roots."""
+    return a(a), lambda _context, builder, _signature, arguments: _by_machine(builder, "sqrt", a, arguments)
+
+
+@intrinsic
+def where_greater(_typing, a, b, x, y):
+    """x where a > b, else y."""
+
+    def lower(_context, builder, _signature, arguments):
+        return builder.select(builder.fcmp_ordered(">", arguments[0], arguments[1]), arguments[2], arguments[3])
+
+    return a(a, b, x, y), lower
+
+
+@intrinsic
+def spread(_typing, lanes, x):
+    """x in all lanes."""
+    kind = _VectorType(lanes.width)
+
+    def lower(context, builder, signature, arguments):
+        value = context.cast(builder, arguments[1], signature.args[1], types.float64)
+        empty = ir.Constant(ir.VectorType(_DOUBLE, kind.width), ir.Undefined)
+        one = builder.insert_element(empty, value, ir.Constant(_SHORT, 0))
+        return builder.shuffle_vector(one, empty, ir.Constant(ir.VectorType(_SHORT, kind.width), [0] * kind.width))
+
+    return kind(lanes, x), lower
+
+
+def _place(context, builder, kind, array, index, vector):
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
+
+
+def _stored(array, width: int) -> tuple[ir.Type, int]:
+    """W values of an array as they lie in memory, and the bytes of one."""
+    single = array.dtype == types.float32
+    return ir.VectorType(_SINGLE if single else _DOUBLE, width), 4 if single else 8
+
+
+@intrinsic
+def load(_typing, lanes, array, index):
+    """W neighbouring values of array (m,), of single or double precision, from index on."""
+    kind = _VectorType(lanes.width)
+
+    def lower(context, builder, signature, arguments):
+        vector, size = _stored(array, kind.width)
+        read = builder.load(_place(context, builder, signature.args[1], arguments[1], arguments[2], vector))
+        read.align = size
+        return read if size == 8 else builder.fpext(read, ir.VectorType(_DOUBLE, kind.width))
+
+    return kind(lanes, array, types.intp), lower
+
+
+@intrinsic
+def store(_typing, array, index, value):
+    """Put a vector to array (m,), of single or double precision, from index on."""
+
+    def lower(context, builder, signature, arguments):
+        vector, size = _stored(array, value.width)
+        stored = arguments[2] if size == 8 else builder.fptrunc(arguments[2], vector)
+        written = builder.store(stored, _place(context, builder, signature.args[0], arguments[0], arguments[1], vector))
+        written.align = size
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, value), lower
+
+
+def _mix(builder, a, b, order):
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_SHORT, len(order)), order))
+
+
+def _transposed(builder, rows):
+    """n vectors of n, n a power of two: swap blocks of 1, 2, 4 ... off the diagonal."""
+    n, block, rows = len(rows), 1, list(rows)
+    while block < n:
+        fresh = list(rows)
+        for i in range(n):
+            if i & block:
+                continue
+            a, b = rows[i], rows[i + block]
+            fresh[i] = _mix(builder, a, b, [k if not k & block else n + k - block for k in range(n)])
+            fresh[i + block] = _mix(builder, a, b, [k + block if not k & block else n + k for k in range(n)])
+        rows, block = fresh, 2 * block
+    return rows
+
+
+def _columns(builder, rows):
+    """8 vectors of the W rows of 8."""
+    w = len(rows)
+    parts = [[_mix(builder, row, row, list(range(first, first + w))) for row in rows] for first in range(0, ROW, w)]
+    return [column for part in parts for column in _transposed(builder, part)]
+
+
+def _rows(builder, columns, w):
+    """W rows of 8 of the 8 vectors."""
+    parts = [_transposed(builder, columns[first : first + w]) for first in range(0, ROW, w)]
+    while len(parts) > 1:
+        parts = [
+            [_mix(builder, a, b, list(range(2 * w))) for a, b in zip(low, high, strict=True)]
+            for low, high in zip(parts[::2], parts[1::2], strict=True)
+        ]
+        w *= 2
+    return parts[0]
+
+
+def _row_place(context, builder, array_type, array, index_type, index, first, lane):
+    number = context.make_array(index_type)(context, builder, index).data
+    number = builder.load(builder.gep(number, [builder.add(first, ir.Constant(first.type, lane))]))
+    start = builder.shl(builder.sext(number, _INDEX), ir.Constant(_INDEX, 3))
+    place = _place(context, builder, array_type, array, start, ir.VectorType(_DOUBLE, ROW))
+    return place
+
+
+@intrinsic
+def gather(_typing, lanes, array, index, first):
+    """The rows index[first:first + W] of array (8 m,), as 8 vectors. index: int32."""
+    kind = types.UniTuple(_VectorType(lanes.width), ROW)
+
+    def lower(context, builder, signature, arguments):
+        _, array_type, index_type, _ = signature.args
+        rows = []
+        for lane in range(lanes.width):
+            row = builder.load(_row_place(context, builder, array_type, arguments[1], index_type, arguments[2], arguments[3], lane))
+            row.align = LINE
+            rows.append(row)
+        return context.make_tuple(builder, kind, _columns(builder, rows))
+
+    return kind(lanes, array, index, types.intp), lower
+
+
+@intrinsic
+def scatter(_typing, array, index, first, columns):
+    """Put 8 vectors to the rows index[first:first + W] of array (8 m,). index: int32."""
+
+    def lower(context, builder, signature, arguments):
+        array_type, index_type, _, kind = signature.args
+        vectors = cgutils.unpack_tuple(builder, arguments[3], ROW)
+        for lane, row in enumerate(_rows(builder, vectors, kind.dtype.width)):
+            place = _row_place(context, builder, array_type, arguments[0], index_type, arguments[1], arguments[2], lane)
+            builder.store(row, place).align = LINE
+        return context.get_dummy_value()
+
+    return types.void(array, index, types.intp, columns), lower

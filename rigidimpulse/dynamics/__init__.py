@@ -1,0 +1,1 @@
+"""From contacts, joints and forces to impulses."""

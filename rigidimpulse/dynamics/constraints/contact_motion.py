@@ -1,0 +1,334 @@
+"""How contacts move: the point where bodies touch wanders over them, and the normal turns.
+
+With r_a, r_b the arms of a contact, n its normal from a to b and u = v_b + w_b x r_b - v_a - w_a x r_a, the relative
+velocity at the place of contact changes, at constant v and w, by
+
+    du/dt = w_b x r_b' - w_a x r_a',        d(u.n)/dt = n.du/dt + u.n'
+
+(' is the time derivative; u.n is the rate of the gap, as the place of contact is where the gap is least). The place of
+contact moves with velocity p' in the world, and r_a' = p' - v_a, r_b' = p' - v_b:
+
+    vertex of b on a face of a      n' = w_a x n,  r_b' = w_b x r_b
+    ball (radius R) of b            the same for its centre:  r_b' = w_b x (r_b + R n) - R n'
+    balls of both                   n' = the velocity of the centres across n over R_a + R_b
+    ball on an edge (direction e)   the same across e;  n'.e = -n.(w x e), as n stays across the edge
+    edges that cross                n'.e_a = -n.(w_a x e_a),  n'.e_b = -n.(w_b x e_b); the place runs along both
+    cylinder b (radius R, axis k)   on a face of a: r_b = c - R e, e = (n - z k) / s, z = n.k, s^2 = 1 - z^2;  r_b' = w_b x c - R e'
+
+and mirrored. The rates |r'| / |r| and |n'| say how long a force along these arms stays right.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
+from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND
+from rigidimpulse.core.copying import copy_vector
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+
+# The point of a round cylinder that is nearest to a face is the one found, or one found a moment ago: it is that near to it,
+# relative to the radius. Where normal and axis are nearer than this sine there is none.
+NEAR = 0.3
+LEAST_LEAN = 1e-3
+# Cosine of normal and axis below which a cylinder that is not touched at a rim is touched at its side.
+ON_ITS_SIDE = 0.7
+# Sine of the angle of two edges below which they count as parallel: the place of contact would run along them too fast to follow.
+PARALLEL = 0.05
+# Cosine of normal and axis of a cylinder, or one less it, that is none.
+ALIGNED = 1e-9
+POINT, LINE, FACE, UNKNOWN = np.arange(4)
+
+
+@jit
+def _cross(a, b, out):
+    """out = a x b."""
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+
+
+@jit
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@jit
+def _rotated(rotation, x, out):
+    for i in range(3):
+        out[i] = rotation[i, 0] * x[0] + rotation[i, 1] * x[1] + rotation[i, 2] * x[2]
+
+
+@jit
+def _owner(first, index):
+    """Place of the range of `first` that an index lies in."""
+    low, high = 0, first.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if first[middle] <= index:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@jit
+def only_primitive(geometry, shape):
+    """The only primitive of a shape, or -1."""
+    p = geometry.shape_first[shape]
+    return p if geometry.shape_first[shape + 1] == p + 1 else -1
+
+
+@jit_making_arrays
+def side_radius(geometry, p, rotation, normal):
+    """Radius of a cylinder (the only primitive of its shape) that is touched at its side, or of a ball; else 0."""
+    if p < 0 or geometry.kind[p] == HALF_SPACE:
+        return 0.0
+    if geometry.kind[p] == CYLINDER:
+        k = np.empty(3)
+        _rotated(rotation, geometry.frame[p, 3:6], k)
+        return geometry.radius[p] if abs(_dot(normal, k)) < ON_ITS_SIDE else 0.0
+    return geometry.radius[p] if geometry.kind[p] == ROUND else 0.0
+
+
+@jit_making_arrays
+def _edge_direction(geometry, edge, rotation, direction):
+    """Unit direction (3,) of an edge in the world."""
+    tail, head, d = geometry.vertex[geometry.edge[edge, 0]], geometry.vertex[geometry.edge[edge, 1]], np.empty(3)
+    length = 0.0
+    for k in range(3):
+        d[k] = head[k] - tail[k]
+        length += d[k] * d[k]
+    _rotated(rotation, d, direction)
+    for k in range(3):
+        direction[k] /= sqrt(length)
+
+
+@jit_making_arrays
+def _cylinder_core(geometry, p, rotation, normal, direction):
+    """A cylinder is a face at its caps, a line with its radius at its side, and at its rims the line along them."""
+    axis = np.empty(3)
+    _rotated(rotation, geometry.frame[p, 3:6], axis)
+    along = _dot(normal, axis)
+    if 1.0 - abs(along) < ALIGNED:
+        return 0.0, FACE
+    if abs(along) < ALIGNED:
+        copy_vector(axis, direction)
+        return geometry.radius[p], LINE
+    _cross(axis, normal, direction)
+    size = sqrt(_dot(direction, direction))
+    for k in range(3):
+        direction[k] /= size
+    return 0.0, LINE
+
+
+@jit
+def _core(geometry, p, kind, feature, is_a, rotation, normal, direction):
+    """What a body (of the single primitive p, or -1) is at a contact: its radius, and POINT, LINE (unit direction (3,)) or FACE.
+
+    UNKNOWN where a pair was stopped by its sweep alone, and for cylinders that are parts of a body.
+    """
+    if feature < 0 or (kind > HALF_SPACE_CONTACT and p < 0):
+        return 0.0, UNKNOWN
+    if kind > HALF_SPACE_CONTACT:
+        if geometry.kind[p] == CYLINDER:
+            return _cylinder_core(geometry, p, rotation, normal, direction)
+        which, feature = feature % 3, feature // 3
+        if geometry.radius[p] > 0.0:
+            return geometry.radius[p], POINT
+        point, line = which == 0, which == 1
+    else:
+        point = kind == HALF_SPACE_CONTACT or (kind == VERTEX_FACE and is_a) or (kind == FACE_VERTEX and not is_a)
+        line = kind == EDGE_EDGE
+        if kind == CORNER:
+            point, line = feature % 2 == 0, feature % 2 == 1
+            feature = feature // 2
+    if point:
+        return geometry.radius[_owner(geometry.vertex_first, feature)], POINT
+    if not line:
+        return geometry.radius[_owner(geometry.triangle_first, feature)], FACE
+    _edge_direction(geometry, feature, rotation, direction)
+    return geometry.radius[_owner(geometry.edge_first, feature)], LINE
+
+
+@jit_making_arrays
+def _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, w, out):
+    """r' of a point of a round cylinder, at a rim or on its side, into out. False where it is touched elsewhere.
+
+    arm (3,): from the centre of mass; outward (3,): from the partner to the body.
+    """
+    k, centre = np.empty(3), np.empty(3)
+    _rotated(rotation, geometry.frame[p, 3:6], k)
+    _rotated(rotation, geometry.frame[p, 0:3], centre)
+    radius, along = geometry.radius[p], 0.0
+    for i in range(3):
+        along += (arm[i] - centre[i]) * k[i]
+    z = _dot(outward, k)
+    s2 = 1.0 - z * z
+    if s2 < LEAST_LEAN * LEAST_LEAN:
+        return False
+    s, off = sqrt(s2), 0.0
+    c = centre
+    for i in range(3):
+        c[i] += along * k[i]
+        off += (arm[i] - c[i] + radius * (outward[i] - z * k[i]) / s) ** 2
+    if off > (NEAR * radius) ** 2:
+        return False
+    k_rate = np.empty(3)
+    _cross(w, k, k_rate)
+    _cross(w, c, out)
+    z_rate = _dot(outward_rate, k) + _dot(outward, k_rate)
+    for i in range(3):
+        e_rate = (outward_rate[i] - z_rate * k[i] - z * k_rate[i]) / s + (outward[i] - z * k[i]) * z * z_rate / (s * s2)
+        out[i] -= radius * e_rate
+    return True
+
+
+@jit
+def _centre_velocity(bodies, i, arm, n, radius, out):
+    """Velocity of the point of body i at arm + radius n, into out."""
+    w, v = bodies.angular_velocity[i], bodies.velocity[i]
+    x, y, z = arm[0] + radius * n[0], arm[1] + radius * n[1], arm[2] + radius * n[2]
+    out[0] = v[0] + w[1] * z - w[2] * y
+    out[1] = v[1] + w[2] * x - w[0] * z
+    out[2] = v[2] + w[0] * y - w[1] * x
+
+
+@jit
+def _on_face(geometry, p, rotation, bodies, i, arm, core_velocity, radius, outward, outward_rate, place):
+    """p' of the place where body i (of the single primitive p, or -1) touches a face that carries the normal.
+
+    outward (3,): from the face to the body, outward_rate (3,) its rate; core_velocity (3,): of the centre of the rounding.
+    """
+    if p >= 0 and geometry.kind[p] == CYLINDER:
+        if _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, bodies.angular_velocity[i], place):
+            for k in range(3):
+                place[k] += bodies.velocity[i, k]
+            return
+    for k in range(3):
+        place[k] = core_velocity[k] - radius * outward_rate[k]
+
+
+@jit_making_arrays
+def _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
+    """Two crossing lines: n' turns with both, and their crossing runs along both. False if they are parallel."""
+    x = np.empty(3)
+    cosine = _dot(ea, eb)
+    determinant = 1.0 - cosine * cosine
+    if determinant < PARALLEL * PARALLEL:
+        return False
+    _cross(wa, ea, x)
+    ca = -_dot(n, x)
+    _cross(wb, eb, x)
+    cb = -_dot(n, x)
+    alpha, beta = (ca - cosine * cb) / determinant, (cb - cosine * ca) / determinant
+    across = _dot(vb, n) - _dot(va, n)
+    for k in range(3):
+        normal_rate[k] = alpha * ea[k] + beta * eb[k]
+        # The part of the relative velocity of the lines' points that they have to run for.
+        x[k] = vb[k] - va[k] - across * n[k] - distance * normal_rate[k]
+    run = (_dot(x, ea) - cosine * _dot(x, eb)) / determinant
+    for k in range(3):
+        place[k] = va[k] + run * ea[k] + ra * normal_rate[k]
+    return True
+
+
+@jit_making_arrays
+def _between_cores(bodies, a, b, core_a, core_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate):
+    """Points and lines with a rounding."""
+    wa, wb, x = bodies.angular_velocity[a], bodies.angular_velocity[b], np.empty(3)
+    if core_a == LINE and core_b == LINE and _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
+        return
+    across = _dot(vb, n) - _dot(va, n)
+    for k in range(3):
+        normal_rate[k] = (vb[k] - va[k] - across * n[k]) / distance
+    if core_a == LINE or core_b == LINE:
+        e = ea if core_a == LINE else eb
+        _cross(wa if core_a == LINE else wb, e, x)
+        change = -_dot(n, x) - _dot(normal_rate, e)
+        for k in range(3):
+            normal_rate[k] += change * e[k]
+    for k in range(3):
+        place[k] = va[k] + ra * normal_rate[k] if core_a == POINT else vb[k] - rb * normal_rate[k]
+
+
+@jit_making_arrays
+def _place_velocity(geometry, shape_of_body, rotation, bodies, contacts, c, kind, feature_a, feature_b, place, normal_rate):
+    """p' and n' of contact c, into place and normal_rate."""
+    a, b, n = contacts.body_a[c], contacts.body_b[c], contacts.normal[c]
+    pa, pb = only_primitive(geometry, shape_of_body[a]), only_primitive(geometry, shape_of_body[b])
+    ea, eb, va, vb, outward_rate = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    flat_a = pa >= 0 and geometry.kind[pa] == HALF_SPACE
+    flat_b = pb >= 0 and geometry.kind[pb] == HALF_SPACE
+    ra, core_a = (0.0, FACE) if flat_a else _core(geometry, pa, kind, feature_a, True, rotation[a], n, ea)
+    rb, core_b = (0.0, FACE) if flat_b else _core(geometry, pb, kind, feature_b, False, rotation[b], n, eb)
+    _centre_velocity(bodies, a, contacts.arm_a[c], n, -ra, va)
+    _centre_velocity(bodies, b, contacts.arm_b[c], n, rb, vb)
+    distance = ra + rb + contacts.gap[c]
+    if core_a == FACE:
+        _cross(bodies.angular_velocity[a], n, normal_rate)
+        _on_face(geometry, pb, rotation[b], bodies, b, contacts.arm_b[c], vb, rb, n, normal_rate, place)
+    elif core_b == FACE:
+        _cross(bodies.angular_velocity[b], n, normal_rate)
+        for k in range(3):
+            outward_rate[k] = -normal_rate[k]
+        _on_face(geometry, pa, rotation[a], bodies, a, contacts.arm_a[c], va, ra, -n, outward_rate, place)
+    elif ra + rb > 0.0 and core_a != UNKNOWN and core_b != UNKNOWN:
+        _between_cores(bodies, a, b, core_a, core_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate)
+    elif not (
+        core_a == LINE and core_b == LINE
+        and _between_lines(va, vb, bodies.angular_velocity[a], bodies.angular_velocity[b], ea, eb, n, distance, ra, place, normal_rate)
+    ):
+        # Sharp corners: half of both.
+        _cross(0.5 * (bodies.angular_velocity[a] + bodies.angular_velocity[b]), n, normal_rate)
+        for k in range(3):
+            place[k] = 0.5 * (va[k] + vb[k])
+
+
+class Motion(NamedTuple):
+    """How m contacts move."""
+
+    turning: np.ndarray
+    """(m, 3) m/s2: du/dt across the normal and d(u.n)/dt along it, at constant velocities"""
+    arm_rate_a: np.ndarray  # (m, 3) m/s
+    arm_rate_b: np.ndarray
+    normal_rate: np.ndarray  # (m, 3) 1/s
+    fastest: float
+    """rad/s, at which the fastest arm or normal turns"""
+
+
+@jit_making_arrays
+def contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, features):
+    """The `Motion` of m contacts; kinds (m,) and features (m, 2) as `detect.features` has them."""
+    m = contacts.gap.shape[0]
+    turning, fastest = np.zeros((m, 3)), 0.0
+    rate_a, rate_b, normal_rate = np.empty((m, 3)), np.empty((m, 3)), np.empty((m, 3))
+    place, u, x = np.empty(3), np.empty(3), np.empty(3)
+    for c in range(m):
+        n = contacts.normal[c]
+        _place_velocity(
+            geometry, shape_of_body, rotation, bodies, contacts, c, kinds[c], features[c, 0], features[c, 1], place,
+            normal_rate[c],
+        )
+        u[:] = 0.0
+        for side in range(2):
+            i = contacts.body_b[c] if side else contacts.body_a[c]
+            r = contacts.arm_b[c] if side else contacts.arm_a[c]
+            arm_rate = rate_b[c] if side else rate_a[c]
+            sign, w = 2.0 * side - 1.0, bodies.angular_velocity[i]
+            for k in range(3):
+                arm_rate[k] = place[k] - bodies.velocity[i, k]
+            _cross(w, arm_rate, x)
+            for k in range(3):
+                turning[c, k] += sign * x[k]
+            _cross(w, r, x)
+            for k in range(3):
+                u[k] += sign * (bodies.velocity[i, k] + x[k])
+            if bodies.inv_mass[i] > 0.0:
+                fastest = max(fastest, sqrt(_dot(arm_rate, arm_rate) / max(_dot(r, r), 1e-300)))
+        along = _dot(u, normal_rate[c])
+        for k in range(3):
+            turning[c, k] += along * n[k]
+        fastest = max(fastest, sqrt(_dot(normal_rate[c], normal_rate[c])))
+    return Motion(turning, rate_a, rate_b, normal_rate, fastest)

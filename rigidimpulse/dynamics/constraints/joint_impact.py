@@ -1,0 +1,90 @@
+"""Joints at an impact: they hold while impulses act, so their rows take part in every block of impulses."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.dynamics.constraints.joint import is_linear, joint_rows, relative_point_velocity
+from rigidimpulse.dynamics.constraints.joint_limits import is_reached, limit_side
+from rigidimpulse.dynamics.constraints.rows import BOUNDED, Rows, change_velocities, make_rows
+from rigidimpulse.dynamics.solvers.newton import solve_newton
+
+# Residual asked of the solver, relative to the fastest rate.
+SOLVE_TOLERANCE = 1e-12
+
+
+class JointBlock(NamedTuple):
+    """Rows of the joints of a group at an impact."""
+
+    members: np.ndarray  # (n,) movable bodies of the group
+    rows: Rows
+    joint: np.ndarray  # (s,) joint of each row
+    direction: np.ndarray  # (s, 3) of the force on b; zeros for rows that turn
+    moment: np.ndarray  # (j, 3) N s on b by joint, added to
+
+
+@jit_making_arrays
+def impact_rows(joints, which, bodies, rotation, members, number, memory, allowed, moment):
+    """The `JointBlock` of the joints listed in `which`: hard rows hold, limits that are reached stop, soft rows are too slow.
+
+    allowed: closing error, m or rad.
+    """
+    for k in range(members.shape[0]):
+        number[members[k]] = k
+    count = np.int64(0)
+    for j in which:
+        count += joints.first[j + 1] - joints.first[j]
+    rows, value, direction, joint = make_rows(count), np.empty(count), np.empty((count, 3)), np.empty(count, np.int64)
+    joint_rows(joints, which, bodies, rotation, number, memory.angle, rows, np.int64(0), value, direction)
+    i = 0
+    for j in which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            joint[i] = j
+            if not is_linear(joints.coordinate[k]):
+                direction[i] = 0.0
+            if rows.kind[i] == BOUNDED or joints.stiffness[k] < np.inf:
+                rows.kind[i] = BOUNDED
+                holds = joints.stiffness[k] == np.inf and (memory.active[k] or is_reached(joints, k, value[i], allowed))
+                rows.lower[i] = -np.inf if holds and joints.lower[k] < 0.0 else 0.0
+                rows.upper[i] = np.inf if holds and joints.upper[k] > 0.0 else 0.0
+            i += 1
+    return JointBlock(members, rows, joint, direction, moment)
+
+
+@jit_making_arrays
+def fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows):
+    """Rates of all rows, to their bias; returns the fastest approach to a hard limit that is reached, m/s or rad/s."""
+    count = rows.bias.shape[0]
+    again, value, direction = make_rows(count), np.empty(count), np.empty((count, 3))
+    joint_rows(joints, which, bodies, rotation, number, memory.angle, again, np.int64(0), value, direction)
+    relative_point_velocity(joints, which, bodies, rotation, direction, rows.bias)
+    fastest, i = 0.0, 0
+    for j in which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            if joints.stiffness[k] == np.inf and is_reached(joints, k, value[i], allowed):
+                fastest = max(fastest, -limit_side(joints, k) * rows.bias[i])
+            i += 1
+    return fastest
+
+
+def stop_at_limits(joints, which, bodies, rotation, members, number, memory, allowed: float, moment) -> None:
+    """Impacts without rebound on the hard limits that are reached; arguments as of `impact_rows`."""
+    block = impact_rows(joints, which, bodies, rotation, members, number, memory, allowed, moment)
+    rows = block.rows
+    if fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows) > 0.0:
+        solve_newton(rows, len(members), SOLVE_TOLERANCE * float(np.abs(rows.bias).max()))
+        change_velocities(bodies, members, rows)
+        add_moments(block, rows.impulse)
+
+
+def copy_rows(source: Rows, rows: Rows, start: int) -> None:
+    """Copy rows without masters to the places from `start` on."""
+    for name in ("first", "second", "kind", "jacobian", "lower", "upper"):
+        getattr(rows, name)[start:] = getattr(source, name)
+
+
+def add_moments(joints: JointBlock, impulse: np.ndarray) -> None:
+    """Add the joints' part of the impulses (r,) of a block to their moments; their rows are the last ones."""
+    last = impulse[len(impulse) - len(joints.joint) :]
+    np.add.at(joints.moment, joints.joint, last[:, None] * joints.direction)

@@ -1,0 +1,337 @@
+"""Bodies under forces that vary.
+
+Where bodies touch nothing and no joint holds them, a step under their forces is one of Nystroem's (`integrate.force_step`), as long as its
+error allows. Where contacts or joints hold them, forces are constant over a sub-step of length h, that of its middle:
+
+    F = F(t + h/2, x(h/2), v(h/2)),    x, v: flown under what accelerated the body last, contacts included
+
+which is of second order in h as contact forces are, and leaves a body that stands still where it is. The sub-step is so short that the
+path is off by no more than is allowed,  |F(h/2) - F| h^2 / (6 m),  F at both ends.
+
+Where forces begin and end with places (`ForceTable.switches`), a step is flown with those that act at its start and ends, to round-off of
+time, where others do, looked for by bisection along its course: so the steps stay of their order. Steps of one length
+(`Accuracy.integrator`) do nothing of the kind.
+
+What each force did, impulse, angular impulse about the world's origin and work, is the integral of its line along the very course.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.dynamics.forces.force import ForceTable, Instant
+from rigidimpulse.dynamics.forces.force_log import ForceLog, ForceWork
+from rigidimpulse.dynamics.forces.mass_flow import BurningForces, MassFlow
+from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.motion.force_step import Lines, Room, nystroem, semi_implicit
+
+IN_FLIGHT, IN_CONTACT = 0.03, 3.0
+"""How far a path may be off, relative to the size, or in rad of turn: in roots of the accuracy's tolerance, inside a step of bodies that
+fly and for each step of the run of those in contact. 1e-8 and 1e-6 by default."""
+SHORTEST = 2.0**-14
+"""Part of the run's step below which it is not split for forces."""
+FIRST = 2.0**-6
+"""Part of the run's step that the first sub-step of bodies takes that have just come to be held."""
+SAFETY, LEAST_CHANGE, MOST_CHANGE = 0.9, 0.2, 5.0
+"""How step lengths follow errors."""
+ASIDE = 1e-9
+"""Part of a step by which forces are taken inside of its ends: where they jump the step's own side counts."""
+
+SWITCHED, LEAST_PIECE, MOST_SWITCHES = 1e-9, 1e-13, 20
+"""Part of a step by which it may end off a switch of forces; part of the run's step to which switches are found; how many in a step."""
+
+
+class VaryingForces:
+    """The varying forces of a run.
+
+    Attributes:
+        acts: (n,) bool, bodies that feel them.
+        value, rate: (n, 6) force and torque on bodies at the start of their courses, and how they change a second.
+        flow: masses that change, if there are any. log: what each force did.
+
+    """
+
+    def __init__(self, world, course, times: np.ndarray, clocks) -> None:
+        """clocks: lines of the plan by kind, which get the time that forces take; times (f,) s of the frames.
+
+        Raises SceneError for forces of one name.
+        """
+        n = world.num_bodies
+        self._world = world
+        self._tables: list[ForceTable] = world.force_tables
+        self._clocks = [clocks[table.kind] for table in self._tables]
+        self._first = np.cumsum([0, *(len(table.body) for table in self._tables)])
+        self._body = np.concatenate([table.body for table in self._tables])
+        self._always = np.zeros(n, bool)
+        for table in self._tables:
+            self._always[table.body] |= not table.comes_and_goes
+        self.acts = self._always.copy()
+        self._component = _components(n, np.concatenate([table.links for table in self._tables]))
+        self._restless = np.zeros(n, bool)
+        for table in self._tables:
+            self._restless[table.body] |= not table.is_steady
+        self._course = course
+        self._room = Room(course, world.inv_mass)
+        self._longest = np.full(n, world.accuracy.step)
+        for table in self._tables:
+            np.minimum.at(self._longest, table.body, table.longest_steps())
+        self._plan = self._longest.copy()
+        self._in_flight, self._in_contact = IN_FLIGHT * world.accuracy.tolerance**0.5, IN_CONTACT * world.accuracy.tolerance**0.5
+        self._size = np.minimum(world.bound_radius, world.size)
+        self._switching = [table for table in self._tables if table.switches]
+        self._cut = 0.0
+        burners = [table for table in self._tables if isinstance(table, BurningForces)]
+        self.flow = MassFlow(burners, world, course) if burners else None
+        self._last, self._held_until, self._was_held = np.zeros((n, 6)), np.full(n, -np.inf), np.zeros(n, bool)
+        self.value, self.rate = np.zeros((n, 6)), np.zeros((n, 6))
+        self.log = ForceLog(times, self._body, course)
+
+    def partners(self, bodies: np.ndarray) -> np.ndarray:
+        """All bodies that a force ties to the given ones, themselves included where forces act on them."""
+        bodies = bodies[self.acts[bodies]]
+        return np.flatnonzero(self.acts & np.isin(self._component, self._component[bodies])) if len(bodies) else bodies
+
+    def ties(self, bodies: np.ndarray) -> list[tuple[int, int]]:
+        """Pairs of the given bodies such that those tied by forces hang together."""
+        first: dict[int, int] = {}
+        return [(first.setdefault(int(self._component[i]), int(i)), int(i)) for i in bodies if self.acts[i]]
+
+    def let_act(self, bodies: np.ndarray) -> None:
+        """From now on forces that come and go act on these bodies, (n,) bool, and on no others."""
+        self.acts = self._always | bodies
+
+    def present(self, table: ForceTable, time: float) -> np.ndarray:
+        """Wrenches (k, 6) of the rows of a table as courses have them at `time`, which lies in all of them."""
+        first = self._first[self._tables.index(table)]
+        return self.log.wrench(np.arange(first, first + len(table.body)), table.body, time)
+
+    def may_rest(self, bodies: np.ndarray) -> bool:
+        """Whether the forces on bodies at rest stay as they are."""
+        return not self._restless[bodies].any()
+
+    def fly(self, context, members: np.ndarray, time: float, end: float) -> np.ndarray:
+        """Forces on members that nothing holds, from `time` to `end` at most, into `value` and `rate`; returns for how long, (m,) s."""
+        state, now = context.state, context.state.now
+        rest = min(end, self._next_break(time)) - time
+        if rest <= 0.0:  # the end of the run
+            return np.zeros(len(members))
+        if self._world.accuracy.integrator != "exact":
+            return self._fly_one_length(members, time, min(rest, self._world.accuracy.step), state)
+        for table in self._switching:
+            table.freeze(Instant(np.full(len(self.acts), time), now, state.rotation, self._course))
+        switches = 0
+        h = np.zeros(len(self.acts))
+        h[members] = _pieces(rest, self._together(members, self._plan[members], np.minimum))
+        shortest = SHORTEST * self._world.accuracy.step
+        todo, cut = members, False
+        while len(todo):
+            first = self._start(context, time, h, todo)
+
+            def evaluate(share: float, bodies, rotation, todo=todo):
+                return self._evaluate(time + h * min(share, 1.0 - ASIDE), todo, bodies, rotation)
+
+            rows, sums = nystroem(evaluate, self._room, first, todo, h, now, self._world.steady_acceleration)
+            share = 1.0 if cut else self._share_until_break(rows)
+            if share < 1.0:
+                cut, h[todo] = True, np.maximum(share * h[todo], shortest)
+                continue
+            error = self._errors(now, todo, sums.off, h[todo], 1.0 / 12.0) / self._in_flight
+            error = self._together(todo, error, np.maximum)
+            grow = np.clip(SAFETY * np.maximum(error, 1e-30) ** -0.25, LEAST_CHANGE, MOST_CHANGE)
+            done = (error <= 1.0) | (h[todo] <= shortest)
+            if self._switching and done.all() and switches < MOST_SWITCHES:
+                part, switches = self._switch(time, todo, now, sums, h), switches + 1
+                if part < 1.0:
+                    h[todo] *= part
+                    continue
+            ready = todo[done]
+            follows = np.where(h[ready] < self._plan[ready], np.maximum(self._plan[ready], h[ready] * grow[done]), h[ready] * grow[done])
+            self._plan[ready] = np.clip(follows, shortest, self._longest[ready])
+            self._keep(ready, time, rows, sums, h)
+            self._report(context, time, ready[error[done] > 1.0], self._in_flight)
+            todo, again = todo[~done], grow[~done]
+            h[todo] = self._plan[todo] = _pieces(rest, np.maximum(h[todo] * again, shortest))
+        for table in self._switching:
+            table.freeze(None)
+        self._cut = float(h[members[0]]) if switches > 1 else 0.0
+        return h[members]
+
+    def _fly_one_length(self, members: np.ndarray, time: float, length: float, state) -> np.ndarray:
+        """The same in one step of a length, s, whatever its error."""
+        h = np.zeros(len(self.acts))
+        h[members] = length
+
+        def evaluate(share: float, bodies, rotation):
+            return self._evaluate(time + h * min(max(share, ASIDE), 1.0 - ASIDE), members, bodies, rotation)
+
+        first = evaluate(0.0, state.now, state.rotation)
+        if self._world.accuracy.integrator == "semi_implicit":
+            rows, sums = semi_implicit(first)
+        else:
+            rows, sums = nystroem(evaluate, self._room, first, members, h, state.now, self._world.steady_acceleration)
+        self._keep(members, time, rows, sums, h)
+        return h[members]
+
+    def _switch(self, time: float, members: np.ndarray, now, sums: Lines, h: np.ndarray) -> float:
+        """Part of a step of h (n,) s, the same for all members, after which other forces act; 1 if that is its end, or never."""
+        room, length = self._room, float(h[members[0]])
+        room.follow(members, now, self._world.steady_acceleration, sums.value, sums.change / length)
+
+        def differ(part: float) -> bool:
+            room.look(members, part * length)
+            at = Instant(np.full(len(self.acts), time + part * length), room.bodies, room.rotation, self._course)
+            return any(table.switched(at) for table in self._switching)
+
+        if not differ(1.0):
+            return 1.0
+        # Forces that rise from nothing may come and go by round-off: pieces that follow each other grow, so that time goes on.
+        step = self._world.accuracy.step
+        least = max(LEAST_PIECE * step, 4.0 * np.spacing(time), min(2.0 * self._cut, SHORTEST * step)) / length
+        low, high = 0.0, 1.0
+        while high - low > least:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if differ(middle) else (middle, high)
+        return 1.0 if high >= 1.0 - SWITCHED else max(high, least)
+
+    def load(self, context, group, h: float) -> float:
+        """Forces on a group that contacts or joints hold, over h s at most, into the accelerations and `value`; returns for how long."""
+        state, now, world = context.state, context.state.now, self._world
+        members = group.members[self.acts[group.members]]
+        time, step = group.time, world.accuracy.step
+        plan = float(self._plan[members].min())
+        if not group.loaded:
+            self._was_held[members] = self._held_until[members] >= time - ASIDE * step
+        if not self._was_held[members].any():
+            # Nobody knows yet what contacts and joints do: forces that answer the fall would throw what has just landed.
+            h = min(h, FIRST * step)
+        given = h = min(h, self._next_break(time) - time, plan)
+        _, start = self._start(context, time, np.full(len(self.acts), h), members)
+        if not group.loaded:
+            pull = (state.course.acceleration[members] - world.steady_acceleration[members]) * world.mass[members, None]
+            self._last[members] = np.hstack([pull, state.course.torque[members]])
+        # Held bodies go on under the sum of what acted last: contacts and joints of the last sub-step beside forces of this one would not
+        # balance each other, and what damps along a held direction would make that grow.
+        last = np.where(self._was_held[:, None], self._last, start)
+        while True:
+            if self.flow is not None:
+                # What holds the members feels all their masses: those of the middle.
+                self.flow.weigh(members, time + 0.5 * h)
+                refresh_pose(members, now, state.rotation, state.course.inertia)
+            half = np.full(len(self.acts), 0.5 * h)
+            self._room.fly(members, half, now, world.steady_acceleration, last)
+            value, total = self._evaluate(time + half, members, self._room.bodies, self._room.rotation)
+            self._room.fly(members, 2.0 * half, now, world.steady_acceleration, last)
+            _, end = self._evaluate(time + 2.0 * (1.0 - ASIDE) * half, members, self._room.bodies, self._room.rotation)
+            # On both sides of the middle: a path that turns comes back to its force.
+            sides = [self._errors(now, members, total - f, 2.0 * half[members], 1.0 / 6.0).max() for f in (start, end)]
+            error = max(sides) / (self._in_contact * h / step)
+            grow = min(max(SAFETY * max(error, 1e-30) ** -0.5, LEAST_CHANGE), MOST_CHANGE)
+            if error <= 1.0 or h <= SHORTEST * step:
+                break
+            h = max(h * grow, SHORTEST * step)
+        if np.any(still := ~np.any(now.velocity[members], axis=1) & ~np.any(now.angular_velocity[members], axis=1)):
+            # What stands and rests bears the forces of where it is, not of where it would fall to without contacts.
+            self._room.fly(members, half, now, world.steady_acceleration, last)
+            self._room.stay(members[still], now, state.rotation)
+            value, total = self._evaluate(time + half, members, self._room.bodies, self._room.rotation)
+        if error > 1.0:
+            self._report(context, time, members, self._in_contact)
+        # Where others made it shorter, what was planned still holds.
+        follows = max(plan, h * grow) if h == given < plan and error <= 1.0 else h * grow
+        self._plan[members] = np.minimum(follows, self._longest[members])
+        rows, sums = (Lines(f, np.zeros_like(f), np.zeros_like(f)) for f in (value, total))
+        self._keep(members, time, rows, sums, np.full(len(self.acts), h))
+        self._held_until[members] = time + h
+        group.loaded = True
+        context.acceleration[members] = group.free[0][self.acts[group.members]] + now.inv_mass[members, None] * total[members, :3]
+        turned = np.einsum("ijk,ik->ij", now.inv_inertia[members], total[members, 3:])
+        context.angular_acceleration[members] = group.free[1][self.acts[group.members]] + turned
+        return h
+
+    def _start(self, context, time: float, h: np.ndarray, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces at the start of steps of h (n,) s, without those that give way there."""
+        state = context.state
+        forces = self._evaluate(time + ASIDE * h, members, state.now, state.rotation)
+        gone = False
+        for table, first in zip(self._tables, self._first[:-1], strict=True):
+            for k in table.give_way(forces[0][first : first + len(table.body)], time):
+                bodies = tuple(self._world.names[i] for i in table.body[table.cause == k])
+                context.log.note(time, "force ended", bodies, f"{table.names[k]} exceeded its greatest force")
+                gone = True
+        return self._evaluate(time + ASIDE * h, members, state.now, state.rotation) if gone else forces
+
+    def _share_until_break(self, rows: Lines) -> float:
+        """Share of a step after which a force gives way, 1 if none does."""
+        parts = zip(self._tables, self._first[:-1], self._first[1:], strict=True)
+        return min(table.share_until_break(rows.value[i:j], rows.change[i:j]) for table, i, j in parts)
+
+    def _evaluate(self, time: np.ndarray, members: np.ndarray, bodies, rotation) -> tuple[np.ndarray, np.ndarray]:
+        """Forces of all rows (k, 6), 0 for those of other bodies, and their sums (n, 6) on bodies of the mass of now; time (n,) s."""
+        value, asked = np.zeros((len(self._body), 6)), np.zeros(len(self.acts), bool)
+        asked[members] = True
+        at = Instant(time, bodies, rotation, self._course)
+        for table, first, clock in zip(self._tables, self._first[:-1], self._clocks, strict=True):
+            rows = np.flatnonzero(asked[table.body])
+            if len(rows):
+                with clock():
+                    value[first + rows] = table.wrench(at, rows)
+        total = np.zeros((len(self.acts), 6))
+        np.add.at(total, self._body, value)
+        return value, total if self.flow is None else total * self.flow.since_weighed(time)[:, None]
+
+    def _errors(self, bodies, members: np.ndarray, off: np.ndarray, h: np.ndarray, part: float) -> np.ndarray:
+        """Errors (m,) of the members' poses by wrenches that are off by (n, 6) over h (m,) s, relative to the size."""
+        square = part * h**2
+        moved = square * bodies.inv_mass[members] * np.linalg.norm(off[members, :3], axis=1) / self._size[members]
+        turned = square * np.linalg.norm(np.einsum("ijk,ik->ij", bodies.inv_inertia[members], off[members, 3:]), axis=1)
+        return np.maximum(moved, turned)
+
+    def _together(self, members: np.ndarray, values: np.ndarray, best) -> np.ndarray:
+        """The least or the largest (best) of the values (m,) of all members that forces tie, for each of them."""
+        _, first, label = np.unique(self._component[members], return_index=True, return_inverse=True)
+        common = values[first].copy()
+        best.at(common, label, values)
+        return common[label]
+
+    def _keep(self, members: np.ndarray, time: float, rows: Lines, sums: Lines, h: np.ndarray) -> None:
+        """From `time` on these lines act on members, for h (n,) s."""
+        self.value[members] = sums.value[members]
+        self.rate[members] = sums.change[members] / h[members, None]
+        self.log.begin(members, time, rows.value, rows.change, h)
+
+    def finish(self, world, times: np.ndarray, recorder) -> ForceWork:
+        """What the forces did until the frames, and their potential energy there."""
+        self.log.finish()
+        starts = np.cumsum([0, *(len(table.names) for table in self._tables)])[:-1]
+        names = [name for table in self._tables for name in table.names]
+        cause = np.concatenate([first + table.cause for first, table in zip(starts, self._tables, strict=True)])
+        potential = [table.potential(times, recorder.position, recorder.orientation) for table in self._tables]
+        share = None if self.flow is None else self.flow.shares_at(times)
+        return ForceWork(names, self._body, cause, self.log.at_frames, np.concatenate(potential, axis=1), share)
+
+    def _next_break(self, time: float) -> float:
+        return min(table.next_break(time * (1.0 + 1e-12) + 1e-300) for table in self._tables)
+
+    def _report(self, context, time: float, bodies: np.ndarray, allowed: float) -> None:
+        for i in bodies.tolist():
+            context.log.report(
+                time, "forces change too fast", (self._world.names[i],),
+                f"the path may be off by more than {allowed:.1g} of the size in a step; use a smaller step or soften the force",
+            )
+
+
+def _pieces(rest: float, h):
+    """Lengths of equal pieces of the rest that are not longer than h, so that nothing short is left at the end."""
+    return rest / np.maximum(np.ceil(rest / h * (1.0 - 1e-9)), 1.0)
+
+
+def _components(n: int, links: np.ndarray) -> np.ndarray:
+    """Label (n,) of each body: that of the first one it is linked with."""
+    label = np.arange(n)
+    changed = True
+    while changed:
+        least = label.copy()
+        for a, b in links:
+            least[a] = least[b] = min(least[a], least[b])
+        changed, label = bool(np.any(least != label)), least
+    return label

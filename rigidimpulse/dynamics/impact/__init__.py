@@ -1,0 +1,1 @@
+"""What an impact does to velocities."""

@@ -1,0 +1,1 @@
+"""The penalty method: springs push bodies out of each other."""

@@ -1,0 +1,172 @@
+"""Points of bodies that are inside others, with the way out: what the penalty method pushes at.
+
+    half space, n.x <= o, and a corner p of radius r:     d = o + r - n.p,        out along n
+    spheres and capsules:  closest points p, q of axes:   d = r_a + r_b - |q - p|, out along q - p
+    corner p of radius r and a surface of triangles:      d = r + s,               out along the way from p to the nearest surface point
+    edges that cross, p and q where their lines are nearest:  d = (p - q).n,       out along n = +- e_a x e_b, out of both edges' wedges
+
+s is the depth of p in the solid, negative outside. A box, hull or mesh has its corners for points (radius 0), a sphere its centre, a
+capsule the two ends of its axis, and where a corner of a surface comes at the middle of its axis that one. Each point has its own spring,
+and both bodies are pushed along the same line.
+
+The nearest surface point of a corner is looked for on faces that push it back into its own body (n.m > 0, m the mean direction of its
+edges): the corners of a box that stands flush on another would else leave by its side. Whether a point is inside is asked a little way,
+NUDGE of the edges' length, inside of its own body: flush corners do not come and go. Edges much deeper than the corners of the pair, or
+than its least deep edges, are no way out and left away.
+
+Sources: P. Moore, J. Wilhelms, Collision detection and response for computer animation, SIGGRAPH 1988 (a spring from each point that is
+inside to the nearest point of the surface); Ericson, Real-Time Collision Detection, 2005, section 5.1.5 (nearest point of a triangle).
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+import numpy as np
+
+from rigidimpulse.collision.containment import point_in_mesh
+from rigidimpulse.collision.distance.simplices import along, closest_on_segments, dot, moved, row, subtract, turned
+from rigidimpulse.collision.geometry import HALF_SPACE, ROUND
+from rigidimpulse.core.kernels import jit
+from rigidimpulse.dynamics.penalty.edges import crossing_edges, drop_deep_edges
+from rigidimpulse.dynamics.penalty.surface import NUDGE, ON_FACE, add_point, box_squared, nearest_on_surface, turned_back
+
+
+@jit
+def _points_in_half_space(geometry, plane, other, bodies, position, rotation, real, integer, count):
+    """Corners of a ROUND primitive of bodies[1] in a half space of bodies[0]."""
+    a, b = bodies
+    normal = turned(rotation[a], row(geometry.frame, plane))
+    offset = geometry.frame[plane, 3] + dot(normal, row(position, a))
+    for v in range(geometry.vertex_first[other], geometry.vertex_first[other + 1]):
+        if geometry.vertex_corner[v]:
+            p = moved(rotation[b], row(position, b), row(geometry.vertex, v))
+            depth = offset + geometry.radius[other] - dot(normal, p)
+            if depth > 0.0:
+                count = add_point(real, integer, count, bodies, (-1 - plane, v), p, normal, depth)
+    return count
+
+
+@jit
+def _points_of_axes(geometry, first, second, bodies, position, rotation, real, integer, count):
+    """The closest points of two spheres or capsules."""
+    a, b = bodies
+    p_first, q_first = geometry.vertex_first[first], geometry.vertex_first[second]
+    p = moved(rotation[a], row(position, a), row(geometry.vertex, p_first))
+    q = moved(rotation[b], row(position, b), row(geometry.vertex, q_first))
+    p_axis = subtract(moved(rotation[a], row(position, a), row(geometry.vertex, geometry.vertex_first[first + 1] - 1)), p)
+    q_axis = subtract(moved(rotation[b], row(position, b), row(geometry.vertex, geometry.vertex_first[second + 1] - 1)), q)
+    s, t = closest_on_segments(p, p_axis, q, q_axis)
+    p, q = along(p, s, p_axis), along(q, t, q_axis)
+    between = subtract(q, p)
+    distance = sqrt(dot(between, between))
+    depth = geometry.radius[first] + geometry.radius[second] - distance
+    if depth > 0.0 and distance > 0.0:
+        normal = (between[0] / distance, between[1] / distance, between[2] / distance)
+        point = along(p, geometry.radius[first] - 0.5 * depth, normal)
+        count = add_point(real, integer, count, bodies, (p_first, q_first), point, normal, depth)
+    return count
+
+
+@jit
+def _points_in_surface(geometry, axes, sizes, surface, other, bodies, position, rotation, real, integer, count):
+    """Corners of a ROUND primitive of bodies[1] in the solid of triangles of bodies[0]."""
+    a, b = bodies
+    radius, root = geometry.radius[other], geometry.node_first[surface]
+    for v in range(geometry.vertex_first[other], geometry.vertex_first[other + 1]):
+        if not geometry.vertex_corner[v]:
+            continue
+        world = moved(rotation[b], row(position, b), row(geometry.vertex, v))
+        p = turned_back(rotation[a], subtract(world, row(position, a)))
+        if box_squared(geometry, root, p) > radius * radius:
+            continue
+        axis = turned_back(rotation[a], turned(rotation[b], row(axes, v)))
+        inside = geometry.closed[surface] and point_in_mesh(geometry, surface, along(p, NUDGE * sizes[v], axis))
+        if radius == 0.0 and not inside:
+            continue
+        squared, q, t = nearest_on_surface(geometry, surface, p, axis)
+        if t < 0:
+            squared, q, t = nearest_on_surface(geometry, surface, p, (0.0, 0.0, 0.0))
+        distance = sqrt(squared)
+        if not inside and distance >= radius:
+            continue
+        out = subtract(q, p) if inside else subtract(p, q)
+        face = row(geometry.triangle_normal, t)
+        normal = face
+        if dot(out, face) < (1.0 - ON_FACE) * distance:
+            normal = (out[0] / distance, out[1] / distance, out[2] / distance)
+        depth = radius + (dot(out, normal) if inside else -distance)
+        if depth > 0.0:
+            count = add_point(real, integer, count, bodies, (-1 - surface, v), world, turned(rotation[a], normal), depth)
+    return count
+
+
+@jit
+def _corners_at_axis(geometry, surface, capsule, bodies, position, rotation, real, integer, count):
+    """Corners of a surface of bodies[0] beside the axis of a capsule of bodies[1]; its ends are points of their own."""
+    a, b = bodies
+    v = geometry.vertex_first[capsule]
+    start = moved(rotation[b], row(position, b), row(geometry.vertex, v))
+    axis = subtract(moved(rotation[b], row(position, b), row(geometry.vertex, v + 1)), start)
+    for corner in range(geometry.vertex_first[surface], geometry.vertex_first[surface + 1]):
+        if not geometry.vertex_corner[corner]:
+            continue
+        p = moved(rotation[a], row(position, a), row(geometry.vertex, corner))
+        s = dot(subtract(p, start), axis) / dot(axis, axis)
+        if not 0.0 < s < 1.0:
+            continue
+        out = subtract(along(start, s, axis), p)
+        distance = sqrt(dot(out, out))
+        if 0.0 < distance < geometry.radius[capsule]:
+            normal = (out[0] / distance, out[1] / distance, out[2] / distance)
+            count = add_point(real, integer, count, bodies, (corner, v), p, normal, geometry.radius[capsule] - distance)
+    return count
+
+
+@jit
+def _points_of_primitives(geometry, axes, sizes, i, j, bodies, position, rotation, real, integer, count):
+    """Points of two primitives of bodies a and b, that of a first."""
+    back = (bodies[1], bodies[0])
+    if geometry.kind[i] == HALF_SPACE or geometry.kind[j] == HALF_SPACE:
+        if geometry.kind[j] == ROUND:
+            return _points_in_half_space(geometry, i, j, bodies, position, rotation, real, integer, count)
+        if geometry.kind[i] == ROUND:
+            return _points_in_half_space(geometry, j, i, back, position, rotation, real, integer, count)
+        return count
+    first, thick_i, thick_j = count, geometry.radius[i] > 0.0, geometry.radius[j] > 0.0
+    if thick_i and thick_j:
+        return _points_of_axes(geometry, i, j, bodies, position, rotation, real, integer, count)
+    if not thick_i:
+        count = _points_in_surface(geometry, axes, sizes, i, j, bodies, position, rotation, real, integer, count)
+        if thick_j and geometry.vertex_first[j + 1] == geometry.vertex_first[j] + 2:
+            count = _corners_at_axis(geometry, i, j, bodies, position, rotation, real, integer, count)
+    if not thick_j:
+        count = _points_in_surface(geometry, axes, sizes, j, i, back, position, rotation, real, integer, count)
+        if thick_i and geometry.vertex_first[i + 1] == geometry.vertex_first[i] + 2:
+            count = _corners_at_axis(geometry, j, i, back, position, rotation, real, integer, count)
+    if not thick_i and not thick_j:
+        end = crossing_edges(geometry, i, j, bodies, position, rotation, real, integer, count)
+        count = drop_deep_edges(real, integer, first, count, end)
+    return count
+
+
+@jit
+def find_points(geometry, axes, sizes, shape_of_body, reach, pairs, position, rotation, real, integer):
+    """Points inside, of all pairs (p, 2) a < b; returns how many there are, also where there is no room for all.
+
+    axes, sizes: see `inward_axes`. reach (n,) m about the centres of mass; position (n, 3), rotation (n, 3, 3) of the principal frames.
+    real (cap, 7): a point of the line of action and the normal from a to b, world, and the depth, m.
+    integer (cap, 4): a, b, and what touches: a vertex of one and of the other a vertex, or a primitive p as -1 - p.
+    """
+    # Not a literal: that would compile everything above twice.
+    count = np.int64(0)
+    for k in range(pairs.shape[0]):
+        a, b = pairs[k, 0], pairs[k, 1]
+        off = subtract(row(position, b), row(position, a))
+        if reach[a] + reach[b] < inf and dot(off, off) >= (reach[a] + reach[b]) ** 2:
+            continue
+        shape_a, shape_b = shape_of_body[a], shape_of_body[b]
+        for i in range(geometry.shape_first[shape_a], geometry.shape_first[shape_a + 1]):
+            for j in range(geometry.shape_first[shape_b], geometry.shape_first[shape_b + 1]):
+                count = _points_of_primitives(geometry, axes, sizes, i, j, (a, b), position, rotation, real, integer, count)
+    return count

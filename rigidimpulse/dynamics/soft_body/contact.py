@@ -1,0 +1,191 @@
+"""Where nets touch rigid bodies: vertices of nets on the surfaces of bodies, and sample points of bodies on faces of nets.
+
+Both are followed over the whole step, along straight ways: vertices as seen from the body, sample points against the moving faces. The
+first place that comes within the gap gives the plane of the contact, so that nothing passes through, whatever its speed. Sample points
+are vertices of meshes and boxes, the core of spheres and capsules with their radius, and points on the rims of cylinders.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+
+from rigidimpulse.collision.distance.simplices import dot, row, subtract
+from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, Geometry
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.dynamics.soft_body.distance import STACK, first_touch, first_touch_of_triangle, signed_distance
+
+RIM_POINTS = 16
+CORE_POINTS = 9
+
+
+@jit
+def _into_frame(R, x, p):
+    """Return R^T (p - x)."""
+    d = subtract(p, (x[0], x[1], x[2]))
+    return (
+        R[0, 0] * d[0] + R[1, 0] * d[1] + R[2, 0] * d[2],
+        R[0, 1] * d[0] + R[1, 1] * d[1] + R[2, 1] * d[2],
+        R[0, 2] * d[0] + R[1, 2] * d[1] + R[2, 2] * d[2],
+    )
+
+
+@jit_making_arrays
+def vertices_on_bodies(geometry, shape_of_body, radius, x0, R0, x1, R1, start, end, gap, skip, out_int, out_real):
+    """Find vertices that come within the gap of bodies; returns their number, which may exceed the room in the output.
+
+    Args:
+        geometry, shape_of_body: compiled shapes. radius: (b,) m, bound of each body about its centre of mass.
+        x0, R0, x1, R1: poses (b, 3), (b, 3, 3) of bodies at both ends of the step. start, end: (n, 3) m vertices there.
+        gap: m. skip: (n, b) bool, pairs that do not touch each other.
+        out_int: (k, 2) vertex, body. out_real: (k, 8) m, in the body's frame: normal, place of the surface, distance, time.
+
+    """
+    stack = np.empty(STACK, np.int64)
+    count = 0
+    for b in range(x0.shape[0]):
+        for i in range(start.shape[0]):
+            y0 = _into_frame(R0[b], x0[b], row(start, i))
+            y1 = _into_frame(R1[b], x1[b], row(end, i))
+            way = subtract(y1, y0)
+            reach = radius[b] + gap + np.sqrt(dot(way, way))
+            if dot(y0, y0) > reach * reach or skip[i, b]:
+                continue
+            time, distance, normal, place = first_touch(geometry, shape_of_body[b], y0, y1, gap, stack)
+            if time == inf:
+                continue
+            if count < out_int.shape[0]:
+                out_int[count, 0], out_int[count, 1] = i, b
+                for k in range(3):
+                    out_real[count, k] = normal[k]
+                    out_real[count, 3 + k] = place[k] - distance * normal[k]
+                out_real[count, 6], out_real[count, 7] = distance, time
+            count += 1
+    return count
+
+
+@jit
+def fit_boxes(geometry, start, end, low, high):
+    """Fit the boxes (N, 3) of the tree over faces to all places of the vertices between start and end (n, 3)."""
+    for node in range(geometry.node_child.shape[0] - 1, -1, -1):
+        child = geometry.node_child[node]
+        for k in range(3):
+            if child >= 0:
+                low[node, k] = min(low[child, k], low[child + 1, k])
+                high[node, k] = max(high[child, k], high[child + 1, k])
+                continue
+            lowest, highest = inf, -inf
+            first = geometry.node_start[node]
+            for t in range(first, first + geometry.node_count[node]):
+                for m in range(3):
+                    i = geometry.triangle[t, m]
+                    lowest, highest = min(lowest, start[i, k], end[i, k]), max(highest, start[i, k], end[i, k])
+            low[node, k], high[node, k] = lowest, highest
+
+
+@jit_making_arrays
+def samples_on_faces(geometry, low, high, p0, p1, radius, body, start, end, gap, skip, every, out_int, out_real):
+    """Find sample points that come within the gap of faces of nets; returns their number, which may exceed the room in the output.
+
+    Args:
+        geometry: faces of all nets as one mesh. low, high: boxes of its tree, see `fit_boxes`.
+        p0, p1: (s, 3) m, samples at both ends of the step. radius: (s,) m. body: (s,).
+        start, end: (n, 3) m, vertices. gap: m. skip: (n, b) bool, see `vertices_on_bodies`.
+        every: (s,) bool, whether to find all faces that a sample meets, or its first one only.
+        out_int: (k, 2) sample, face. out_real: (k, 8) weights, normal from the sample to the face, distance at the start, time.
+
+    """
+    stack = np.empty(STACK, np.int64)
+    count = 0
+    for s in range(p0.shape[0]):
+        a, b = row(p0, s), row(p1, s)
+        way = subtract(b, a)
+        first, hit = inf, -1
+        weights, normal = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        nearest = inf
+        stack[0] = 0
+        depth = 1
+        while depth > 0:
+            depth -= 1
+            node = stack[depth]
+            apart = False
+            for k in range(3):
+                reach = radius[s] + gap * 1.02
+                apart = apart or max(a[k], b[k]) + reach < low[node, k] or min(a[k], b[k]) - reach > high[node, k]
+            if apart:
+                continue
+            child = geometry.node_child[node]
+            if child >= 0:
+                stack[depth], stack[depth + 1] = child + 1, child
+                depth += 2
+                continue
+            from_ = geometry.node_start[node]
+            for t in range(from_, from_ + geometry.node_count[node]):
+                i, j, m = geometry.triangle[t, 0], geometry.triangle[t, 1], geometry.triangle[t, 2]
+                if skip[i, body[s]] and skip[j, body[s]] and skip[m, body[s]]:
+                    continue
+                corners = (row(start, i), row(start, j), row(start, m))
+                ways = (
+                    subtract(row(end, i), corners[0]), subtract(row(end, j), corners[1]), subtract(row(end, m), corners[2])
+                )  # fmt: skip
+                time, w, n, away = first_touch_of_triangle(a, way, corners, ways, radius[s], gap)
+                if time == inf:
+                    continue
+                if every[s]:
+                    _write_sample(count, s, t, w, n, away, time, out_int, out_real)
+                    count += 1
+                elif time < first or (time == first and away < nearest):
+                    first, hit, weights, normal, nearest = time, t, w, n, away
+        if hit >= 0:
+            _write_sample(count, s, hit, weights, normal, nearest, first, out_int, out_real)
+            count += 1
+    return count
+
+
+@jit
+def _write_sample(c, s, face, weights, normal, distance, time, out_int, out_real):
+    """Row c of what `samples_on_faces` finds, if there is room."""
+    if c < out_int.shape[0]:
+        out_int[c, 0], out_int[c, 1] = s, face
+        for k in range(3):
+            out_real[c, k], out_real[c, 3 + k] = weights[k], normal[k]
+        out_real[c, 6], out_real[c, 7] = distance, time
+
+
+@jit
+def distances_at(geometry, shape_of_body, x1, R1, body, place, limit, stack, distance, normal):
+    """Write signed distances (k,) of places (k, 3) from one body each, and the outward normals (k, 3) there, in the world."""
+    for c in range(body.shape[0]):
+        b = body[c]
+        p = _into_frame(R1[b], x1[b], row(place, c))
+        d, n = signed_distance(geometry, shape_of_body[b], p, limit, stack)
+        distance[c] = d
+        for k in range(3):
+            normal[c, k] = R1[b, k, 0] * n[0] + R1[b, k, 1] * n[1] + R1[b, k, 2] * n[2]
+
+
+def sample_points(geometry: Geometry, shape: int) -> tuple[np.ndarray, np.ndarray]:
+    """Sample points (s, 3) m of a shape, in its frame, and the radius (s,) m of the ball about each; none for half spaces."""
+    points, radii = [np.zeros((0, 3))], [np.zeros(0)]
+    for p in range(int(geometry.shape_first[shape]), int(geometry.shape_first[shape + 1])):
+        if geometry.kind[p] == HALF_SPACE:
+            continue
+        if geometry.kind[p] == CYLINDER:
+            found, radius = _rim_points(geometry.frame[p], float(geometry.radius[p])), 0.0
+        else:
+            found, radius = geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]], float(geometry.radius[p])
+            if len(found) == 2:
+                found = np.linspace(found[0], found[1], CORE_POINTS)
+        points.append(found)
+        radii.append(np.full(len(found), radius))
+    return np.concatenate(points), np.concatenate(radii)
+
+
+def _rim_points(frame: np.ndarray, radius: float) -> np.ndarray:
+    centre, axis, half = frame[:3], frame[3:6], frame[6]
+    across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    across /= np.linalg.norm(across)
+    angle = 2.0 * np.pi * np.arange(RIM_POINTS) / RIM_POINTS
+    rim = radius * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * np.cross(axis, across))
+    return np.concatenate([centre + half * axis + rim, centre - half * axis + rim])

@@ -1,0 +1,300 @@
+"""The exact solver of rows, for islands of any mass ratio: true complementarity, true Coulomb cones.
+
+Problem. Find impulses p and velocities  u = b + Jh Jh^T p  that satisfy the laws of all rows (see `rows`).
+
+Method. Outside a proximal method of multipliers (Rockafellar 1976) with regularisation R = k diag(Jh Jh^T), k driven
+from 1e-3 to 1e-12 (at most 1e-9 for FREE rows), which makes redundant rows harmless; inside a semi-smooth Newton method
+(Alart & Curnier 1991) on y = Jh^T p:
+
+    p(u) = projection of (R q - u) / (R + s) on the bounds, with the radius of discs from the current p_master,
+    F = (y - Jh^T q) - Jh^T (p(b + Jh y) - q) = 0,        F' = I + Jh^T (-dp/du) Jh,
+
+with a halving line search on |F|. It is written in the changes of y and p since q: as u goes to 0 the round-off of u / R
+goes with it. F' has a 6 x 6 block wherever two bodies share a row and is solved by sparse block elimination
+(`block_lu`), so that chains and stacks cost in proportion to their length. Where the line search fails k is raised; as
+the last resort one step is made with the radii frozen, for which the problem is convex. The answer with the least
+residual of the natural map is returned, with that residual; one whose impulses are larger must have a residual that is
+smaller in proportion. Rows that contradict each other have no answer: their impulses would grow without end.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from rigidimpulse.core.copying import copy_matrix, copy_vector
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMENT, multiply, multiply_transposed
+from rigidimpulse.dynamics.solvers.sparse_lu import factor, plan_elimination, solve_factored
+
+MAX_OUTER = 60
+MAX_INNER = 60
+MAX_HALVINGS = 8
+MOST_IDLE = 16
+REGULARISATION_START = 1e-3
+REGULARISATION_LEAST = 1e-12
+REGULARISATION_FREE = 1e-9
+TINY = 1e-300
+ROUND_OFF = 4e-16
+
+
+@jit
+def row_weights(rows, weight):
+    """Diagonal of Jh Jh^T, into weight (r,); both rows of a disc get the larger one."""
+    for i in range(weight.shape[0]):
+        total = TINY
+        for k in range(12):
+            total += rows.jacobian[i, k] ** 2
+        weight[i] = total
+        if rows.kind[i] == DISC_SECOND:
+            weight[i - 1] = weight[i] = max(weight[i - 1], total)
+
+
+@jit
+def natural_residual(rows, u, p, weight):
+    """Largest violation of the rows' laws, as a velocity: 0 at a solution."""
+    worst = 0.0
+    for i in range(p.shape[0]):
+        kind, w = rows.kind[i], weight[i]
+        x = p[i] - (u[i] + rows.softness[i] * p[i]) / w
+        if kind == DISC:
+            z = p[i + 1] - (u[i + 1] + rows.softness[i + 1] * p[i + 1]) / w
+            length, radius = sqrt(x * x + z * z), rows.coefficient[i] * max(p[rows.master[i]], 0.0)
+            if length > radius:
+                x *= radius / length
+                z *= radius / length
+            worst = max(worst, max(abs(p[i] - x), abs(p[i + 1] - z)) * w)
+        elif kind == SEGMENT:
+            radius = rows.coefficient[i] * max(p[rows.master[i]], 0.0)
+            worst = max(worst, abs(p[i] - min(max(x, -radius), radius)) * w)
+        elif kind == BOUNDED or kind == FREE:
+            worst = max(worst, abs(p[i] - min(max(x, rows.lower[i]), rows.upper[i])) * w)
+    return worst
+
+
+@jit
+def _impulse_law(rows, u, q, r, frozen, p, slope):
+    """p(u), and slope (r, 3): -dp_i/du of the row itself, of its partner in a disc, of its master.
+
+    frozen (r,) >= 0 fixes the radius of a disc or segment.
+    """
+    for i in range(p.shape[0]):
+        kind = rows.kind[i]
+        if kind == DISC_SECOND:
+            continue
+        stiffness = 1.0 / (r[i] + rows.softness[i])
+        x = (r[i] * q[i] - u[i]) * stiffness
+        slope[i, 0], slope[i, 1], slope[i, 2] = stiffness, 0.0, 0.0
+        if kind == FREE or kind == BOUNDED:
+            p[i] = min(max(x, rows.lower[i]), rows.upper[i])
+            if p[i] != x:
+                slope[i, 0] = 0.0
+            continue
+        coupled = frozen[i] < 0.0
+        master = rows.master[i]
+        radius = rows.coefficient[i] * max(p[master], 0.0) if coupled else frozen[i]
+        share = rows.coefficient[i] * slope[master, 0] if coupled else 0.0
+        z = 0.0
+        if kind == DISC:
+            z = (r[i] * q[i + 1] - u[i + 1]) * stiffness
+            slope[i + 1, 0], slope[i + 1, 1], slope[i + 1, 2] = stiffness, 0.0, 0.0
+        length = sqrt(x * x + z * z)
+        if length > radius:
+            k = stiffness * radius / length
+            x, z = x / length, z / length
+            slope[i, 0], slope[i, 2] = k * (1.0 - x * x), share * x
+            if kind == DISC:
+                slope[i, 1] = slope[i + 1, 1] = -k * x * z
+                slope[i + 1, 0], slope[i + 1, 2] = k * (1.0 - z * z), share * z
+            x, z = radius * x, radius * z
+        p[i] = x
+        if kind == DISC:
+            p[i + 1] = z
+
+
+@jit
+def _add_outer(blocks, place, jacobian, row, first, right, start):
+    """Block `place` += left^T right, with left the six entries of a row of the Jacobian from `first` on, right from `start` on."""
+    r0, r1, r2 = right[start], right[start + 1], right[start + 2]
+    r3, r4, r5 = right[start + 3], right[start + 4], right[start + 5]
+    for i in range(6):
+        left = jacobian[row, first + i]
+        blocks[place, i, 0] += left * r0
+        blocks[place, i, 1] += left * r1
+        blocks[place, i, 2] += left * r2
+        blocks[place, i, 3] += left * r3
+        blocks[place, i, 4] += left * r4
+        blocks[place, i, 5] += left * r5
+
+
+@jit_making_arrays
+def _assemble(rows, slope, slot, blocks, n):
+    """I + Jh^T slope Jh."""
+    jacobian, kinds, masters, right = rows.jacobian, rows.kind, rows.master, np.empty(12)
+    for place in range(blocks.shape[0]):
+        for i in range(6):
+            for j in range(6):
+                blocks[place, i, j] = 0.0
+    for i in range(n):
+        place = slot[i, i]
+        for k in range(6):
+            blocks[place, k, k] = 1.0
+    for i in range(slope.shape[0]):
+        here, partner, master = slope[i, 0], slope[i, 1], slope[i, 2]
+        if here == 0.0 and partner == 0.0 and master == 0.0:
+            continue
+        other = i + 1 if kinds[i] == DISC else (i - 1 if kinds[i] == DISC_SECOND else i)
+        above = masters[i]
+        for k in range(12):
+            right[k] = here * jacobian[i, k] + partner * jacobian[other, k] + master * jacobian[above, k]
+        a, b = rows.first[i], rows.second[i]
+        if a >= 0:
+            _add_outer(blocks, slot[a, a], jacobian, i, 0, right, 0)
+        if a >= 0 and b >= 0:
+            _add_outer(blocks, slot[a, b], jacobian, i, 0, right, 6)
+            _add_outer(blocks, slot[b, a], jacobian, i, 6, right, 0)
+        if b >= 0:
+            _add_outer(blocks, slot[b, b], jacobian, i, 6, right, 6)
+
+
+@jit
+def _norm(v):
+    total = 0.0
+    for i in range(v.shape[0]):
+        for k in range(6):
+            total += v[i, k] * v[i, k]
+    return sqrt(total)
+
+
+@jit
+def _evaluate(rows, base, change, q, r, frozen, u, p, slope, residual):
+    """p and slope at y + change, and the residual F (n, 6); returns |F|. u (r,) is room for the velocities."""
+    multiply(rows, change, u)
+    for i in range(u.shape[0]):
+        u[i] += base[i]
+    _impulse_law(rows, u, q, r, frozen, p, slope)
+    for i in range(u.shape[0]):
+        u[i] = p[i] - q[i]
+    multiply_transposed(rows, u, residual)
+    for i in range(change.shape[0]):
+        for k in range(6):
+            residual[i, k] = change[i, k] - residual[i, k]
+    return _norm(residual)
+
+
+@jit
+def _largest(p):
+    worst = 0.0
+    for i in range(p.shape[0]):
+        worst = max(worst, abs(p[i]))
+    return worst
+
+
+@jit
+def _speed(rows, y, line):
+    """Largest velocity of a row that y (n, 6) stands for."""
+    multiply(rows, y, line)
+    largest = 0.0
+    for i in range(line.shape[0]):
+        largest = max(largest, abs(line[i]))
+    return largest
+
+
+@jit_making_arrays
+def _newton(rows, elimination, base, q, r, frozen, p, target):
+    """Find p with F = 0; base (r,): u at the impulses q. Returns whether it converged (or cannot be improved further)."""
+    n, count = elimination.order.shape[0], p.shape[0]
+    change, trial = np.zeros((n, 6)), np.empty((n, 6))
+    residual, step = np.empty((n, 6)), np.empty((n, 6))
+    u, line, slope = np.empty(count), np.empty(count), np.empty((count, 3))
+    blocks, pivots = np.empty((elimination.num_blocks, 6, 6)), np.empty((n, 6), np.int64)
+    size = _evaluate(rows, base, change, q, r, frozen, u, p, slope, residual)
+    for _ in range(MAX_INNER):
+        if _speed(rows, residual, line) <= target:
+            return True
+        _assemble(rows, slope, elimination.slot, blocks, n)
+        copy_matrix(residual, step)
+        factor(elimination, blocks, pivots)
+        solve_factored(elimination, blocks, pivots, step)
+        # |F| carries the round-off of u divided by k; its step does not.
+        is_last = _speed(rows, step, line) <= target
+        scale, improved, trial_size = 1.0, False, size
+        for _halving in range(MAX_HALVINGS):
+            for i in range(n):
+                for k in range(6):
+                    trial[i, k] = change[i, k] - scale * step[i, k]
+            trial_size = _evaluate(rows, base, trial, q, r, frozen, u, p, slope, residual)
+            if is_last or trial_size < size * (1.0 - 0.1 * scale):
+                improved = True
+                break
+            scale *= 0.5
+        if not improved:
+            return _speed(rows, step, line) <= 1e4 * target
+        copy_matrix(trial, change)
+        if is_last:
+            return True
+        size = trial_size
+    return False
+
+
+@jit
+def _velocities(rows, p, y, u):
+    """y = Jh^T p and u = b + Jh y."""
+    multiply_transposed(rows, p, y)
+    multiply(rows, y, u)
+    for i in range(u.shape[0]):
+        u[i] += rows.bias[i]
+
+
+@jit
+def rounding_floor(rows, weight, p):
+    """Velocity below which the residual of impulses p is round-off: what large opposite impulses leave where they cancel."""
+    largest = 0.0
+    for i in range(p.shape[0]):
+        largest = max(largest, abs(rows.bias[i]), weight[i] * abs(p[i]))
+    return ROUND_OFF * largest
+
+
+@jit_making_arrays
+def solve_newton(rows, n, target):
+    """Solve the rows of an island of n movable bodies; `rows.impulse` is start and answer.
+
+    target: residual asked for, m/s. Returns the residual of the natural map that was reached.
+    """
+    count = rows.bias.shape[0]
+    elimination = plan_elimination(rows.first, rows.second, n)
+    weight = np.empty(count)
+    row_weights(rows, weight)
+    y, u, r = np.empty((n, 6)), np.empty(count), np.empty(count)
+    trial, q, frozen = rows.impulse.copy(), rows.impulse.copy(), np.full(count, -1.0)
+    _velocities(rows, q, y, u)
+    best, largest = natural_residual(rows, u, q, weight), _largest(q)
+    k, free_k, failures, stagnant, idle, previous, convex = REGULARISATION_START, REGULARISATION_FREE, 0, 0, 0, best, False
+    for _ in range(MAX_OUTER):
+        if best <= max(target, rounding_floor(rows, weight, rows.impulse)) or stagnant > 4:
+            break
+        for i in range(count):
+            frozen[i] = rows.coefficient[i] * max(q[rows.master[i]], 0.0) if convex else -1.0
+            r[i] = weight[i] * (min(k, free_k) if rows.kind[i] == FREE else k)
+        solved = _newton(rows, elimination, u, q, r, frozen, trial, 0.05 * target)
+        if not solved and not convex:
+            failures += 1
+            convex = k >= 0.5
+            free_k *= 30.0
+            k = min(30.0 * k, 1.0)
+            continue
+        copy_vector(trial, q)
+        _velocities(rows, q, y, u)
+        reached = natural_residual(rows, u, q, weight)
+        now = _largest(q)
+        if reached < best and (largest == 0.0 or reached * now <= best * largest):
+            best, largest = reached, now
+            copy_vector(q, rows.impulse)
+        if reached > 0.5 * previous and k <= REGULARISATION_LEAST:
+            stagnant += 1
+        idle = idle + 1 if reached > 0.9 * previous else 0
+        if idle > MOST_IDLE:
+            break
+        previous = reached
+        k = max(k * 0.3, 1e-2) if convex else max(k * (0.1 if failures < 3 else 0.3), REGULARISATION_LEAST)
+        convex = False
+    return best

@@ -1,0 +1,1 @@
+"""The sub-stepped soft solver (TGS soft)."""

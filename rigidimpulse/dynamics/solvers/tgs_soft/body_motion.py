@@ -1,0 +1,171 @@
+"""How bodies of heaps move in a sub-step, see `heap_solver`: gravity, free rotation, positions (kernels)."""
+
+from math import sqrt
+
+from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, set_inverse_inertia, turned, turned_back
+from rigidimpulse.core.kernels import inlined, jit
+from rigidimpulse.core.quaternion import exponential, product, quaternion_to_matrix
+
+
+@inlined
+def set_orientation(bodies, i, x, y, z):
+    """Turn body i by the vector (x, y, z), rad."""
+    q = bodies.orientation[i]
+    t0, t1, t2, t3 = exponential(x, y, z)
+    q0, q1, q2, q3 = product(t0, t1, t2, t3, q[0], q[1], q[2], q[3])
+    size = sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+    q[0], q[1], q[2], q[3] = q0 / size, q1 / size, q2 / size, q3 / size
+    quaternion_to_matrix(q, bodies.rotation[i])
+
+
+@inlined
+def _spin_rate(moments, i, x0, x1, x2):
+    """Euler's equations without torque: the rate of the spin x in principal axes."""
+    a, b, c = moments[i, 0], moments[i, 1], moments[i, 2]
+    return (b - c) / a * x1 * x2, (c - a) / b * x2 * x0, (a - b) / c * x0 * x1
+
+
+@inlined
+def _turn_freely(bodies, i, h):
+    """Turn body i of unlike moments by its spin over h, keeping its angular momentum; returns the mean spin.
+
+    The spin x in the body's axes by the classical Runge-Kutta method, x_m half-way by Hermite's cubic, and the turn of fourth order
+    (Magnus), h (x_0 + 4 x_m + x_1) / 6 + h^2 (x_0 x x_1) / 12: with that of second order spinning bodies gain energy.
+    """
+    moments, v, half = bodies.inertia, 8 * i + 3, 0.5 * h
+    x0, x1, x2 = turned_back(bodies.rotation, i, bodies.velocity[v], bodies.velocity[v + 1], bodies.velocity[v + 2])
+    lx, ly, lz = turned(bodies.rotation, i, moments[i, 0] * x0, moments[i, 1] * x1, moments[i, 2] * x2)
+    a0, a1, a2 = _spin_rate(moments, i, x0, x1, x2)
+    b0, b1, b2 = _spin_rate(moments, i, x0 + half * a0, x1 + half * a1, x2 + half * a2)
+    c0, c1, c2 = _spin_rate(moments, i, x0 + half * b0, x1 + half * b1, x2 + half * b2)
+    d0, d1, d2 = _spin_rate(moments, i, x0 + h * c0, x1 + h * c1, x2 + h * c2)
+    y0 = x0 + h / 6.0 * (a0 + 2.0 * (b0 + c0) + d0)
+    y1 = x1 + h / 6.0 * (a1 + 2.0 * (b1 + c1) + d1)
+    y2 = x2 + h / 6.0 * (a2 + 2.0 * (b2 + c2) + d2)
+    e0, e1, e2 = _spin_rate(moments, i, y0, y1, y2)
+    twelfth = h / 12.0
+    # h (x_0 + 4 x_m + x_1) / 6 over h, with x_m = (x_0 + x_1) / 2 + h (x_0' - x_1') / 8.
+    m0 = 0.5 * (x0 + y0) + twelfth * (a0 - e0) + twelfth * (x1 * y2 - x2 * y1)
+    m1 = 0.5 * (x1 + y1) + twelfth * (a1 - e1) + twelfth * (x2 * y0 - x0 * y2)
+    m2 = 0.5 * (x2 + y2) + twelfth * (a2 - e2) + twelfth * (x0 * y1 - x1 * y0)
+    wx, wy, wz = turned(bodies.rotation, i, m0, m1, m2)
+    set_orientation(bodies, i, h * wx, h * wy, h * wz)
+    set_inverse_inertia(bodies, i)
+    m, o = bodies.mass, 8 * i
+    bodies.velocity[v] = m[o] * lx + m[o + 1] * ly + m[o + 2] * lz
+    bodies.velocity[v + 1] = m[o + 1] * lx + m[o + 3] * ly + m[o + 4] * lz
+    bodies.velocity[v + 2] = m[o + 2] * lx + m[o + 4] * ly + m[o + 5] * lz
+    return wx, wy, wz
+
+
+@jit
+def kick(bodies, begin, end, h):
+    """Let gravity act over h s on the bodies from `begin` to `end`."""
+    v, before = bodies.velocity, bodies.before
+    for i in range(begin, end):
+        if bodies.part[i] != MEMBER:
+            continue
+        o = 8 * i
+        for k in range(3):
+            v[o + k] += h * bodies.gravity[i, k]
+        for k in range(6):
+            before[o + k] = v[o + k]
+
+
+@jit
+def move(bodies, begin, end, h):
+    """Move the bodies from `begin` to `end` by their velocities over h s; those that no contact pushed, on their parabola."""
+    v, before, moved, drift = bodies.velocity, bodies.before, bodies.moved, bodies.drift
+    for i in range(begin, end):
+        if bodies.part[i] == OUTSIDE:
+            continue
+        o = 8 * i
+        member = bodies.part[i] == MEMBER
+        loose = member
+        for k in range(6):
+            loose = loose and v[o + k] == before[o + k]
+        back = 0.5 * h * h if loose else 0.0
+        for k in range(3):
+            step = h * v[o + k] - back * bodies.gravity[i, k]
+            bodies.position[i, k] += step
+            moved[o + k] += step
+            drift[o + k] += step
+        wx, wy, wz = v[o + 3], v[o + 4], v[o + 5]
+        if wx == 0.0 and wy == 0.0 and wz == 0.0:
+            continue
+        if member and not bodies.alike[i]:
+            wx, wy, wz = _turn_freely(bodies, i, h)
+        for k, turn in ((3, h * wx), (4, h * wy), (5, h * wz)):
+            moved[o + k] += turn
+            drift[o + k] += turn
+
+
+@inlined
+def _length(a, o):
+    return sqrt(a[o] * a[o] + a[o + 1] * a[o + 1] + a[o + 2] * a[o + 2])
+
+
+@jit
+def mark_quick(bodies, ahead, limit):
+    """Mark members as quick that have drifted by more than `limit` inner radii, or will have in `ahead` s; returns the share that is."""
+    v, drift, members, quick = bodies.velocity, bodies.drift, 0, 0
+    for i in range(bodies.part.shape[0]):
+        if bodies.part[i] != MEMBER:
+            continue
+        o = 8 * i
+        way = _length(drift, o) + ahead * _length(v, o) + bodies.reach[i] * (_length(drift, o + 3) + ahead * _length(v, o + 3))
+        bodies.quick[i] = bodies.quick[i] or way > limit * bodies.inner[i]
+        members += 1
+        quick += bodies.quick[i]
+    return quick / members
+
+
+@jit
+def finish(bodies):
+    """Orientations at the end of sub-steps of those that have not been turned in them; what has moved counts from here on."""
+    for i in range(bodies.part.shape[0]):
+        if bodies.part[i] != OUTSIDE and (bodies.part[i] != MEMBER or bodies.alike[i]):
+            o = 8 * i + 3
+            set_orientation(bodies, i, bodies.moved[o], bodies.moved[o + 1], bodies.moved[o + 2])
+        for k in range(8 * i, 8 * i + 6):
+            bodies.moved[k] = 0.0
+
+
+@jit
+def note_pressed(bodies, order, pressed):
+    """Mark the members, in pressed (n,) by index, that contacts acted on in the last sub-step; order (n,) indices by rank."""
+    for i in range(order.shape[0]):
+        if bodies.part[i] == MEMBER:
+            acted = False
+            for k in range(8 * i, 8 * i + 6):
+                acted = acted or bodies.velocity[k] != bodies.before[k]
+            pressed[order[i]] = acted
+
+
+@jit
+def energies(bodies, masses, pull):
+    """Kinetic energy, and that energy with the potential of a steady pull (n, 3) m/s2, of the members, J; masses (n,) kg."""
+    kinetic, total = 0.0, 0.0
+    for i in range(masses.shape[0]):
+        if bodies.part[i] != MEMBER:
+            continue
+        o = 8 * i
+        v = bodies.velocity
+        x, y, z = turned_back(bodies.rotation, i, v[o + 3], v[o + 4], v[o + 5])
+        moments = bodies.inertia[i]
+        own = 0.5 * masses[i] * (v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2])
+        own += 0.5 * (moments[0] * x * x + moments[1] * y * y + moments[2] * z * z)
+        kinetic += own
+        total += own
+        for k in range(3):
+            total -= masses[i] * pull[i, k] * bodies.position[i, k]
+    return kinetic, total
+
+
+@jit
+def slow_down(bodies, factor):
+    """Multiply the speeds of the members."""
+    for i in range(bodies.part.shape[0]):
+        if bodies.part[i] == MEMBER:
+            for k in range(8 * i, 8 * i + 6):
+                bodies.velocity[k] *= factor

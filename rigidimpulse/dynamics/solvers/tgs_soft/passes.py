@@ -1,0 +1,326 @@
+"""The passes of the solver of heaps over batches of patches, see `heap_solver` for the method and `heap_records` for the record.
+
+With d = (x_b - x_a) moved since the step began, the arms of a patch are those to one point O that goes along with both bodies:
+r_a = ARM_A + (1 - s) d, r_b = ARM_B - s d, s = SHARE, so that impulses leave no torque over. The gap at a point c of a body that has turned
+by the rotation vector h has changed along n, to second order, by c.G with G = h x (h x n) / 2 - h x n.
+
+At O the patch has relative velocity u and spin w. A point (x, y) moves along n at u.n + y w.t_1 - x w.t_2; its impulse p is one along n
+at O and a torque p (y t_1 - x t_2). A pass finds the impulses of a patch one after the other by the couplings between them (Gauss-
+Seidel) and gives their sum to the bodies.
+"""
+
+from __future__ import annotations
+
+from rigidimpulse.core.kernels import inlined, jit
+from rigidimpulse.core.simd import fma, gather, load, root, scatter, spread, store, where_greater, width_of
+from rigidimpulse.dynamics.solvers.tgs_soft.records import (
+    ARM_A,
+    ARM_B,
+    ARM_FIELDS,
+    BETWEEN,
+    DEPTH,
+    FIELDS,
+    GAP,
+    HARD,
+    LEVER,
+    MASS,
+    MU_DYNAMIC,
+    MU_STATIC,
+    NORMAL,
+    POINT,
+    POINT_SIZE,
+    PRESS,
+    PUSH_1,
+    PUSH_2,
+    RADIUS_A,
+    RADIUS_B,
+    SHARE,
+    SOFT,
+    STEP_N,
+    STEP_T,
+    STIFF,
+    TANGENT_1,
+    TANGENT_2,
+    TO_NORMAL,
+    TO_TURN_1,
+    TO_TURN_2,
+    TWIST,
+    TWIST_TO_1,
+    TWIST_TO_2,
+    X,
+    Y,
+)
+
+DEEPEST = 10.0
+"""Depth, in skins, beyond which a contact pushes no harder."""
+TINY = 1e-30
+
+
+@inlined
+def cross(a, b):
+    return fma(a[1], b[2], -(a[2] * b[1])), fma(a[2], b[0], -(a[0] * b[2])), fma(a[0], b[1], -(a[1] * b[0]))
+
+
+@inlined
+def dot(a, b):
+    return fma(a[0], b[0], fma(a[1], b[1], a[2] * b[2]))
+
+
+@inlined
+def times(m, a):
+    """The symmetric matrix m (xx, xy, xz, yy, yz, zz) times a."""
+    return (
+        fma(m[0], a[0], fma(m[1], a[1], m[2] * a[2])),
+        fma(m[1], a[0], fma(m[3], a[1], m[4] * a[2])),
+        fma(m[2], a[0], fma(m[4], a[1], m[5] * a[2])),
+    )
+
+
+@inlined
+def add(a, b):
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inlined
+def less(a, b):
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inlined
+def along(a, f, b):
+    """a + f b."""
+    return fma(f, b[0], a[0]), fma(f, b[1], a[1]), fma(f, b[2], a[2])
+
+
+@inlined
+def three(lanes, record, at):
+    """The field of three at `at`."""
+    w = width_of(lanes)
+    return load(lanes, record, at), load(lanes, record, at + w), load(lanes, record, at + 2 * w)
+
+
+@inlined
+def linear(row):
+    return row[0], row[1], row[2]
+
+
+@inlined
+def angular(row):
+    return row[3], row[4], row[5]
+
+
+@inlined
+def store_three(record, at, w, a, b, c):
+    store(record, at, a)
+    store(record, at + w, b)
+    store(record, at + 2 * w, c)
+
+
+@inlined
+def _arms(lanes, batches, k):
+    """The arms of batch k as they were when it was made."""
+    w = width_of(lanes)
+    o = k * ARM_FIELDS * w
+    return three(lanes, batches.arm, o + ARM_A * w), three(lanes, batches.arm, o + ARM_B * w)
+
+
+@inlined
+def _moved_arms(lanes, arm_a, arm_b, share, xa, xb):
+    """The arms to O, and how far b has moved from a."""
+    d = (xb[0] - xa[0], xb[1] - xa[1], xb[2] - xa[2])
+    return along(arm_a, spread(lanes, 1.0) - share, d), along(arm_b, -share, d), d
+
+
+@inlined
+def _push(velocity, batches, first, va, vb, ma, mb, arm_a, arm_b, f, torque):
+    """Give the impulse f at O and the torque to b and their opposites to a."""
+    ta, tb = times(ma, add(cross(arm_a, f), torque)), times(mb, add(cross(arm_b, f), torque))
+    a, b = -ma[6], mb[6]
+    scatter(
+        velocity, batches.first, first,
+        (fma(a, f[0], va[0]), fma(a, f[1], va[1]), fma(a, f[2], va[2]), va[3] - ta[0], va[4] - ta[1], va[5] - ta[2], va[6], va[7]),
+    )  # fmt: skip
+    scatter(
+        velocity, batches.second, first,
+        (fma(b, f[0], vb[0]), fma(b, f[1], vb[1]), fma(b, f[2], vb[2]), vb[3] + tb[0], vb[4] + tb[1], vb[5] + tb[2], vb[6], vb[7]),
+    )  # fmt: skip
+
+
+@inlined
+def sum_up(t, u, n, along_t, along_u, along_n):
+    """along_t t + along_u u + along_n n."""
+    return (
+        fma(t[0], along_t, fma(u[0], along_u, n[0] * along_n)),
+        fma(t[1], along_t, fma(u[1], along_u, n[1] * along_n)),
+        fma(t[2], along_t, fma(u[2], along_u, n[2] * along_n)),
+    )
+
+
+@jit
+def warm_start(lanes, batches, begin, number, velocity, moved, mass):
+    """Give bodies the impulses carried over of the batches from `begin` to `number`; moved: since these were made."""
+    w = width_of(lanes)
+    record, zero = batches.record, spread(lanes, 0.0)
+    for k in range(begin, number):
+        o = k * FIELDS * w
+        va, vb = gather(lanes, velocity, batches.first, k * w), gather(lanes, velocity, batches.second, k * w)
+        ma, mb = gather(lanes, mass, batches.first, k * w), gather(lanes, mass, batches.second, k * w)
+        xa, xb = gather(lanes, moved, batches.first, k * w), gather(lanes, moved, batches.second, k * w)
+        arm_a, arm_b = _arms(lanes, batches, k)
+        arm_a, arm_b, _ = _moved_arms(lanes, arm_a, arm_b, load(lanes, record, o + SHARE * w), xa, xb)
+        press, turn_1, turn_2 = zero, zero, zero
+        for c in range(batches.points[k]):
+            g = o + (POINT + POINT_SIZE * c) * w
+            p = load(lanes, record, g + PRESS * w)
+            press = press + p
+            turn_1, turn_2 = fma(p, load(lanes, record, g + Y * w), turn_1), fma(-p, load(lanes, record, g + X * w), turn_2)
+        f1 = where_greater(press, zero, load(lanes, record, o + PUSH_1 * w), zero)
+        f2 = where_greater(press, zero, load(lanes, record, o + PUSH_2 * w), zero)
+        twist = where_greater(press, zero, load(lanes, record, o + TWIST * w), zero)
+        store_three(record, o + PUSH_1 * w, w, f1, f2, twist)
+        n = three(lanes, record, o + NORMAL * w)
+        t, u = three(lanes, record, o + TANGENT_1 * w), three(lanes, record, o + TANGENT_2 * w)
+        f, torque = sum_up(t, u, n, f1, f2, press), sum_up(t, u, n, turn_1, turn_2, twist)
+        _push(velocity, batches, k * w, va, vb, ma, mb, arm_a, arm_b, f, torque)
+
+
+@inlined
+def _clamp(lanes, x, limit):
+    x = where_greater(x, limit, limit, x)
+    return where_greater(-limit, x, -limit, x)
+
+
+@inlined
+def _rub(lanes, record, o, points, u1, u2, w3):
+    """Friction of a patch with slip (u1, u2) and spin w3 about n: the changes of its impulses along t_1, t_2 and about n."""
+    w = width_of(lanes)
+    zero, one = spread(lanes, 0.0), spread(lanes, 1.0)
+    press, lever = zero, zero
+    for c in range(points):
+        g = o + (POINT + POINT_SIZE * c) * w
+        p = load(lanes, record, g + PRESS * w)
+        press, lever = press + p, fma(p, load(lanes, record, g + LEVER * w), lever)
+    static, dynamic = load(lanes, record, o + MU_STATIC * w), load(lanes, record, o + MU_DYNAMIC * w)
+    old = load(lanes, record, o + TWIST * w)
+    free = fma(-load(lanes, record, o + STEP_N * w), w3, old)
+    size = where_greater(free, zero, free, -free)
+    new = where_greater(size, static * lever, _clamp(lanes, free, dynamic * lever), free)
+    store(record, o + TWIST * w, new)
+    d3 = new - old
+    u1 = fma(load(lanes, record, o + TWIST_TO_1 * w), d3, u1)
+    u2 = fma(load(lanes, record, o + TWIST_TO_2 * w), d3, u2)
+    old_1, old_2 = load(lanes, record, o + PUSH_1 * w), load(lanes, record, o + PUSH_2 * w)
+    step = load(lanes, record, o + STEP_T * w)
+    f1, f2 = fma(-step, u1, old_1), fma(-step, u2, old_2)
+    square, most = fma(f1, f1, f2 * f2), static * press
+    factor = where_greater(square, most * most, dynamic * press / root(square + spread(lanes, TINY * TINY)), one)
+    f1, f2 = f1 * factor, f2 * factor
+    store(record, o + PUSH_1 * w, f1)
+    store(record, o + PUSH_2 * w, f2)
+    return f1 - old_1, f2 - old_2, d3
+
+
+@inlined
+def _press(lanes, record, g, speed, gap, relaxing, per_h, stiff, hard, soft, deepest):
+    """Normal impulse of the points at g that approach at -speed, in m/s; returns its change."""
+    w = width_of(lanes)
+    zero = spread(lanes, 0.0)
+    mass, old = load(lanes, record, g + MASS * w), load(lanes, record, g + PRESS * w)
+    if relaxing:
+        new = fma(-mass, fma(where_greater(gap, zero, gap, zero), per_h, speed), old)
+    else:
+        spring = where_greater(stiff * gap, -deepest, stiff * gap, -deepest)
+        bias = where_greater(gap, zero, gap * per_h, spring)
+        share = where_greater(gap, zero, spread(lanes, 1.0), hard)
+        kept = where_greater(gap, zero, zero, soft)
+        new = fma(-(mass * share), speed + bias, fma(-kept, old, old))
+    new = where_greater(new, zero, new, zero)
+    store(record, g + PRESS * w, new)
+    return new - old
+
+
+@inlined
+def _turned_normal(theta, n, half):
+    """G of a body turned by theta."""
+    across = cross(theta, n)
+    twice = cross(theta, across)
+    return fma(half, twice[0], -across[0]), fma(half, twice[1], -across[1]), fma(half, twice[2], -across[2])
+
+
+@jit
+def solve(lanes, batches, begin, number, velocity, moved, mass, h, relaxing):
+    """One pass over the batches from `begin` to `number`; moved: since these were made.
+
+    relaxing: the one with friction and without springs, after the bodies have moved.
+    """
+    w = width_of(lanes)
+    record, zero, per_h, half = batches.record, spread(lanes, 0.0), spread(lanes, 1.0 / h), spread(lanes, 0.5)
+    for k in range(begin, number):
+        o, points = k * FIELDS * w, batches.points[k]
+        va, vb = gather(lanes, velocity, batches.first, k * w), gather(lanes, velocity, batches.second, k * w)
+        xa, xb = gather(lanes, moved, batches.first, k * w), gather(lanes, moved, batches.second, k * w)
+        n = three(lanes, record, o + NORMAL * w)
+        t, u = three(lanes, record, o + TANGENT_1 * w), three(lanes, record, o + TANGENT_2 * w)
+        arm_a, arm_b = _arms(lanes, batches, k)
+        # How the gap has changed: at O, and from there along t_1 and t_2.
+        ga, gb = _turned_normal(angular(xa), n, half), _turned_normal(angular(xb), n, half)
+        core_a = along(arm_a, -load(lanes, record, o + RADIUS_A * w), n)
+        core_b = along(arm_b, load(lanes, record, o + RADIUS_B * w), n)
+        arm_a, arm_b, d = _moved_arms(lanes, arm_a, arm_b, load(lanes, record, o + SHARE * w), xa, xb)
+        at_o = dot(n, d) + (dot(gb, core_b) - dot(ga, core_a))
+        between = less(gb, ga)
+        slope_1, slope_2 = dot(t, between), dot(u, between)
+        # Relative velocity at O and relative spin, along the axes.
+        slip = less(add(linear(vb), cross(angular(vb), arm_b)), add(linear(va), cross(angular(va), arm_a)))
+        spin = less(angular(vb), angular(va))
+        un, w1, w2 = dot(n, slip), dot(t, spin), dot(u, spin)
+        f1, f2, f3 = zero, zero, zero
+        if relaxing:
+            f1, f2, f3 = _rub(lanes, record, o, points, dot(t, slip), dot(u, slip), dot(n, spin))
+            un = _coupled(lanes, record, o + TO_NORMAL * w, f1, f2, f3, un)
+            w1 = _coupled(lanes, record, o + TO_TURN_1 * w, f1, f2, f3, w1)
+            w2 = _coupled(lanes, record, o + TO_TURN_2 * w, f1, f2, f3, w2)
+        press, turn_1, turn_2 = _press_points(lanes, record, o, points, un, w1, w2, at_o, slope_1, slope_2, relaxing, per_h)
+        ma, mb = gather(lanes, mass, batches.first, k * w), gather(lanes, mass, batches.second, k * w)
+        f, torque = sum_up(t, u, n, f1, f2, press), sum_up(t, u, n, turn_1, turn_2, f3)
+        _push(velocity, batches, k * w, va, vb, ma, mb, arm_a, arm_b, f, torque)
+
+
+@inlined
+def _coupled(lanes, record, at, f1, f2, f3, speed):
+    c = three(lanes, record, at)
+    return fma(c[0], f1, fma(c[1], f2, fma(c[2], f3, speed)))
+
+
+@inlined
+def _press_points(lanes, record, o, points, un, w1, w2, at_o, slope_1, slope_2, relaxing, per_h):
+    """Normal impulses of the points of a patch; returns the sum of their changes along n and its torque about t_1 and t_2."""
+    w = width_of(lanes)
+    zero = spread(lanes, 0.0)
+    stiff, hard = load(lanes, record, o + STIFF * w), load(lanes, record, o + HARD * w)
+    soft, deepest = load(lanes, record, o + SOFT * w), load(lanes, record, o + DEPTH * w)
+    press, turn_1, turn_2 = zero, zero, zero
+    p0, p1, p2 = zero, zero, zero
+    for c in range(points):
+        g = o + (POINT + POINT_SIZE * c) * w
+        x, y = load(lanes, record, g + X * w), load(lanes, record, g + Y * w)
+        gap = load(lanes, record, g + GAP * w) + (at_o + fma(x, slope_1, y * slope_2))
+        speed = fma(y, w1, fma(-x, w2, un))
+        if c == 1:
+            speed = fma(load(lanes, record, o + BETWEEN * w), p0, speed)
+        elif c == 2:
+            speed = fma(load(lanes, record, o + (BETWEEN + 1) * w), p0, speed)
+            speed = fma(load(lanes, record, o + (BETWEEN + 3) * w), p1, speed)
+        elif c == 3:
+            speed = fma(load(lanes, record, o + (BETWEEN + 2) * w), p0, speed)
+            speed = fma(load(lanes, record, o + (BETWEEN + 4) * w), p1, speed)
+            speed = fma(load(lanes, record, o + (BETWEEN + 5) * w), p2, speed)
+        change = _press(lanes, record, g, speed, gap, relaxing, per_h, stiff, hard, soft, deepest)
+        if c == 0:
+            p0 = change
+        elif c == 1:
+            p1 = change
+        elif c == 2:
+            p2 = change
+        press, turn_1, turn_2 = press + change, fma(change, y, turn_1), fma(-change, x, turn_2)
+    return press, turn_1, turn_2

@@ -1,0 +1,389 @@
+"""The sub-stepped solver of heaps: soft contacts with a skin, a relaxing pass, friction in a cone (kernels).
+
+A step is cut into sub-steps of length h. In each of them, for every body and every patch of contact points (`heap_records`) with normal
+n, gaps less the skin s, effective masses m = 1 / (n.K n), normal impulses p, and friction f and twist t at its centre carried
+over from the sub-step before (a warm start):
+
+    v <- v + h g                                                                gravity
+    v <- v + M^-1 J^T (p n + f, t n)                                            warm start
+    p <- max(0, (1 - i) p - m k (u_n + c))                                      normal rows, with
+         s > 0:   c = s / h,        k = 1,          i = 0                       (free to close the gap, no further)
+         s <= 0:  c = s w / a_1,    k = a_2 a_3,    i = a_3                     (spring and damper, implicit)
+    x <- x + h v,   q <- exp(h w) q                                             and where no contact pushed: x <- x - h^2 g / 2
+    t <- t - w_n / (n.K_w n),     |t| > mu_s sum p r:  t <- mu_k sum p r sign t about n, r the points' distances from the centre
+    f <- f - u_t / k_t,           |f| > mu_s sum p:    f <- mu_k sum p f / |f|   friction, before the normal rows
+    p once more with k = 1, i = 0, c = max(s, 0) / h                            relax: takes out the speed the spring gave
+
+Friction is found in the relaxing pass only, from speeds that the spring has no part in: with it in both passes a stack of three
+boxes rocks for ever at some cm/s. k_t is the largest eigenvalue of the tangents' part of K: with the inverse matrix and a radial clamp a
+block slides where it should hold.
+
+w = 2 pi F / h is the frequency of the spring, z its damping ratio, a_1 = 2 z + h w, a_2 = h w a_1, a_3 = 1 / (1 + a_2); twice
+w against what cannot be moved. Patches are visited colour by colour (Gauss-Seidel), many at once. K is that of the start of the
+step; gaps and arms are those of points fixed in the bodies, anew in every sub-step (gaps to second order in the turn); radii are taken
+along the normal, so that balls roll, and the normal of two balls is made anew. At the end of a sub-step contacts that were seen
+at u_n < -sqrt(2 g skin) / e and are closed by now leave at -e u_n. The torque-free part of rotation keeps the angular
+momentum: w <- I(q')^-1 I(q) w, with q' from the spin at mid-way.
+
+Method: Macklin et al., Small steps in physics simulation, 2019; the relaxing pass and restitution after E. Catto, Solver2D
+(2024). The load of a column of k bodies presses the skin in by k g / w^2; the error is of first order in h.
+"""
+
+from math import pi, sqrt
+
+import numpy as np
+
+from rigidimpulse.collision.contact_records import INVERSE_MASS, SKIN
+from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
+from rigidimpulse.core.simd import width_of
+from rigidimpulse.core.workers import LAST, NONE, PATIENCE, look_at, open_round, pause, report_piece, take_piece, wait_for
+from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import finish, kick, move
+from rigidimpulse.dynamics.solvers.tgs_soft.passes import solve, warm_start
+from rigidimpulse.dynamics.solvers.tgs_soft.records import (
+    ARM_A,
+    ARM_B,
+    ARM_FIELDS,
+    FIELDS,
+    GAP,
+    MASS,
+    MU_DYNAMIC,
+    MU_STATIC,
+    NORMAL,
+    POINT,
+    POINT_SIZE,
+    PRESS,
+    PUSH_1,
+    PUSH_2,
+    SHARE,
+    STEP_T,
+    TANGENT_1,
+    TANGENT_2,
+    TWIST,
+    X,
+    Y,
+    normal_of,
+    point_of,
+    tangents,
+)
+
+FREQUENCY = 0.25
+"""F: frequency of the spring in sub-steps."""
+DAMPING = 10.0
+"""z: damping ratio."""
+KICK, WARM, SOLVE, MOVE, RELAX = range(5)
+"""Phases of a sub-step: gravity, warm start, normal rows, motion, relaxing. WARM, SOLVE and RELAX have a round for each colour."""
+BODIES_EACH, BATCHES_EACH = 128, 8
+"""Bodies and batches of a piece of a round: a microsecond or two of work."""
+
+
+def softness(h: float) -> np.ndarray:
+    """Rows (w / a_1 [1/s], a_2 a_3, a_3): between movable bodies, against immovable ones, (2, 3)."""
+    out = np.zeros((2, 3))
+    for k, factor in enumerate((1.0, 2.0)):
+        w = factor * 2.0 * pi * FREQUENCY / h
+        a_1 = 2.0 * DAMPING + h * w
+        a_2 = h * w * a_1
+        a_3 = 1.0 / (1.0 + a_2)
+        out[k] = w / a_1, a_2 * a_3, a_3
+    return out
+
+
+@inlined
+def _field(record, at):
+    """A field of the record, in double precision."""
+    return np.float64(record[at])
+
+
+@jit
+def _vector(record, at, width):
+    return _field(record, at), _field(record, at + width), _field(record, at + 2 * width)
+
+
+@jit
+def _cross(ax, ay, az, bx, by, bz):
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@inlined
+def _first_arm(s, width):
+    """Place of the first field of the arms of slot s."""
+    return s // width * ARM_FIELDS * width + s % width
+
+
+@jit_making_arrays
+def _arms_to(bodies, batches, s, o, width, c):
+    """Bodies of lane s, and the arms from them to its point c (to its centre for c < 0) as they are now."""
+    record, arm, moved = batches.record, batches.arm, bodies.moved
+    a, b = batches.first[s], batches.second[s]
+    x, y = 0.0, 0.0
+    if c >= 0:
+        g = o + (POINT + POINT_SIZE * c) * width
+        x, y = _field(record, g + X * width), _field(record, g + Y * width)
+    share, q = _field(record, o + SHARE * width), _first_arm(s, width)
+    arm_a, arm_b = np.empty(3), np.empty(3)
+    for k in range(3):
+        d = moved[8 * b + k] - moved[8 * a + k]
+        along = x * _field(record, o + (TANGENT_1 + k) * width) + y * _field(record, o + (TANGENT_2 + k) * width)
+        arm_a[k] = arm[q + (ARM_A + k) * width] + (1.0 - share) * d + along
+        arm_b[k] = arm[q + (ARM_B + k) * width] - share * d + along
+    return a, b, arm_a, arm_b
+
+
+@jit
+def _velocity_at(bodies, i, arm):
+    v = bodies.velocity
+    o = 8 * i
+    x, y, z = _cross(v[o + 3], v[o + 4], v[o + 5], arm[0], arm[1], arm[2])
+    return v[o] + x, v[o + 1] + y, v[o + 2] + z
+
+
+@jit
+def _push(bodies, i, arm, x, y, z):
+    """The impulse (x, y, z) on body i at the end of the arm; returns the work that it does if it cannot be moved, J."""
+    v, m, o = bodies.velocity, bodies.mass, 8 * i
+    if m[o + INVERSE_MASS] == 0.0:
+        ux, uy, uz = _velocity_at(bodies, i, arm)
+        return -(x * ux + y * uy + z * uz)
+    v[o] += m[o + INVERSE_MASS] * x
+    v[o + 1] += m[o + INVERSE_MASS] * y
+    v[o + 2] += m[o + INVERSE_MASS] * z
+    tx, ty, tz = _cross(arm[0], arm[1], arm[2], x, y, z)
+    v[o + 3] += m[o] * tx + m[o + 1] * ty + m[o + 2] * tz
+    v[o + 4] += m[o + 1] * tx + m[o + 3] * ty + m[o + 4] * tz
+    v[o + 5] += m[o + 2] * tx + m[o + 4] * ty + m[o + 5] * tz
+    return 0.0
+
+
+@jit
+def _slip_at(bodies, a, b, arm_a, arm_b):
+    ax, ay, az = _velocity_at(bodies, a, arm_a)
+    bx, by, bz = _velocity_at(bodies, b, arm_b)
+    return bx - ax, by - ay, bz - az
+
+
+@jit_making_arrays
+def special_patches(width, bodies, pairs, patches, begin, count, rows, batches, coefficients, gravity, lists, target):
+    """Patches from `begin` to `count` that need more than the passes give: of two balls, of rebounds, of moving supports.
+
+    Writes them to lists (3, m), and returns their numbers. coefficients (k, k, 4) of two materials; gravity: its strength, m/s2. target
+    (m, 4): speeds at which points leave after they have closed, m/s, 0 for none.
+    """
+    balls, rebounds, supports = 0, 0, 0
+    for m in range(begin, count):
+        p, s = patches.pair[m], patches.slot[m]
+        a, b = pairs.first[p], pairs.second[p]
+        if bodies.reach[a] == 0.0 and bodies.reach[b] == 0.0:
+            lists[0, balls] = m
+            balls += 1
+        for i in (a, b):
+            if bodies.mass[8 * i + INVERSE_MASS] == 0.0 and np.any(bodies.velocity[8 * i : 8 * i + 6] != 0.0):
+                lists[2, supports] = m
+                supports += 1
+        restitution = coefficients[bodies.material[a], bodies.material[b], 0]
+        if restitution == 0.0:
+            continue
+        o = (s // width) * FIELDS * width + s % width
+        nx, ny, nz = _vector(batches.record, o + NORMAL * width, width)
+        some = False
+        for c in range(patches.size[m]):
+            _, _, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
+            ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
+            speed = -restitution * (ux * nx + uy * ny + uz * nz)
+            target[m, c] = speed if speed > sqrt(2.0 * gravity * rows[patches.row[m, 0], SKIN]) else 0.0
+            some = some or target[m, c] > 0.0
+        if some:
+            lists[1, rebounds] = m
+            rebounds += 1
+    return balls, rebounds, supports
+
+
+@jit
+def _turn_balls(width, bodies, pairs, patches, chosen, rows, batches):
+    """Normals, arms and gaps of two balls where they are now; friction stays across the normal."""
+    record = batches.record
+    for m in chosen:
+        p, s = patches.pair[m], patches.slot[m]
+        a, b = pairs.first[p], pairs.second[p]
+        o = (s // width) * FIELDS * width + s % width
+        r, share, q = patches.row[m, 0], _field(record, o + SHARE * width), _first_arm(s, width)
+        f1, f2 = _field(record, o + PUSH_1 * width), _field(record, o + PUSH_2 * width)
+        t, u = _vector(record, o + TANGENT_1 * width, width), _vector(record, o + TANGENT_2 * width, width)
+        f = (f1 * t[0] + f2 * u[0], f1 * t[1] + f2 * u[1], f1 * t[2] + f2 * u[2])
+        n = normal_of(bodies.position, bodies.rotation, rows, r, a, b, pairs.carrier[p])
+        ux, uy, uz, vx, vy, vz = tangents(n[0], n[1], n[2])
+        x, y, z, gap = point_of(bodies.position, bodies.rotation, rows, r, a, b, n[0], n[1], n[2], share)
+        record[o + PUSH_1 * width] = ux * f[0] + uy * f[1] + uz * f[2]
+        record[o + PUSH_2 * width] = vx * f[0] + vy * f[1] + vz * f[2]
+        arm, t, u = (x, y, z), (ux, uy, uz), (vx, vy, vz)
+        for k in range(3):
+            d = bodies.moved[8 * b + k] - bodies.moved[8 * a + k]
+            gap -= n[k] * d
+            record[o + (NORMAL + k) * width] = n[k]
+            record[o + (TANGENT_1 + k) * width], record[o + (TANGENT_2 + k) * width] = t[k], u[k]
+            batches.arm[q + (ARM_A + k) * width] = arm[k] - (1.0 - share) * d
+            between = bodies.position[b, k] - bodies.position[a, k]
+            batches.arm[q + (ARM_B + k) * width] = arm[k] - between + share * d
+        record[o + (POINT + GAP) * width] = gap
+
+
+@jit_making_arrays
+def _rebound(width, bodies, patches, chosen, batches, target):
+    """Give points that came in fast and are closed their rebound, with friction; returns the supports' work, J."""
+    record, work = batches.record, 0.0
+    for m in chosen:
+        s = patches.slot[m]
+        o = (s // width) * FIELDS * width + s % width
+        n = _vector(record, o + NORMAL * width, width)
+        for c in range(patches.size[m]):
+            g = o + (POINT + POINT_SIZE * c) * width
+            if target[m, c] == 0.0 or record[g + PRESS * width] == 0.0:
+                continue
+            a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
+            ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
+            p = max(_field(record, g + MASS * width) * (target[m, c] - (ux * n[0] + uy * n[1] + uz * n[2])), 0.0)
+            work += _push(bodies, b, arm_b, p * n[0], p * n[1], p * n[2]) + _push(bodies, a, arm_a, -p * n[0], -p * n[1], -p * n[2])
+            ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
+            un, step = ux * n[0] + uy * n[1] + uz * n[2], _field(record, o + STEP_T * width)
+            x, y, z = -step * (ux - un * n[0]), -step * (uy - un * n[1]), -step * (uz - un * n[2])
+            size = sqrt(x * x + y * y + z * z)
+            if size > _field(record, o + MU_STATIC * width) * p:
+                factor = _field(record, o + MU_DYNAMIC * width) * p / size
+                x, y, z = factor * x, factor * y, factor * z
+            work += _push(bodies, b, arm_b, x, y, z) + _push(bodies, a, arm_a, -x, -y, -z)
+            target[m, c] = record[g + PRESS * width] = 0.0
+            record[o + PUSH_1 * width] = record[o + PUSH_2 * width] = record[o + TWIST * width] = 0.0
+    return work
+
+
+@jit_making_arrays
+def _work_of(width, bodies, patches, chosen, batches):
+    """Work that moving supports did by the impulses of a sub-step, J."""
+    record, work = batches.record, 0.0
+    for m in chosen:
+        s = patches.slot[m]
+        o = (s // width) * FIELDS * width + s % width
+        n = _vector(record, o + NORMAL * width, width)
+        t, u = _vector(record, o + TANGENT_1 * width, width), _vector(record, o + TANGENT_2 * width, width)
+        f1, f2, f3 = _vector(record, o + PUSH_1 * width, width)
+        press, turn_1, turn_2 = 0.0, 0.0, 0.0
+        for c in range(patches.size[m]):
+            g = o + (POINT + POINT_SIZE * c) * width
+            p = _field(record, g + PRESS * width)
+            press = press + p
+            turn_1, turn_2 = turn_1 + p * _field(record, g + Y * width), turn_2 - p * _field(record, g + X * width)
+        a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, np.int64(-1))
+        support, sign, arm = (b, -1.0, arm_b) if bodies.mass[8 * b + INVERSE_MASS] == 0.0 else (a, 1.0, arm_a)
+        ux, uy, uz = _velocity_at(bodies, support, arm)
+        v = bodies.velocity[8 * support + 3 : 8 * support + 6]
+        for k in range(3):
+            force, torque = press * n[k] + f1 * t[k] + f2 * u[k], turn_1 * t[k] + turn_2 * u[k] + f3 * n[k]
+            work += sign * (force * (ux if k == 0 else (uy if k == 1 else uz)) + torque * v[k])
+    return work
+
+
+@jit
+def _round(number, colours):
+    """Phase and colour of a round."""
+    k = number % (3 * colours + 2)
+    if k == 0:
+        return KICK, 0
+    if k == 2 * colours + 1:
+        return MOVE, 0
+    if k > 2 * colours + 1:
+        return RELAX, k - 2 * colours - 2
+    return (WARM, k - 1) if k <= colours else (SOLVE, k - 1 - colours)
+
+
+@jit
+def _extent(bodies, edges, phase, colour):
+    """Begin and end of the bodies or batches of a round, how many of them make a piece, and the number of pieces."""
+    begin, end, each = 0, bodies.part.shape[0], BODIES_EACH
+    if phase not in (KICK, MOVE):
+        begin, end, each = edges[colour], edges[colour + 1], BATCHES_EACH
+    return begin, end, each, (end - begin + each - 1) // each
+
+
+@jit
+def _work_on(lanes, bodies, batches, calm, h, phase, colour, begin, end):
+    """A piece of a round; calm: colours of batches that were made before the last look."""
+    moved = bodies.drift if colour < calm else bodies.moved
+    if phase == KICK:
+        kick(bodies, begin, end, h)
+    elif phase == WARM:
+        warm_start(lanes, batches, begin, end, bodies.velocity, moved, bodies.mass)
+    elif phase == MOVE:
+        move(bodies, begin, end, h)
+    else:
+        solve(lanes, batches, begin, end, bodies.velocity, moved, bodies.mass, h, phase == RELAX)
+
+
+@jit
+def _lead(lanes, bodies, batches, edges, calm, h, deck, is_shared, number):
+    """Work on a round until it is done."""
+    phase, colour = _round(number, edges.shape[0] - 1)
+    begin, end, each, pieces = _extent(bodies, edges, phase, colour)
+    if not is_shared or pieces < 2:
+        _work_on(lanes, bodies, batches, calm, h, phase, colour, begin, end)
+        return
+    open_round(deck, number)
+    mine = 0
+    while True:
+        _, taken = take_piece(deck)
+        if taken >= pieces:
+            break
+        first = begin + mine * each
+        _work_on(lanes, bodies, batches, calm, h, phase, colour, first, min(first + each, end))
+        mine += 1
+    wait_for(deck, pieces - mine)
+
+
+@jit
+def _help(lanes, bodies, batches, edges, calm, h, deck):
+    """Work on whatever round is open, to the last."""
+    waited, colours, mine, last = 0, edges.shape[0] - 1, 0, NONE
+    while waited < PATIENCE:
+        number, taken = look_at(deck)
+        if number >= 0 and number != LAST and taken < _extent(bodies, edges, *_round(number, colours))[3]:
+            # Another round may be open by now.
+            number, taken = take_piece(deck)
+        if number == LAST:
+            return
+        waited += 1
+        if number >= 0:
+            phase, colour = _round(number, colours)
+            begin, end, each, pieces = _extent(bodies, edges, phase, colour)
+            if taken < pieces:
+                mine = mine + 1 if number == last else 1
+                last, waited = number, 0
+                first = begin + (pieces - mine) * each
+                _work_on(lanes, bodies, batches, calm, h, phase, colour, first, min(first + each, end))
+                report_piece(deck)
+        pause()
+
+
+@jit
+def advance(
+    lanes, bodies, pairs, patches, batches, edges, calm, rows, lists, balls, rebounds, supports, target, sub_steps, h, deck, share, shares
+):
+    """So many sub-steps of length h; returns the work of moving supports, J.
+
+    edges (c+1,): where the batches of colours begin; calm: how many colours were made before the last look; what bodies have come since
+    then is in `drift`. share: 0 for who leads, 1 for who helps, if `shares` is 2, see `heap_team`.
+    """
+    width, colours, work = width_of(lanes), edges.shape[0] - 1, 0.0
+    if share > 0:
+        _help(lanes, bodies, batches, edges, calm, h, deck)
+        return 0.0
+    for s in range(sub_steps):
+        first = s * (3 * colours + 2)
+        for k in range(2 * colours + 2):
+            _lead(lanes, bodies, batches, edges, calm, h, deck, shares > 1, first + k)
+        _turn_balls(width, bodies, pairs, patches, lists[0, :balls], rows, batches)
+        for k in range(2 * colours + 2, 3 * colours + 2):
+            _lead(lanes, bodies, batches, edges, calm, h, deck, shares > 1, first + k)
+        # Whatever a rebound takes from the impulses has acted already.
+        work += _work_of(width, bodies, patches, lists[2, :supports], batches)
+        work += _rebound(width, bodies, patches, lists[1, :rebounds], batches, target)
+    open_round(deck, LAST)
+    finish(bodies)
+    return work

@@ -1,0 +1,1 @@
+"""Islands advanced from event to event."""

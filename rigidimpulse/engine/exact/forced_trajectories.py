@@ -1,0 +1,60 @@
+"""The stage integrate where forces vary: courses follow lines of force (see `force_step`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimpulse.engine.exact.trajectories import integrate
+from rigidimpulse.engine.islands import Group
+from rigidimpulse.engine.plan import Bound, Skip
+
+WHOLE = 1.0 - 1e-9
+"""Part of the rest of a step that counts as all of it."""
+
+
+@dataclass(frozen=True)
+class VaryingLoad:
+    """Marks the groups that varying forces act on."""
+
+    stage: str = "forces"
+    name: str = "varying load"
+
+    def bind(self, world) -> Bound | Skip:
+        """In where a force varies."""
+        if not world.force_tables:
+            return Skip("no force varies")
+        return Bound(note_free, "where contacts or joints hold bodies it is constant over a sub-step")
+
+
+@dataclass(frozen=True)
+class ForcedFlight:
+    """Steps of order 4 where nothing holds bodies; forces of the middle of the sub-step where contacts or joints do."""
+
+    stage: str = "integrate"
+    name: str = "forced flight"
+
+    def bind(self, world) -> Bound | Skip:
+        """In where a force varies."""
+        if not world.force_tables:
+            return Skip("no force varies")
+        if world.accuracy.integrator != "exact":
+            return Bound(integrate_forced, f"{world.accuracy.integrator}: steps of the accuracy's length, whatever their error")
+        impacts = "; impacts are exact on them" if world.can_collide else ""
+        return Bound(integrate_forced, f"steps of order 4, as long as their error allows{impacts}")
+
+
+def note_free(context, _window, group: Group) -> None:
+    """Keep the members' accelerations without varying forces, if these act on one of them."""
+    if context.forces.acts[group.members].any():
+        group.free = context.acceleration[group.members], context.angular_acceleration[group.members]
+
+
+def integrate_forced(context, window, group: Group) -> None:
+    """Give new courses to members, under varying forces where they feel them."""
+    if group.free is not None and not group.loaded:
+        members = group.members[context.forces.acts[group.members]]
+        h = context.forces.fly(context, members, group.time, window.end)
+        window.wake[members] = np.where(h < (window.end - group.time) * WHOLE, group.time + h, np.inf)
+    integrate(context, window, group)

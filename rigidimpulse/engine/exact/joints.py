@@ -1,0 +1,345 @@
+"""Joints in a run: what they remember, what they do when a group arrives, and how they hold it (see `joint_forces`)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.dynamics.constraints.joint import RADIUS
+from rigidimpulse.dynamics.constraints.joint_impact import impact_rows, stop_at_limits
+from rigidimpulse.dynamics.constraints.joint_limits import next_switch
+from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_jointed, make_memory, stop_joints
+from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
+from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.motion.trajectory import FIXED
+from rigidimpulse.scene.joint import Joint
+
+TURN = 0.02
+"""rad, how far the bodies of a joint may turn against each other in a sub-step."""
+SWAY = 0.7
+"""rad, how far the fastest oscillation may go in a sub-step that the tension of joints keeps up across them; 2 is unstable."""
+NOT_CLOSED = 1e3
+"""How many times farther than allowed joints may be off before that is reported."""
+MOST_SUB_STEPS, MOST_SWAYS, MOST_SWINGS = 4096, 256, 16
+"""Sub-steps in a step, and those that bounds of rates may ask for while energy is kept: light links between heavy bodies mostly stand, and
+what only swings about a fixed point has a far lower rate than its bound."""
+DRIFT = 1e-7
+"""Part of its kinetic energy that a group may gain or lose in a sub-step as if nothing swayed."""
+SHORT = 1e-5
+"""Part of a step below which a sub-step is planned as a longer one: closing divides by its length."""
+MOST_CUTS = 20
+"""Times a sub-step is cut to end where a limit is reached or lets go."""
+STEEP = 1e3
+"""Torque of a twist over that about a fixed axis, above which it counts as undefined: half a turn of swing but for 2e-3 rad."""
+
+
+class JointState:
+    """The joints of a run.
+
+    Attributes:
+        table: the rows of all joints. memory: what kernels remember.
+        names: of the joints. whole: (j,) bool, not broken.
+        moment: (j, 3) N s, impulse on b at the instant being worked on. shock: (j, 3) N s, by impacts, so far.
+        pull: (j, 3) N, last force on b.
+        are_closed: whether the forces found last close the joints.
+        drift: (j,) energy gained or lost in the last sub-step without contacts, as a part of the kinetic energy.
+        began: (j,) s, start of the present sub-step. length: (j,) s, that of the one before.
+        reactions: (time, joint, force (3,) on b) at the ends of sub-steps.
+
+    """
+
+    def __init__(self, world) -> None:
+        """All joints whole and without load."""
+        joints: list[Joint] = world.joints_of_scene
+        self.table = world.joints
+        self.memory = make_memory(world.joints, world.inertia)
+        self.names = [joint.name or f"joint{j}" for j, joint in enumerate(joints)]
+        self.break_force = np.array([joint.break_force for joint in joints])
+        self.release_time = np.array([joint.release_time for joint in joints])
+        self.whole = np.ones(len(joints), bool)
+        self.moment = np.zeros((len(joints), 3))
+        self.shock = np.zeros((len(joints), 3))
+        self._booked_shock = np.zeros((len(joints), 3))
+        self.pull = np.zeros((len(joints), 3))
+        self.are_closed = True
+        self.drift = np.zeros(len(joints))
+        self._energy = np.full(len(joints), np.nan)
+        self.began = np.zeros(len(joints))
+        self.length = np.zeros(len(joints))
+        self.reactions: list[tuple[float, int, np.ndarray]] = []
+        self._allowed = TOLERANCES.joint * world.joint_size
+        self._joint_of_row = np.repeat(np.arange(len(joints)), np.diff(self.table.first))
+        held = (self.table.coordinate < RADIUS) & np.isinf(self.table.stiffness) & np.isinf(self.table.lower) & np.isinf(self.table.upper)
+        movable = [(i >= 0) & world.dynamic[i] for i in (self.table.body_a, self.table.body_b)]
+        held_along = np.bincount(self._joint_of_row[held], minlength=len(joints))
+        self._pins = (held_along == 3) & ~(movable[0] & movable[1])
+        self._slides = (held_along == 1) | (held_along == 2)
+        self._limited = bool(np.any((self.table.lower == 0.0) != (self.table.upper == 0.0)))
+        self._dynamic = world.dynamic
+        self._of_body: dict[int, list[int]] = {}
+        for j, pair in enumerate(zip(self.table.body_a.tolist(), self.table.body_b.tolist(), strict=True)):
+            for i in pair:
+                if i >= 0 and world.dynamic[i]:
+                    self._of_body.setdefault(i, []).append(j)
+
+    def at(self, bodies) -> np.ndarray:
+        """Whole joints at any of the given dynamic bodies, in order."""
+        found = {j for i in bodies for j in self._of_body.get(int(i), ()) if self.whole[j]}
+        return np.array(sorted(found), np.int64)
+
+    def movable_end(self, joint: int) -> int:
+        """A dynamic body of a joint."""
+        a, b = int(self.table.body_a[joint]), int(self.table.body_b[joint])
+        return a if a >= 0 and self._dynamic[a] else b
+
+    def bodies_of(self, joints: np.ndarray) -> np.ndarray:
+        """Bodies of the joints, without the world."""
+        both = np.unique(np.concatenate([self.table.body_a[joints], self.table.body_b[joints]]))
+        return both[both >= 0]
+
+    def are_passive(self, which: np.ndarray) -> bool:
+        """Whether joints are neither driven nor springs."""
+        rows = np.isin(self._joint_of_row, which)
+        return bool(np.all(np.isinf(self.table.stiffness[rows])))
+
+    def hold_to_world(self, which: np.ndarray) -> bool:
+        """Whether one of the joints is fixed to the world."""
+        return bool(np.any(self.table.body_a[which] < 0) or np.any(self.table.body_b[which] < 0))
+
+    def moving_bodies(self, context) -> np.ndarray:
+        """Dynamic bodies with joints that do not rest."""
+        bodies = np.array(sorted(self._of_body), np.int64)
+        return bodies[context.state.course.mode[bodies] != FIXED]
+
+    def arrive(self, context, group) -> None:
+        """End the group's sub-steps: take half of the forces back, close what drifted, stop the joints."""
+        state, now, memory = context.state, context.state.now, self.memory
+        members, which = group.members, group.joints
+        elapsed = np.zeros(len(self.whole))
+        elapsed[which] = group.time - self.began[which]
+        self.moment[which] = 0.0
+        before = mechanical_energy(now, context.world, members)
+        arrived = np.hstack([now.velocity[members], now.angular_velocity[members]])
+        for i in members:
+            held = memory.wrench[i] * max(elapsed[j] for j in self.at([i])) if int(i) in self._of_body else np.zeros(6)
+            now.velocity[i] -= now.inv_mass[i] * held[:3]
+            now.angular_velocity[i] -= now.inv_inertia[i] @ held[3:]
+        moved = close_joints(
+            self.table, which, now, group.contacts, state.rotation, members, context.column, memory.angle, self._allowed
+        )
+        if moved:
+            refresh_pose(members, now, state.rotation, state.course.inertia)
+            group.moved = True
+        stop_joints(
+            self.table, which, now, state.rotation, members, context.column, memory, elapsed, self.moment
+        )
+        self._book(context, which, group.time)
+        state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
+        if self._limited:
+            # An impact at this instant: what came before goes on unchanged.
+            stop_at_limits(
+                self.table, which, now, state.rotation, members, context.column, memory, self._allowed, self.shock
+            )
+        memory.wrench[members] = 0.0
+        self.length[which] = elapsed[which]
+        after = mechanical_energy(now, context.world, members)
+        context.log.book(group.time, "joints", after - before)
+        self._note_drift(which, after, kinetic_energy(now, context.world, members))
+
+    def _note_drift(self, which: np.ndarray, energy: float, kinetic: float) -> None:
+        """What the sub-step that ends has made or lost of the energy that joints keep by themselves."""
+        begun, self._energy[which] = self._energy[which], np.nan
+        self.drift[which] = 0.0
+        if len(which) and np.all(begun == begun[0]) and kinetic > 0.0:
+            self.drift[which] = abs(energy - begun[0]) / kinetic
+
+    def _book(self, context, which: np.ndarray, time: float) -> None:
+        """Impulses on b of the sub-steps that end: half of what their forces were, and what stopped the joints."""
+        for j in which.tolist():
+            a, b, cause = int(self.table.body_a[j]), int(self.table.body_b[j]), f"joint {self.names[j]}"
+            began = float(self.began[j])
+            if time > began:
+                context.impulses.add(cause, a, b, began, time, 0.5 * self.pull[j] + self.moment[j] / (time - began))
+            context.impulses.add_at(cause, a, b, time, self.shock[j] - self._booked_shock[j])
+        self._booked_shock[which] = self.shock[which]
+
+    def impact_block(self, context, group):
+        """The joints' part in the impulses of an impact (`JointBlock`)."""
+        state = context.state
+        return impact_rows(
+            self.table, group.joints, state.now, state.rotation, group.members, context.column, self.memory, self._allowed,
+            self.shock,
+        )
+
+    def sub_step(self, context, group, h: float) -> float:
+        """Length of the next sub-step: h, the rest of the step, or a part of it. Very short rests are planned as longer ones."""
+        world, now = context.world, context.state.now
+        fastest = 0.0
+        sways, swings = self._tension_rates(context, group.joints)
+        rates = max(sways, self._spring_rate(group.joints))
+        for j in group.joints.tolist():
+            a, b = int(self.table.body_a[j]), int(self.table.body_b[j])
+            spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
+            fastest = max(fastest, float(np.linalg.norm(spins[1] - spins[0])))
+            if self._slides[j] and min(a, b) >= 0:
+                fastest = max(fastest, _slide_rate(now, a, b, world.accuracy.step))
+        waits = self.release_time[group.joints] - group.time
+        h = min(h, float(waits[waits > 0.0].min(initial=np.inf)))
+        step = world.accuracy.step
+        drifts = self.drift[group.joints].max(initial=0.0) > DRIFT
+        pieces = max(
+            math.ceil(fastest * step / TURN),
+            min(math.ceil(rates * step / SWAY), MOST_SUB_STEPS if drifts else MOST_SWAYS),
+            min(math.ceil(swings * step / SWAY), MOST_SUB_STEPS if drifts else MOST_SWINGS),
+        )
+        pieces = max(min(pieces, MOST_SUB_STEPS), 1)
+        piece = step / pieces
+        return piece if h > piece * (1.0 + SHORT) else max(h, SHORT * step)
+
+    def _spring_rate(self, which: np.ndarray) -> float:
+        """Fastest oscillation [rad/s] of soft rows that other joints pull at: alone they are exact at any length."""
+        if len(which) < 2:
+            return 0.0
+        table, memory = self.table, self.memory
+        works = np.isfinite(table.stiffness) & ~memory.slack & np.isin(self._joint_of_row, which)
+        stiffness = table.stiffness[works]
+        square = np.where(table.per_mass[works], stiffness, stiffness * memory.weight[works])
+        return math.sqrt(square.max(initial=0.0))
+
+    def _tension_rates(self, context, which: np.ndarray) -> tuple[float, float]:
+        """Bounds of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m r)).
+
+        Returns that of all others, and that of bodies that only swing about a point which cannot be moved.
+        """
+        world, table, squares = context.world, self.table, {}
+        force = np.linalg.norm(self.pull[which], axis=1)
+        for bodies, anchors in ((table.body_a[which], table.anchor_a[which]), (table.body_b[which], table.anchor_b[which])):
+            for i, f, r in zip(bodies.tolist(), force.tolist(), np.linalg.norm(anchors, axis=1).tolist(), strict=True):
+                if i >= 0 and world.dynamic[i] and r > 0.0:
+                    square = f * (r / world.inertia[i].min() + world.inv_mass[i] / r)
+                    squares[i] = squares.get(i, 0.0) + square
+        swinging = {self.movable_end(j) for j in which[self._pins[which]].tolist()}
+        swinging = {i for i in swinging if len(self.at([i])) == 1}
+        others = (square for i, square in squares.items() if i not in swinging)
+        own = (square for i, square in squares.items() if i in swinging)
+        return math.sqrt(max(others, default=0.0)), math.sqrt(max(own, default=0.0))
+
+    def hold(self, context, group, contacts, turning, force, rest: float, rolling) -> tuple[float, float]:
+        """Forces into context.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
+        state, memory = context.state, self.memory
+        others = self.bodies_of(group.joints)
+        others = others[~context.world.dynamic[others]]
+        h, cuts = self.sub_step(context, group, rest), 0
+        while True:
+            h = group.load(context, h)
+            for i in others:
+                memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, group.time + h)
+            moment = self.moment.copy()
+            residual, worst = hold_jointed(
+                context.solve_rows, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
+                group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
+                context.wrench, moment, rolling,
+            )
+            self.pull[group.joints] = 2.0 * (moment[group.joints] - self.moment[group.joints]) / h
+            shorter = self.sub_step(context, group, h)
+            if shorter < 0.5 * h:
+                # Only the forces show how short it has to be.
+                h = shorter
+                continue
+            if self._break(context, group):
+                continue
+            switch = next_switch(self.table, group.joints, memory, h, self._allowed)
+            if cuts == MOST_CUTS or switch >= h * (1.0 - SHORT):
+                break
+            h, cuts = max(switch, SHORT * context.world.accuracy.step), cuts + 1
+        self.moment[:] = moment
+        self._log(group, h)
+        self.began[group.joints] = group.time
+        if not len(group.contacts.gap) and group.free is None and self.are_passive(group.joints):
+            self._energy[group.joints] = mechanical_energy(state.now, context.world, group.members)
+        self._report(context, group, worst)
+        self.are_closed = worst <= NOT_CLOSED * self._allowed
+        return h, residual
+
+    def let_go(self, group) -> None:
+        """Forget the forces of the group's joints, which are not to be used."""
+        self.memory.wrench[group.members] = 0.0
+        self.pull[group.joints] = 0.0
+        for j in group.joints.tolist():
+            self.memory.force[self.table.first[j] : self.table.first[j + 1]] = 0.0
+
+    def _report(self, context, group, worst: float) -> None:
+        """Report joints that are off by `worst` m or rad, and those near the singularity of a twist."""
+        names = tuple(context.world.names[i] for i in group.members)
+        if worst > NOT_CLOSED * self._allowed:
+            far = f"off by {worst:.1e}" if math.isfinite(worst) else "no pose closes them"
+            context.log.report(group.time, "joints not closed", names, f"{far}; use a smaller step")
+        for j in group.joints.tolist():
+            if self.memory.steepness[self.table.first[j] : self.table.first[j + 1]].max(initial=0.0) > STEEP:
+                pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
+                context.log.report(
+                    group.time, "singular joint", pair,
+                    f"{self.names[j]}: its axis has swung by half a turn, where the twist about it is not defined; limit the swing",
+                )
+
+    def _break(self, context, group) -> bool:
+        """Take out a joint whose time has come, or the most overloaded one, if there is one."""
+        which = group.joints
+        due = which[self.release_time[which] <= group.time]
+        if len(due):
+            self._take_out(context, group, int(due[0]), "joint let go", "")
+            return True
+        load = np.linalg.norm(self.pull[which], axis=1) / self.break_force[which]
+        if not len(which) or load.max() <= 1.0:
+            return False
+        j = int(which[np.argmax(load)])
+        self._take_out(context, group, j, "joint broke", f": {np.linalg.norm(self.pull[j]):.6g} N")
+        return True
+
+    def _take_out(self, context, group, j: int, kind: str, why: str) -> None:
+        """The joint is gone."""
+        self.whole[j] = False
+        group.joints = group.joints[group.joints != j]
+        pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
+        context.log.note(group.time, kind, pair, f"{self.names[j]}{why}")
+        self.reactions.append((group.time, j, np.zeros(3)))
+
+    def log_rest(self, group) -> None:
+        """Forces on b from here on, while the group rests."""
+        for j in group.joints.tolist():
+            self.reactions.append((group.time, j, self.pull[j].copy()))
+
+    def _log(self, group, h: float) -> None:
+        """Forces on b at this instant: its impulses over half of the sub-steps on both sides."""
+        for j in group.joints.tolist():
+            self.reactions.append((group.time, j, self.moment[j] / (0.5 * (self.length[j] + h))))
+
+
+def _slide_rate(now, a: int, b: int, step: float) -> float:
+    """sqrt(w u / r) [1/s] of a body that slides at u in the frame of another, which turns at w, at the distance r; w at most.
+
+    The force of the guide, 2 m w u, turns with the frame: constant over h it makes or loses energy, of the order of (w h)^2 u / r a second.
+    u: what it may be at the end of a step, by w^2 r.
+    """
+    spin, between = now.angular_velocity[a], now.position[b] - now.position[a]
+    turn, distance = float(np.linalg.norm(spin)), float(np.linalg.norm(between))
+    slide = float(np.linalg.norm(now.velocity[b] - now.velocity[a] - np.cross(spin, between))) + turn * turn * distance * step
+    return math.sqrt(turn * min(turn, slide / distance)) if distance > 0.0 else turn
+
+
+def reaction_table(joints: JointState | None, times: np.ndarray) -> dict[str, np.ndarray]:
+    """Forces on b by joint name, (f, 3) N at the frame times."""
+    if joints is None:
+        return {}
+    table = {}
+    for j, name in enumerate(joints.names):
+        nodes = [(time, force) for time, k, force in joints.reactions if k == j]
+        if not nodes:
+            table[name] = np.zeros((len(times), 3))
+            continue
+        at, force = np.array([n[0] for n in nodes]), np.array([n[1] for n in nodes])
+        last = np.append(np.flatnonzero(np.diff(at) > 0.0), len(at) - 1)
+        table[name] = np.column_stack([np.interp(times, at[last], force[last, k]) for k in range(3)])
+    return table

@@ -1,0 +1,285 @@
+"""Overlap at the start: found with FCL before the first frame, reported, and taken out by position alone.
+
+Bodies that merely touch are no overlap. FCL's yes-or-no answer counts touching, so a pair is an overlap only if it
+stays one when a body is moved by DEPTH of its size along each axis: whoever only touches, along whatever normal, is
+free in one of the six directions.
+
+The depth of a pair is the least way s along a direction n by which b, come from outside, stands at the gap of lasting
+contacts. Directions tried: that of the centres, the principal axes of both bodies, and, from the best of them, the
+normal where the bodies touch, as long as it is better (the descent of expanding polytopes, van den Bergen 2001). If
+several are as good the one nearest to that of the centres is taken, else the first axis of a. Then
+
+    min sum of m |D|^2 / 2    with    n.(D_b - D_a) >= s   for all pairs that overlap or came to on the way
+
+gives the displacements D of all bodies together, again and again until no pair overlaps. Bodies do not turn, so what
+joints join moves as one. Velocities stay; the potential energy is booked as "overlap". Pairs for which there is no room
+are reported, and do not touch each other in that run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigidimpulse.collision.distance.fcl import Narrowphase, Separation
+from rigidimpulse.core.quaternion import rotate, to_matrix
+from rigidimpulse.dynamics.constraints.rows import BOUNDED, make_rows
+from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.engine.pair_events import Window
+from rigidimpulse.motion.trajectory import begin
+
+DEPTH = 1e-5
+DIRECTIONS = np.vstack([np.eye(3), -np.eye(3)])
+MAX_ROUNDS = 40
+MAX_APPROACHES = 40
+MAX_DESCENTS = 4
+EQUAL = 1e-7
+"""Ways that differ by less, relative to the size of the smaller body, are equal."""
+SOFTNESS = 1e-8
+"""Softness of a demand, relative to its inverse mass: demands that contradict each other end in a compromise."""
+SURE = 1.0 + 1e-9
+"""Distance of bounding spheres, relative to their radii, beyond which bodies are apart whatever rounding does."""
+STALLED = 5
+"""Rounds without a lesser overlap after which there is no room."""
+
+
+@dataclass
+class _Demand:
+    """Pair a < b with the direction (3,) from a to b in which it is taken apart, and the way that is left, m."""
+
+    a: int
+    b: int
+    direction: np.ndarray
+    way: float
+
+
+def resolve_overlaps(context) -> None:
+    """Report pairs that overlap by more than DEPTH of the smaller body's size where the run starts, and take them apart."""
+    world = context.world
+    if not world.can_collide:
+        return
+    search = _Search(context)
+    demands = search.new_demands({})
+    if not demands:
+        return
+    for demand in demands.values():
+        context.log.report(
+            0.0, "overlap at the start", (world.names[demand.a], world.names[demand.b]),
+            f"the bodies are inside each other by {demand.way:.4g} m; as far as there is room they are moved apart before the "
+            "first step, without a change of velocity: move them apart in the scene to see no jump",
+        )
+    _take_apart(search, demands)
+    stuck = sorted(search.overlapping())
+    for a, b in stuck:
+        context.log.report(
+            0.0, "overlap not resolved", (world.names[a], world.names[b]),
+            "there is no room to move the bodies apart, or joints hold them: in this run they do not touch each other; make room",
+        )
+    if stuck:
+        keys = np.array([a * world.num_bodies + b for a, b in stuck])
+        context.world = replace(world, apart=np.union1d(world.apart, keys))
+    moved = search.position - world.position
+    gained = -float(np.sum(np.where(world.dynamic, world.mass, 0.0)[:, None] * world.steady_acceleration * moved))
+    # Frame 0 is the state as given: the books change right after it.
+    context.log.book(float(np.nextafter(0.0, 1.0)), "overlap", gained)
+
+
+def _take_apart(search: _Search, demands: dict[tuple[int, int], _Demand]) -> None:
+    """Move the bodies until no pair overlaps, or it does not get better any more."""
+    least, stalled = np.inf, 0
+    for _ in range(MAX_ROUNDS):
+        search.move_to(search.least_displacement(demands))
+        for demand in demands.values():
+            search.measure(demand)
+        fresh = search.new_demands(demands)
+        worst = max(d.way / search.size(d.a, d.b) for d in (*demands.values(), *fresh.values()))
+        if not fresh and worst <= 0.5 * search.world.contact_gap:
+            return
+        stalled = 0 if fresh or worst < 0.99 * least else stalled + 1
+        least = min(least, worst)
+        if stalled == STALLED:
+            return
+        demands.update(fresh)
+
+
+class _Search:
+    """Overlaps at the present positions.
+
+    Attributes:
+        position: (n, 3) m, centres of mass.
+        cluster: (n,) bodies that joints join have the same number. inv_mass: (k,) 1/kg of the clusters, 0 if one cannot move.
+
+    """
+
+    def __init__(self, context) -> None:
+        self.context = context
+        self.world = context.world
+        self.position = context.world.position.copy()
+        self.narrowphase = Narrowphase(context.world.shapes, context.world.geometry)
+        self.cluster, self.inv_mass = _clusters(context.world)
+
+    def size(self, a: int, b: int) -> float:
+        """Size of the smaller body of a pair, m."""
+        return float(min(self.world.size[a], self.world.size[b]))
+
+    def separation(self, a: int, b: int, shift: np.ndarray) -> Separation:
+        """Separation of a pair whose b is shifted, (3,) m."""
+        world = self.world
+        return self.narrowphase.separation(
+            int(world.shape_of_body[a]), (self.position[a], world.orientation[a]),
+            int(world.shape_of_body[b]), (self.position[b] + shift, world.orientation[b]),
+        )
+
+    def overlapping(self) -> set[tuple[int, int]]:
+        """Pairs that overlap."""
+        window = Window(self.context, self.context.state.time)
+        window.find_pairs()
+        near = ~self._surely_apart(window.a, window.b)
+        pairs = zip(window.a[near].tolist(), window.b[near].tolist(), strict=True)
+        return {pair for pair in pairs if self._overlaps(*pair)}
+
+    def _surely_apart(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Which pairs have bounding spheres apart, or one apart from the half space that is all of the other body."""
+        world, geometry = self.world, self.world.geometry
+        apart = np.linalg.norm(self.position[b] - self.position[a], axis=1) > SURE * (world.bound_radius[a] + world.bound_radius[b])
+        first = geometry.shape_first[world.shape_of_body]
+        plane = world.half_space & (geometry.shape_first[world.shape_of_body + 1] == first + 1)
+        for half, other in ((a, b), (b, a)):
+            which = np.flatnonzero(plane[half] & np.isfinite(world.bound_radius[other]))
+            i, j = half[which], other[which]
+            frame = geometry.frame[first[i]]
+            height = (rotate(world.orientation[i], frame[:, :3]) * (self.position[j] - self.position[i])).sum(axis=1) - frame[:, 3]
+            apart[which] |= height > SURE * world.bound_radius[j]
+        return apart
+
+    def _overlaps(self, a: int, b: int) -> bool:
+        world = self.world
+        shape_a, shape_b = int(world.shape_of_body[a]), int(world.shape_of_body[b])
+        pose_a, moved = (self.position[a], world.orientation[a]), DEPTH * self.size(a, b)
+        return all(
+            self.narrowphase.overlap(shape_a, pose_a, shape_b, (self.position[b] + moved * d, world.orientation[b]))
+            for d in np.vstack([np.zeros(3), DIRECTIONS])
+        )
+
+    def new_demands(self, known: dict[tuple[int, int], _Demand]) -> dict[tuple[int, int], _Demand]:
+        """Demands of the overlapping pairs that have none yet."""
+        return {pair: self._demand(*pair) for pair in sorted(self.overlapping() - set(known))}
+
+    def measure(self, demand: _Demand) -> None:
+        """Bring the way of a demand up to date; negative if there is room, inf if none can be told."""
+        a, b = demand.a, demand.b
+        if self._is_endless(a, b):
+            found = self.separation(a, b, np.zeros(3))
+            known = bool(np.all(np.isfinite(found.normal)))
+            demand.direction = found.normal if known else np.zeros(3)
+            demand.way = self._held_gap(a, b) - found.gap if known else np.inf
+        elif np.any(demand.direction):
+            demand.way = self._way(a, b, demand.direction)
+
+    def _is_endless(self, a: int, b: int) -> bool:
+        """Whether a pair has a half space, which knows its depth and has no far side to come from."""
+        return not np.isfinite(self.world.bound_radius[a] + self.world.bound_radius[b])
+
+    def _held_gap(self, a: int, b: int) -> float:
+        return self.world.contact_gap * self.size(a, b)
+
+    def _demand(self, a: int, b: int) -> _Demand:
+        """The least way out of an overlap."""
+        demand = _Demand(a, b, np.zeros(3), np.inf)
+        if self._is_endless(a, b):
+            self.measure(demand)
+            return demand
+        apart, equal = self.position[b] - self.position[a], EQUAL * self.size(a, b)
+        best, nearest = np.inf, 0.0
+        for n in self._directions(a, b, apart):
+            way, along = self._way(a, b, n), float(n @ apart)
+            if way < best - equal or (way <= best + equal and along > nearest + equal):
+                best, nearest, demand.direction = way, along, n
+        for _ in range(MAX_DESCENTS):
+            n = self.separation(a, b, (best + equal) * demand.direction).normal
+            way = self._way(a, b, n) if np.all(np.isfinite(n)) else np.inf
+            if not way < best - equal:
+                break
+            best, demand.direction = way, n
+        demand.way = best
+        return demand
+
+    def _directions(self, a: int, b: int, apart: np.ndarray) -> list[np.ndarray]:
+        """Directions to try: of the centres, which is enough for two balls, and of the axes of both bodies."""
+        distance = float(np.linalg.norm(apart))
+        directions = [apart / distance] if distance > EQUAL * self.size(a, b) else []
+        if directions and self.world.ball[a] and self.world.ball[b]:
+            return directions
+        for i in (a, b):
+            axes = to_matrix(self.world.orientation[i]).T
+            directions += [*axes, *-axes]
+        return directions
+
+    def _way(self, a: int, b: int, n: np.ndarray) -> float:
+        """How far b has to move along n to stand off a, coming from outside; inf where that cannot be told."""
+        reach = float(self.world.bound_radius[a] + self.world.bound_radius[b])
+        way, gap = reach - float(n @ (self.position[b] - self.position[a])), self._held_gap(a, b)
+        free, careful = np.inf, False
+        for _ in range(MAX_APPROACHES):
+            found = self.separation(a, b, way * n)
+            left = found.gap - gap
+            if not np.all(np.isfinite(found.normal)):
+                # One step too far, which a concave body does not forgive: the gap itself is always safe.
+                way, careful = free, True
+                if not np.isfinite(way):
+                    return np.inf
+                continue
+            free = way
+            rate = float(n @ found.normal)
+            way -= left if careful or rate <= 0.0 else left / rate
+            if abs(left) <= 0.1 * gap:
+                break
+        return way
+
+    def least_displacement(self, demands: dict[tuple[int, int], _Demand]) -> np.ndarray:
+        """D (n, 3) of all bodies from where they were given."""
+        given = [d for d in demands.values() if self.cluster[d.a] != self.cluster[d.b] and np.isfinite(d.way)]
+        given = [d for d in given if self.inv_mass[self.cluster[d.a]] + self.inv_mass[self.cluster[d.b]] > 0.0]
+        moved = self.position - self.world.position
+        first, second = (self.cluster[[getattr(d, side) for d in given]] for side in "ab")
+        n = np.array([d.direction for d in given]).reshape(-1, 3)
+        asked = np.array([d.way + d.direction @ (moved[d.b] - moved[d.a]) for d in given])
+        root = np.sqrt(self.inv_mass)
+        rows = make_rows(len(given))
+        rows.first[:], rows.second[:] = np.where(root[first] > 0.0, first, -1), np.where(root[second] > 0.0, second, -1)
+        rows.jacobian[:, :3], rows.jacobian[:, 6:9] = -root[first, None] * n, root[second, None] * n
+        rows.kind[:], rows.lower[:], rows.bias[:] = BOUNDED, 0.0, -asked
+        rows.softness[:] = SOFTNESS * (self.inv_mass[first] + self.inv_mass[second])
+        if len(given):
+            solve_newton(rows, len(root), EQUAL * min(self.size(d.a, d.b) for d in given))
+        shift = np.zeros((len(root), 3))
+        np.add.at(shift, first, -rows.impulse[:, None] * n)
+        np.add.at(shift, second, rows.impulse[:, None] * n)
+        return (self.inv_mass[:, None] * shift)[self.cluster]
+
+    def move_to(self, displacement: np.ndarray) -> None:
+        """Put the bodies where they were given plus D (n, 3)."""
+        course = self.context.state.course
+        self.position = self.world.position + displacement
+        for i in np.flatnonzero(np.any(course.position != self.position, axis=1)).tolist():
+            course.position[i] = self.position[i]
+            begin(course, i)
+
+
+def _clusters(world) -> tuple[np.ndarray, np.ndarray]:
+    """Number of the cluster of each body (n,), and inverse masses of clusters (k,), 0 with a body or the world that cannot move."""
+    number = np.arange(world.num_bodies)
+    fixed = ~world.dynamic
+    if world.joints_of_scene:
+        for a, b in zip(world.joints.body_a.tolist(), world.joints.body_b.tolist(), strict=True):
+            if a < 0 or b < 0:
+                fixed[max(a, b)] = True
+            elif fixed[a] != fixed[b] and not (world.dynamic[a] and world.dynamic[b]):
+                fixed[[a, b]] = True
+            else:
+                number[number == number[b]] = number[a]
+    _, cluster = np.unique(number, return_inverse=True)
+    mass = np.bincount(cluster, np.where(world.dynamic, world.mass, 0.0))
+    held = np.bincount(cluster, fixed) > 0
+    return cluster, np.where(held, 0.0, 1.0 / np.where(held, 1.0, mass))

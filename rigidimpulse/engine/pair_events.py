@@ -1,0 +1,246 @@
+"""The pairs of one step: which bodies may meet in it, at which gap a contact is declared, and when each pair comes to it.
+
+Boxes enclose each body's bounding sphere along its path to the end of the step. When a body changes course its box is
+made anew and pairs that it may now reach are added; pairs of which a body changed course are swept again, all others
+keep their time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.collision.broad_phase import overlapping_pairs
+from rigidimpulse.collision.time_of_impact.spheres import is_closed_form
+from rigidimpulse.engine.islands import MARGIN, Group, touching_groups
+from rigidimpulse.engine.pair_table import MAX_REPEATS, Pairs, new_pairs, path_boxes, renew_pairs
+from rigidimpulse.motion.trajectory import FIXED
+
+STUCK_STEP = 1e-3
+"""Part of delta by which the gap of contact is lowered after a contact without consequence."""
+MAX_TRIES = 30
+INSTANT = 1e-6
+"""Part of a step within which a pair that comes to contact again does so at the same instant."""
+
+
+class Window:
+    """Pairs of the step [begin, end], growing as bodies change course.
+
+    Attributes:
+        pairs: the table; its columns are attributes of their own, too.
+        wake: (n,) s, when bodies must be looked at again though nothing meets them.
+        inside: (n,) bool, members of heaps: their pairs with each other and with immovable bodies are not swept.
+        still: (n,) bool, members of heaps at rest, and bodies that never move: nor are their pairs with each other.
+        heaps_begun: whether the heaps of the step have been stepped from its start.
+    """
+
+    def __init__(self, context, end: float) -> None:
+        self.context = context
+        self.begin, self.end = context.state.time, end
+        self._take(new_pairs(context.world, np.zeros(0, np.int64), np.zeros(0, np.int64), self.begin))
+        self.wake = np.full(context.world.num_bodies, np.inf)
+        self.inside = np.zeros(context.world.num_bodies, bool)
+        self.still = ~(context.world.dynamic | context.world.moving)
+        self._looked_around = np.full(context.world.num_bodies, -np.inf)
+        self.heaps_begun = False
+        self._moves = (context.state.course.mode != FIXED) | context.world.dynamic
+
+    def _take(self, pairs: Pairs) -> None:
+        """Let `pairs` be the table."""
+        self.pairs = pairs
+        (
+            self.a, self.b, self.time, self.start, self.touch, self.least, self.delta, self.tolerance, self.tries, self.since,
+            self.repeats, self.witness,
+        ) = pairs  # fmt: skip
+        key = self.a * self.context.world.num_bodies + self.b
+        self._order = np.argsort(key, kind="stable")
+        self._sorted_key = key[self._order]
+
+    def find_pairs(self) -> None:
+        """Broad phase: the pairs whose boxes overlap in the step."""
+        context = self.context
+        world, course = context.world, context.state.course
+        if self.inside.any() and not np.any(world.dynamic & ~self.inside):
+            return
+        box_min, box_max = context.box_min, context.box_max
+        box_min[:], box_max[:] = world.static_min, world.static_max
+        members = np.flatnonzero(self._moves)
+        path_boxes(course, members, self.begin, self.end, world.bound_radius, box_min, box_max)
+        box_min[members] -= MARGIN * world.largest_delta
+        box_max[members] += MARGIN * world.largest_delta
+        pairs = np.empty((max(64, 8 * world.num_bodies), 2), np.int32)
+        count = overlapping_pairs(box_min, box_max, self._moves, pairs)
+        if count < 0:
+            pairs = np.empty((-count, 2), np.int32)
+            count = overlapping_pairs(box_min, box_max, self._moves, pairs)
+        first, second = pairs[:count].T.astype(np.int64)
+        self._append(first, second, self.begin)
+
+    def recall(self, begin: float) -> None:
+        """Let pairs be as if the window had begun at `begin`, where the step did [s], all bodies having flown freely since.
+
+        A pair is swept from the last change of course of its bodies; when it was last in contact is known from its rebound.
+        """
+        course = self.context.state.course
+        self.start[:] = np.maximum(np.maximum(course.start[self.a], course.start[self.b]), begin)
+        for p, pair in enumerate(zip(self.a.tolist(), self.b.tolist(), strict=True)):
+            last = self.context.state.rebounds.get(pair)
+            if last is not None and last[0] >= begin:
+                self.since[p] = last[0]
+
+    def is_plain(self, time: float) -> bool:
+        """Whether nothing in the window asks to be remembered: no body held or called, no pair met more than once or without an impulse."""
+        state = self.context.state
+        lowered = np.flatnonzero(self.touch != self.least)
+        if len(lowered) and not self._is_closed_form(lowered):
+            return False
+        return not (
+            state.under_contact.any()
+            or self.wake.min() < np.inf
+            or self.inside.any()
+            or self.tries.any()
+            or self.repeats.any()
+            or (self.time <= time).any()
+        )
+
+    def _is_closed_form(self, places: np.ndarray) -> bool:
+        """Whether pairs are balls, or balls and planes that stand, that were in contact at gap 0: that leaves no trace in their times."""
+        detector, course = self.context.detector, self.context.state.course
+        return all(
+            is_closed_form(
+                course, detector.sweep_scratch, a, b, detector.shape_of_body[a], detector.shape_of_body[b], self.touch[p]
+            )
+            for p, a, b in zip(places, self.a[places], self.b[places], strict=True)
+        )
+
+    def touching(self, time: float, bodies: np.ndarray) -> tuple[list[Group], np.ndarray]:
+        """Groups of touching bodies that the given ones belong to at `time`, and all bodies looked at."""
+        groups, reached = touching_groups(self.context, self, time, bodies)
+        return groups if self.context.heaps is None else self.context.heaps.join(self.context, self, time, groups), reached
+
+    def _is_shut(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Which pairs are not swept, since a heap's solver looks after them."""
+        free = self.context.world.dynamic & ~self.inside
+        return ~(free[a] | free[b]) | (self.still[a] & self.still[b])
+
+    def _append(self, a: np.ndarray, b: np.ndarray, start: float) -> None:
+        """Add pairs whose bodies may meet and that are not there yet."""
+        world = self.context.world
+        keep = world.may_collide(a, b) & ~self._is_shut(a, b)
+        if keep.any():
+            fresh = new_pairs(world, a[keep], b[keep], start)
+            both = zip(self.pairs, fresh, strict=True)
+            self._take(Pairs(*map(np.concatenate, both)) if len(self.a) else fresh)
+
+    def change_course(self, body: int, time: float) -> None:
+        """The body took a new course at `time`: sweep its pairs again, and add those it may now reach."""
+        context, world = self.context, self.context.world
+        partners = np.empty(world.num_bodies, np.int64)
+        count = renew_pairs(
+            context.state.course, body, time, self.end, world.bound_radius[body], MARGIN * world.largest_delta, self._moves,
+            world.dynamic, self.inside, self.pairs, context.box_min, context.box_max, partners,
+        )
+        if count:
+            fresh = partners[:count]
+            self._append(np.minimum(fresh, body), np.maximum(fresh, body), time)
+
+    def change_courses(self, bodies: np.ndarray, time: float) -> None:
+        """The same for the members of heaps, all at once."""
+        context = self.context
+        free = context.world.dynamic & ~self.inside
+        moved = np.zeros(context.world.num_bodies, bool)
+        moved[bodies] = True
+        known = np.flatnonzero(moved[self.a] | moved[self.b])
+        self.sweep_again(known, time)
+        if not free.any():
+            return
+        self.touch[known] = self.least[known]
+        self.tries[known] = 0
+        path_boxes(
+            context.state.course, bodies, time, self.end, context.world.bound_radius, context.box_min, context.box_max
+        )
+        context.box_min[bodies] -= MARGIN * context.world.largest_delta
+        context.box_max[bodies] += MARGIN * context.world.largest_delta
+        pairs = np.empty((len(bodies) + 64, 2), np.int32)
+        low, high = context.box_min.copy(), context.box_max.copy()
+        low[~(moved | free)], high[~(moved | free)] = np.inf, -np.inf
+        count = overlapping_pairs(low, high, free, pairs)
+        if count < 0:
+            pairs = np.empty((-count, 2), np.int32)
+            count = overlapping_pairs(low, high, free, pairs)
+        n = context.world.num_bodies
+        first, second = pairs[:count].T.astype(np.int64)
+        fresh = ~np.isin(first * n + second, self.a * n + self.b)
+        self._append(first[fresh], second[fresh], time)
+
+    def active_bodies(self) -> np.ndarray:
+        """Bodies that move or that a net presses, but for those in heaps."""
+        moves = self.context.state.course.mode != FIXED
+        if self.context.nets is not None:
+            moves |= self.context.nets.pressed
+        return np.flatnonzero(moves & ~self.inside)
+
+    def bodies_at(self, time: float) -> np.ndarray:
+        """Movable bodies that come to contact, and bodies that are called, at `time`.
+
+        Not what they come to contact with, if it does not move: whoever else touches a floor has nothing to do with them.
+        """
+        hit = self.time <= time
+        mark = np.zeros(len(self.wake), bool)
+        mark[self.a[hit]] = mark[self.b[hit]] = True
+        mark &= self.context.world.dynamic
+        mark |= self.wake <= time
+        return mark.nonzero()[0]
+
+    def look_around(self, bodies: np.ndarray, time: float, shift: float) -> None:
+        """Call bodies that a lift moved by `shift` [m] once more at `time`, where others that their group does not know may be near now."""
+        fresh = bodies[self._looked_around[bodies] < time]
+        mark = np.zeros(len(self.wake), bool)
+        mark[fresh] = True
+        if shift > self.delta[mark[self.a] | mark[self.b]].min(initial=np.inf):
+            self._looked_around[fresh] = self.wake[fresh] = time
+
+    def find(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Places of the pairs (a, b)."""
+        return self._order[self._sorted_key.searchsorted(a * self.context.world.num_bodies + b)]
+
+    def sweep_again(self, places: np.ndarray, time: float) -> None:
+        """Let pairs be swept from `time` on, but for those that are given up."""
+        self.time[places] = np.inf
+        again = (self.repeats[places] <= MAX_REPEATS) & ~self._is_shut(self.a[places], self.b[places])
+        self.start[places[again]] = time
+        self.start[places[~again]] = np.nan
+
+    def count_contacts(self, time: float) -> None:
+        """Count contacts at one instant; a pair with too many is left alone until the end of the step, and reported."""
+        hit = (self.time <= time).nonzero()[0]
+        again = time - self.since[hit] <= INSTANT * self.context.world.accuracy.step
+        self.repeats[hit] = np.where(again, self.repeats[hit] + 1, 0)
+        self.since[hit[~again]] = time
+        names = self.context.world.names
+        for p in hit[self.repeats[hit] > MAX_REPEATS]:
+            self.start[p], self.time[p] = np.nan, np.inf
+            self.context.log.report(
+                time, "squeezed", (names[self.a[p]], names[self.b[p]]),
+                "no motion keeps the body apart from all that presses on it; make room, or let the pressing bodies move freely",
+            )
+
+    def settle(self, time: float) -> None:
+        """Pairs that came to contact without consequence are swept again from here with a smaller gap."""
+        stuck = (self.time <= time).nonzero()[0]
+        if not len(stuck):
+            return
+        self.tries[stuck] += 1
+        step = self.tries[stuck] * STUCK_STEP * self.delta[stuck]
+        self.touch[stuck] = np.where(self.least[stuck] > 0.0, 0.5 * self.touch[stuck], -step)
+        self.sweep_again(stuck, time)
+        for p in stuck[self.tries[stuck] > MAX_TRIES]:
+            self.start[p] = np.nan
+            names = self.context.world.names
+            self.context.log.report(
+                time, "contact not resolved", (names[self.a[p]], names[self.b[p]]),
+                "the pair is left alone until the end of the step; use a smaller step",
+            )
+
+    def next_time(self) -> float:
+        """Time of the earliest contact or call, inf if there is none."""
+        return float(min(self.time.min(initial=np.inf), self.wake.min()))

@@ -1,0 +1,177 @@
+"""Which bodies are a heap: islands of bodies that may touch in a step, and which of them the sub-stepped solver takes.
+
+The exact solver is the better one wherever it can be afforded. "auto" takes an island for a heap only where all of this holds:
+
+    many        at least MANY movable bodies, or FEW that move (faster than what is calm, see `heap_courses`) in a scene of MANY;
+                KEPT for one that is a heap already
+    or dear     at least FEW, each of which the exact solver dealt with more than TOIL times in the last step, in the mean: what rests
+                takes 2 to 4, a fall of boxes 10 to 20, each about as long as a step of a small heap
+    no joints   they want exact rows
+and, where a heap begins (who comes near one later is taken in):
+    alike       no two neighbours of masses beyond RATIO : 1
+    dull        no restitution above REBOUND: a rebound is found at the end of the step only
+    low         no body more than TALL others above a support: long columns want exact rows
+
+Scenes of fewer than SOME have no heaps. "substepped" takes every island without joints. Bodies that move farther than FAST of their inner
+radius in a sub-step, or turn by more than SPIN rad, are no part of any: they are swept.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.collision.contact_records import SEPARATION, SKIN, SUPPORT, in_play
+from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.engine.substepped.trajectories import CALM
+
+MANY, SOME, FEW, KEPT = 60, 12, 8, 2
+TOIL = 6.0
+RATIO, REBOUND, TALL = 30.0, 0.5, 12
+FAST, SPIN = 0.5, 2.5 / 16.0
+
+
+def why_no_heaps(world) -> str:
+    """Why a scene cannot have heaps; empty where it can."""
+    solver = world.accuracy.contact_solver
+    if "heaps" in world.left_out:
+        return "left out by the caller"
+    if solver not in ("auto", "substepped"):
+        return f"contact_solver is {solver!r}"
+    if not world.can_collide or not world.can_press:
+        return "nothing presses bodies together"
+    if world.force_tables:
+        return "forces vary"
+    if solver == "substepped":
+        return ""
+    if _number(world) < SOME:
+        return f"fewer than {SOME} movable bodies without joints"
+    used, movable = np.unique(world.material_of_body), np.unique(world.material_of_body[world.dynamic])
+    if np.all(world.coefficients[np.ix_(movable, used)][:, :, 0] > REBOUND):
+        return f"all bodies rebound by more than {REBOUND}"
+    return ""
+
+
+def only_dear(world) -> bool:
+    """Whether heaps begin only where the exact solver has become dear: the scene has not MANY bodies."""
+    return world.accuracy.contact_solver == "auto" and _number(world) < MANY
+
+
+def jointed(world) -> np.ndarray:
+    """Which bodies (n,) bool have joints."""
+    out = np.zeros(world.num_bodies, bool)
+    if world.joints_of_scene:
+        ends = np.concatenate([world.joints.body_a, world.joints.body_b])
+        out[ends[ends >= 0]] = True
+    return out
+
+
+def _number(world) -> int:
+    """Movable bodies without joints."""
+    return int(np.count_nonzero(world.dynamic & ~jointed(world)))
+
+
+@jit_making_arrays
+def islands(number, first, second, movable):
+    """Root (l,) of each of `number` bodies: the lowest one that pairs of movable bodies join it with."""
+    root = np.arange(number)
+    for p in range(first.shape[0]):
+        if not (movable[first[p]] and movable[second[p]]):
+            continue
+        a, b = first[p], second[p]
+        while root[a] != a:
+            root[a] = root[root[a]]
+            a = root[a]
+        while root[b] != b:
+            root[b] = root[root[b]]
+            b = root[b]
+        root[max(a, b)] = min(a, b)
+    for i in range(number):
+        a = i
+        while root[a] != a:
+            a = root[a]
+        root[i] = a
+    return root
+
+
+@jit_making_arrays
+def support_levels(bodies, pairs, rows, tall):
+    """How many bodies each one is above what cannot be moved, by closed contacts, (n+1,): at most tall + 1; 0 for immovable ones.
+
+    Bodies without support, and those that play no part, have tall + 2.
+    """
+    number = bodies.part.shape[0]
+    level = np.full(number, tall + 2, np.int64)
+    for i in range(number):
+        if bodies.part[i] == SUPPORT:
+            level[i] = 0
+    changed = True
+    while changed:
+        changed = False
+        for p in range(pairs.first.shape[0]):
+            a, b = pairs.first[p], pairs.second[p]
+            closed = False
+            if in_play(bodies.part, a, b):
+                for c in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
+                    closed = closed or rows[c, SEPARATION] <= rows[c, SKIN]
+            if not closed:
+                continue
+            low, high = (a, b) if level[a] < level[b] else (b, a)
+            reached = min(level[low] + 1, tall + 1)
+            if level[low] <= tall + 1 and reached < level[high]:
+                level[high] = reached
+                changed = True
+    return level
+
+
+def lively(now, strength: np.ndarray, inner: np.ndarray) -> np.ndarray:
+    """Which bodies (n,) bool are faster than what is calm; strength (n,) m/s2 of what pulls them, inner (n,) m."""
+    radius = np.where(np.isfinite(inner), inner, 0.0)
+    v, w = now.velocity, now.angular_velocity
+    speed = np.sqrt(np.einsum("ij,ij->i", v, v)) + radius * np.sqrt(np.einsum("ij,ij->i", w, w))
+    return speed > CALM * np.sqrt(strength * radius)
+
+
+def refusals(
+    world, root: np.ndarray, heap_before: np.ndarray, joined: np.ndarray, moves: np.ndarray, toil: np.ndarray, a: np.ndarray, b: np.ndarray,
+    auto: bool,
+) -> dict[int, str]:  # fmt: skip
+    """Why islands are no heaps, by their root; what holds of contacts (`low`) is not looked at here.
+
+    Args:
+        world: the compiled scene.
+        root: (n,) of every body; -1 for those in no island.
+        heap_before: (n,) bool, members of heaps. joined, moves: (n,) bool.
+        toil: (n,) how often the exact solver dealt with each body in the last step.
+        a: (k,) bodies of the pairs that may touch in the step; likewise b.
+        auto: False where every island without joints is taken.
+
+    """
+    out: dict[int, str] = {}
+    members = np.flatnonzero(root >= 0)
+    size = np.bincount(root[members], minlength=len(root))
+    was_heap = np.zeros(len(root), bool)
+    was_heap[root[members[heap_before[members]]]] = True
+    for r in np.unique(root[members[joined[members]]]).tolist():
+        out[r] = "joints"
+    owner = np.where(root[a] >= 0, root[a], root[b])
+    if not auto:
+        alone = np.setdiff1d(np.flatnonzero(size), owner)
+        out.update(dict.fromkeys(alone.tolist(), "alone"))
+        return out
+    stir = np.bincount(root[members[moves[members]]], minlength=len(root))
+    dear = np.bincount(root[members], weights=toil[members], minlength=len(root)) > TOIL * size
+    lively_enough = dear if only_dear(world) else dear | (stir >= FEW)
+    least = np.where(was_heap, KEPT, np.where(lively_enough, FEW, MANY))
+    for r in np.flatnonzero((size > 0) & (size < least)).tolist():
+        out[r] = "few bodies"
+    begins = ~was_heap[owner]
+    if not begins.any():
+        return out
+    coefficient = world.coefficients[world.material_of_body[a], world.material_of_body[b], 0]
+    both = world.dynamic[a] & world.dynamic[b]
+    heavy = np.maximum(world.mass[a], world.mass[b]) > RATIO * np.minimum(world.mass[a], world.mass[b])
+    for r in np.unique(owner[begins & (coefficient > REBOUND)]).tolist():
+        out.setdefault(r, "restitution")
+    for r in np.unique(owner[begins & both & heavy]).tolist():
+        out.setdefault(r, "mass ratio")
+    return out

@@ -1,0 +1,62 @@
+"""Where the event kernel is of use."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimpulse.collision.geometry import HALF_SPACE
+from rigidimpulse.engine.plan import Bound, Skip
+from rigidimpulse.engine.regime import only_dear, why_no_heaps
+from rigidimpulse.engine.spheres.layout import BALL, OTHER, PLANE
+
+ARRIVED, STEP, GO_ON, NO_ROOM = 0, 1, 2, 3
+"""How a flight of the kernel ends: at its end; at a boundary whose step is not simple; between boundaries, at something that is not
+simple; for want of room in a table."""
+
+
+@dataclass(frozen=True)
+class EventKernel:
+    """Flight of balls from impact to impact in one kernel; it changes nothing but the time that a run takes."""
+
+    stage: str = "sweep"
+    name: str = "event kernel"
+
+    def bind(self, world) -> Bound | Skip:
+        """In where a ball may collide and nothing in the scene needs every step."""
+        reason = why_not(world)
+        if reason:
+            return Skip(reason)
+        count = int(np.count_nonzero((kinds(world) == BALL) & world.dynamic))
+        return Bound(None, f"impacts of {count} balls with each other and with planes, as long as nothing lasting touches")
+
+
+def why_not(world) -> str:
+    """Why a scene is left to the loop in Python; empty where it is not."""
+    accuracy = world.accuracy
+    if not world.can_collide:
+        return world.why_no_impacts
+    kind = kinds(world)
+    if not np.any(world.dynamic & (kind == BALL)) or np.count_nonzero(kind != OTHER) < 2:
+        return "no ball may meet another one or a plane"
+    if not np.all(np.isfinite(world.bound_radius[kind == OTHER])):
+        return "half spaces that move, or in parts"
+    if world.joints_of_scene or world.force_tables:
+        return "joints" if world.joints_of_scene else "forces vary"
+    if world.triggers:
+        return "triggers are looked at after every step"
+    if accuracy.impact_time not in ("bisection", "conservative") or accuracy.response == "kinematic":
+        return f"{accuracy.impact_time}, {accuracy.response}"
+    return "" if why_no_heaps(world) or only_dear(world) else "bodies may heap up"
+
+
+def kinds(world) -> np.ndarray:
+    """(n,) BALL, PLANE or OTHER."""
+    geometry, shape = world.geometry, world.shape_of_body
+    first = geometry.shape_first[shape]
+    plane = (geometry.kind[first] == HALF_SPACE) & (geometry.shape_first[shape + 1] == first + 1) & ~world.moving & ~world.dynamic
+    driven = np.array([body.keyframes is not None for body in world.scene.bodies], bool)
+    carried = np.array([body.release_time is not None for body in world.scene.bodies], bool)
+    ball = world.ball & ~carried & np.all(world.inertia == world.inertia[:, :1], axis=1)
+    return np.where(ball, BALL, np.where(plane & ~driven, PLANE, OTHER))

@@ -1,0 +1,159 @@
+"""The event kernel in a run: its tables, and what it hands to the loop in Python."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.dynamics.impact.restitution import LAWS
+from rigidimpulse.engine.islands import empty_contacts
+from rigidimpulse.engine.pair_table import NEAR, ROUND_OFF
+from rigidimpulse.engine.spheres.effect import NO_ROOM, STEP, kinds
+from rigidimpulse.engine.spheres.flight import fly
+from rigidimpulse.engine.spheres.impact import copy_rebounds, remember
+from rigidimpulse.engine.spheres.layout import PLANE, Book, Fixed, Motion, Rebounds, Table, make_rebounds
+from rigidimpulse.engine.spheres.paths import BODY, DYNAMIC, GAP, KIND, LEVEL, PATH_SIZE, PLANE_SIZE, RADIUS
+from rigidimpulse.engine.spheres.queue import make_queue
+from rigidimpulse.engine.spheres.tree import make_tree
+from rigidimpulse.recording.events import ROW_LENGTH
+
+ROOM = 256
+"""Impacts, pairs and rebounds that there is room for at first; doubled where it does not do."""
+MOST_ROWS = 2**14
+"""Impacts at most that are handed over at once."""
+FIRST_WINDOW = 16
+"""Steps in the first window."""
+LIVE = 2.0
+"""How much farther away contacts are left to the loop in Python than it takes them for touching."""
+LONGEST_PAUSE = 16
+"""Steps at most in which the kernel is not tried, after steps that were not simple."""
+
+
+class EventRun:
+    """The kernel's tables for one run."""
+
+    def __init__(self, context) -> None:
+        """context: of the run, with the first courses."""
+        world = context.world
+        self._context, self._pause, self._waits, self._window = context, 0, 0, FIRST_WINDOW
+        self._fixed = Fixed(
+            world.dynamic, world.steady_acceleration, world.mass, world.inertia, world.material_of_body, world.coefficients,
+            world.apart, world.static_min, world.static_max, LAWS[world.accuracy.restitution], world.accuracy.step,
+        )  # fmt: skip
+        self._paths, self._planes = _constants(world)
+        state = context.state
+        self._motion = Motion(state.course, state.now, state.rotation)
+        self._pairs, self._rows = ROOM + world.num_bodies, ROOM
+        self._table, self._book = self._make_table(), self._make_book()
+        self._rebounds, self._known = make_rebounds(2 * ROOM), 0
+        self._step_begin = 0.0
+        gap = world.contact_gap
+        self._live = LIVE * (NEAR + ROUND_OFF + 2.0 * world.accuracy.tolerance / gap)
+
+    def _make_table(self) -> Table:
+        context, n = self._context, self._context.world.num_bodies
+        capacity = n + self._pairs
+        first, second = np.zeros((2, capacity), np.int64)
+        return Table(
+            make_queue(capacity), make_tree(n), self._paths, self._planes,
+            context.box_min, context.box_max, first, second, np.full(n, -1, np.int64), np.zeros(capacity, np.int8),
+            np.full(2 * capacity, -1, np.int64), np.full(n, -1, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64),
+            np.zeros(2 * capacity, np.int64), np.zeros(3, np.int64),
+        )  # fmt: skip
+
+    def _make_book(self) -> Book:
+        recorder = self._context.recorder
+        return Book(
+            recorder.times, recorder.written, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
+            np.empty((self._rows, ROW_LENGTH)), np.empty(self._rows), np.zeros(1, np.int64), empty_contacts(1),
+            np.empty((1, 7)), np.empty(2, np.int64),
+        )  # fmt: skip
+
+    def may_fly(self) -> bool:
+        """Whether to try the kernel now: not where contacts last, and not at once again where it did not get on."""
+        waits, self._waits = self._waits > 0, max(self._waits - 1, 0)
+        context = self._context
+        calm = context.heaps is None or context.heaps.is_idle()
+        return not waits and calm and not context.state.under_contact.any() and context.nets is None
+
+    def fly(self, end: float, at_boundary: bool = True) -> tuple[int, float, float]:
+        """Carry the scene from a boundary of steps, or from the middle of one, towards `end` [s] as far as what happens is simple.
+
+        Returns how the flight ends (see `effect`), and where the step begins and ends in which it does, s.
+        """
+        context = self._context
+        self._learn()
+        begin = now = context.state.time
+        if at_boundary:
+            self._step_begin = begin
+        how, number, window_end = NO_ROOM, 0, -1.0
+        while how == NO_ROOM:
+            how, now, at_boundary, number, self._window, window_end = fly(
+                self._fixed, self._motion, self._table, self._book, self._rebounds, now, end, at_boundary, self._window,
+                self._live, window_end,
+            )
+            self._keep_impacts()
+            if how == NO_ROOM and self._make_room():
+                window_end = -1.0
+        context.state.time = now
+        if how == STEP:
+            self._pause = 0 if now > begin else min(2 * self._pause + 1, LONGEST_PAUSE)
+            self._waits = self._pause
+        step = self._fixed.step
+        return how, max(self._step_begin, (number - 1) * step), min(number * step, end)
+
+    def _learn(self) -> None:
+        """Take over the rebounds since the last flight, and what has become dynamic."""
+        self._paths[:, DYNAMIC] = self._context.world.dynamic
+        rows = self._context.log.impacts
+        known = self._context.state.rebounds
+        for a, b in rows.rows[self._known : rows.count, 1:3].astype(np.int64).tolist():
+            if 2 * self._rebounds.used[0] >= len(self._rebounds.key):
+                self._grow_rebounds()
+            remember(self._rebounds, a * self._context.world.num_bodies + b, *known[a, b])
+            if known[a, b][2] > 0:
+                self._live = np.inf  # what came back fast may be dealt with before it touches
+        self._known = rows.count
+
+    def _keep_impacts(self) -> None:
+        """Hand impacts, their energies and rebounds to the run."""
+        context, count = self._context, int(self._book.count[0])
+        if not count:
+            return
+        rows = self._book.rows[:count]
+        context.log.impacts.extend(rows)
+        self._known = context.log.impacts.count
+        times, speeds = rows[:, 0].tolist(), rows[:, 14].tolist()
+        context.log.energy.extend((t, "impact", e) for t, e in zip(times, self._book.energy[:count].tolist(), strict=True) if e != 0.0)
+        pairs = map(tuple, rows[:, 1:3].astype(np.int64).tolist())
+        context.state.rebounds.update((pair, (t, speed, 0)) for pair, t, speed in zip(pairs, times, speeds, strict=True))
+        self._book.count[0] = 0
+
+    def _make_room(self) -> bool:
+        """Make the table that is full larger; returns whether that is the one of events, which then has to be filled again."""
+        if 2 * self._rebounds.used[0] >= len(self._rebounds.key):
+            self._grow_rebounds()
+        elif self._table.count[0] >= len(self._table.first):
+            self._pairs *= 2
+            self._table = self._make_table()
+            return True
+        else:
+            self._rows = min(2 * self._rows, MOST_ROWS)
+            self._book = self._make_book()
+        return False
+
+    def _grow_rebounds(self) -> None:
+        old: Rebounds = self._rebounds
+        self._rebounds = make_rebounds(4 * len(old.key))
+        copy_rebounds(old, self._rebounds)
+
+
+def _constants(world) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of paths (n, PATH_SIZE) and planes (q, PLANE_SIZE) with what never changes."""
+    kind = kinds(world)
+    paths, which = np.zeros((world.num_bodies, PATH_SIZE)), np.flatnonzero(kind == PLANE)
+    paths[:, RADIUS], paths[:, GAP] = world.bound_radius, world.contact_gap * world.size
+    paths[:, KIND], paths[:, DYNAMIC] = kind, world.dynamic
+    planes = np.zeros((len(which), PLANE_SIZE))
+    planes[:, : LEVEL + 1] = world.geometry.frame[world.geometry.shape_first[world.shape_of_body[which]], : LEVEL + 1]
+    planes[:, BODY] = which
+    return paths, planes

@@ -1,0 +1,1 @@
+"""Islands advanced by the sub-stepped solver."""

@@ -1,0 +1,380 @@
+"""Heaps: islands of many bodies, stepped by the sub-stepped solver (`heap_solver`) instead of from contact to contact.
+
+At the start of a step islands are chosen (`heap_islands`); their bodies get courses (mode STEPPED) that end in the poses
+which the solver found for the end of the step. Pairs inside a heap are not swept; pairs of a member and any other body are,
+and at their contact the impulse is found exactly and the heap is stepped anew from there, the other body with it if it is slow
+enough. Contacts are held at a gap, the skin. A member that stays within PLAY skins of one place and below CALM sqrt(g r) for
+REST sqrt(r / g) s (r: inner radius) is calm. Calm members that no restless one stirs (`stirred`) stand still, to the bit, and bear
+the others; a heap whose members are all calm stands still until something touches it.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+
+from rigidimpulse.dynamics.constraints.energy_limit import note_arrival
+from rigidimpulse.dynamics.energy import mechanical_energy
+from rigidimpulse.engine.exact.trajectories import book_contact_work
+from rigidimpulse.engine.islands import Group, empty_contacts
+from rigidimpulse.engine.regime import FAST, FEW, SPIN, TALL, TOIL, islands, jointed, lively, only_dear, refusals, support_levels
+from rigidimpulse.engine.substepped.contact_forces import HeapStepper, Outcome
+from rigidimpulse.engine.substepped.trajectories import arrive, count_calm, depart, let_fly, mark_slow, most_stray, stirred
+from rigidimpulse.engine.touching import bring_all
+from rigidimpulse.engine.warm_up import prepare_kernels
+from rigidimpulse.motion.trajectory import FIXED, STEPPED
+
+REST = 3.0
+"""For how long members must have hardly moved to be calm, in sqrt(r / g), see `heap_courses`."""
+LEAVING = 0.1
+"""Part of its speed at which a fast body must leave a heap that it has hit to be no part of it."""
+MOST_PIECES = 4
+"""Parts of what is stepped at once, between which a heap's courses begin anew."""
+STRAY = 10.0
+"""Skins by which courses may stray from the ways of turning bodies, over `Accuracy.heap_motion`: a skin by default."""
+TOUCHES = 5.0
+"""Skins within which a body at rest belongs to the heap that comes near it."""
+
+
+class Heaps:
+    """The heaps of a run.
+
+    Attributes:
+        label: (n,) the heap that a body belongs to, -1 for none; heaps at rest keep theirs.
+        calm: (n,) s, for how long a member has hardly moved.
+        asleep: (n,) bool, members that stand still while others of their heap move.
+        toil: (n,) how often the exact solver has dealt with each body in the step.
+
+    """
+
+    def __init__(self, world) -> None:
+        """No heaps yet."""
+        self._world, self._only_dear, self._movable = world, only_dear(world), world.dynamic.copy()
+        self.label = np.full(world.num_bodies, -1, np.int64)
+        self.calm = np.zeros(world.num_bodies)
+        self.asleep = np.zeros(world.num_bodies, bool)
+        self._stood = np.full((world.num_bodies, 7), np.inf)
+        self._taken = np.zeros(world.num_bodies, bool)
+        self._auto = world.accuracy.contact_solver == "auto"
+        self._jointed = jointed(world)
+        self.toil, self._step_end = np.zeros(world.num_bodies), 0.0
+        self._ends: dict[int, float] = {}
+        self._began: dict[int, tuple[float, np.ndarray, float]] = {}
+        self._outcome: Outcome | None = None
+        self._outcome_end = 0.0
+        self._most = self._steps = 0
+        self._refused: dict[str, int] = {}
+
+    @cached_property
+    def stepper(self) -> HeapStepper:
+        """The solver and its contacts; its kernels are compiled here where they were not needed at the start."""
+        prepare_kernels(self._world, with_events=False, with_heaps=True)
+        return HeapStepper(self._world, self._movable, self._only_dear)
+
+    def is_idle(self) -> bool:
+        """Whether no heap is there and none may begin."""
+        return self._only_dear and self.toil.sum() <= FEW * TOIL and bool(np.all(self.label < 0))
+
+    def summary(self) -> str:
+        """What became of heaps in the run."""
+        refused = ", ".join(f"{reason} ({count})" for reason, count in sorted(self._refused.items()))
+        text = f"{self._steps} steps of heaps, largest {self._most} bodies" if self._steps else "no heaps"
+        return f"{text}; left to newton, islands times steps: {refused}" if refused else text
+
+    def gather(self, context, window) -> None:
+        """Choose the heaps of the step: `window.inside` marks their bodies, `window.still` those at rest."""
+        idle, toil = self.is_idle(), self.toil
+        if window.end > self._step_end:
+            self.toil, self._step_end = np.zeros_like(toil), window.end
+        if idle:
+            return
+        world, course, time = context.world, context.state.course, window.begin
+        ended = course.mode == STEPPED
+        self._end_courses(context, np.flatnonzero(ended), time)
+        chosen = self._choose(context, window, ended, toil) if window.end > time else np.zeros_like(ended)
+        left = np.flatnonzero(ended & ~chosen & (course.mode == STEPPED))
+        let_fly(course, left, world.steady_acceleration)
+        self.calm[left] = 0.0
+        self._taken &= chosen
+        self.asleep &= chosen
+        window.inside |= chosen
+        window.still |= (self.label >= 0) & (course.mode == FIXED)
+
+    def _choose(self, context, window, brought: np.ndarray, toil: np.ndarray) -> np.ndarray:
+        """Which bodies (n,) bool are stepped; those `brought` are at the begin of the window already."""
+        world, course, time = context.world, context.state.course, window.begin
+        member = world.dynamic & ((course.mode != FIXED) | self.asleep)
+        if not member.any():
+            return member
+        ahead = window.end - time
+        bring_all(
+            course, np.flatnonzero(~(brought | self.asleep)), time, context.state.now, context.state.rotation, context.acceleration,
+            context.angular_acceleration,
+        )  # fmt: skip
+        context.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
+        self._leave_out_fast(context, member)
+        a, b, touch = self._near(context, member, ahead)
+        while len(woken := self._touched(context, member, a, b)):
+            member[woken] = True
+            a, b, touch = self._near(context, member, ahead)
+        root = islands(world.num_bodies, a, b, member)
+        root[~member] = -1
+        moves = lively(context.state.now, world.steady_strength, self.stepper.inner)
+        refused = refusals(world, root, self.label >= 0, self._jointed, moves, toil, a, b, self._auto)
+        chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
+        chosen = self._low(context, window, chosen, root, refused)
+        for reason in refused.values():
+            self._refused[reason] = self._refused.get(reason, 0) + 1
+        self.label[member & ~chosen] = -1
+        self._settle(context, chosen, root, a, b, touch > 0, time)
+        return chosen
+
+    def _leave_out_fast(self, context, member: np.ndarray) -> None:
+        """Unmark those that are too fast for sub-steps."""
+        h = self.stepper.sub_step(np.flatnonzero(context.world.dynamic))
+        mark_slow(context.state.now, self.stepper.inner, FAST / h, SPIN / h, member)
+
+    def _near(self, context, member: np.ndarray, ahead: float) -> np.ndarray:
+        # Movable bodies under way that are no members are swept.
+        other = ~member & ~(context.world.dynamic & (context.state.course.mode != FIXED))
+        self.stepper.find_pairs(context, np.flatnonzero(member), np.flatnonzero(other), ahead)
+        return self.stepper.near(context, member, other, ahead)
+
+    def _touched(self, context, member: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Bodies at rest that members touch, and all of the heaps they belong to."""
+        world = context.world
+        resting = world.dynamic & ~member & (context.state.course.mode == FIXED)
+        which = np.flatnonzero(resting[a] | resting[b])
+        if not len(which):
+            return which
+        a, b = a[which], b[which]
+        margin = TOUCHES * np.minimum(self.stepper.skin[a], self.stepper.skin[b])
+        buffer = context.contact_buffer
+        count = buffer.find(self.stepper.geometry, world, context.state.now, context.state.rotation, a, b, margin)
+        touched = np.unique(buffer.integer[:count, :2])
+        touched = touched[resting[touched]]
+        labels = self.label[touched]
+        mates = np.flatnonzero(resting & np.isin(self.label, labels[labels >= 0]))
+        return np.union1d(touched, mates)
+
+    def _low(self, context, window, chosen: np.ndarray, root: np.ndarray, refused: dict[int, str]) -> np.ndarray:
+        """Leave out islands that begin as tall columns."""
+        begins = chosen & (self.label < 0)
+        if not self._auto or not begins.any():
+            return chosen
+        begins &= ~np.isin(root, np.unique(root[chosen & ~begins]))
+        if not begins.any():
+            return chosen
+        self._set_up(context, np.flatnonzero(begins), window.begin, window.end - window.begin, 0.0)
+        stepper = self.stepper
+        level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
+        tall = np.unique(root[stepper.order[level[: len(root)] == TALL + 1]])
+        tall = tall[tall >= 0]
+        refused.update(dict.fromkeys(tall.tolist(), "tall"))
+        return chosen & ~np.isin(root, tall)
+
+    def _settle(self, context, chosen, root, a: np.ndarray, b: np.ndarray, touch: np.ndarray, time: float) -> None:
+        """Label the heaps; let those that have been calm for long stand still, and members that are far from restless ones."""
+        world, course = context.world, context.state.course
+        inner = self.stepper.inner
+        carried = world.moving[a] | world.moving[b]
+        moving = np.unique(root[np.where(world.moving[a], b, a)[carried]])
+        restless = chosen.copy()
+        for r in np.unique(root[chosen]).tolist():
+            members = np.flatnonzero(chosen & (root == r))
+            self.label[members] = r
+            strength = float(world.steady_strength[members].max())
+            if strength > 0.0 and r not in moving:
+                restless[members] = self.calm[members] < REST * np.sqrt(inner[members] / strength)
+        if np.array_equal(restless, chosen):
+            self.asleep[:] = False
+            return
+        still = chosen & ~stirred(a[touch], b[touch], chosen, restless, context.state.now, world.mass, world.steady_strength, inner)
+        self._stand_still(context, np.flatnonzero(still & (course.mode != FIXED)), time)
+        alive = np.zeros(len(root), bool)
+        alive[root[restless]] = True
+        chosen &= alive[root]
+        self.asleep = still & chosen
+
+    def _stand_still(self, context, members: np.ndarray, time: float) -> None:
+        """Let members stay where they are."""
+        world, course, now = context.world, context.state.course, context.state.now
+        if not len(members):
+            return
+        before = mechanical_energy(now, world, members)
+        context.recorder.flush_all(course, members, time)
+        now.velocity[members] = now.angular_velocity[members] = 0.0
+        course.mode[members], course.start[members] = FIXED, time
+        course.velocity[members] = course.angular_velocity[members] = 0.0
+        self.stepper.report_crossed(context, members, time)
+        context.log.book(time, "heap", mechanical_energy(now, world, members) - before)
+
+    def _end_courses(self, context, members: np.ndarray, time: float) -> None:
+        """Bring members to `time`, the end of their courses; book what the step took of their energy."""
+        if not len(members):
+            return
+        state, world = context.state, context.world
+        context.recorder.flush_all(state.course, members, time)
+        arrive(
+            state.course, members, time, world.steady_acceleration, state.now, state.rotation, context.acceleration,
+            context.angular_acceleration,
+        )  # fmt: skip
+        for label in np.unique(self.label[members]).tolist():
+            self._book(context, label, time)
+
+    def _book(self, context, label: int, time: float) -> None:
+        if label in self._began:
+            start, members, energy = self._began.pop(label)
+            change = mechanical_energy(context.state.now, context.world, members) - energy
+            context.log.book_over(start, time, "heap", change)
+
+    def close(self, context, time: float) -> None:
+        """Book what the steps under way take until `time`, the end of the run."""
+        members = np.flatnonzero(context.state.course.mode == STEPPED)
+        if not len(members):
+            return
+        self._end_courses(context, members, time)
+        self.stepper.report_crossed(context, members, time)
+        let_fly(context.state.course, members, context.world.steady_acceleration)
+
+    def join(self, context, window, time: float, groups: list[Group]) -> list[Group]:
+        """The groups at `time` with the heaps that they touch; at the start of a step all of its heaps."""
+        for group in groups:
+            self.toil[group.members] += 1.0
+        if window.end <= window.begin:  # the end of the run: there is no time to step a heap over
+            return [group for group in groups if np.all(self.label[group.members] < 0)]
+        first = not window.heaps_begun
+        window.heaps_begun = True
+        hit = [group for group in groups if np.any(self.label[group.members] >= 0)]
+        members = np.flatnonzero(window.inside) if first else self._due(window, time)
+        if len(members) and not hit:
+            bare = _bare_group(time)
+            self._bring_in(context, bare, members)
+            return [*groups, bare]
+        for group in hit:
+            labels = self.label[group.members]
+            members = np.union1d(members, np.flatnonzero(np.isin(self.label, labels[labels >= 0])))
+            self._bring_in(context, group, members)
+        return groups
+
+    def _due(self, window, time: float) -> np.ndarray:
+        """Members of heaps whose courses end at `time`."""
+        due = [label for label, end in self._ends.items() if end <= time]
+        return np.flatnonzero(window.inside & np.isin(self.label, due)) if due else np.zeros(0, np.int64)
+
+    def _bring_in(self, context, group: Group, members: np.ndarray) -> None:
+        """Let the members be the heap of a group; bring them to its time. (Those that it does not touch are no members of the group.)"""
+        state, time = context.state, group.time
+        stepped = state.course.mode[members] == STEPPED
+        self._end_courses(context, members[stepped & (state.course.start[members] < time)], time)
+        away = np.setdiff1d(members[~(stepped | self.asleep[members])], group.members)
+        bring_all(state.course, away, time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
+        context.acceleration[away] = context.world.steady_acceleration[away]
+        group.heap = members
+
+    def step(self, context, window, group: Group) -> None:
+        """Step the heap of a group from its time to the end of the window, with what touches it and is slow."""
+        world, members = context.world, group.heap
+        assert members is not None
+        if len(group.members):
+            stays = np.zeros(world.num_bodies, bool)
+            stays[group.members] = True
+            self._leave_out_fast(context, stays)
+            stays[group.members] |= ~self._leaves(context, group)
+            near = group.members[stays[group.members] & ~self._jointed[group.members]]
+            self.label[np.setdiff1d(near, members)] = self.label[members].max()
+            group.heap = members = np.union1d(members, near)
+            window.inside[members] = True
+            context.wrench[group.members] = 0.0
+            self.asleep[members] = False
+            self.calm[group.members] = 0.0
+        fresh = members[~self._taken[members]]
+        self._take_in(context, fresh, group.time)
+        self._steps += 1
+        self._most = max(self._most, len(members))
+        members = members[~self.asleep[members]]
+        end = self._end_of(context, window, group.time, members)
+        self._set_up(context, members, group.time, end - group.time, self.stepper.kept if group.time > window.begin else 0.0)
+        for label in np.unique(self.label[members]).tolist():
+            mine = members[self.label[members] == label]
+            self._ends[label] = end
+            self._began[label] = group.time, mine, mechanical_energy(context.state.now, world, mine)
+        if len(fresh):
+            self.stepper.move_apart(context, fresh)
+        self._outcome = self.stepper.step(context, group.time, end)
+        self._outcome_end = end
+        if end < window.end:
+            window.wake[members] = end
+
+    def _take_in(self, context, fresh: np.ndarray, time: float) -> None:
+        """What exact contact did to bodies ends where they come to a heap."""
+        self._taken[fresh] = True
+        context.wrench[fresh] = 0.0
+        context.contact_log.close(fresh.tolist(), time)
+        for i in fresh[context.state.under_contact[fresh]].tolist():
+            note_arrival(context, [i])
+            book_contact_work(context, i, time)
+            context.state.under_contact[i] = False
+
+    def _end_of(self, context, window, time: float, members: np.ndarray) -> float:
+        """When the courses of members end: before the step does where bodies are tiny, spin fast, or stray from their straight ways."""
+        stepper = self.stepper
+        step, allowed, pressed = stepper.step_length, STRAY * stepper.motion, stepper.pressed | self._only_dear
+        stray = most_stray(context.state.now, members, pressed, stepper.reach, stepper.skin, allowed)
+        spans = max(math.ceil(step / stepper.span(members) - 1e-9), 1)
+        pieces = max(min(math.ceil(stray * step), MOST_PIECES * spans), spans)
+        left = max(math.ceil((window.end - time) * pieces / step - 1e-6), 1)
+        return window.end if left == 1 else time + (window.end - time) / left
+
+    def _leaves(self, context, group: Group) -> np.ndarray:
+        """Which members (k,) bool leave all that they touch at a speed worth the name."""
+        slowest = np.full(context.world.num_bodies, np.inf)
+        np.minimum.at(slowest, group.contacts.body_a, group.approach)
+        np.minimum.at(slowest, group.contacts.body_b, group.approach)
+        speed = np.linalg.norm(context.state.now.velocity[group.members], axis=1)
+        return slowest[group.members] > LEAVING * speed
+
+    def _set_up(self, context, members: np.ndarray, time: float, ahead: float, kept: float) -> None:
+        """Put members, in their order, and the bodies near them that stand still before the solver; kept: see `review`."""
+        world, order = context.world, self.stepper.order
+        marked = np.zeros(world.num_bodies, bool)
+        marked[members] = True
+        members = order[marked[order]]
+        fixed = np.flatnonzero(~world.dynamic | self.asleep)
+        moving = fixed[world.moving[fixed]]
+        bring_all(
+            context.state.course, moving, time, context.state.now, context.state.rotation, context.acceleration,
+            context.angular_acceleration,
+        )  # fmt: skip
+        self.stepper.set_up(context, members, fixed, ahead, kept)
+
+    def take_courses(self, context, window, group: Group) -> None:
+        """Give the members of a group's heap the courses that the solver found."""
+        out, state, time = self._outcome, context.state, group.time
+        assert out is not None
+        length = self._outcome_end - time
+        context.recorder.flush_all(state.course, out.members, time)
+        depart(state.course, out.members, time, length, state.now, out.position, out.orientation, out.velocity)
+        state.correction[out.members] = 0.0
+        self._note_calm(context, out, length)
+        window.change_courses(out.members, time)
+
+    def _note_calm(self, context, out: Outcome, length: float) -> None:
+        """For how long each member has hardly moved from where it was."""
+        stepper = self.stepper
+        count_calm(
+            out.members, out.position, out.orientation, out.velocity, context.world.steady_strength, stepper.inner, stepper.skin, length,
+            self._stood, self.calm,
+        )  # fmt: skip
+
+
+def _bare_group(time: float) -> Group:
+    """A group without contacts of the exact kind."""
+    none = np.zeros(0, np.int64)
+    return Group(
+        time=time, members=none, pairs=none, contacts=empty_contacts(0), place=none, kinds=none,
+        features=np.zeros((0, 2), np.int64), keys=[], delta=np.zeros(0), approach=np.zeros(0), rest_speed=np.zeros(0),
+        live=np.zeros(0, bool), velocity=np.zeros((0, 3)), angular_velocity=np.zeros((0, 3)),
+    )  # fmt: skip

@@ -1,0 +1,383 @@
+"""One step of heaps: bodies put before the kernels, contacts looked at, sub-steps, energy kept in bounds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimpulse.collision.contact_buffer import ContactBuffer, find_together
+from rigidimpulse.collision.contact_cache import classify, look, make_room, most_motion, share_of
+from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT, HeapBodies, load_bodies
+from rigidimpulse.collision.contact_table import HeapTable
+from rigidimpulse.collision.contact_update import FARTHER, convex_polyhedra, inner_radii, shrunk_geometry, store_contacts
+from rigidimpulse.collision.fat_boxes import Cover
+from rigidimpulse.collision.manifold.dispatch import pair_gap
+from rigidimpulse.collision.manifold.inset_surface import cores
+from rigidimpulse.collision.manifold.penetrating import solids
+from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.kernels import number_of_cores
+from rigidimpulse.core.memory import reserve
+from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.core.simd import ROW, aligned, machine_lanes
+from rigidimpulse.core.workers import empty_deck
+from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import energies, mark_quick, note_pressed, slow_down
+from rigidimpulse.dynamics.solvers.tgs_soft.depenetration import move_apart
+from rigidimpulse.dynamics.solvers.tgs_soft.fill import fill, keep_impulses, place_bodies
+from rigidimpulse.dynamics.solvers.tgs_soft.records import (
+    PATCHES_OF_A_BODY,
+    POINTS,
+    Batches,
+    colour_patches,
+    empty_patches,
+    leave_out_quick,
+    list_patches,
+    more_batches,
+    more_patches,
+    place_patches,
+)
+from rigidimpulse.dynamics.solvers.tgs_soft.solver import FREQUENCY, advance, softness, special_patches
+from rigidimpulse.engine.touching import refresh_pose
+
+COLUMN = 20.0
+"""Bodies whose weight may press the skin in by PRESSED."""
+PRESSED = 0.25
+LEAST_SUB_STEPS = 16
+"""Sub-steps in a whole step."""
+SPAN = 1.0
+"""Longest time that is stepped at once, in sqrt(r / g) of the smallest inner radius r."""
+CROSSED = 1e-6
+"""Inner radii below which the surfaces of two cores cross."""
+LEAST_SUB_STEPS_BETWEEN = 2
+"""Sub-steps from look to look."""
+COARSEST = 0.3
+"""Inner radii by which bodies with cores may pass each other from look to look: sub-steps are made shorter for it."""
+SAME, KEPT = 0.02, 0.2
+"""Parts of the motion until a look (`Accuracy.heap_motion`) that a pair may make with the contacts it has: at any time, and in the
+middle of a step."""
+QUICK = 0.4
+"""Part of `kept` beyond which a body is quick: its contacts are looked for, and their records made anew, in the middle of a step."""
+MOSTLY = 0.3
+"""Part of the bodies that are quick beyond which all count as such."""
+WORTHWHILE, WORTHWHILE_GENERAL = 400, 16
+"""Pairs, all and general ones, beyond which several cores look at them: some tens of microseconds are lost by it."""
+WORTHWHILE_BATCHES, MOST_SOLVERS = 2000, 2
+"""Batches, each counted in every sub-step, beyond which two cores solve them."""
+_NO_STEADY = 0, np.zeros(1, np.int64)
+"""Patches, and edges of the colours of batches, that were made before the last look."""
+FINER_STEP, FINER_SUB_STEP, FINER_MOTION = 1.0 / 8.0, 1.0 / 32.0, 1.0 / 10.0
+"""Parts of `Accuracy.step`, of sub-steps and of `Accuracy.heap_motion` that scenes of few bodies are stepped with: they can afford it."""
+CLEAR = 0.2
+"""Inner radii within which bodies may meet, beside the way they go."""
+
+
+@dataclass
+class Outcome:
+    """What a step of heaps gave: bodies (k,) of the scene, in order of the heap, their poses and velocities (k, 6) at its end."""
+
+    members: np.ndarray
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+
+
+class HeapStepper:
+    """Steps sets of bodies by the sub-stepped solver; holds what does not change, and the contacts.
+
+    Attributes:
+        order: (n,) bodies by their places at the start of the run; rank: (n,) place of each in it.
+        inner: (n,) m, distance from the centre of mass to the nearest face; inf for what cannot be moved. skin: (n,) m.
+        step_length: s, that is stepped at once at most; motion: inner radii, see `Accuracy.heap_motion`.
+        kept: inner radii that a pair may come past each other with the contacts it has, in the middle of a step.
+        bodies: by rank. table: pairs and contact points. pressed: (n,) bool, contacts acted on the body when it was last stepped.
+
+    """
+
+    def __init__(self, world, movable: np.ndarray, finer: bool) -> None:
+        """Make the arrays of the bodies; shrink the shapes for the contact kernels.
+
+        Args:
+            world: the compiled scene.
+            movable: (n,) bool, bodies that are dynamic, or will be when they are let go.
+            finer: for scenes of few bodies.
+
+        """
+        n = world.num_bodies
+        self.world = world
+        self.order = np.lexsort(np.column_stack([np.arange(n), world.position[:, ::-1]]).T)
+        self.rank = np.argsort(self.order, kind="stable")
+        dynamic_shapes = np.zeros(len(world.geometry.shape_first) - 1, bool)
+        dynamic_shapes[world.shape_of_body[movable]] = True
+        self.inner = np.where(movable, inner_radii(world.geometry)[world.shape_of_body], np.inf)
+        self.skin = TOLERANCES.skin * self.inner
+        self.reach = np.where(world.ball, 0.0, world.bound_radius)
+        convex = convex_polyhedra(world.geometry)
+        cored, depth, self._back = cores(world.shapes, world.geometry, convex, dynamic_shapes)
+        self.geometry, factor = shrunk_geometry(cored, dynamic_shapes)
+        self.shapes = make_polyhedra(world.geometry, convex)
+        self._solids, drum, self._inset = solids(world.shapes, world.geometry, convex, self.shapes)
+        convex |= drum
+        kinds = world.shape_of_body[self.order]
+        self._factor, self._depth, self._convex = factor[kinds], depth[kinds], convex[kinds]
+        bound = np.where(np.isfinite(world.bound_radius), world.bound_radius, 0.0)
+        self._taken_off = self._depth + (1.0 - self._factor) * bound[self.order]
+        self.bodies = self._make_bodies()
+        self._masses, self._pull = world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order])
+        self._shares, self._looked_at = number_of_cores(), 0
+        self._rooms = [make_room() for _ in range(self._shares)]
+        self._more_buffers: list[ContactBuffer] = []
+        self.table = HeapTable(self._shares, n)
+        least = CLEAR * np.where(movable, self.inner, 0.0)
+        self.cover = Cover(world, self.order, self.inner, least)
+        self.lanes = machine_lanes()
+        self._patches, self._count, self._steady = empty_patches(PATCHES_OF_A_BODY * n), 0, _NO_STEADY
+        none = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
+        self._batches = more_batches(none, PATCHES_OF_A_BODY * n // self.lanes.width + 1, self.lanes.width)
+        self._begins, self._edges = np.zeros(256, np.int64), np.zeros(1, np.int64)
+        self._deck = empty_deck()
+        self._places_of_bodies = aligned(n + 1)
+        self._part = np.zeros(n, np.int64)
+        self.step_length = world.accuracy.step * (FINER_STEP if finer else 1.0)
+        self._least_sub_steps = LEAST_SUB_STEPS / (FINER_SUB_STEP if finer else 1.0)
+        self.motion = world.accuracy.heap_motion * (FINER_MOTION if finer else 1.0)
+        self.kept = KEPT * self.motion
+        self._all_quick = bool(world.moving.any() or world.ball.any())
+        self._special = self._all_quick or bool(world.coefficients[:, :, 0].any())
+        self.pressed = np.zeros(n, bool)
+        self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
+        self.members, self.ahead, self._parts, self._sub_steps = np.zeros(0, np.int64), 0.0, 1, 1
+
+    def _make_bodies(self) -> HeapBodies:
+        """Rows of all bodies by rank, and one of none."""
+        world, n = self.world, self.world.num_bodies
+
+        def by_rank(column: np.ndarray, none) -> np.ndarray:
+            return np.concatenate([column[self.order], np.full((1, *column.shape[1:]), none, column.dtype)])
+
+        unlike = world.inertia.max(axis=1) > world.inertia.min(axis=1)
+        return HeapBodies(
+            shape=by_rank(world.shape_of_body, 0), material=by_rank(world.material_of_body, 0), inertia=by_rank(world.inertia, 1.0),
+            alike=by_rank(~unlike, True), inner=by_rank(self.inner, np.inf), skin=by_rank(self.skin, np.inf),
+            reach=by_rank(self.reach, 0.0), radius=by_rank(world.bound_radius, 0.0), part=np.zeros(n + 1, np.int64),
+            position=np.zeros((n + 1, 3)), orientation=np.zeros((n + 1, 4)), rotation=np.zeros((n + 1, 3, 3)),
+            gravity=np.zeros((n + 1, 3)), velocity=aligned(n + 1), before=aligned(n + 1), moved=aligned(n + 1), drift=aligned(n + 1),
+            quick=np.zeros(n + 1, bool), mass=aligned(n + 1),
+        )  # fmt: skip
+
+    def sub_step(self, members: np.ndarray) -> float:
+        """Length of a sub-step, s: short enough for the load of a column, so that it scales with the size of bodies."""
+        strength = float(self.world.steady_strength[members].max())
+        step, pieces = self.world.accuracy.step, self._least_sub_steps
+        if strength > 0.0:
+            h = 2.0 * math.pi * FREQUENCY * math.sqrt(PRESSED * float(self.skin[members].min()) / (COLUMN * strength))
+            pieces = max(math.ceil(step / h), pieces)
+        return step / pieces
+
+    def span(self, members: np.ndarray) -> float:
+        """Longest time that members are stepped at once, s: bodies may fall by half an inner radius in it."""
+        strength, step = float(self.world.steady_strength[members].max()), self.step_length
+        return min(step, SPAN * math.sqrt(float(self.inner[members].min()) / strength)) if strength > 0.0 else step
+
+    def find_pairs(self, context, members: np.ndarray, others: np.ndarray, ahead: float) -> None:
+        """See that the pairs hold all that members may meet in `ahead` s, among themselves and of the others."""
+        found = self.cover.renewed(context.state.now, context.acceleration, members, others, ahead)
+        if found is not None:
+            self.table.replace(*found)
+            classify(self.table.pairs, self.bodies, self.shapes)
+
+    def near(self, context, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
+        """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `Cover.near`."""
+        return self.cover.near(self.table.pairs, context.state.now, context.acceleration, member, other, ahead)
+
+    def set_up(self, context, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0) -> None:
+        """Put members and what they may touch before the kernels at the present instant, with their contacts; kept: see `review`."""
+        self.find_pairs(context, members, supports, ahead)
+        self.table.pack()
+        self.members = members
+        self._part[:] = OUTSIDE
+        self._part[supports], self._part[members] = SUPPORT, MEMBER
+        load_bodies(self.bodies, self.order, context.state.now, context.acceleration, self.world.inv_mass, self._part)
+        motion = most_motion(self.bodies, self.table.pairs, ahead)
+        needed = math.ceil(motion / COARSEST)
+        self._sub_steps = max(math.ceil(ahead / self.sub_step(members) - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
+        most = max(self._sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
+        self._parts = min(max(math.ceil(motion / self.motion), 1), most)
+        self.ahead = ahead / self._parts
+        self._look(context, kept)
+
+    def _look(self, context, kept: float) -> None:
+        """Look at the contacts of all pairs in play, on several cores where the last look had much to do; kept: see `review`."""
+        table, number = self.table, len(self.table.pairs.first)
+        shares = self._shares if self._looked_at > WORTHWHILE else 1
+        room = share_of(number, shares, shares)
+        if room > len(self._places):
+            self._places, self._margins = reserve((2 * room,), np.int64), reserve((2 * room,), np.float64)
+        while True:
+            outcome = look.together([
+                (
+                    self.shapes, self._solids, self._inset, self.bodies, table.pairs, share, shares, self.ahead, SAME * self.motion, kept,
+                    self._places, self._margins, table.rows, table.ids, table.free, self.world.coefficients, self._rooms[share],
+                )
+                for share in range(shares)
+            ])  # fmt: skip
+            if min(waiting for _, waiting in outcome) >= 0:
+                break
+            table.make_room(POINTS)
+        self._looked_at = sum(looked_at for looked_at, _ in outcome)
+        begins = [share_of(number, share, shares) for share in range(shares)]
+        waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
+        if len(waits):
+            waits = waits[np.argsort(self._places[waits])]
+            self._look_at_general(context, self._places[waits], self._margins[waits])
+
+    def _look_at_general(self, context, places: np.ndarray, margin: np.ndarray) -> None:
+        """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `detect`."""
+        table, world, pairs = self.table, self.world, self.table.pairs
+        first, second = pairs.first[places], pairs.second[places]
+        # A wide margin is dear for meshes.
+        far = np.where(self._depth[first] + self._depth[second] > 0.0, margin, FARTHER * margin)
+        shown = far + self._taken_off[first] + self._taken_off[second]
+        n, now, rotation = world.num_bodies, context.state.now, context.state.rotation.copy()
+        # In the course of a step bodies are elsewhere than at its start.
+        now = now._replace(position=now.position.copy(), orientation=now.orientation.copy())
+        mine = self.bodies.part[:n] != OUTSIDE
+        at = self.order[mine]
+        now.position[at], now.orientation[at] = self.bodies.position[:n][mine], self.bodies.orientation[:n][mine]
+        rotation[at] = self.bodies.rotation[:n][mine]
+        shares = np.array_split(np.arange(len(places)), self._shares if len(places) > WORTHWHILE_GENERAL else 1)
+        while len(self._more_buffers) < len(shares) - 1:
+            self._more_buffers.append(ContactBuffer())
+        buffers = [context.contact_buffer, *self._more_buffers][: len(shares)]
+        a, b = self.order[first], self.order[second]
+        found = find_together(buffers, [(self.geometry, world, now, rotation, a[some], b[some], shown[some]) for some in shares])
+        for some, buffer, count in zip(shares, buffers, found, strict=True):
+            # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
+            table.make_room(count + POINTS * len(some) + 1)
+            table.free[0, 0] = store_contacts(
+                world.geometry, self.geometry, self._back, self._solids, self.bodies, pairs, places[some], margin[some], far[some],
+                self._convex, self._factor, self._depth, world.coefficients, buffer.real, buffer.integer, count, self.order, table.rows,
+                table.ids, int(table.free[0, 0]),
+            )  # fmt: skip
+
+    def report_crossed(self, context, members: np.ndarray, time: float) -> None:
+        """Report pairs of members, brought to the present, whose cores cross: where they press on each other is not known any more."""
+        if not self._depth.any():
+            return
+        pairs, world, now = self.table.pairs, self.world, context.state.now
+        mine = np.zeros(world.num_bodies, bool)
+        mine[self.rank[members]] = True
+        asked = (mine[pairs.first] | mine[pairs.second]) & (self._depth[pairs.first] + self._depth[pairs.second] > 0.0)
+        for i, j in zip(self.order[pairs.first[asked]].tolist(), self.order[pairs.second[asked]].tolist(), strict=True):
+            a, b, limit = int(world.shape_of_body[i]), int(world.shape_of_body[j]), CROSSED * min(self.inner[i], self.inner[j])
+            rotation = to_matrix(now.orientation[i]), to_matrix(now.orientation[j])
+            if pair_gap(self.geometry, a, now.position[i], rotation[0], b, now.position[j], rotation[1], limit, np.zeros(7)) < limit:
+                context.log.report(
+                    time, "overlap in a heap", (world.names[min(i, j)], world.names[max(i, j)]),
+                    "the bodies are deeper inside each other than their contacts can tell; use a smaller step",
+                )  # fmt: skip
+
+    def _look_again(self, context) -> None:
+        """Look at the contacts of quick bodies in the course of a step; those of all others stay in the steady batches, where they are."""
+        bodies, width = self.bodies, self.lanes.width
+        all_quick = self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY
+        if all_quick:
+            bodies.quick[:] = True
+        self._look(context, self.kept)
+        if all_quick:
+            bodies.drift[:] = 0.0
+            self._steady = _NO_STEADY
+        leave_out_quick(width, bodies, self.table.pairs, self._patches, self._steady[0], self._batches)
+
+    def _fill(self, h: float) -> int:
+        """Make patches, colours and records of quick bodies after the steady ones, for sub-steps of h s; returns the number of batches."""
+        bodies, table, width, (begin, edges) = self.bodies, self.table, self.lanes.width, self._steady
+        first = int(edges[-1])
+        count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
+        if count < 0:
+            self._patches = more_patches(self._patches, -2 * count)
+            count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
+        self._count = count
+        number, colours = colour_patches(width, bodies, table.pairs, self._patches, begin, count, first, self._begins)
+        if colours < 0:
+            self._begins = np.zeros(1 - 2 * colours, np.int64)
+            number, colours = colour_patches(width, bodies, table.pairs, self._patches, begin, count, first, self._begins)
+        if number > len(self._batches.points):
+            self._batches = more_batches(self._batches, 2 * number, width)
+        self._edges = np.concatenate([edges[:-1], self._begins[: colours + 1]])
+        place_patches(width, bodies, table.pairs, self._patches, begin, count, self._batches, first, number)
+        place_bodies(bodies, self._places_of_bodies)
+        fill(self.lanes, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
+        return number
+
+    def move_apart(self, context, fresh: np.ndarray) -> None:
+        """Move members that are fresh apart from each other and from all else to the gaps that contacts are held at; their speeds pay."""
+        bodies, now, at = self.bodies, context.state.now, self.rank[fresh]
+        mine = np.zeros(len(bodies.part), bool)
+        mine[at] = True
+        before = self._energies()[1]
+        if not move_apart(bodies, self.table.pairs, self.table.rows, mine):
+            return
+        self._take_off(before)
+        members = self.rank[self.members]
+        now.position[fresh], now.orientation[fresh] = bodies.position[at], bodies.orientation[at]
+        now.velocity[self.members] = bodies.velocity.reshape(-1, ROW)[members, :3]
+        now.angular_velocity[self.members] = bodies.velocity.reshape(-1, ROW)[members, 3:6]
+        refresh_pose(fresh, now, context.state.rotation, self.world.inertia)
+
+    def step(self, context, time: float, end: float) -> Outcome:
+        """Step what `set_up` put before the kernels from `time` to `end`."""
+        bodies, members = self.bodies, self.members
+        sub_steps = self._sub_steps
+        h = (end - time) / sub_steps
+        before = self._energies()[1]
+        work, done = 0.0, 0
+        self._steady = _NO_STEADY
+        for part in range(self._parts):
+            if part:
+                self._look_again(context)
+            some = (part + 1) * sub_steps // self._parts - done
+            work += self._advance(some, h)
+            done += some
+        note_pressed(bodies, self.order, self.pressed)
+        self._take_off(before + work)
+        at = self.rank[members]
+        return Outcome(members, bodies.position[at], bodies.orientation[at], bodies.velocity.reshape(-1, ROW)[at, :6])
+
+    def _energies(self) -> tuple[float, float]:
+        """Kinetic energy of the members, and all of it, J."""
+        return energies(self.bodies, self._masses, self._pull)
+
+    def _take_off(self, allowed: float) -> None:
+        """Take what members have gained beyond `allowed` J off their speeds."""
+        kinetic, total = self._energies()
+        if total > allowed and kinetic > 0.0:
+            slow_down(self.bodies, math.sqrt(max(1.0 - (total - allowed) / kinetic, 0.0)))
+
+    def _advance(self, sub_steps: int, h: float) -> float:
+        """Sub-steps of h s with the contacts as they are known; returns the work of moving supports, J."""
+        bodies, table, width = self.bodies, self.table, self.lanes.width
+        number = self._fill(h)
+        lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
+        balls = rebounds = supports = 0
+        if self._special:
+            strength = float(self.world.steady_strength[self.members].max())
+            balls, rebounds, supports = special_patches(
+                width, bodies, table.pairs, self._patches, self._steady[0], self._count, table.rows, self._batches,
+                self.world.coefficients, strength, lists, target,
+            )
+        shares, calm = min(self._shares, MOST_SOLVERS) if number * sub_steps > WORTHWHILE_BATCHES else 1, len(self._steady[1]) - 1
+        self._deck[:] = empty_deck()
+        work, *_ = advance.together([
+            (
+                self.lanes, bodies, table.pairs, self._patches, self._batches, self._edges, calm, table.rows, lists, balls, rebounds,
+                supports, target, sub_steps, h, self._deck, share, shares,
+            )
+            for share in range(shares)
+        ])  # fmt: skip
+        keep_impulses(self.lanes, self._batches, number, table.lines)
+        if not calm:
+            bodies.quick[:] = False
+            self._steady = self._count, self._edges
+        return work

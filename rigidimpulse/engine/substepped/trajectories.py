@@ -1,0 +1,187 @@
+"""Courses of the members of heaps: how they end, begin, and for how long bodies have been calm (kernels)."""
+
+import numpy as np
+
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.quaternion import product, quaternion_to_matrix
+from rigidimpulse.motion.trajectory import FREE, LENGTH, SPEEDS, STEPPED, begin, begin_straight, stepped_at
+
+CALM, PLAY = 0.05, 0.5
+"""Speed, in sqrt(g r), and motion, in skins, below which a body is calm."""
+TURN = 2.5
+"""Angle by which a body may turn in one course, rad."""
+EVEN = 1e-6
+"""Part of its way by which a body may miss where an even acceleration would have brought it, for its path to be a parabola."""
+
+
+@jit
+def arrive(course, members, time, steady, bodies, rotation, acceleration, angular_acceleration):
+    """End the courses of members at `time`, bring them there, and let them go straight on; steady (n, 3) m/s2 is what pulls them."""
+    for i in members:
+        place, q, v, w = stepped_at(course, i, time)
+        x, y, z = 1.0 / course.inertia[i, 0], 1.0 / course.inertia[i, 1], 1.0 / course.inertia[i, 2]
+        quaternion_to_matrix(q, rotation[i])
+        for c in range(3):
+            for d in range(3):
+                bodies.inv_inertia[i, c, d] = (
+                    x * rotation[i, c, 0] * rotation[i, d, 0] + y * rotation[i, c, 1] * rotation[i, d, 1]
+                    + z * rotation[i, c, 2] * rotation[i, d, 2]
+                )
+        course.start[i], course.top[i, LENGTH] = time, 1.0
+        bodies.position[i, 0], bodies.position[i, 1], bodies.position[i, 2] = place
+        bodies.orientation[i, 0], bodies.orientation[i, 1], bodies.orientation[i, 2], bodies.orientation[i, 3] = q
+        bodies.velocity[i, 0], bodies.velocity[i, 1], bodies.velocity[i, 2] = v
+        bodies.angular_velocity[i, 0], bodies.angular_velocity[i, 1], bodies.angular_velocity[i, 2] = w
+        for c in range(4):
+            course.orientation[i, c] = bodies.orientation[i, c]
+        for c in range(3):
+            course.position[i, c] = bodies.position[i, c]
+            course.velocity[i, c] = course.top[i, SPEEDS + c] = bodies.velocity[i, c]
+            course.angular_velocity[i, c] = course.top[i, SPEEDS + 3 + c] = bodies.angular_velocity[i, c]
+            course.top[i, SPEEDS + 6 + c] = course.top[i, SPEEDS + 9 + c] = course.acceleration[i, c] = 0.0
+            acceleration[i, c], angular_acceleration[i, c] = steady[i, c], 0.0
+        begin_straight(course, i)
+
+
+@jit
+def let_fly(course, members, steady):
+    """Let members that have arrived fly freely from where they are."""
+    for i in members:
+        course.mode[i] = FREE
+        for c in range(3):
+            course.acceleration[i, c] = steady[i, c]
+        begin(course, i)
+
+
+@jit
+def mark_slow(bodies, inner, farthest, fastest, member):
+    """Unmark members (n,) that move farther than `farthest` 1/s of their inner radius, or spin faster than `fastest` rad/s."""
+    for i in range(member.shape[0]):
+        if not member[i]:
+            continue
+        speed, spin = 0.0, 0.0
+        for c in range(3):
+            speed += bodies.velocity[i, c] ** 2
+            spin += bodies.angular_velocity[i, c] ** 2
+        member[i] = np.sqrt(speed) <= farthest * inner[i] and np.sqrt(spin) <= fastest
+
+
+@jit
+def most_stray(bodies, members, pressed, reach, skin, allowed):
+    """Largest w / TURN of the members, and w sqrt(r / (8 d)) of those that contacts act on, 1/s; d: `allowed` skins.
+
+    The centre of a body that rolls over a point at r strays by d = r (w h)^2 / 8 from its straight way in h s.
+    """
+    most = 0.0
+    for i in members:
+        spin = 0.0
+        for c in range(3):
+            spin += bodies.angular_velocity[i, c] ** 2
+        most = max(most, np.sqrt(spin) / TURN)
+        if pressed[i]:
+            most = max(most, np.sqrt(spin * reach[i] / (8.0 * allowed * skin[i])))
+    return most
+
+
+@jit_making_arrays
+def stirred(first, second, member, restless, bodies, mass, strength, inner):
+    """Mark (n,) restless members, and calm ones that such a one may move, over pairs (k,) that may touch.
+
+    A body of mass m at a speed v that runs into calm ones of mass m_0 sets at most k = m v / (m_0 u) of them going faster than u: behind
+    that many bodies nothing moves on by more than what calm bodies may. u = CALM sqrt(g r), m_0 is the least mass of a member.
+    """
+    reach, least = np.zeros(member.shape[0]), np.inf
+    for i in range(member.shape[0]):
+        if member[i]:
+            least = min(least, mass[i])
+    for i in range(member.shape[0]):
+        if restless[i]:
+            speed, spin = 0.0, 0.0
+            for c in range(3):
+                speed += bodies.velocity[i, c] ** 2
+                spin += bodies.angular_velocity[i, c] ** 2
+            size = np.sqrt(speed) + inner[i] * np.sqrt(spin)
+            reach[i] = 1.0 + max(mass[i] * size / (least * max(CALM * np.sqrt(strength[i] * inner[i]), 1e-300)), 1.0)
+    left = 0
+    for i in range(member.shape[0]):
+        left += member[i] and reach[i] < 1.0
+    spreads, number, turn = True, first.shape[0], 0
+    while spreads and left > 0:
+        spreads, turn = False, 1 - turn
+        for k in range(number):
+            # To and fro: a stir goes far either way.
+            p = k if turn else number - 1 - k
+            a, b = first[p], second[p]
+            if not (member[a] and member[b]):
+                continue
+            if reach[a] > reach[b]:
+                a, b = b, a
+            if reach[b] - 1.0 > reach[a]:
+                left -= reach[a] < 1.0 <= reach[b] - 1.0
+                reach[a] = reach[b] - 1.0
+                spreads = spreads or reach[a] > 1.0
+    return reach >= 1.0
+
+
+@jit
+def count_calm(members, position, orientation, velocity, strength, inner, skin, length, stood, calm):
+    """Add `length` s to the calm of members (k,) that have hardly moved from where they stood (n, 7); start anew that of the others."""
+    for k in range(members.shape[0]):
+        i = members[k]
+        moved, turned, speed, spin = 0.0, 0.0, 0.0, 0.0
+        for c in range(3):
+            moved += (position[k, c] - stood[i, c]) ** 2
+            speed += velocity[k, c] ** 2
+            spin += velocity[k, 3 + c] ** 2
+        for c in range(4):
+            turned += (orientation[k, c] - stood[i, 3 + c]) ** 2
+        play = PLAY * skin[i]
+        if (
+            np.sqrt(moved) <= play
+            and 2.0 * inner[i] * np.sqrt(turned) <= play
+            and np.sqrt(speed) + inner[i] * np.sqrt(spin) <= CALM * np.sqrt(strength[i] * inner[i])
+        ):
+            calm[i] += length
+            continue
+        calm[i] = 0.0
+        for c in range(3):
+            stood[i, c] = position[k, c]
+        for c in range(4):
+            stood[i, 3 + c] = orientation[k, c]
+
+
+@jit
+def depart(course, members, time, length, bodies, position, orientation, velocity):
+    """Courses from the present poses to the given ones (k, 3), (k, 4), where the velocities are (k, 6).
+
+    They are straight, but parabolas of bodies that fly freely: their velocities agree with where they come.
+    """
+    for k in range(members.shape[0]):
+        i = members[k]
+        a0, a1, a2, a3 = bodies.orientation[i, 0], bodies.orientation[i, 1], bodies.orientation[i, 2], bodies.orientation[i, 3]
+        q0, q1, q2, q3 = product(orientation[k, 0], orientation[k, 1], orientation[k, 2], orientation[k, 3], a0, -a1, -a2, -a3)
+        if q0 < 0.0:
+            q0, q1, q2, q3 = -q0, -q1, -q2, -q3
+        sine = np.sqrt(q1 * q1 + q2 * q2 + q3 * q3)
+        factor = 2.0 * np.arctan2(sine, q0) / (sine * length) if sine > 0.0 else 0.0
+        missed, way = 0.0, 0.0
+        for c in range(3):
+            first, last = bodies.velocity[i, c], velocity[k, c]
+            missed += np.abs(position[k, c] - bodies.position[i, c] - 0.5 * length * (first + last))
+            way += 0.5 * length * (np.abs(first) + np.abs(last))
+        course.start[i], course.mode[i] = time, STEPPED
+        course.angular_velocity[i, 0] = factor * q1
+        course.angular_velocity[i, 1] = factor * q2
+        course.angular_velocity[i, 2] = factor * q3
+        for c in range(3):
+            course.position[i, c] = bodies.position[i, c]
+            pull = (velocity[k, c] - bodies.velocity[i, c]) / length if missed <= EVEN * way else 0.0
+            course.velocity[i, c] = (position[k, c] - bodies.position[i, c]) / length - 0.5 * length * pull
+            course.acceleration[i, c], course.torque[i, c] = pull, 0.0
+            course.top[i, SPEEDS + c], course.top[i, SPEEDS + 3 + c] = bodies.velocity[i, c], bodies.angular_velocity[i, c]
+            course.top[i, SPEEDS + 6 + c] = velocity[k, c] - bodies.velocity[i, c]
+            course.top[i, SPEEDS + 9 + c] = velocity[k, 3 + c] - bodies.angular_velocity[i, c]
+        for c in range(4):
+            course.orientation[i, c] = bodies.orientation[i, c]
+        course.top[i, LENGTH] = length
+        begin_straight(course, i)

@@ -1,0 +1,204 @@
+"""Which bodies touch at one instant: poses brought to it, manifolds of the pairs in question, and what presses each
+contact.
+
+The acceleration that presses contact i together, without the force the contact itself carried before, is
+
+    a_i = -n.(a_b + alpha_b x r_b - a_a - alpha_a x r_a) - d(u.n)/dt + f_i (n.K n)
+
+with the present accelerations of the bodies (forces and contacts included), d(u.n)/dt what the gap gains at constant
+velocities, as the place of contact wanders and the normal turns (dynamics/constraints/contact_motion.py), and f_i the normal force
+it carried. It is what a rebound is measured against: one that rises less than delta, v^2 < 2 a delta, is none, and a
+contact that leaves more slowly than that is held. So a ball that slides in a spinning hollow is held without gravity.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from rigidimpulse.collision.manifold.dispatch import MAX_PER_NORMAL, pair_contacts, reduce_contacts
+from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
+from rigidimpulse.core.quaternion import quaternion_to_matrix
+from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
+from rigidimpulse.dynamics.impact.point import inverse_effective_mass, relative_velocity
+from rigidimpulse.motion.trajectory import FIXED, JERK, TORQUE_RATE, place_at, rate_of, row_at, state_at
+
+# Part of bounding radii and of held gaps that rounding may take.
+ROUND_OFF = 1e-9
+
+
+@jit
+def world_inverse_inertia(r, inertia, out):
+    """R diag(1 / I) R^T."""
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = (
+                r[i, 0] * r[j, 0] / inertia[0] + r[i, 1] * r[j, 1] / inertia[1] + r[i, 2] * r[j, 2] / inertia[2]
+            )
+
+
+@jit_making_arrays
+def gyroscopic_acceleration(r, inertia, w, torque, out):
+    """I^-1 (torque - w x (I w)), world frame."""
+    x = np.empty(3)
+    t = np.empty(3)
+    for k in range(3):
+        x[k] = r[0, k] * w[0] + r[1, k] * w[1] + r[2, k] * w[2]
+        t[k] = r[0, k] * torque[0] + r[1, k] * torque[1] + r[2, k] * torque[2]
+    a0 = (t[0] + (inertia[1] - inertia[2]) * x[1] * x[2]) / inertia[0]
+    a1 = (t[1] + (inertia[2] - inertia[0]) * x[2] * x[0]) / inertia[1]
+    a2 = (t[2] + (inertia[0] - inertia[1]) * x[0] * x[1]) / inertia[2]
+    for k in range(3):
+        out[k] = r[k, 0] * a0 + r[k, 1] * a1 + r[k, 2] * a2
+
+
+@inlined
+def bring(course, i, time, bodies, rotation, acceleration, angular_acceleration):
+    """Bring body i to `time`: pose, velocities, inverse inertia and its present accelerations."""
+    state_at(course, i, time, bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i])
+    quaternion_to_matrix(bodies.orientation[i], rotation[i])
+    if bodies.inv_mass[i] > 0.0:
+        world_inverse_inertia(rotation[i], course.inertia[i], bodies.inv_inertia[i])
+    for k in range(3):
+        acceleration[i, k] = 0.0
+        angular_acceleration[i, k] = 0.0
+    if bodies.inv_mass[i] > 0.0 and course.mode[i] != FIXED:
+        s = time - course.start[i]
+        acceleration[i, 0], acceleration[i, 1], acceleration[i, 2] = row_at(course.acceleration, i, rate_of(course, i, JERK), s)
+        torque = row_at(course.torque, i, rate_of(course, i, TORQUE_RATE), s)
+        gyroscopic_acceleration(rotation[i], course.inertia[i], bodies.angular_velocity[i], torque, angular_acceleration[i])
+
+
+@jit
+def bring_all(course, members, time, bodies, rotation, acceleration, angular_acceleration):
+    for i in members:
+        bring(course, i, time, bodies, rotation, acceleration, angular_acceleration)
+
+
+@jit_making_arrays
+def near_pairs(course, time, pairs, margin, radius, bodies, seen, near):
+    """Write the pairs of the given bodies (k,) that are not `seen` (p,) yet and whose bounding spheres are near at `time`.
+
+    margin: gap that counts as near, relative to that at which contacts are held; radius (n,) m. near (p,): their places, in order.
+    Marks the pairs that were looked at as seen, and returns how many are near.
+    """
+    x, y = np.empty(3), np.empty(3)
+    asked = np.zeros(radius.shape[0], np.bool_)
+    for i in bodies:
+        asked[i] = True
+    count = 0
+    for p in range(pairs.a.shape[0]):
+        a, b = pairs.a[p], pairs.b[p]
+        if seen[p] or not (asked[a] or asked[b]):
+            continue
+        seen[p] = True
+        reach = (radius[a] + radius[b]) * (1.0 + ROUND_OFF) + margin * pairs.delta[p]
+        if reach < np.inf:
+            place_at(course, a, time, x)
+            place_at(course, b, time, y)
+            if (y[0] - x[0]) ** 2 + (y[1] - x[1]) ** 2 + (y[2] - x[2]) ** 2 > reach * reach:
+                continue
+        near[count] = p
+        count += 1
+    return count
+
+
+@jit
+def bring_gyroscopic(members, bodies, rotation, inertia, angular_acceleration):
+    """Angular accelerations of torque-free bodies at their present spins."""
+    for i in members:
+        gyroscopic_acceleration(rotation[i], inertia[i], bodies.angular_velocity[i], (0.0, 0.0, 0.0), angular_acceleration[i])
+
+
+@jit
+def refresh_pose(members, bodies, rotation, inertia):
+    """Rotation matrix and inverse inertia after a change of orientation."""
+    for i in members:
+        quaternion_to_matrix(bodies.orientation[i], rotation[i])
+        world_inverse_inertia(rotation[i], inertia[i], bodies.inv_inertia[i])
+
+
+@jit
+def contacts_of_pairs(
+    geometry, shape_of_body, bodies, rotation, pairs_a, pairs_b, margin, scratch, real, integer, cylinders
+):
+    """Reduced manifolds of the pairs, margin (k,) m; returns the number of contacts, or -(needed) if a buffer is too small.
+
+    cylinders: None where no shape is a cylinder.
+    """
+    # Not a literal: that would compile everything below twice.
+    count = np.int64(0)
+    for k in range(pairs_a.shape[0]):
+        a, b = pairs_a[k], pairs_b[k]
+        first = count
+        count = pair_contacts(
+            geometry, shape_of_body[a], bodies.position[a], rotation[a],
+            shape_of_body[b], bodies.position[b], rotation[b], margin[k], scratch, real, integer, count, cylinders,
+        )
+        if count < 0:
+            return count
+        count = reduce_contacts(real, integer, first, count, MAX_PER_NORMAL)
+        for c in range(first, count):
+            integer[c, 0] = a
+            integer[c, 1] = b
+    return count
+
+
+@jit
+def fill_contacts(bodies, real, integer, rows, material_of_body, coefficients, contacts):
+    """Contacts (see dynamics/impact/point.py) from the buffer rows; coefficients (k, k, 4): e, mu_s, mu_k, e_t of two materials."""
+    for s in range(rows.shape[0]):
+        c = rows[s]
+        a, b = integer[c, 0], integer[c, 1]
+        contacts.body_a[s] = a
+        contacts.body_b[s] = b
+        for k in range(3):
+            contacts.arm_a[s, k] = real[c, k] - bodies.position[a, k]
+            contacts.arm_b[s, k] = real[c, 3 + k] - bodies.position[b, k]
+            contacts.normal[s, k] = real[c, 6 + k]
+        contacts.gap[s] = real[c, 9]
+        pair = coefficients[material_of_body[a], material_of_body[b]]
+        contacts.restitution[s] = pair[0]
+        contacts.static_friction[s] = pair[1]
+        contacts.dynamic_friction[s] = pair[2]
+        contacts.tangential_restitution[s] = pair[3]
+
+
+@jit
+def _point_acceleration(acceleration, angular_acceleration, i, r, n):
+    """n.(a + alpha x r) of body i."""
+    a, alpha = acceleration[i], angular_acceleration[i]
+    x = a[0] + alpha[1] * r[2] - alpha[2] * r[1]
+    y = a[1] + alpha[2] * r[0] - alpha[0] * r[2]
+    z = a[2] + alpha[0] * r[1] - alpha[1] * r[0]
+    return n[0] * x + n[1] * y + n[2] * z
+
+
+@jit_making_arrays
+def pressing(
+    geometry, shape_of_body, rotation, bodies, contacts, kinds, features, acceleration, angular_acceleration, normal_force, least,
+    step, delta, approach, rest_speed,
+):
+    """Fill approach (m,) = u.n and rest_speed (m,) = sqrt(2 a delta) [m/s]; a is at least `least`.
+
+    What the motion gives counts where it makes more than round-off of delta in a step [s]: bodies that stand still do so by round-off.
+
+    kinds (m,), features (m, 2): what touches; acceleration, angular_acceleration (n, 3); normal_force (m,) N carried; delta (m,) m.
+    """
+    turning = contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, features).turning
+    u = np.empty(3)
+    k = np.empty((3, 3))
+    for c in range(contacts.gap.shape[0]):
+        n = contacts.normal[c]
+        approach[c] = relative_velocity(bodies, contacts, c, u)
+        a = _point_acceleration(
+            acceleration, angular_acceleration, contacts.body_a[c], contacts.arm_a[c], n
+        ) - _point_acceleration(acceleration, angular_acceleration, contacts.body_b[c], contacts.arm_b[c], n)
+        turn = turning[c, 0] * n[0] + turning[c, 1] * n[1] + turning[c, 2] * n[2]
+        if abs(turn) * step * step > ROUND_OFF * delta[c]:
+            a -= turn
+        if normal_force[c] > 0.0:
+            inverse_effective_mass(bodies, contacts, c, k)
+            for i in range(3):
+                for j in range(3):
+                    a += normal_force[c] * n[i] * k[i, j] * n[j]
+        rest_speed[c] = sqrt(2.0 * max(a, least) * delta[c])

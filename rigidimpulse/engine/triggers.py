@@ -1,0 +1,239 @@
+"""Triggers: volumes that report which bodies overlap them, and never push.
+
+What is inside is looked at where each step ends, at the start of the run, and in between on the courses that the bodies
+have at the end of the step: often enough that neither side moves by more than half the thickness of both in between. Where
+the answer changes, the time is found by bisection on these courses to `SHARPNESS`; it is late by at most a step where a
+body was in an impact since.
+"""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass, field
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rigidimpulse.collision.distance.fcl import Narrowphase
+from rigidimpulse.collision.geometry import compile_shape
+from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.quaternion import multiply, rotate
+from rigidimpulse.engine.plan import Skip
+from rigidimpulse.motion.trajectory import FIXED, pose_at
+from rigidimpulse.scene.body import vector
+from rigidimpulse.scene.collision_filter import CollisionFilter, may_meet
+from rigidimpulse.scene.shape import Shape, check_orientation, normalized_quaternion
+
+if TYPE_CHECKING:
+    from rigidimpulse.model.state import StepContext
+
+SHARPNESS = 1e-9
+"""s, to which times are found."""
+MOST_LOOKS = 1000
+"""Looks at most at one pair in one step."""
+BEGINS, ENDS = "overlap begins", "overlap ends"
+"""Kinds of the events."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trigger:
+    """A volume that reports overlap: `run.status.events` has "overlap begins" and "overlap ends" with trigger and body.
+
+    Attributes:
+        name: what events call it.
+        shape: the volume, in its own frame.
+        body: name of the body that it moves with, which it does not report; None: it stands still.
+        position: (3,) m, in the frame of that body, or in the world.
+        orientation: quaternion (w, x, y, z), the same.
+        collision_filter: which bodies it reports; None: all.
+
+    Raises:
+        SceneError: when the scene is compiled, for a bad shape or pose or an unknown body; names the trigger.
+
+    """
+
+    name: str
+    shape: Shape
+    _: KW_ONLY
+    body: str | None = None
+    position: ArrayLike = (0.0, 0.0, 0.0)
+    orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
+    collision_filter: CollisionFilter | None = None
+    stage: ClassVar[str] = "observe"
+
+    def bind(self, _world) -> Skip:
+        """Triggers are looked at all together."""
+        return Skip("a trigger; see triggers")
+
+    def check(self, names: list[str]) -> None:
+        """Raise a `SceneError` for what makes no sense."""
+        where = f"trigger {self.name!r}"
+        try:
+            if not isinstance(self.shape, Shape):
+                raise SceneError(f"shape is a {type(self.shape).__name__}", "give a Shape")
+            self.shape.check()
+            vector(self.position, "position", "m")
+            check_orientation(np.asarray(self.orientation, float))
+        except SceneError as error:
+            raise error.within(where) from None
+        if self.body is not None and self.body not in names:
+            raise unknown_name("body", self.body, names, where)
+
+
+@dataclass
+class _Watched:
+    """One trigger in a run: index of its body or -1, its pose in that body's principal frame, size, and who is inside."""
+
+    trigger: Trigger
+    body: int
+    shape: int
+    reach: float
+    thickness: float
+    may: np.ndarray
+    inside: set[int] = field(default_factory=set)
+
+
+class Triggers:
+    """All triggers of a run."""
+
+    def __init__(self, context: StepContext, triggers: list[Trigger]) -> None:
+        """Check the triggers and look at who is inside at the start."""
+        world = context.world
+        self._context = context
+        for trigger in triggers:
+            trigger.check(world.names)
+        compiled = [compile_shape(trigger.shape, np.zeros(3), np.eye(3)) for trigger in triggers]
+        self._narrowphase = Narrowphase([*world.shapes, *compiled])
+        self._thickness = np.array([_thickness(body.shape) for body in world.scene.bodies])
+        moves = world.dynamic | world.moving
+        self._watched = []
+        for number, trigger in enumerate(triggers):
+            body = -1 if trigger.body is None else world.names.index(trigger.body)
+            may = np.array([may_meet(trigger.collision_filter, other.collision_filter) for other in world.scene.bodies])
+            may &= moves | (body >= 0 and moves[body])
+            if body >= 0:
+                may[body] = False
+            reach, thick = _reach(trigger.shape), _thickness(trigger.shape)
+            self._watched.append(_Watched(trigger, body, len(world.shapes) + number, reach, thick, np.flatnonzero(may)))
+        self.look(0.0, 0.0)
+
+    def look(self, begin: float, end: float) -> None:
+        """Look at what happened in the step from `begin` to `end` [s]."""
+        for watched in self._watched:
+            for i in self._near(watched, begin, end):
+                self._follow(watched, i, begin, end)
+
+    def _near(self, watched: _Watched, begin: float, end: float) -> list[int]:
+        """Bodies that may be inside or have come and gone, by bounding spheres, and those that were inside."""
+        course, world = self._context.state.course, self._context.world
+        i = watched.may
+        if not np.isfinite(watched.reach):
+            return i.tolist()
+        way = np.linalg.norm(course.velocity[i], axis=1) + np.linalg.norm(course.acceleration[i], axis=1) * (end - course.start[i])
+        centre, _ = self._pose(watched, end)
+        own = watched.body
+        if own >= 0:
+            away = np.linalg.norm(centre - self._body(own, end)[0])
+            own_way = np.linalg.norm(course.velocity[own]) + np.linalg.norm(course.acceleration[own]) * (end - course.start[own])
+            way = way + own_way + 2.0 * away * np.linalg.norm(course.angular_velocity[own])
+        place = np.array([self._body(k, end)[0] for k in i.tolist()]).reshape(-1, 3)
+        near = np.linalg.norm(place - centre, axis=1) <= watched.reach + world.bound_radius[i] + way * (end - begin)
+        return sorted({*i[near].tolist(), *watched.inside})
+
+    def _follow(self, watched: _Watched, i: int, begin: float, end: float) -> None:
+        """Find the changes of one pair."""
+        course = self._context.state.course
+        low = max(begin, *(float(course.start[k]) for k in (i, watched.body) if k >= 0))
+        low = min(low, end)
+        count = 1
+        if end > low:
+            thick = 0.5 * (watched.thickness + self._thickness[i])
+            way = (end - low) * (self._speed(i, low, end) + self._speed(watched.body, low, end, watched.reach))
+            count = int(np.clip(np.ceil(way / thick), 1, MOST_LOOKS)) if thick > 0.0 else MOST_LOOKS
+            if way == 0.0 and low <= begin:
+                return
+        was, before = i in watched.inside, low
+        # The first look is spared where the last step ended with it.
+        first = 1 if low <= begin < end else 0
+        for time in np.linspace(low, end, count + 1)[first:].tolist():
+            now = self._overlaps(watched, i, time)
+            if now != was:
+                self._note(watched, i, self._changed(watched, i, before, time, was), now)
+            was, before = now, time
+
+    def _changed(self, watched: _Watched, i: int, low: float, high: float, was: bool) -> float:
+        """When the answer changes between two times; the first one if it has changed there already."""
+        if self._overlaps(watched, i, low) != was:
+            return low
+        while high - low > max(SHARPNESS, 4.0 * np.spacing(high)):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._overlaps(watched, i, middle) == was else (low, middle)
+        return high
+
+    def _note(self, watched: _Watched, i: int, time: float, begins: bool) -> None:
+        body = self._context.world.names[i]
+        (watched.inside.add if begins else watched.inside.discard)(i)
+        text = f"{body!r} {'enters' if begins else 'leaves'} trigger {watched.trigger.name!r}"
+        self._context.log.note(time, BEGINS if begins else ENDS, (watched.trigger.name, body), text)
+
+    def _overlaps(self, watched: _Watched, i: int, time: float) -> bool:
+        shape = int(self._context.world.shape_of_body[i])
+        return bool(self._narrowphase.overlap(watched.shape, self._pose(watched, time), shape, self._body(i, time)))
+
+    def _speed(self, i: int, low: float, high: float, reach: float | None = None) -> float:
+        """Bound of the speed of any point of a body on its course, m/s."""
+        course = self._context.state.course
+        if i < 0 or course.mode[i] == FIXED:
+            return 0.0
+        reach = float(self._context.world.bound_radius[i]) if reach is None else reach
+        fall = float(np.linalg.norm(course.acceleration[i])) * (high - float(course.start[i]))
+        spin = float(np.linalg.norm(course.angular_velocity[i])) * (reach if np.isfinite(reach) else 0.0)
+        return float(np.linalg.norm(course.velocity[i])) + fall + spin
+
+    def _body(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Principal frame of a body."""
+        x, q = np.empty(3), np.empty(4)
+        pose_at(self._context.state.course, i, max(time, float(self._context.state.course.start[i])), x, q)
+        return x, q / np.linalg.norm(q)
+
+    def _pose(self, watched: _Watched, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Frame of a trigger."""
+        position, turn = np.asarray(watched.trigger.position, float), normalized_quaternion(watched.trigger.orientation)
+        if watched.body < 0:
+            return position, turn
+        x, q = self._context.world.body_pose(watched.body, *self._body(watched.body, time))
+        return x + rotate(q, position), multiply(q, turn)
+
+
+def _corners(shape: Shape) -> tuple[np.ndarray, np.ndarray] | None:
+    """Box about a shape in its own frame; None if it is endless."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for part in shape.parts_flat():
+        if part.shape.kind == "half_space":
+            return None
+        if part.shape.kind in ("mesh", "box"):
+            points, grown = part.shape.surface().vertices, 0.0
+        else:
+            half = 0.0 if part.shape.kind == "sphere" else 0.5 * part.shape.height
+            points, grown = np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), part.shape.radius
+        points = part.position + points @ part.rotation.T
+        low, high = np.minimum(low, points.min(axis=0) - grown), np.maximum(high, points.max(axis=0) + grown)
+    return low, high
+
+
+def extent(shape: Shape) -> float:
+    """Return the longest side of the box about a shape, m; 1 m for an endless one."""
+    box = _corners(shape)
+    return 1.0 if box is None else float(np.max(box[1] - box[0]))
+
+
+def _reach(shape: Shape) -> float:
+    """Radius about the origin of the frame that encloses a shape, m."""
+    box = _corners(shape)
+    return np.inf if box is None else float(np.linalg.norm(np.maximum(np.abs(box[0]), np.abs(box[1]))))
+
+
+def _thickness(shape: Shape) -> float:
+    """Least side of the box about a shape, m; 1 m for an endless one, into which nothing comes by passing through."""
+    box = _corners(shape)
+    return 1.0 if box is None else float(np.min(box[1] - box[0]))

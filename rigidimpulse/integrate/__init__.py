@@ -1,1 +1,0 @@
-"""Stage `integrate`: where a body is at any time of its course, in closed form wherever there is one."""

@@ -1,0 +1,1 @@
+"""The compiled scene and the state of a run."""

@@ -1,0 +1,1 @@
+"""Where a body is at any time: trajectories in closed form."""

@@ -1,1 +1,0 @@
-"""Stage observe: what is kept of a run: frames, impacts, the ledger, events."""

@@ -1,0 +1,1 @@
+"""What is kept of a run: frames, impacts, the ledger, events."""

@@ -1,0 +1,128 @@
+"""Who gave a body its momentum.
+
+    m v(t) - m v(0) = sum over causes of the integral of F ds + sum of impulses
+
+Causes: gravity, constant forces, each force that varies, each joint, each body touched (lasting contact and impacts apart), and what is
+left: "corrections", by which sub-steps end (of second order in their length), captures, what heaps exchange. Of a body that loses mass the
+left side is the integral of m v'.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigidimpulse.core.errors import unknown_name
+
+if TYPE_CHECKING:
+    from rigidimpulse.dynamics.forces.force_log import ForceWork
+
+
+class ImpulseBook:
+    """Impulses between pairs until the frames, while a run goes on; body -1 is the world."""
+
+    def __init__(self, times: np.ndarray) -> None:
+        """times (f,) s of the frames."""
+        self._times = times
+        self._gains: dict[tuple[str, int, int], np.ndarray] = {}
+
+    def add(self, cause: str, a: int, b: int, start: float, end: float, force: np.ndarray) -> None:
+        """A constant force (3,) N of a cause on b, the opposite on a, from start to end [s]."""
+        first, last = np.searchsorted(self._times, (start, end), side="left")
+        nodes = np.concatenate([[start], self._times[first:last], [end]])
+        gain = self._gain(cause, a, b)
+        gain[first : last + 1] += np.diff(nodes)[:, None] * force
+
+    def add_at(self, cause: str, a: int, b: int, time: float, impulse: np.ndarray) -> None:
+        """An impulse (3,) N s of a cause on b, the opposite on a, at `time`."""
+        self._gain(cause, a, b)[np.searchsorted(self._times, time, side="left")] += impulse
+
+    def _gain(self, cause: str, a: int, b: int) -> np.ndarray:
+        """What is gained since the frame before (f + 1, 3); the last row is after all frames."""
+        return self._gains.setdefault((cause, a, b), np.zeros((len(self._times) + 1, 3)))
+
+    def of(self, body: int) -> dict[tuple[str, int], np.ndarray]:
+        """By cause and the other body: impulses (f, 3) on a body."""
+        found: dict[tuple[str, int], np.ndarray] = {}
+        for (cause, a, b), gain in self._gains.items():
+            if body in (a, b):
+                total = np.cumsum(gain[:-1], axis=0)
+                found[cause, a if body == b else b] = total if body == b else -total
+        return found
+
+
+@dataclass(frozen=True)
+class Impulses:
+    """Impulses of a run by body and cause.
+
+    Attributes:
+        names: of the bodies. times: (f,) s.
+        pull: (n, 2, 3) N of gravity and of constant forces on each body, at its mass at the end.
+        mass: (n,) kg at the end, 0 of bodies that are never dynamic. release: (n,) s, when bodies that are carried first are let go.
+        velocity: (f, n, 3) m/s.
+        book: what pairs exchange. forces: what varying forces did, None where there are none.
+        impacts: the table of impacts.
+
+    """
+
+    names: list[str]
+    times: np.ndarray
+    pull: np.ndarray
+    mass: np.ndarray
+    release: np.ndarray
+    velocity: np.ndarray
+    book: ImpulseBook
+    forces: ForceWork | None
+    impacts: np.ndarray
+
+    def of(self, name: str) -> dict[str, np.ndarray]:
+        """Impulses (f, 3) N s on a body by cause.
+
+        Raises:
+            SceneError: for an unknown name, listing the known ones.
+
+        """
+        if name not in self.names:
+            raise unknown_name("body", name, self.names)
+        i = self.names.index(name)
+        held, gained = self._course_of(i)
+        parts: dict[str, np.ndarray] = {}
+        for what, pull in zip(("gravity", "constant forces"), self.pull[i], strict=True):
+            if np.any(pull):
+                parts[what] = held[:, None] * pull
+        if self.forces is not None:
+            parts.update(self.forces.impulses_on(i))
+        for (cause, other), impulse in sorted(self.book.of(i).items(), key=lambda item: item[0]):
+            parts[cause if other < 0 or cause.startswith("joint ") else f"{cause} {self.names[other]}"] = impulse
+        parts.update(self._impacts_on(i))
+        rest = gained - sum(parts.values(), np.zeros_like(gained))
+        if np.any(np.abs(rest) > 0.0):
+            parts["corrections"] = rest
+        return parts
+
+    def _course_of(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+        """Time until each frame (f,) s, each instant counted by the body's mass over that at the end, and what it gained (f, 3) N s."""
+        share = np.ones(len(self.times))
+        if self.forces is not None and self.forces.mass_share is not None:
+            share = self.forces.mass_share[:, i]
+        # Mass at the frames over that at the end of the run, in the middle between frames; and the part of that time in which it counts.
+        middle = 0.5 * (share + np.concatenate([share[:1], share[:-1]]))
+        counted = np.clip(self.times - self.release[i], 0.0, np.diff(self.times, prepend=0.0))
+        gain = np.diff(self.velocity[:, i], axis=0, prepend=self.velocity[:1, i])
+        weight = (counted > 0.0) * middle * self.mass[i]
+        return np.cumsum(counted * middle), np.cumsum(weight[:, None] * gain, axis=0)
+
+    def _impacts_on(self, i: int) -> dict[str, np.ndarray]:
+        """Impulses (f, 3) of impacts with each other body."""
+        parts: dict[str, np.ndarray] = {}
+        for mine, other, sign in (("body_b", "body_a", 1.0), ("body_a", "body_b", -1.0)):
+            rows = self.impacts[self.impacts[mine] == i]
+            for j in np.unique(rows[other]).tolist():
+                those = rows[rows[other] == j]
+                impulse = sign * (those["impulse"][:, None] * those["normal"] + those["tangent_impulse"])
+                sums = np.vstack([np.zeros(3), np.cumsum(impulse, axis=0)])
+                key = f"impacts with {self.names[j]}"
+                parts[key] = parts.get(key, 0.0) + sums[np.searchsorted(those["time"], self.times, side="right")]
+        return parts

@@ -1,0 +1,104 @@
+"""The recorder: samples every body's exact path at the frame times, whatever the frame rate, without touching the motion.
+
+A body's path is fixed from one change of course to the next. Before a body's course changes at time t its frames
+before t are written; a frame at the very time of an impact shows the state after it, but frame 0 is the state as
+given.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.core.kernels import inlined, jit
+from rigidimpulse.motion.trajectory import FIXED, STEPPED, motion_at, stepped_at
+
+
+@inlined
+def _write_stepped(course, i, times, f, position, orientation, velocity, angular_velocity):
+    """Write frame f of body i in mode STEPPED."""
+    x, q, v, w = stepped_at(course, i, times[f])
+    position[f, i, 0], position[f, i, 1], position[f, i, 2] = x
+    orientation[f, i, 0], orientation[f, i, 1], orientation[f, i, 2], orientation[f, i, 3] = q
+    velocity[f, i, 0], velocity[f, i, 1], velocity[f, i, 2] = v
+    angular_velocity[f, i, 0], angular_velocity[f, i, 1], angular_velocity[f, i, 2] = w
+
+
+@inlined
+def _write_fixed(course, i, f, position, orientation, velocity, angular_velocity):
+    """Write frame f of body i in mode FIXED."""
+    for k in range(3):
+        position[f, i, k] = course.position[i, k]
+        # Only where it is not 0: zeros that nobody has written take no memory.
+        if velocity[f, i, k] != 0.0:
+            velocity[f, i, k] = 0.0
+        if angular_velocity[f, i, k] != 0.0:
+            angular_velocity[f, i, k] = 0.0
+    for k in range(4):
+        orientation[f, i, k] = course.orientation[i, k]
+
+
+@jit
+def sample_paths(course, bodies, times, last, written, position, orientation, velocity, angular_velocity):
+    """Write the frames of these bodies from written[i] to last - 1, on their present courses, and say so in `written`.
+
+    times (f,) s; position, orientation and velocities (f, n, ...).
+    """
+    for i in bodies:
+        for f in range(written[i], last):
+            if course.mode[i] == STEPPED:
+                _write_stepped(course, i, times, f, position, orientation, velocity, angular_velocity)
+            elif course.mode[i] == FIXED:
+                _write_fixed(course, i, f, position, orientation, velocity, angular_velocity)
+            else:
+                motion_at(course, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
+        written[i] = max(written[i], last)
+
+
+AT_ONCE = 16
+"""Frames of all bodies that are written at once, since those of one body are far apart in memory."""
+
+
+class Recorder:
+    """Frames of n bodies in the principal frame: position (f, n, 3), orientation (f, n, 4), velocities (f, n, 3)."""
+
+    def __init__(self, times: np.ndarray, num_bodies: int) -> None:
+        """times (f,) s, increasing."""
+        self.times = times
+        self.position = np.empty((len(times), num_bodies, 3))
+        self.orientation = np.empty((len(times), num_bodies, 4))
+        self.velocity = np.zeros((len(times), num_bodies, 3))
+        self.angular_velocity = np.zeros((len(times), num_bodies, 3))
+        self.written = np.zeros(num_bodies, np.int64)
+        self._everyone = np.arange(num_bodies)
+
+    def start(self, course) -> None:
+        """Write frame 0, the state as given."""
+        self._write(course, self._everyone, 1)
+
+    def flush(self, course, i: int, time: float, correction: np.ndarray) -> None:
+        """Write the frames of body i before `time`; its course must still be the one that led there.
+
+        correction (6,): change of velocity [m/s] and spin [rad/s] that it got at the end of its course, for what the
+        course was off by: that grew with the square of the time.
+        """
+        first, last = int(self.written[i]), int(np.searchsorted(self.times, time, side="left"))
+        if last > first:
+            self._write(course, self._everyone[i : i + 1], last)
+        if last > first and np.any(correction):
+            share = ((self.times[first:last] - course.start[i]) / (time - course.start[i])) ** 2
+            self.velocity[first:last, i] += share[:, None] * correction[:3]
+            self.angular_velocity[first:last, i] += share[:, None] * correction[3:]
+
+    def flush_all(self, course, bodies: np.ndarray, time: float) -> None:
+        """Write the frames of all these bodies before `time`, as `flush` does."""
+        self._write(course, bodies, int(np.searchsorted(self.times, time, side="left")))
+
+    def finish(self, course) -> None:
+        """Write what is left of all bodies."""
+        for last in range(int(self.written.min(initial=0)), len(self.times), AT_ONCE):
+            self.flush_all(course, self._everyone, self.times[last])
+        self.flush_all(course, self._everyone, np.inf)
+
+    def _write(self, course, bodies: np.ndarray, last: int) -> None:
+        frames = self.position, self.orientation, self.velocity, self.angular_velocity
+        sample_paths(course, bodies, self.times, last, self.written, *frames)

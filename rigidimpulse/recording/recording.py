@@ -1,0 +1,381 @@
+"""What a run leaves: frames, impacts, ledger, status; and the files it can be written to."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.files import ANIMATED_SUFFIXES, write_renamed
+from rigidimpulse.recording.contacts import CONTACT_DTYPE, forces_on
+
+if TYPE_CHECKING:
+    from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
+    from rigidimpulse.engine.plan import Plan
+    from rigidimpulse.recording.events import Event
+    from rigidimpulse.recording.impulses import Impulses
+    from rigidimpulse.recording.ledger import Ledger
+    from rigidimpulse.recording.profile import Profile
+    from rigidimpulse.scene.accuracy import Accuracy
+    from rigidimpulse.scene.scene import Scene
+    from rigidimpulse.studies.accuracy_targets import Choice
+
+
+@dataclass(frozen=True)
+class Status:
+    """How a run went.
+
+    Attributes:
+        ok: nothing happened that a user should know of.
+        message: what happened and what to change.
+        events: all of it, in order of time.
+
+    """
+
+    ok: bool
+    message: str
+    events: tuple[Event, ...] = ()
+
+    @staticmethod
+    def of(events: Sequence[Event]) -> Status:
+        """Return the status that the events of a run add up to."""
+        problems = [e for e in events if e.is_problem]
+        if not problems:
+            return Status(True, "finished", tuple(events))
+        lines = [f"t = {e.time:.6g} s, {e.kind} ({', '.join(e.bodies)}): {e.message}" for e in problems]
+        return Status(False, "\n".join(lines), tuple(events))
+
+
+class RunSettings(NamedTuple):
+    """What `simulate` was asked for besides the scene: see there."""
+
+    duration: float
+    fps: float
+    accuracy: Accuracy
+    effects: dict[str, bool]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Frames of n bodies at f times.
+
+    Attributes:
+        times: (f,) s. names: body names, in order of index.
+        positions: (f, n, 3) m, body origins. orientations: (f, n, 4) wxyz, body to world.
+        velocities: (f, n, 3) m/s, centres of mass. angular_velocities: (f, n, 3) rad/s, world axes.
+        centers: (f, n, 3) m, centres of mass.
+        impacts: structured array, one row an impulse at a contact point (see observe.events.IMPACT_DTYPE).
+        ledger: energy and momentum per frame. status: how the run went. plan: what was simulated and why.
+        scene: the scene as it was written; None in a recording loaded from a file without one.
+        reactions: (f, 3) N by joint, see `reaction`.
+        contacts: structured array, one row a stretch of time over which a lasting contact carries the same force (see
+            observe.contacts.CONTACT_DTYPE); stretches that no frame sees are left out. `contacts_at`, `contact_force` by frame.
+        by_cause: impulses by body and cause, see `impulses`; None in a loaded recording.
+        nets: frames of flexible bodies, see `net`.
+        profile: where the time of the run went, by stage and by kernel; `profile.table()` for people.
+        settings: duration, fps, accuracy and chosen effects of the run; None in a loaded recording.
+        choice: how the accuracy was chosen, if it was asked for by `Within` or `InTime`.
+
+    """
+
+    times: np.ndarray
+    names: list[str]
+    positions: np.ndarray
+    orientations: np.ndarray
+    velocities: np.ndarray
+    angular_velocities: np.ndarray
+    centers: np.ndarray
+    impacts: np.ndarray
+    ledger: Ledger | None = None
+    status: Status = Status(True, "loaded")
+    plan: Plan | None = None
+    scene: Scene | None = None
+    reactions: dict[str, np.ndarray] = field(default_factory=dict)
+    contacts: np.ndarray = field(default_factory=lambda: np.zeros(0, CONTACT_DTYPE))
+    by_cause: Impulses | None = None
+    nets: list[FlexibleTrack] = field(default_factory=list)
+    profile: Profile | None = None
+    settings: RunSettings | None = None
+    choice: Choice | None = None
+
+    @cached_property
+    def horizon(self) -> dict[str, float]:
+        """Time by body until which the run can be trusted, s: it is one of many plausible ones beyond.
+
+        Until then two runs whose settings bracket those of this run (steps larger and smaller by sqrt(2), tolerances by 10), started off by
+        rounding, agree with each other: to the wished tolerance, where accuracy was asked for by `Within`, else to a thousandth of the
+        body's size. Dynamic bodies only; the last frame's time where they always agree. The two runs are made when this is first asked for.
+
+        Raises:
+            SceneError: for a recording that was loaded from a file.
+
+        """
+        if self.scene is None or self.settings is None:
+            raise SceneError("a loaded recording cannot be run again", "ask the run that simulate() returned")
+        from rigidimpulse.studies.horizon import find_horizon
+
+        return find_horizon(self)
+
+    def index(self, name: str) -> int:
+        """Index of a body.
+
+        Raises:
+            SceneError: for an unknown name, listing the known ones.
+
+        """
+        if name not in self.names:
+            raise unknown_name("body", name, self.names)
+        return self.names.index(name)
+
+    def position(self, name: str) -> np.ndarray:
+        """(f, 3) m, the body's own origin."""
+        return self.positions[:, self.index(name)]
+
+    def orientation(self, name: str) -> np.ndarray:
+        """(f, 4) wxyz, body to world; signs are continuous."""
+        from rigidimpulse.core.quaternion import quaternion_continuity
+
+        return quaternion_continuity(self.orientations[:, self.index(name)])
+
+    def velocity(self, name: str) -> np.ndarray:
+        """(f, 3) m/s, of the centre of mass."""
+        return self.velocities[:, self.index(name)]
+
+    def angular_velocity(self, name: str) -> np.ndarray:
+        """(f, 3) rad/s, world axes."""
+        return self.angular_velocities[:, self.index(name)]
+
+    def center_of_mass(self, name: str) -> np.ndarray:
+        """(f, 3) m."""
+        return self.centers[:, self.index(name)]
+
+    def net(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (f, v, 3) m in the world and faces (t, 3) of a flexible body.
+
+        Raises:
+            SceneError: for an unknown name, listing the known ones.
+
+        """
+        for track in self.nets:
+            if track.name == name:
+                return track.vertices, track.faces
+        raise unknown_name("flexible body", name, [track.name for track in self.nets])
+
+    def reaction(self, name: str) -> np.ndarray:
+        """(f, 3) N, force of a joint on its body b; impulses at impacts are not in it.
+
+        Raises:
+            SceneError: for an unknown name, listing the known ones.
+
+        """
+        if name not in self.reactions:
+            raise unknown_name("joint", name, self.reactions)
+        return self.reactions[name]
+
+    def impulses(self, name: str) -> dict[str, np.ndarray]:
+        """Impulse on a body by cause until each frame, (f, 3) N s; together they are its change of momentum.
+
+        Causes: "gravity", "constant forces", each other force by its name, "joint NAME", "contact with NAME" (lasting contact), "impacts
+        with NAME", and "corrections", what ends sub-steps: small, but for heaps, whose contacts are all in it.
+
+        Raises:
+            SceneError: for an unknown name, listing the known ones; for a recording that was loaded from a file.
+
+        """
+        if self.by_cause is None:
+            raise SceneError("a loaded recording knows no causes", "ask the run that simulate() returned")
+        return self.by_cause.of(name)
+
+    def contacts_at(self, frame: int) -> np.ndarray:
+        """Rows of `contacts` that carry load at a frame (an index of `times`, negative ones from the end).
+
+        A row has body_a, body_b (indices), the point (3,) m where the sub-step began, the normal (3,) from a to b, and the force
+        (3,) N on b; that on a is the opposite. Impulses at impacts are not in it, moments of rolling friction neither.
+
+        Raises:
+            IndexError: there is no such frame.
+
+        """
+        if not -len(self.times) <= frame < len(self.times):
+            raise IndexError(f"frame {frame} of a run of {len(self.times)} frames")
+        time = self.times[frame]
+        return self.contacts[(self.contacts["start"] <= time) & (time < self.contacts["end"])]
+
+    def contact_force(self, name: str) -> np.ndarray:
+        """(f, 3) N, sum of the forces of lasting contacts on a body, resting ones included; impulses at impacts are not in it.
+
+        Raises:
+            SceneError: for an unknown name, listing the known ones.
+
+        """
+        return forces_on(self.contacts, self.index(name), self.times)
+
+    def part(self, first: int, last: int | None = None) -> Recording:
+        """Frames `first` to `last`, that included, None: the last one, as a recording of its own whose time begins at 0.
+
+        For a pre-roll: `run.part(48).export("x.glb", start_frame=1001)` leaves out the first 48 frames. Impulses by cause, settings and
+        horizon are those of whole runs only.
+
+        Raises:
+            SceneError: there are no such frames.
+
+        """
+        frames = range(len(self.times))[first : None if last is None else last + 1]
+        if not 0 <= first < len(self.times) or not frames or (last is not None and last >= len(self.times)):
+            raise SceneError(f"frames {first} to {last} of a run of {len(self.times)}", f"give frames from 0 to {len(self.times) - 1}")
+        here, begin, end = slice(frames[0], frames[-1] + 1), self.times[frames[0]], self.times[frames[-1]]
+        impacts, contacts = self.impacts.copy(), self.contacts.copy()
+        for table, names in ((impacts, ("time",)), (contacts, ("start", "end"))):
+            for name in names:
+                table[name] -= begin
+        arrays = ("positions", "orientations", "velocities", "angular_velocities", "centers")
+        return replace(
+            self, times=self.times[here] - begin, **{name: getattr(self, name)[here] for name in arrays},
+            impacts=impacts[(impacts["time"] >= 0.0) & (impacts["time"] <= end - begin)],
+            contacts=contacts[(contacts["end"] > 0.0) & (contacts["start"] <= end - begin)],
+            ledger=None if self.ledger is None else self.ledger.part(here),
+            reactions={name: force[here] for name, force in self.reactions.items()},
+            nets=[replace(track, vertices=track.vertices[here]) for track in self.nets],
+            by_cause=None, settings=None,
+        )  # fmt: skip
+
+    def state_hash(self) -> str:
+        """SHA-256 of all frames, nets and impacts: equal if and only if two runs agree in every bit."""
+        import hashlib
+
+        digest = hashlib.sha256()
+        for array in (self.times, self.positions, self.orientations, self.velocities, self.angular_velocities):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        digest.update(np.ascontiguousarray(self.impacts).tobytes())
+        for track in self.nets:
+            digest.update(np.ascontiguousarray(track.vertices).tobytes())
+        return digest.hexdigest()
+
+    def export(
+        self, path: str | os.PathLike, *, start_frame: float = 0.0, tolerance: float | None = None, impact_keys: bool = False,
+        only_moved: bool = True, samples: int = 1, up_axis: str | None = None, unit: float = 1.0,
+    ) -> Path:  # fmt: skip
+        """Write the recording; the suffix says how.
+
+        .npz: arrays. .csv: a table, one row a frame and body. .html: a page that plays it. .glb, .gltf: animated nodes of glTF.
+        .usda, .usdc, .usd, .usdz: animated prims of USD (extra `usd`). A scene from a glTF or USD file is written as that file
+        with its nodes or prims animated, into its own kind of file; any other as a node or prim a body. See docs/gltf.md and
+        docs/usd.md.
+
+        Args:
+            path: where to.
+            start_frame: of animated files: number of the first frame, at the time start_frame / fps.
+            tolerance: of animated files, m: leave out keys that no point of a body misses by more; None: a key a frame.
+            impact_keys: of animated files: have keys at the impacts between frames of bodies that fly freely before and after.
+            only_moved: of animated files: bodies that do not move have no keys.
+            samples: of animated files: keys a frame, for motion blur; in between bodies turn evenly and fly on parabolas.
+            up_axis: of USD: "y" or "z"; None: that of the scene. (glTF is Y up.)
+            unit: of USD: metres in a unit of the file, 0.01 for centimetres. (glTF is in metres.)
+
+        Raises:
+            SceneError: for another suffix, an option that the format has not, or without a scene, which .npz and .csv do not need.
+
+        """
+        path = Path(path)
+        options = (start_frame, tolerance, impact_keys, only_moved, samples, up_axis, unit)
+        if path.suffix in ANIMATED_SUFFIXES:
+            self._need_scene("an animated file")
+            from rigidimpulse.io.motion import MotionOptions
+            from rigidimpulse.io.motion_file import write_motion
+
+            return write_motion(self, path, MotionOptions(*options))
+        if options != (0.0, None, False, True, 1, None, 1.0):
+            names = "start_frame, tolerance, impact_keys, only_moved, samples, up_axis or unit"
+            raise SceneError(f"{names} for {path.name!r}", f"give them for {', '.join(ANIMATED_SUFFIXES)} only")
+        if path.suffix == ".npz":
+            return write_renamed(path, self._write_npz)
+        if path.suffix == ".csv":
+            from rigidimpulse.io.table import write_csv
+
+            return write_renamed(path, lambda target: write_csv(self, target))
+        if path.suffix == ".html":
+            self._need_scene("an HTML page")
+            from rigidimpulse.view import write_html
+
+            return write_renamed(path, lambda target: write_html(self, target, title=path.stem))
+        raise SceneError(f"cannot export to {path.name!r}", f"use a name that ends in .npz, .csv, .html, {', '.join(ANIMATED_SUFFIXES)}")
+
+    def show(self) -> Any:
+        """Open the recording in the browser (meshcat); returns the viewer, which ends with the program.
+
+        Raises:
+            SceneError: without a scene.
+
+        """
+        self._need_scene("the viewer")
+        from rigidimpulse.view import show
+
+        return show(self)
+
+    def _need_scene(self, what: str) -> None:
+        if self.scene is None:
+            raise SceneError(f"{what} needs the shapes of the scene", "simulate the scene, then export or show that run")
+
+    def _write_npz(self, path: Path) -> None:
+        nets: dict[str, Any] = {}
+        for number, track in enumerate(self.nets):
+            nets.update(track.arrays(number))
+        np.savez_compressed(
+            path,
+            times=self.times,
+            names=np.array(self.names),
+            position=self.positions,
+            orientation=self.orientations,
+            velocity=self.velocities,
+            angular_velocity=self.angular_velocities,
+            center_of_mass=self.centers,
+            impacts=self.impacts,
+            contacts=self.contacts,
+            **nets,
+        )
+
+
+def load_recording(path: str | os.PathLike) -> Recording:
+    """Read a recording written as .npz, or the cache of a run (.h5, see `simulate`), which may still be written: its frames so far.
+
+    Raises:
+        SceneError: the file is missing or no recording.
+
+    """
+    if Path(path).suffix in (".h5", ".hdf5"):
+        from rigidimpulse.io.cache.load import load_cache
+
+        return load_cache(Path(path))
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return Recording(
+                times=data["times"],
+                names=[str(name) for name in data["names"]],
+                positions=data["position"],
+                orientations=data["orientation"],
+                velocities=data["velocity"],
+                angular_velocities=data["angular_velocity"],
+                centers=data["center_of_mass"],
+                impacts=data["impacts"],
+                contacts=data["contacts"],
+                nets=_nets_in(data),
+            )
+    except (OSError, KeyError, ValueError) as error:
+        raise SceneError(
+            f"{os.fspath(path)} is no recording: {error}", "give an .npz file written by Recording.export"
+        ) from None
+
+
+def _nets_in(data: Any) -> list[FlexibleTrack]:
+    """Flexible bodies in the arrays of a file."""
+    if "net0_name" not in data:
+        return []
+    from rigidimpulse.dynamics.soft_body.track import tracks_in
+
+    return tracks_in(data)

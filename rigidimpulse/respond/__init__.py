@@ -1,1 +1,0 @@
-"""Stage respond: what an impact does to velocities."""

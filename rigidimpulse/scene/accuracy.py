@@ -1,0 +1,82 @@
+"""Accuracy: one named strategy for each slot, and the presets, which are nothing but named values.
+
+Slots
+    impact_time     how the first contact in an interval is found (stage sweep)
+    response        how impulses are computed (stage respond); "penalty": none are, springs push bodies apart that are inside each other,
+                    with penalty_stiffness [N/m] and penalty_damping [N s/m] at every point that is inside; None: from weights, speeds
+                    and restitutions, see docs/penalty.md
+    restitution     law that ends an impact: "newton" (speeds), "poisson" (impulses), "energetic" (works; Stronge), or "auto":
+                    energetic where a contact has friction, Newton's where it has none. They differ only with friction, and
+                    there where the contact couples normal and tangential motion (see dynamics/impact/restitution.py)
+    integrator      how bodies move between impacts (stage integrate): "exact" (forces that vary: steps of order 4, as long as their error
+                    allows), or in steps of one length, where forces vary and nothing collides by impulses: "runge_kutta" (of order 4),
+                    "semi_implicit" (Euler's, of order 1)
+    contact_solver  how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for heaps of many bodies: see
+                    docs/heaps.md), "qp" (the exact laws by a convex solver library: a reference), or "auto": per island of bodies
+                    that may touch in a step, newton unless it is a large heap
+    heap_motion     how far touching bodies of a heap may come past each other until their contacts are looked for anew, as a fraction of
+                    the distance from the centre of mass to the nearest face
+    step            s; contact forces are constant over it, impacts are found inside it at any time
+    tolerance       gap error at an impact, as a fraction of the size of the smaller body
+    iterations      limit of gap queries for one pair and one interval
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from rigidimpulse.core.errors import SceneError
+
+
+class Accuracy(BaseModel):
+    """Settings of a run; see the module's head for the slots.
+
+    Example:
+        >>> Accuracy(impact_time="conservative", step=1 / 120).response
+        'sequential'
+
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    impact_time: Literal["bisection", "conservative", "linear", "after"] = "bisection"
+    response: Literal["sequential", "simultaneous", "kinematic", "penalty"] = "sequential"
+    restitution: Literal["auto", "newton", "poisson", "energetic"] = "auto"
+    penalty_stiffness: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
+    penalty_damping: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
+    integrator: Literal["exact", "semi_implicit", "runge_kutta"] = "exact"
+    contact_solver: Literal["auto", "newton", "substepped", "qp"] = "auto"
+    heap_motion: float = Field(default=0.1, gt=0.0, le=1.0, allow_inf_nan=False)
+    step: float = Field(default=1.0 / 60.0, gt=0.0, allow_inf_nan=False)
+    tolerance: float = Field(default=1e-13, gt=0.0, le=1e-2, allow_inf_nan=False)
+    iterations: int = Field(default=10_000, ge=1)
+
+    def __init__(self, **settings: object) -> None:
+        try:
+            super().__init__(**settings)
+        except ValidationError as error:
+            lines = [f"accuracy: {'.'.join(map(str, e['loc']))} = {e['input']!r}: {e['msg']}" for e in error.errors()]
+            raise SceneError("\n".join(lines)) from None
+
+
+PRESETS = {
+    "preview": {"impact_time": "conservative", "tolerance": 1e-7, "step": 1.0 / 30.0, "heap_motion": 0.3},
+    "standard": {},
+    "exact": {"step": 1.0 / 240.0, "tolerance": 1e-15, "iterations": 100000},
+}
+
+
+def resolve_accuracy(accuracy: str | Accuracy) -> Accuracy:
+    """The settings behind a preset's name; settings pass through.
+
+    Raises:
+        SceneError: for an unknown name, listing the known ones.
+
+    """
+    if isinstance(accuracy, Accuracy):
+        return accuracy
+    if accuracy not in PRESETS:
+        raise SceneError(f"accuracy {accuracy!r} is not known; use {', '.join(map(repr, PRESETS))} or ri.Accuracy(...)")
+    return Accuracy(**PRESETS[accuracy])

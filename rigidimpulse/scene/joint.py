@@ -1,0 +1,315 @@
+"""Joints as people write them, and the table that the kernels read.
+
+Anchors and axes are given in world coordinates at the start. A joint's frame has its first axis along `axis`. What a
+joint does is a list of `Row`s: coordinates (see `joint_rows`) with a target, bounds, and a stiffness.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import KW_ONLY, dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.dynamics.constraints.joint import ABOUT, ACROSS, ALONG, DISTANCE, SWING, TWIST, Joints
+from rigidimpulse.engine.plan import Skip
+from rigidimpulse.scene.body import vector
+
+HARD = math.inf
+
+
+@dataclass(frozen=True)
+class Row:
+    """One coordinate of a joint: where it shall be, what it may exert (N or N m), hard or as a spring and damper."""
+
+    coordinate: int
+    target: float = 0.0
+    lower: float = -math.inf
+    upper: float = math.inf
+    stiffness: float = HARD
+    damping: float = 0.0
+    rate: float = 0.0
+    per_mass: bool = False
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A drive of a hinge or slider: a spring and damper with a moving aim, and a greatest force.
+
+    Torque or force = stiffness (target - x) + damping (velocity - x'), kept within +- max_force. It is implicit: any
+    stiffness and damping is stable at any step.
+
+    Attributes:
+        velocity: rad/s or m/s that the damping strives for.
+        target: rad or m that the stiffness strives for.
+        stiffness: N m/rad or N/m. damping: N m s/rad or N s/m.
+        max_force: N m or N.
+        mode: "force", or "acceleration": stiffness [1/s2] and damping [1/s] give the acceleration of x, whatever mass
+            and inertia the two bodies oppose to it through this joint.
+
+    """
+
+    velocity: float = 0.0
+    target: float = 0.0
+    _: KW_ONLY
+    stiffness: float = 0.0
+    damping: float = 0.0
+    max_force: float = math.inf
+    mode: str = "force"
+
+    def rows(self, coordinate: int) -> list[Row]:
+        """Return the row of the drive."""
+        if not (self.stiffness > 0.0 or self.damping > 0.0):
+            raise SceneError("the motor has neither stiffness nor damping", "give one of them, > 0", "motor")
+        if self.mode not in ("force", "acceleration"):
+            raise SceneError(f"mode is {self.mode!r}", "give 'force' or 'acceleration'", "motor")
+        bound, per_mass = abs(self.max_force), self.mode == "acceleration"
+        return [Row(coordinate, self.target, -bound, bound, self.stiffness, self.damping, self.velocity, per_mass)]
+
+
+def bounds(coordinate: int, lower: float | None, upper: float | None, stiffness: float = HARD, damping: float = 0.0) -> list[Row]:
+    """Rows that keep a coordinate between lower and upper, hard or with the stiffness and damping of a soft row.
+
+    Raises:
+        SceneError: lower is above upper, or one of them is no number.
+
+    """
+    for name, value in (("lower", lower), ("upper", upper)):
+        if value is not None and math.isnan(value):
+            raise SceneError(f"{name} = {value}", "give a number, or leave it out")
+    if lower is not None and upper is not None and lower > upper:
+        raise SceneError(f"lower = {lower} is above upper = {upper}", "exchange them")
+    rows = []
+    if lower is not None and lower > -math.inf:
+        rows.append(Row(coordinate, float(lower), 0.0, math.inf, stiffness, damping))
+    if upper is not None and upper < math.inf:
+        rows.append(Row(coordinate, float(upper), -math.inf, 0.0, stiffness, damping))
+    return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """Base of all joints: `a` and `b` are names of bodies, None is the world.
+
+    Attributes:
+        name: what `run.reaction` calls it; "joint0", "joint1", ... if not given.
+        lower, upper: bounds of the joint's free coordinate: rad for a hinge (turn of b against a about the axis, right
+            hand), m for a slider (way of b along the axis) and for a distance; upper alone for a ball joint (angle
+            between the two axes, rad).
+        stiffness, damping: make the joint soft: N/m and N s/m along, N m/rad and N m s/rad about its axes.
+        break_force: N, the joint is gone when its force exceeds it. release_time: s, when it lets go: of a stage, of a bomb.
+        collide: whether the two bodies touch each other.
+
+    """
+
+    a: str | None
+    b: str | None
+    _: KW_ONLY
+    name: str | None = None
+    lower: float | None = None
+    upper: float | None = None
+    stiffness: float | None = None
+    damping: float = 0.0
+    break_force: float = math.inf
+    release_time: float = math.inf
+    collide: bool = False
+    stage: ClassVar[str] = "constrain"
+
+    def bind(self, _world) -> Skip:
+        """Joints are rows of the stage constrain, not stages of their own."""
+        return Skip("a joint; see joint forces")
+
+    def points(self, _world) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Anchor on a, anchor on b and first axis, (3,) each, in the world at the start."""
+        raise NotImplementedError
+
+    def frames(self, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Axes of the joint's frame on a and on b (3, 3), in columns, in the world at the start."""
+        frame = _frame(axis)
+        return frame, frame
+
+    def rows(self, _distance: float) -> list[Row]:
+        """Rows of the joint, hard; `_distance` m is that of its anchors at the start."""
+        raise NotImplementedError
+
+    @property
+    def label(self) -> str:
+        """What errors call it."""
+        return f"{type(self).__name__} {self.name!r}" if self.name else f"{type(self).__name__}({self.a!r}, {self.b!r})"
+
+
+@dataclass(frozen=True, eq=False)
+class _AnchoredJoint(Joint):
+    """A joint with one point and one axis."""
+
+    anchor: ArrayLike
+    axis: ArrayLike
+
+    def points(self, _world):
+        """See `Joint`."""
+        anchor = vector(self.anchor, "anchor", "m")
+        return anchor, anchor, vector(self.axis, "axis", "")
+
+
+@dataclass(frozen=True, eq=False)
+class BallJoint(_AnchoredJoint):
+    """Two bodies share the point `anchor`; `upper` bounds the angle between the axes (at the start both `axis`)."""
+
+    axis: ArrayLike = (0.0, 0.0, 1.0)
+
+    def rows(self, _distance: float) -> list[Row]:
+        """See `Joint`."""
+        if self.lower is not None:
+            raise SceneError(f"lower = {self.lower}", "a ball joint has only an upper bound")
+        return [Row(ALONG), Row(ALONG + 1), Row(ALONG + 2), *bounds(SWING, self.lower, self.upper)]
+
+
+def across(axis: int) -> list[int]:
+    """Coordinates whose rows leave free the turn about one axis only."""
+    return [ACROSS + 3 * axis + (axis + 1) % 3, ACROSS + 3 * axis + (axis + 2) % 3]
+
+
+@dataclass(frozen=True, eq=False)
+class HingeJoint(_AnchoredJoint):
+    """The bodies turn against each other about `axis` through `anchor`."""
+
+    motor: Motor | None = None
+
+    def rows(self, _distance: float) -> list[Row]:
+        """See `Joint`."""
+        held = [Row(ALONG), Row(ALONG + 1), Row(ALONG + 2), *(Row(code) for code in across(0))]
+        return held + bounds(TWIST, self.lower, self.upper) + (self.motor.rows(TWIST) if self.motor else [])
+
+
+@dataclass(frozen=True, eq=False)
+class SliderJoint(_AnchoredJoint):
+    """The bodies shift against each other along `axis`; they do not turn."""
+
+    motor: Motor | None = None
+
+    def rows(self, _distance: float) -> list[Row]:
+        """See `Joint`."""
+        held = [Row(ALONG + 1), Row(ALONG + 2), Row(ABOUT), Row(ABOUT + 1), Row(ABOUT + 2)]
+        return held + bounds(ALONG, self.lower, self.upper) + (self.motor.rows(ALONG) if self.motor else [])
+
+
+@dataclass(frozen=True, eq=False)
+class FixedJoint(Joint):
+    """The bodies keep the pose they have to each other at the start."""
+
+    anchor: ArrayLike | None = None
+
+    def points(self, world):
+        """See `Joint`."""
+        if self.anchor is not None:
+            anchor = vector(self.anchor, "anchor", "m")
+        else:
+            anchor = world.position[world.names.index(self.b if self.b is not None else self.a)]
+        return anchor, anchor, np.array([0.0, 0.0, 1.0])
+
+    def rows(self, _distance: float) -> list[Row]:
+        """See `Joint`."""
+        return [Row(code + k) for code in (ALONG, ABOUT) for k in range(3)]
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceJoint(Joint):
+    """Two points keep their distance `length` (that at the start by default); with bounds it is a rope or a strut."""
+
+    anchor_a: ArrayLike
+    anchor_b: ArrayLike
+    length: float | None = None
+
+    def points(self, _world):
+        """See `Joint`."""
+        return vector(self.anchor_a, "anchor_a", "m"), vector(self.anchor_b, "anchor_b", "m"), np.array([0.0, 0.0, 1.0])
+
+    def rows(self, distance: float) -> list[Row]:
+        """See `Joint`."""
+        limits = bounds(DISTANCE, self.lower, self.upper)
+        length = distance if self.length is None else float(self.length)
+        if not (math.isfinite(length) and length > 0.0):
+            raise SceneError(f"length is {length} m", "give a length > 0, or two different anchors")
+        return limits if limits and self.length is None else [Row(DISTANCE, length), *limits]
+
+
+def _frame(axis: np.ndarray) -> np.ndarray:
+    """Right-handed axes (3, 3) in columns, the first one along `axis`."""
+    size = float(np.linalg.norm(axis))
+    if size == 0.0:
+        raise SceneError("the axis is (0, 0, 0)", "give a direction")
+    first = axis / size
+    second = np.cross(first, np.eye(3)[int(np.argmin(np.abs(first)))])
+    second /= np.linalg.norm(second)
+    return np.column_stack([first, second, np.cross(first, second)])
+
+
+def _soften(joint: Joint, rows: list[Row]) -> list[Row]:
+    """The rows with the joint's stiffness and damping; drives keep their own."""
+    if joint.stiffness is None:
+        if joint.damping != 0.0:
+            raise SceneError(f"damping = {joint.damping} without stiffness", "give a stiffness too")
+        return rows
+    stiffness = float(joint.stiffness)
+    if not (math.isfinite(stiffness) and stiffness >= 0.0 and math.isfinite(joint.damping) and joint.damping >= 0.0):
+        raise SceneError(f"stiffness {joint.stiffness}, damping {joint.damping}", "give finite values >= 0")
+    return [replace(r, stiffness=stiffness, damping=float(joint.damping)) if r.stiffness == HARD else r for r in rows]
+
+
+def compile_joints(joints: list[Joint], world) -> Joints:
+    """The table of joints of a world whose bodies are compiled.
+
+    Raises:
+        SceneError: unknown bodies, bad values; names the joint.
+
+    """
+    columns: dict[str, list] = {field: [] for field in Joints._fields}
+    columns["first"].append(0)
+    for joint in joints:
+        sides = [_side(joint, world, name) for name in (joint.a, joint.b)]
+        if sides[0][0] == sides[1][0]:
+            raise SceneError(f"it joins {joint.a!r} to itself", "name two different bodies", joint.label)
+        if not joint.break_force > 0.0:
+            raise SceneError(f"break_force = {joint.break_force}", "give a force in N, > 0, or leave it out", joint.label)
+        if not joint.release_time >= 0.0:
+            raise SceneError(f"release_time = {joint.release_time}", "give a time in s, >= 0, or leave it out", joint.label)
+        if joint.name is not None and sum(other.name == joint.name for other in joints) > 1:
+            raise SceneError(f"another joint has the name {joint.name!r}, too", "give each joint a name of its own", joint.label)
+        motor = getattr(joint, "motor", None)
+        if not isinstance(motor, Motor | None):
+            raise SceneError(f"motor = {motor!r}", "give ri.Motor(velocity=..., damping=...) or another Motor", joint.label)
+        if not any(i >= 0 and world.dynamic[i] for i, _, _ in sides):
+            raise SceneError("neither body is dynamic", "join at least one that moves", joint.label)
+        try:
+            anchor_a, anchor_b, axis = joint.points(world)
+            frames = joint.frames(axis)
+            rows = _soften(joint, joint.rows(float(np.linalg.norm(anchor_b - anchor_a))))
+        except SceneError as error:
+            raise error.within(joint.label) from None
+        ends = zip("ab", (anchor_a, anchor_b), frames, sides, strict=True)
+        for side, anchor, frame, (i, turn, origin) in ends:
+            columns[f"body_{side}"].append(i)
+            columns[f"anchor_{side}"].append(turn.T @ (anchor - origin))
+            columns[f"frame_{side}"].append(turn.T @ frame)
+        for row in rows:
+            for field in ("coordinate", "target", "lower", "upper", "stiffness", "damping", "rate", "per_mass"):
+                columns[field].append(getattr(row, field))
+        columns["first"].append(columns["first"][-1] + len(rows))
+    integers = ("body_a", "body_b", "first", "coordinate")
+    types = dict.fromkeys(integers, np.int64) | {"per_mass": np.bool_}
+    arrays = (np.array(columns[f], types.get(f, float)) for f in Joints._fields)
+    return Joints(*(np.ascontiguousarray(array) for array in arrays))
+
+
+def _side(joint: Joint, world, name: str | None) -> tuple[int, np.ndarray, np.ndarray]:
+    """Index, rotation (3, 3) and position (3,) of one side's principal frame at the start."""
+    if name is None:
+        return -1, np.eye(3), np.zeros(3)
+    if name not in world.names:
+        raise unknown_name("body", name, world.names, joint.label)
+    i = world.names.index(name)
+    return i, to_matrix(world.orientation[i]), world.position[i]

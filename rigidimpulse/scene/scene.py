@@ -1,0 +1,128 @@
+"""Scenes: gravity, bodies and effects, as people write them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike
+
+from rigidimpulse.core.conventions import STANDARD_GRAVITY
+from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.scene.body import Body, vector
+from rigidimpulse.scene.mass import masses_of
+
+if TYPE_CHECKING:
+    from rigidimpulse.scene.origin import FileOrigin
+
+
+class Scene:
+    """Bodies and what acts on them. Plain data: nothing is computed before it is simulated.
+
+    Attributes:
+        gravity: (3,) m/s^2, world frame.
+        origin: what is kept of the file that the scene was read from; None for one that was not.
+
+    """
+
+    def __init__(self, gravity: ArrayLike = STANDARD_GRAVITY, bodies: Iterable[Body] = ()) -> None:
+        """Make a scene with a uniform gravity, and add the given bodies.
+
+        Raises:
+            SceneError: two bodies have the same name.
+
+        """
+        self.gravity = gravity
+        self._bodies: dict[str, Body] = {}
+        self._effects: list[Any] = []
+        self.origin: FileOrigin | None = None
+        for body in bodies:
+            self.add(body)
+
+    def add(self, thing: Any) -> Any:
+        """Add a body, or an effect (anything with a `stage` and a `bind` method: forces, joints), and return it.
+
+        Raises:
+            SceneError: the name is taken, or it is neither.
+
+        """
+        if isinstance(thing, Body):
+            if not isinstance(thing.name, str) or not thing.name:
+                raise SceneError(f"a body's name is {thing.name!r}", "give a text that is not empty")
+            if thing.name in self._bodies:
+                raise SceneError("the scene has a body of this name already", "give it another", f"body {thing.name!r}")
+            self._bodies[thing.name] = thing
+        elif not isinstance(thing, type) and hasattr(thing, "stage") and callable(getattr(thing, "bind", None)):
+            self._effects.append(thing)
+        else:
+            what = f"the class {thing.__name__}" if isinstance(thing, type) else f"a {type(thing).__name__}"
+            raise SceneError(f"{what} cannot be added to a scene", "add a Body, a force or a joint")
+        return thing
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The bodies, in the order they were added."""
+        return tuple(self._bodies.values())
+
+    @property
+    def effects(self) -> tuple[Any, ...]:
+        """The effects, in the order they were added."""
+        return tuple(self._effects)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the bodies, in the order they were added."""
+        return tuple(self._bodies)
+
+    @property
+    def report(self) -> tuple[str, ...]:
+        """What of the file that the scene was read from is not in it, or not as it is written there; a line each."""
+        return () if self.origin is None else self.origin.report
+
+    def export(self, path: str | os.PathLike[str]) -> Path:
+        """Write the scene as a .glb or .gltf file with physics (KHR_physics_rigid_bodies), which `load_scene` reads.
+
+        What the format cannot say (most forces, flexible bodies, rolling friction) is left out: each thing is logged as a
+        warning and listed in the file.
+
+        Returns:
+            The path.
+
+        Raises:
+            SceneError: for another suffix, or a scene that is not valid.
+
+        """
+        from rigidimpulse.io.scene_file import write_scene
+
+        return write_scene(self, Path(path))
+
+    def __getitem__(self, name: str) -> Body:
+        """Return the body of a name; a `SceneError` lists the names there are."""
+        if name not in self._bodies:
+            raise unknown_name("body", name, self._bodies)
+        return self._bodies[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Whether a body has this name."""
+        return name in self._bodies
+
+    def __repr__(self) -> str:
+        """Return the numbers of bodies and effects."""
+        return f"Scene({len(self._bodies)} bodies, {len(self._effects)} effects)"
+
+
+def validate(scene: Scene) -> None:
+    """Check everything that can be known about a scene before it is compiled.
+
+    Raises:
+        SceneError: it names the body, the value and the remedy.
+
+    """
+    vector(scene.gravity, "gravity", "m/s^2")
+    if not scene.bodies:
+        raise SceneError("the scene has no bodies", "add one: scene.add(Body('ball', Shape.sphere(0.5)))")
+    for body in scene.bodies:
+        body.check()
+    masses_of(scene.bodies)

@@ -1,0 +1,263 @@
+"""Accuracy by wish: the scene is measured on a ladder of settings, coarse ones first, and the cheapest that will do is taken.
+
+Let u_k be the run on rung k (`settings.rung`) and d_k the largest distance between u_k and u_(k+1). For an error c h^p with p >= 1,
+halving the step leaves at most half of it, so e_k <= 2 d_k. That is for errors that have begun to shrink as they should; so
+
+    e_k  ~  SAFETY max(d_k, d_(k-1) / 8) + r_k + floor
+
+where r_k is how far u_k moves when it is started off by rounding (`reference.perturbed`) and its impact times may be off by LOOSER times
+their tolerance, and d_(k-1) / 8 guards against a d_k that is
+small by chance. The floor is what all rungs have in common: the rounding of the places themselves, and, where contacts last, the gap at
+which they are held (`conventions.TOLERANCES.contact_gap` of a body's size; in heaps the skin, relative to half a size).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.engine.simulate import simulate
+from rigidimpulse.model.world import World, compile_scene
+from rigidimpulse.recording.events import Event
+from rigidimpulse.recording.recording import Recording, Status
+from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.studies.deviation import deviation
+from rigidimpulse.studies.reference import perturbed
+from rigidimpulse.studies.settings import Setting, rung
+
+SAFETY = 3.0
+LAST_RUNG = 7
+"""A step of 1/3840 s."""
+LOOSER = 4.0
+FLOOR = 8.0 * float(np.finfo(float).eps)
+"""Of the largest coordinate, and of the largest angle turned."""
+
+
+@dataclass(frozen=True)
+class Within:
+    """A wish: errors within bounds.
+
+    Attributes:
+        position: m, of any dynamic body's origin. angle: rad, of its orientation. At least one is given.
+        until: s, how long the bounds are to hold; all of the run if None.
+
+    """
+
+    position: float | None = None
+    angle: float | None = None
+    until: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if self.position is None and self.angle is None:
+            raise SceneError("Within() wishes for nothing", "give position=... in m, or angle=... in rad")
+        for name, unit in (("position", "m"), ("angle", "rad"), ("until", "s")):
+            _check_positive(f"Within({name}=...)", getattr(self, name), unit)
+
+
+@dataclass(frozen=True)
+class InTime:
+    """A wish: as accurate as the time allows.
+
+    Attributes:
+        per_frame: s that a frame may take to compute, on this machine and under its load now, in the mean over the run.
+
+    """
+
+    per_frame: float
+
+    def __post_init__(self) -> None:
+        """Check the number."""
+        _check_positive("InTime(per_frame=...)", self.per_frame, "s")
+
+
+Wish = Within | InTime
+
+
+class Estimate(NamedTuple):
+    """Estimated largest errors of a run, m and rad."""
+
+    position: float
+    angle: float
+
+    def within(self, wish: Within) -> bool:
+        """Whether a wish is met."""
+        return (wish.position is None or self.position <= wish.position) and (wish.angle is None or self.angle <= wish.angle)
+
+
+UNKNOWN = Estimate(math.nan, math.nan)
+
+
+class Try(NamedTuple):
+    """One run that was made to choose: its setting, s it took, and what its error is about (NaN where it was not estimated)."""
+
+    setting: Setting
+    seconds: float
+    error: Estimate
+
+
+@dataclass(frozen=True)
+class Choice:
+    """How a setting was chosen.
+
+    Attributes:
+        wish: what was asked for. accuracy: what was chosen. met: whether the wish is met.
+        error: estimated largest errors until `until` [s]. how: how they were estimated.
+        tries: all runs that were made, coarse ones first.
+
+    """
+
+    wish: Wish
+    accuracy: Accuracy
+    met: bool
+    error: Estimate
+    until: float
+    how: str
+    tries: tuple[Try, ...]
+
+    @property
+    def message(self) -> str:
+        """One line for people."""
+        chosen = f"chose step {self.accuracy.step:.4g} s, tolerance {self.accuracy.tolerance:.0e}, of {len(self.tries)} measured settings"
+        error = f"estimated error until {self.until:.4g} s: {self.error.position:.1e} m, {self.error.angle:.1e} rad ({self.how})"
+        return f"{chosen}; {error}"
+
+
+def _check_positive(what: str, value: object, unit: str) -> None:
+    if value is not None and not (isinstance(value, int | float) and math.isfinite(value) and value > 0.0):
+        raise SceneError(f"{what}: {value!r}", f"give a positive finite number, {unit}")
+
+
+def simulate_as_wished(
+    scene: Scene, duration: float, fps: float, wish: object, effects: Mapping[str, bool] | None, progress: Callable[[float], None] | None
+) -> Recording:
+    """Choose a setting and return its run; see `simulate`.
+
+    Raises:
+        SceneError: as `simulate`; or the accuracy is neither a name, an Accuracy nor a wish.
+
+    """
+    if not isinstance(wish, Within | InTime):
+        raise SceneError(f"accuracy {wish!r}", "give 'preview', 'standard', 'exact', an Accuracy, Within(...) or InTime(...)")
+
+    def run(setting: Setting, end: float, given: Scene = scene) -> Recording:
+        return simulate(given, end, fps, accuracy=setting.accuracy, effects=effects, progress=progress)
+
+    chosen, choice = _within(run, scene, duration, wish) if isinstance(wish, Within) else _in_time(run, scene, duration, wish)
+    events = chosen.status.events
+    if not choice.met:
+        names = tuple(body.name for body in scene.bodies if body.motion == "dynamic")
+        events = (*events, Event(choice.until, "accuracy not reached", names, f"{_complaint(wish)}: {choice.message}"))
+    status = Status.of(events)
+    return replace(chosen, status=replace(status, message=f"{status.message}\n{choice.message}"), choice=choice)
+
+
+def _complaint(wish: Wish) -> str:
+    if isinstance(wish, InTime):
+        return f"no setting computes a frame in {wish.per_frame:g} s; wish for more time, or for fewer bodies"
+    return "no setting is as accurate as wished for so long; wish for less, or until an earlier time (chaos has no remedy: see run.horizon)"
+
+
+def _within(run: Callable[..., Recording], scene: Scene, duration: float, wish: Within) -> tuple[Recording, Choice]:
+    """The cheapest rung whose estimated error is within the wish, and its run."""
+    until = duration if wish.until is None else min(wish.until, duration)
+    settings = [rung(0)]
+    runs, steps, errors = [run(settings[0], until)], [], []
+
+    def drift(level: int) -> np.ndarray:
+        """What rounding and tolerance do to a rung; asked only of one that might do."""
+        return _apart(runs[level], run(_looser(settings[level]), until, perturbed(scene)))
+
+    for level in range(1, LAST_RUNG + 1):
+        settings.append(rung(level))
+        runs.append(run(settings[-1], until))
+        steps.append(_apart(runs[-2], runs[-1]))
+        errors.append(_estimate(steps, np.zeros(2), runs[-2]))
+        if not Estimate(*_floor(runs[-2]).tolist()).within(wish):
+            break  # finer steps would not help
+        if errors[-1].within(wish):
+            errors[-1] = _estimate(steps, drifted := drift(level - 1), runs[-2])
+            if errors[-1].within(wish) or drifted.max() >= steps[-1].max():
+                break  # it will do, or it is about as good as rounding lets it be
+    best = len(errors) - 1
+    if not errors[best].within(wish):
+        best = int(np.argmin([error.position for error in errors]))
+        errors[best] = _estimate(steps[: best + 1], drift(best), runs[best])
+    tries = [Try(setting, _seconds(made), error) for setting, made, error in zip(settings, runs, [*errors, UNKNOWN], strict=True)]
+    how = "from a run with half the step, and one started off by rounding"
+    choice = Choice(wish, settings[best].accuracy, errors[best].within(wish), errors[best], until, how, tuple(tries))
+    return (runs[best] if until == duration else run(settings[best], duration)), choice
+
+
+def _in_time(run: Callable[..., Recording], scene: Scene, duration: float, wish: InTime) -> tuple[Recording, Choice]:
+    """The finest rung whose frames take no longer than wished, and its run."""
+    settings, runs, steps = [], [], []
+    for level in range(LAST_RUNG + 1):
+        settings.append(rung(level))
+        runs.append(run(settings[-1], duration))
+        if level:
+            steps.append(_apart(runs[-2], runs[-1]))
+        if _seconds(runs[-1]) > wish.per_frame * len(runs[-1].times):
+            break
+    fast = [k for k, made in enumerate(runs) if _seconds(made) <= wish.per_frame * len(made.times)]
+    best = fast[-1] if fast else 0
+    drift = _apart(runs[best], run(_looser(settings[best]), duration, perturbed(scene)))
+    # The finest that was run has nothing finer to compare with: what the one before is off by bounds its error.
+    error = _estimate(steps[: best + 1], drift, runs[best]) if steps else UNKNOWN
+    tries = tuple(Try(setting, _seconds(made), UNKNOWN) for setting, made in zip(settings, runs, strict=True))
+    how = f"from a run with {'half' if best < len(steps) else 'twice'} the step, and one started off by rounding"
+    return runs[best], Choice(wish, settings[best].accuracy, bool(fast), error, duration, how, tries)
+
+
+def _looser(setting: Setting) -> Setting:
+    """The setting with a larger tolerance of impact times."""
+    return setting._replace(accuracy=setting.accuracy.model_copy(update={"tolerance": LOOSER * setting.accuracy.tolerance}))
+
+
+def _seconds(run: Recording) -> float:
+    """Time that a run took but for loading kernels, s."""
+    assert run.profile is not None
+    return run.profile.seconds - run.profile.preparing
+
+
+def _apart(a: Recording, b: Recording) -> np.ndarray:
+    """Largest distance [m] and angle [rad] between two runs, (2,)."""
+    apart = deviation(a, b)
+    return np.array([apart.distance.max(initial=0.0), apart.angle.max(initial=0.0)])
+
+
+def _floor(run: Recording) -> np.ndarray:
+    """What runs on all rungs have in common: rounding, and what lasting contacts leave between bodies; m and rad, (2,)."""
+    assert run.scene is not None and run.ledger is not None
+    world = compile_scene(run.scene)
+    spin = float(np.linalg.norm(run.angular_velocities, axis=2).max(initial=0.0))
+    rounding = FLOOR * np.array([np.abs(run.positions).max(initial=0.0), 1.0 + spin * run.times[-1]])
+    touching = [group for group in _groups(run, world) if len(group) > 0]
+    share = 0.5 * TOLERANCES.skin if "heap" in run.ledger.dissipated else 2.0 * TOLERANCES.contact_gap
+    return rounding + share * np.array([max((world.size[group].sum() for group in touching), default=0.0), float(bool(touching))])
+
+
+def _groups(run: Recording, world: World) -> list[np.ndarray]:
+    """Indices of the dynamic bodies of each group that lasting contacts joined at some time; gaps add up in it."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    a, b, n = run.contacts["body_a"], run.contacts["body_b"], world.num_bodies
+    touched = np.isin(np.arange(n), np.concatenate([a, b])) & world.dynamic
+    inner = world.dynamic[a] & world.dynamic[b]
+    links = coo_matrix((np.ones(int(inner.sum())), (a[inner], b[inner])), (n, n))
+    count, label = connected_components(links, directed=False)
+    return [np.flatnonzero((label == k) & touched) for k in range(count)]
+
+
+def _estimate(steps: list[np.ndarray], drift: np.ndarray, run: Recording) -> Estimate:
+    """The estimate for a run whose distance to the next finer one is the last of `steps`."""
+    step = np.maximum(steps[-1], steps[-2] / 8.0) if len(steps) > 1 else steps[-1]
+    return Estimate(*(SAFETY * step + drift + _floor(run)).tolist())
