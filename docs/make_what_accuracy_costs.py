@@ -69,12 +69,12 @@ ADVICE = """## What to choose
 ## A heap
 
 A thousand boxes fall into a pit ([heaps](heaps.md)). There is no reference for where they land; what shows is how deep they are inside each
-other on the way. The knobs are `heap_motion`, how far bodies move past each other until contacts are looked for anew, and `step`. Made by
-`python tests/bench/heap_costs.py`, on one core; boxes of 0.5 m.
+other on the way. The knobs are `substep_motion`, how far bodies move until contacts are looked for again, and `step`. Made by
+`python tests/bench/substepped_costs.py`, on one core; boxes of 0.5 m.
 
 ![heap](heap_costs.png)
 
-Every setting of other engines has one here that is both faster and less deep: at 12 mm `step=1/30, heap_motion=1` takes 0.7 of the
+Every setting of other engines has one here that is both faster and less deep: at 12 mm `step=1/30, substep_motion=1` takes 0.7 of the
 time that Rapier takes at 127 mm, a quarter of a box, with its usual steps of 1/60 s. With steps of 1/240 s PhysX is 9 mm deep and Rapier
 26, in 3.8 and 1.5 times the time of the default here, at 2.9 mm. (The deepest pair of ten frames of any of five falls, of which three stay
 apart with the default; times are the median of the five. One fall of an engine.)

@@ -51,7 +51,7 @@ def assert_energy_never_grows(run: Recording, tolerance: float = PULLED) -> None
     total = ledger.total
     rise = total - np.minimum.accumulate(total)
     moved = float(ledger.kinetic.max() + np.ptp(ledger.potential))
-    allowed = max(tolerance, ROUNDING) * moved + _lifts(run)
+    allowed = max(tolerance, ROUNDING) * moved + _rises(run)
     if rise.max() > allowed:
         at = run.times[int(np.argmax(rise))]
         share = rise.max() / moved if moved > 0.0 else np.inf
@@ -59,7 +59,7 @@ def assert_energy_never_grows(run: Recording, tolerance: float = PULLED) -> None
         raise AssertionError(f"{grown}, {share:.2g} of what moves; allowed {allowed:.2g} J")
 
 
-def _lifts(run: Recording) -> float:
+def _rises(run: Recording) -> float:
     """Work against gravity of lifting every dynamic body by its held gap and those of all below it, J."""
     if run.scene is None:
         return 0.0
@@ -67,7 +67,7 @@ def _lifts(run: Recording) -> float:
 
     world = compile_scene(run.scene)
     weight = np.where(world.dynamic, world.mass, 0.0) * np.linalg.norm(world.steady_acceleration, axis=1)
-    gaps = TOLERANCES.contact_gap * float(world.size[world.dynamic].sum())
+    gaps = TOLERANCES.contact_margin * float(world.size[world.dynamic].sum())
     return 2.0 * gaps * float(weight.sum())
 
 

@@ -68,7 +68,9 @@ EFFECTS = {
         "ground", 'scene.add(ri.Body("c", ri.Shape.sphere(0.1), position=(2, 0, 0.2), material=ri.Material(rolling_friction=0.01)))',
         ["dynamics.constraints.rolling_friction"],
     ),
-    "heaps": ("ground", "settings = {'accuracy': ri.Accuracy(contact_solver='substepped')}", ["dynamics.solvers.tgs_soft.solver"]),
+    "sub-stepped islands": (
+        "ground", "settings = {'accuracy': ri.Accuracy(contact_solver='substepped')}", ["dynamics.solvers.tgs_soft.solver"]
+    ),
     "contact forces": (
         "balls", 'scene.gravity = (0, 0, -1)\nscene.add(ri.Body("floor", ri.Shape.half_space(offset=-0.1), motion="static"))',
         ["dynamics.solvers.newton"],
@@ -83,7 +85,7 @@ EFFECTS = {
     "gyroscopic term": ("balls", 'scene.add(ri.Body("d", ri.Shape.box((1, 2, 3)), position=(9, 9, 9)))', []),
 }
 """Name in the plan: the plain scene, what calls for the effect, modules of the package whose kernels are the effect's."""
-KERNELS = {"springs", "joints", "rolling friction", "heaps", "contact forces", "contact detection", "event kernel"}
+KERNELS = {"springs", "joints", "rolling friction", "sub-stepped islands", "contact forces", "contact detection", "event kernel"}
 """Effects with kernels of their own."""
 ASKED_FOR = ("rigidimpulse.dynamics.forces.", "rigidimpulse.dynamics.soft_body", "rigidimpulse.io", "rigidimpulse.engine.triggers")
 """Modules that are imported where a scene asks for them only, but for those of forces that do not vary."""

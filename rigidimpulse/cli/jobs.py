@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rigidimpulse.recording.recording import Recording
     from rigidimpulse.scene.accuracy import Accuracy
     from rigidimpulse.scene.scene import Scene
-    from rigidimpulse.studies.accuracy_targets import Wish
+    from rigidimpulse.studies.accuracy_targets import AccuracyTarget
     from rigidimpulse.studies.compare import Comparison
 
 SCENE_SUFFIXES = (*ANIMATED_SUFFIXES, ".urdf", ".xml", ".mjcf")
@@ -39,7 +39,7 @@ class Job(NamedTuple):
     make: Callable[..., Scene]
     duration: float
     fps: float
-    accuracy: str | Accuracy | Wish
+    accuracy: str | Accuracy | AccuracyTarget
     entry: GalleryScene | None
 
 

@@ -42,7 +42,7 @@ def splits_first(low_a, high_a, low_b, high_b):
 
 
 @inner
-def gather_leaf_pairs(node_min, node_max, node_child, R, t, core, pairs, depth):
+def gather_leaf_pairs(node_min, node_max, node_child, R, t, skeleton, pairs, depth):
     """Walk on from the stack in rows [0, depth) of `pairs`, for boxes within the distance `core`.
 
     Returns (depth, end): what is left of the stack, and the pairs of leaves in rows [STACK_ROWS, end).
@@ -54,7 +54,7 @@ def gather_leaf_pairs(node_min, node_max, node_child, R, t, core, pairs, depth):
         b = pairs[depth, 1]
         low_a, high_a = row(node_min, a), row(node_max, a)
         low_b, high_b = row(node_min, b), row(node_max, b)
-        if box_distance_squared(low_a, high_a, low_b, high_b, R, t, core * core) > core * core:
+        if box_distance_squared(low_a, high_a, low_b, high_b, R, t, skeleton * skeleton) > skeleton * skeleton:
             continue
         child_a = node_child[a]
         child_b = node_child[b]

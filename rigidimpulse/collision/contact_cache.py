@@ -25,7 +25,7 @@ from rigidimpulse.collision.manifold.polyhedra import ALIKE, POINTS, Scratch, al
 from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.quaternion import product
 
-BOXES, WALL, GENERAL, HULLS = 0, 1, 2, 3
+BOXES, PLANE, GENERAL, HULLS = 0, 1, 2, 3
 """Kinds of pairs: two boxes, a half space and a convex polyhedron, all others, two convex polyhedra."""
 MOST_HULL_CORNERS = 256
 """Corners of a polyhedron that are all asked for the farthest one."""
@@ -39,7 +39,7 @@ BLOCK = 64
 """Pairs that are dealt out together."""
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """What a share of the pairs is looked at in."""
 
     real: np.ndarray  # (POINTS + 1, 10) the contacts of a pair
@@ -55,10 +55,10 @@ class Room(NamedTuple):
     origin: np.ndarray  # (3,) zeros
 
 
-def make_room() -> Room:
+def make_workspace() -> Workspace:
     """Room for one share."""
     number = POINTS + 1
-    return Room(
+    return Workspace(
         np.empty((number, 10)), np.empty((number, 3), np.int64), np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64),
         make_scratch.py_func(), make_simplex.py_func(), make_polytope.py_func(), *np.empty((2, 3, 3)), *np.zeros((2, 3)),
     )  # fmt: skip
@@ -75,20 +75,20 @@ def classify(pairs, bodies, shapes):
         pairs.carrier[p] = bodies.reach[a] <= bodies.reach[b]
         pairs.round[p] = (bodies.reach[a] if pairs.carrier[p] else bodies.reach[b]) == 0.0
         solid_s, solid_t = shapes.face_first[s] < shapes.face_first[s + 1], shapes.face_first[t] < shapes.face_first[t + 1]
-        wall_s, wall_t = _is_wall(shapes.wall, s), _is_wall(shapes.wall, t)
+        half_space_s, half_space_t = _is_half_space(shapes.half_space, s), _is_half_space(shapes.half_space, t)
         pairs.kind[p] = GENERAL
         if shapes.half[s, 0] > 0.0 and shapes.half[t, 0] > 0.0:
             pairs.kind[p] = BOXES
-        elif (solid_s and wall_t) or (wall_s and solid_t):
-            pairs.kind[p] = WALL
+        elif (solid_s and half_space_t) or (half_space_s and solid_t):
+            pairs.kind[p] = PLANE
         elif solid_s and solid_t and max(_corners(shapes, s), _corners(shapes, t)) <= MOST_HULL_CORNERS:
             pairs.kind[p] = HULLS
 
 
 @inlined
-def _is_wall(wall, s):
+def _is_half_space(half_space, s):
     """Whether shape s is a half space."""
-    return wall[s, 0] != 0.0 or wall[s, 1] != 0.0 or wall[s, 2] != 0.0
+    return half_space[s, 0] != 0.0 or half_space[s, 1] != 0.0 or half_space[s, 2] != 0.0
 
 
 @inlined
@@ -194,13 +194,13 @@ def review(bodies, pairs, share, shares, ahead, same, kept, places, margins):
 @inlined
 def _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, ids):
     """Contacts of a half space and a convex polyhedron relative to the first body; returns their number and the gap."""
-    wall_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
-    wall, w, i, sign = shapes.wall, s if wall_is_a else t, a if wall_is_a else b, 1.0 if wall_is_a else -1.0
-    nx, ny, nz = turned(rotation, i, wall[w, 0], wall[w, 1], wall[w, 2])
-    offset = wall[w, 3] - sign * (nx * between[0] + ny * between[1] + nz * between[2])
-    solid, j = (t, b) if wall_is_a else (s, a)
+    half_space_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
+    half_space, w, i, sign = shapes.half_space, s if half_space_is_a else t, a if half_space_is_a else b, 1.0 if half_space_is_a else -1.0
+    nx, ny, nz = turned(rotation, i, half_space[w, 0], half_space[w, 1], half_space[w, 2])
+    offset = half_space[w, 3] - sign * (nx * between[0] + ny * between[1] + nz * between[2])
+    solid, j = (t, b) if half_space_is_a else (s, a)
     count, least = half_space_contacts(shapes, solid, rotation, j, nx, ny, nz, offset, margin, sign, scratch, real, ids)
-    if wall_is_a:
+    if half_space_is_a:
         for k in range(count):
             for c in range(3):
                 real[k, c] += between[c]
@@ -250,14 +250,14 @@ def _are_apart(solids, inset, bodies, pairs, p, between, margin, c, simplex):
 
 
 @jit
-def look(shapes, solids, inset, bodies, pairs, share, shares, ahead, same, kept, places, margins, rows, ids, free, coefficients, room):
+def look(shapes, solids, inset, bodies, pairs, share, shares, ahead, same, kept, places, margins, rows, ids, free, coefficients, workspace):
     """Find the contacts of a share of the pairs where `review` says so, but for general ones, which are left at the begin of its places.
 
     solids, inset: see `heap_overlap`; ahead: length of the step, s; free (shares, 2): where the rows of the pool that each share may take
     begin and end; coefficients (k, k, 4) of two materials; room: of its own. Returns how many pairs were looked at, and how many general
     ones there are, -1 where there are too few rows (get more and call it again).
     """
-    real, found, old, old_ids, scratch, simplex, polytope, work, c, between, origin = room
+    real, found, old, old_ids, scratch, simplex, polytope, work, c, between, origin = workspace
     position, rotation, velocity, shape = bodies.position, bodies.rotation, bodies.velocity, bodies.shape
     waiting = 0
     begin, end = review(bodies, pairs, share, shares, ahead, same, kept, places, margins)
@@ -272,7 +272,7 @@ def look(shapes, solids, inset, bodies, pairs, share, shares, ahead, same, kept,
                 waiting += 1
             continue
         s, t = shape[a], shape[b]
-        if pairs.kind[p] == WALL:
+        if pairs.kind[p] == PLANE:
             count, gap = _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, found)
         elif pairs.kind[p] == HULLS:
             size = min(bodies.inner[a], bodies.inner[b])
@@ -281,12 +281,12 @@ def look(shapes, solids, inset, bodies, pairs, share, shares, ahead, same, kept,
             )
         else:
             count, gap = _of_boxes(shapes.half, velocity, rotation, a, b, s, t, between, margin, ahead, c, work, scratch, real, found)
-        if count > pairs.room[p]:
+        if count > pairs.capacity[p]:
             used = free[share, 0]
             if used + POINTS > free[share, 1]:
                 return end - begin, -1
             before = pairs.start[p]
-            pairs.start[p], pairs.room[p] = used, POINTS
+            pairs.start[p], pairs.capacity[p] = used, POINTS
             for i in range(pairs.count[p]):
                 for j in range(ROW_SIZE):
                     rows[used + i, j] = rows[before + i, j]

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from rigidimpulse.collision.contact_records import (
     CARRIER,
-    CORE_A,
-    CORE_B,
     DYNAMIC_FRICTION,
     FRICTION,
     HELD,
@@ -19,6 +17,8 @@ from rigidimpulse.collision.contact_records import (
     ROUND_B,
     ROW_SIZE,
     SEPARATION,
+    SKELETON_A,
+    SKELETON_B,
     SKIN,
     STATIC_FRICTION,
     turned_back,
@@ -49,8 +49,8 @@ def write_row(
     for k in range(IMPULSE, ROW_SIZE):
         rows[r, k] = 0.0
     rows[r, 0], rows[r, 1], rows[r, 2] = turned_back(rotation, b if carrier else a, nx, ny, nz)
-    rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2] = turned_back(rotation, a, ax, ay, az)
-    rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2] = turned_back(rotation, b, bx, by, bz)
+    rows[r, SKELETON_A], rows[r, SKELETON_A + 1], rows[r, SKELETON_A + 2] = turned_back(rotation, a, ax, ay, az)
+    rows[r, SKELETON_B], rows[r, SKELETON_B + 1], rows[r, SKELETON_B + 2] = turned_back(rotation, b, bx, by, bz)
     rows[r, ROUND_A], rows[r, ROUND_B], rows[r, CARRIER] = round_a, round_b, 1.0 if carrier else 0.0
     rows[r, STATIC_FRICTION], rows[r, DYNAMIC_FRICTION] = coefficients[m, t, 1], coefficients[m, t, 2]
     rows[r, SKIN], rows[r, HELD] = min(skin[a], skin[b]), held
@@ -88,8 +88,8 @@ def hand_over(old_rows, old_ids, old, old_end, rows, ids, new, new_end, near):
                 cosine = rows[c, 0] * old_rows[o, 0] + rows[c, 1] * old_rows[o, 1] + rows[c, 2] * old_rows[o, 2]
                 same = ids[c, 0] == old_ids[o, 0] and ids[c, 1] == old_ids[o, 1] and ids[c, 2] == old_ids[o, 2]
                 if nearby == 1:
-                    x, y = rows[c, CORE_A] - old_rows[o, CORE_A], rows[c, CORE_A + 1] - old_rows[o, CORE_A + 1]
-                    z = rows[c, CORE_A + 2] - old_rows[o, CORE_A + 2]
+                    x, y = rows[c, SKELETON_A] - old_rows[o, SKELETON_A], rows[c, SKELETON_A + 1] - old_rows[o, SKELETON_A + 1]
+                    z = rows[c, SKELETON_A + 2] - old_rows[o, SKELETON_A + 2]
                     same = x * x + y * y + z * z < near * near
                 if not same or cosine < 0.9:
                     continue

@@ -21,7 +21,7 @@ from rigidimpulse.core.quaternion import quaternion_to_matrix
 # Kernels that are called for each pair or point get arrays one by one, and indices: a tuple of twenty arrays is passed word by word,
 # and a view is counted, which costs more than what is computed.
 
-NORMAL, CORE_A, ROUND_A, ROUND_B, CORE_B = 0, 3, 6, 7, 8
+NORMAL, SKELETON_A, ROUND_A, ROUND_B, SKELETON_B = 0, 3, 6, 7, 8
 """Offsets in a row: unit normal from first to second in the axes of the pair's carrier; body-fixed points, in the axes of their
 bodies, and the radii of the rounded surfaces around them, m."""
 SKIN, STATIC_FRICTION, DYNAMIC_FRICTION, HELD, CARRIER = 11, 12, 13, 14, 15
@@ -38,7 +38,7 @@ INVERSE_MASS = 6
 """Place of 1/m in a row of `mass`."""
 
 
-class HeapBodies(NamedTuple):
+class SolverBodies(NamedTuple):
     """n bodies by rank, and one more row that is no body, for lanes that have nothing to do."""
 
     shape: np.ndarray  # (n+1,)
@@ -62,7 +62,7 @@ class HeapBodies(NamedTuple):
     mass: np.ndarray  # (8 (n+1),)
 
 
-class HeapPairs(NamedTuple):
+class ContactPairs(NamedTuple):
     """k pairs, ascending."""
 
     first: np.ndarray  # (k,) number of a body
@@ -72,7 +72,7 @@ class HeapPairs(NamedTuple):
     kind: np.ndarray  # (k,) how contacts are found, see `heap_narrow`; UNKNOWN for a new pair
     start: np.ndarray  # (k,) first row
     count: np.ndarray  # (k,) rows
-    room: np.ndarray  # (k,) rows that are the pair's own
+    capacity: np.ndarray  # (k,) rows that are the pair's own
     known: np.ndarray  # (k,) bool, `seen` and `apart` hold
     apart: np.ndarray  # (k,) m, the gap was at least that; 0 for a pair that has rows
     held: np.ndarray  # (k,) m, gap at which contacts are held

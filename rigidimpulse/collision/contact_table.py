@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import ROW_SIZE, UNKNOWN, HeapPairs
+from rigidimpulse.collision.contact_records import ROW_SIZE, UNKNOWN, ContactPairs
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.simd import ROW, aligned
@@ -21,15 +21,15 @@ LOW, FULL = 0.03, 0.9
 """Parts of the rows taken: free below which they are packed, in use beyond which it is not worth it."""
 
 
-def empty_pairs(k: int) -> HeapPairs:
+def empty_pairs(k: int) -> ContactPairs:
     """Pairs (k,) of which nothing is known."""
 
     def numbers() -> np.ndarray:
         return np.zeros(k, np.int32)
 
-    return HeapPairs(
+    return ContactPairs(
         first=numbers(), second=numbers(), carrier=np.zeros(k, bool), round=np.zeros(k, bool), kind=np.full(k, UNKNOWN, np.int8),
-        start=numbers(), count=numbers(), room=numbers(), known=np.zeros(k, bool), apart=np.zeros(k), held=np.zeros(k),
+        start=numbers(), count=numbers(), capacity=numbers(), known=np.zeros(k, bool), apart=np.zeros(k), held=np.zeros(k),
         seen=np.zeros((k, 7)),
     )  # fmt: skip
 
@@ -45,7 +45,7 @@ def _carry_over(old, new, places):
         places[p] = -1
         if o < old.first.shape[0] and old.first[o] == a and old.second[o] == b:
             places[p] = o
-            new.start[p], new.count[p], new.room[p] = old.start[o], old.count[o], old.room[o]
+            new.start[p], new.count[p], new.capacity[p] = old.start[o], old.count[o], old.capacity[o]
             new.known[p], new.apart[p], new.held[p] = old.known[o], old.apart[o], old.held[o]
             new.kind[p], new.carrier[p], new.round[p] = old.kind[o], old.carrier[o], old.round[o]
 
@@ -67,7 +67,7 @@ def _pack(pairs, rows, ids, target):
         for r in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
             target[r] = used
             used += 1
-        pairs.start[p], pairs.room[p] = used - pairs.count[p], pairs.count[p]
+        pairs.start[p], pairs.capacity[p] = used - pairs.count[p], pairs.count[p]
     row, kind = np.empty(ROW_SIZE), np.empty(3, ids.dtype)
     for r in range(1, target.shape[0]):
         # A row pushes the one that lies at its place on to its own, until it comes to a place that is free.
@@ -97,7 +97,7 @@ def _parts(begin: int, end: int, shares: int) -> np.ndarray:
     return np.column_stack([edges[:-1], edges[1:]])
 
 
-class HeapTable:
+class ContactTable:
     """Pairs and their rows in a pool.
 
     Attributes:
@@ -123,7 +123,7 @@ class HeapTable:
         seen, self.pairs = self.pairs.seen, fresh
         _carry_seen(seen, places, fresh.seen)
 
-    def make_room(self, needed: int) -> None:
+    def grow(self, needed: int) -> None:
         """Room for at least `needed` more rows in each share; all rows keep their numbers."""
         if (self.free[:, 1] - self.free[:, 0]).min() >= needed:
             return

@@ -11,7 +11,7 @@ import numpy as np
 
 from rigidimpulse.collision.contact_cache import note_seen
 from rigidimpulse.collision.contact_matching import NEAR, hand_over, take_up, write_row
-from rigidimpulse.collision.contact_records import CORE_A, CORE_B, ROUND_A, ROUND_B, SKIN, turned
+from rigidimpulse.collision.contact_records import ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SKIN, turned
 from rigidimpulse.collision.distance.epa import make_polytope
 from rigidimpulse.collision.distance.gjk import make_simplex
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
@@ -115,8 +115,8 @@ def _contradicts(bodies, pairs, p, rows, new, new_end):
     for o in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
         row = rows[o]
         nx, ny, nz = turned(bodies.rotation, carrier, row[0], row[1], row[2])
-        ax, ay, az = turned(bodies.rotation, a, row[CORE_A], row[CORE_A + 1], row[CORE_A + 2])
-        bx, by, bz = turned(bodies.rotation, b, row[CORE_B], row[CORE_B + 1], row[CORE_B + 2])
+        ax, ay, az = turned(bodies.rotation, a, row[SKELETON_A], row[SKELETON_A + 1], row[SKELETON_A + 2])
+        bx, by, bz = turned(bodies.rotation, b, row[SKELETON_B], row[SKELETON_B + 1], row[SKELETON_B + 2])
         gap = (
             (bodies.position[b, 0] - bodies.position[a, 0] + bx - ax) * nx
             + (bodies.position[b, 1] - bodies.position[a, 1] + by - ay) * ny
@@ -218,7 +218,7 @@ def store_contacts(
                 take_up(pairs.held, p, rows, new, used)
             old = pairs.start[p]
             hand_over(rows, ids, old, old + pairs.count[p], rows, ids, new, used, NEAR * size)
-            pairs.start[p], pairs.count[p], pairs.room[p] = new, used - new, used - new
+            pairs.start[p], pairs.count[p], pairs.capacity[p] = new, used - new, used - new
         pairs.apart[p] = far[k] if pairs.count[p] == 0 and sunk == 0 and last == first else 0.0
         note_seen(bodies, pairs, p)
     return used

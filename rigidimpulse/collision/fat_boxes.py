@@ -17,7 +17,7 @@ SLACK = 0.1
 """Inner radii of slack that every body gets beside what it needs."""
 CLOSE = 0.02
 """Inner radii within which two slow bodies stay of where they were to each other; contacts are looked for farther away than that."""
-WINDOWS = 2.0
+INTERVALS = 2.0
 """Lengths of time ahead for whose motion bodies get slack, too."""
 
 
@@ -32,7 +32,7 @@ def _way(velocity, acceleration, i, ahead):
 
 
 @jit
-def _left_cover(members, now, acceleration, least, ahead, covered, centre, slack):
+def _left_fat_box(members, now, acceleration, least, ahead, covered, centre, slack):
     """Whether a member may leave its cover in `ahead` s, or has none."""
     for i in members:
         if not covered[i]:
@@ -54,7 +54,7 @@ def _boxes(order, now, acceleration, least, ahead, world_min, world_max, moves, 
             for k in range(3):
                 low[r, k], high[r, k] = (world_min[i, k], world_max[i, k]) if covered[i] else (np.inf, -np.inf)
             continue
-        slack[i] = least[i] + WINDOWS * _way(now.velocity, acceleration, i, ahead) + SLACK * min(inner[i], radius[i])
+        slack[i] = least[i] + INTERVALS * _way(now.velocity, acceleration, i, ahead) + SLACK * min(inner[i], radius[i])
         for k in range(3):
             centre[i, k] = now.position[i, k]
             low[r, k] = now.position[i, k] - radius[i] - slack[i]
@@ -116,7 +116,7 @@ def near_pairs(order, pairs, now, acceleration, least, inner, ahead, world_min, 
     return count
 
 
-class Cover:
+class FatBoxes:
     """Covers of the bodies of a scene.
 
     Attributes:
@@ -142,7 +142,7 @@ class Cover:
         """
         world = self.world
         # A body that came to rest elsewhere is looked at as a member of those that move.
-        if np.all(self._covered[others]) and not _left_cover(
+        if np.all(self._covered[others]) and not _left_fat_box(
             members, now, acceleration, self.least, ahead, self._covered, self._centre, self._slack
         ):
             return None

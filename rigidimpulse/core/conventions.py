@@ -47,9 +47,9 @@ class Tolerances:
     """Difference of mirrored entries of a given inertia tensor, relative to the largest, that passes as rounding."""
     least_moment: float = 1e-14
     """Least principal moment of inertia, relative to the largest."""
-    contact_gap: float = 1e-6
+    contact_margin: float = 1e-6
     """Gap at which lasting contacts are held (delta), relative to the size of the smaller body."""
-    touch_gap: float = 1e-10
+    impact_margin: float = 1e-10
     """Gap at which impacts of faces, edges and rims with each other take place, relative to the size of the smaller body."""
     joint: float = 1e-12
     """Distance at which joints are closed, relative to the size of what they join; also their angles, in rad."""

@@ -35,7 +35,7 @@ intrinsic: Any = extending.intrinsic
 _DOUBLE, _SINGLE, _INDEX, _SHORT = ir.DoubleType(), ir.FloatType(), ir.IntType(64), ir.IntType(32)
 
 
-class Lanes:
+class Simd:
     """How many lanes a kernel is to work with, 2, 4 or 8."""
 
     def __init__(self, width: int) -> None:
@@ -44,10 +44,10 @@ class Lanes:
 
 
 @cache
-def machine_lanes() -> Lanes:
+def machine_simd() -> Simd:
     """Return the lanes of this machine's widest vector unit."""
     features = llvmlite.binding.get_host_cpu_features()
-    return Lanes(8 if features.get("avx512f") else 4 if features.get("avx2") else 2)
+    return Simd(8 if features.get("avx512f") else 4 if features.get("avx2") else 2)
 
 
 def aligned(rows: int) -> np.ndarray:
@@ -55,7 +55,7 @@ def aligned(rows: int) -> np.ndarray:
     return reserve((rows * ROW,), np.float64)
 
 
-class _LanesType(types.Type):
+class _SimdType(types.Type):
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"Lanes({width})")
@@ -67,7 +67,7 @@ class _VectorType(types.Type):
         super().__init__(name=f"Vector({width})")
 
 
-register_model(_LanesType)(models.OpaqueModel)
+register_model(_SimdType)(models.OpaqueModel)
 
 
 @register_model(_VectorType)
@@ -76,18 +76,18 @@ class _VectorModel(models.PrimitiveModel):
         super().__init__(manager, kind, ir.VectorType(_DOUBLE, kind.width))
 
 
-@typeof_impl.register(Lanes)
-def _type_of_lanes(lanes: Lanes, _context) -> types.Type:
-    return _LanesType(lanes.width)
+@typeof_impl.register(Simd)
+def _type_of_simd(simd: Simd, _context) -> types.Type:
+    return _SimdType(simd.width)
 
 
-@unbox(_LanesType)
-def _unbox_lanes(_type, _object, context):
+@unbox(_SimdType)
+def _unbox_simd(_type, _object, context):
     return NativeValue(context.context.get_dummy_value())
 
 
-@lower_constant(_LanesType)
-def _constant_lanes(context, _builder, _type, _value):
+@lower_constant(_SimdType)
+def _constant_simd(context, _builder, _type, _value):
     return context.get_dummy_value()
 
 
@@ -122,9 +122,9 @@ def _by_machine(builder, name: str, kind: _VectorType, arguments):
 
 
 @intrinsic
-def width_of(_typing, lanes):
+def width_of(_typing, simd):
     """W."""
-    return types.int64(lanes), lambda _context, _builder, _signature, _arguments: ir.Constant(_INDEX, lanes.width)
+    return types.int64(simd), lambda _context, _builder, _signature, _arguments: ir.Constant(_INDEX, simd.width)
 
 
 @intrinsic
@@ -150,9 +150,9 @@ def where_greater(_typing, a, b, x, y):
 
 
 @intrinsic
-def spread(_typing, lanes, x):
+def spread(_typing, simd, x):
     """x in all lanes."""
-    kind = _VectorType(lanes.width)
+    kind = _VectorType(simd.width)
 
     def lower(context, builder, signature, arguments):
         value = context.cast(builder, arguments[1], signature.args[1], types.float64)
@@ -160,7 +160,7 @@ def spread(_typing, lanes, x):
         one = builder.insert_element(empty, value, ir.Constant(_SHORT, 0))
         return builder.shuffle_vector(one, empty, ir.Constant(ir.VectorType(_SHORT, kind.width), [0] * kind.width))
 
-    return kind(lanes, x), lower
+    return kind(simd, x), lower
 
 
 def _place(context, builder, kind, array, index, vector):
@@ -175,9 +175,9 @@ def _stored(array, width: int) -> tuple[ir.Type, int]:
 
 
 @intrinsic
-def load(_typing, lanes, array, index):
+def load(_typing, simd, array, index):
     """W neighbouring values of array (m,), of single or double precision, from index on."""
-    kind = _VectorType(lanes.width)
+    kind = _VectorType(simd.width)
 
     def lower(context, builder, signature, arguments):
         vector, size = _stored(array, kind.width)
@@ -185,7 +185,7 @@ def load(_typing, lanes, array, index):
         read.align = size
         return read if size == 8 else builder.fpext(read, ir.VectorType(_DOUBLE, kind.width))
 
-    return kind(lanes, array, types.intp), lower
+    return kind(simd, array, types.intp), lower
 
 
 @intrinsic
@@ -249,20 +249,20 @@ def _row_place(context, builder, array_type, array, index_type, index, first, la
 
 
 @intrinsic
-def gather(_typing, lanes, array, index, first):
+def gather(_typing, simd, array, index, first):
     """The rows index[first:first + W] of array (8 m,), as 8 vectors. index: int32."""
-    kind = types.UniTuple(_VectorType(lanes.width), ROW)
+    kind = types.UniTuple(_VectorType(simd.width), ROW)
 
     def lower(context, builder, signature, arguments):
         _, array_type, index_type, _ = signature.args
         rows = []
-        for lane in range(lanes.width):
+        for lane in range(simd.width):
             row = builder.load(_row_place(context, builder, array_type, arguments[1], index_type, arguments[2], arguments[3], lane))
             row.align = LINE
             rows.append(row)
         return context.make_tuple(builder, kind, _columns(builder, rows))
 
-    return kind(lanes, array, index, types.intp), lower
+    return kind(simd, array, index, types.intp), lower
 
 
 @intrinsic

@@ -33,11 +33,11 @@ PATIENCE = 20_000
 _IS_X86 = llvmlite.binding.get_process_triple().startswith(("x86_64", "i686"))
 
 
-def empty_deck() -> np.ndarray:
+def empty_work_queue() -> np.ndarray:
     """What leader and helper share, before the first round."""
-    deck = np.zeros(PLACES, np.int64)
-    deck[TICKET] = NONE << BITS
-    return deck
+    work_queue = np.zeros(PLACES, np.int64)
+    work_queue[TICKET] = NONE << BITS
+    return work_queue
 
 
 def _pointer(context, builder, signature, arguments):
@@ -46,34 +46,34 @@ def _pointer(context, builder, signature, arguments):
 
 
 @intrinsic
-def _add(_typing, deck, place, number):
+def _add(_typing, work_queue, place, number):
     """Add to a place at once; returns what was there."""
 
     def lower(context, builder, signature, arguments):
         return builder.atomic_rmw("add", _pointer(context, builder, signature, arguments), arguments[2], "acq_rel")
 
-    return types.int64(deck, types.intp, types.int64), lower
+    return types.int64(work_queue, types.intp, types.int64), lower
 
 
 @intrinsic
-def _read(_typing, deck, place):
+def _read(_typing, work_queue, place):
     """What is at a place, and all that was written before it came there."""
 
     def lower(context, builder, signature, arguments):
         return builder.load_atomic(_pointer(context, builder, signature, arguments), "acquire", 8)
 
-    return types.int64(deck, types.intp), lower
+    return types.int64(work_queue, types.intp), lower
 
 
 @intrinsic
-def _write(_typing, deck, place, number):
+def _write(_typing, work_queue, place, number):
     """Put a number to a place, after all that was written before."""
 
     def lower(context, builder, signature, arguments):
         builder.store_atomic(arguments[2], _pointer(context, builder, signature, arguments), "release", 8)
         return context.get_dummy_value()
 
-    return types.void(deck, types.intp, types.int64), lower
+    return types.void(work_queue, types.intp, types.int64), lower
 
 
 @intrinsic
@@ -90,34 +90,34 @@ def pause(_typing):
 
 
 @inlined
-def open_round(deck, number):
+def open_round(work_queue, number):
     """Let pieces of a round be taken."""
-    _write(deck, DONE, 0)
-    _write(deck, TICKET, np.int64(number) << BITS)
+    _write(work_queue, DONE, 0)
+    _write(work_queue, TICKET, np.int64(number) << BITS)
 
 
 @inlined
-def take_piece(deck):
+def take_piece(work_queue):
     """Take a piece: returns its round, and how many had been taken before."""
-    ticket = _add(deck, TICKET, 1)
+    ticket = _add(work_queue, TICKET, 1)
     return ticket >> BITS, ticket & ((1 << BITS) - 1)
 
 
 @inlined
-def look_at(deck):
+def look_at(work_queue):
     """The round that is open, and how many of its pieces have been taken."""
-    ticket = _read(deck, TICKET)
+    ticket = _read(work_queue, TICKET)
     return ticket >> BITS, ticket & ((1 << BITS) - 1)
 
 
 @inlined
-def report_piece(deck):
+def report_piece(work_queue):
     """Say that a piece is done."""
-    _add(deck, DONE, 1)
+    _add(work_queue, DONE, 1)
 
 
 @jit
-def wait_for(deck, number):
+def wait_for(work_queue, number):
     """Wait until the helper has done so many pieces of a round."""
-    while _read(deck, DONE) < number:
+    while _read(work_queue, DONE) < number:
         pause()

@@ -20,9 +20,9 @@ class BroadPhase:
             springs = world.accuracy.response == "penalty"
             return Skip(world.why_no_impacts if springs else "a dynamic body and another are needed for contact")
 
-        def detect(context, window) -> None:
-            if context.heaps is not None:
-                context.heaps.gather(context, window)
-            window.find_pairs()
+        def detect(context, pair_events) -> None:
+            if context.substepped is not None:
+                context.substepped.gather(context, pair_events)
+            pair_events.find_pairs()
 
         return Bound(detect, f"{world.num_bodies} bodies may touch")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.engine.plan import Bound, Skip
-from rigidimpulse.engine.regime import MANY, only_dear, why_no_heaps
+from rigidimpulse.engine.regime import MANY, only_expensive, why_not_substepped
 
 
 @dataclass(frozen=True)
@@ -54,22 +54,22 @@ class RollingFriction:
 
 
 @dataclass(frozen=True)
-class HeapForces:
+class SubsteppedContact:
     """Contact inside heaps."""
 
     stage: str = "constrain"
-    name: str = "heaps"
+    name: str = "sub-stepped islands"
 
     def bind(self, world) -> Bound | Skip:
         """In where heaps are possible; the reason is told anew when the run is over."""
-        reason = why_no_heaps(world)
+        reason = why_not_substepped(world)
         if reason:
             return Skip(reason)
-        when = f"once exact contact gets dear: fewer than {MANY} bodies" if only_dear(world) else "bodies may heap up"
-        return Bound(step_heap, f"sub-stepped: {when}")
+        when = f"once exact contact gets dear: fewer than {MANY} bodies" if only_expensive(world) else "bodies may heap up"
+        return Bound(step_substepped, f"sub-stepped: {when}")
 
 
-def step_heap(context, window, group) -> None:
+def step_substepped(context, pair_events, island) -> None:
     """Step the heap of a group to the end of the window."""
-    if group.heap is not None:
-        context.heaps.step(context, window, group)
+    if island.substepped is not None:
+        context.substepped.step(context, pair_events, island)

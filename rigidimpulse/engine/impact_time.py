@@ -1,4 +1,4 @@
-"""The stage sweep: the first contact of every pair whose course is new."""
+"""The stage sweep: the time of impact of every pair whose trajectory is new."""
 
 from __future__ import annotations
 
@@ -18,9 +18,13 @@ REASONS = {
 }
 
 
+MODULES = {"bisection": "bisection", "conservative": "conservative", "linear": "linear", "after": "end_of_step"}
+"""The module of `collision/time_of_impact` that holds each method; all have the same function `sweep`."""
+
+
 @dataclass(frozen=True)
 class ImpactTime:
-    """One of REASONS; each is a module of this folder with the same `sweep`."""
+    """One of REASONS."""
 
     method: str
     stage: str = "sweep"
@@ -31,29 +35,29 @@ class ImpactTime:
         """In where something can collide."""
         if not world.can_collide:
             return Skip(world.why_no_impacts)
-        method = importlib.import_module(f"rigidimpulse.collision.time_of_impact.{self.method}").sweep
+        method = importlib.import_module(f"rigidimpulse.collision.time_of_impact.{MODULES[self.method]}").sweep
 
-        def sweep(context, window) -> None:
-            sweep_window(context, window, method)
+        def sweep(context, pair_events) -> None:
+            sweep_stale_pairs(context, pair_events, method)
 
         return Bound(sweep, f"{self.method}: {REASONS[self.method]}")
 
 
-def sweep_window(context, window, method) -> None:
+def sweep_stale_pairs(context, pair_events, method) -> None:
     """Sweep the pairs that ask for it, and note when they come to contact."""
-    stale = np.flatnonzero(~np.isnan(window.start))
+    stale = np.flatnonzero(~np.isnan(pair_events.start))
     if not len(stale):
         return
     found = method(
-        context.detector, context.state.course, window.a[stale], window.b[stale], window.start[stale], window.end,
-        window.touch[stale], window.tolerance[stale],
+        context.detector, context.state.trajectory, pair_events.a[stale], pair_events.b[stale], pair_events.start[stale], pair_events.end,
+        pair_events.impact_margin[stale], pair_events.tolerance[stale],
     )
-    window.time[stale] = found.time
-    window.witness[stale] = found.witness
-    window.start[stale] = np.nan
+    pair_events.time[stale] = found.time
+    pair_events.witness[stale] = found.witness
+    pair_events.start[stale] = np.nan
     for k in np.flatnonzero(found.status == STALLED):
         names = context.world.names
         context.log.report(
-            float(found.time[k]), "sweep stalled", (names[window.a[stale[k]]], names[window.b[stale[k]]]),
+            float(found.time[k]), "sweep stalled", (names[pair_events.a[stale[k]]], names[pair_events.b[stale[k]]]),
             "the budget of gap queries was used up; raise iterations or the tolerance",
         )

@@ -26,7 +26,7 @@ from rigidimpulse.collision.distance.fcl import Narrowphase, Separation
 from rigidimpulse.core.quaternion import rotate, to_matrix
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, make_rows
 from rigidimpulse.dynamics.solvers.newton import solve_newton
-from rigidimpulse.engine.pair_events import Window
+from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.motion.trajectory import begin
 
 DEPTH = 1e-5
@@ -82,7 +82,7 @@ def resolve_overlaps(context) -> None:
     moved = search.position - world.position
     gained = -float(np.sum(np.where(world.dynamic, world.mass, 0.0)[:, None] * world.steady_acceleration * moved))
     # Frame 0 is the state as given: the books change right after it.
-    context.log.book(float(np.nextafter(0.0, 1.0)), "overlap", gained)
+    context.log.account(float(np.nextafter(0.0, 1.0)), "overlap", gained)
 
 
 def _take_apart(search: _Search, demands: dict[tuple[int, int], _Demand]) -> None:
@@ -94,7 +94,7 @@ def _take_apart(search: _Search, demands: dict[tuple[int, int], _Demand]) -> Non
             search.measure(demand)
         fresh = search.new_demands(demands)
         worst = max(d.way / search.size(d.a, d.b) for d in (*demands.values(), *fresh.values()))
-        if not fresh and worst <= 0.5 * search.world.contact_gap:
+        if not fresh and worst <= 0.5 * search.world.contact_margin:
             return
         stalled = 0 if fresh or worst < 0.99 * least else stalled + 1
         least = min(least, worst)
@@ -133,10 +133,10 @@ class _Search:
 
     def overlapping(self) -> set[tuple[int, int]]:
         """Pairs that overlap."""
-        window = Window(self.context, self.context.state.time)
-        window.find_pairs()
-        near = ~self._surely_apart(window.a, window.b)
-        pairs = zip(window.a[near].tolist(), window.b[near].tolist(), strict=True)
+        pair_events = PairEvents(self.context, self.context.state.time)
+        pair_events.find_pairs()
+        near = ~self._surely_apart(pair_events.a, pair_events.b)
+        pairs = zip(pair_events.a[near].tolist(), pair_events.b[near].tolist(), strict=True)
         return {pair for pair in pairs if self._overlaps(*pair)}
 
     def _surely_apart(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -173,7 +173,7 @@ class _Search:
             found = self.separation(a, b, np.zeros(3))
             known = bool(np.all(np.isfinite(found.normal)))
             demand.direction = found.normal if known else np.zeros(3)
-            demand.way = self._held_gap(a, b) - found.gap if known else np.inf
+            demand.way = self._contact_margin(a, b) - found.gap if known else np.inf
         elif np.any(demand.direction):
             demand.way = self._way(a, b, demand.direction)
 
@@ -181,8 +181,8 @@ class _Search:
         """Whether a pair has a half space, which knows its depth and has no far side to come from."""
         return not np.isfinite(self.world.bound_radius[a] + self.world.bound_radius[b])
 
-    def _held_gap(self, a: int, b: int) -> float:
-        return self.world.contact_gap * self.size(a, b)
+    def _contact_margin(self, a: int, b: int) -> float:
+        return self.world.contact_margin * self.size(a, b)
 
     def _demand(self, a: int, b: int) -> _Demand:
         """The least way out of an overlap."""
@@ -219,7 +219,7 @@ class _Search:
     def _way(self, a: int, b: int, n: np.ndarray) -> float:
         """How far b has to move along n to stand off a, coming from outside; inf where that cannot be told."""
         reach = float(self.world.bound_radius[a] + self.world.bound_radius[b])
-        way, gap = reach - float(n @ (self.position[b] - self.position[a])), self._held_gap(a, b)
+        way, gap = reach - float(n @ (self.position[b] - self.position[a])), self._contact_margin(a, b)
         free, careful = np.inf, False
         for _ in range(MAX_APPROACHES):
             found = self.separation(a, b, way * n)
@@ -260,11 +260,11 @@ class _Search:
 
     def move_to(self, displacement: np.ndarray) -> None:
         """Put the bodies where they were given plus D (n, 3)."""
-        course = self.context.state.course
+        trajectory = self.context.state.trajectory
         self.position = self.world.position + displacement
-        for i in np.flatnonzero(np.any(course.position != self.position, axis=1)).tolist():
-            course.position[i] = self.position[i]
-            begin(course, i)
+        for i in np.flatnonzero(np.any(trajectory.position != self.position, axis=1)).tolist():
+            trajectory.position[i] = self.position[i]
+            begin(trajectory, i)
 
 
 def _clusters(world) -> tuple[np.ndarray, np.ndarray]:

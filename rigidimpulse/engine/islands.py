@@ -9,8 +9,8 @@ import numpy as np
 
 from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.core.conventions import TOLERANCES
-from rigidimpulse.dynamics.constraints.energy_limit import guard_energy, note_arrival
-from rigidimpulse.dynamics.constraints.rattle import arrive
+from rigidimpulse.dynamics.constraints.energy_limit import limit_energy, note_end_energy
+from rigidimpulse.dynamics.constraints.rattle import project_velocities
 from rigidimpulse.dynamics.impact.point import Contacts
 from rigidimpulse.engine.pair_table import live_contacts
 from rigidimpulse.engine.touching import bring_all, fill_contacts, near_pairs, pressing
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 MARGIN, FAR_MARGIN = 2.0, 30.0
 """Contacts are looked for within this many delta, and those that a lift of bodies may close."""
 NO_FORCE = np.zeros(3)
-LIFTED = 10.0
+CORRECTED = 10.0
 """Approach speed that a lift may make, in held gaps of turning (gap over size) times the speed: arms and normals turn a little."""
 SLACK = 1e-9
 """Contacts that leave or approach slower than the held ones by this part are held."""
 
 
 @dataclass
-class Group:
+class Island:
     """Bodies joined by contacts at `time`.
 
     Attributes:
@@ -43,7 +43,7 @@ class Group:
         velocity, angular_velocity, position: of the members as they arrived.
         moved: whether a lift has changed poses. shift: m, how far it moved points of the members at most.
         held: (m,) bool, contacts that carry forces. rests: whether all members stand still.
-        still: m/s, approach speed that counts as none. scale: m/s, largest speed of a contact point.
+        zero_speed: m/s, approach speed that counts as none. scale: m/s, largest speed of a contact point.
         joints: the joints of the members.
         heap: members that are stepped as a heap (see `engine/substepped/advance`), None where there is none.
         free: accelerations and angular accelerations (k, 3) of the members but for varying forces, None where these do not act.
@@ -59,7 +59,7 @@ class Group:
     kinds: np.ndarray
     features: np.ndarray
     keys: list[tuple[int, ...]]
-    delta: np.ndarray
+    contact_margin: np.ndarray
     approach: np.ndarray
     rest_speed: np.ndarray
     live: np.ndarray
@@ -69,10 +69,10 @@ class Group:
     shift: float = 0.0
     held: np.ndarray | None = None
     rests: bool = False
-    still: float = 0.0
+    zero_speed: float = 0.0
     scale: float = 0.0
     joints: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
-    heap: np.ndarray | None = None
+    substepped: np.ndarray | None = None
     free: tuple[np.ndarray, np.ndarray] | None = None
     loaded: bool = False
 
@@ -82,10 +82,10 @@ class Group:
 
     def slow(self) -> np.ndarray:
         """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
-        still = self.still
+        zero_speed = self.zero_speed
         if self.moved:
-            still += LIFTED * self.scale * TOLERANCES.contact_gap
-        return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + still
+            zero_speed += CORRECTED * self.scale * TOLERANCES.contact_margin
+        return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + zero_speed
 
 
 def empty_contacts(m: int) -> Contacts:
@@ -93,50 +93,50 @@ def empty_contacts(m: int) -> Contacts:
     return Contacts(*np.empty((2, m), np.int64), *np.empty((3, m, 3)), *np.empty((5, m)))
 
 
-def collect(context, window, pairs: np.ndarray, time: float, margin: float = MARGIN) -> tuple[np.ndarray, np.ndarray]:
+def collect(context, pair_events, pairs: np.ndarray, time: float, margin: float = MARGIN) -> tuple[np.ndarray, np.ndarray]:
     """Manifolds of window pairs at the present poses within so many held gaps: copies of the filled buffer rows.
 
     A pair that just came to contact but has no manifold (it overlaps, since its sweep does not back up time) has the
     witness of its sweep for a contact.
     """
     world, state = context.world, context.state
-    buffer, a, b = context.contact_buffer, window.a[pairs], window.b[pairs]
-    count = buffer.find(world.geometry, world, state.now, state.rotation, a, b, margin * window.delta[pairs])
+    buffer, a, b = context.contact_buffer, pair_events.a[pairs], pair_events.b[pairs]
+    count = buffer.find(world.geometry, world, state.now, state.rotation, a, b, margin * pair_events.contact_margin[pairs])
     real, integer = buffer.real[:count].copy(), buffer.integer[:count].copy()
-    for p in pairs[window.time[pairs] <= time].tolist():
-        a, b = window.a[p], window.b[p]
-        if not np.any((integer[:, 0] == a) & (integer[:, 1] == b)) and np.any(window.witness[p, 6:9]):
-            real = np.vstack([real, window.witness[p]])
+    for p in pairs[pair_events.time[pairs] <= time].tolist():
+        a, b = pair_events.a[p], pair_events.b[p]
+        if not np.any((integer[:, 0] == a) & (integer[:, 1] == b)) and np.any(pair_events.witness[p, 6:9]):
+            real = np.vstack([real, pair_events.witness[p]])
             integer = np.vstack([integer, np.array([a, b, CORNER, -1, -1])])
     return real, integer
 
 
-def touching_groups(context, window, time: float, bodies: np.ndarray) -> tuple[list[Group], np.ndarray]:
+def touching_islands(context, pair_events, time: float, bodies: np.ndarray) -> tuple[list[Island], np.ndarray]:
     """Groups that the given bodies belong to at `time`, and all bodies looked at, which are brought to it.
 
     Bodies that share the forces of a group come along when one of them is looked at, even if they touch nothing any more: those
     forces end for all of them at once, or momentum would not be kept.
     """
     world, state = context.world, context.state
-    seen, near = np.zeros(len(window.a), bool), np.empty(len(window.a), np.int64)
+    seen, near = np.zeros(len(pair_events.a), bool), np.empty(len(pair_events.a), np.int64)
     brought, reached = np.zeros(world.num_bodies, bool), np.zeros(world.num_bodies, bool)
     frontier = np.asarray(bodies, np.int64)
     reals, integers = [], []
     while len(frontier):
         reached[frontier] = True
         # All that a lift may come near is brought to `time` with what touches.
-        pairs = near[: near_pairs(state.course, time, window.pairs, FAR_MARGIN, world.bound_radius, frontier, seen, near)]
+        pairs = near[: near_pairs(state.trajectory, time, pair_events.pairs, FAR_MARGIN, world.bound_radius, frontier, seen, near)]
         partners = _partners(context, frontier)
         mark = np.zeros(world.num_bodies, bool)
-        mark[frontier] = mark[window.a[pairs]] = mark[window.b[pairs]] = mark[partners] = True
+        mark[frontier] = mark[pair_events.a[pairs]] = mark[pair_events.b[pairs]] = mark[partners] = True
         fresh = (mark & ~brought).nonzero()[0]
         brought[fresh] = True
         bring_all(
-            state.course, fresh, time, state.now, state.rotation, context.acceleration, context.angular_acceleration
+            state.trajectory, fresh, time, state.now, state.rotation, context.acceleration, context.angular_acceleration
         )
         if context.forces is not None and context.forces.flow is not None:
             context.forces.flow.weigh(fresh, time)
-        real, integer = collect(context, window, pairs, time)
+        real, integer = collect(context, pair_events, pairs, time)
         reals.append(real)
         integers.append(integer)
         mark[:] = False
@@ -145,11 +145,11 @@ def touching_groups(context, window, time: float, bodies: np.ndarray) -> tuple[l
     if not reals:
         return [], frontier
     integer = np.concatenate(integers)
-    groups = []
+    islands = []
     if len(integer) or context.joints is not None or context.forces is not None:
-        groups = _components(context, window, time, reached, np.concatenate(reals), integer)
-    _end_sub_steps(context, groups, time, reached.nonzero()[0])
-    return groups, reached.nonzero()[0]
+        islands = _components(context, pair_events, time, reached, np.concatenate(reals), integer)
+    _end_sub_steps(context, islands, time, reached.nonzero()[0])
+    return islands, reached.nonzero()[0]
 
 
 def _partners(context, bodies: np.ndarray) -> np.ndarray:
@@ -167,7 +167,7 @@ def _partners(context, bodies: np.ndarray) -> np.ndarray:
     return np.concatenate([partners, sharers])
 
 
-def _components(context, window, time: float, reached, real: np.ndarray, integer: np.ndarray) -> list[Group]:
+def _components(context, pair_events, time: float, reached, real: np.ndarray, integer: np.ndarray) -> list[Island]:
     """Split contacts and joints into groups joined by movable bodies, in order of their first body."""
     dynamic = context.world.dynamic
     parent: dict[int, int] = {}
@@ -201,43 +201,43 @@ def _components(context, window, time: float, reached, real: np.ndarray, integer
     owner = np.array([root(a if dynamic[a] else b) for a, b in ends_of_contacts], np.int64)
     owner_of_joint = np.array([root(i) for i in at], np.int64)
     owner_of_forced = np.array([root(i) for i in forced.tolist()], np.int64)
-    owners, groups = sorted({*owner.tolist(), *owner_of_joint.tolist()}), []
+    owners, islands = sorted({*owner.tolist(), *owner_of_joint.tolist()}), []
     for o in owners:
         tied = forced[owner_of_forced == o]
-        groups.append(make_group(context, window, time, real, integer, owner == o, joints[owner_of_joint == o], tied))
+        islands.append(make_island(context, pair_events, time, real, integer, owner == o, joints[owner_of_joint == o], tied))
     if len(forced) and len(free := forced[~np.isin(owner_of_forced, owners)]):
-        groups.append(_free_group(context, time, free))
-    return groups
+        islands.append(_free_island(context, time, free))
+    return islands
 
 
-def _free_group(context, time: float, members: np.ndarray) -> Group:
+def _free_island(context, time: float, members: np.ndarray) -> Island:
     """Bodies that nothing but forces hold: no contacts, no joints."""
     none, now = np.zeros(0, np.int64), context.state.now
-    return Group(
+    return Island(
         time, members, none, empty_contacts(0), none, none, np.zeros((0, 2), np.int64), [], np.zeros(0), np.zeros(0), np.zeros(0),
         np.zeros(0, bool), now.velocity[members], now.angular_velocity[members],
     )
 
 
-def _end_sub_steps(context, groups: list[Group], time: float, bodies: np.ndarray) -> None:
+def _end_sub_steps(context, islands: list[Island], time: float, bodies: np.ndarray) -> None:
     """What happens to all bodies brought at once when forces that were constant over a sub-step end."""
-    for group in groups:
-        if arrive(context, group):
-            classify(context, group)
-    note_arrival(context, bodies.tolist())
-    for group in groups:
-        if len(group.joints):
-            context.joints.arrive(context, group)
-            classify(context, group)
-    slowed = guard_energy(context, bodies.tolist(), time)
-    for group in groups:
-        if not slowed.isdisjoint(group.members.tolist()):
-            classify(context, group)
+    for island in islands:
+        if project_velocities(context, island):
+            classify(context, island)
+    note_end_energy(context, bodies.tolist())
+    for island in islands:
+        if len(island.joints):
+            context.joints.project_velocities(context, island)
+            classify(context, island)
+    slowed = limit_energy(context, bodies.tolist(), time)
+    for island in islands:
+        if not slowed.isdisjoint(island.members.tolist()):
+            classify(context, island)
 
 
-def make_group(
-    context, window, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray, joints: np.ndarray, tied: np.ndarray
-) -> Group:
+def make_island(
+    context, pair_events, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray, joints: np.ndarray, tied: np.ndarray
+) -> Island:
     """The group of the contacts marked in `which`, sorted by pair, of the given joints, and of the bodies tied to them by forces."""
     world, state = context.world, context.state
     rows, contacts = _sorted_contacts(context, real, integer, which.nonzero()[0])
@@ -247,8 +247,8 @@ def make_group(
         mark[context.joints.bodies_of(joints)] = True
     mark[tied] = True
     members = (mark & world.dynamic).nonzero()[0]
-    place = window.find(contacts.body_a, contacts.body_b)
-    group = Group(
+    place = pair_events.find(contacts.body_a, contacts.body_b)
+    island = Island(
         time=time,
         members=members,
         pairs=np.array(sorted(set(place.tolist())), np.int64),
@@ -257,16 +257,16 @@ def make_group(
         kinds=integer[rows, 2],
         features=integer[rows, 3:5],
         keys=[contact_key(*row) for row in integer[rows].tolist()],
-        delta=window.delta[place],
+        contact_margin=pair_events.contact_margin[place],
         approach=np.empty(len(rows)),
         rest_speed=np.empty(len(rows)),
-        live=live_contacts(window.pairs, place, contacts.gap, time),
+        live=live_contacts(pair_events.pairs, place, contacts.gap, time),
         velocity=state.now.velocity[members],
         angular_velocity=state.now.angular_velocity[members],
         joints=joints,
     )
-    classify(context, group)
-    return group
+    classify(context, island)
+    return island
 
 
 def _sorted_contacts(context, real: np.ndarray, integer: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, Contacts]:
@@ -278,14 +278,15 @@ def _sorted_contacts(context, real: np.ndarray, integer: np.ndarray, rows: np.nd
     return rows, contacts
 
 
-def near_contacts(context, window, members: np.ndarray, time: float) -> tuple[Contacts, np.ndarray, list[tuple[int, ...]]]:
+def near_contacts(context, pair_events, members: np.ndarray, time: float) -> tuple[Contacts, np.ndarray, list[tuple[int, ...]]]:
     """What a lift of the members of a group may close: contacts with all that is near at `time`, held gaps [m], and keys."""
-    near = np.empty(len(window.a), np.int64)
-    seen = np.zeros(len(window.a), bool)
-    count = near_pairs(context.state.course, time, window.pairs, FAR_MARGIN, context.world.bound_radius, members, seen, near)
-    real, integer = collect(context, window, near[:count], time, FAR_MARGIN)
+    near = np.empty(len(pair_events.a), np.int64)
+    seen = np.zeros(len(pair_events.a), bool)
+    count = near_pairs(context.state.trajectory, time, pair_events.pairs, FAR_MARGIN, context.world.bound_radius, members, seen, near)
+    real, integer = collect(context, pair_events, near[:count], time, FAR_MARGIN)
     rows, contacts = _sorted_contacts(context, real, integer, np.arange(len(real)))
-    return contacts, window.delta[window.find(contacts.body_a, contacts.body_b)], [contact_key(*row) for row in integer[rows].tolist()]
+    place = pair_events.find(contacts.body_a, contacts.body_b)
+    return contacts, pair_events.contact_margin[place], [contact_key(*row) for row in integer[rows].tolist()]
 
 
 def contact_key(a: int, b: int, kind: int, feature_a: int, feature_b: int) -> tuple[int, ...]:
@@ -297,21 +298,21 @@ def contact_key(a: int, b: int, kind: int, feature_a: int, feature_b: int) -> tu
     return a, b, kind, feature_a, feature_b
 
 
-def classify(context, group: Group) -> None:
+def classify(context, island: Island) -> None:
     """Measure approach speeds and what presses each contact; slow approaches within the margin count as live.
 
     Where a group is supported, whatever it carries is pressed by its steady acceleration (gravity, constant forces) as soon as the support
     bears, so that is the least that counts.
     """
     state, world = context.state, context.world
-    contacts = group.contacts
-    force = np.array([state.force_of(key)[0] for key in group.keys])
+    contacts = island.contacts
+    force = np.array([state.force_of(key)[0] for key in island.keys])
     least = 0.0
     if not (world.dynamic[contacts.body_a] & world.dynamic[contacts.body_b]).all():
-        least = float(world.steady_strength[group.members].max())
+        least = float(world.steady_strength[island.members].max())
     pressing(
-        world.geometry, world.shape_of_body, state.rotation, state.now, contacts, group.kinds, group.features,
-        context.acceleration, context.angular_acceleration, force, least, world.accuracy.step, group.delta, group.approach,
-        group.rest_speed,
+        world.geometry, world.shape_of_body, state.rotation, state.now, contacts, island.kinds, island.features,
+        context.acceleration, context.angular_acceleration, force, least, world.accuracy.step, island.contact_margin, island.approach,
+        island.rest_speed,
     )
-    group.live |= np.abs(group.approach) <= group.rest_speed
+    island.live |= np.abs(island.approach) <= island.rest_speed

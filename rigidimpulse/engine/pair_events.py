@@ -11,7 +11,7 @@ import numpy as np
 
 from rigidimpulse.collision.broad_phase import overlapping_pairs
 from rigidimpulse.collision.time_of_impact.spheres import is_closed_form
-from rigidimpulse.engine.islands import MARGIN, Group, touching_groups
+from rigidimpulse.engine.islands import MARGIN, Island, touching_islands
 from rigidimpulse.engine.pair_table import MAX_REPEATS, Pairs, new_pairs, path_boxes, renew_pairs
 from rigidimpulse.motion.trajectory import FIXED
 
@@ -22,7 +22,7 @@ INSTANT = 1e-6
 """Part of a step within which a pair that comes to contact again does so at the same instant."""
 
 
-class Window:
+class PairEvents:
     """Pairs of the step [begin, end], growing as bodies change course.
 
     Attributes:
@@ -30,7 +30,7 @@ class Window:
         wake: (n,) s, when bodies must be looked at again though nothing meets them.
         inside: (n,) bool, members of heaps: their pairs with each other and with immovable bodies are not swept.
         still: (n,) bool, members of heaps at rest, and bodies that never move: nor are their pairs with each other.
-        heaps_begun: whether the heaps of the step have been stepped from its start.
+        substepped_begun: whether the heaps of the step have been stepped from its start.
     """
 
     def __init__(self, context, end: float) -> None:
@@ -39,16 +39,17 @@ class Window:
         self._take(new_pairs(context.world, np.zeros(0, np.int64), np.zeros(0, np.int64), self.begin))
         self.wake = np.full(context.world.num_bodies, np.inf)
         self.inside = np.zeros(context.world.num_bodies, bool)
-        self.still = ~(context.world.dynamic | context.world.moving)
+        self.asleep = ~(context.world.dynamic | context.world.moving)
         self._looked_around = np.full(context.world.num_bodies, -np.inf)
-        self.heaps_begun = False
-        self._moves = (context.state.course.mode != FIXED) | context.world.dynamic
+        self.substepped_begun = False
+        self._moves = (context.state.trajectory.mode != FIXED) | context.world.dynamic
 
     def _take(self, pairs: Pairs) -> None:
         """Let `pairs` be the table."""
         self.pairs = pairs
         (
-            self.a, self.b, self.time, self.start, self.touch, self.least, self.delta, self.tolerance, self.tries, self.since,
+            self.a, self.b, self.time, self.start, self.impact_margin, self.least_impact_margin, self.contact_margin, self.tolerance,
+            self.tries, self.since,
             self.repeats, self.witness,
         ) = pairs  # fmt: skip
         key = self.a * self.context.world.num_bodies + self.b
@@ -58,15 +59,15 @@ class Window:
     def find_pairs(self) -> None:
         """Broad phase: the pairs whose boxes overlap in the step."""
         context = self.context
-        world, course = context.world, context.state.course
+        world, trajectory = context.world, context.state.trajectory
         if self.inside.any() and not np.any(world.dynamic & ~self.inside):
             return
         box_min, box_max = context.box_min, context.box_max
         box_min[:], box_max[:] = world.static_min, world.static_max
         members = np.flatnonzero(self._moves)
-        path_boxes(course, members, self.begin, self.end, world.bound_radius, box_min, box_max)
-        box_min[members] -= MARGIN * world.largest_delta
-        box_max[members] += MARGIN * world.largest_delta
+        path_boxes(trajectory, members, self.begin, self.end, world.bound_radius, box_min, box_max)
+        box_min[members] -= MARGIN * world.largest_contact_margin
+        box_max[members] += MARGIN * world.largest_contact_margin
         pairs = np.empty((max(64, 8 * world.num_bodies), 2), np.int32)
         count = overlapping_pairs(box_min, box_max, self._moves, pairs)
         if count < 0:
@@ -80,8 +81,8 @@ class Window:
 
         A pair is swept from the last change of course of its bodies; when it was last in contact is known from its rebound.
         """
-        course = self.context.state.course
-        self.start[:] = np.maximum(np.maximum(course.start[self.a], course.start[self.b]), begin)
+        trajectory = self.context.state.trajectory
+        self.start[:] = np.maximum(np.maximum(trajectory.start[self.a], trajectory.start[self.b]), begin)
         for p, pair in enumerate(zip(self.a.tolist(), self.b.tolist(), strict=True)):
             last = self.context.state.rebounds.get(pair)
             if last is not None and last[0] >= begin:
@@ -90,7 +91,7 @@ class Window:
     def is_plain(self, time: float) -> bool:
         """Whether nothing in the window asks to be remembered: no body held or called, no pair met more than once or without an impulse."""
         state = self.context.state
-        lowered = np.flatnonzero(self.touch != self.least)
+        lowered = np.flatnonzero(self.impact_margin != self.least_impact_margin)
         if len(lowered) and not self._is_closed_form(lowered):
             return False
         return not (
@@ -104,23 +105,23 @@ class Window:
 
     def _is_closed_form(self, places: np.ndarray) -> bool:
         """Whether pairs are balls, or balls and planes that stand, that were in contact at gap 0: that leaves no trace in their times."""
-        detector, course = self.context.detector, self.context.state.course
+        detector, trajectory = self.context.detector, self.context.state.trajectory
         return all(
             is_closed_form(
-                course, detector.sweep_scratch, a, b, detector.shape_of_body[a], detector.shape_of_body[b], self.touch[p]
+                trajectory, detector.sweep_scratch, a, b, detector.shape_of_body[a], detector.shape_of_body[b], self.impact_margin[p]
             )
             for p, a, b in zip(places, self.a[places], self.b[places], strict=True)
         )
 
-    def touching(self, time: float, bodies: np.ndarray) -> tuple[list[Group], np.ndarray]:
+    def touching(self, time: float, bodies: np.ndarray) -> tuple[list[Island], np.ndarray]:
         """Groups of touching bodies that the given ones belong to at `time`, and all bodies looked at."""
-        groups, reached = touching_groups(self.context, self, time, bodies)
-        return groups if self.context.heaps is None else self.context.heaps.join(self.context, self, time, groups), reached
+        islands, reached = touching_islands(self.context, self, time, bodies)
+        return islands if self.context.substepped is None else self.context.substepped.join(self.context, self, time, islands), reached
 
     def _is_shut(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Which pairs are not swept, since a heap's solver looks after them."""
         free = self.context.world.dynamic & ~self.inside
-        return ~(free[a] | free[b]) | (self.still[a] & self.still[b])
+        return ~(free[a] | free[b]) | (self.asleep[a] & self.asleep[b])
 
     def _append(self, a: np.ndarray, b: np.ndarray, start: float) -> None:
         """Add pairs whose bodies may meet and that are not there yet."""
@@ -131,19 +132,19 @@ class Window:
             both = zip(self.pairs, fresh, strict=True)
             self._take(Pairs(*map(np.concatenate, both)) if len(self.a) else fresh)
 
-    def change_course(self, body: int, time: float) -> None:
+    def trajectory_changed(self, body: int, time: float) -> None:
         """The body took a new course at `time`: sweep its pairs again, and add those it may now reach."""
         context, world = self.context, self.context.world
         partners = np.empty(world.num_bodies, np.int64)
         count = renew_pairs(
-            context.state.course, body, time, self.end, world.bound_radius[body], MARGIN * world.largest_delta, self._moves,
+            context.state.trajectory, body, time, self.end, world.bound_radius[body], MARGIN * world.largest_contact_margin, self._moves,
             world.dynamic, self.inside, self.pairs, context.box_min, context.box_max, partners,
         )
         if count:
             fresh = partners[:count]
             self._append(np.minimum(fresh, body), np.maximum(fresh, body), time)
 
-    def change_courses(self, bodies: np.ndarray, time: float) -> None:
+    def trajectories_changed(self, bodies: np.ndarray, time: float) -> None:
         """The same for the members of heaps, all at once."""
         context = self.context
         free = context.world.dynamic & ~self.inside
@@ -153,13 +154,13 @@ class Window:
         self.sweep_again(known, time)
         if not free.any():
             return
-        self.touch[known] = self.least[known]
+        self.impact_margin[known] = self.least_impact_margin[known]
         self.tries[known] = 0
         path_boxes(
-            context.state.course, bodies, time, self.end, context.world.bound_radius, context.box_min, context.box_max
+            context.state.trajectory, bodies, time, self.end, context.world.bound_radius, context.box_min, context.box_max
         )
-        context.box_min[bodies] -= MARGIN * context.world.largest_delta
-        context.box_max[bodies] += MARGIN * context.world.largest_delta
+        context.box_min[bodies] -= MARGIN * context.world.largest_contact_margin
+        context.box_max[bodies] += MARGIN * context.world.largest_contact_margin
         pairs = np.empty((len(bodies) + 64, 2), np.int32)
         low, high = context.box_min.copy(), context.box_max.copy()
         low[~(moved | free)], high[~(moved | free)] = np.inf, -np.inf
@@ -174,9 +175,9 @@ class Window:
 
     def active_bodies(self) -> np.ndarray:
         """Bodies that move or that a net presses, but for those in heaps."""
-        moves = self.context.state.course.mode != FIXED
-        if self.context.nets is not None:
-            moves |= self.context.nets.pressed
+        moves = self.context.state.trajectory.mode != FIXED
+        if self.context.soft_bodies is not None:
+            moves |= self.context.soft_bodies.pressed
         return np.flatnonzero(moves & ~self.inside)
 
     def bodies_at(self, time: float) -> np.ndarray:
@@ -196,7 +197,7 @@ class Window:
         fresh = bodies[self._looked_around[bodies] < time]
         mark = np.zeros(len(self.wake), bool)
         mark[fresh] = True
-        if shift > self.delta[mark[self.a] | mark[self.b]].min(initial=np.inf):
+        if shift > self.contact_margin[mark[self.a] | mark[self.b]].min(initial=np.inf):
             self._looked_around[fresh] = self.wake[fresh] = time
 
     def find(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -230,8 +231,8 @@ class Window:
         if not len(stuck):
             return
         self.tries[stuck] += 1
-        step = self.tries[stuck] * STUCK_STEP * self.delta[stuck]
-        self.touch[stuck] = np.where(self.least[stuck] > 0.0, 0.5 * self.touch[stuck], -step)
+        step = self.tries[stuck] * STUCK_STEP * self.contact_margin[stuck]
+        self.impact_margin[stuck] = np.where(self.least_impact_margin[stuck] > 0.0, 0.5 * self.impact_margin[stuck], -step)
         self.sweep_again(stuck, time)
         for p in stuck[self.tries[stuck] > MAX_TRIES]:
             self.start[p] = np.nan

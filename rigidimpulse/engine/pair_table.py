@@ -24,18 +24,18 @@ MAX_REPEATS = 100
 
 
 @jit_making_arrays
-def path_box(course, i, begin, end, radius, box_min, box_max):
+def path_box(trajectory, i, begin, end, radius, box_min, box_max):
     """Box of the sphere of `radius` about the centre of body i along its parabola or cubic from begin to end."""
     x = np.empty(3)
-    place_at(course, i, begin, x)
+    place_at(trajectory, i, begin, x)
     h = end - begin
-    s = begin - course.start[i]
-    mode = course.mode[i]
-    growth = rate_of(course, i, JERK)
-    pull = row_at(course.acceleration, i, growth, s)
+    s = begin - trajectory.start[i]
+    mode = trajectory.mode[i]
+    growth = rate_of(trajectory, i, JERK)
+    pull = row_at(trajectory.acceleration, i, growth, s)
     for k in range(3):
         a, jerk = pull[k] if mode >= FREE else 0.0, 0.0 if mode == FIXED else growth[k]
-        v = 0.0 if mode == FIXED else course.velocity[i, k] + (a - 0.5 * jerk * s) * s
+        v = 0.0 if mode == FIXED else trajectory.velocity[i, k] + (a - 0.5 * jerk * s) * s
         last = x[k] + v * h + 0.5 * a * h * h + jerk * h * h * h / 6.0
         low, high = min(x[k], last), max(x[k], last)
         if jerk != 0.0:
@@ -51,9 +51,9 @@ def path_box(course, i, begin, end, radius, box_min, box_max):
 
 
 @jit
-def path_boxes(course, members, begin, end, radius, box_min, box_max):
+def path_boxes(trajectory, members, begin, end, radius, box_min, box_max):
     for i in members:
-        path_box(course, i, begin, end, radius[i], box_min, box_max)
+        path_box(trajectory, i, begin, end, radius[i], box_min, box_max)
 
 
 class Pairs(NamedTuple):
@@ -63,9 +63,9 @@ class Pairs(NamedTuple):
     b: np.ndarray
     time: np.ndarray  # (k,) s, when the pair reaches `touch`; inf if it does not before the end of the step
     start: np.ndarray  # (k,) s, from when the pair must be swept again; nan if its time stands
-    touch: np.ndarray  # (k,) m, gap at which contact is declared now
-    least: np.ndarray  # (k,) m, the same for a pair without a past
-    delta: np.ndarray  # (k,) m, gap at which lasting contacts are held
+    impact_margin: np.ndarray  # (k,) m, gap at which contact is declared now
+    least_impact_margin: np.ndarray  # (k,) m, the same for a pair without a past
+    contact_margin: np.ndarray  # (k,) m, gap at which lasting contacts are held
     tolerance: np.ndarray  # (k,) m, gap error of an impact
     tries: np.ndarray  # (k,) how often the pair came to contact at one instant without an impulse
     since: np.ndarray  # (k,) s, instant of contact
@@ -77,15 +77,15 @@ def new_pairs(world, a: np.ndarray, b: np.ndarray, start: float) -> Pairs:
     """Pairs (k,) without a past, to be swept from `start` [s] on."""
     k = len(a)
     size = np.minimum(world.size[a], world.size[b])
-    least = world.least_touch(a, b)
+    least = world.least_impact_margin(a, b)
     return Pairs(
         a=a,
         b=b,
         time=np.full(k, np.inf),
         start=np.full(k, start),
-        touch=least.copy(),
-        least=least,
-        delta=world.contact_gap * size,
+        impact_margin=least.copy(),
+        least_impact_margin=least,
+        contact_margin=world.contact_margin * size,
         tolerance=world.accuracy.tolerance * size,
         tries=np.zeros(k, np.int64),
         since=np.full(k, -np.inf),
@@ -116,23 +116,23 @@ def live_contacts(pairs, place, gap, time):
         while last < place.shape[0] and place[last] == p:
             nearest = min(nearest, gap[last])
             last += 1
-        zone = pairs.touch[p] * (1.0 + NEAR) + 2.0 * pairs.tolerance[p]
+        zone = pairs.impact_margin[p] * (1.0 + NEAR) + 2.0 * pairs.tolerance[p]
         if pairs.time[p] <= time:
             zone = max(zone, nearest * (1.0 + NEAR))
         for c in range(first, last):
-            live[c] = gap[c] <= zone + ROUND_OFF * pairs.delta[p]
+            live[c] = gap[c] <= zone + ROUND_OFF * pairs.contact_margin[p]
         first = last
     return live
 
 
 @jit_making_arrays
-def renew_pairs(course, body, time, end, radius, margin, movable, dynamic, inside, pairs, box_min, box_max, fresh):
+def renew_pairs(trajectory, body, time, end, radius, margin, movable, dynamic, inside, pairs, box_min, box_max, fresh):
     """Let the pairs of a body that took a new course at `time` be swept again, and look whom it may now reach until `end`.
 
     radius, margin: m, about its centre; movable, dynamic, inside (n,) bool; box_min, box_max (n, 3) m: its row is made anew.
     Writes the bodies whose boxes overlap its own and that it has no pair with into fresh (n,), in ascending order; returns their number.
     """
-    path_box(course, body, time, end, radius, box_min, box_max)
+    path_box(trajectory, body, time, end, radius, box_min, box_max)
     for k in range(3):
         box_min[body, k] -= margin
         box_max[body, k] += margin
@@ -144,7 +144,7 @@ def renew_pairs(course, body, time, end, radius, margin, movable, dynamic, insid
             continue
         known[a] = known[b] = True
         sweep_pair_again(pairs, p, time, dynamic, inside)
-        pairs.touch[p] = pairs.least[p]
+        pairs.impact_margin[p] = pairs.least_impact_margin[p]
         pairs.tries[p] = 0
     reached = overlapping_with(body, box_min, box_max, movable, fresh)
     count = 0

@@ -25,15 +25,15 @@ from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.engine.substepped.trajectories import CALM
 
 MANY, SOME, FEW, KEPT = 60, 12, 8, 2
-TOIL = 6.0
+EXPENSIVE_SOLVES = 6.0
 RATIO, REBOUND, TALL = 30.0, 0.5, 12
 FAST, SPIN = 0.5, 2.5 / 16.0
 
 
-def why_no_heaps(world) -> str:
+def why_not_substepped(world) -> str:
     """Why a scene cannot have heaps; empty where it can."""
     solver = world.accuracy.contact_solver
-    if "heaps" in world.left_out:
+    if "sub-stepped islands" in world.left_out:
         return "left out by the caller"
     if solver not in ("auto", "substepped"):
         return f"contact_solver is {solver!r}"
@@ -51,7 +51,7 @@ def why_no_heaps(world) -> str:
     return ""
 
 
-def only_dear(world) -> bool:
+def only_expensive(world) -> bool:
     """Whether heaps begin only where the exact solver has become dear: the scene has not MANY bodies."""
     return world.accuracy.contact_solver == "auto" and _number(world) < MANY
 
@@ -71,7 +71,7 @@ def _number(world) -> int:
 
 
 @jit_making_arrays
-def islands(number, first, second, movable):
+def island_roots(number, first, second, movable):
     """Root (l,) of each of `number` bodies: the lowest one that pairs of movable bodies join it with."""
     root = np.arange(number)
     for p in range(first.shape[0]):
@@ -132,7 +132,8 @@ def lively(now, strength: np.ndarray, inner: np.ndarray) -> np.ndarray:
 
 
 def refusals(
-    world, root: np.ndarray, heap_before: np.ndarray, joined: np.ndarray, moves: np.ndarray, toil: np.ndarray, a: np.ndarray, b: np.ndarray,
+    world, root: np.ndarray, substepped_before: np.ndarray, joined: np.ndarray, moves: np.ndarray, solve_count: np.ndarray, a: np.ndarray,
+    b: np.ndarray,
     auto: bool,
 ) -> dict[int, str]:  # fmt: skip
     """Why islands are no heaps, by their root; what holds of contacts (`low`) is not looked at here.
@@ -140,7 +141,7 @@ def refusals(
     Args:
         world: the compiled scene.
         root: (n,) of every body; -1 for those in no island.
-        heap_before: (n,) bool, members of heaps. joined, moves: (n,) bool.
+        substepped_before: (n,) bool, members of heaps. joined, moves: (n,) bool.
         toil: (n,) how often the exact solver dealt with each body in the last step.
         a: (k,) bodies of the pairs that may touch in the step; likewise b.
         auto: False where every island without joints is taken.
@@ -149,8 +150,8 @@ def refusals(
     out: dict[int, str] = {}
     members = np.flatnonzero(root >= 0)
     size = np.bincount(root[members], minlength=len(root))
-    was_heap = np.zeros(len(root), bool)
-    was_heap[root[members[heap_before[members]]]] = True
+    was_substepped = np.zeros(len(root), bool)
+    was_substepped[root[members[substepped_before[members]]]] = True
     for r in np.unique(root[members[joined[members]]]).tolist():
         out[r] = "joints"
     owner = np.where(root[a] >= 0, root[a], root[b])
@@ -159,12 +160,12 @@ def refusals(
         out.update(dict.fromkeys(alone.tolist(), "alone"))
         return out
     stir = np.bincount(root[members[moves[members]]], minlength=len(root))
-    dear = np.bincount(root[members], weights=toil[members], minlength=len(root)) > TOIL * size
-    lively_enough = dear if only_dear(world) else dear | (stir >= FEW)
-    least = np.where(was_heap, KEPT, np.where(lively_enough, FEW, MANY))
+    expensive = np.bincount(root[members], weights=solve_count[members], minlength=len(root)) > EXPENSIVE_SOLVES * size
+    lively_enough = expensive if only_expensive(world) else expensive | (stir >= FEW)
+    least = np.where(was_substepped, KEPT, np.where(lively_enough, FEW, MANY))
     for r in np.flatnonzero((size > 0) & (size < least)).tolist():
         out[r] = "few bodies"
-    begins = ~was_heap[owner]
+    begins = ~was_substepped[owner]
     if not begins.any():
         return out
     coefficient = world.coefficients[world.material_of_body[a], world.material_of_body[b], 0]

@@ -16,7 +16,7 @@ from rigidimpulse.dynamics.forces.constant import ConstantForces
 from rigidimpulse.dynamics.forces.gravity import FreeRotation, Gravity, SteadyLoad
 from rigidimpulse.dynamics.forces.kinds import bind_forces, force_kinds
 from rigidimpulse.engine.broad_phase_effect import BroadPhase
-from rigidimpulse.engine.constraint_effects import Friction, HeapForces, JointRows, RollingFriction
+from rigidimpulse.engine.constraint_effects import Friction, JointRows, RollingFriction, SubsteppedContact
 from rigidimpulse.engine.exact.contact_forces import ContactForces
 from rigidimpulse.engine.exact.forced_trajectories import ForcedFlight, VaryingLoad
 from rigidimpulse.engine.exact.impacts import ImpactResponse
@@ -24,9 +24,9 @@ from rigidimpulse.engine.exact.joints import reaction_table
 from rigidimpulse.engine.exact.trajectories import ExactFlight
 from rigidimpulse.engine.impact_time import ImpactTime
 from rigidimpulse.engine.initial_overlap import resolve_overlaps
-from rigidimpulse.engine.pair_events import Window
+from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.plan import Plan
-from rigidimpulse.engine.regime import only_dear
+from rigidimpulse.engine.regime import only_expensive
 from rigidimpulse.engine.spheres.effect import ARRIVED, GO_ON, STEP, EventKernel
 from rigidimpulse.engine.step import go_on, react, step
 from rigidimpulse.engine.trigger_effect import TriggerVolumes, bind_triggers
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force_log import ForceWork
     from rigidimpulse.engine.spheres.run import EventRun
     from rigidimpulse.io.cache.checkpointer import Cache
-    from rigidimpulse.studies.accuracy_targets import Wish
+    from rigidimpulse.studies.accuracy_targets import AccuracyTarget
 
 # Frames whose product with the number of bodies is refused as a slip of the keyboard (about 1e9 poses, 100 GB).
 MOST_POSES = 1_000_000_000
@@ -62,7 +62,7 @@ def simulate(
     duration: float,
     fps: float = 60.0,
     *,
-    accuracy: str | Accuracy | Wish = "standard",
+    accuracy: str | Accuracy | AccuracyTarget = "standard",
     effects: Mapping[str, bool] | None = None,
     progress: Callable[[float], None] | None = None,
     cache: str | os.PathLike[str] | Cache | None = None,
@@ -92,9 +92,9 @@ def simulate(
         return _simulate(scene, duration, fps, accuracy, effects, progress, cache)
     if cache is not None:
         raise SceneError("a cache for an accuracy that is still to be chosen", "choose it first, and give run.choice.accuracy")
-    from rigidimpulse.studies.accuracy_targets import simulate_as_wished
+    from rigidimpulse.studies.accuracy_targets import simulate_to_target
 
-    return simulate_as_wished(scene, duration, fps, accuracy, effects, progress)
+    return simulate_to_target(scene, duration, fps, accuracy, effects, progress)
 
 
 def _simulate(
@@ -114,7 +114,7 @@ def _simulate(
     if len(times) * world.num_bodies > MOST_POSES:
         raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
     plan = make_plan(world, effects)
-    prepare_kernels(world, has_effect(plan, EventKernel.name), has_effect(plan, HeapForces.name) and not only_dear(world))
+    prepare_kernels(world, has_effect(plan, EventKernel.name), has_effect(plan, SubsteppedContact.name) and not only_expensive(world))
     recorder = Recorder(times, world.num_bodies)
     log = EventLog()
     for name, reason in left_out.items():
@@ -122,8 +122,8 @@ def _simulate(
     context = StepContext(world, recorder, log)
     bind_forces(context, plan, times)
     paths = KeyframePaths(world)
-    start_courses(context)
-    recorder.start(context.state.course)
+    start_trajectories(context)
+    recorder.start(context.state.trajectory)
     resolve_overlaps(context)
     bind_triggers(context, plan)
     running = Running(context, paths, make_flight(context, plan))
@@ -132,13 +132,13 @@ def _simulate(
         run_to_end(running, plan, duration, progress)
         run = finish_run(running, plan, duration)
     else:
-        from rigidimpulse.io.cache.checkpointer import Keeper
+        from rigidimpulse.io.cache.checkpointer import Checkpointer
 
-        with closing(Keeper(cache, settings, running, plan)) as keeper:
-            run_to_end(keeper.running, plan, duration, lambda time: keeper.look(time, progress))
-            keeper.write(float(duration))
-            run = finish_run(keeper.running, plan, duration)
-            keeper.finish(run)
+        with closing(Checkpointer(cache, settings, running, plan)) as checkpointer:
+            run_to_end(checkpointer.running, plan, duration, lambda time: checkpointer.look(time, progress))
+            checkpointer.write(float(duration))
+            run = finish_run(checkpointer.running, plan, duration)
+            checkpointer.finish(run)
     return replace(run, profile=stopwatch.read(plan), settings=settings)
 
 
@@ -165,10 +165,10 @@ def finish_run(running: Running, plan: Plan, duration: float) -> Recording:
     """End what is under way at the end, and return the recording."""
     context = running.context
     finish_sub_steps(context, plan, context.state.time)
-    if context.heaps is not None:
-        context.heaps.close(context, context.state.time)
-        plan.tell(HeapForces.name, context.heaps.summary())
-    context.recorder.finish(context.state.course)
+    if context.substepped is not None:
+        context.substepped.close(context, context.state.time)
+        plan.tell(SubsteppedContact.name, context.substepped.summary())
+    context.recorder.finish(context.state.trajectory)
     return make_recording(context, plan, context.recorder.times, duration)
 
 
@@ -215,7 +215,7 @@ def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
         Friction(),
         RollingFriction(),
         ContactForces(),
-        HeapForces(),
+        SubsteppedContact(),
         ImpactTime(accuracy.impact_time),
         EventKernel(),
         ExactFlight(),
@@ -225,16 +225,16 @@ def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
     return Plan(world, effects, chosen)
 
 
-def start_courses(context: StepContext) -> None:
+def start_trajectories(context: StepContext) -> None:
     """Give every body its first course."""
-    world, course = context.world, context.state.course
-    course.position[:], course.orientation[:] = world.position, world.orientation
-    course.velocity[:], course.angular_velocity[:] = world.velocity, world.angular_velocity
-    course.acceleration[:] = np.where(world.dynamic[:, None], world.steady_acceleration, 0.0)
-    course.inertia[:] = world.inertia
-    course.mode[:] = np.where(world.dynamic, FREE, np.where(world.moving, PRESCRIBED, FIXED))
+    world, trajectory = context.world, context.state.trajectory
+    trajectory.position[:], trajectory.orientation[:] = world.position, world.orientation
+    trajectory.velocity[:], trajectory.angular_velocity[:] = world.velocity, world.angular_velocity
+    trajectory.acceleration[:] = np.where(world.dynamic[:, None], world.steady_acceleration, 0.0)
+    trajectory.inertia[:] = world.inertia
+    trajectory.mode[:] = np.where(world.dynamic, FREE, np.where(world.moving, PRESCRIBED, FIXED))
     for i in range(world.num_bodies):
-        begin(course, i)
+        begin(trajectory, i)
 
 
 def has_effect(plan: Plan, name: str) -> bool:
@@ -260,7 +260,7 @@ def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, flight: Ev
     while context.state.time < end:
         begin = context.state.time
         paths.start_segments(context, begin)
-        if context.nets is None and not np.any(context.state.course.mode != FIXED):
+        if context.soft_bodies is None and not np.any(context.state.trajectory.mode != FIXED):
             context.state.time = min(paths.next_key(begin), end)
             continue
         stop = min(paths.next_key(begin), end)
@@ -272,7 +272,7 @@ def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, flight: Ev
         if how == STEP:
             index = math.floor(context.state.time / size + 1e-9) + 1
             until = min(index * size, stop)
-            step(context, plan, until if context.nets is None else context.nets.advance(context, until))
+            step(context, plan, until if context.soft_bodies is None else context.soft_bodies.advance(context, until))
         if context.triggers is not None:
             with plan.clock(TriggerVolumes.name):
                 context.triggers.look(begin, context.state.time)
@@ -302,16 +302,16 @@ def finish_sub_steps(context: StepContext, plan: Plan, end: float) -> None:
     if context.joints is not None:
         bodies.update(context.joints.moving_bodies(context).tolist())
     if bodies:
-        window = Window(context, end)
-        plan.run("detect", context, window)
-        react(context, plan, window, end, np.array(sorted(bodies)))
+        pair_events = PairEvents(context, end)
+        plan.run("detect", context, pair_events)
+        react(context, plan, pair_events, end, np.array(sorted(bodies)))
 
 
 def close_stretches(context: StepContext) -> None:
     """Book the courses under contact forces that are still under way."""
     state = context.state
     for i in np.flatnonzero(state.under_contact).tolist():
-        context.log.stretches.append((state.course.start[i], np.inf, i, state.energy_at_start[i], 0.0))
+        context.log.stretches.append((state.trajectory.start[i], np.inf, i, state.energy_at_start[i], 0.0))
 
 
 def release_times(world: World) -> np.ndarray:
@@ -330,7 +330,7 @@ def impulses_by_cause(context: StepContext, times: np.ndarray, impacts: np.ndarr
         mass=mass,
         release=release_times(world),
         velocity=context.recorder.velocity,
-        book=context.impulses,
+        accounts=context.impulses,
         forces=work,
         impacts=impacts,
     )
@@ -348,8 +348,8 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
         mass, world.inertia, world.steady_acceleration, context.log, work,
     )
-    if context.nets is not None:
-        context.nets.add_to(ledger)
+    if context.soft_bodies is not None:
+        context.soft_bodies.add_to(ledger)
     contacts = context.contact_log.table()
     return Recording(
         times=times,
@@ -367,5 +367,5 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         reactions=reaction_table(context.joints, times),
         contacts=contacts,
         by_cause=impulses_by_cause(context, times, impacts, work),
-        nets=[] if context.nets is None else context.nets.tracks(),
+        soft_bodies=[] if context.soft_bodies is None else context.soft_bodies.tracks(),
     )

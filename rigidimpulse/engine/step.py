@@ -10,17 +10,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.engine.exact.trajectories import take_course
-from rigidimpulse.engine.islands import Group
-from rigidimpulse.engine.pair_events import Window
+from rigidimpulse.engine.exact.trajectories import begin_trajectory
+from rigidimpulse.engine.islands import Island
+from rigidimpulse.engine.pair_events import PairEvents
 
 
 def step(context, plan, end: float) -> None:
     """Advance all courses to `end` [s]."""
-    window = Window(context, end)
-    plan.run("detect", context, window)
-    react(context, plan, window, context.state.time, window.active_bodies())
-    _run_window(context, plan, window, may_leave=False)
+    pair_events = PairEvents(context, end)
+    plan.run("detect", context, pair_events)
+    react(context, plan, pair_events, context.state.time, pair_events.active_bodies())
+    _run_pair_events(context, plan, pair_events, may_leave=False)
 
 
 def go_on(context, plan, begin: float, end: float, may_leave: bool) -> None:
@@ -28,42 +28,42 @@ def go_on(context, plan, begin: float, end: float, may_leave: bool) -> None:
 
     may_leave: whether to end earlier, at an instant from which on all bodies fly freely again.
     """
-    window = Window(context, end)
-    plan.run("detect", context, window)
-    window.recall(begin)
-    _run_window(context, plan, window, may_leave)
+    pair_events = PairEvents(context, end)
+    plan.run("detect", context, pair_events)
+    pair_events.recall(begin)
+    _run_pair_events(context, plan, pair_events, may_leave)
 
 
-def _run_window(context, plan, window: Window, may_leave: bool) -> None:
+def _run_pair_events(context, plan, pair_events: PairEvents, may_leave: bool) -> None:
     """From contact to contact, to the end of the window, or until no pair of it has a past if it may be left."""
     while True:
-        plan.run("sweep", context, window)
-        time = window.next_time()
-        if time >= window.end:
+        plan.run("sweep", context, pair_events)
+        time = pair_events.next_time()
+        if time >= pair_events.end:
             break
-        bodies = window.bodies_at(time)
-        window.count_contacts(time)
-        react(context, plan, window, time, bodies)
-        if may_leave and window.is_plain(time):
+        bodies = pair_events.bodies_at(time)
+        pair_events.count_contacts(time)
+        react(context, plan, pair_events, time, bodies)
+        if may_leave and pair_events.is_plain(time):
             context.state.time = time
             return
-    context.state.time = window.end
+    context.state.time = pair_events.end
 
 
-def react(context, plan, window: Window, time: float, bodies: np.ndarray) -> None:
+def react(context, plan, pair_events: PairEvents, time: float, bodies: np.ndarray) -> None:
     """Everything that happens at `time` to the groups that the given bodies touch."""
-    window.wake[bodies] = np.inf
-    groups, reached = window.touching(time, bodies)
-    release(context, window, time, reached, groups)
-    for group in groups:
-        plan.run("respond", context, group)
-        plan.run("forces", context, window, group)
-        plan.run("constrain", context, window, group)
-        plan.run("integrate", context, window, group)
-    window.settle(time)
+    pair_events.wake[bodies] = np.inf
+    islands, reached = pair_events.touching(time, bodies)
+    release(context, pair_events, time, reached, islands)
+    for island in islands:
+        plan.run("respond", context, island)
+        plan.run("forces", context, pair_events, island)
+        plan.run("constrain", context, pair_events, island)
+        plan.run("integrate", context, pair_events, island)
+    pair_events.settle(time)
 
 
-def release(context, window: Window, time: float, bodies: np.ndarray, groups: list[Group]) -> None:
+def release(context, pair_events: PairEvents, time: float, bodies: np.ndarray, islands: list[Island]) -> None:
     """Let go those bodies that still carry the forces of contacts they have left."""
     state = context.state
     bodies = bodies[state.under_contact[bodies]]
@@ -72,9 +72,9 @@ def release(context, window: Window, time: float, bodies: np.ndarray, groups: li
     free = np.zeros(6)
     leaves = np.zeros(len(state.under_contact), bool)
     leaves[bodies] = True
-    for group in groups:
-        leaves[group.members] = False
+    for island in islands:
+        leaves[island.members] = False
     left = leaves.nonzero()[0]
-    left = left[(state.course.start[left] < time) & ~window.inside[left]]
+    left = left[(state.trajectory.start[left] < time) & ~pair_events.inside[left]]
     for i in left.tolist():
-        take_course(context, window, i, time, free, rests=False)
+        begin_trajectory(context, pair_events, i, time, free, rests=False)

@@ -52,30 +52,30 @@ def gyroscopic_acceleration(r, inertia, w, torque, out):
 
 
 @inlined
-def bring(course, i, time, bodies, rotation, acceleration, angular_acceleration):
+def bring(trajectory, i, time, bodies, rotation, acceleration, angular_acceleration):
     """Bring body i to `time`: pose, velocities, inverse inertia and its present accelerations."""
-    state_at(course, i, time, bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i])
+    state_at(trajectory, i, time, bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i])
     quaternion_to_matrix(bodies.orientation[i], rotation[i])
     if bodies.inv_mass[i] > 0.0:
-        world_inverse_inertia(rotation[i], course.inertia[i], bodies.inv_inertia[i])
+        world_inverse_inertia(rotation[i], trajectory.inertia[i], bodies.inv_inertia[i])
     for k in range(3):
         acceleration[i, k] = 0.0
         angular_acceleration[i, k] = 0.0
-    if bodies.inv_mass[i] > 0.0 and course.mode[i] != FIXED:
-        s = time - course.start[i]
-        acceleration[i, 0], acceleration[i, 1], acceleration[i, 2] = row_at(course.acceleration, i, rate_of(course, i, JERK), s)
-        torque = row_at(course.torque, i, rate_of(course, i, TORQUE_RATE), s)
-        gyroscopic_acceleration(rotation[i], course.inertia[i], bodies.angular_velocity[i], torque, angular_acceleration[i])
+    if bodies.inv_mass[i] > 0.0 and trajectory.mode[i] != FIXED:
+        s = time - trajectory.start[i]
+        acceleration[i, 0], acceleration[i, 1], acceleration[i, 2] = row_at(trajectory.acceleration, i, rate_of(trajectory, i, JERK), s)
+        torque = row_at(trajectory.torque, i, rate_of(trajectory, i, TORQUE_RATE), s)
+        gyroscopic_acceleration(rotation[i], trajectory.inertia[i], bodies.angular_velocity[i], torque, angular_acceleration[i])
 
 
 @jit
-def bring_all(course, members, time, bodies, rotation, acceleration, angular_acceleration):
+def bring_all(trajectory, members, time, bodies, rotation, acceleration, angular_acceleration):
     for i in members:
-        bring(course, i, time, bodies, rotation, acceleration, angular_acceleration)
+        bring(trajectory, i, time, bodies, rotation, acceleration, angular_acceleration)
 
 
 @jit_making_arrays
-def near_pairs(course, time, pairs, margin, radius, bodies, seen, near):
+def near_pairs(trajectory, time, pairs, margin, radius, bodies, seen, near):
     """Write the pairs of the given bodies (k,) that are not `seen` (p,) yet and whose bounding spheres are near at `time`.
 
     margin: gap that counts as near, relative to that at which contacts are held; radius (n,) m. near (p,): their places, in order.
@@ -91,10 +91,10 @@ def near_pairs(course, time, pairs, margin, radius, bodies, seen, near):
         if seen[p] or not (asked[a] or asked[b]):
             continue
         seen[p] = True
-        reach = (radius[a] + radius[b]) * (1.0 + ROUND_OFF) + margin * pairs.delta[p]
+        reach = (radius[a] + radius[b]) * (1.0 + ROUND_OFF) + margin * pairs.contact_margin[p]
         if reach < np.inf:
-            place_at(course, a, time, x)
-            place_at(course, b, time, y)
+            place_at(trajectory, a, time, x)
+            place_at(trajectory, b, time, y)
             if (y[0] - x[0]) ** 2 + (y[1] - x[1]) ** 2 + (y[2] - x[2]) ** 2 > reach * reach:
                 continue
         near[count] = p
@@ -176,7 +176,7 @@ def _point_acceleration(acceleration, angular_acceleration, i, r, n):
 @jit_making_arrays
 def pressing(
     geometry, shape_of_body, rotation, bodies, contacts, kinds, features, acceleration, angular_acceleration, normal_force, least,
-    step, delta, approach, rest_speed,
+    step, contact_margin, approach, rest_speed,
 ):
     """Fill approach (m,) = u.n and rest_speed (m,) = sqrt(2 a delta) [m/s]; a is at least `least`.
 
@@ -194,11 +194,11 @@ def pressing(
             acceleration, angular_acceleration, contacts.body_a[c], contacts.arm_a[c], n
         ) - _point_acceleration(acceleration, angular_acceleration, contacts.body_b[c], contacts.arm_b[c], n)
         turn = turning[c, 0] * n[0] + turning[c, 1] * n[1] + turning[c, 2] * n[2]
-        if abs(turn) * step * step > ROUND_OFF * delta[c]:
+        if abs(turn) * step * step > ROUND_OFF * contact_margin[c]:
             a -= turn
         if normal_force[c] > 0.0:
             inverse_effective_mass(bodies, contacts, c, k)
             for i in range(3):
                 for j in range(3):
                     a += normal_force[c] * n[i] * k[i, j] * n[j]
-        rest_speed[c] = sqrt(2.0 * max(a, least) * delta[c])
+        rest_speed[c] = sqrt(2.0 * max(a, least) * contact_margin[c])

@@ -125,25 +125,27 @@ class Triggers:
 
     def _near(self, watched: _Watched, begin: float, end: float) -> list[int]:
         """Bodies that may be inside or have come and gone, by bounding spheres, and those that were inside."""
-        course, world = self._context.state.course, self._context.world
+        trajectory, world = self._context.state.trajectory, self._context.world
         i = watched.may
         if not np.isfinite(watched.reach):
             return i.tolist()
-        way = np.linalg.norm(course.velocity[i], axis=1) + np.linalg.norm(course.acceleration[i], axis=1) * (end - course.start[i])
+        speed, pull = np.linalg.norm(trajectory.velocity[i], axis=1), np.linalg.norm(trajectory.acceleration[i], axis=1)
+        way = speed + pull * (end - trajectory.start[i])
         centre, _ = self._pose(watched, end)
         own = watched.body
         if own >= 0:
             away = np.linalg.norm(centre - self._body(own, end)[0])
-            own_way = np.linalg.norm(course.velocity[own]) + np.linalg.norm(course.acceleration[own]) * (end - course.start[own])
-            way = way + own_way + 2.0 * away * np.linalg.norm(course.angular_velocity[own])
+            own_speed, own_pull = np.linalg.norm(trajectory.velocity[own]), np.linalg.norm(trajectory.acceleration[own])
+            own_way = own_speed + own_pull * (end - trajectory.start[own])
+            way = way + own_way + 2.0 * away * np.linalg.norm(trajectory.angular_velocity[own])
         place = np.array([self._body(k, end)[0] for k in i.tolist()]).reshape(-1, 3)
         near = np.linalg.norm(place - centre, axis=1) <= watched.reach + world.bound_radius[i] + way * (end - begin)
         return sorted({*i[near].tolist(), *watched.inside})
 
     def _follow(self, watched: _Watched, i: int, begin: float, end: float) -> None:
         """Find the changes of one pair."""
-        course = self._context.state.course
-        low = max(begin, *(float(course.start[k]) for k in (i, watched.body) if k >= 0))
+        trajectory = self._context.state.trajectory
+        low = max(begin, *(float(trajectory.start[k]) for k in (i, watched.body) if k >= 0))
         low = min(low, end)
         count = 1
         if end > low:
@@ -182,18 +184,18 @@ class Triggers:
 
     def _speed(self, i: int, low: float, high: float, reach: float | None = None) -> float:
         """Bound of the speed of any point of a body on its course, m/s."""
-        course = self._context.state.course
-        if i < 0 or course.mode[i] == FIXED:
+        trajectory = self._context.state.trajectory
+        if i < 0 or trajectory.mode[i] == FIXED:
             return 0.0
         reach = float(self._context.world.bound_radius[i]) if reach is None else reach
-        fall = float(np.linalg.norm(course.acceleration[i])) * (high - float(course.start[i]))
-        spin = float(np.linalg.norm(course.angular_velocity[i])) * (reach if np.isfinite(reach) else 0.0)
-        return float(np.linalg.norm(course.velocity[i])) + fall + spin
+        fall = float(np.linalg.norm(trajectory.acceleration[i])) * (high - float(trajectory.start[i]))
+        spin = float(np.linalg.norm(trajectory.angular_velocity[i])) * (reach if np.isfinite(reach) else 0.0)
+        return float(np.linalg.norm(trajectory.velocity[i])) + fall + spin
 
     def _body(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Principal frame of a body."""
         x, q = np.empty(3), np.empty(4)
-        pose_at(self._context.state.course, i, max(time, float(self._context.state.course.start[i])), x, q)
+        pose_at(self._context.state.trajectory, i, max(time, float(self._context.state.trajectory.start[i])), x, q)
         return x, q / np.linalg.norm(q)
 
     def _pose(self, watched: _Watched, time: float) -> tuple[np.ndarray, np.ndarray]:

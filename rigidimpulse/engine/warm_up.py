@@ -21,29 +21,29 @@ from rigidimpulse.core.kernels import is_cached
 logger = logging.getLogger("rigidimpulse")
 SECONDS_OF_A_KIND = 20
 """s that compiling one kind of kernels takes, about."""
-CYLINDERS, CONTACTS, EVENTS, HEAPS, JOINTS = "cylinders", "contacts", "impacts of balls", "heaps", "joints"
+CYLINDERS, CONTACTS, EVENTS, SUBSTEPPED, JOINTS = "cylinders", "contacts", "impacts of balls", "sub-stepped islands", "joints"
 LAST = {
     CONTACTS: ("engine.touching", "contacts_of_pairs"),
     EVENTS: ("engine.spheres.flight", "fly"),
-    HEAPS: ("dynamics.solvers.tgs_soft.solver", "advance"),
+    SUBSTEPPED: ("dynamics.solvers.tgs_soft.solver", "advance"),
     JOINTS: ("dynamics.constraints.joint_sub_step", "close_at_end"),
 }
 """The kernel of each kind that is compiled last."""
 STEP = 1.0 / 60.0
 
 
-def prepare_kernels(world, with_events: bool, with_heaps: bool) -> None:
+def prepare_kernels(world, with_events: bool, with_substepped: bool) -> None:
     """Say so and compile on several cores what a run needs, where this machine has never run these sources."""
-    missing = kernels_to_compile(world, with_events, with_heaps)
+    missing = kernels_to_compile(world, with_events, with_substepped)
     if missing:
         kinds, seconds = ", ".join(missing), SECONDS_OF_A_KIND * len(missing)
         logger.warning(f"compiling kernels ({kinds}) for the first run on this machine, once: this takes about {seconds} s")
         compile_kernels(world, missing)
 
 
-def kernels_to_compile(world, with_events: bool, with_heaps: bool) -> list[str]:
+def kernels_to_compile(world, with_events: bool, with_substepped: bool) -> list[str]:
     """Kinds of kernels that a run of a world needs and that do not lie in the cache: what is compiled last of each tells."""
-    needed = {CONTACTS: world.can_collide, EVENTS: with_events, HEAPS: with_heaps, JOINTS: bool(world.joints_of_scene)}
+    needed = {CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: bool(world.joints_of_scene)}
     missing = []
     for kind, (module, name) in LAST.items():
         if needed[kind] and not is_cached(getattr(import_module(f"rigidimpulse.{module}"), name)):
@@ -115,14 +115,14 @@ def _respond_and_detect(context) -> None:
     """Impulses first: by then the other process has rows and what moves bodies in the cache, which these need too."""
     from rigidimpulse.dynamics.constraints.contact import hold_contacts
     from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
-    from rigidimpulse.dynamics.constraints.position_correction import needs_lift
+    from rigidimpulse.dynamics.constraints.position_correction import needs_correction
     from rigidimpulse.dynamics.constraints.rows import make_rows
     from rigidimpulse.dynamics.impact.restitution import LAWS
     from rigidimpulse.dynamics.impact.sequence import respond_sequential
     from rigidimpulse.dynamics.solvers.newton import solve_newton
     from rigidimpulse.engine.exact.impacts import respond_to_impacts
-    from rigidimpulse.engine.pair_events import Window
-    from rigidimpulse.engine.simulate import start_courses
+    from rigidimpulse.engine.pair_events import PairEvents
+    from rigidimpulse.engine.simulate import start_trajectories
     from rigidimpulse.engine.touching import bring_gyroscopic, refresh_pose
     from rigidimpulse.recording.contact_log import fill_contacts_and_forces
 
@@ -130,9 +130,9 @@ def _respond_and_detect(context) -> None:
     members = np.array([1])
     now.inv_inertia[1] = np.eye(3)
     respond_sequential(now, contacts, LAWS["auto"], False, one, 1.0, 1.0, context.column, None, context.impact_log)
-    needs_lift(contacts, np.ones(1, bool), one)
-    refresh_pose(members, now, state.rotation, state.course.inertia)
-    bring_gyroscopic(members, now, state.rotation, state.course.inertia, context.angular_acceleration)
+    needs_correction(contacts, np.ones(1, bool), one)
+    refresh_pose(members, now, state.rotation, state.trajectory.inertia)
+    bring_gyroscopic(members, now, state.rotation, state.trajectory.inertia, context.angular_acceleration)
     fill_contacts_and_forces(contacts, now.position, np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)))
     motion = contact_motion(
         world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
@@ -142,12 +142,12 @@ def _respond_and_detect(context) -> None:
         _leave_unsolved, now, contacts, members, motion.turning, np.zeros(1), context.acceleration, context.angular_acceleration,
         1.0, 1.0, context.column, np.zeros((1, 3)), context.wrench,
     )
-    start_courses(context)
-    window = Window(context, 1.0 / 60.0)
-    window.find_pairs()
-    groups, _ = window.touching(0.0, members)
-    group = groups[0]
-    respond_to_impacts(context, group, respond_sequential, LAWS["auto"])
+    start_trajectories(context)
+    pair_events = PairEvents(context, 1.0 / 60.0)
+    pair_events.find_pairs()
+    islands, _ = pair_events.touching(0.0, members)
+    island = islands[0]
+    respond_to_impacts(context, island, respond_sequential, LAWS["auto"])
 
 
 def _leave_unsolved(_rows, _n: int, _target: float) -> float:
@@ -177,61 +177,61 @@ def _fill_rows(context) -> None:
 
 def _move(context) -> None:
     from rigidimpulse.collision.time_of_impact import bisection
-    from rigidimpulse.engine.exact.trajectories import set_touch_gaps
-    from rigidimpulse.engine.pair_events import Window
-    from rigidimpulse.engine.simulate import start_courses
+    from rigidimpulse.engine.exact.trajectories import set_impact_margins
+    from rigidimpulse.engine.pair_events import PairEvents
+    from rigidimpulse.engine.simulate import start_trajectories
     from rigidimpulse.engine.touching import bring_all
     from rigidimpulse.motion.trajectory import FREE, take
 
     state, now, world = context.state, context.state.now, context.world
     zero = np.zeros(1)
-    start_courses(context)
-    context.recorder.start(state.course)
-    bring_all(state.course, np.array([1]), 0.0, now, state.rotation, context.acceleration, context.angular_acceleration)
-    take(state.course, 1, 0.0, now, *np.zeros((4, 3)), FREE)
-    window = Window(context, 1.0 / 60.0)
-    window.find_pairs()
-    window.change_course(1, 0.0)
-    set_touch_gaps(window.pairs, np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool), 0.0, world.dynamic, window.inside)
-    bisection.sweep(context.detector, state.course, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
+    start_trajectories(context)
+    context.recorder.start(state.trajectory)
+    bring_all(state.trajectory, np.array([1]), 0.0, now, state.rotation, context.acceleration, context.angular_acceleration)
+    take(state.trajectory, 1, 0.0, now, *np.zeros((4, 3)), FREE)
+    pair_events = PairEvents(context, 1.0 / 60.0)
+    pair_events.find_pairs()
+    pair_events.trajectory_changed(1, 0.0)
+    set_impact_margins(pair_events.pairs, np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool), 0.0, world.dynamic, pair_events.inside)
+    bisection.sweep(context.detector, state.trajectory, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
 
 
-def _look_at_heap(context) -> None:
+def _find_substepped_contacts(context) -> None:
     """What comes before the solver of heaps: pairs and their contacts."""
-    from rigidimpulse.engine.regime import islands, refusals
-    from rigidimpulse.engine.substepped.contact_forces import HeapStepper
+    from rigidimpulse.engine.regime import island_roots, refusals
+    from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 
     world, state, member = context.world, context.state, np.array([False, True])
     state.now.inv_inertia[1] = np.eye(3)
-    stepper = HeapStepper(world, world.dynamic, finer=False)
+    stepper = ContactStepper(world, world.dynamic, finer=False)
     for _ in range(2):  # The second time there is a cover.
         stepper.set_up(context, np.array([1]), np.array([0]), STEP)
     stepper.near(context, member, ~member, STEP)
     # Columns of one row only would be another type.
     a, b = np.array([[0, 1], [0, 1]]).T
-    refusals(world, islands(world.num_bodies, a, b, member), member, ~member, member, np.zeros(world.num_bodies), a, b, True)
+    refusals(world, island_roots(world.num_bodies, a, b, member), member, ~member, member, np.zeros(world.num_bodies), a, b, True)
 
 
-def _step_heap(context) -> None:
+def _step_substepped(context) -> None:
     """The solver of heaps, and what brings bodies from step to step."""
     from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
     from rigidimpulse.engine.regime import TALL, support_levels
-    from rigidimpulse.engine.substepped.contact_forces import HeapStepper
-    from rigidimpulse.engine.substepped.trajectories import arrive, count_calm, depart, let_fly, mark_slow, most_stray
+    from rigidimpulse.engine.substepped.contact_forces import ContactStepper
+    from rigidimpulse.engine.substepped.trajectories import advance_sleep_timers, depart, end_trajectories, let_fly, mark_slow, most_stray
 
     state, now, members = context.state, context.state.now, np.array([1])
-    stepper = HeapStepper(context.world, context.world.dynamic, finer=False)
+    stepper = ContactStepper(context.world, context.world.dynamic, finer=False)
     stepper.members = members
     support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
     mark_quick(stepper.bodies, STEP, 1.0)
     out = stepper.step(context, 0.0, STEP)
     steady = context.world.steady_acceleration
-    arrive(state.course, members, 0.0, steady, now, state.rotation, context.acceleration, context.angular_acceleration)
-    depart(state.course, members, 0.0, STEP, now, out.position, out.orientation, out.velocity)
-    let_fly(state.course, members, steady)
+    end_trajectories(state.trajectory, members, 0.0, steady, now, state.rotation, context.acceleration, context.angular_acceleration)
+    depart(state.trajectory, members, 0.0, STEP, now, out.position, out.orientation, out.velocity)
+    let_fly(state.trajectory, members, steady)
     mark_slow(now, stepper.inner, 1.0, 1.0, np.array([False, True]))
     most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin, 0.5)
-    count_calm(
+    advance_sleep_timers(
         members, out.position, out.orientation, out.velocity, context.world.steady_strength, stepper.inner, stepper.skin, STEP,
         np.zeros((2, 7)), np.zeros(2),
     )  # fmt: skip
@@ -268,7 +268,7 @@ def _close_and_stop_joints(context) -> None:
 
 def _fly(_context) -> None:
     """The event kernel; it knows balls only."""
-    from rigidimpulse.engine.simulate import start_courses
+    from rigidimpulse.engine.simulate import start_trajectories
     from rigidimpulse.engine.spheres.run import EventRun
     from rigidimpulse.model.state import StepContext
     from rigidimpulse.model.world import compile_scene
@@ -280,14 +280,14 @@ def _fly(_context) -> None:
 
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static"), Body("ball", Shape.sphere(1.0), position=(0, 0, 9))])
     context = StepContext(compile_scene(scene), Recorder(np.zeros(1), 2), EventLog())
-    start_courses(context)
+    start_trajectories(context)
     EventRun(context).fly(1.0)
 
 
 PARTS = {
     CONTACTS: (_respond_and_detect, _move_and_sweep),
     EVENTS: (_fly,),
-    HEAPS: (_look_at_heap, _step_heap),
+    SUBSTEPPED: (_find_substepped_contacts, _step_substepped),
     JOINTS: (_start_joints, _close_and_stop_joints),
 }
 """What is compiled at once, by kind; each gets a context."""

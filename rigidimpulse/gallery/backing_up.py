@@ -35,7 +35,7 @@ from rigidimpulse.scene.shape import Shape
 GRAVITY, LENGTH, RADIUS, DENSITY = 9.81, 0.6, 0.07, 700.0
 BATONS = {"slow": (1.0, -3.0, 2.0, 0.5), "quick": (1.3, -5.0, 9.0, 0.3), "whirling": (1.6, -4.0, 17.0, 1.0), "fast": (1.9, -12.0, 6.0, 0.2)}
 """z0 m, v_z m/s, w rad/s, a0 rad of each."""
-LANE, ALONG = 0.6, 0.8
+TRACK, ALONG = 0.6, 0.8
 """m between batons, and m/s along the floor."""
 STEP = 1.0 / 60.0
 DURATION = 1.25
@@ -53,7 +53,7 @@ def scene() -> Scene:
         # A capsule lies along z: a quarter turn about y lays it along x, and `angle` more raises one of its ends.
         turn = quaternion_from_axis_angle((0.0, 1.0, 0.0), 0.5 * math.pi + angle)
         motion: dict[str, Any] = {"velocity": (ALONG, 0.0, speed), "angular_velocity": (0.0, spin, 0.0)}
-        scene.add(Body(name, baton, position=(0.0, k * LANE, height), orientation=turn, material=smooth, **motion))
+        scene.add(Body(name, baton, position=(0.0, k * TRACK, height), orientation=turn, material=smooth, **motion))
     return scene
 
 

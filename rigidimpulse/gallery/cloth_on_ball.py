@@ -40,7 +40,7 @@ def scene() -> Scene:
 
 def check(run: Recording) -> list[Check]:
     """Compare with the laws that hold whatever the folds."""
-    vertices, _ = run.net("cloth")
+    vertices, _ = run.soft_body("cloth")
     falling = run.times < np.sqrt(2.0 * (START[2] - CENTRE[2] - RADIUS - 0.03) / GRAVITY)
     parabola = START[2] - 0.5 * GRAVITY * run.times[falling] ** 2
     inside = RADIUS - np.linalg.norm(vertices - np.array(CENTRE), axis=2).min()

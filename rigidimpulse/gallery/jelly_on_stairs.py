@@ -51,7 +51,7 @@ def scene() -> Scene:
 
 def check(run: Recording) -> list[Check]:
     """Compare with the laws that hold whatever the way down."""
-    vertices, faces = run.net("jelly")
+    vertices, faces = run.soft_body("jelly")
     volume = enclosed_volume(vertices, faces)
     inside = -np.inf
     for centre, size in stairs():

@@ -28,12 +28,12 @@ from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
 GRAVITY, RADIUS, HEIGHT = 9.81, 0.08, 1.2
-LANES = {"k = 0.5": 0.5, "k = 0.7": 0.7, "k = 0.85": 0.85, "k = 1": 1.0}
+TRACKS = {"k = 0.5": 0.5, "k = 0.7": 0.7, "k = 0.85": 0.85, "k = 1": 1.0}
 """Restitution of each lane."""
 DENSITIES = {"light": 30.0, "heavy": 240_000.0}
 SPEED, SPIN = 0.9, 6.0
 """m/s along the lane, rad/s about the vertical."""
-LANE, PAIR = 0.7, 0.2
+TRACK, PAIR = 0.7, 0.2
 """m between lanes, and between the balls of a lane."""
 DURATION = 3.5
 BOUND = 1e-11
@@ -46,9 +46,9 @@ def scene() -> Scene:
     scene = Scene(gravity=(0.0, 0.0, -GRAVITY))
     scene.add(Body("floor", Shape.half_space(), motion="static"))
     ball = Shape.sphere(RADIUS)
-    for lane, (name, k) in enumerate(LANES.items()):
+    for lane, (name, k) in enumerate(TRACKS.items()):
         for side, (kind, density) in enumerate(DENSITIES.items()):
-            place = (0.0, lane * LANE + side * PAIR, RADIUS + HEIGHT)
+            place = (0.0, lane * TRACK + side * PAIR, RADIUS + HEIGHT)
             motion: dict[str, Any] = {"velocity": (SPEED, 0.0, 0.0), "angular_velocity": (0.0, 0.0, SPIN)}
             material = Material(density=density, restitution=k)
             scene.add(Body(f"{kind}, {name}", ball, position=place, material=material, **motion))
@@ -58,7 +58,7 @@ def scene() -> Scene:
 def check(run: Recording) -> list[Check]:
     """Compare times and speeds of all impacts with the closed forms, and the balls of each lane with each other."""
     checks, along, turn = [], 0.0, 0.0
-    for name, k in LANES.items():
+    for name, k in TRACKS.items():
         light, heavy = (f"{kind}, {name}" for kind in DENSITIES)
         time, approach, leaving = (_impacts(run, light)[field] for field in ("time", "approach_speed", "separation_speed"))
         times = _times(k, float(run.times[-1]))

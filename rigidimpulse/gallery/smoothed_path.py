@@ -34,7 +34,7 @@ FRICTION = 0.6
 ROCKS = 0.02
 """rad; frames change the velocity in steps of up to 0.03 m/s, on which the box rocks a little. One that tips goes on to a quarter turn."""
 DURATION = SEGMENT * (len(KEYS) - 1) + 0.5
-LANES = {"zig-zag": 0.5 * APART, "smooth": -0.5 * APART}
+TRACKS = {"zig-zag": 0.5 * APART, "smooth": -0.5 * APART}
 
 
 def path(name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -44,7 +44,7 @@ def path(name: str) -> tuple[np.ndarray, np.ndarray]:
     per_key = round(SEGMENT * RATE)
     times = np.arange((len(KEYS) - 1) * per_key + 1) / RATE
     knots = SEGMENT * np.arange(len(KEYS))
-    start = KEYS + (0.0, LANES[name], ABOVE)
+    start = KEYS + (0.0, TRACKS[name], ABOVE)
     straight = np.stack([np.interp(times, knots, along) for along in start.T], axis=1)
     if name == "zig-zag":
         return times, straight
@@ -59,7 +59,7 @@ def scene() -> Scene:
     scene = Scene(gravity=(0.0, 0.0, -GRAVITY))
     scene.add(Body("floor", Shape.half_space(), motion="static", material=wood))
     tray, box, dot = Shape.box((TRAY, TRAY, THICK)), Shape.box((WIDTH, WIDTH, HEIGHT)), Shape.sphere(0.018)
-    for name in LANES:
+    for name in TRACKS:
         times, places = path(name)
         # Straight lines need no frames between their ends.
         step = round(SEGMENT * RATE) if name == "zig-zag" else 1
@@ -76,7 +76,7 @@ def check(run: Recording) -> list[Check]:
     """Compare the smooth path with the clamped spline, and what the boxes do with the accelerations."""
     limit = GRAVITY * WIDTH / HEIGHT
     spline, acceleration = _spline(run.times)
-    tray = run.position("tray, smooth") - (0.0, LANES["smooth"], ABOVE)
+    tray = run.position("tray, smooth") - (0.0, TRACKS["smooth"], ABOVE)
     carried = run.position("box, smooth") - run.position("tray, smooth")
     lean = 2.0 * np.arccos(np.clip(np.abs(run.orientation("box, smooth")[:, 0]), 0.0, 1.0))
     fallen = run.position("box, zig-zag")[-1, 2]

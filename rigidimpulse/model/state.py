@@ -11,26 +11,26 @@ from rigidimpulse.collision.contact_buffer import ContactBuffer
 from rigidimpulse.collision.geometry import Geometry
 from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch, make_scratch
 from rigidimpulse.core.quaternion import to_matrix
-from rigidimpulse.dynamics.constraints.energy_limit import Ground, note_arrival
+from rigidimpulse.dynamics.constraints.energy_limit import Ground, note_end_energy
 from rigidimpulse.dynamics.constraints.rattle import PairForce
 from rigidimpulse.dynamics.impact.point import BodyState
 from rigidimpulse.dynamics.solvers.qp import row_solver
 from rigidimpulse.engine.exact.joints import JointState
-from rigidimpulse.engine.exact.step_size import Foresight
+from rigidimpulse.engine.exact.step_size import ErrorEstimate
 from rigidimpulse.engine.islands import NO_FORCE
-from rigidimpulse.engine.regime import why_no_heaps
-from rigidimpulse.engine.substepped.advance import Heaps
+from rigidimpulse.engine.regime import why_not_substepped
+from rigidimpulse.engine.substepped.advance import SubsteppedIslands
 from rigidimpulse.engine.touching import bring_all
 from rigidimpulse.model.world import World
-from rigidimpulse.motion.trajectory import Course, make_course, pose_at
+from rigidimpulse.motion.trajectory import Trajectories, make_trajectories, pose_at
 from rigidimpulse.recording.contact_log import ContactLog
 from rigidimpulse.recording.events import EventLog
-from rigidimpulse.recording.impulses import ImpulseBook
+from rigidimpulse.recording.impulses import ImpulseAccounts
 from rigidimpulse.recording.recorder import Recorder
 
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.varying import VaryingForces
-    from rigidimpulse.dynamics.soft_body.in_run import RunningNets
+    from rigidimpulse.dynamics.soft_body.in_run import RunningSoftBodies
     from rigidimpulse.engine.triggers import Triggers
 
 LOG_CAPACITY = 4096
@@ -43,7 +43,7 @@ class State:
         time: s, every body's course is known from here on.
         course: path of every body since its last change of course.
         now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
-        energy_at_start, arrival_energy: J, of bodies under contact forces, when their course began and when it was looked at.
+        energy_at_start, end_energy: J, of bodies under contact forces, when their course began and when it was looked at.
         under_contact: (n,) bool, bodies whose course carries contact forces.
         sharing: (n,) first body of the group whose forces bodies under contact share. closed: (n,) bool, whether those make no
             energy. ground: by that first body, what stands by the group.
@@ -57,7 +57,7 @@ class State:
     def __init__(self, world: World) -> None:
         n = world.num_bodies
         self.time = 0.0
-        self.course: Course = make_course(n)
+        self.trajectory: Trajectories = make_trajectories(n)
         self.now = BodyState(
             position=world.position.copy(),
             orientation=world.orientation.copy(),
@@ -77,12 +77,12 @@ class State:
         self.sharing = np.zeros(n, np.int64)
         self.closed = np.zeros(n, bool)
         self.ground: dict[int, Ground] = {}
-        self.arrival_energy: dict[int, float] = {}
+        self.end_energy: dict[int, float] = {}
 
     def force_of(self, key: tuple[int, ...]) -> np.ndarray:
         """Force (3,) N that a contact carries until now, in its frame; zeros if its bodies have parted since."""
         force, time = self.contact_force.get(key, (NO_FORCE, -np.inf))
-        return force if time >= max(self.course.start[key[0]], self.course.start[key[1]]) else NO_FORCE
+        return force if time >= max(self.trajectory.start[key[0]], self.trajectory.start[key[1]]) else NO_FORCE
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class StepContext:
         self.state = State(world)
         self.recorder = recorder
         self.log = log
-        self.impulses = ImpulseBook(recorder.times)
+        self.impulses = ImpulseAccounts(recorder.times)
         self.contact_log = ContactLog(recorder.times, self.impulses)
         self.detector = Detector(world.geometry, world.shape_of_body, make_scratch(world.geometry), world.accuracy.iterations)
         self.contact_buffer = ContactBuffer()
@@ -115,30 +115,30 @@ class StepContext:
         self.wrench = np.zeros((n, 6))
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
-        self.foresight = Foresight(world)
+        self.error_estimate = ErrorEstimate(world)
         self.solve_rows = row_solver(world.accuracy.contact_solver)
         self.joints = JointState(world) if world.joints_of_scene else None
         self.forces: VaryingForces | None = None
-        self.nets: RunningNets | None = None
+        self.soft_bodies: RunningSoftBodies | None = None
         self.triggers: Triggers | None = None
-        self.heaps = None if why_no_heaps(world) else Heaps(world)
+        self.substepped = None if why_not_substepped(world) else SubsteppedIslands(world)
 
     def bring(self, i: int, time: float) -> None:
         """Bring body i to `time` on its course."""
         state = self.state
-        bring_all(state.course, np.array([i]), time, state.now, state.rotation, self.acceleration, self.angular_acceleration)
-        note_arrival(self, [i])
+        bring_all(state.trajectory, np.array([i]), time, state.now, state.rotation, self.acceleration, self.angular_acceleration)
+        note_end_energy(self, [i])
 
     def pose_matrix(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Position (3,) and rotation matrix (3, 3) of body i at `time` on its present course."""
         x, q = np.empty(3), np.empty(4)
-        pose_at(self.state.course, i, time, x, q)
+        pose_at(self.state.trajectory, i, time, x, q)
         return x, to_matrix(q)
 
     def quarantine(self, i: int, time: float) -> None:
         """Freeze a body whose state stopped being finite where its course last was, and report it."""
-        now, course = self.state.now, self.state.course
-        pose_at(course, i, time, now.position[i], now.orientation[i])
+        now, trajectory = self.state.now, self.state.trajectory
+        pose_at(trajectory, i, time, now.position[i], now.orientation[i])
         now.velocity[i] = now.angular_velocity[i] = 0.0
         self.log.report(
             time, "not finite", (self.world.names[i],),

@@ -46,10 +46,10 @@ class World:
         rolling: (k, k, 2) m, rolling and spinning friction, see material.combine_rolling; None where there is none.
         flat: (n,) bool, has faces or rims that must not touch those of another at gap 0.
         half_space, ball: (n,) bool, the shape is half spaces only; one sphere about the centre of mass.
-        touch_gap: gap at which faces and rims meet, as a fraction of the smaller body's size.
+        impact_margin: gap at which faces and rims meet, as a fraction of the smaller body's size.
         apart: (p,) pairs a * n + b, a < b, ascending, that do not touch each other by a joint or by their collision filters.
         joints_of_scene: the joints as written. left_out: names of effects that the caller leaves out.
-        contact_gap: gap at which lasting contacts are held, as a fraction of the smaller body's size.
+        contact_margin: gap at which lasting contacts are held, as a fraction of the smaller body's size.
 
     """
 
@@ -83,8 +83,8 @@ class World:
     flat: np.ndarray
     half_space: np.ndarray
     ball: np.ndarray
-    contact_gap: float
-    touch_gap: float
+    contact_margin: float
+    impact_margin: float
     apart: np.ndarray
     joints_of_scene: list[Joint]
     left_out: frozenset[str]
@@ -105,10 +105,10 @@ class World:
         return np.linalg.norm(self.steady_acceleration, axis=1)
 
     @cached_property
-    def largest_delta(self) -> float:
+    def largest_contact_margin(self) -> float:
         """Largest gap at which any contact is held, m."""
         finite = self.size[np.isfinite(self.size)]
-        return self.contact_gap * float(finite.max()) if len(finite) else 0.0
+        return self.contact_margin * float(finite.max()) if len(finite) else 0.0
 
     @cached_property
     def force_tables(self) -> list[ForceTable]:
@@ -169,10 +169,10 @@ class World:
         place = np.searchsorted(self.apart, key)
         return (self.apart[np.minimum(place, len(self.apart) - 1)] == key) if len(self.apart) else np.zeros(np.shape(key), bool)
 
-    def least_touch(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    def least_impact_margin(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Gap at which contact of new pairs is declared, m: 0 where normals are well defined at gap 0."""
         size = np.minimum(self.size[a], self.size[b])
-        return np.where(self.flat[a] & self.flat[b], self.touch_gap * size, 0.0)
+        return np.where(self.flat[a] & self.flat[b], self.impact_margin * size, 0.0)
 
     def body_pose(self, i: int, position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pose of the body's own origin and axes from principal-frame poses (f, 3), (f, 4)."""
@@ -229,8 +229,8 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         flat=_has_faces(geometry, shape_of_body),
         half_space=np.array([_all_half_spaces(geometry, k) for k in shape_of_body], bool),
         ball=np.array([_is_ball(geometry, k) for k in shape_of_body], bool),
-        contact_gap=TOLERANCES.contact_gap,
-        touch_gap=TOLERANCES.touch_gap,
+        contact_margin=TOLERANCES.contact_margin,
+        impact_margin=TOLERANCES.impact_margin,
         apart=_pairs_apart(joints, bodies, dynamic),
         joints_of_scene=joints,
         left_out=left_out,

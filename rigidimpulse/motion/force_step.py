@@ -35,25 +35,25 @@ import numpy as np
 from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.dynamics.impact.point import BodyState
 from rigidimpulse.engine.touching import bring, bring_all
-from rigidimpulse.motion.trajectory import FORCED, FREE, make_course, take
+from rigidimpulse.motion.trajectory import FORCED, FREE, make_trajectories, take
 
 Stage = tuple[np.ndarray, np.ndarray]
 
 
 @jit_making_arrays
-def fly(course, members, elapsed, bodies, steady, wrench, out, rotation, acceleration, angular_acceleration):
+def fly(trajectory, members, elapsed, bodies, steady, wrench, out, rotation, acceleration, angular_acceleration):
     """Where the members (k,) are after elapsed (n,) s under constant wrenches (n, 6) and steady accelerations (n, 3); from `bodies`."""
     zero, pull = np.zeros(3), np.empty(3)
     for i in members:
         for k in range(3):
             pull[k] = steady[i, k] + bodies.inv_mass[i] * wrench[i, k]
         turned = wrench[i, 3] != 0.0 or wrench[i, 4] != 0.0 or wrench[i, 5] != 0.0
-        take(course, i, -elapsed[i], bodies, pull, wrench[i, 3:], zero, zero, FORCED if turned else FREE)
-        bring(course, i, 0.0, out, rotation, acceleration, angular_acceleration)
+        take(trajectory, i, -elapsed[i], bodies, pull, wrench[i, 3:], zero, zero, FORCED if turned else FREE)
+        bring(trajectory, i, 0.0, out, rotation, acceleration, angular_acceleration)
 
 
 @jit_making_arrays
-def follow(course, members, bodies, steady, value, rate):
+def follow(trajectory, members, bodies, steady, value, rate):
     """Let the members (k,) go from `bodies`, at time 0, along lines of force (n, 6) that change by rate (n, 6) a second."""
     pull, jerk = np.empty(3), np.empty(3)
     for i in members:
@@ -63,16 +63,16 @@ def follow(course, members, bodies, steady, value, rate):
         turned = False
         for k in range(3, 6):
             turned = turned or value[i, k] != 0.0 or rate[i, k] != 0.0
-        take(course, i, 0.0, bodies, pull, value[i, 3:], jerk, rate[i, 3:], FORCED if turned else FREE)
+        take(trajectory, i, 0.0, bodies, pull, value[i, 3:], jerk, rate[i, 3:], FORCED if turned else FREE)
 
 
-class Room:
+class Workspace:
     """Room for the states of a step's stages."""
 
-    def __init__(self, course, inv_mass: np.ndarray) -> None:
+    def __init__(self, trajectory, inv_mass: np.ndarray) -> None:
         """Of the bodies of a course."""
         n = len(inv_mass)
-        self.course = make_course(n)._replace(inertia=course.inertia)
+        self.trajectory = make_trajectories(n)._replace(inertia=trajectory.inertia)
         self.bodies = BodyState(
             np.empty((n, 3)), np.empty((n, 4)), np.empty((n, 3)), np.empty((n, 3)), inv_mass, np.zeros((n, 3, 3))
         )
@@ -81,7 +81,7 @@ class Room:
 
     def fly(self, members, elapsed, bodies: BodyState, steady, wrench) -> None:
         """Bring the members to where they are after elapsed (n,) s (see `fly`)."""
-        fly(self.course, members, elapsed, bodies, steady, wrench, self.bodies, self.rotation, *self._unused)
+        fly(self.trajectory, members, elapsed, bodies, steady, wrench, self.bodies, self.rotation, *self._unused)
 
     def stay(self, members, bodies: BodyState, rotation) -> None:
         """Leave the members where they are."""
@@ -92,11 +92,11 @@ class Room:
 
     def follow(self, members, bodies: BodyState, steady, value, rate) -> None:
         """Let the members go along lines of force (see `follow`), for `look`."""
-        follow(self.course, members, bodies, steady, value, rate)
+        follow(self.trajectory, members, bodies, steady, value, rate)
 
     def look(self, members, elapsed: float) -> None:
         """Bring the members to where the lines lead them after a time."""
-        bring_all(self.course, members, elapsed, self.bodies, self.rotation, *self._unused)
+        bring_all(self.trajectory, members, elapsed, self.bodies, self.rotation, *self._unused)
 
     def fly_speeds(self, members, elapsed, bodies: BodyState, steady, wrench) -> None:
         """The same for the velocities alone."""
@@ -114,7 +114,7 @@ class Lines(NamedTuple):
     off: np.ndarray
 
 
-def nystroem(evaluate: Callable, room: Room, first: Stage, members, h: np.ndarray, bodies: BodyState, steady) -> tuple[Lines, Lines]:
+def nystroem(evaluate: Callable, room: Workspace, first: Stage, members, h: np.ndarray, bodies: BodyState, steady) -> tuple[Lines, Lines]:
     """Lines of the forces over a step, of each row (k, 6) and of their sums (n, 6) on bodies.
 
     evaluate(share, bodies, rotation) -> the same as `first`, after that share of the step; first: forces of rows and their sums at the

@@ -20,11 +20,11 @@ import math
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import exponential, from_columns, product, rotated
-from rigidimpulse.motion import free_rotation as free_top
+from rigidimpulse.motion import free_rotation as free_rotation
 
 ORDER = 18
 """order of the series: a higher one costs more at the start and less beyond the first segment, which grows with it"""
-FORCED_AXIS, FORCED = 4.0, 5.0  # kinds of rotation, after those of free_top
+FORCED_AXIS, FORCED = 4.0, 5.0  # kinds of rotation, after those of free_rotation
 
 KIND = 0
 BASE = 1  # (4,) orientation at the start
@@ -39,7 +39,7 @@ SEGMENT = 10  # s
 _TORQUE_RATE = 11  # |tau1|
 _RATE_ALONG = 12  # p
 _RATE_ACROSS = 13  # r
-FORCED_TOP_SIZE = 14
+FORCED_ROTATION_SIZE = 14
 _STRIDE = 9
 """coefficients of one order: of w, e_1, e_2"""
 SERIES_SIZE = _STRIDE * (ORDER + 1)
@@ -201,7 +201,7 @@ def _parallel(ax, ay, az, bx, by, bz):
 
 @jit
 def prepare(inertia, q, w_world, torque, torque_rate, constants_out, series_out):
-    """Write constants (FORCED_TOP_SIZE,) and series (SERIES_SIZE,) of the motion from orientation q (4,) and angular velocity (3,), rad/s.
+    """Write constants (FORCED_ROTATION_SIZE,) and series (SERIES_SIZE,) of the motion from orientation q (4,) and spin (3,), rad/s.
 
     `w_world`, `torque` (3,), N m, and `torque_rate` (3,), N m/s, are in the world; `inertia` (3,): principal moments,
     kg m^2, all > 0. Returns False and writes nothing if torque and rate are none: then the body is a free top.
@@ -271,13 +271,13 @@ def _last_segment(constants, coefficients, t):
 
 @jit_making_arrays
 def rotation(constants, series, t):
-    """Quaternion and world angular velocity t seconds after the start, as seven numbers; for rows of free_top too.
+    """Quaternion and world angular velocity t seconds after the start, as seven numbers; for rows of free_rotation too.
 
     NaN if the body turns so fast, for so long, that it would take more than _MOST_SEGMENTS.
     """
     c = constants
     if c[KIND] < FORCED_AXIS:
-        return free_top.rotation(c, t)
+        return free_rotation.rotation(c, t)
     if c[KIND] == FORCED:
         if t > c[SEGMENT]:
             c, series, t = _last_segment(c, series, t)

@@ -57,7 +57,7 @@ _TERMS = 4
 _MAX_LEVELS = 14
 _ARITHMETIC = 32  # (_MAX_LEVELS,) arithmetic means
 _GEOMETRIC = _ARITHMETIC + _MAX_LEVELS  # (_MAX_LEVELS,) geometric means
-FREE_TOP_SIZE = _GEOMETRIC + _MAX_LEVELS
+FREE_ROTATION_SIZE = _GEOMETRIC + _MAX_LEVELS
 
 _EQUAL = 4e-15
 """relative difference of two moments below which they are equal: rates then err by half of it, a few eps"""
@@ -332,7 +332,7 @@ def keep_axis(q, w_world, constants_out):
 
 @jit
 def prepare(inertia, q, w_world, constants_out):
-    """Write the constants (FREE_TOP_SIZE,) of the motion from orientation q (4,) and angular velocity (3,), rad/s.
+    """Write the constants (FREE_ROTATION_SIZE,) of the motion from orientation q (4,) and angular velocity (3,), rad/s.
 
     `w_world` is in the world. `inertia` (3,): principal moments, kg m^2, all > 0; any ratios.
     """

@@ -53,28 +53,28 @@ class KeyframePaths:
 
     def start_segments(self, context, time: float) -> None:
         """Put bodies whose key is at or before `time` on their new course, and let go those whose time it is."""
-        course = context.state.course
+        trajectory = context.state.trajectory
         while self._next < len(self.segments) and self.segments[self._next][0] <= time:
             start, i, pose = self.segments[self._next]
             self._next += 1
-            context.recorder.flush(course, i, start, np.zeros(6))
+            context.recorder.flush(trajectory, i, start, np.zeros(6))
             if pose is None:
                 _let_go(context, i, start)
             else:
                 x, q, v, w = pose
-                course.start[i], course.mode[i] = start, PRESCRIBED
-                course.position[i], course.orientation[i] = x, q
-                course.velocity[i], course.angular_velocity[i] = v, w
-                begin(course, i)
+                trajectory.start[i], trajectory.mode[i] = start, PRESCRIBED
+                trajectory.position[i], trajectory.orientation[i] = x, q
+                trajectory.velocity[i], trajectory.angular_velocity[i] = v, w
+                begin(trajectory, i)
 
 
 def _let_go(context, i: int, time: float) -> None:
     """Body i is dynamic from `time` on."""
-    world, course, now = context.world, context.state.course, context.state.now
-    state_at(course, i, time, now.position[i], now.orientation[i], now.velocity[i], now.angular_velocity[i])
+    world, trajectory, now = context.world, context.state.trajectory, context.state.now
+    state_at(trajectory, i, time, now.position[i], now.orientation[i], now.velocity[i], now.angular_velocity[i])
     world.dynamic[i], world.moving[i], world.inv_mass[i] = True, False, 1.0 / world.mass[i]
-    course.position[i], course.orientation[i] = now.position[i], now.orientation[i]
-    course.velocity[i], course.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]
-    course.acceleration[i], course.start[i], course.mode[i] = world.steady_acceleration[i], time, FREE
-    begin(course, i)
-    context.log.book(time, "let go", mechanical_energy(now, world, np.array([i])))
+    trajectory.position[i], trajectory.orientation[i] = now.position[i], now.orientation[i]
+    trajectory.velocity[i], trajectory.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]
+    trajectory.acceleration[i], trajectory.start[i], trajectory.mode[i] = world.steady_acceleration[i], time, FREE
+    begin(trajectory, i)
+    context.log.account(time, "let go", mechanical_energy(now, world, np.array([i])))

@@ -4,8 +4,8 @@
     rotation, by mode:
       FIXED        none, the body never moves
       PRESCRIBED   q(t) = exp(w0 s) q0, constant velocity and world angular velocity (its acceleration must be 0)
-      FREE         no torque: closed form (free_top)
-      FORCED       world torque tau0 + tau1 s: power series (forced_top)
+      FREE         no torque: closed form (free_rotation)
+      FORCED       world torque tau0 + tau1 s: power series (forced_rotation)
       STEPPED      as PRESCRIBED, but for a constant acceleration: the way to a pose that a heap's solver found; the body's own
                    velocities run from those at the start to those at the end of the step
 
@@ -29,18 +29,18 @@ import numpy as np
 from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.quaternion import exponential, product
-from rigidimpulse.motion import forced_rotation as forced_top
-from rigidimpulse.motion import free_rotation as free_top
+from rigidimpulse.motion import forced_rotation as forced_rotation
+from rigidimpulse.motion import free_rotation as free_rotation
 
-FIXED, PRESCRIBED, FREE, FORCED, STEPPED = 0, 1, 2, 3, 4
+FIXED, PRESCRIBED, FREE, FORCED, LINEAR = 0, 1, 2, 3, 4
 
 SPEEDS, LENGTH = 8, 20
 """Places in a row of `Course.top` in mode STEPPED, after the constants of a fixed axis: see `Course.stepped`."""
-JERK, TORQUE_RATE, TOP_SIZE = max(free_top.FREE_TOP_SIZE, forced_top.FORCED_TOP_SIZE) + np.array([0, 3, 6])
+JERK, TORQUE_RATE, TOP_SIZE = max(free_rotation.FREE_ROTATION_SIZE, forced_rotation.FORCED_ROTATION_SIZE) + np.array([0, 3, 6])
 """Places in a row of `Course.top`, and its length. The constants of the rotation come first."""
 
 
-class Course(NamedTuple):
+class Trajectories(NamedTuple):
     """Paths of n bodies; see the head of the file. Vectors in the world frame, inertia in the principal frame."""
 
     start: np.ndarray
@@ -83,7 +83,7 @@ class Course(NamedTuple):
         return self.top[:, TORQUE_RATE:]
 
 
-def make_course(num_bodies: int) -> Course:
+def make_trajectories(num_bodies: int) -> Trajectories:
     """A course of `num_bodies` bodies, all FIXED at the origin at time 0, with unit inertia."""
     orientation = np.zeros((num_bodies, 4))
     orientation[:, 0] = 1.0
@@ -91,7 +91,7 @@ def make_course(num_bodies: int) -> Course:
     def vectors() -> np.ndarray:
         return np.zeros((num_bodies, 3))
 
-    return Course(
+    return Trajectories(
         start=np.zeros(num_bodies),
         position=vectors(),
         orientation=orientation,
@@ -102,54 +102,54 @@ def make_course(num_bodies: int) -> Course:
         mode=np.zeros(num_bodies, dtype=np.int64),
         inertia=np.ones((num_bodies, 3)),
         top=np.zeros((num_bodies, TOP_SIZE)),
-        series=reserve((num_bodies, forced_top.SERIES_SIZE), np.float64),  # of most bodies never touched
+        series=reserve((num_bodies, forced_rotation.SERIES_SIZE), np.float64),  # of most bodies never touched
     )
 
 
 @jit
-def begin(course, i):
+def begin(trajectory, i):
     """Prepare `course.top[i]`; call it after any other column of row i has changed. Rates that the mode has not are set to 0."""
-    mode = course.mode[i]
-    if mode == PRESCRIBED or mode == STEPPED:
-        begin_straight(course, i)
+    mode = trajectory.mode[i]
+    if mode == PRESCRIBED or mode == LINEAR:
+        begin_straight(trajectory, i)
         return
     if mode != FORCED:
         for k in range(TORQUE_RATE if mode == FREE else JERK, TOP_SIZE):
-            course.top[i, k] = 0.0
-    inertia, q, w, top = course.inertia[i], course.orientation[i], course.angular_velocity[i], course.top[i]
-    if mode == FORCED and forced_top.prepare(inertia, q, w, course.torque[i], top[TORQUE_RATE:], top, course.series[i]):
+            trajectory.top[i, k] = 0.0
+    inertia, q, w, top = trajectory.inertia[i], trajectory.orientation[i], trajectory.angular_velocity[i], trajectory.top[i]
+    if mode == FORCED and forced_rotation.prepare(inertia, q, w, trajectory.torque[i], top[TORQUE_RATE:], top, trajectory.series[i]):
         return
     if mode == FREE or mode == FORCED:
-        free_top.prepare(inertia, q, w, top)
+        free_rotation.prepare(inertia, q, w, top)
 
 
 @inlined
-def begin_straight(course, i):
+def begin_straight(trajectory, i):
     """The same in modes PRESCRIBED and STEPPED: apart, so that it is compiled into loops over thousands of bodies."""
     for k in range(JERK, TOP_SIZE):
-        course.top[i, k] = 0.0
-    free_top.keep_axis(course.orientation[i], course.angular_velocity[i], course.top[i])
+        trajectory.top[i, k] = 0.0
+    free_rotation.keep_axis(trajectory.orientation[i], trajectory.angular_velocity[i], trajectory.top[i])
 
 
 @jit
-def take(course, i, time, bodies, acceleration, torque, jerk, torque_rate, mode):
+def take(trajectory, i, time, bodies, acceleration, torque, jerk, torque_rate, mode):
     """Let body i go on from where it is now, at `time`, in a mode.
 
     acceleration (3,) m/s^2 and torque (3,) N m at `time`, jerk (3,) m/s^3 and torque_rate (3,) N m/s from then on.
     """
-    course.start[i] = time
-    course.mode[i] = mode
+    trajectory.start[i] = time
+    trajectory.mode[i] = mode
     for k in range(3):
-        course.position[i, k] = bodies.position[i, k]
-        course.velocity[i, k] = bodies.velocity[i, k]
-        course.angular_velocity[i, k] = bodies.angular_velocity[i, k]
-        course.acceleration[i, k] = acceleration[k]
-        course.torque[i, k] = torque[k]
-        course.top[i, JERK + k] = jerk[k]
-        course.top[i, TORQUE_RATE + k] = torque_rate[k]
+        trajectory.position[i, k] = bodies.position[i, k]
+        trajectory.velocity[i, k] = bodies.velocity[i, k]
+        trajectory.angular_velocity[i, k] = bodies.angular_velocity[i, k]
+        trajectory.acceleration[i, k] = acceleration[k]
+        trajectory.torque[i, k] = torque[k]
+        trajectory.top[i, JERK + k] = jerk[k]
+        trajectory.top[i, TORQUE_RATE + k] = torque_rate[k]
     for k in range(4):
-        course.orientation[i, k] = bodies.orientation[i, k]
-    begin(course, i)
+        trajectory.orientation[i, k] = bodies.orientation[i, k]
+    begin(trajectory, i)
 
 
 @jit
@@ -167,9 +167,9 @@ def turning_points(rate, bend, growth):
 
 
 @jit
-def rate_of(course, i, which):
+def rate_of(trajectory, i, which):
     """JERK or TORQUE_RATE of body i as three numbers."""
-    return course.top[i, which], course.top[i, which + 1], course.top[i, which + 2]
+    return trajectory.top[i, which], trajectory.top[i, which + 1], trajectory.top[i, which + 2]
 
 
 @jit
@@ -192,54 +192,55 @@ def _moved(x, v, a, j, s):
 
 
 @jit
-def place_at(course, i, t, x_out):
+def place_at(trajectory, i, t, x_out):
     """Write the position (3,) of body i at the time t >= start."""
-    s = t - course.start[i] if course.mode[i] != FIXED else 0.0
+    s = t - trajectory.start[i] if trajectory.mode[i] != FIXED else 0.0
     for k in range(3):
-        x_out[k] = _moved(course.position[i, k], course.velocity[i, k], course.acceleration[i, k], course.top[i, JERK + k], s)
+        a, jerk = trajectory.acceleration[i, k], trajectory.top[i, JERK + k]
+        x_out[k] = _moved(trajectory.position[i, k], trajectory.velocity[i, k], a, jerk, s)
 
 
 @jit
-def pose_at(course, i, t, x_out, q_out):
+def pose_at(trajectory, i, t, x_out, q_out):
     """Write position (3,) and quaternion (4,) of body i at the time t >= start."""
-    place_at(course, i, t, x_out)
-    s = t - course.start[i] if course.mode[i] != FIXED else 0.0
+    place_at(trajectory, i, t, x_out)
+    s = t - trajectory.start[i] if trajectory.mode[i] != FIXED else 0.0
     if s == 0.0:
         for k in range(4):
-            q_out[k] = course.orientation[i, k]
+            q_out[k] = trajectory.orientation[i, k]
     else:
-        q_out[0], q_out[1], q_out[2], q_out[3], _, _, _ = forced_top.rotation(course.top[i], course.series[i], s)
+        q_out[0], q_out[1], q_out[2], q_out[3], _, _, _ = forced_rotation.rotation(trajectory.top[i], trajectory.series[i], s)
 
 
 @jit
-def state_at(course, i, t, x_out, q_out, v_out, w_out):
+def state_at(trajectory, i, t, x_out, q_out, v_out, w_out):
     """Write position, quaternion, velocity (3,) and world angular velocity (3,) of body i at the time t >= start."""
-    if course.mode[i] == STEPPED:
-        x, q, v, w = stepped_at(course, i, t)
+    if trajectory.mode[i] == LINEAR:
+        x, q, v, w = stepped_at(trajectory, i, t)
         x_out[0], x_out[1], x_out[2] = x
         q_out[0], q_out[1], q_out[2], q_out[3] = q
         v_out[0], v_out[1], v_out[2] = v
         w_out[0], w_out[1], w_out[2] = w
     else:
-        motion_at(course, i, t, x_out, q_out, v_out, w_out)
+        motion_at(trajectory, i, t, x_out, q_out, v_out, w_out)
 
 
 @inlined
-def stepped_at(course, i, t):
+def stepped_at(trajectory, i, t):
     """Position, quaternion, velocity and angular velocity, three and four numbers each, of body i in mode STEPPED.
 
     Heaps have thousands of such: numbers, since a view of an array costs more than what is computed.
     """
-    s = t - course.start[i]
-    top = course.top
+    s = t - trajectory.start[i]
+    top = trajectory.top
     share = min(s / top[i, LENGTH], 1.0)
     x = (
-        _moved(course.position[i, 0], course.velocity[i, 0], course.acceleration[i, 0], 0.0, s),
-        _moved(course.position[i, 1], course.velocity[i, 1], course.acceleration[i, 1], 0.0, s),
-        _moved(course.position[i, 2], course.velocity[i, 2], course.acceleration[i, 2], 0.0, s),
+        _moved(trajectory.position[i, 0], trajectory.velocity[i, 0], trajectory.acceleration[i, 0], 0.0, s),
+        _moved(trajectory.position[i, 1], trajectory.velocity[i, 1], trajectory.acceleration[i, 1], 0.0, s),
+        _moved(trajectory.position[i, 2], trajectory.velocity[i, 2], trajectory.acceleration[i, 2], 0.0, s),
     )
-    q = (course.orientation[i, 0], course.orientation[i, 1], course.orientation[i, 2], course.orientation[i, 3])
-    wx, wy, wz = course.angular_velocity[i, 0], course.angular_velocity[i, 1], course.angular_velocity[i, 2]
+    q = (trajectory.orientation[i, 0], trajectory.orientation[i, 1], trajectory.orientation[i, 2], trajectory.orientation[i, 3])
+    wx, wy, wz = trajectory.angular_velocity[i, 0], trajectory.angular_velocity[i, 1], trajectory.angular_velocity[i, 2]
     if s != 0.0 and (wx != 0.0 or wy != 0.0 or wz != 0.0):
         e0, e1, e2, e3 = exponential(s * wx, s * wy, s * wz)
         norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
@@ -258,19 +259,20 @@ def stepped_at(course, i, t):
 
 
 @jit
-def motion_at(course, i, t, x_out, q_out, v_out, w_out):
+def motion_at(trajectory, i, t, x_out, q_out, v_out, w_out):
     """The same, with the velocities of the path: those by which pose changes. They differ in mode STEPPED only."""
-    moves = course.mode[i] != FIXED
-    s = t - course.start[i] if moves else 0.0
-    mean = row_at(course.acceleration, i, rate_of(course, i, JERK), 0.5 * s)
+    moves = trajectory.mode[i] != FIXED
+    s = t - trajectory.start[i] if moves else 0.0
+    mean = row_at(trajectory.acceleration, i, rate_of(trajectory, i, JERK), 0.5 * s)
     for k in range(3):
-        x_out[k] = _moved(course.position[i, k], course.velocity[i, k], course.acceleration[i, k], course.top[i, JERK + k], s)
-        v_out[k] = course.velocity[i, k] + s * mean[k] if moves else 0.0
-        w_out[k] = course.angular_velocity[i, k] if moves else 0.0
+        a, jerk = trajectory.acceleration[i, k], trajectory.top[i, JERK + k]
+        x_out[k] = _moved(trajectory.position[i, k], trajectory.velocity[i, k], a, jerk, s)
+        v_out[k] = trajectory.velocity[i, k] + s * mean[k] if moves else 0.0
+        w_out[k] = trajectory.angular_velocity[i, k] if moves else 0.0
     if s == 0.0:
         for k in range(4):
-            q_out[k] = course.orientation[i, k]
+            q_out[k] = trajectory.orientation[i, k]
     else:
-        q0, q1, q2, q3, wx, wy, wz = forced_top.rotation(course.top[i], course.series[i], s)
+        q0, q1, q2, q3, wx, wy, wz = forced_rotation.rotation(trajectory.top[i], trajectory.series[i], s)
         q_out[0], q_out[1], q_out[2], q_out[3] = q0, q1, q2, q3
         w_out[0], w_out[1], w_out[2] = wx, wy, wz

@@ -9,7 +9,7 @@ import numpy as np
 from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.dynamics.impact.friction import tangents
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
-from rigidimpulse.recording.impulses import ImpulseBook
+from rigidimpulse.recording.impulses import ImpulseAccounts
 
 
 @jit_making_arrays
@@ -36,9 +36,9 @@ class Stretch:
 class ContactLog:
     """Collects contact forces while a run goes on; those that no frame sees are dropped."""
 
-    def __init__(self, times: np.ndarray, book: ImpulseBook) -> None:
+    def __init__(self, times: np.ndarray, accounts: ImpulseAccounts) -> None:
         """times (f,) s, of the frames; book: where impulses go."""
-        self.times, self._book = times, book
+        self.times, self._accounts = times, accounts
         self._open: dict[int, Stretch] = {}
         self._done: list[np.ndarray] = []
 
@@ -93,7 +93,7 @@ class ContactLog:
         for a, b, force in zip(rows["body_a"].tolist(), rows["body_b"].tolist(), rows["force"], strict=True):
             total[a, b] = total.get((a, b), 0.0) + force
         for (a, b), force in total.items():
-            self._book.add("contact with", a, b, float(rows["start"][0]), end, force)
+            self._accounts.add("contact with", a, b, float(rows["start"][0]), end, force)
 
     def _keep(self, rows: np.ndarray) -> None:
         seen = np.searchsorted(self.times, rows["start"]) < np.searchsorted(self.times, rows["end"])

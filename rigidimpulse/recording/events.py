@@ -105,12 +105,12 @@ class EventLog:
     stretches: list[tuple[float, float, int, float, float]] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
 
-    def book(self, time: float, cause: str, change: float) -> None:
+    def account(self, time: float, cause: str, change: float) -> None:
         """Book a change of mechanical energy [J]; negative is dissipated."""
         if change != 0.0:
             self.energy.append((time, cause, change))
 
-    def book_over(self, start: float, end: float, cause: str, change: float) -> None:
+    def account_over(self, start: float, end: float, cause: str, change: float) -> None:
         """Book a change of mechanical energy [J] that went on from start to end [s]."""
         if change != 0.0:
             self.spans.append((start, end, cause, change))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force_log import ForceWork
 
 
-class ImpulseBook:
+class ImpulseAccounts:
     """Impulses between pairs until the frames, while a run goes on; body -1 is the world."""
 
     def __init__(self, times: np.ndarray) -> None:
@@ -73,7 +73,7 @@ class Impulses:
     mass: np.ndarray
     release: np.ndarray
     velocity: np.ndarray
-    book: ImpulseBook
+    accounts: ImpulseAccounts
     forces: ForceWork | None
     impacts: np.ndarray
 
@@ -87,14 +87,14 @@ class Impulses:
         if name not in self.names:
             raise unknown_name("body", name, self.names)
         i = self.names.index(name)
-        held, gained = self._course_of(i)
+        held, gained = self._trajectory_of(i)
         parts: dict[str, np.ndarray] = {}
         for what, pull in zip(("gravity", "constant forces"), self.pull[i], strict=True):
             if np.any(pull):
                 parts[what] = held[:, None] * pull
         if self.forces is not None:
             parts.update(self.forces.impulses_on(i))
-        for (cause, other), impulse in sorted(self.book.of(i).items(), key=lambda item: item[0]):
+        for (cause, other), impulse in sorted(self.accounts.of(i).items(), key=lambda item: item[0]):
             parts[cause if other < 0 or cause.startswith("joint ") else f"{cause} {self.names[other]}"] = impulse
         parts.update(self._impacts_on(i))
         rest = gained - sum(parts.values(), np.zeros_like(gained))
@@ -102,7 +102,7 @@ class Impulses:
             parts["corrections"] = rest
         return parts
 
-    def _course_of(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+    def _trajectory_of(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """Time until each frame (f,) s, each instant counted by the body's mass over that at the end, and what it gained (f, 3) N s."""
         share = np.ones(len(self.times))
         if self.forces is not None and self.forces.mass_share is not None:

@@ -22,7 +22,9 @@ class Ledger:
         potential: (f,) J, of gravity and constant forces, zero at the world's origin.
         momentum: (f, 3) kg m/s.
         angular_momentum: (f, 3) kg m2/s about the world's origin.
-        dissipated: by cause ("impact", "contact", "capture", "lift", "joints", "guard", "heap", each force by its name, ...), (f,) J taken
+        dissipated: by cause ("impact", "contact", "stick", "position correction", "joints", "energy correction", "sub-stepping",
+            each force by its
+            name, ...), (f,) J taken
             from the bodies until each frame; a negative value is energy fed in (a moving support, a lift out of the contact margin).
 
     """

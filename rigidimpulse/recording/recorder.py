@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.core.kernels import inlined, jit
-from rigidimpulse.motion.trajectory import FIXED, STEPPED, motion_at, stepped_at
+from rigidimpulse.motion.trajectory import FIXED, LINEAR, motion_at, stepped_at
 
 
 @inlined
-def _write_stepped(course, i, times, f, position, orientation, velocity, angular_velocity):
+def _write_stepped(trajectory, i, times, f, position, orientation, velocity, angular_velocity):
     """Write frame f of body i in mode STEPPED."""
-    x, q, v, w = stepped_at(course, i, times[f])
+    x, q, v, w = stepped_at(trajectory, i, times[f])
     position[f, i, 0], position[f, i, 1], position[f, i, 2] = x
     orientation[f, i, 0], orientation[f, i, 1], orientation[f, i, 2], orientation[f, i, 3] = q
     velocity[f, i, 0], velocity[f, i, 1], velocity[f, i, 2] = v
@@ -24,33 +24,33 @@ def _write_stepped(course, i, times, f, position, orientation, velocity, angular
 
 
 @inlined
-def _write_fixed(course, i, f, position, orientation, velocity, angular_velocity):
+def _write_fixed(trajectory, i, f, position, orientation, velocity, angular_velocity):
     """Write frame f of body i in mode FIXED."""
     for k in range(3):
-        position[f, i, k] = course.position[i, k]
+        position[f, i, k] = trajectory.position[i, k]
         # Only where it is not 0: zeros that nobody has written take no memory.
         if velocity[f, i, k] != 0.0:
             velocity[f, i, k] = 0.0
         if angular_velocity[f, i, k] != 0.0:
             angular_velocity[f, i, k] = 0.0
     for k in range(4):
-        orientation[f, i, k] = course.orientation[i, k]
+        orientation[f, i, k] = trajectory.orientation[i, k]
 
 
 @jit
-def sample_paths(course, bodies, times, last, written, position, orientation, velocity, angular_velocity):
+def sample_paths(trajectory, bodies, times, last, written, position, orientation, velocity, angular_velocity):
     """Write the frames of these bodies from written[i] to last - 1, on their present courses, and say so in `written`.
 
     times (f,) s; position, orientation and velocities (f, n, ...).
     """
     for i in bodies:
         for f in range(written[i], last):
-            if course.mode[i] == STEPPED:
-                _write_stepped(course, i, times, f, position, orientation, velocity, angular_velocity)
-            elif course.mode[i] == FIXED:
-                _write_fixed(course, i, f, position, orientation, velocity, angular_velocity)
+            if trajectory.mode[i] == LINEAR:
+                _write_stepped(trajectory, i, times, f, position, orientation, velocity, angular_velocity)
+            elif trajectory.mode[i] == FIXED:
+                _write_fixed(trajectory, i, f, position, orientation, velocity, angular_velocity)
             else:
-                motion_at(course, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
+                motion_at(trajectory, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
         written[i] = max(written[i], last)
 
 
@@ -71,11 +71,11 @@ class Recorder:
         self.written = np.zeros(num_bodies, np.int64)
         self._everyone = np.arange(num_bodies)
 
-    def start(self, course) -> None:
+    def start(self, trajectory) -> None:
         """Write frame 0, the state as given."""
-        self._write(course, self._everyone, 1)
+        self._write(trajectory, self._everyone, 1)
 
-    def flush(self, course, i: int, time: float, correction: np.ndarray) -> None:
+    def flush(self, trajectory, i: int, time: float, correction: np.ndarray) -> None:
         """Write the frames of body i before `time`; its course must still be the one that led there.
 
         correction (6,): change of velocity [m/s] and spin [rad/s] that it got at the end of its course, for what the
@@ -83,22 +83,22 @@ class Recorder:
         """
         first, last = int(self.written[i]), int(np.searchsorted(self.times, time, side="left"))
         if last > first:
-            self._write(course, self._everyone[i : i + 1], last)
+            self._write(trajectory, self._everyone[i : i + 1], last)
         if last > first and np.any(correction):
-            share = ((self.times[first:last] - course.start[i]) / (time - course.start[i])) ** 2
+            share = ((self.times[first:last] - trajectory.start[i]) / (time - trajectory.start[i])) ** 2
             self.velocity[first:last, i] += share[:, None] * correction[:3]
             self.angular_velocity[first:last, i] += share[:, None] * correction[3:]
 
-    def flush_all(self, course, bodies: np.ndarray, time: float) -> None:
+    def flush_all(self, trajectory, bodies: np.ndarray, time: float) -> None:
         """Write the frames of all these bodies before `time`, as `flush` does."""
-        self._write(course, bodies, int(np.searchsorted(self.times, time, side="left")))
+        self._write(trajectory, bodies, int(np.searchsorted(self.times, time, side="left")))
 
-    def finish(self, course) -> None:
+    def finish(self, trajectory) -> None:
         """Write what is left of all bodies."""
         for last in range(int(self.written.min(initial=0)), len(self.times), AT_ONCE):
-            self.flush_all(course, self._everyone, self.times[last])
-        self.flush_all(course, self._everyone, np.inf)
+            self.flush_all(trajectory, self._everyone, self.times[last])
+        self.flush_all(trajectory, self._everyone, np.inf)
 
-    def _write(self, course, bodies: np.ndarray, last: int) -> None:
+    def _write(self, trajectory, bodies: np.ndarray, last: int) -> None:
         frames = self.position, self.orientation, self.velocity, self.angular_velocity
-        sample_paths(course, bodies, self.times, last, self.written, *frames)
+        sample_paths(trajectory, bodies, self.times, last, self.written, *frames)

@@ -99,7 +99,7 @@ class Recording:
     reactions: dict[str, np.ndarray] = field(default_factory=dict)
     contacts: np.ndarray = field(default_factory=lambda: np.zeros(0, CONTACT_DTYPE))
     by_cause: Impulses | None = None
-    nets: list[FlexibleTrack] = field(default_factory=list)
+    soft_bodies: list[FlexibleTrack] = field(default_factory=list)
     profile: Profile | None = None
     settings: RunSettings | None = None
     choice: Choice | None = None
@@ -155,17 +155,17 @@ class Recording:
         """(f, 3) m."""
         return self.centers[:, self.index(name)]
 
-    def net(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+    def soft_body(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Vertices (f, v, 3) m in the world and faces (t, 3) of a flexible body.
 
         Raises:
             SceneError: for an unknown name, listing the known ones.
 
         """
-        for track in self.nets:
+        for track in self.soft_bodies:
             if track.name == name:
                 return track.vertices, track.faces
-        raise unknown_name("flexible body", name, [track.name for track in self.nets])
+        raise unknown_name("flexible body", name, [track.name for track in self.soft_bodies])
 
     def reaction(self, name: str) -> np.ndarray:
         """(f, 3) N, force of a joint on its body b; impulses at impacts are not in it.
@@ -241,7 +241,7 @@ class Recording:
             contacts=contacts[(contacts["end"] > 0.0) & (contacts["start"] <= end - begin)],
             ledger=None if self.ledger is None else self.ledger.part(here),
             reactions={name: force[here] for name, force in self.reactions.items()},
-            nets=[replace(track, vertices=track.vertices[here]) for track in self.nets],
+            soft_bodies=[replace(track, vertices=track.vertices[here]) for track in self.soft_bodies],
             by_cause=None, settings=None,
         )  # fmt: skip
 
@@ -253,7 +253,7 @@ class Recording:
         for array in (self.times, self.positions, self.orientations, self.velocities, self.angular_velocities):
             digest.update(np.ascontiguousarray(array).tobytes())
         digest.update(np.ascontiguousarray(self.impacts).tobytes())
-        for track in self.nets:
+        for track in self.soft_bodies:
             digest.update(np.ascontiguousarray(track.vertices).tobytes())
         return digest.hexdigest()
 
@@ -323,9 +323,9 @@ class Recording:
             raise SceneError(f"{what} needs the shapes of the scene", "simulate the scene, then export or show that run")
 
     def _write_npz(self, path: Path) -> None:
-        nets: dict[str, Any] = {}
-        for number, track in enumerate(self.nets):
-            nets.update(track.arrays(number))
+        soft_bodies: dict[str, Any] = {}
+        for number, track in enumerate(self.soft_bodies):
+            soft_bodies.update(track.arrays(number))
         np.savez_compressed(
             path,
             times=self.times,
@@ -337,7 +337,7 @@ class Recording:
             center_of_mass=self.centers,
             impacts=self.impacts,
             contacts=self.contacts,
-            **nets,
+            **soft_bodies,
         )
 
 
@@ -364,7 +364,7 @@ def load_recording(path: str | os.PathLike) -> Recording:
                 centers=data["center_of_mass"],
                 impacts=data["impacts"],
                 contacts=data["contacts"],
-                nets=_nets_in(data),
+                soft_bodies=_soft_bodies_in(data),
             )
     except (OSError, KeyError, ValueError) as error:
         raise SceneError(
@@ -372,7 +372,7 @@ def load_recording(path: str | os.PathLike) -> Recording:
         ) from None
 
 
-def _nets_in(data: Any) -> list[FlexibleTrack]:
+def _soft_bodies_in(data: Any) -> list[FlexibleTrack]:
     """Flexible bodies in the arrays of a file."""
     if "net0_name" not in data:
         return []

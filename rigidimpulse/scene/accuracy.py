@@ -14,7 +14,7 @@ Slots
     contact_solver  how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for heaps of many bodies: see
                     docs/heaps.md), "qp" (the exact laws by a convex solver library: a reference), or "auto": per island of bodies
                     that may touch in a step, newton unless it is a large heap
-    heap_motion     how far touching bodies of a heap may come past each other until their contacts are looked for anew, as a fraction of
+    substep_motion     how far touching bodies of a heap may come past each other until their contacts are looked for anew, as a fraction of
                     the distance from the centre of mass to the nearest face
     step            s; contact forces are constant over it, impacts are found inside it at any time
     tolerance       gap error at an impact, as a fraction of the size of the smaller body
@@ -48,7 +48,7 @@ class Accuracy(BaseModel):
     penalty_damping: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
     integrator: Literal["exact", "semi_implicit", "runge_kutta"] = "exact"
     contact_solver: Literal["auto", "newton", "substepped", "qp"] = "auto"
-    heap_motion: float = Field(default=0.1, gt=0.0, le=1.0, allow_inf_nan=False)
+    substep_motion: float = Field(default=0.1, gt=0.0, le=1.0, allow_inf_nan=False)
     step: float = Field(default=1.0 / 60.0, gt=0.0, allow_inf_nan=False)
     tolerance: float = Field(default=1e-13, gt=0.0, le=1e-2, allow_inf_nan=False)
     iterations: int = Field(default=10_000, ge=1)
@@ -62,7 +62,7 @@ class Accuracy(BaseModel):
 
 
 PRESETS = {
-    "preview": {"impact_time": "conservative", "tolerance": 1e-7, "step": 1.0 / 30.0, "heap_motion": 0.3},
+    "preview": {"impact_time": "conservative", "tolerance": 1e-7, "step": 1.0 / 30.0, "substep_motion": 0.3},
     "standard": {},
     "exact": {"step": 1.0 / 240.0, "tolerance": 1e-15, "iterations": 100000},
 }

@@ -8,7 +8,7 @@ halving the step leaves at most half of it, so e_k <= 2 d_k. That is for errors 
 where r_k is how far u_k moves when it is started off by rounding (`reference.perturbed`) and its impact times may be off by LOOSER times
 their tolerance, and d_(k-1) / 8 guards against a d_k that is
 small by chance. The floor is what all rungs have in common: the rounding of the places themselves, and, where contacts last, the gap at
-which they are held (`conventions.TOLERANCES.contact_gap` of a body's size; in heaps the skin, relative to half a size).
+which they are held (`conventions.TOLERANCES.contact_margin` of a body's size; in heaps the skin, relative to half a size).
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class InTime:
         _check_positive("InTime(per_frame=...)", self.per_frame, "s")
 
 
-Wish = Within | InTime
+AccuracyTarget = Within | InTime
 
 
 class Estimate(NamedTuple):
@@ -87,9 +87,9 @@ class Estimate(NamedTuple):
     position: float
     angle: float
 
-    def within(self, wish: Within) -> bool:
+    def within(self, target: Within) -> bool:
         """Whether a wish is met."""
-        return (wish.position is None or self.position <= wish.position) and (wish.angle is None or self.angle <= wish.angle)
+        return (target.position is None or self.position <= target.position) and (target.angle is None or self.angle <= target.angle)
 
 
 UNKNOWN = Estimate(math.nan, math.nan)
@@ -114,7 +114,7 @@ class Choice:
 
     """
 
-    wish: Wish
+    target: AccuracyTarget
     accuracy: Accuracy
     met: bool
     error: Estimate
@@ -135,8 +135,8 @@ def _check_positive(what: str, value: object, unit: str) -> None:
         raise SceneError(f"{what}: {value!r}", f"give a positive finite number, {unit}")
 
 
-def simulate_as_wished(
-    scene: Scene, duration: float, fps: float, wish: object, effects: Mapping[str, bool] | None, progress: Callable[[float], None] | None
+def simulate_to_target(
+    scene: Scene, duration: float, fps: float, target: object, effects: Mapping[str, bool] | None, progress: Callable[[float], None] | None
 ) -> Recording:
     """Choose a setting and return its run; see `simulate`.
 
@@ -144,30 +144,30 @@ def simulate_as_wished(
         SceneError: as `simulate`; or the accuracy is neither a name, an Accuracy nor a wish.
 
     """
-    if not isinstance(wish, Within | InTime):
-        raise SceneError(f"accuracy {wish!r}", "give 'preview', 'standard', 'exact', an Accuracy, Within(...) or InTime(...)")
+    if not isinstance(target, Within | InTime):
+        raise SceneError(f"accuracy {target!r}", "give 'preview', 'standard', 'exact', an Accuracy, Within(...) or InTime(...)")
 
     def run(setting: Setting, end: float, given: Scene = scene) -> Recording:
         return simulate(given, end, fps, accuracy=setting.accuracy, effects=effects, progress=progress)
 
-    chosen, choice = _within(run, scene, duration, wish) if isinstance(wish, Within) else _in_time(run, scene, duration, wish)
+    chosen, choice = _within(run, scene, duration, target) if isinstance(target, Within) else _in_time(run, scene, duration, target)
     events = chosen.status.events
     if not choice.met:
         names = tuple(body.name for body in scene.bodies if body.motion == "dynamic")
-        events = (*events, Event(choice.until, "accuracy not reached", names, f"{_complaint(wish)}: {choice.message}"))
+        events = (*events, Event(choice.until, "accuracy not reached", names, f"{_complaint(target)}: {choice.message}"))
     status = Status.of(events)
     return replace(chosen, status=replace(status, message=f"{status.message}\n{choice.message}"), choice=choice)
 
 
-def _complaint(wish: Wish) -> str:
-    if isinstance(wish, InTime):
-        return f"no setting computes a frame in {wish.per_frame:g} s; wish for more time, or for fewer bodies"
+def _complaint(target: AccuracyTarget) -> str:
+    if isinstance(target, InTime):
+        return f"no setting computes a frame in {target.per_frame:g} s; wish for more time, or for fewer bodies"
     return "no setting is as accurate as wished for so long; wish for less, or until an earlier time (chaos has no remedy: see run.horizon)"
 
 
-def _within(run: Callable[..., Recording], scene: Scene, duration: float, wish: Within) -> tuple[Recording, Choice]:
+def _within(run: Callable[..., Recording], scene: Scene, duration: float, target: Within) -> tuple[Recording, Choice]:
     """The cheapest rung whose estimated error is within the wish, and its run."""
-    until = duration if wish.until is None else min(wish.until, duration)
+    until = duration if target.until is None else min(target.until, duration)
     settings = [rung(0)]
     runs, steps, errors = [run(settings[0], until)], [], []
 
@@ -180,23 +180,23 @@ def _within(run: Callable[..., Recording], scene: Scene, duration: float, wish: 
         runs.append(run(settings[-1], until))
         steps.append(_apart(runs[-2], runs[-1]))
         errors.append(_estimate(steps, np.zeros(2), runs[-2]))
-        if not Estimate(*_floor(runs[-2]).tolist()).within(wish):
+        if not Estimate(*_floor(runs[-2]).tolist()).within(target):
             break  # finer steps would not help
-        if errors[-1].within(wish):
+        if errors[-1].within(target):
             errors[-1] = _estimate(steps, drifted := drift(level - 1), runs[-2])
-            if errors[-1].within(wish) or drifted.max() >= steps[-1].max():
+            if errors[-1].within(target) or drifted.max() >= steps[-1].max():
                 break  # it will do, or it is about as good as rounding lets it be
     best = len(errors) - 1
-    if not errors[best].within(wish):
+    if not errors[best].within(target):
         best = int(np.argmin([error.position for error in errors]))
         errors[best] = _estimate(steps[: best + 1], drift(best), runs[best])
     tries = [Try(setting, _seconds(made), error) for setting, made, error in zip(settings, runs, [*errors, UNKNOWN], strict=True)]
     how = "from a run with half the step, and one started off by rounding"
-    choice = Choice(wish, settings[best].accuracy, errors[best].within(wish), errors[best], until, how, tuple(tries))
+    choice = Choice(target, settings[best].accuracy, errors[best].within(target), errors[best], until, how, tuple(tries))
     return (runs[best] if until == duration else run(settings[best], duration)), choice
 
 
-def _in_time(run: Callable[..., Recording], scene: Scene, duration: float, wish: InTime) -> tuple[Recording, Choice]:
+def _in_time(run: Callable[..., Recording], scene: Scene, duration: float, target: InTime) -> tuple[Recording, Choice]:
     """The finest rung whose frames take no longer than wished, and its run."""
     settings, runs, steps = [], [], []
     for level in range(LAST_RUNG + 1):
@@ -204,16 +204,16 @@ def _in_time(run: Callable[..., Recording], scene: Scene, duration: float, wish:
         runs.append(run(settings[-1], duration))
         if level:
             steps.append(_apart(runs[-2], runs[-1]))
-        if _seconds(runs[-1]) > wish.per_frame * len(runs[-1].times):
+        if _seconds(runs[-1]) > target.per_frame * len(runs[-1].times):
             break
-    fast = [k for k, made in enumerate(runs) if _seconds(made) <= wish.per_frame * len(made.times)]
+    fast = [k for k, made in enumerate(runs) if _seconds(made) <= target.per_frame * len(made.times)]
     best = fast[-1] if fast else 0
     drift = _apart(runs[best], run(_looser(settings[best]), duration, perturbed(scene)))
     # The finest that was run has nothing finer to compare with: what the one before is off by bounds its error.
     error = _estimate(steps[: best + 1], drift, runs[best]) if steps else UNKNOWN
     tries = tuple(Try(setting, _seconds(made), UNKNOWN) for setting, made in zip(settings, runs, strict=True))
     how = f"from a run with {'half' if best < len(steps) else 'twice'} the step, and one started off by rounding"
-    return runs[best], Choice(wish, settings[best].accuracy, bool(fast), error, duration, how, tries)
+    return runs[best], Choice(target, settings[best].accuracy, bool(fast), error, duration, how, tries)
 
 
 def _looser(setting: Setting) -> Setting:
@@ -240,7 +240,7 @@ def _floor(run: Recording) -> np.ndarray:
     spin = float(np.linalg.norm(run.angular_velocities, axis=2).max(initial=0.0))
     rounding = FLOOR * np.array([np.abs(run.positions).max(initial=0.0), 1.0 + spin * run.times[-1]])
     touching = [group for group in _groups(run, world) if len(group) > 0]
-    share = 0.5 * TOLERANCES.skin if "heap" in run.ledger.dissipated else 2.0 * TOLERANCES.contact_gap
+    share = 0.5 * TOLERANCES.skin if "sub-stepping" in run.ledger.dissipated else 2.0 * TOLERANCES.contact_margin
     return rounding + share * np.array([max((world.size[group].sum() for group in touching), default=0.0), float(bool(touching))])
 
 

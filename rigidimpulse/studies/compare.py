@@ -49,7 +49,7 @@ class Comparison:
         labels: what tables and pages call them.
         horizon: time, s, until which the results of a body are to be trusted, by its name; bodies without one are not in it.
         deviation: distance (f, n) m and angle (f, n) rad of the n bodies at times (f,) s.
-        net_distance: (f,) m, largest distance of the vertices, by name of flexible body.
+        soft_body_distance: (f,) m, largest distance of the vertices, by name of flexible body.
 
     """
 
@@ -58,7 +58,7 @@ class Comparison:
     labels: tuple[str, str]
     horizon: dict[str, float]
     deviation: Deviation
-    net_distance: dict[str, np.ndarray] = field(default_factory=dict)
+    soft_body_distance: dict[str, np.ndarray] = field(default_factory=dict)
 
     @cached_property
     def names(self) -> list[str]:
@@ -70,7 +70,7 @@ class Comparison:
             chosen = [name for name, moved in zip(self.run_a.names, moves, strict=True) if moved]
         else:
             chosen = [body.name for body in scene.bodies if body.motion != "static"]
-        return chosen + list(self.net_distance)
+        return chosen + list(self.soft_body_distance)
 
     def distance(self, name: str) -> np.ndarray:
         """(f,) m, between the two places of a body; of a flexible one the largest of its vertices.
@@ -79,8 +79,8 @@ class Comparison:
             SceneError: for an unknown name, listing the known ones.
 
         """
-        if name in self.net_distance:
-            return self.net_distance[name]
+        if name in self.soft_body_distance:
+            return self.soft_body_distance[name]
         return self.deviation.distance[:, self.run_a.index(name)]
 
     def angle(self, name: str) -> np.ndarray:
@@ -90,7 +90,7 @@ class Comparison:
             SceneError: for an unknown name, listing the known ones.
 
         """
-        if name in self.net_distance:
+        if name in self.soft_body_distance:
             return np.zeros(len(self.deviation.times))
         return self.deviation.angle[:, self.run_a.index(name)]
 
@@ -116,7 +116,7 @@ class Comparison:
         lines = [head]
         for row in sorted(self.rows, key=lambda row: -row.distance):
             apart = "-" if np.isnan(row.size) else "never" if np.isinf(row.apart) else f"{row.apart:.4g}"
-            angle = "-" if row.name in self.net_distance else f"{row.angle:.2g}"
+            angle = "-" if row.name in self.soft_body_distance else f"{row.angle:.2g}"
             horizon = f"{self.horizon[row.name]:.4g}" if row.name in self.horizon else "-"
             lines.append([row.name, f"{row.distance:.2g}", angle, apart, horizon])
         if not self.horizon:
@@ -164,7 +164,7 @@ class Comparison:
         from rigidimpulse.model.world import compile_scene
 
         sizes = dict(zip(self.run_a.names, compile_scene(self.run_a.scene).size.tolist(), strict=True))
-        for track in self.run_a.nets:
+        for track in self.run_a.soft_bodies:
             sizes[track.name] = float(np.ptp(track.vertices[0], axis=0).max())
         return sizes
 
@@ -187,7 +187,7 @@ def compare(
     """
     first, second = _two_labels(labels)
     apart = deviation(run_a, run_b)
-    distances = _net_distances(run_a, run_b)
+    distances = _soft_body_distances(run_a, run_b)
     known = run_a.names + list(distances)
     for name, time in (horizon or {}).items():
         if name not in known:
@@ -253,13 +253,13 @@ def _two_labels(labels: Sequence[str]) -> tuple[str, str]:
     return labels[0], labels[1]
 
 
-def _net_distances(a: Recording, b: Recording) -> dict[str, np.ndarray]:
+def _soft_body_distances(a: Recording, b: Recording) -> dict[str, np.ndarray]:
     """Largest distance of the vertices, (f,) m, by flexible body; infinite where a vertex is not finite."""
-    in_a, in_b = (", ".join(f"{track.name} of {track.vertices.shape[1]} vertices" for track in run.nets) or "none" for run in (a, b))
+    in_a, in_b = (", ".join(f"{track.name} of {track.vertices.shape[1]} vertices" for track in run.soft_bodies) or "none" for run in (a, b))
     if in_a != in_b:
         raise SceneError(f"one run has the flexible bodies {in_a}, the other {in_b}", "compare runs of one scene")
     distances = {}
-    for track, other in zip(a.nets, b.nets, strict=True):
+    for track, other in zip(a.soft_bodies, b.soft_bodies, strict=True):
         distance = np.linalg.norm(track.vertices - other.vertices, axis=2).max(axis=1)
         distances[track.name] = np.where(np.isfinite(distance), distance, np.inf)
     return distances

@@ -36,8 +36,8 @@ def find_horizon(run: Recording) -> dict[str, float]:
     ]
     world = compile_scene(run.scene)
     bodies = np.flatnonzero(world.dynamic)
-    wished = None if run.choice is None else getattr(run.choice.wish, "position", None)
-    tolerance = TOLERANCE * world.size[bodies] if wished is None else wished
+    targeted = None if run.choice is None else getattr(run.choice.target, "position", None)
+    tolerance = TOLERANCE * world.size[bodies] if targeted is None else targeted
     until = agree_until(run.times, deviation(*pair).distance[:, bodies], tolerance)
     return {world.names[i]: float(time) for i, time in zip(bodies.tolist(), until, strict=True)}
 

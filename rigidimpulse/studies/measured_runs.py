@@ -36,7 +36,7 @@ class TimeUp(Exception):
     """A run takes longer than the budget has left."""
 
 
-class Desk:
+class MeasuredRuns:
     """Runs settings of one scene and measures them; a run that takes too long is given up.
 
     Too long is a share of the budget, or some times what the dearest preset took, if that is more; and never beyond the budget.

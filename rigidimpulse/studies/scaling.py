@@ -29,7 +29,7 @@ FILLED = 0.05
 """Part of the box that the balls of a gas fill."""
 BALL_SECONDS = 6_000.0
 """Duration of a run of gas times the number of balls, s, and of 4 s at least."""
-HEAPED, LAYERS = 2.0, 10
+PILED, LAYERS = 2.0, 10
 """s in which boxes fall and heap up, and layers they fall in."""
 
 
@@ -81,15 +81,15 @@ def _point(number: int, run: Recording, count: int) -> Point:
     return Point(number, profile.seconds, count, sum(profile.stages[stage] for stage in STAGES if stage in profile.stages) / count)
 
 
-def _heap_point(number: int) -> Point:
+def _pile_point(number: int) -> Point:
     steps: list[float] = []
-    run = simulate(pile(number, LAYERS), HEAPED, fps=1.0, progress=steps.append)
+    run = simulate(pile(number, LAYERS), PILED, fps=1.0, progress=steps.append)
     return _point(number, run, len(steps))
 
 
 SCENES = {
     "gas": Scaling("elastic balls in a box", "impact", _gas_point),
-    "heap": Scaling("boxes that fall into a pit and heap up", "step", _heap_point),
+    "pile": Scaling("boxes that fall into a pit and heap up", "step", _pile_point),
 }
 
 
@@ -100,7 +100,7 @@ def sizes(kind: str, most: int) -> list[int]:
         SceneError: fewer than two sizes are left to compare.
 
     """
-    least = FEWEST if kind == "heap" else SIZES[0]
+    least = FEWEST if kind == "pile" else SIZES[0]
     out = [number for number in SIZES if least <= number <= most]
     if len([number for number in out if number >= FEWEST]) < 2:
         raise SceneError(f"most = {most}", f"an exponent needs two sizes: give at least {SIZES[SIZES.index(FEWEST) + 1]}")

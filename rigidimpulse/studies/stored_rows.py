@@ -21,7 +21,7 @@ from rigidimpulse.studies.row import COLUMNS, Row
 MARK = "# study "
 
 
-class KeptRows:
+class StoredRows:
     """The rows in a file; none are kept without one."""
 
     def __init__(self, path: Path | None, fingerprint: str) -> None:

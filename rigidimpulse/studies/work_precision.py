@@ -30,11 +30,11 @@ from rigidimpulse.engine.simulate import frame_times
 from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.model.world import World, compile_scene
 from rigidimpulse.scene.scene import Scene
-from rigidimpulse.studies.measured_runs import Desk, TimeUp, peer_setting
+from rigidimpulse.studies.measured_runs import MeasuredRuns, TimeUp, peer_setting
 from rigidimpulse.studies.reference import Reference, converged_reference, exact_reference
 from rigidimpulse.studies.row import ERRORS, Row
 from rigidimpulse.studies.settings import Setting, grid
-from rigidimpulse.studies.stored_rows import KeptRows, kept_reference
+from rigidimpulse.studies.stored_rows import StoredRows, kept_reference
 
 BUDGET, FULL_BUDGET = 60.0, 3600.0
 """s, of a study and of one of all settings."""
@@ -147,11 +147,11 @@ def study(
         lambda: make_reference(topic, world, REFERENCE_SHARE * budget, lambda what: tell(what, 0.0)),
     )  # fmt: skip
     out = Study(topic.name, topic.duration, reference)
-    desk = Desk(world, topic.scene, reference, topic.duration, topic.fps, first, start, budget)
-    jobs: list[tuple[Setting, Callable[[], Row]]] = [(each, lambda each=each: desk.run(each)) for each in settings or grid(full)]
+    measured_runs = MeasuredRuns(world, topic.scene, reference, topic.duration, topic.fps, first, start, budget)
+    jobs: list[tuple[Setting, Callable[[], Row]]] = [(each, lambda each=each: measured_runs.run(each)) for each in settings or grid(full)]
     for peer in peers:
-        jobs += [(peer_setting(peer, k, topic.fps), lambda peer=peer, k=k: desk.run_peer(peer, k)) for k in PEER_STEPS]
-    kept = KeptRows(None if folder is None else folder / "study.csv", mark)
+        jobs += [(peer_setting(peer, k, topic.fps), lambda peer=peer, k=k: measured_runs.run_peer(peer, k)) for k in PEER_STEPS]
+    kept = StoredRows(None if folder is None else folder / "study.csv", mark)
     _run_jobs(out, _in_turn(jobs), kept, lambda: perf_counter() - start, budget, tell)
     if folder is not None and charts_are_installed():
         from rigidimpulse.studies.charts import write_html, write_png
@@ -189,7 +189,7 @@ def _topic(scene: Scene | str, duration: float | None, fps: float | None, name: 
 
 
 def _run_jobs(
-    out: Study, jobs: list[tuple[Setting, Callable[[], Row]]], kept: KeptRows, spent: Callable[[], float], budget: float,
+    out: Study, jobs: list[tuple[Setting, Callable[[], Row]]], kept: StoredRows, spent: Callable[[], float], budget: float,
     tell: Callable[[str, float], None],
 ) -> None:
     """Add the rows that are kept, or that the budget has time for; spent: s until now."""

@@ -47,17 +47,17 @@ def comparison_contents(comparison: Comparison) -> tuple[dict[str, Any], list[tu
     times = np.asarray(run.times, dtype=np.float64)
     manifest, messages = page_contents(comparison.run_a, run)
     drawn = {entry["name"]: entry for entry in manifest["bodies"] + manifest["nets"]}
-    net_names = [track.name for track in run.nets]
+    soft_body_names = [track.name for track in run.soft_bodies]
     ghosts, tracks = [], {}
     for name in comparison.names:
-        if name not in net_names:
+        if name not in soft_body_names:
             position, orientation = finite_poses(run, name)
             ghosts.append(_ghost_entry(drawn[name], position[0], orientation[:1]))
             tracks[f"ghosts/{drawn[name]['key']}"] = body_tracks(times, position, orientation)
     manifest["comparison"] = {
         "labels": list(comparison.labels),
         "ghosts": ghosts,
-        "nets": [{"name": name, "key": drawn[name]["key"]} for name in net_names],
+        "nets": [{"name": name, "key": drawn[name]["key"]} for name in soft_body_names],
         "horizon": {name: max(time, float(times[0]) - 1.0) for name, time in comparison.horizon.items() if time < np.inf},
     }
     manifest["summary"] = _summary(comparison)
@@ -66,7 +66,7 @@ def comparison_contents(comparison: Comparison) -> tuple[dict[str, Any], list[tu
     for values in ("distance", "angle"):
         by_body = [getattr(comparison, values)(name) for name in comparison.names]
         messages.append(("apart", property_message("ghosts", values, np.array(by_body))))
-    for track in run.nets:
+    for track in run.soft_bodies:
         if not np.isfinite(track.vertices).all():
             raise ValueError(f"flexible body {track.name!r}: a vertex is not finite; look at the status of the run")
         messages.append(("frames", property_message(f"ghosts/{drawn[track.name]['key']}", "frames", track.vertices)))

@@ -31,10 +31,10 @@ from rigidimpulse.view.arrows import arrow_rows, fade_time, longest_arrow
 from rigidimpulse.view.camera import Framing, Path, frame_action, up_axis
 from rigidimpulse.view.display import SEGMENTS, DisplayMesh, display_mesh, display_planes
 from rigidimpulse.view.history import contact_rows, energy_span, impact_marks, ledger_curves
-from rigidimpulse.view.materials import ROUND_KINDS, net_surface, surface
-from rigidimpulse.view.protocol import NetLike, RecordingLike
+from rigidimpulse.view.materials import ROUND_KINDS, soft_body_surface, surface
+from rigidimpulse.view.protocol import RecordingLike, SoftBodyLike
 from rigidimpulse.view.rendered import rendered_meshes
-from rigidimpulse.view.soft_bodies import is_closed, net_messages
+from rigidimpulse.view.soft_bodies import is_closed, soft_body_messages
 from rigidimpulse.view.tracks import animation_message, body_tracks, pack_bytes, pack_float32, quaternion_keys
 
 MANY_SHAPES = 50
@@ -50,9 +50,9 @@ LEVEL = 0.99
 """Least cosine of the slope of a half space that is drawn as the ground and not as a wall or a ramp."""
 ROUND_OFF = 1e-9
 """m and relative, of a centre of mass."""
-NET_COLOUR = 2
+SOFT_BODY_COLOUR = 2
 """Colours of the palette that are left out between bodies and nets: amber blanches on level cloth."""
-NET_MARGIN = 0.03
+SOFT_BODY_MARGIN = 0.03
 """Margin about the vertices of a net in the picture, relative to its extent."""
 
 
@@ -78,11 +78,12 @@ def page_contents(
     numbers, meshes = _shared_meshes(bodies)
     rendered, meshes = _with_rendered(recording.scene, bodies, numbers, meshes)
     up = up_axis(recording.scene.gravity)
-    nets = list(recording.nets)
+    soft_bodies = list(recording.soft_bodies)
     framed = poses if other is None else [_both(pose, finite_poses(other, body.name)) for body, pose in zip(bodies, poses, strict=True)]
-    net_paths = [_net_path(*tracks) for tracks in zip(*(run.nets for run in (recording, other) if run is not None), strict=True)]
-    framing = frame_action(_paths(bodies, framed, numbers, meshes) + net_paths, up)
-    framing = replace(framing, movers=[name for name in framing.movers if name not in {track.name for track in nets}])
+    runs = [run for run in (recording, other) if run is not None]
+    soft_body_paths = [_soft_body_path(*tracks) for tracks in zip(*(run.soft_bodies for run in runs), strict=True)]
+    framing = frame_action(_paths(bodies, framed, numbers, meshes) + soft_body_paths, up)
+    framing = replace(framing, movers=[name for name in framing.movers if name not in {track.name for track in soft_bodies}])
     entries = _entries(recording, bodies, poses, numbers, rendered)
     num_coloured = sum(body.motion != "static" for body in bodies)
     radius = float(np.linalg.norm(framing.half))
@@ -94,10 +95,10 @@ def page_contents(
     manifest = {
         "framing": asdict(framing),
         "bodies": entries,
-        "nets": [_net_entry(track, len(bodies) + k, num_coloured + NET_COLOUR + k) for k, track in enumerate(nets)],
+        "nets": [_soft_body_entry(track, len(bodies) + k, num_coloured + SOFT_BODY_COLOUR + k) for k, track in enumerate(soft_bodies)],
         "numShapes": len(meshes),
         "fade": fade_time(float(times[-1] - times[0])),
-        "summary": _summary(sum(dynamic) + len(nets), len(recording.impacts), float(times[-1] - times[0])),
+        "summary": _summary(sum(dynamic) + len(soft_bodies), len(recording.impacts), float(times[-1] - times[0])),
         "ledger": None if curves is None else {"energySpan": energy_span(recording.ledger)},
         "contacts": len(contacts) > 0,
     }
@@ -111,8 +112,8 @@ def page_contents(
     ):
         if values is not None:
             messages.append((kind, property_message(path, name, values)))
-    for number, track in enumerate(nets):
-        messages += net_messages(track, number)
+    for number, track in enumerate(soft_bodies):
+        messages += soft_body_messages(track, number)
     return manifest, messages + _motion(recording, entries, poses, large)
 
 
@@ -175,7 +176,7 @@ def glb_file(recording: Any) -> bytes:
     from rigidimpulse.io.motion import MotionOptions
     from rigidimpulse.scene.scene import Scene
 
-    plain = replace(recording, scene=Scene(recording.scene.gravity, recording.scene.bodies), nets=[])
+    plain = replace(recording, scene=Scene(recording.scene.gravity, recording.scene.bodies), soft_bodies=[])
     with TemporaryDirectory() as folder:
         path = FilePath(folder) / "motion.glb"
         write_motion(plain, path, MotionOptions())
@@ -195,7 +196,7 @@ def page_scene(recording: RecordingLike) -> tuple[Framing, list[tuple[Any, Displ
     poses = [finite_poses(recording, body.name) for body in bodies]
     numbers, meshes = _shared_meshes(bodies)
     rendered, meshes = _with_rendered(recording.scene, bodies, numbers, meshes)
-    paths = _paths(bodies, poses, numbers, meshes) + [_net_path(track) for track in recording.nets]
+    paths = _paths(bodies, poses, numbers, meshes) + [_soft_body_path(track) for track in recording.soft_bodies]
     framing, drawn = frame_action(paths, up_axis(recording.scene.gravity)), []
     for entry, body in zip(_entries(recording, bodies, poses, numbers, rendered), bodies, strict=True):
         number = entry["rendered"] if entry["rendered"] >= 0 else entry["shape"]
@@ -269,17 +270,17 @@ def _paths(
     return paths
 
 
-def _net_path(*tracks: NetLike) -> Path:
+def _soft_body_path(*tracks: SoftBodyLike) -> Path:
     """Return the places of all vertices of a net in all frames of its tracks, as a path."""
     vertices = np.concatenate([np.asarray(track.vertices, dtype=np.float64) for track in tracks])
-    margin = NET_MARGIN * float(np.linalg.norm(np.ptp(vertices[0], axis=0)))
+    margin = SOFT_BODY_MARGIN * float(np.linalg.norm(np.ptp(vertices[0], axis=0)))
     return Path(tracks[0].name, vertices.reshape(-1, 3), margin, moves=True)
 
 
-def _net_entry(track: NetLike, index: int, colour: int) -> dict[str, Any]:
+def _soft_body_entry(track: SoftBodyLike, index: int, colour: int) -> dict[str, Any]:
     """Return what the manifest says of a net."""
     closed = is_closed(track.faces)
-    surface = net_surface(colour, closed)
+    surface = soft_body_surface(colour, closed)
     return {"name": track.name, "key": _path_key(index, track.name), "surface": surface, "thin": not closed}
 
 

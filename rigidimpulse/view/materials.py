@@ -55,7 +55,7 @@ def surface(index: int, body: Any) -> dict[str, Any]:
     }
 
 
-def net_surface(index: int, closed: bool) -> dict[str, Any]:
+def soft_body_surface(index: int, closed: bool) -> dict[str, Any]:
     """Return how the page paints a flexible body: cloth is dull, what is closed shines like jelly; see `surface`."""
     roughness, clearcoat = (0.3, 0.6) if closed else (0.75, 0.0)
     return {"color": color(index), "roughness": roughness, "metalness": 0.0, "clearcoat": clearcoat, "octants": False}

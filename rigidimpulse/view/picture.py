@@ -30,7 +30,7 @@ SKY, HORIZON, NADIR = np.array([176, 203, 233]) / 255.0, np.array([244, 240, 233
 GROUND, LINES = np.array([205, 209, 213]) / 255.0, np.array([150, 160, 170]) / 255.0
 CELLS = 12
 """Cells of the ground's grid, about, across the action."""
-NET_COLOURS = np.array([[63, 157, 132], [140, 107, 177]]) / 255.0
+SOFT_BODY_COLOURS = np.array([[63, 157, 132], [140, 107, 177]]) / 255.0
 DRAPE = 1.01
 """How much nearer flexible bodies are drawn: the faces of cloth cut into round bodies between its vertices."""
 SHADOW = 0.3
@@ -155,9 +155,9 @@ def _meshes(recording: Any, drawn: list[Any], rotation: np.ndarray, frame: int) 
         if mesh is not None:
             local = mesh.vertices if paint["octants"] else None
             meshes.append(Mesh(mesh.vertices @ turn.T + place, mesh.normals @ turn.T, mesh.faces, _colour(paint["color"]), local))
-    for number, track in enumerate(recording.nets):
+    for number, track in enumerate(recording.soft_bodies):
         surface = shade(track.vertices[frame] @ rotation.T, track.faces)
-        meshes.append(Mesh(surface.vertices, surface.normals, surface.faces, NET_COLOURS[number % 2], nearer=DRAPE))
+        meshes.append(Mesh(surface.vertices, surface.normals, surface.faces, SOFT_BODY_COLOURS[number % 2], nearer=DRAPE))
     return meshes, levels
 
 

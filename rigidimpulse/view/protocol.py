@@ -22,7 +22,7 @@ class SceneLike(Protocol):
         ...
 
 
-class NetLike(Protocol):
+class SoftBodyLike(Protocol):
     """Frames of a flexible body."""
 
     @property
@@ -60,7 +60,7 @@ class RecordingLike(Protocol):
         ...
 
     @property
-    def nets(self) -> Sequence[NetLike]:
+    def soft_bodies(self) -> Sequence[SoftBodyLike]:
         """The flexible bodies."""
         ...
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.view.protocol import NetLike
+from rigidimpulse.view.protocol import SoftBodyLike
 from rigidimpulse.view.tracks import pack_float32
 
 
@@ -21,7 +21,7 @@ def is_closed(faces: np.ndarray) -> bool:
     return bool(np.all(np.unique(edges, axis=0, return_counts=True)[1] == 2))
 
 
-def net_messages(track: NetLike, number: int) -> list[tuple[str, dict[str, Any]]]:
+def soft_body_messages(track: SoftBodyLike, number: int) -> list[tuple[str, dict[str, Any]]]:
     """Return the messages of a net for `view.contents`, each with its kind: "net" (mesh) and "frames" (vertices of all frames).
 
     Raises:

@@ -34,9 +34,9 @@ OURS = "rigidimpulse"
 SETTINGS = {
     OURS: "standard",
     "preview": "preview",
-    "step=1/30, heap_motion=1": ri.Accuracy(step=1.0 / 30.0, heap_motion=1.0),
-    "step=1/20, heap_motion=1": ri.Accuracy(step=1.0 / 20.0, heap_motion=1.0),
-    "heap_motion=1": ri.Accuracy(heap_motion=1.0),
+    "step=1/30, substep_motion=1": ri.Accuracy(step=1.0 / 30.0, substep_motion=1.0),
+    "step=1/20, substep_motion=1": ri.Accuracy(step=1.0 / 20.0, substep_motion=1.0),
+    "substep_motion=1": ri.Accuracy(substep_motion=1.0),
 }
 FLIGHTS = {"gas": (gas, 1000, 10.0, 1.0 / 240.0), "bounce": (bounce, 49, 20.0, 1.0 / 60.0)}
 """Maker, number of balls, duration [s] and step of the other engines [s]."""

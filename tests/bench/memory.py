@@ -19,7 +19,7 @@ from rigidimpulse.gallery.pile import pile
 from rigidimpulse.studies.scaling import LAYERS, gas
 
 FEW = 300
-DURATION = {"gas": 0.5, "heap": 2.0}
+DURATION = {"gas": 0.5, "pile": 2.0}
 """s; boxes lie on each other by then."""
 
 

@@ -75,10 +75,10 @@ def measure(playwright, path: Path) -> str:
     page.evaluate("rigidimpulse.pause(); gc()")
     session = page.context.new_cdp_session(page)
     session.send("Performance.enable")
-    heap = {entry["name"]: entry["value"] for entry in session.send("Performance.getMetrics")["metrics"]}["JSHeapUsedSize"]
+    pile = {entry["name"]: entry["value"] for entry in session.send("Performance.getMetrics")["metrics"]}["JSHeapUsedSize"]
     seek = page.evaluate(SEEK)
     browser.close()
-    return f"{path.stat().st_size / 1e6:8.1f} MB {moving:8.2f} s moving {heap / 1e6:8.1f} MB heap {seek:8.2f} ms a seek"
+    return f"{path.stat().st_size / 1e6:8.1f} MB {moving:8.2f} s moving {pile / 1e6:8.1f} MB heap {seek:8.2f} ms a seek"
 
 
 def main() -> None:

@@ -31,14 +31,14 @@ def two_runs() -> tuple[ri.Recording, ri.Recording]:
     """Runs A and B."""
     a = recording()
     patch = np.array([[1.4, -1, 0.5], [1.8, -1, 0.5], [1.8, -0.6, 0.5], [1.4, -0.6, 0.5]])
-    net = FlexibleTrack("patch", np.tile(patch, (len(a.times), 1, 1)), np.array([[0, 1, 2], [0, 2, 3]]))
-    a = replace(a, nets=[net])
-    positions, orientations, vertices = a.positions.copy(), a.orientations.copy(), net.vertices.copy()
+    soft_body = FlexibleTrack("patch", np.tile(patch, (len(a.times), 1, 1)), np.array([[0, 1, 2], [0, 2, 3]]))
+    a = replace(a, soft_bodies=[soft_body])
+    positions, orientations, vertices = a.positions.copy(), a.orientations.copy(), soft_body.vertices.copy()
     positions[:, 2] += a.times[:, None] * DRIFT
     half = 0.5 * TURN * a.times
     orientations[:, 3] = multiply(np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1), orientations[:, 3])
     vertices[:, :, 2] += 0.25 * a.times[:, None]
-    return a, replace(a, positions=positions, orientations=orientations, nets=[replace(net, vertices=vertices)])
+    return a, replace(a, positions=positions, orientations=orientations, soft_bodies=[replace(soft_body, vertices=vertices)])
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +94,7 @@ def test_ghosts_are_where_the_second_run_was_and_bodies_where_the_first_was(open
                 assert np.allclose(pose[:3], run.position(name)[frame], rtol=0, atol=4 * FLOAT32_ROUNDING)
                 assert abs(abs(pose[3:] @ quaternion) - 1.0) < 4 * FLOAT32_ROUNDING
         vertices = np.array(opened.do("r.comparison.vertices(0)")).reshape(-1, 3)
-        assert np.allclose(vertices, b.nets[0].vertices[frame], rtol=0, atol=4 * FLOAT32_ROUNDING)
+        assert np.allclose(vertices, b.soft_bodies[0].vertices[frame], rtol=0, atol=4 * FLOAT32_ROUNDING)
 
 
 def test_distances_are_those_of_the_runs(opened: Opened) -> None:

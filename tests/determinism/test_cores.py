@@ -12,12 +12,12 @@ import pytest
 import trimesh
 
 import rigidimpulse as ri
-from rigidimpulse.collision import contact_table as heap_table
+from rigidimpulse.collision import contact_table
 from rigidimpulse.collision.contact_buffer import ContactBuffer
 from rigidimpulse.collision.contact_cache import BLOCK, look, share_of
 from rigidimpulse.core.kernels import MOST_CORES, number_of_cores
 from rigidimpulse.dynamics.solvers.tgs_soft.solver import BATCHES_EACH, advance
-from rigidimpulse.engine.substepped import contact_forces as heap_stepper
+from rigidimpulse.engine.substepped import contact_forces
 
 ROUGH = ri.Material(density=500, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
 
@@ -42,7 +42,7 @@ def rings() -> list[ri.Shape]:
 
 
 @pytest.mark.parametrize(("shapes", "number", "duration"), [([ri.Shape.box(0.2)], 144, 0.6), (rings(), 72, 0.45)], ids=["boxes", "rings"])
-def test_heaps_have_the_same_bits_on_one_core_and_on_several(monkeypatch, shapes, number, duration) -> None:
+def test_substepped_islands_have_the_same_bits_on_one_core_and_on_several(monkeypatch, shapes, number, duration) -> None:
     hashes, dealt = set(), []
 
     def together(calls):
@@ -50,14 +50,14 @@ def test_heaps_have_the_same_bits_on_one_core_and_on_several(monkeypatch, shapes
         return type(look).together(look, calls)
 
     monkeypatch.setattr(look, "together", together, raising=False)
-    monkeypatch.setattr(heap_stepper, "WORTHWHILE", 20)
-    monkeypatch.setattr(heap_stepper, "WORTHWHILE_GENERAL", 4)
+    monkeypatch.setattr(contact_forces, "WORTHWHILE", 20)
+    monkeypatch.setattr(contact_forces, "WORTHWHILE_GENERAL", 4)
     # The third has so little room at first that rows, patches and batches are moved when they become more.
     for cores, rows, rows_of_a_body, patches_of_a_body in ((1, 1024, 32, 8), (2, 1024, 32, 8), (3, 48, 0, 0)):
-        monkeypatch.setattr(heap_stepper, "number_of_cores", lambda cores=cores: cores)
-        monkeypatch.setattr(heap_table, "FIRST_ROWS", rows)
-        monkeypatch.setattr(heap_table, "ROWS_OF_A_BODY", rows_of_a_body)
-        monkeypatch.setattr(heap_stepper, "PATCHES_OF_A_BODY", patches_of_a_body)
+        monkeypatch.setattr(contact_forces, "number_of_cores", lambda cores=cores: cores)
+        monkeypatch.setattr(contact_table, "FIRST_ROWS", rows)
+        monkeypatch.setattr(contact_table, "ROWS_OF_A_BODY", rows_of_a_body)
+        monkeypatch.setattr(contact_forces, "PATCHES_OF_A_BODY", patches_of_a_body)
         dealt.clear()
         run = ri.simulate(cloud(shapes, number), duration)
         hashes.add(run.state_hash())
@@ -69,7 +69,7 @@ def test_heaps_have_the_same_bits_on_one_core_and_on_several(monkeypatch, shapes
 def alone() -> str:
     """The hash of a heap whose sub-steps had no helper."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(heap_stepper, "WORTHWHILE_BATCHES", 10**9)
+        patch.setattr(contact_forces, "WORTHWHILE_BATCHES", 10**9)
         return crowded()
 
 
@@ -82,7 +82,7 @@ def crowded() -> str:
 def test_sub_steps_have_the_same_bits_however_much_the_helper_does(monkeypatch, alone: str, together: str) -> None:
     asked, largest = [], 0
 
-    def team(calls):
+    def workers(calls):
         nonlocal largest
         asked.append(len(calls))
         largest = max(largest, int(np.diff(calls[0][5]).max(initial=0)))
@@ -90,9 +90,9 @@ def test_sub_steps_have_the_same_bits_however_much_the_helper_does(monkeypatch, 
             return type(advance).together(advance, calls)
         return [advance(*arguments) for arguments in (calls[:1] if together == "nobody helps" else calls)]
 
-    monkeypatch.setattr(heap_stepper, "number_of_cores", lambda: 2)
-    monkeypatch.setattr(heap_stepper, "WORTHWHILE_BATCHES", 0)
-    monkeypatch.setattr(advance, "together", team, raising=False)
+    monkeypatch.setattr(contact_forces, "number_of_cores", lambda: 2)
+    monkeypatch.setattr(contact_forces, "WORTHWHILE_BATCHES", 0)
+    monkeypatch.setattr(advance, "together", workers, raising=False)
     assert crowded() == alone
     assert set(asked) == {2}
     # Some colours have more than two pieces, so that both take of them.
@@ -105,8 +105,8 @@ def test_contacts_that_find_no_room_are_found_again(monkeypatch) -> None:
     def small(buffer: ContactBuffer) -> None:
         buffer.real, buffer.integer, buffer.scratch = np.empty((40, 10)), np.empty((40, 5), np.int64), np.empty((4096, 2), np.int64)
 
-    monkeypatch.setattr(heap_stepper, "WORTHWHILE_GENERAL", 4)
-    monkeypatch.setattr(heap_stepper, "number_of_cores", lambda: 2)
+    monkeypatch.setattr(contact_forces, "WORTHWHILE_GENERAL", 4)
+    monkeypatch.setattr(contact_forces, "number_of_cores", lambda: 2)
     usual = ri.simulate(cloud(rings(), 72), 0.3).state_hash()
     monkeypatch.setattr(ContactBuffer, "__init__", small)
     assert ri.simulate(cloud(rings(), 72), 0.3).state_hash() == usual

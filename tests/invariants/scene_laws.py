@@ -83,7 +83,7 @@ def _energy(plan: ScenePlan, run: ri.Recording, mass, acceleration) -> list[str]
     moved = float(kinetic.max() + np.ptp(potential))
     size = max(max(body.size) + body.size[2] * (body.shape == "capsule") for body in plan.bodies)
     weight = float(mass @ np.linalg.norm(acceleration, axis=1))
-    gap = 2.0 * TOLERANCES.contact_gap * size
+    gap = 2.0 * TOLERANCES.contact_margin * size
     allowed = (JOINT_ENERGY if plan.joints else ENERGY) * moved + gap * len(mass) * weight + 0.5 * mass.sum() * (gap / STEP) ** 2
     at = run.times[int(np.argmax(total - np.minimum.accumulate(total)))]
     return [f"energy grows by {rise:.1e} J until {at:.4f} s, {rise / moved:.1e} of what moves"] if rise > allowed else []
@@ -96,7 +96,7 @@ def _momentum(plan: ScenePlan, run: ri.Recording, mass, acceleration) -> list[st
     allowed = MOMENTUM * float((mass * np.linalg.norm(run.velocities[:, : len(mass)], axis=2)).sum(axis=1).max())
     if any(joint.to_world for joint in plan.joints):
         return []
-    pressed = bool({"contact", "capture"} & set(run.ledger.dissipated)) or bool(plan.joints) or bool(np.any(acceleration))
+    pressed = bool({"contact", "stick"} & set(run.ledger.dissipated)) or bool(plan.joints) or bool(np.any(acceleration))
     if plan.support == "none" or not pressed:
         error = float(np.abs(given - _impulse_of_supports(run, len(mass))).max())
         return [f"momentum off by {error:.1e} kg m/s, allowed {allowed:.1e}"] if error > allowed else []
@@ -116,7 +116,7 @@ def _captured(run: ri.Recording, mass, moves: bool) -> float:
     Where the floor moves, its work is part of what the ledger has, which then may be of either sign.
     """
     assert run.ledger is not None
-    energy = float(run.ledger.dissipated.get("capture", np.zeros(1))[-1])
+    energy = float(run.ledger.dissipated.get("stick", np.zeros(1))[-1])
     energy = abs(energy) if moves else max(energy, 0.0)
     return float(np.sqrt(2.0 * mass.sum() * energy * len(run.contacts)))
 

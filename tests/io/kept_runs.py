@@ -15,10 +15,10 @@ import time
 import numpy as np
 
 import rigidimpulse as ri
-from rigidimpulse.io.cache import checkpointer as keeper
+from rigidimpulse.io.cache import checkpointer as checkpointer
 
 
-def heap() -> ri.Scene:
+def pile() -> ri.Scene:
     """Spinning boxes that fall on each other and on a concave mesh."""
     scene = ri.Scene()
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static"))
@@ -51,7 +51,7 @@ def gas() -> ri.Scene:
 
 def forces() -> ri.Scene:
     """A pendulum, a ball on a spring and one that is pushed to and fro, over the floor and through a trigger."""
-    scene = heap()
+    scene = pile()
     scene.add(ri.Body("bob", ri.Shape.sphere(0.1), position=(3, 0, 2), velocity=(0, 2, 0)))
     scene.add(ri.BallJoint("bob", None, (3, 0, 3)))
     scene.add(ri.Body("hung", ri.Shape.sphere(0.1), position=(-3, 0, 2)))
@@ -62,7 +62,7 @@ def forces() -> ri.Scene:
     return scene
 
 
-SCENES = {"heap": heap, "gas": gas, "forces": forces}
+SCENES = {"pile": pile, "gas": gas, "forces": forces}
 
 
 def run(name: str, duration: float, cache: str | None) -> ri.Recording:
@@ -72,7 +72,7 @@ def run(name: str, duration: float, cache: str | None) -> ri.Recording:
 
 def main(name: str, duration: str, cache: str, seed: str) -> None:
     """See the head of the file."""
-    keeper.DEAR = 0.0
+    checkpointer.EXPENSIVE = 0.0
     run(name, 0.05, None)  # kernels are there, so that what is killed is the run
     random_numbers = random.Random(int(seed))
     kills = 0

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from kept_runs import SCENES, gas, heap, run
+from kept_runs import SCENES, gas, pile, run
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
 from rigidimpulse.cli.cli import BAD_SCENE, main
-from rigidimpulse.io.cache import checkpointer as keeper
+from rigidimpulse.io.cache import checkpointer as checkpointer
 
 h5py = pytest.importorskip("h5py")
-DURATIONS = {"heap": 0.5, "gas": 40.0, "forces": 0.4}
+DURATIONS = {"pile": 0.5, "gas": 40.0, "forces": 0.4}
 
 
 class Stopped(Exception):
@@ -65,7 +65,7 @@ EFFECTS = ["spot", "pile", "cloth_on_ball", "rocket", "pendulum", "driven_oscill
 @pytest.mark.parametrize("name", EFFECTS)
 def test_every_effect_goes_on(name, tmp_path, monkeypatch):
     # Each step is a checkpoint, and the run is stopped three times on its way: what a checkpoint leaves out would show.
-    monkeypatch.setattr(keeper, "DEAR", 0.0)
+    monkeypatch.setattr(checkpointer, "EXPENSIVE", 0.0)
     entry = gallery.load(name)
     settings = {"duration": 0.3, "fps": entry.fps, "accuracy": entry.accuracy}
     whole = ri.simulate(entry.scene(), **settings)
@@ -78,9 +78,9 @@ def test_every_effect_goes_on(name, tmp_path, monkeypatch):
 
 def test_a_finished_cache_is_read_and_not_run_again(tmp_path):
     cache = tmp_path / "run.h5"
-    first = ri.simulate(heap(), 0.5, cache=cache)
+    first = ri.simulate(pile(), 0.5, cache=cache)
     looks = []
-    same(ri.simulate(heap(), 0.5, cache=cache, progress=looks.append), first)
+    same(ri.simulate(pile(), 0.5, cache=cache, progress=looks.append), first)
     assert looks == []
     loaded = ri.load_recording(cache)
     assert loaded.state_hash() == first.state_hash()
@@ -92,16 +92,16 @@ def test_flexible_bodies_are_in_the_cache(tmp_path):
     entry = gallery.load("cloth_on_ball")
     first = ri.simulate(entry.scene(), 0.1, cache=tmp_path / "run.h5")
     loaded = ri.load_recording(tmp_path / "run.h5")
-    for track in first.nets:
-        np.testing.assert_array_equal(loaded.net(track.name)[0], track.vertices)
+    for track in first.soft_bodies:
+        np.testing.assert_array_equal(loaded.soft_body(track.name)[0], track.vertices)
 
 
 def test_a_stopped_run_leaves_its_frames(tmp_path, monkeypatch):
-    monkeypatch.setattr(keeper, "DEAR", 0.0)
+    monkeypatch.setattr(checkpointer, "EXPENSIVE", 0.0)
     cache = ri.Cache(tmp_path / "run.h5", every=0.0)
     with pytest.raises(Stopped):
-        ri.simulate(heap(), 0.4, 100.0, cache=cache, progress=stop_after(0.25))
-    left, whole = ri.load_recording(tmp_path / "run.h5"), ri.simulate(heap(), 0.4, 100.0)
+        ri.simulate(pile(), 0.4, 100.0, cache=cache, progress=stop_after(0.25))
+    left, whole = ri.load_recording(tmp_path / "run.h5"), ri.simulate(pile(), 0.4, 100.0)
     assert 20 <= len(left.times) <= 26
     frames = slice(0, len(left.times))
     np.testing.assert_array_equal(left.positions, whole.positions[frames])
@@ -113,10 +113,10 @@ def test_a_stopped_run_leaves_its_frames(tmp_path, monkeypatch):
 
 
 def test_the_older_checkpoint_does_where_the_newer_one_is_damaged(tmp_path, monkeypatch):
-    monkeypatch.setattr(keeper, "DEAR", 0.0)
+    monkeypatch.setattr(checkpointer, "EXPENSIVE", 0.0)
     cache = ri.Cache(tmp_path / "run.h5", every=0.0)
     with pytest.raises(Stopped):
-        ri.simulate(heap(), 0.4, cache=cache, progress=stop_after(0.25))
+        ri.simulate(pile(), 0.4, cache=cache, progress=stop_after(0.25))
     with h5py.File(cache.path, "r+") as file:
         newer = int(np.argmax(file["checkpoint/commits"]["number"]))
         number = int(file["checkpoint/commits"]["number"].max())
@@ -124,11 +124,11 @@ def test_the_older_checkpoint_does_where_the_newer_one_is_damaged(tmp_path, monk
     assert number > 2
     before = len(ri.load_recording(cache.path).times)
     assert before >= 14
-    same(ri.simulate(heap(), 0.4, cache=cache), ri.simulate(heap(), 0.4))
+    same(ri.simulate(pile(), 0.4, cache=cache), ri.simulate(pile(), 0.4))
 
 
 def heavier():
-    scene = heap()
+    scene = pile()
     changed = ri.Scene()
     for body in scene.bodies:
         changed.add(replace(body, mass=np.nextafter(3.0, 4.0)) if body.name == "box3" else body)
@@ -145,11 +145,11 @@ def pushed(strength):
 @pytest.mark.parametrize(
     ("made", "other", "told"),
     [
-        ((heap(), 0.1, {}), (heavier(), 0.1, {}), "another scene"),
-        ((heap(), 0.1, {}), (heap(), 0.2, {}), "duration 0.1 s, asked for is 0.2 s"),
-        ((heap(), 0.1, {}), (heap(), 0.1, {"fps": 30.0}), "asked for is 30"),
-        ((heap(), 0.1, {}), (heap(), 0.1, {"accuracy": "exact"}), "another accuracy"),
-        ((heap(), 0.1, {}), (heap(), 0.1, {"effects": {"friction": False}}), "other effects"),
+        ((pile(), 0.1, {}), (heavier(), 0.1, {}), "another scene"),
+        ((pile(), 0.1, {}), (pile(), 0.2, {}), "duration 0.1 s, asked for is 0.2 s"),
+        ((pile(), 0.1, {}), (pile(), 0.1, {"fps": 30.0}), "asked for is 30"),
+        ((pile(), 0.1, {}), (pile(), 0.1, {"accuracy": "exact"}), "another accuracy"),
+        ((pile(), 0.1, {}), (pile(), 0.1, {"effects": {"friction": False}}), "other effects"),
         ((pushed(1.0), 0.1, {}), (pushed(2.0), 0.1, {}), "another scene"),
     ],
 )
@@ -181,7 +181,7 @@ def test_bad_caches_are_refused(tmp_path):
 
 def test_a_cache_that_is_written_to_is_left_alone(tmp_path):
     cache = tmp_path / "run.h5"
-    program = f"import rigidimpulse as ri; from kept_runs import heap; ri.simulate(heap(), 0.1, cache={str(cache)!r})"
+    program = f"import rigidimpulse as ri; from kept_runs import pile; ri.simulate(pile(), 0.1, cache={str(cache)!r})"
 
     def second(now):
         other = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=Path(__file__).parent)
@@ -190,7 +190,7 @@ def test_a_cache_that_is_written_to_is_left_alone(tmp_path):
         raise Stopped
 
     with pytest.raises(Stopped):
-        ri.simulate(heap(), 0.1, cache=cache, progress=second)
+        ri.simulate(pile(), 0.1, cache=cache, progress=second)
 
 
 def test_cut_off_files_are_refused_or_gone_on_with(tmp_path):

@@ -39,7 +39,7 @@ def played(path: Path, name: str, times: np.ndarray) -> np.ndarray:
 
 def test_frames_are_the_recorded_ones_and_between_them_straight(run: ri.Recording, tmp_path: Path) -> None:
     path = run.export(tmp_path / "cloth.glb")
-    (track,) = run.nets
+    (track,) = run.soft_bodies
     np.testing.assert_allclose(played(path, track.name, run.times), track.vertices, rtol=0, atol=1e-6)
     middle = 0.5 * (run.times[3] + run.times[4])
     halfway = 0.5 * (track.vertices[3] + track.vertices[4])
@@ -48,7 +48,8 @@ def test_frames_are_the_recorded_ones_and_between_them_straight(run: ri.Recordin
 
 def test_start_frame_moves_the_weights_too(run: ri.Recording, tmp_path: Path) -> None:
     path = run.export(tmp_path / "cloth.glb", start_frame=1001)
-    np.testing.assert_allclose(played(path, run.nets[0].name, run.times + 1001 / 30.0), run.nets[0].vertices, rtol=0, atol=1e-4)
+    track = run.soft_bodies[0]
+    np.testing.assert_allclose(played(path, track.name, run.times + 1001 / 30.0), track.vertices, rtol=0, atol=1e-4)
 
 
 def test_left_out_frames_are_missed_by_no_more_than_the_tolerance(run: ri.Recording, tmp_path: Path) -> None:
@@ -63,6 +64,6 @@ def test_left_out_frames_are_missed_by_no_more_than_the_tolerance(run: ri.Record
         assert len(kept) <= 2.0 * np.sqrt(9.81 / (8.0 * tolerance)) + 2.0
     still = FlexibleTrack("still", np.zeros((101, 4, 3)) + fall[0], np.array([[0, 1, 2], [1, 3, 2]]))
     assert kept_frames(still.vertices, None).tolist() == kept_frames(still.vertices, 1e-3).tolist() == [0]
-    path = replace(run, nets=[replace(still, vertices=still.vertices[: len(run.times)])]).export(tmp_path / "still.glb")
+    path = replace(run, soft_bodies=[replace(still, vertices=still.vertices[: len(run.times)])]).export(tmp_path / "still.glb")
     tree: dict[str, Any] = unpack(path)[0]
     assert not any(channel["target"]["path"] == "weights" for a in tree.get("animations", []) for channel in a["channels"])

@@ -218,7 +218,7 @@ def test_flexible_bodies_have_moving_points(tmp_path: Path) -> None:
     scene = ri.Scene(bodies=[ri.Body("a", ri.Shape.box(1))])
     run = recorded(scene, {"a": smooth(4, (0, 0, 0))})
     points = np.random.default_rng(1).normal(size=(4, 3, 3))
-    run.nets.append(FlexibleTrack("a", points, np.array([[0, 1, 2]])))
+    run.soft_bodies.append(FlexibleTrack("a", points, np.array([[0, 1, 2]])))
     stage = opened(run.export(tmp_path / "out.usdc", start_frame=10))
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/World/a_2"))
     for k in range(4):
@@ -230,7 +230,7 @@ def test_the_validators_of_usd_find_nothing(tmp_path: Path) -> None:
 
     scene = scene_of_shapes()
     run = recorded(scene, {body.name: smooth(4, body.position) for body in scene.bodies[1:]})
-    run.nets.append(FlexibleTrack("net", np.random.default_rng(1).normal(size=(4, 3, 3)), np.array([[0, 1, 2]])))
+    run.soft_bodies.append(FlexibleTrack("net", np.random.default_rng(1).normal(size=(4, 3, 3)), np.array([[0, 1, 2]])))
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     for name in ("out.usdc", "out.usdz"):
         stage = opened(run.export(tmp_path / name))

@@ -9,7 +9,7 @@ import numpy as np
 import rigidimpulse as ri
 from rigidimpulse.core.quaternion import quaternion_from_rotation_vector, to_matrix
 from rigidimpulse.dynamics.soft_body import FlexibleBody, Flexibles, FlexibleStep, RigidMotion
-from rigidimpulse.dynamics.soft_body.mass_spring import Net
+from rigidimpulse.dynamics.soft_body.mass_spring import SpringMesh
 
 
 def sheet_mesh(n: int, length: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
@@ -42,12 +42,12 @@ def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class SpringNet(FlexibleBody):
+class GridCloth(FlexibleBody):
     """Point masses (n,) at mesh (n, 3) with given springs, hinges and rest lengths, of which a body without faces is made."""
 
-    springs: Net | None = None
+    springs: SpringMesh | None = None
 
-    def build(self) -> Net:
+    def build(self) -> SpringMesh:
         assert self.springs is not None
         return self.springs
 
@@ -56,13 +56,13 @@ class SpringNet(FlexibleBody):
         return self.springs.position, np.zeros((0, 3), np.int64)
 
 
-def spring_net(x, mass, springs, stiffness, rest=None, damping=0.0, **more) -> SpringNet:
+def spring_mesh(x, mass, springs, stiffness, rest=None, damping=0.0, **more) -> GridCloth:
     """Body of springs (s, 2) at points x (n, 3)."""
     x, springs = np.asarray(x, float), np.asarray(springs, np.int64).reshape(-1, 2)
     k = np.broadcast_to(np.asarray(stiffness, float), len(springs)).copy()
-    net = Net(x, np.broadcast_to(np.asarray(mass, float), len(x)).copy(), springs, np.zeros(len(springs)), k, damping * k)
-    net = replace(net, spring_rest=net.lengths(x) if rest is None else np.asarray(rest, float))
-    return SpringNet("net", None, stiffness=1.0, springs=net, **more)
+    soft_body = SpringMesh(x, np.broadcast_to(np.asarray(mass, float), len(x)).copy(), springs, np.zeros(len(springs)), k, damping * k)
+    soft_body = replace(soft_body, spring_rest=soft_body.lengths(x) if rest is None else np.asarray(rest, float))
+    return GridCloth("net", None, stiffness=1.0, springs=soft_body, **more)
 
 
 class Run:
@@ -70,7 +70,7 @@ class Run:
 
     def __init__(self, scene: ri.Scene, **settings) -> None:
         self.world = ri.compile_scene(scene)
-        self.nets = Flexibles(self.world, **settings)
+        self.soft_bodies = Flexibles(self.world, **settings)
         self.x, self.v, self.w = (a.copy() for a in (self.world.position, self.world.velocity, self.world.angular_velocity))
         self.R = np.array([to_matrix(q) for q in self.world.orientation])
         self.time = 0.0
@@ -90,7 +90,7 @@ class Run:
     def step(self, h: float) -> FlexibleStep:
         """One step: bodies fly under gravity and the ramp F0 + F1 s; their spin takes the impulse of the torque and its way."""
         world, motion = self.world, self.motion(h)
-        done = self.nets.step(self.time, h, motion)
+        done = self.soft_bodies.step(self.time, h, motion)
         gained = world.inv_mass[:, None] * done.impulse[:, :3]
         spun = np.einsum("nij,nj->ni", motion.inv_inertia, done.impulse[:, 3:])
         way = 0.5 * h * h * done.ramp[0, :, :3] + h**3 / 6.0 * done.ramp[1, :, :3]
@@ -105,10 +105,10 @@ def turned(rotation: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return np.array([to_matrix(quaternion_from_rotation_vector(v)) @ R for v, R in zip(vectors, rotation, strict=True)])
 
 
-def anchor_scene(*nets: FlexibleBody, gravity=(0.0, 0.0, -9.81)) -> ri.Scene:
+def anchor_scene(*soft_bodies: FlexibleBody, gravity=(0.0, 0.0, -9.81)) -> ri.Scene:
     """Nets far from the one body that a scene needs."""
     scene = ri.Scene(gravity=gravity)
     scene.add(ri.Body("far", ri.Shape.sphere(0.1), motion="static", position=(0, 0, -1e3)))
-    for net in nets:
-        scene.add(net)
+    for soft_body in soft_bodies:
+        scene.add(soft_body)
     return scene

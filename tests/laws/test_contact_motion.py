@@ -18,7 +18,7 @@ import rigidimpulse as ri
 from rigidimpulse.core.quaternion import multiply, quaternion_from_axis_angle
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.impact.point import Contacts
-from rigidimpulse.engine.simulate import start_courses
+from rigidimpulse.engine.simulate import start_trajectories
 from rigidimpulse.engine.touching import bring_all, fill_contacts
 from rigidimpulse.model.state import StepContext
 from rigidimpulse.model.world import compile_scene
@@ -102,7 +102,7 @@ NAMES = (
 def contact_at(context: StepContext, time: float):
     """The nearest contact of the pair at a time: contacts of one, kinds and features."""
     world, state = context.world, context.state
-    bring_all(state.course, np.arange(2), time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
+    bring_all(state.trajectory, np.arange(2), time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
     buffer = context.contact_buffer
     count = buffer.find(world.geometry, world, state.now, state.rotation, np.array([0]), np.array([1]), np.array([MARGIN]))
     nearest = np.array([np.argmin(buffer.real[:count, 9])])
@@ -114,18 +114,18 @@ def contact_at(context: StepContext, time: float):
 
 def keep_gap(context: StepContext) -> None:
     """Take off the velocity along the normal: what lasts neither opens nor closes, and both arms end at one place."""
-    first, now, course = contact_at(context, 0.0)[0], context.state.now, context.state.course
+    first, now, trajectory = contact_at(context, 0.0)[0], context.state.now, context.state.trajectory
     n = first.normal[0]
     at = [now.velocity[i] + np.cross(now.angular_velocity[i], arm[0]) for i, arm in enumerate((first.arm_a, first.arm_b))]
-    course.velocity[1] -= n * (n @ (at[1] - at[0]))
-    begin(course, 1)
+    trajectory.velocity[1] -= n * (n @ (at[1] - at[0]))
+    begin(trajectory, 1)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_places_of_contact_move_as_found_a_moment_later(name: str) -> None:
     scene = ri.Scene(gravity=(0.0, 0.0, 0.0), bodies=pair(name))
     context = StepContext(compile_scene(scene), Recorder(np.zeros(1), 2), EventLog())
-    start_courses(context)
+    start_trajectories(context)
     keep_gap(context)
     found = [contact_at(context, k * STEP)[0] for k in range(4)]
     first, kinds, features = contact_at(context, 0.0)

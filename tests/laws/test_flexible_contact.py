@@ -33,9 +33,9 @@ def test_floor_carries_the_weight() -> None:
     for _ in range(20):
         done = run.step(1.0 / 60.0)
     assert -60.0 * done.impulse[0, 2] == pytest.approx(0.5 * G, rel=1e-9)
-    assert np.abs(run.nets.velocity).max() < 1e-10
-    assert np.ptp(run.nets.position[:, 2]) < 1e-10
-    assert run.nets.position[:, 2].min() > 0.0
+    assert np.abs(run.soft_bodies.velocity).max() < 1e-10
+    assert np.ptp(run.soft_bodies.position[:, 2]) < 1e-10
+    assert run.soft_bodies.position[:, 2].min() > 0.0
 
 
 @pytest.mark.parametrize("excess", [-0.1, -0.001, 0.001, 0.1])
@@ -54,7 +54,7 @@ def test_incline(excess: float) -> None:
     run = Run(scene, tolerance=1e-11)
     for _ in range(60):
         run.step(1.0 / 120.0)
-    speed = run.nets.velocity @ down
+    speed = run.soft_bodies.velocity @ down
     expected = max(0.0, 0.5 * G * (np.sin(angle) - friction * np.cos(angle)))
     np.testing.assert_allclose(speed.mean(), expected, rtol=0, atol=1e-8 * 0.5 * G)
 
@@ -67,23 +67,23 @@ def test_ball_on_a_free_cloth_keeps_all_momenta(mass: float) -> None:
     scene.add(ri.Body("ball", ri.Shape.sphere(0.15), mass=mass, position=(0.53, 0.47, 0.18), **spin))
     scene.add(FlexibleBody("cloth", x, faces, stiffness=800.0, bending=1e-3, mass=0.5, damping=1e-3))
     run = Run(scene)
-    net = run.nets.net
+    soft_body = run.soft_bodies.soft_body
 
     def momenta() -> np.ndarray:
         inertia = np.linalg.inv(run.inverse_inertia()[0])
         angular = mass * np.cross(run.x[0], run.v[0]) + inertia @ run.w[0]
-        angular += (net.mass[:, None] * np.cross(run.nets.position, run.nets.velocity)).sum(0)
-        return np.concatenate([mass * run.v[0] + net.mass @ run.nets.velocity, angular])
+        angular += (soft_body.mass[:, None] * np.cross(run.soft_bodies.position, run.soft_bodies.velocity)).sum(0)
+        return np.concatenate([mass * run.v[0] + soft_body.mass @ run.soft_bodies.velocity, angular])
 
     start, energy = momenta(), []
     for _ in range(60):
         done = run.step(1.0 / 120.0)
         assert done.converged and done.unresolved == 0
         inertia = run.world.inertia[0, 0]
-        energy.append(run.nets.energy() + 0.5 * mass * run.v[0] @ run.v[0] + 0.5 * inertia * run.w[0] @ run.w[0])
-        assert np.linalg.norm(run.nets.position - run.x[0], axis=1).min() > 0.15
+        energy.append(run.soft_bodies.energy() + 0.5 * mass * run.v[0] @ run.v[0] + 0.5 * inertia * run.w[0] @ run.w[0])
+        assert np.linalg.norm(run.soft_bodies.position - run.x[0], axis=1).min() > 0.15
     np.testing.assert_allclose(momenta(), start, rtol=0, atol=1e-12 * np.abs(start).max())
-    assert run.nets.velocity[:, 2].min() < -0.05  # it was hit
+    assert run.soft_bodies.velocity[:, 2].min() < -0.05  # it was hit
     assert np.all(np.diff(energy) <= 1e-6 * energy[0])
 
 
@@ -114,12 +114,12 @@ def test_cloth_over_a_ball_is_never_inside() -> None:
     scene.add(ri.Body("ball", ri.Shape.sphere(0.3), motion="static", position=centre))
     scene.add(FlexibleBody("cloth", x, faces, stiffness=200.0, bending=1e-4, damping=0.002, area_density=0.2))
     run = Run(scene, tolerance=1e-6)
-    gap = run.nets._surfaces.gap
+    gap = run.soft_bodies._surfaces.gap
     for _ in range(60):
         done = run.step(1.0 / 60.0)
         assert done.converged and done.unresolved == 0
-        assert np.linalg.norm(run.nets.position - centre, axis=1).min() > 0.3 + 0.2 * gap
-        assert run.nets.position[:, 2].min() > -0.6 + 0.2 * gap
+        assert np.linalg.norm(run.soft_bodies.position - centre, axis=1).min() > 0.3 + 0.2 * gap
+        assert run.soft_bodies.position[:, 2].min() > -0.6 + 0.2 * gap
     assert done.num_contacts > 20
 
 
@@ -150,13 +150,13 @@ def test_nothing_falls_through_a_trampoline(shape: ri.Shape, speed: float, seed:
     run = Run(scene, tolerance=1e-6)
     turned = False
     for _ in range(400):
-        h = min(1.0 / 60.0, run.nets.step_limit(run.motion(1.0 / 60.0), 1.0 / 60.0))
+        h = min(1.0 / 60.0, run.soft_bodies.step_limit(run.motion(1.0 / 60.0), 1.0 / 60.0))
         run.step(h)
         turned = turned or run.v[0, 2] > 0.0
         if turned and run.x[0, 2] > 0.3:
             break
         inside = np.all(np.abs(run.x[0, :2] - 0.5) < 0.45)
-        assert not inside or run.x[0, 2] > run.nets.position[:, 2].min() - 1e-2
+        assert not inside or run.x[0, 2] > run.soft_bodies.position[:, 2].min() - 1e-2
     assert turned
 
 
@@ -169,18 +169,18 @@ def test_cloth_fastened_to_a_body(motion: str) -> None:
     scene.add(ri.Body("bar", ri.Shape.box((0.1, 0.6, 0.1)), motion=motion, position=(-0.06, 0.25, 0), **state))
     scene.add(FlexibleBody("flag", x, faces, stiffness=500.0, mass=0.5, attached={"bar": [0, 1, 2, 3, 4]}))
     run = Run(scene)
-    fastened = (run.nets.position[:5] - run.x[0]) @ run.R[0]
+    fastened = (run.soft_bodies.position[:5] - run.x[0]) @ run.R[0]
 
     def momenta() -> np.ndarray:
         own = run.world.mass[0] * run.v[0], np.linalg.inv(run.inverse_inertia()[0]) @ run.w[0]
-        net = run.nets.net.mass[:, None] * run.nets.velocity
-        orbit = np.cross(run.x[0], own[0]) + own[1] + np.cross(run.nets.position, net).sum(0)
-        return np.concatenate([own[0] + net.sum(0), orbit])
+        soft_body = run.soft_bodies.soft_body.mass[:, None] * run.soft_bodies.velocity
+        orbit = np.cross(run.x[0], own[0]) + own[1] + np.cross(run.soft_bodies.position, soft_body).sum(0)
+        return np.concatenate([own[0] + soft_body.sum(0), orbit])
 
     start = momenta() if motion == "dynamic" else np.zeros(6)
     for _ in range(60):
         done = run.step(1.0 / 240.0)
-    places = (run.nets.position[:5] - run.x[0]) @ run.R[0]
+    places = (run.soft_bodies.position[:5] - run.x[0]) @ run.R[0]
     np.testing.assert_allclose(places, fastened, rtol=0, atol=1e-12 if motion == "kinematic" else 2e-4)
     assert np.abs(done.impulse).max() > 1e-4
     if motion == "dynamic":
@@ -198,17 +198,17 @@ def test_jelly_keeps_its_volume() -> None:
     shares = []
     for _ in range(200):
         run.step(1.0 / 60.0)
-        shares.append(volume(run.nets.position, faces) / volume(x, faces))
+        shares.append(volume(run.soft_bodies.position, faces) / volume(x, faces))
     assert np.abs(np.array(shares) - 1.0).max() < 0.039
     assert shares[-1] == pytest.approx(1.0 - 0.5 * 0.039, abs=0.005)
-    assert np.abs(run.nets.velocity).max() < 0.05
+    assert np.abs(run.soft_bodies.velocity).max() < 0.05
     empty = FlexibleBody("cube", x, faces, stiffness=200.0, mass=64.0, position=(0, 0, 0.205), damping=0.01)
     scene = ri.Scene(bodies=[floor()])
     scene.add(empty)
     run = Run(scene, tolerance=1e-6)
     for _ in range(60):
         run.step(1.0 / 60.0)
-    assert volume(run.nets.position, faces) < 0.5 * volume(x, faces)
+    assert volume(run.soft_bodies.position, faces) < 0.5 * volume(x, faces)
 
 
 def test_runs_are_the_same_to_the_bit() -> None:
@@ -219,6 +219,6 @@ def test_runs_are_the_same_to_the_bit() -> None:
         run = Run(scene, tolerance=1e-6)
         for _ in range(30):
             run.step(1.0 / 60.0)
-        return np.concatenate([run.nets.position, run.x])
+        return np.concatenate([run.soft_bodies.position, run.x])
 
     np.testing.assert_array_equal(run(), run())

@@ -76,16 +76,16 @@ def test_the_same_bits_twice_and_at_any_frame_rate(trampoline) -> None:
     assert again.state_hash() == trampoline.state_hash()
     coarse = ri.simulate(trampoline_scene(), 0.8, fps=10.0)
     assert np.array_equal(coarse.positions, trampoline.positions[::6])
-    assert np.array_equal(coarse.net("net")[0][1:], trampoline.net("net")[0][6::6])
+    assert np.array_equal(coarse.soft_body("net")[0][1:], trampoline.soft_body("net")[0][6::6])
 
 
-def boxes_scene(*nets: ri.FlexibleBody) -> ri.Scene:
+def boxes_scene(*soft_bodies: ri.FlexibleBody) -> ri.Scene:
     scene = ri.Scene(gravity=(0.0, 0.0, -GRAVITY))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static"))
     scene.add(ri.Body("box", ri.Shape.box((0.3, 0.2, 0.1)), position=(0, 0, 0.3), angular_velocity=(1.0, 2.0, 0.5)))
     scene.add(ri.Body("ball", ri.Shape.sphere(0.1), position=(0.05, 0.0, 0.6), velocity=(0.5, 0.0, 0.0)))
-    for net in nets:
-        scene.add(net)
+    for soft_body in soft_bodies:
+        scene.add(soft_body)
     return scene
 
 
@@ -103,7 +103,7 @@ def test_a_net_without_load_falls_as_a_stone_does() -> None:
     scene.add(ri.Body("stone", ri.Shape.sphere(0.1), position=(0.0, 0.0, 5.0)))
     scene.add(sheet("cloth", 3.0, pinned=False, n=4, position=(3.0, 0.0, 5.0)))
     run = ri.simulate(scene, 0.5)
-    heights = run.net("cloth")[0][:, :, 2].mean(axis=1)
+    heights = run.soft_body("cloth")[0][:, :, 2].mean(axis=1)
     np.testing.assert_allclose(heights, run.position("stone")[:, 2], atol=1e-6)
 
 
@@ -131,25 +131,25 @@ def test_a_cloth_lies_on_a_light_box_that_stands_on_the_floor() -> None:
     scene.add(ri.Body("box", ri.Shape.box((0.4, 0.4, 0.3)), mass=0.2, position=(0, 0, 0.15), material=ROUGH))
     scene.add(sheet("cloth", 0.5, pinned=False, n=13, stiffness=100.0, bending=1e-3, area_density=0.5, damping=0.05))
     run = ri.simulate(scene, 1.5)
-    depth = (np.array([0.2, 0.2, 0.15]) - np.abs(run.net("cloth")[0] - run.position("box")[:, None])).min(axis=2)
+    depth = (np.array([0.2, 0.2, 0.15]) - np.abs(run.soft_body("cloth")[0] - run.position("box")[:, None])).min(axis=2)
     assert depth.max() < 5e-3
     assert np.abs(run.position("box") - run.position("box")[0]).max() < 1e-3
 
 
 def test_files_and_pages_bring_nets_back(trampoline, tmp_path: Path) -> None:
     back = ri.load_recording(trampoline.export(tmp_path / "run.npz"))
-    vertices, faces = trampoline.net("net")
+    vertices, faces = trampoline.soft_body("net")
     assert vertices.shape == (49, 49, 3) and faces.shape == (72, 3)
-    assert np.array_equal(back.net("net")[0], vertices) and np.array_equal(back.net("net")[1], faces)
+    assert np.array_equal(back.soft_body("net")[0], vertices) and np.array_equal(back.soft_body("net")[1], faces)
     page = trampoline.export(tmp_path / "run.html").read_text()
     assert 'data-kind="frames"' in page and '"name":"net"' in page
     with pytest.raises(ri.SceneError, match="net"):
-        trampoline.net("cloth")
+        trampoline.soft_body("cloth")
 
 
 def test_nets_can_be_left_out_by_name() -> None:
     run = ri.simulate(trampoline_scene(), 0.5, effects={"flexible bodies": False})
-    assert run.nets == []
+    assert run.soft_bodies == []
     np.testing.assert_allclose(run.position("ball")[-1, 2], 1.4 - 0.5 * GRAVITY * 0.25, atol=1e-12)
     assert not run.status.ok  # it says so
 

@@ -63,7 +63,7 @@ def test_bodies_that_part_do_not_take_others_with_them() -> None:
 
 def test_the_wished_tolerance_is_the_horizons() -> None:
     scene, _ = disks(1)
-    loose, tight = (ri.simulate(scene, DURATION, FPS, accuracy=ri.Within(position=wish, until=10.0)) for wish in (0.1, 1e-9))
+    loose, tight = (ri.simulate(scene, DURATION, FPS, accuracy=ri.Within(position=target, until=10.0)) for target in (0.1, 1e-9))
     assert min(tight.horizon.values()) < min(loose.horizon.values())
 
 

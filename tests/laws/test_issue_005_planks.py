@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from heap_pit import STONE, inside_each_other
+from box_pit import STONE, inside_each_other
 
 import rigidimpulse as ri
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from heap_pit import inside_each_other
+from box_pit import inside_each_other
 
 import rigidimpulse as ri
 

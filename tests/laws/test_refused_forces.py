@@ -16,7 +16,7 @@ from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.model import state
 
 G, SIZE, SPEED = 9.81, 0.2, 2.0
-GAP = 2.0 * TOLERANCES.contact_gap * SIZE
+GAP = 2.0 * TOLERANCES.contact_margin * SIZE
 
 
 def spoilt(factor: float, start: float, end: float = np.inf):

@@ -17,7 +17,7 @@ import trimesh
 from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
 from rigidimpulse.collision.time_of_impact import bisection, conservative, linear
 from rigidimpulse.collision.time_of_impact.safe_step import make_scratch
-from rigidimpulse.motion.trajectory import FREE, begin, make_course, state_at
+from rigidimpulse.motion.trajectory import FREE, begin, make_trajectories, state_at
 
 BOX = trimesh.creation.box((1.0, 0.6, 0.4))
 GEOMETRY = build_geometry(
@@ -31,9 +31,9 @@ DETECTOR = SimpleNamespace(
 )
 
 
-def course(height=2.0, velocity=(1.0, 0.5, -3.0)):
+def trajectory(height=2.0, velocity=(1.0, 0.5, -3.0)):
     """A box that tumbles and falls on the plane z = 0."""
-    result = make_course(2)
+    result = make_trajectories(2)
     result.mode[1] = FREE
     result.position[1], result.velocity[1] = (0.0, 0.0, height), velocity
     result.angular_velocity[1], result.acceleration[1] = (2.0, 3.0, 1.0), (0.0, 0.0, -9.81)
@@ -56,7 +56,7 @@ def impact(method, path, start=0.0, end=1.0, tolerance=1e-15):
 
 @pytest.mark.parametrize("method", [bisection, conservative])
 def test_guarded_error_is_within_the_tolerance_and_early(method):
-    path = course()
+    path = trajectory()
     exact, _, closing = impact(method, path)
     for tolerance in 10.0 ** -np.arange(2, 14):
         time, _, _ = impact(method, path, tolerance=tolerance)
@@ -66,13 +66,13 @@ def test_guarded_error_is_within_the_tolerance_and_early(method):
 @pytest.mark.parametrize("method", [bisection, conservative])
 def test_guarded_cost_is_that_of_bisection(method):
     for tolerance in 10.0 ** -np.arange(2, 15):
-        _, queries, closing = impact(method, course(), tolerance=tolerance)
+        _, queries, closing = impact(method, trajectory(), tolerance=tolerance)
         assert queries <= np.log2(1.0 / (tolerance / closing)) + 12
 
 
 def test_linear_error_is_of_second_order():
     """Started ever closer to the impact: the slope of error against time to go is 2, and at most three queries are made."""
-    path = course()
+    path = trajectory()
     exact, _, _ = impact(bisection, path)
     ahead = 2.0 ** -np.arange(4.0, 14.0)
     errors = []

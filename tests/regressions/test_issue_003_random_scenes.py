@@ -39,7 +39,7 @@ def test_bodies_that_left_their_contacts_carry_no_forces_of_them() -> None:
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=SMOOTH))
     run = ri.simulate(scene, 0.6)
     assert run.status.ok, run.status.message
-    assert rise(run) < 2.0 * TOLERANCES.contact_gap * (height + 2.0 * radius) * (mass + 1.0) * G
+    assert rise(run) < 2.0 * TOLERANCES.contact_margin * (height + 2.0 * radius) * (mass + 1.0) * G
 
 
 def linkage(plate: bool) -> ri.Scene:
@@ -90,11 +90,11 @@ def test_a_cylinder_that_is_drawn_flush_on_a_box_stands_on_it(box, radius: float
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=SMOOTH))
     run = ri.simulate(scene, 0.2)
     assert run.status.ok, run.status.message
-    gaps = 2.0 * TOLERANCES.contact_gap * 2.0 * radius
+    gaps = 2.0 * TOLERANCES.contact_margin * 2.0 * radius
     np.testing.assert_allclose(run.position("drum"), [drum["position"]] * len(run.times), atol=gaps)
 
 
-def test_bodies_that_sink_in_a_heap_have_room_for_their_contacts() -> None:
+def test_bodies_that_sink_in_a_substepped_island_have_room_for_their_contacts() -> None:
     """Contacts of sunk bodies were written beyond the end of the heap's table: the process died ("free(): invalid next size").
 
     A cube of 1,000 t on one of 1 kg is not for soft contacts: it sinks in, and both are looked at again and again.

@@ -14,7 +14,7 @@ from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE
 from rigidimpulse.collision.time_of_impact.safe_step import make_scratch
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
-from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, PRESCRIBED, begin, make_course, pose_at
+from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, PRESCRIBED, begin, make_trajectories, pose_at
 
 ROUND_OFF = 1e-13
 STEP = 1.0 / 60.0
@@ -54,45 +54,45 @@ class Pair:
         self.detector = SimpleNamespace(
             geometry=geometry, shape_of_body=np.array(self.shapes, dtype=np.int64), sweep_scratch=scratch, max_queries=10_000
         )
-        self.course = make_course(2)
+        self.trajectory = make_trajectories(2)
 
     def set(self, body, mode, position=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0), turned=(1, 0, 0, 0), **rows):
-        course = self.course
-        course.mode[body] = mode
-        course.position[body], course.velocity[body], course.angular_velocity[body] = position, velocity, spin
-        course.orientation[body] = np.array(turned) / np.linalg.norm(turned)
+        trajectory = self.trajectory
+        trajectory.mode[body] = mode
+        trajectory.position[body], trajectory.velocity[body], trajectory.angular_velocity[body] = position, velocity, spin
+        trajectory.orientation[body] = np.array(turned) / np.linalg.norm(turned)
         for name, value in rows.items():
-            getattr(course, name)[body] = value
-        begin(course, body)
+            getattr(trajectory, name)[body] = value
+        begin(trajectory, body)
         return self
 
-    def sweep(self, method=bisection, end=STEP, touch=1e-6, tolerance=1e-15, start=0.0, swapped=False):
+    def sweep(self, method=bisection, end=STEP, impact_margin=1e-6, tolerance=1e-15, start=0.0, swapped=False):
         """(time, status, queries, witness) of the pair."""
         a, b = np.array([int(swapped)]), np.array([int(not swapped)])
-        rows = [np.array([float(value)]) for value in (start, touch, tolerance)]
-        result = method.sweep(self.detector, self.course, a, b, rows[0], end, rows[1], rows[2])
+        rows = [np.array([float(value)]) for value in (start, impact_margin, tolerance)]
+        result = method.sweep(self.detector, self.trajectory, a, b, rows[0], end, rows[1], rows[2])
         return result.time[0], result.status[0], result.queries[0], result.witness[0]
 
     def gap(self, t):
-        return gap_at(self.detector.geometry, self.course, *self.shapes, t)
+        return gap_at(self.detector.geometry, self.trajectory, *self.shapes, t)
 
 
 @jit_making_arrays
-def gap_at(geometry, course, shape_a, shape_b, t):
+def gap_at(geometry, trajectory, shape_a, shape_b, t):
     """Least gap of bodies 0 and 1 at time t."""
     x, q, axes, points = np.empty((2, 3)), np.empty((2, 4)), np.empty((2, 3, 3)), np.empty(7)
     for i in range(2):
-        pose_at(course, i, t, x[i], q[i])
+        pose_at(trajectory, i, t, x[i], q[i])
         quaternion_to_matrix(q[i], axes[i])
     return pair_gap(geometry, shape_a, x[0], axes[0], shape_b, x[1], axes[1], np.inf, points)
 
 
 @jit
-def first_sample_below(geometry, course, shape_a, shape_b, start, end, samples, level):
+def first_sample_below(geometry, trajectory, shape_a, shape_b, start, end, samples, level):
     """First of the sampled times at which the gap is below a level; inf if none is."""
     for i in range(samples + 1):
         t = start + (end - start) * i / samples
-        if gap_at(geometry, course, shape_a, shape_b, t) < level:
+        if gap_at(geometry, trajectory, shape_a, shape_b, t) < level:
             return t
     return np.inf
 
@@ -116,16 +116,16 @@ def random_pair(rng, rates=False):
             inertia=split.sum() - split,
         )
         if rates and free:
-            pair.course.jerk[body] = rng.normal(size=3) * 10 ** rng.uniform(0, 5)
-            pair.course.torque_rate[body] = rng.normal(size=3) * 10 ** rng.uniform(0, 5)
-            begin(pair.course, body)
+            pair.trajectory.jerk[body] = rng.normal(size=3) * 10 ** rng.uniform(0, 5)
+            pair.trajectory.torque_rate[body] = rng.normal(size=3) * 10 ** rng.uniform(0, 5)
+            begin(pair.trajectory, body)
     direction, wanted = rng.normal(size=3), 10 ** rng.uniform(-4, 0.3)
     near, far = 0.0, 20.0
     for _ in range(40):
         middle = 0.5 * (near + far)
-        pair.course.position[1] = direction / np.linalg.norm(direction) * middle
+        pair.trajectory.position[1] = direction / np.linalg.norm(direction) * middle
         near, far = (middle, far) if pair.gap(0.0) < wanted else (near, middle)
-    pair.course.position[1] = direction / np.linalg.norm(direction) * far
+    pair.trajectory.position[1] = direction / np.linalg.norm(direction) * far
     return pair if 1e-8 < pair.gap(0.0) < 10.0 else None
 
 
@@ -134,23 +134,23 @@ def check_random_pairs(rng, number, rates):
     swept = impacts = 0
     for pair in filter(None, (random_pair(rng, rates) for _ in range(number))):
         end = STEP * 10 ** rng.uniform(-1, 1)
-        touch = 10 ** rng.uniform(-9, -4)
-        if pair.gap(0.0) < 2.0 * touch:
+        impact_margin = 10 ** rng.uniform(-9, -4)
+        if pair.gap(0.0) < 2.0 * impact_margin:
             continue
-        time, status, _, witness = pair.sweep(end=end, touch=touch)
-        other, other_status, _, _ = pair.sweep(conservative, end=end, touch=touch)
+        time, status, _, witness = pair.sweep(end=end, impact_margin=impact_margin)
+        other, other_status, _, _ = pair.sweep(conservative, end=end, impact_margin=impact_margin)
         assert status == other_status
         last = end if status == SEPARATE else time
         sample = (*pair.shapes, 0.0, last)
-        assert first_sample_below(GEOMETRY, pair.course, *sample, 200, touch - ROUND_OFF) == np.inf
+        assert first_sample_below(GEOMETRY, pair.trajectory, *sample, 200, impact_margin - ROUND_OFF) == np.inf
         swept += 1
         if status == SEPARATE:
             continue
         impacts += 1
         assert status == IMPACT
-        assert abs(pair.gap(time) - touch) < ROUND_OFF + 1e-11 * touch
-        assert abs(pair.gap(other) - touch) < ROUND_OFF + 1e-11 * touch
-        assert abs(witness[9] - touch) < ROUND_OFF
+        assert abs(pair.gap(time) - impact_margin) < ROUND_OFF + 1e-11 * impact_margin
+        assert abs(pair.gap(other) - impact_margin) < ROUND_OFF + 1e-11 * impact_margin
+        assert abs(witness[9] - impact_margin) < ROUND_OFF
         assert np.linalg.norm(witness[6:9]) == pytest.approx(1.0, abs=1e-12)
         assert witness[3:6] - witness[0:3] == pytest.approx(witness[9] * witness[6:9], abs=1e-9)
     return swept, impacts

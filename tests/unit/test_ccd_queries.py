@@ -69,8 +69,8 @@ def test_touch_and_tolerance():
     face = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]]
     rest = FeaturePath(np.zeros((2, 3)), np.zeros((2, 3)))
     fall = FeaturePath(np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]), np.zeros((2, 3)))
-    assert first_contact(face, rest, [[0.0, 0.0, 0.0]], fall, touch=0.25) == pytest.approx(0.75, abs=1e-15)
-    assert 0.65 <= first_contact(face, rest, [[0.0, 0.0, 0.0]], fall, touch=0.25, tolerance=0.1) <= 0.75
+    assert first_contact(face, rest, [[0.0, 0.0, 0.0]], fall, impact_margin=0.25) == pytest.approx(0.75, abs=1e-15)
+    assert 0.65 <= first_contact(face, rest, [[0.0, 0.0, 0.0]], fall, impact_margin=0.25, tolerance=0.1) <= 0.75
 
 
 def test_bad_input_is_refused():

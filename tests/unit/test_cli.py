@@ -207,7 +207,7 @@ def test_accuracy_by_wish_on_the_command_line(scene_file, tmp_path):
 def test_study_prints_exponents_of_cost():
     result = call("study", "--scaling", "--most", 300)
     assert result.exit_code == 0, result.output
-    assert "gas: elastic balls in a box" in result.stdout and "heap: boxes that fall" in result.stdout
+    assert "gas: elastic balls in a box" in result.stdout and "pile: boxes that fall" in result.stdout
     assert len([line for line in result.stdout.splitlines() if line.startswith("exponent of the cost")]) == 2
     result = call("study", "--scaling", "--most", 100)
     assert result.exit_code == BAD_SCENE and "give at least 300" in result.stderr

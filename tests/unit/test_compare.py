@@ -52,14 +52,14 @@ def runs(num_frames: int = 49) -> tuple[ri.Recording, ri.Recording]:
     orientations = np.tile([1.0, 0.0, 0.0, 0.0], (num_frames, 3, 1))
     orientations[:, 2] = turn_about(np.array([1.0, 0.0, 0.0]), 3.0 * times)
     corners = np.array([[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float)
-    net = FlexibleTrack("cloth", np.tile(corners, (num_frames, 1, 1)), np.array([[0, 1, 2], [0, 2, 3]]))
+    soft_body = FlexibleTrack("cloth", np.tile(corners, (num_frames, 1, 1)), np.array([[0, 1, 2], [0, 2, 3]]))
     a = ri.Recording(times, list(scene.names), positions, orientations, positions, positions, positions, np.zeros(0, IMPACT_DTYPE),
-                     scene=scene, nets=[net])  # fmt: skip
-    drifted, turned, lifted = positions.copy(), orientations.copy(), net.vertices.copy()
+                     scene=scene, soft_bodies=[soft_body])  # fmt: skip
+    drifted, turned, lifted = positions.copy(), orientations.copy(), soft_body.vertices.copy()
     drifted[:, 1] += times[:, None] * DRIFT
     turned[:, 2] = -multiply(turn_about(AXIS, TURN * times), orientations[:, 2])  # the sign of a quaternion means nothing
     lifted[:, 2, 2] += 0.125 * times
-    return a, replace(a, positions=drifted, orientations=turned, nets=[replace(net, vertices=lifted)])
+    return a, replace(a, positions=drifted, orientations=turned, soft_bodies=[replace(soft_body, vertices=lifted)])
 
 
 def manifest_of(page: str) -> dict[str, Any]:
@@ -128,7 +128,7 @@ class TestComparison:
         with pytest.raises(ValueError, match=r"'ball'.*frame 7"):
             comparison.export(tmp_path / "x.html")
         b.positions[7, 1, 0] = 0.0
-        b.nets[0].vertices[3, 2] = np.inf
+        b.soft_bodies[0].vertices[3, 2] = np.inf
         assert ri.compare(a, b).distance("cloth")[3] == np.inf
         with pytest.raises(ValueError, match="'cloth'"):
             ri.compare(a, b).export(tmp_path / "x.html")
@@ -136,8 +136,8 @@ class TestComparison:
     @pytest.mark.parametrize(("change", "words"), [
         (lambda b: replace(b, names=["floor", "ball", "crate"]), "crate.*runs of one scene"),
         (lambda b: replace(b, times=2.0 * b.times), "same duration and fps"),
-        (lambda b: replace(b, nets=[]), "cloth of 4 vertices.*none"),
-        (lambda b: replace(b, nets=[replace(b.nets[0], vertices=b.nets[0].vertices[:, :3])]), "of 3 vertices"),
+        (lambda b: replace(b, soft_bodies=[]), "cloth of 4 vertices.*none"),
+        (lambda b: replace(b, soft_bodies=[replace(b.soft_bodies[0], vertices=b.soft_bodies[0].vertices[:, :3])]), "of 3 vertices"),
     ])  # fmt: skip
     def test_runs_of_different_scenes_are_refused(self, change: Any, words: str) -> None:
         a, b = runs()
@@ -177,7 +177,7 @@ class TestPage:
         assert np.frombuffer(angle["value"].data, "<f4").reshape(3, -1)[1, -1] == pytest.approx(TURN * a.times[-1], rel=1e-7)
         *_, frames = messages_of(page, "frames")
         assert frames["path"] == f"/ghosts/{contents['nets'][0]['key']}"
-        assert np.array_equal(np.frombuffer(frames["value"].data, "<f4"), b.nets[0].vertices.astype(np.float32).ravel())
+        assert np.array_equal(np.frombuffer(frames["value"].data, "<f4"), b.soft_bodies[0].vertices.astype(np.float32).ravel())
 
     def test_camera_sees_both_runs(self) -> None:
         # The box reaches 1.9 m to either side, the ball of the second run 5.5 m to one: 1.8 m more in half the width.

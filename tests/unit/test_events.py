@@ -20,7 +20,7 @@ def test_queue_gives_the_earliest_entry_after_any_changes() -> None:
         schedule(queue, p, float(times[p]), int(owners[p]))
         assert queue.size[0] == np.count_nonzero(times < np.inf)
         if queue.size[0]:
-            assert queue.heap[0] == min(range(n), key=lambda i: (times[i], owners[i]))
+            assert queue.order[0] == min(range(n), key=lambda i: (times[i], owners[i]))
 
 
 def test_tree_finds_the_bodies_that_a_test_of_all_pairs_finds() -> None:

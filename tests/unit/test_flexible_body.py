@@ -11,7 +11,7 @@ from rigidimpulse.core.quaternion import rotate_inverse
 from rigidimpulse.dynamics.soft_body import FlexibleBody, Flexibles, FlexibleTrack
 from rigidimpulse.dynamics.soft_body.distance import STACK, first_touch, first_touch_of_triangle, signed_distance
 from rigidimpulse.dynamics.soft_body.track import tracks_in
-from rigidimpulse.view.soft_bodies import net_messages
+from rigidimpulse.view.soft_bodies import soft_body_messages
 
 TRIANGLE = {"mesh": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
 
@@ -108,10 +108,10 @@ def test_fast_ball_touches_a_moving_triangle() -> None:
 
 def test_track_of_a_page_and_a_file() -> None:
     track = FlexibleTrack("cloth", np.arange(36.0).reshape(3, 4, 3), np.array([[0, 1, 2], [0, 2, 3]]))
-    (kind, mesh), (_, frames) = net_messages(track, 2)
+    (kind, mesh), (_, frames) = soft_body_messages(track, 2)
     assert kind == "net" and mesh["path"] == frames["path"] == "/nets/2"
     assert np.frombuffer(frames["value"].data, "<f4").tolist() == list(range(36))
     (back,) = tracks_in(track.arrays(0))
     np.testing.assert_array_equal(back.vertices, track.vertices)
     with pytest.raises(ValueError, match="'cloth'"):
-        net_messages(FlexibleTrack("cloth", np.full((1, 3, 3), np.nan), track.faces[:1]), 0)
+        soft_body_messages(FlexibleTrack("cloth", np.full((1, 3, 3), np.nan), track.faces[:1]), 0)

@@ -171,12 +171,12 @@ class TestHalfSpace:
         rng = np.random.default_rng(11)
         for _ in range(20):
             x, R = random_pose(rng)
-            core = shape.vertices @ R.T
-            x[2] = 1e-4 + shape.radius - core[:, 2].min()
-            height = core[:, 2] + x[2] - shape.radius
+            skeleton = shape.vertices @ R.T
+            x[2] = 1e-4 + shape.radius - skeleton[:, 2].min()
+            height = skeleton[:, 2] + x[2] - shape.radius
             margin = 2e-2
             contacts = scene.contacts((x, R), IDENTITY, margin).check()
-            expected = (core + x - [0, 0, shape.radius])[height <= margin]
+            expected = (skeleton + x - [0, 0, shape.radius])[height <= margin]
             assert matched(contacts.point_a, expected, ROUND_OFF)
             np.testing.assert_allclose(contacts.gap, contacts.point_a[:, 2], rtol=0, atol=ROUND_OFF)
             gap, point_a, point_b = scene.gap((x, R), IDENTITY)

@@ -380,7 +380,7 @@ def test_only_the_narrowphase_touches_fcl_and_only_its_safe_part():
                 imported.add(node.module.split(".")[0])
         assert ("fcl" in imported) == (path.relative_to(PACKAGE).as_posix() == "collision/distance/fcl.py"), path
         assert "trimesh.collision" not in path.read_text()
-    tree = ast.parse((PACKAGE / "detect" / "narrowphase.py").read_text())
+    tree = ast.parse((PACKAGE / "collision" / "distance" / "fcl.py").read_text())
     used = {
         n.attr
         for n in ast.walk(tree)

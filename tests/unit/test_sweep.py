@@ -41,7 +41,7 @@ def test_swapped_bodies_meet_at_the_same_time():
 def test_ball_falls_on_a_plane(method):
     """1/2 g t^2 = z - r - touch."""
     pair = Pair("half space", "sphere").set(1, FREE, (0, 0, 2), acceleration=(0, 0, -9.81), spin=(3, 2, 1))
-    time, status, queries, witness = pair.sweep(method, end=1.0, touch=0.0)
+    time, status, queries, witness = pair.sweep(method, end=1.0, impact_margin=0.0)
     assert status == IMPACT
     assert time == pytest.approx(np.sqrt(2.0 * 1.5 / 9.81), abs=1e-15)
     assert queries <= 3
@@ -54,7 +54,7 @@ def test_balls_graze_or_miss(method):
     for miss in (1e-3, 1e-9, 1e-13):
         for side in (-1.0, 1.0):
             pair = Pair("sphere", "sphere").set(1, FREE, (-8, 0, 1.0 + side * miss), velocity=(1000, 0, 0))
-            time, status, _, _ = pair.sweep(method, touch=0.0)
+            time, status, _, _ = pair.sweep(method, impact_margin=0.0)
             if side > 0.0:
                 assert status == SEPARATE
             else:
@@ -69,7 +69,7 @@ def test_ball_thrown_at_a_ball_meets_the_root_of_the_quartic(method):
         x, v = rng.normal(size=3) * 3.0 + [0, 0, 4.0], rng.normal(size=3) * 4.0
         a = np.array([0.0, 0.0, -9.81])
         pair = Pair("sphere", "sphere").set(1, FREE, x, velocity=v, acceleration=a)
-        time, status, _, _ = pair.sweep(method, end=2.0, touch=0.0)
+        time, status, _, _ = pair.sweep(method, end=2.0, impact_margin=0.0)
         square = np.polynomial.Polynomial([x @ x - 1.0, 2.0 * x @ v, v @ v + x @ a, v @ a, 0.25 * a @ a])
         roots = [r.real for r in square.roots() if abs(r.imag) < 1e-9 and 0.0 < r.real < 2.0]
         assert (status == IMPACT) == bool(roots)
@@ -109,13 +109,13 @@ def test_bar_at_500_radians_per_second_meets_a_thin_post(method):
     names = ["bar", "post"]
     geometry = build_geometry([shape(mesh(box(2.0, 0.01, 0.01))), shape(cylinder(0.002, 1.0))])
     pair = Pair("bar", "post", geometry, make_scratch(geometry), names)
-    w, distance, touch = 500.0, 0.7, 1e-6
+    w, distance, impact_margin = 500.0, 0.7, 1e-6
     for phi in (0.1, 1.0, 2.0, 3.1):
         pair.set(0, PRESCRIBED, spin=(0, 0, w))
         pair.set(1, FIXED, (distance * np.cos(phi), distance * np.sin(phi), 0.0))
-        time, status, _, _ = pair.sweep(method, touch=touch)
+        time, status, _, _ = pair.sweep(method, impact_margin=impact_margin)
         assert status == IMPACT
-        assert time == pytest.approx((phi - np.arcsin((0.005 + 0.002 + touch) / distance)) / w, abs=1e-16 / w * 1e3)
+        assert time == pytest.approx((phi - np.arcsin((0.005 + 0.002 + impact_margin) / distance)) / w, abs=1e-16 / w * 1e3)
 
 
 @pytest.mark.parametrize("method", GUARDED)
@@ -125,7 +125,7 @@ def test_the_first_of_two_contacts_is_found(method):
     geometry = build_geometry([shape(sphere(0.1, at=(-1, 0, 0)), sphere(0.1, at=(1, 0, 0))), shape(sphere(0.1))])
     pair = Pair("two", "ball", geometry, make_scratch(geometry), names)
     pair.set(1, FREE, (-3, 0, 0), velocity=(400, 0, 0))
-    time, status, _, witness = pair.sweep(method, touch=0.0)
+    time, status, _, witness = pair.sweep(method, impact_margin=0.0)
     assert status == IMPACT
     assert time == pytest.approx(1.8 / 400.0, abs=1e-16)
     assert witness[0:3] == pytest.approx([-1.1, 0, 0], abs=1e-12)
@@ -168,7 +168,7 @@ def test_what_slides_or_rolls_at_a_gap_does_not_stall(method, floor, name):
     pair = Pair(floor, name.split()[-1], geometry, make_scratch(geometry), [*floors, *solids])
     height, turned, velocity, spin = RESTING[name]
     pair.set(1, FREE, (0.013, 0.017, height + 1e-6), velocity=velocity, spin=spin, turned=turned)
-    _, status, queries, _ = pair.sweep(method, touch=5e-7)
+    _, status, queries, _ = pair.sweep(method, impact_margin=5e-7)
     assert status == SEPARATE
     assert queries <= 30
 
@@ -177,24 +177,24 @@ def test_what_slides_or_rolls_at_a_gap_does_not_stall(method, floor, name):
 @pytest.mark.parametrize("name", ["ball", "box", "cylinder"])
 def test_at_the_gap_of_contact(method, name):
     """At `touch`: leaving is free until the return, hovering is free, approaching is contact at once."""
-    touch = 1e-3
+    impact_margin = 1e-3
     pair = Pair("half space", name)
-    height = {"ball": 0.05, "box": 0.2, "cylinder": 0.4}[name] + touch
+    height = {"ball": 0.05, "box": 0.2, "cylinder": 0.4}[name] + impact_margin
     pair.set(1, FREE, (0, 0, height), velocity=(1, 0, 2))
-    assert pair.sweep(method, touch=touch)[1] == SEPARATE
+    assert pair.sweep(method, impact_margin=impact_margin)[1] == SEPARATE
     pair.set(1, FREE, (0, 0, height), velocity=(1, 0, 1e-17))
-    assert pair.sweep(method, touch=touch)[1] == SEPARATE
+    assert pair.sweep(method, impact_margin=impact_margin)[1] == SEPARATE
     pair.set(1, FREE, (0, 0, height), velocity=(1, 0, -1e-17))
-    assert pair.sweep(method, touch=touch)[1] == SEPARATE
+    assert pair.sweep(method, impact_margin=impact_margin)[1] == SEPARATE
     pair.set(1, FREE, (0, 0, height - 1e-16), velocity=(1, 0, -1.0))
-    time, status, _, _ = pair.sweep(method, touch=touch)
+    time, status, _, _ = pair.sweep(method, impact_margin=impact_margin)
     assert (time, status) == (0.0, TOUCHING) or (status == IMPACT and time < 1e-15)
     # Thrown up at 1 m/s it is back after 2 v / g; and from half the gap, it passes `touch` upwards and comes down on it.
     pair.set(1, FREE, (0, 0, height), velocity=(1, 0, 1), acceleration=(0, 0, -9.81))
-    assert pair.sweep(method, end=0.5, touch=touch)[0] == pytest.approx(2.0 / 9.81, abs=1e-12)
-    pair.set(1, FREE, (0, 0, height - 0.5 * touch), velocity=(1, 0, 1), acceleration=(0, 0, -9.81))
-    late = (1.0 + np.sqrt(1.0 - 9.81 * touch)) / 9.81
-    assert pair.sweep(method, end=0.5, touch=touch)[0] == pytest.approx(late, abs=1e-12)
+    assert pair.sweep(method, end=0.5, impact_margin=impact_margin)[0] == pytest.approx(2.0 / 9.81, abs=1e-12)
+    pair.set(1, FREE, (0, 0, height - 0.5 * impact_margin), velocity=(1, 0, 1), acceleration=(0, 0, -9.81))
+    late = (1.0 + np.sqrt(1.0 - 9.81 * impact_margin)) / 9.81
+    assert pair.sweep(method, end=0.5, impact_margin=impact_margin)[0] == pytest.approx(late, abs=1e-12)
 
 
 def test_crossing_bodies_touch_at_the_start():
@@ -235,7 +235,7 @@ def test_scaling_by_a_power_of_two_changes_no_bit():
             pull, velocity = np.array([0, 0, -9.81 * unit]), np.array([0.5, 0.2, -20.0]) * unit
             position = np.array([0, 0, 1.6 * unit])
             pair.set(1, FREE, position, velocity, spin, turned, acceleration=pull, inertia=(1.0, 1.5, 2.0))
-        one, other = first.sweep(end=0.1), second.sweep(end=0.1, touch=1024e-6, tolerance=1024e-15)
+        one, other = first.sweep(end=0.1), second.sweep(end=0.1, impact_margin=1024e-6, tolerance=1024e-15)
         assert one[:3] == other[:3]
 
 
@@ -245,7 +245,7 @@ def test_linear_may_miss_what_is_not_yet_approaching():
     assert pair.sweep(linear, end=0.5)[1] == SEPARATE
     assert pair.sweep(end=0.5)[1] == IMPACT
     pair.set(1, FREE, (0, 0, 0.75), velocity=(0, 0, -2), acceleration=(0, 0, 0))
-    time, status, queries, witness = pair.sweep(linear, end=0.5, touch=0.05)
+    time, status, queries, witness = pair.sweep(linear, end=0.5, impact_margin=0.05)
     assert status == IMPACT
     assert queries <= 3
     assert time == pytest.approx(0.1, abs=1e-15)

@@ -39,7 +39,7 @@ def test_ball_with_jerk_meets_a_plane_at_the_root_of_the_cubic(method):
         if z < 1e-3:
             continue
         pair = Pair("half space", "sphere").set(1, FREE, (0, 0, 0.5 + z), (1, 0, v), acceleration=(0, 2, a), jerk=(3, 0, j))
-        time, status, queries, _ = pair.sweep(method, end=2.0, touch=0.0)
+        time, status, queries, _ = pair.sweep(method, end=2.0, impact_margin=0.0)
         real = [r.real for r in cubic.roots() if abs(r.imag) < 1e-12 and 0.0 < r.real < 2.0]
         assert (status == IMPACT) == bool(real)
         assert queries <= 3
@@ -53,8 +53,8 @@ def test_ball_with_jerk_returns_to_a_plane(method):
     """From the very gap of contact it leaves, slower and slower, by v t + a t^2 / 2 - |j| t^3 / 6, and is back at the root of that."""
     pair = Pair("half space", "sphere").set(1, FREE, (0, 0, 0.5), (0, 0, 1.0), acceleration=(0, 0, 2.0), jerk=(0, 0, -30.0))
     back = (1.0 + np.sqrt(1.0 + 4.0 * 5.0)) / 10.0  # 1 + t - 5 t^2 = 0
-    assert pair.sweep(method, end=2.0, touch=0.0)[0] == pytest.approx(back, abs=1e-14)
-    assert pair.sweep(method, end=0.5 * back, touch=0.0)[1] == SEPARATE
+    assert pair.sweep(method, end=2.0, impact_margin=0.0)[0] == pytest.approx(back, abs=1e-14)
+    assert pair.sweep(method, end=0.5 * back, impact_margin=0.0)[1] == SEPARATE
 
 
 @pytest.mark.parametrize("method", GUARDED)
@@ -64,7 +64,7 @@ def test_balls_with_jerk_meet_at_the_root_of_the_sextic(method):
         x, v, a, j = rng.normal(size=(4, 3)) * np.array([3.0, 3.0, 6.0, 20.0])[:, None]
         x[2] += 4.0
         pair = Pair("sphere", "sphere").set(1, FREE, x, velocity=v, acceleration=a, jerk=j)
-        time, status, _, _ = pair.sweep(method, end=2.0, touch=0.0)
+        time, status, _, _ = pair.sweep(method, end=2.0, impact_margin=0.0)
         square = sum(np.polynomial.Polynomial([x[k], v[k], a[k] / 2.0, j[k] / 6.0]) ** 2 for k in range(3)) - 1.0
         roots = [r.real for r in square.roots() if abs(r.imag) < 1e-9 and 0.0 < r.real < 2.0]
         assert (status == IMPACT) == bool(roots)

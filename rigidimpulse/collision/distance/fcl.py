@@ -48,7 +48,7 @@ class Separation(NamedTuple):
     normal: np.ndarray  # (3,) unit, from a to b
 
 
-class _Core(NamedTuple):
+class _Skeleton(NamedTuple):
     """A tree of triangles for FCL, twice, so that a shape can be asked about itself."""
 
     radius: float
@@ -59,7 +59,7 @@ class _Solid(NamedTuple):
     """What is asked of one shape."""
 
     half_spaces: list[np.ndarray]  # normal, offset
-    cores: list[_Core]
+    skeletons: list[_Skeleton]
     cylinders: list[Primitive]
     vertices: np.ndarray  # (v, 3) all corners of cores
     radii: np.ndarray  # (v,) their radii
@@ -108,7 +108,7 @@ class Narrowphase:
         """
         (x_a, R_a), (x_b, R_b) = _frame(pose_a), _frame(pose_b)
         R, t = R_a.T @ R_b, R_a.T @ (x_b - x_a)  # from the frame of b into that of a
-        best = self._core_separation(a, b, R, t)
+        best = self._skeleton_separation(a, b, R, t)
         best = min(best, self._cylinder_separation(a, b, R, t, best.gap), key=_gap)
         if best.gap < np.inf and self._contained(a, b, R, t):
             best = _overlapping(0.0)
@@ -126,7 +126,7 @@ class Narrowphase:
         R, t = R_a.T @ R_b, R_a.T @ (x_b - x_a)
         return (
             self._plane_separation(a, b, R, t).gap <= 0.0
-            or self._cores_meet(a, b, R, t)
+            or self._skeletons_meet(a, b, R, t)
             or self._cylinder_separation(a, b, R, t, np.inf).gap <= 0.0
             or self._contained(a, b, R, t)
         )
@@ -150,17 +150,17 @@ class Narrowphase:
             best = min(best, _swapped(_above(_moved_plane(plane, R, t), solid_a, np.eye(3), np.zeros(3))), key=_gap)
         return best
 
-    def _core_separation(self, a: int, b: int, R: np.ndarray, t: np.ndarray) -> Separation:
+    def _skeleton_separation(self, a: int, b: int, R: np.ndarray, t: np.ndarray) -> Separation:
         """Return the least separation of pairs of cores."""
         best = _NOTHING
         placed = fcl.Transform(R, t * self._scale)
-        for core_a in self._solid(a).cores:
-            for core_b in self._solid(b).cores:
-                first, second = core_a.objects[0], core_b.objects[1]
+        for skeleton_a in self._solid(a).skeletons:
+            for skeleton_b in self._solid(b).skeletons:
+                first, second = skeleton_a.objects[0], skeleton_b.objects[1]
                 second.setTransform(placed)
                 result = fcl.DistanceResult()
                 distance = max(0.0, fcl.distance(first, second, self._request, result) / self._scale)
-                gap = distance - core_a.radius - core_b.radius
+                gap = distance - skeleton_a.radius - skeleton_b.radius
                 if not gap < best.gap:
                     continue
                 best = _overlapping(gap)
@@ -168,16 +168,16 @@ class Narrowphase:
                 length = float(np.linalg.norm(q - p))
                 if distance > 0.0 and length > 0.0:
                     n = (q - p) / length
-                    best = Separation(gap, p + core_a.radius * n, q - core_b.radius * n, n)
+                    best = Separation(gap, p + skeleton_a.radius * n, q - skeleton_b.radius * n, n)
         return best
 
-    def _cores_meet(self, a: int, b: int, R: np.ndarray, t: np.ndarray) -> bool:
+    def _skeletons_meet(self, a: int, b: int, R: np.ndarray, t: np.ndarray) -> bool:
         placed = fcl.Transform(R, t * self._scale)
-        for core_a in self._solid(a).cores:
-            for core_b in self._solid(b).cores:
-                first, second = core_a.objects[0], core_b.objects[1]
+        for skeleton_a in self._solid(a).skeletons:
+            for skeleton_b in self._solid(b).skeletons:
+                first, second = skeleton_a.objects[0], skeleton_b.objects[1]
                 second.setTransform(placed)
-                radius = core_a.radius + core_b.radius
+                radius = skeleton_a.radius + skeleton_b.radius
                 if radius == 0.0:
                     if fcl.collide(first, second, fcl.CollisionRequest(), fcl.CollisionResult()) > 0:
                         return True
@@ -188,7 +188,7 @@ class Narrowphase:
     def _cylinder_separation(self, a: int, b: int, R: np.ndarray, t: np.ndarray, limit: float) -> Separation:
         """Return the separation of two shapes of which one has cylinders, if below `limit`."""
         solid_a, solid_b = self._solid(a), self._solid(b)
-        if not ((solid_a.cylinders and (solid_b.cylinders or solid_b.cores)) or (solid_b.cylinders and solid_a.cores)):
+        if not ((solid_a.cylinders and (solid_b.cylinders or solid_b.skeletons)) or (solid_b.cylinders and solid_a.skeletons)):
             return _NOTHING
         out = np.zeros(7)
         farthest = float(np.linalg.norm(R @ solid_b.centre + t - solid_a.centre)) + solid_a.reach + solid_b.reach
@@ -316,9 +316,9 @@ def _solid_of(shape: CompiledShape, scale: float) -> _Solid:
     rounds = [primitive for primitive in shape.primitives if primitive.kind == ROUND]
     cylinders = [primitive for primitive in shape.primitives if primitive.kind == CYLINDER]
     meshes = [primitive for primitive in rounds if primitive.radius == 0.0]
-    cores = [_core([primitive], scale) for primitive in rounds if primitive.radius > 0.0]
+    skeletons = [_skeleton([primitive], scale) for primitive in rounds if primitive.radius > 0.0]
     if meshes:
-        cores.append(_core(meshes, scale))
+        skeletons.append(_skeleton(meshes, scale))
     vertices = np.concatenate([np.zeros((0, 3)), *(primitive.vertices for primitive in rounds)])
     radii = np.concatenate([np.zeros(0), *(np.full(len(p.vertices), p.radius) for p in rounds)])
     balls = np.concatenate([vertices, np.zeros((0, 3)), *(p.frame[None, :3] for p in cylinders)])
@@ -326,7 +326,7 @@ def _solid_of(shape: CompiledShape, scale: float) -> _Solid:
     centre = 0.5 * (balls.min(axis=0) + balls.max(axis=0)) if len(balls) else np.zeros(3)
     return _Solid(
         half_spaces=[primitive.frame[:4] for primitive in shape.primitives if primitive.kind == HALF_SPACE],
-        cores=cores,
+        skeletons=skeletons,
         cylinders=cylinders,
         vertices=vertices,
         radii=radii,
@@ -346,7 +346,7 @@ def _parts(primitive: Primitive) -> np.ndarray:
     return primitive.vertices[faces[first, 0]]
 
 
-def _core(primitives: list[Primitive], scale: float) -> _Core:
+def _skeleton(primitives: list[Primitive], scale: float) -> _Skeleton:
     """Return the tree of one or more primitives of the same radius."""
     first = np.cumsum([0, *(len(primitive.vertices) for primitive in primitives)])
     vertices = np.concatenate([primitive.vertices for primitive in primitives]) * scale
@@ -355,4 +355,4 @@ def _core(primitives: list[Primitive], scale: float) -> _Core:
     tree.beginModel(len(faces), len(vertices))
     tree.addSubModel(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
     tree.endModel()
-    return _Core(primitives[0].radius, (fcl.CollisionObject(tree), fcl.CollisionObject(tree)))
+    return _Skeleton(primitives[0].radius, (fcl.CollisionObject(tree), fcl.CollisionObject(tree)))

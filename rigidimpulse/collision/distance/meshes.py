@@ -133,11 +133,11 @@ def round_round_gap(geometry, first, second, R, t, limit, stack, out):
     """
     node_min, node_max, node_child = geometry.node_min, geometry.node_max, geometry.node_child
     reach = geometry.radius[first] + geometry.radius[second]
-    core = limit + reach
-    if core <= 0.0:
+    skeleton = limit + reach
+    if skeleton <= 0.0:
         return limit
     nowhere = (0.0, 0.0, 0.0)
-    best = (core * core, nowhere, nowhere)
+    best = (skeleton * skeleton, nowhere, nowhere)
     bound = np.empty(STACK_ROWS)
     stack[0, 0] = geometry.node_first[first]
     stack[0, 1] = geometry.node_first[second]
@@ -167,7 +167,7 @@ def round_round_gap(geometry, first, second, R, t, limit, stack, out):
                 place = depth
             stack[place, 0], stack[place, 1], bound[place] = a, b, squared
         depth += 2
-    if best[0] >= core * core:
+    if best[0] >= skeleton * skeleton:
         return limit
     distance = sqrt(best[0])
     for i in range(3):

@@ -39,7 +39,7 @@ class View(NamedTuple):
     radius_v: float
     radius_t: float
     margin: float
-    core: float  # greatest distance of the cores: margin and radii
+    skeleton: float  # greatest distance of the skeletons: margin and radii
     slack: float  # how far a capsule may miss being locally closest, m
     leeway: float  # added to the sine by which a normal may miss an arc or a cone
     two_sided: bool  # the triangles bound no solid: their back is outside too

@@ -168,7 +168,7 @@ def closest_to_ring(centre, u, v, rim_radius, s, radius, level, axial):
 
 
 @inner
-def ring_contact(q, tangent, curvature, solid, level, core):
+def ring_contact(q, tangent, curvature, solid, level, skeleton):
     """Return (found, p, normal, distance) for the point q of a curve that is locally closest to a rim.
 
     `core`: radius by which the curve is grown. The normal lies between those of cap and side; distance and q are of
@@ -180,7 +180,7 @@ def ring_contact(q, tangent, curvature, solid, level, core):
     between = subtract(q, p)
     distance = sqrt(dot(between, between))
     squared = dot(tangent, tangent)
-    if distance > solid.margin + core or curvature * solid.radius <= _LEAST_CURVATURE * distance * squared:
+    if distance > solid.margin + skeleton or curvature * solid.radius <= _LEAST_CURVATURE * distance * squared:
         return False, p, out, distance
     up = copysign(1.0, level)
     across = cross(tangent, (-out[1], out[0], 0.0))
@@ -191,7 +191,7 @@ def ring_contact(q, tangent, curvature, solid, level, core):
     else:
         n = along(ZERO, 1.0 / distance, between)
     in_arc = dot(n, out) >= -solid.tilt and up * n[2] >= -solid.tilt
-    return in_arc and distance >= core - PENETRATION * solid.radius, p, n, distance
+    return in_arc and distance >= skeleton - PENETRATION * solid.radius, p, n, distance
 
 
 @inner

@@ -101,14 +101,14 @@ def cylinder_round_contacts(geometry, cylinder, round_, R, t, margin, stack, con
     vertex, edge_kind = geometry.vertex, geometry.edge_kind
     solid = solid_of(geometry.frame, geometry.radius, cylinder, margin)
     view = _view(solid, R, t)
-    core = geometry.radius[round_]
+    skeleton = geometry.radius[round_]
     rows = (contact_real, contact_int, count)
     stack[0, 0] = geometry.node_first[round_]
     depth = 1
     while depth > 0:
         depth -= 1
         node = stack[depth, 0]
-        if _box_gap(solid, view, row(geometry.node_min, node), row(geometry.node_max, node)) > margin + core:
+        if _box_gap(solid, view, row(geometry.node_min, node), row(geometry.node_max, node)) > margin + skeleton:
             continue
         child = geometry.node_child[node]
         if child >= 0:
@@ -121,34 +121,34 @@ def cylinder_round_contacts(geometry, cylinder, round_, R, t, margin, stack, con
             triangle, k = slot // 3, slot % 3
             if k == 0:
                 a, b, c = _corners(geometry, view, triangle)
-                near = _corner_gap(solid, a, b, c) <= margin + core
+                near = _corner_gap(solid, a, b, c) <= margin + skeleton
             if not near:
                 continue
             owns = geometry.triangle_owns[triangle] >> k
             corner, edge = geometry.triangle[triangle, k], geometry.triangle_edge[triangle, k]
             if owns & 1 and geometry.vertex_corner[corner]:
-                count = _vertex_contact(geometry, solid, view, rows, count, corner, core)
+                count = _vertex_contact(geometry, solid, view, rows, count, corner, skeleton)
             if owns >> 3 & 1 and edge_kind[edge] != EDGE_HIDDEN:
                 tail = _seen(view, row(vertex, geometry.edge[edge, 0]))
                 d = subtract(_seen(view, row(vertex, geometry.edge[edge, 1])), tail)
                 normal_0, normal_1 = edge_normals(geometry.edge_normal, edge)
                 arc = (to_axes(view.x, view.y, view.z, normal_0), to_axes(view.x, view.y, view.z, normal_1))
-                count = _edge_contacts(solid, rows, count, tail, d, arc, edge_kind[edge], core, 3 * edge + 1)
-            if core == 0.0 and k < (1 if geometry.closed[round_] else 2):  # an open surface has two sides
+                count = _edge_contacts(solid, rows, count, tail, d, arc, edge_kind[edge], skeleton, 3 * edge + 1)
+            if skeleton == 0.0 and k < (1 if geometry.closed[round_] else 2):  # an open surface has two sides
                 m = to_axes(view.x, view.y, view.z, row(geometry.triangle_normal, triangle))
                 m = along(ZERO, 1.0 - 2.0 * k, m)
                 count = rims_on_plane(solid, rows, count, m, a, b, c, TRIANGLE, 3 * triangle + 2)
                 a, b = b, a
-    if core > 0.0 or count == rows[2]:  # the closest point of a smooth body is a contact in any case
-        pair, triangle = _closest_triangle(geometry, solid, view, round_, margin + core, stack)
+    if skeleton > 0.0 or count == rows[2]:  # the closest point of a smooth body is a contact in any case
+        pair, triangle = _closest_triangle(geometry, solid, view, round_, margin + skeleton, stack)
         distance, p, q, n = pair
         if triangle >= 0 and dot(n, n) > 0.0:
-            count = append(solid, rows, count, p, along(q, -core, n), n, distance - core, SIDE, 3 * triangle + 2)
+            count = append(solid, rows, count, p, along(q, -skeleton, n), n, distance - skeleton, SIDE, 3 * triangle + 2)
     return count
 
 
 @inner
-def _vertex_contact(geometry, solid, view, rows, count, vertex, core):
+def _vertex_contact(geometry, solid, view, rows, count, vertex, skeleton):
     """Append the contact of a vertex if no edge that leaves it comes closer; over a cap that needs not be so."""
     q = _seen(view, row(geometry.vertex, vertex))
     border = BORDER * solid.radius
@@ -156,13 +156,13 @@ def _vertex_contact(geometry, solid, view, rows, count, vertex, core):
     if solid.radius < rho <= solid.radius + border and abs(q[2]) > solid.half:  # in line with the rim: over the cap
         q = (q[0] * solid.radius / rho, q[1] * solid.radius / rho, q[2])
     distance, p, _, n = closest_on_curve(q, ZERO, solid.radius, solid.half)
-    if distance == 0.0 and core == 0.0 and solid.half - abs(q[2]) <= border:
+    if distance == 0.0 and skeleton == 0.0 and solid.half - abs(q[2]) <= border:
         # In the very plane of the cap, or in it by rounding.
         n, distance = (0.0, 0.0, 1.0 if q[2] > 0.0 else -1.0), abs(q[2]) - solid.half
         p = (q[0], q[1], n[2] * solid.half)
-    elif distance > solid.margin + core or distance == 0.0:
+    elif distance > solid.margin + skeleton or distance == 0.0:
         return count
-    flat = core == 0.0 and abs(n[2]) == 1.0
+    flat = skeleton == 0.0 and abs(n[2]) == 1.0
     for k in range(geometry.vertex_edge_first[vertex], geometry.vertex_edge_first[vertex + 1]):
         edge = geometry.vertex_edge[k]
         other = geometry.edge[edge, 0] + geometry.edge[edge, 1] - vertex
@@ -170,13 +170,13 @@ def _vertex_contact(geometry, solid, view, rows, count, vertex, core):
         length = sqrt(dot(leaving, leaving))
         if not flat and dot(n, leaving) < -min(solid.margin, solid.tilt * length):
             return count
-    return append(solid, rows, count, p, along(q, -core, n), n, distance - core, RIM, 3 * vertex)
+    return append(solid, rows, count, p, along(q, -skeleton, n), n, distance - skeleton, RIM, 3 * vertex)
 
 
 @inner
-def _edge_contacts(solid, rows, count, a, d, arc, kind, core, other):
+def _edge_contacts(solid, rows, count, a, d, arc, kind, skeleton, other):
     """Append the contacts of an edge a + t d with the side and the rims; `arc`: normals of its faces."""
-    radius, half, reach = solid.radius, solid.half, solid.margin + core
+    radius, half, reach = solid.radius, solid.half, solid.margin + skeleton
     length = sqrt(dot(d, d))
     direction = along(ZERO, 1.0 / length, d)
     across = d[0] * d[0] + d[1] * d[1]
@@ -185,11 +185,11 @@ def _edge_contacts(solid, rows, count, a, d, arc, kind, core, other):
     rho = hypot(q[0], q[1])
     if rho > radius + reach:
         return count
-    if 0.0 < nearest < 1.0 and abs(q[2]) <= half and rho >= radius + core - PENETRATION * radius:
+    if 0.0 < nearest < 1.0 and abs(q[2]) <= half and rho >= radius + skeleton - PENETRATION * radius:
         n = (q[0] / rho, q[1] / rho, 0.0)
         if in_edge_arc((-n[0], -n[1], 0.0), direction, arc[0], arc[1], kind, solid.tilt):
             p = (radius * n[0], radius * n[1], q[2])
-            count = append(solid, rows, count, p, along(q, -core, n), n, rho - radius - core, SIDE, other)
+            count = append(solid, rows, count, p, along(q, -skeleton, n), n, rho - radius - skeleton, SIDE, other)
     chord = sqrt((radius - rho) * (radius + rho) / across) if rho < radius and across > 0.0 else 0.0
     steep = d[2] * d[2] >= across
     for start in range(4):  # both rims; both places where a shallow line crosses the side
@@ -203,10 +203,10 @@ def _edge_contacts(solid, rows, count, a, d, arc, kind, core, other):
         if curvature < 0.0 or not 0.0 < t < 1.0:
             continue
         q = along(a, t, d)
-        found, p, n, distance = ring_contact(q, d, curvature, solid, level, core)
+        found, p, n, distance = ring_contact(q, d, curvature, solid, level, skeleton)
         if found and in_edge_arc((-n[0], -n[1], -n[2]), direction, arc[0], arc[1], kind, solid.tilt):
             feature = RIM + (0 if start < 2 else 1) + (2 if q[0] * d[0] + q[1] * d[1] > 0.0 else 0)
-            count = append(solid, rows, count, p, along(q, -core, n), n, distance - core, feature, other)
+            count = append(solid, rows, count, p, along(q, -skeleton, n), n, distance - skeleton, feature, other)
     return count
 
 
@@ -243,10 +243,10 @@ def _closest_triangle(geometry, solid, view, round_, limit, stack):
 def cylinder_round_gap(geometry, cylinder, round_, R, t, limit, stack, out):
     """Return the least gap, minus the radius if the core is inside; `limit` with `out` untouched if not below."""
     solid = solid_of(geometry.frame, geometry.radius, cylinder, 0.0)
-    core = geometry.radius[round_]
-    pair, near = _closest_triangle(geometry, solid, _view(solid, R, t), round_, limit + core, stack)
+    skeleton = geometry.radius[round_]
+    pair, near = _closest_triangle(geometry, solid, _view(solid, R, t), round_, limit + skeleton, stack)
     if near < 0:
         return limit
     distance, p, q, n = pair
-    write_points(solid, p, along(q, -core, n), out)
-    return distance - core
+    write_points(solid, p, along(q, -skeleton, n), out)
+    return distance - skeleton

@@ -60,7 +60,7 @@ SCRATCH_ROWS = 8 * STACK_ROWS
 
 MAX_PER_NORMAL = 8
 """Directions in which the extreme contacts of one normal are kept."""
-SAME_WALL = 0.999
+SAME_PATCH = 0.999
 """Cosine of the angle below which normals belong to one wall."""
 TIE = 1e-9
 """Difference of two positions along a direction, relative to the extent, below which they are equally extreme."""
@@ -203,11 +203,11 @@ def pair_gap(geometry, shape_a, x_a, R_a, shape_b, x_b, R_b, limit, out):
 
 
 @inner
-def _deepest_left(contact_real, wall, first):
+def _deepest_left(contact_real, patch, first):
     """Return the deepest contact that has no wall yet, or -1."""
     deepest = -1
-    for i in range(len(wall)):
-        if wall[i] < 0 and (deepest < 0 or contact_real[first + i, 9] < contact_real[deepest, 9]):
+    for i in range(len(patch)):
+        if patch[i] < 0 and (deepest < 0 or contact_real[first + i, 9] < contact_real[deepest, 9]):
             deepest = first + i
     return deepest
 
@@ -223,12 +223,12 @@ def _tangents(normal):
 
 
 @inner
-def _extreme(contact_real, contact_int, wall, label, first, direction):
+def _extreme(contact_real, contact_int, patch, label, first, direction):
     """Return the contact of a wall that lies farthest along a direction; of equal ones that of the least features."""
     best = -1
     farthest = 0.0
-    for i in range(len(wall)):
-        if wall[i] != label:
+    for i in range(len(patch)):
+        if patch[i] != label:
             continue
         at = first + i
         place = dot(row(contact_real, at), direction)
@@ -244,39 +244,39 @@ def _extreme(contact_real, contact_int, wall, label, first, direction):
 def reduce_contacts(contact_real, contact_int, first, count, max_per_normal=MAX_PER_NORMAL):
     """Keep the contacts that carry load, of rows [first, count), which belong to one pair of bodies.
 
-    Contacts whose normals agree (`SAME_WALL`) form a wall. Of a wall with more than `max_per_normal` contacts the
+    Contacts whose normals agree (`SAME_PATCH`) form a wall. Of a wall with more than `max_per_normal` contacts the
     deepest and the extreme ones in that many directions stay, unchanged and in their order. Returns the new count.
     """
     if count - first <= max_per_normal:
         return count
-    wall = np.full(count - first, -1, np.int64)
+    patch = np.full(count - first, -1, np.int64)
     kept = np.zeros(count - first, np.bool_)
     label = np.int64(0)  # (a literal would compile `_extreme` twice)
     while True:
-        leader = _deepest_left(contact_real, wall, first)
+        leader = _deepest_left(contact_real, patch, first)
         if leader < 0:
             break
         normal = (contact_real[leader, 6], contact_real[leader, 7], contact_real[leader, 8])
         members = 0
-        for i in range(len(wall)):
+        for i in range(len(patch)):
             at = first + i
             cosine = normal[0] * contact_real[at, 6] + normal[1] * contact_real[at, 7] + normal[2] * contact_real[at, 8]
-            if wall[i] < 0 and (at == leader or cosine > SAME_WALL):
-                wall[i] = label
+            if patch[i] < 0 and (at == leader or cosine > SAME_PATCH):
+                patch[i] = label
                 kept[i] = True
                 members += 1
         if members > max_per_normal:
-            for i in range(len(wall)):
-                kept[i] = kept[i] and wall[i] != label
+            for i in range(len(patch)):
+                kept[i] = kept[i] and patch[i] != label
             kept[leader - first] = True
             u, v = _tangents(normal)
             for k in range(max_per_normal):
                 angle = 2.0 * pi * k / max_per_normal
                 direction = along((cos(angle) * u[0], cos(angle) * u[1], cos(angle) * u[2]), sin(angle), v)
-                kept[_extreme(contact_real, contact_int, wall, label, first, direction) - first] = True
+                kept[_extreme(contact_real, contact_int, patch, label, first, direction) - first] = True
         label += 1
     end = first
-    for i in range(len(wall)):
+    for i in range(len(patch)):
         if kept[i]:
             for column in range(contact_real.shape[1]):
                 contact_real[end, column] = contact_real[first + i, column]

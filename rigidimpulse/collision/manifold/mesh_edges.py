@@ -50,7 +50,7 @@ def _arcs_miss(edge_normal, edge_kind, R_back, R, edge_a, edge_b, d, e, normal):
 
 
 @inner
-def _crossing(p, d, q, e, core):
+def _crossing(p, d, q, e, skeleton):
     """Return (near, point_a, point_b, c, distance) for the common normal c of two edges p + s d, q + t e.
 
     `near`: both closest points lie on the edges and are at most `core` apart; c points from a to b.
@@ -67,13 +67,13 @@ def _crossing(p, d, q, e, core):
         distance = -distance
         c = (-c[0], -c[1], -c[2])
     inside = -INSIDE <= s <= 1.0 + INSIDE and -INSIDE <= t <= 1.0 + INSIDE
-    return inside and distance <= core, point_a, point_b, c, distance
+    return inside and distance <= skeleton, point_a, point_b, c, distance
 
 
 @inner
 def _crossing_contact(edge_normal, edge_kind, view, rows, count, edge_a, edge_b, p, d, q, e):
     """Append the contact of two edges p + s d and q + t e if they cross (frame of the first body)."""
-    near, point_a, point_b, c, distance = _crossing(p, d, q, e, view.core)
+    near, point_a, point_b, c, distance = _crossing(p, d, q, e, view.skeleton)
     if not near:
         return count
     c_length = sqrt(dot(c, c))
@@ -120,7 +120,7 @@ def _parallel_contacts(edge, edge_normal, edge_kind, view, rows, count, edge_a, 
     middle = 0.5 * (low + high)
     between = subtract(along(q, (middle - start) / speed, e), along(p, middle, u))
     distance = sqrt(dot(between, between))
-    if high - low <= MERGE * length or distance > view.core or distance <= ROUND_OFF * length:
+    if high - low <= MERGE * length or distance > view.skeleton or distance <= ROUND_OFF * length:
         return count
     normal = (between[0] / distance, between[1] / distance, between[2] / distance)
     tolerance = STRICT + view.leeway + ROUND_OFF * (length + abs(p[0]) + abs(p[1]) + abs(p[2])) / distance
@@ -133,7 +133,7 @@ def _parallel_contacts(edge, edge_normal, edge_kind, view, rows, count, edge_a, 
         between = subtract(point_b, point_a)
         gap = dot(between, normal)
         sideways = along(between, -gap, normal)
-        if not 0.0 < gap <= view.core or dot(sideways, sideways) > (SIDEWAYS * gap) ** 2:
+        if not 0.0 < gap <= view.skeleton or dot(sideways, sideways) > (SIDEWAYS * gap) ** 2:
             continue
         # The end is a vertex of one edge, beside the other edge.
         of_a = place == 0.0 or place == length
@@ -160,7 +160,7 @@ def edge_contacts(geometry, view, pairs, end, rows, count):
                 continue
             q = moved(view.R, view.t, row(vertex, edge[edge_b, 0]))
             q_end = moved(view.R, view.t, row(vertex, edge[edge_b, 1]))
-            if outside_box(q, q_end, low, high, view.core):
+            if outside_box(q, q_end, low, high, view.skeleton):
                 continue
             e = subtract(q_end, q)
             for i in range(3 * start_a, 3 * (start_a + count_a)):
@@ -170,7 +170,7 @@ def edge_contacts(geometry, view, pairs, end, rows, count):
                 p, p_end = row(vertex, edge[edge_a, 0]), row(vertex, edge[edge_a, 1])
                 least = (min(p[0], p_end[0]), min(p[1], p_end[1]), min(p[2], p_end[2]))
                 most = (max(p[0], p_end[0]), max(p[1], p_end[1]), max(p[2], p_end[2]))
-                if outside_box(q, q_end, least, most, view.core):
+                if outside_box(q, q_end, least, most, view.skeleton):
                     continue
                 d = subtract(p_end, p)
                 c = cross(d, e)

@@ -65,11 +65,11 @@ CREASE = 2.0 * TOLERANCES.flat_angle
 
 
 @inner
-def _append_vertex(view, rows, count, core_v, core_t, normal, distance, kind, feature_v, feature_t, merge):
-    """Append a contact of a vertex (core point `core_v`) with a triangle (`core_t`), given in the triangle's frame."""
+def _append_vertex(view, rows, count, skeleton_v, skeleton_t, normal, distance, kind, feature_v, feature_t, merge):
+    """Append a contact of a vertex (core point `skeleton_v`) with a triangle (`skeleton_t`), given in the triangle's frame."""
     gap = distance - view.radius_v - view.radius_t
-    point_v = along(core_v, view.radius_v, normal)
-    point_t = along(core_t, -view.radius_t, normal)
+    point_v = along(skeleton_v, view.radius_v, normal)
+    point_t = along(skeleton_t, -view.radius_t, normal)
     if view.flipped:
         normal = (-normal[0], -normal[1], -normal[2])
         return append_contact(rows, count, point_t, point_v, normal, gap, kind, feature_t, feature_v, merge)
@@ -114,7 +114,7 @@ def _face_contact(geometry, view, rows, count, vertex, p, triangle, corners, nor
         normal = (-normal[0], -normal[1], -normal[2])
     if not _in_vertex_cone(
         geometry.vertex, geometry.edge, geometry.vertex_edge_first, geometry.vertex_edge, vertex,
-        turned(view.R_back, normal), view.core, TILT,
+        turned(view.R_back, normal), view.skeleton, TILT,
     ):
         return count
     kind = FACE_VERTEX if view.flipped else VERTEX_FACE
@@ -138,13 +138,13 @@ def _face_contacts(geometry, view, pairs, end, rows, count):
                 if not (owns[owner] >> k & 1 and geometry.vertex_corner[corner]):
                     continue
                 p = moved(view.R, view.t, row(vertex, corner))
-                if outside_box(p, p, low, high, view.core):
+                if outside_box(p, p, low, high, view.skeleton):
                     continue
                 for face in range(start_t, start_t + count_t):
                     a = row(vertex, triangle[face, 0])
                     normal = row(geometry.triangle_normal, face)
                     height = dot(subtract(p, a), normal)
-                    if abs(height) > view.core or triangle[face, 1] == triangle[face, 2]:
+                    if abs(height) > view.skeleton or triangle[face, 1] == triangle[face, 2]:
                         continue
                     corners = (a, row(vertex, triangle[face, 1]), row(vertex, triangle[face, 2]))
                     hidden = (
@@ -189,7 +189,7 @@ def _corner_contact(geometry, view, rows, count, corner, p, foot, feature, size)
 def _corner_contacts(geometry, view, pairs, end, rows, count):
     """Append the contacts of the corners in one node of each pair with the edges and corners in the other."""
     vertex, triangle, owns, edge = geometry.vertex, geometry.triangle, geometry.triangle_owns, geometry.edge
-    core_squared = view.core * view.core
+    skeleton_squared = view.skeleton * view.skeleton
     for pair in range(STACK_ROWS, end):
         node_v = pairs[pair, 1] if view.flipped else pairs[pair, 0]
         node_t = pairs[pair, 0] if view.flipped else pairs[pair, 1]
@@ -202,7 +202,7 @@ def _corner_contacts(geometry, view, pairs, end, rows, count):
                 if not (owns[owner] >> k & 1 and geometry.vertex_corner[corner]):
                     continue
                 p = moved(view.R, view.t, row(vertex, corner))
-                if outside_box(p, p, low, high, view.core):
+                if outside_box(p, p, low, high, view.skeleton):
                     continue
                 for slot in range(3 * start_t, 3 * (start_t + count_t)):
                     face = slot // 3
@@ -215,14 +215,14 @@ def _corner_contacts(geometry, view, pairs, end, rows, count):
                         s = dot(subtract(p, a), side) / length_squared
                         foot = along(a, s, side)
                         off = subtract(foot, p)
-                        if -INSIDE <= s <= 1.0 + INSIDE and dot(off, off) <= core_squared:
+                        if -INSIDE <= s <= 1.0 + INSIDE and dot(off, off) <= skeleton_squared:
                             size = sqrt(length_squared)
                             count = _corner_contact(geometry, view, rows, count, corner, p, foot, 2 * e + 1, size)
                     v = triangle[face, m]
                     if not view.flipped and owns[face] >> m & 1 and geometry.vertex_corner[v]:
                         foot = row(vertex, v)
                         off = subtract(foot, p)
-                        if dot(off, off) <= core_squared:
+                        if dot(off, off) <= skeleton_squared:
                             size = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(foot[0]) + abs(foot[1]) + abs(foot[2])
                             count = _corner_contact(geometry, view, rows, count, corner, p, foot, 2 * v, size)
     return count
@@ -264,7 +264,7 @@ def round_round_contacts(geometry, first, second, R, t, margin, pairs, contact_r
     """
     R_back, t_back = _pose_back(R, t)
     radius_a, radius_b = geometry.radius[first], geometry.radius[second]
-    core = margin + radius_a + radius_b
+    skeleton = margin + radius_a + radius_b
     edges_a = geometry.edge_first[first + 1] - geometry.edge_first[first]
     edges_b = geometry.edge_first[second + 1] - geometry.edge_first[second]
     slack = margin if edges_a > 0 and edges_b > 0 and radius_a + radius_b > 0.0 else 0.0
@@ -272,14 +272,14 @@ def round_round_contacts(geometry, first, second, R, t, margin, pairs, contact_r
     rows = (contact_real, contact_int, count)
     first_row = count
     for leeway in (0.0, ANY):
-        of_a = View(False, R_back, t_back, R, t, radius_a, radius_b, margin, core, slack, leeway, open_b)
-        of_b = View(True, R, t, R_back, t_back, radius_b, radius_a, margin, core, slack, leeway, open_a)
+        of_a = View(False, R_back, t_back, R, t, radius_a, radius_b, margin, skeleton, slack, leeway, open_b)
+        of_b = View(True, R, t, R_back, t_back, radius_b, radius_a, margin, skeleton, slack, leeway, open_a)
         pairs[0, 0] = geometry.node_first[first]
         pairs[0, 1] = geometry.node_first[second]
         depth = np.int64(1)  # (a literal would compile the walk twice)
         while depth > 0:
             depth, end = gather_leaf_pairs(
-                geometry.node_min, geometry.node_max, geometry.node_child, R, t, core, pairs, depth
+                geometry.node_min, geometry.node_max, geometry.node_child, R, t, skeleton, pairs, depth
             )
             count = edge_contacts(geometry, of_b, pairs, end, rows, count)
             for view in (of_a, of_b):

@@ -65,12 +65,12 @@ class Polyhedra(NamedTuple):
     plane: np.ndarray  # (F, 4) unit outward normal and offset, m
     loop_first: np.ndarray  # (F+1,)
     loop: np.ndarray  # (L,) corners of each face, counter-clockwise seen from outside
-    wall: np.ndarray  # (s, 4) unit normal and offset of shapes that are one half space, 0 for others
+    half_space: np.ndarray  # (s, 4) unit normal and offset of shapes that are one half space, 0 for others
 
 
 def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | None = None) -> Polyhedra:
     """Tables of the shapes that are `convex` (s,) bool; those that are `bare` (s,) bool have corners, but no faces, others neither."""
-    half, wall = np.zeros((len(convex), 3)), np.zeros((len(convex), 4))
+    half, half_space = np.zeros((len(convex), 3)), np.zeros((len(convex), 4))
     planes: list[np.ndarray] = []
     loops: list[list[int]] = []
     corners: list[np.ndarray] = []
@@ -78,7 +78,7 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | No
     for s, is_convex in enumerate(convex):
         p = int(geometry.shape_first[s])
         if geometry.shape_first[s + 1] == p + 1 and geometry.kind[p] == HALF_SPACE:
-            wall[s] = geometry.frame[p, :4]
+            half_space[s] = geometry.frame[p, :4]
         vertex = geometry.vertex[int(geometry.vertex_first[p]) : int(geometry.vertex_first[p + 1])]
         if bare is not None and bare[s]:
             corners.append(vertex)
@@ -96,7 +96,7 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | No
     return Polyhedra(
         half=half, corner_first=np.array(firsts[0]), corner=np.concatenate([*corners, np.zeros((0, 3))]), face_first=np.array(firsts[1]),
         plane=np.array(planes).reshape(-1, 4), loop_first=np.cumsum([0, *map(len, loops)]),
-        loop=np.array([v for loop in loops for v in loop], np.int64), wall=wall,
+        loop=np.array([v for loop in loops for v in loop], np.int64), half_space=half_space,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from rigidimpulse.collision.geometry import CYLINDER
 from rigidimpulse.collision.time_of_impact.result import ImpactTimes, SweepDetector, no_impacts
 from rigidimpulse.collision.time_of_impact.search import first_contacts
-from rigidimpulse.motion.trajectory import Course
+from rigidimpulse.motion.trajectory import Trajectories
 
 LOOK_AHEAD = 0.5
 """How far past a safe step the root is looked for, relative to the step."""
@@ -21,12 +21,12 @@ LOOK_AHEAD = 0.5
 
 def sweep(
     detector: SweepDetector,
-    course: Course,
+    trajectory: Trajectories,
     pairs_a: np.ndarray,
     pairs_b: np.ndarray,
     start: np.ndarray,
     end: float,
-    touch: np.ndarray,
+    impact_margin: np.ndarray,
     tolerance: np.ndarray,
 ) -> ImpactTimes:
     """Find the first contact of each pair of bodies.
@@ -48,14 +48,14 @@ def sweep(
     result = no_impacts(len(pairs_a))
     first_contacts(
         detector.geometry,
-        course,
+        trajectory,
         detector.sweep_scratch,
         detector.shape_of_body,
         pairs_a,
         pairs_b,
         start,
         float(end),
-        touch,
+        impact_margin,
         tolerance,
         LOOK_AHEAD,
         detector.max_queries,

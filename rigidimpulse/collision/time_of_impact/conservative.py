@@ -11,31 +11,31 @@ import numpy as np
 from rigidimpulse.collision.geometry import CYLINDER
 from rigidimpulse.collision.time_of_impact.result import ImpactTimes, SweepDetector, no_impacts
 from rigidimpulse.collision.time_of_impact.search import first_contacts
-from rigidimpulse.motion.trajectory import Course
+from rigidimpulse.motion.trajectory import Trajectories
 
 
 def sweep(
     detector: SweepDetector,
-    course: Course,
+    trajectory: Trajectories,
     pairs_a: np.ndarray,
     pairs_b: np.ndarray,
     start: np.ndarray,
     end: float,
-    touch: np.ndarray,
+    impact_margin: np.ndarray,
     tolerance: np.ndarray,
 ) -> ImpactTimes:
     """Find the first contact of each pair of bodies; arguments and result as for `bisection.sweep`."""
     result = no_impacts(len(pairs_a))
     first_contacts(
         detector.geometry,
-        course,
+        trajectory,
         detector.sweep_scratch,
         detector.shape_of_body,
         pairs_a,
         pairs_b,
         start,
         float(end),
-        touch,
+        impact_margin,
         tolerance,
         0.0,
         detector.max_queries,

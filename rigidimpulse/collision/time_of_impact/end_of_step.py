@@ -18,16 +18,16 @@ from rigidimpulse.collision.time_of_impact.result import IMPACT, ImpactTimes, Sw
 from rigidimpulse.collision.time_of_impact.scratch_layout import GAP, NORMAL
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
-from rigidimpulse.motion.trajectory import Course, pose_at
+from rigidimpulse.motion.trajectory import Trajectories, pose_at
 
 
 @jit_making_arrays
-def _is_inside(geometry, course, shape_of_body, a, b, t):
+def _is_inside(geometry, trajectory, shape_of_body, a, b, t):
     """Tell whether a primitive of one body lies inside the other, for bodies whose surfaces do not cross."""
     position, orientation, axes = np.empty(6), np.empty((2, 4)), np.empty(18)
     points, inside = np.empty((1, 3)), np.zeros(1, np.bool_)
     for side in range(2):
-        pose_at(course, b if side else a, t, position[3 * side : 3 * side + 3], orientation[side])
+        pose_at(trajectory, b if side else a, t, position[3 * side : 3 * side + 3], orientation[side])
         quaternion_to_matrix(orientation[side], axes[9 * side : 9 * side + 9].reshape((3, 3)))
     for side in range(2):
         small, large = shape_of_body[b if side else a], shape_of_body[a if side else b]
@@ -47,31 +47,31 @@ def _is_inside(geometry, course, shape_of_body, a, b, t):
 
 
 @jit
-def _sweep(geometry, course, shape_of_body, pairs_a, pairs_b, start, end, touch, result):
+def _sweep(geometry, trajectory, shape_of_body, pairs_a, pairs_b, start, end, impact_margin, result):
     for k in range(pairs_a.shape[0]):
         a, b, witness = pairs_a[k], pairs_b[k], result.witness[k]
-        measure(geometry, course, shape_of_body, a, b, end, witness)
+        measure(geometry, trajectory, shape_of_body, a, b, end, witness)
         result.queries[k] = 1
         gap = witness[GAP]
-        if gap > touch[k] and not _is_inside(geometry, course, shape_of_body, a, b, end):
+        if gap > impact_margin[k] and not _is_inside(geometry, trajectory, shape_of_body, a, b, end):
             continue
         result.time[k], result.status[k] = end, IMPACT
-        if gap <= 0.0 or gap > touch[k]:  # crossing or inside
-            measure(geometry, course, shape_of_body, a, b, start[k], witness)
+        if gap <= 0.0 or gap > impact_margin[k]:  # crossing or inside
+            measure(geometry, trajectory, shape_of_body, a, b, start[k], witness)
             normal = vector(witness, NORMAL)
-            measure(geometry, course, shape_of_body, a, b, end, witness)
+            measure(geometry, trajectory, shape_of_body, a, b, end, witness)
             put(witness, NORMAL, normal)
             result.queries[k] = 3
 
 
 def sweep(
     detector: SweepDetector,
-    course: Course,
+    trajectory: Trajectories,
     pairs_a: np.ndarray,
     pairs_b: np.ndarray,
     start: np.ndarray,
     end: float,
-    touch: np.ndarray,
+    impact_margin: np.ndarray,
     tolerance: np.ndarray,
 ) -> ImpactTimes:
     """Report the pairs that are in contact at `end`; arguments as for `bisection.sweep`, `tolerance` is not read.
@@ -81,5 +81,5 @@ def sweep(
 
     """
     result = no_impacts(len(pairs_a))
-    _sweep(detector.geometry, course, detector.shape_of_body, pairs_a, pairs_b, start, float(end), touch, result)
+    _sweep(detector.geometry, trajectory, detector.shape_of_body, pairs_a, pairs_b, start, float(end), impact_margin, result)
     return result

@@ -88,7 +88,7 @@ def _bend(corners, path, k):
 
 
 @jit
-def _first_contact(corners_a, path_a, corners_b, path_b, touch, tolerance, work, index, speeds):
+def _first_contact(corners_a, path_a, corners_b, path_b, impact_margin, tolerance, work, index, speeds):
     """Return (tau, steps); tau is inf without contact, nan if the steps were used up."""
     index[COUNT], index[COUNT + 1] = corners_a.shape[0], corners_b.shape[0]
     tau = 0.0
@@ -97,13 +97,13 @@ def _first_contact(corners_a, path_a, corners_b, path_b, touch, tolerance, work,
         _place(corners_b, path_b, tau, SECOND, work, speeds)
         separation, _ = closest_simplices(work, index, CLOSEST)
         size = length(vector(work, CORNER)) + length(vector(work, CORNER + 9))
-        if separation <= touch + max(tolerance, _ROUND_OFF * size):
+        if separation <= impact_margin + max(tolerance, _ROUND_OFF * size):
             return tau, step
         normal = vector(work, CLOSEST + NORMAL)
         safe = 1.0 - tau
         for i in range(corners_a.shape[0]):
             for j in range(corners_b.shape[0]):
-                gap = dot(normal, subtract(vector(work, CORNER + 9 + 3 * j), vector(work, CORNER + 3 * i))) - touch
+                gap = dot(normal, subtract(vector(work, CORNER + 9 + 3 * j), vector(work, CORNER + 3 * i))) - impact_margin
                 closing = -dot(normal, subtract(vector(speeds, 9 + 3 * j), vector(speeds, 3 * i)))
                 safe = safe_until(gap, closing, _bend(corners_a, path_a, i) + _bend(corners_b, path_b, j), safe)
         if tau + safe >= 1.0:
@@ -120,7 +120,7 @@ def first_contact(
     corners_b: ArrayLike,
     path_b: FeaturePath,
     *,
-    touch: float = 0.0,
+    impact_margin: float = 0.0,
     tolerance: float = 0.0,
 ) -> float:
     """Find when two features on prescribed paths first come together; never passes a contact, however fast they spin.
@@ -152,7 +152,7 @@ def first_contact(
             raise ValueError("a triangle without area: give its longest edge")
         features += [arrays[0], FeaturePath(arrays[1], arrays[2])]
     work, index, speeds = np.zeros(WORK_SIZE), np.zeros(INDEX_SIZE, np.int64), np.zeros(18)
-    tau, steps = _first_contact(*features, float(touch), float(tolerance), work, index, speeds)
+    tau, steps = _first_contact(*features, float(impact_margin), float(tolerance), work, index, speeds)
     if np.isnan(tau):
         raise RuntimeError(f"no end after {steps} safe steps: split the path into shorter pieces")
     return float(tau)

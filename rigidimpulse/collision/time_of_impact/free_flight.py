@@ -22,16 +22,16 @@ _ROUND_OFF = TOLERANCES.round_off
 
 
 @jit
-def relative_flight(course, a, b, t):
+def relative_flight(trajectory, a, b, t):
     """Position, velocity, acceleration and jerk of b's centre of mass less those of a."""
     x, v, acceleration, jerk = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for side in range(2):
         i, sign = b if side else a, 1.0 if side else -1.0
-        x = along(x, sign, row(course.position, i))
-        if course.mode[i] != FIXED:
-            s = t - course.start[i]
-            pull, growth = row(course.acceleration, i), rate_of(course, i, JERK)
-            start_velocity = row(course.velocity, i)
+        x = along(x, sign, row(trajectory.position, i))
+        if trajectory.mode[i] != FIXED:
+            s = t - trajectory.start[i]
+            pull, growth = row(trajectory.acceleration, i), rate_of(trajectory, i, JERK)
+            start_velocity = row(trajectory.velocity, i)
             x = along(x, sign * s, along(start_velocity, 0.5 * s, along(pull, s / 3.0, growth)))
             v = along(v, sign, along(start_velocity, s, along(pull, 0.5 * s, growth)))
             acceleration = along(acceleration, sign, along(pull, s, growth))
@@ -40,16 +40,16 @@ def relative_flight(course, a, b, t):
 
 
 @jit
-def rounding_slack(course, reach, a, b, shape_a, shape_b, end):
+def rounding_slack(trajectory, reach, a, b, shape_a, shape_b, end):
     """How far rounding can move the gap of a pair until `end`, m: relative to the coordinates of its path."""
     size = 0.0
     for side in range(2):
         i, shape = b if side else a, shape_b if side else shape_a
-        s = end - course.start[i]
-        size += length(row(course.position, i))
-        if course.mode[i] != FIXED:
-            mean = along(row(course.acceleration, i), s / 3.0, rate_of(course, i, JERK))
-            size += s * length(along(row(course.velocity, i), 0.5 * s, mean))
+        s = end - trajectory.start[i]
+        size += length(row(trajectory.position, i))
+        if trajectory.mode[i] != FIXED:
+            mean = along(row(trajectory.acceleration, i), s / 3.0, rate_of(trajectory, i, JERK))
+            size += s * length(along(row(trajectory.velocity, i), 0.5 * s, mean))
         if reach[shape] < inf:
             size += reach[shape]
     return _ROUND_OFF * size
@@ -80,12 +80,12 @@ def spheres_safe_until(x, v, a, jerk, reach, exact, horizon):
 
 
 @jit
-def plane_safe_until(course, i, normal_x, normal_y, normal_z, level, ball, x, v, a, jerk, horizon):
+def plane_safe_until(trajectory, i, normal_x, normal_y, normal_z, level, ball, x, v, a, jerk, horizon):
     """Safe time of a plane of body i, which does not turn, and a sphere with its centre at `level` at the threshold.
 
     x, v, a, jerk: the sphere's flight from the plane's body.
     """
-    q = course.orientation
+    q = trajectory.orientation
     normal = rotated(q[i, 0], q[i, 1], q[i, 2], q[i, 3], normal_x, normal_y, normal_z)
     gap = dot(normal, x) - level
     if gap <= 0.0 and not ball:

@@ -24,11 +24,11 @@ from rigidimpulse.collision.time_of_impact.result import IMPACT, TOUCHING, Impac
 from rigidimpulse.collision.time_of_impact.scratch_layout import FIRST, GAP, NORMAL, POINT_FIRST, POINT_SECOND, SECOND
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
-from rigidimpulse.motion.trajectory import Course, motion_at
+from rigidimpulse.motion.trajectory import Trajectories, motion_at
 
 
 @jit_making_arrays
-def measure(geometry, course, shape_of_body, a, b, t, witness):
+def measure(geometry, trajectory, shape_of_body, a, b, t, witness):
     """Measure the least gap of two bodies: points, normal and gap to witness (10,); returns the closing speed.
 
     Where surfaces cross or coincide, the normal is the line between the centres of mass, and the points tell nothing.
@@ -36,7 +36,7 @@ def measure(geometry, course, shape_of_body, a, b, t, witness):
     x, q, v, w = np.empty((2, 3)), np.empty((2, 4)), np.empty((2, 3)), np.empty((2, 3))
     axes, points = np.empty((2, 3, 3)), np.zeros(7)
     for side in range(2):
-        motion_at(course, b if side else a, t, x[side], q[side], v[side], w[side])
+        motion_at(trajectory, b if side else a, t, x[side], q[side], v[side], w[side])
         quaternion_to_matrix(q[side], axes[side])
     gap = pair_gap(geometry, shape_of_body[a], x[0], axes[0], shape_of_body[b], x[1], axes[1], inf, points)
     point_a, point_b = (points[0], points[1], points[2]), (points[3], points[4], points[5])
@@ -55,30 +55,30 @@ def measure(geometry, course, shape_of_body, a, b, t, witness):
 
 
 @jit
-def _sweep(geometry, course, shape_of_body, pairs_a, pairs_b, start, end, touch, result):
+def _sweep(geometry, trajectory, shape_of_body, pairs_a, pairs_b, start, end, impact_margin, result):
     for k in range(pairs_a.shape[0]):
         a, b, witness = pairs_a[k], pairs_b[k], result.witness[k]
-        closing = measure(geometry, course, shape_of_body, a, b, start[k], witness)
+        closing = measure(geometry, trajectory, shape_of_body, a, b, start[k], witness)
         result.queries[k] = 1
         if closing <= 0.0:
             continue
-        wait = (witness[GAP] - touch[k]) / closing
+        wait = (witness[GAP] - impact_margin[k]) / closing
         if wait <= 0.0:
             result.time[k], result.status[k] = start[k], TOUCHING
         elif start[k] + wait <= end:
             result.time[k], result.status[k] = start[k] + wait, IMPACT
-            measure(geometry, course, shape_of_body, a, b, start[k] + wait, witness)
+            measure(geometry, trajectory, shape_of_body, a, b, start[k] + wait, witness)
             result.queries[k] = 2
 
 
 def sweep(
     detector: SweepDetector,
-    course: Course,
+    trajectory: Trajectories,
     pairs_a: np.ndarray,
     pairs_b: np.ndarray,
     start: np.ndarray,
     end: float,
-    touch: np.ndarray,
+    impact_margin: np.ndarray,
     tolerance: np.ndarray,
 ) -> ImpactTimes:
     """Estimate the first contact of each pair of bodies; arguments as for `bisection.sweep`, `tolerance` is not read.
@@ -88,5 +88,5 @@ def sweep(
 
     """
     result = no_impacts(len(pairs_a))
-    _sweep(detector.geometry, course, detector.shape_of_body, pairs_a, pairs_b, start, float(end), touch, result)
+    _sweep(detector.geometry, trajectory, detector.shape_of_body, pairs_a, pairs_b, start, float(end), impact_margin, result)
     return result

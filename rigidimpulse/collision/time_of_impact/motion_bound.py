@@ -43,7 +43,7 @@ from rigidimpulse.collision.distance.simplices import along, cross, dot, subtrac
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
-from rigidimpulse.motion.trajectory import FIXED, FORCED, JERK, PRESCRIBED, STEPPED, TORQUE_RATE, motion_at, rate_of, row_at
+from rigidimpulse.motion.trajectory import FIXED, FORCED, JERK, LINEAR, PRESCRIBED, TORQUE_RATE, motion_at, rate_of, row_at
 
 # Offsets are numpy integers because numba would compile a kernel anew for every literal int that it is called with.
 
@@ -160,29 +160,29 @@ def _write_spin_bounds(moments, torque_world, torque_rate, horizon, row):
 
 
 @jit_making_arrays
-def motion_bound(course, i, t, horizon, row):
+def motion_bound(trajectory, i, t, horizon, row):
     """Write the motion of body i at time t, with bounds that hold until t + horizon, into row (MOTION_SIZE,).
 
     Works for every mode of a course: fixed, prescribed, free, and turning under a world torque.
     """
     motion_at(
-        course, i, t, row[POSITION:VELOCITY], row[ORIENTATION:SPIN_BOUND], row[VELOCITY:SPIN], row[SPIN:ACCELERATION]
+        trajectory, i, t, row[POSITION:VELOCITY], row[ORIENTATION:SPIN_BOUND], row[VELOCITY:SPIN], row[SPIN:ACCELERATION]
     )
     quaternion_to_matrix(row[ORIENTATION:SPIN_BOUND], row[AXES:ORIENTATION].reshape((3, 3)))
-    mode, s = course.mode[i], t - course.start[i]
+    mode, s = trajectory.mode[i], t - trajectory.start[i]
     none = (0.0, 0.0, 0.0)
-    growth = rate_of(course, i, JERK)
-    put(row, ACCELERATION, none if mode == FIXED else row_at(course.acceleration, i, growth, s))
+    growth = rate_of(trajectory, i, JERK)
+    put(row, ACCELERATION, none if mode == FIXED else row_at(trajectory.acceleration, i, growth, s))
     put(row, CENTRE_JERK, none if mode == FIXED else growth)
-    if mode == FIXED or mode == PRESCRIBED or mode == STEPPED:
+    if mode == FIXED or mode == PRESCRIBED or mode == LINEAR:
         put(row, SPIN_RATE, none)
         row[SPIN_BOUND] = length(vector(row, SPIN))
         row[SPIN_RATE_BOUND] = 0.0
         row[JERK_BOUND] = 0.0
         return
-    moments = (course.inertia[i, 0], course.inertia[i, 1], course.inertia[i, 2])
-    torque_rate = rate_of(course, i, TORQUE_RATE)
-    torque = row_at(course.torque, i, torque_rate, s) if mode == FORCED else none
+    moments = (trajectory.inertia[i, 0], trajectory.inertia[i, 1], trajectory.inertia[i, 2])
+    torque_rate = rate_of(trajectory, i, TORQUE_RATE)
+    torque = row_at(trajectory.torque, i, torque_rate, s) if mode == FORCED else none
     _write_spin_bounds(moments, torque, torque_rate, horizon, row)
 
 

@@ -41,18 +41,18 @@ def _later(t, s):
 
 
 @jit
-def _flight_safe_until(frame, course, scratch, a, b, shape_a, shape_b, t, threshold, horizon):
+def _flight_safe_until(frame, trajectory, scratch, a, b, shape_a, shape_b, t, threshold, horizon):
     """Return (safe time of the bounding spheres or planes, whether it is exact for the shapes)."""
-    x, v, acceleration, jerk = relative_flight(course, a, b, t)
+    x, v, acceleration, jerk = relative_flight(trajectory, a, b, t)
     plane_a, plane_b = scratch.plane[shape_a], scratch.plane[shape_b]
     if plane_a >= 0 or plane_b >= 0:
         i, plane, other = a if plane_a >= 0 else b, max(plane_a, plane_b), shape_b if plane_a >= 0 else shape_a
-        if course.mode[i] != FIXED and length(row(course.angular_velocity, i)) > 0.0:
+        if trajectory.mode[i] != FIXED and length(row(trajectory.angular_velocity, i)) > 0.0:
             return 0.0, False
         sign, ball = 1.0 if plane_a >= 0 else -1.0, scratch.ball[other]
         n0, n1, n2 = sign * frame[plane, 0], sign * frame[plane, 1], sign * frame[plane, 2]
         level = frame[plane, 3] + scratch.reach[other] + threshold
-        return plane_safe_until(course, i, n0, n1, n2, level, ball, x, v, acceleration, jerk, horizon), ball
+        return plane_safe_until(trajectory, i, n0, n1, n2, level, ball, x, v, acceleration, jerk, horizon), ball
     reach = scratch.reach[shape_a] + scratch.reach[shape_b] + threshold
     if reach == inf:
         return 0.0, False
@@ -61,18 +61,18 @@ def _flight_safe_until(frame, course, scratch, a, b, shape_a, shape_b, t, thresh
 
 
 @jit
-def _bring_motions(course, scratch, a, b, shape_a, shape_b, t, horizon):
+def _bring_motions(trajectory, scratch, a, b, shape_a, shape_b, t, horizon):
     """Write the motions of a pair at time t, over a horizon in which neither turns too far; returns that horizon."""
     for side in range(2):
         i, shape = b if side else a, shape_b if side else shape_a
-        if not scratch.ball[shape] and course.mode[i] != FIXED:
-            spin = length(row(course.angular_velocity, i))
+        if not scratch.ball[shape] and trajectory.mode[i] != FIXED:
+            spin = length(row(trajectory.angular_velocity, i))
             if spin * horizon > _TURN:
                 horizon = _TURN / spin
     for side in range(2):
         i, shape = b if side else a, shape_b if side else shape_a
         motion = MOTION + MOTION_SIZE * side
-        motion_bound(course, i, t, horizon, scratch.work[motion : motion + MOTION_SIZE])
+        motion_bound(trajectory, i, t, horizon, scratch.work[motion : motion + MOTION_SIZE])
         if scratch.ball[shape]:
             stop_turning(scratch.work[motion : motion + MOTION_SIZE])
     return horizon
@@ -88,17 +88,18 @@ def _record(result, k, time, status, queries, work):
 
 
 @jit
-def _record_ball(frame, course, scratch, a, b, shape_a, shape_b, t, start, end, result, k):
+def _record_ball(frame, trajectory, scratch, a, b, shape_a, shape_b, t, start, end, result, k):
     """Write row k of the answer for a pair that meets at t [s]."""
     result.time[k], result.status[k], result.queries[k] = t if t < end else inf, SEPARATE, 1
     if t < end:
         result.status[k] = IMPACT if t > start else TOUCHING
-        write_ball_witness(frame, course, scratch, a, b, shape_a, shape_b, t, result.witness[k])
+        write_ball_witness(frame, trajectory, scratch, a, b, shape_a, shape_b, t, result.witness[k])
 
 
 @jit
 def first_contacts(
-    geometry, course, scratch, shape_of_body, pairs_a, pairs_b, start, end, touch, tolerance, ahead, max_queries, cylinders, result
+    geometry, trajectory, scratch, shape_of_body, pairs_a, pairs_b, start, end, impact_margin, tolerance, ahead, max_queries, cylinders,
+    result,
 ):
     """Fill in `result` (`ImpactTimes`); arguments as for `bisection.sweep`.
 
@@ -110,23 +111,23 @@ def first_contacts(
     for k in range(pairs_a.shape[0]):
         a, b = pairs_a[k], pairs_b[k]
         shape_a, shape_b = shape_of_body[a], shape_of_body[b]
-        if is_closed_form(course, scratch, a, b, shape_a, shape_b, touch[k]):
-            t = ball_time(geometry.frame, course, scratch, a, b, shape_a, shape_b, start[k])
+        if is_closed_form(trajectory, scratch, a, b, shape_a, shape_b, impact_margin[k]):
+            t = ball_time(geometry.frame, trajectory, scratch, a, b, shape_a, shape_b, start[k])
             if t == t:
-                _record_ball(geometry.frame, course, scratch, a, b, shape_a, shape_b, t, start[k], end, result, k)
+                _record_ball(geometry.frame, trajectory, scratch, a, b, shape_a, shape_b, t, start[k], end, result, k)
                 continue
-        slack = rounding_slack(course, scratch.reach, a, b, shape_a, shape_b, end)
+        slack = rounding_slack(trajectory, scratch.reach, a, b, shape_a, shape_b, end)
         above = max(tolerance[k], slack)
-        t, target, trial, floor = start[k], end, end - start[k], touch[k]
+        t, target, trial, floor = start[k], end, end - start[k], impact_margin[k]
         status, queries, is_let_go = STALLED, 0, False
         while queries < max_queries:
             rest = target - t
             horizon = rest if is_let_go else min(rest, trial)
             queries += 1
-            s, exact = _flight_safe_until(geometry.frame, course, scratch, a, b, shape_a, shape_b, t, floor, horizon)
+            s, exact = _flight_safe_until(geometry.frame, trajectory, scratch, a, b, shape_a, shape_b, t, floor, horizon)
             is_free = s >= horizon or (not exact and s > _WORTHWHILE * horizon)
             if not is_free:
-                span = _bring_motions(course, scratch, a, b, shape_a, shape_b, t, horizon)
+                span = _bring_motions(trajectory, scratch, a, b, shape_a, shape_b, t, horizon)
                 guarded = safe_time(geometry, shape_a, shape_b, work, index, floor, span, cylinders)
                 is_free = guarded >= span
                 s = s if exact and not is_free else guarded
@@ -135,15 +136,15 @@ def first_contacts(
                     t, status = inf, SEPARATE
                     break
                 t, target = target if s >= rest else _later(t, s), end if s >= rest else target
-                trial, floor, is_let_go = max(_GROWTH * s, trial), touch[k], False
+                trial, floor, is_let_go = max(_GROWTH * s, trial), impact_margin[k], False
                 continue
             gap, closing = work[WITNESS + GAP], closing_speed(work)
-            near = gap <= touch[k] + above
+            near = gap <= impact_margin[k] + above
             if near and closing * (end - t) > slack:
-                status = TOUCHING if t == start[k] and gap <= touch[k] else IMPACT
+                status = TOUCHING if t == start[k] and gap <= impact_margin[k] else IMPACT
                 break
             if near and not is_let_go:
-                floor, is_let_go, target = min(gap, touch[k]) - slack, True, end
+                floor, is_let_go, target = min(gap, impact_margin[k]) - slack, True, end
                 continue
             if near and closing < 0.0:
                 s *= 0.5  # it leaves: look again half way to its return
@@ -151,9 +152,9 @@ def first_contacts(
             if t <= now:
                 status = IMPACT
                 break
-            trial, floor, is_let_go = 2.0 * s, touch[k], False
+            trial, floor, is_let_go = 2.0 * s, impact_margin[k], False
             probe = min(target, t + ahead * s)
             if probe > t and not exact:
-                root, used = witness_root(geometry, course, work, index, a, b, t, probe, touch[k], above)
+                root, used = witness_root(geometry, trajectory, work, index, a, b, t, probe, impact_margin[k], above)
                 target, queries = min(target, root), queries + used
         _record(result, k, t, status, queries, work)

@@ -38,7 +38,7 @@ _NEWTON_ERROR = 10.0
 
 
 @jit
-def is_closed_form(course, scratch, a, b, shape_a, shape_b, touch):
+def is_closed_form(trajectory, scratch, a, b, shape_a, shape_b, impact_margin):
     """Whether the pair is two balls, or a ball and a plane that stands, and is to meet at gap 0.
 
     Where it has just been in contact `touch` [m] may be lower by round-off; lower still, the pair was in contact without consequence.
@@ -46,9 +46,9 @@ def is_closed_form(course, scratch, a, b, shape_a, shape_b, touch):
     plane_a, plane_b = scratch.plane[shape_a] >= 0, scratch.plane[shape_b] >= 0
     if not ((scratch.ball[shape_a] or plane_a) and (scratch.ball[shape_b] or plane_b)) or (plane_a and plane_b):
         return False
-    if touch > 0.0 or touch < -DEEPEST * scratch.reach[shape_b if plane_a else shape_a]:
+    if impact_margin > 0.0 or impact_margin < -DEEPEST * scratch.reach[shape_b if plane_a else shape_a]:
         return False
-    return not ((plane_a and course.mode[a] != FIXED) or (plane_b and course.mode[b] != FIXED))
+    return not ((plane_a and trajectory.mode[a] != FIXED) or (plane_b and trajectory.mode[b] != FIXED))
 
 
 @jit
@@ -96,22 +96,22 @@ def until_contact(x, v, acceleration, reach, size, speed, normal, level):
 
 
 @jit
-def ball_time(frame, course, scratch, a, b, shape_a, shape_b, start):
+def ball_time(frame, trajectory, scratch, a, b, shape_a, shape_b, start):
     """Time from `start` on at which a pair of `is_closed_form` meets, inf if it never does; nan where the guard must look.
 
     frame (p, 7): that of the geometry; course: paths of all bodies, since before `start` [s]; scratch: `SweepScratch`.
     """
-    since = max(course.start[a], course.start[b])
-    x, v, acceleration, jerk = relative_flight(course, a, b, since)
+    since = max(trajectory.start[a], trajectory.start[b])
+    x, v, acceleration, jerk = relative_flight(trajectory, a, b, since)
     if jerk[0] != 0.0 or jerk[1] != 0.0 or jerk[2] != 0.0:
         return nan
-    size = length(row(course.position, a)) + length(row(course.position, b))
-    speed = length(row(course.velocity, a)) + length(row(course.velocity, b))
+    size = length(row(trajectory.position, a)) + length(row(trajectory.position, b))
+    speed = length(row(trajectory.velocity, a)) + length(row(trajectory.velocity, b))
     plane_a, plane_b = scratch.plane[shape_a] >= 0, scratch.plane[shape_b] >= 0
     reach, normal, level = 0.0, (0.0, 0.0, 0.0), 0.0
     if plane_a or plane_b:
         i, p, sign = (a, scratch.plane[shape_a], 1.0) if plane_a else (b, scratch.plane[shape_b], -1.0)
-        q = course.orientation
+        q = trajectory.orientation
         n = rotated(q[i, 0], q[i, 1], q[i, 2], q[i, 3], frame[p, 0], frame[p, 1], frame[p, 2])
         normal, level, reach = scaled(n, sign), frame[p, 3], scratch.reach[shape_b if plane_a else shape_a]
     else:
@@ -121,16 +121,16 @@ def ball_time(frame, course, scratch, a, b, shape_a, shape_b, start):
 
 
 @jit_making_arrays
-def write_ball_witness(frame, course, scratch, a, b, shape_a, shape_b, t, witness):
+def write_ball_witness(frame, trajectory, scratch, a, b, shape_a, shape_b, t, witness):
     """Write points on a and b, the normal from a to b and the gap at t [s] into witness (10,); pairs of `is_closed_form`."""
     centre = np.empty((2, 3))
-    place_at(course, a, t, centre[0])
-    place_at(course, b, t, centre[1])
+    place_at(trajectory, a, t, centre[0])
+    place_at(trajectory, b, t, centre[1])
     x, y = row(centre, FIRST), row(centre, SECOND)
     plane_a, plane_b = scratch.plane[shape_a] >= 0, scratch.plane[shape_b] >= 0
     if plane_a or plane_b:
         i, p = (a, scratch.plane[shape_a]) if plane_a else (b, scratch.plane[shape_b])
-        q, ball, radius = course.orientation, y if plane_a else x, scratch.reach[shape_b if plane_a else shape_a]
+        q, ball, radius = trajectory.orientation, y if plane_a else x, scratch.reach[shape_b if plane_a else shape_a]
         n = rotated(q[i, 0], q[i, 1], q[i, 2], q[i, 3], frame[p, 0], frame[p, 1], frame[p, 2])
         height = dot(n, subtract(ball, x if plane_a else y)) - frame[p, 3]
         on_plane, on_ball, gap = along(ball, -height, n), along(ball, -radius, n), height - radius

@@ -103,7 +103,7 @@ def _next_trial(low, above, high, below, truncation, least, left):
 
 
 @jit_making_arrays
-def witness_root(geometry, course, work, index, a, b, low, high, touch, tolerance):
+def witness_root(geometry, trajectory, work, index, a, b, low, high, impact_margin, tolerance):
     """Find where the witness of bodies a and b comes down to `touch` between two times.
 
     Bisection with interpolation (ITP: Oliveira and Takahashi 2020): at most log2((high - low) / rounding) + 1
@@ -125,9 +125,9 @@ def witness_root(geometry, course, work, index, a, b, low, high, touch, toleranc
             t = _next_trial(low, above, high, below, truncation, least, budget + 1 - trial)
         for side in range(2):
             place, turn, frame = PLACE + 3 * side, TURN + 4 * side, FRAME + 9 * side
-            pose_at(course, b if side else a, t, work[place : place + 3], work[turn : turn + 4])
+            pose_at(trajectory, b if side else a, t, work[place : place + 3], work[turn : turn + 4])
             quaternion_to_matrix(work[turn : turn + 4], work[frame : frame + 9].reshape((3, 3)))
-        gap = _gap_along(geometry, work, index, direction) - touch
+        gap = _gap_along(geometry, work, index, direction) - impact_margin
         if trial == 0:
             above = gap
         elif trial == 1 or gap < 0.0:

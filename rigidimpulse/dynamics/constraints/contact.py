@@ -45,7 +45,7 @@ from rigidimpulse.dynamics.constraints.rows import (
 )
 from rigidimpulse.dynamics.impact.point import Contacts
 
-CAPTURE_PASSES = 4
+STICK_PASSES = 4
 # Residual asked of the solver and slip that counts, relative to the speed gained in the sub-step.
 SOLVE_TOLERANCE = 1e-12
 POOR = 1e-8
@@ -127,12 +127,12 @@ def hold_contacts(
         return residual / scale, scale, u, slides
 
     residual, scale, u, slides = attempt(h)
-    for _ in range(CAPTURE_PASSES):
+    for _ in range(STICK_PASSES):
         loaded = np.flatnonzero(rows.impulse[first_row] > 0.0)
         target = SOLVE_TOLERANCE * scale
         if not np.any(u[loaded, 0] > target):
             break
-        capture(solve, bodies, members, rows, first_row[loaded], u[loaded, 0], target)
+        stick(solve, bodies, members, rows, first_row[loaded], u[loaded, 0], target)
         residual, scale, u, slides = attempt(h)
     disc, slip = first_row[slides] + 1, u[slides, 1:]
     second = disc + 1
@@ -175,7 +175,7 @@ def _first_stop(slip: np.ndarray, end: np.ndarray, brief: float) -> float:
     return float(time.min(initial=np.inf))
 
 
-def capture(solve, bodies, members, rows: Rows, normals: np.ndarray, leaving: np.ndarray, target: float) -> None:
+def stick(solve, bodies, members, rows: Rows, normals: np.ndarray, leaving: np.ndarray, target: float) -> None:
     """Stop load-bearing contacts that leave slowly; normals: their rows, leaving: their u.n [m/s]."""
     stops = take_rows(rows, normals)
     stops.kind[:], stops.bias[:], stops.impulse[:] = FREE, leaving, 0.0

@@ -106,7 +106,7 @@ def _edge_direction(geometry, edge, rotation, direction):
 
 
 @jit_making_arrays
-def _cylinder_core(geometry, p, rotation, normal, direction):
+def _cylinder_skeleton(geometry, p, rotation, normal, direction):
     """A cylinder is a face at its caps, a line with its radius at its side, and at its rims the line along them."""
     axis = np.empty(3)
     _rotated(rotation, geometry.frame[p, 3:6], axis)
@@ -133,7 +133,7 @@ def _core(geometry, p, kind, feature, is_a, rotation, normal, direction):
         return 0.0, UNKNOWN
     if kind > HALF_SPACE_CONTACT:
         if geometry.kind[p] == CYLINDER:
-            return _cylinder_core(geometry, p, rotation, normal, direction)
+            return _cylinder_skeleton(geometry, p, rotation, normal, direction)
         which, feature = feature % 3, feature // 3
         if geometry.radius[p] > 0.0:
             return geometry.radius[p], POINT
@@ -196,10 +196,10 @@ def _centre_velocity(bodies, i, arm, n, radius, out):
 
 
 @jit
-def _on_face(geometry, p, rotation, bodies, i, arm, core_velocity, radius, outward, outward_rate, place):
+def _on_face(geometry, p, rotation, bodies, i, arm, skeleton_velocity, radius, outward, outward_rate, place):
     """p' of the place where body i (of the single primitive p, or -1) touches a face that carries the normal.
 
-    outward (3,): from the face to the body, outward_rate (3,) its rate; core_velocity (3,): of the centre of the rounding.
+    outward (3,): from the face to the body, outward_rate (3,) its rate; skeleton_velocity (3,): of the centre of the rounding.
     """
     if p >= 0 and geometry.kind[p] == CYLINDER:
         if _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, bodies.angular_velocity[i], place):
@@ -207,7 +207,7 @@ def _on_face(geometry, p, rotation, bodies, i, arm, core_velocity, radius, outwa
                 place[k] += bodies.velocity[i, k]
             return
     for k in range(3):
-        place[k] = core_velocity[k] - radius * outward_rate[k]
+        place[k] = skeleton_velocity[k] - radius * outward_rate[k]
 
 
 @jit_making_arrays
@@ -235,22 +235,22 @@ def _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
 
 
 @jit_making_arrays
-def _between_cores(bodies, a, b, core_a, core_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate):
+def _between_skeletons(bodies, a, b, skeleton_a, skeleton_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate):
     """Points and lines with a rounding."""
     wa, wb, x = bodies.angular_velocity[a], bodies.angular_velocity[b], np.empty(3)
-    if core_a == LINE and core_b == LINE and _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
+    if skeleton_a == LINE and skeleton_b == LINE and _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
         return
     across = _dot(vb, n) - _dot(va, n)
     for k in range(3):
         normal_rate[k] = (vb[k] - va[k] - across * n[k]) / distance
-    if core_a == LINE or core_b == LINE:
-        e = ea if core_a == LINE else eb
-        _cross(wa if core_a == LINE else wb, e, x)
+    if skeleton_a == LINE or skeleton_b == LINE:
+        e = ea if skeleton_a == LINE else eb
+        _cross(wa if skeleton_a == LINE else wb, e, x)
         change = -_dot(n, x) - _dot(normal_rate, e)
         for k in range(3):
             normal_rate[k] += change * e[k]
     for k in range(3):
-        place[k] = va[k] + ra * normal_rate[k] if core_a == POINT else vb[k] - rb * normal_rate[k]
+        place[k] = va[k] + ra * normal_rate[k] if skeleton_a == POINT else vb[k] - rb * normal_rate[k]
 
 
 @jit_making_arrays
@@ -261,23 +261,23 @@ def _place_velocity(geometry, shape_of_body, rotation, bodies, contacts, c, kind
     ea, eb, va, vb, outward_rate = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     flat_a = pa >= 0 and geometry.kind[pa] == HALF_SPACE
     flat_b = pb >= 0 and geometry.kind[pb] == HALF_SPACE
-    ra, core_a = (0.0, FACE) if flat_a else _core(geometry, pa, kind, feature_a, True, rotation[a], n, ea)
-    rb, core_b = (0.0, FACE) if flat_b else _core(geometry, pb, kind, feature_b, False, rotation[b], n, eb)
+    ra, skeleton_a = (0.0, FACE) if flat_a else _core(geometry, pa, kind, feature_a, True, rotation[a], n, ea)
+    rb, skeleton_b = (0.0, FACE) if flat_b else _core(geometry, pb, kind, feature_b, False, rotation[b], n, eb)
     _centre_velocity(bodies, a, contacts.arm_a[c], n, -ra, va)
     _centre_velocity(bodies, b, contacts.arm_b[c], n, rb, vb)
     distance = ra + rb + contacts.gap[c]
-    if core_a == FACE:
+    if skeleton_a == FACE:
         _cross(bodies.angular_velocity[a], n, normal_rate)
         _on_face(geometry, pb, rotation[b], bodies, b, contacts.arm_b[c], vb, rb, n, normal_rate, place)
-    elif core_b == FACE:
+    elif skeleton_b == FACE:
         _cross(bodies.angular_velocity[b], n, normal_rate)
         for k in range(3):
             outward_rate[k] = -normal_rate[k]
         _on_face(geometry, pa, rotation[a], bodies, a, contacts.arm_a[c], va, ra, -n, outward_rate, place)
-    elif ra + rb > 0.0 and core_a != UNKNOWN and core_b != UNKNOWN:
-        _between_cores(bodies, a, b, core_a, core_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate)
+    elif ra + rb > 0.0 and skeleton_a != UNKNOWN and skeleton_b != UNKNOWN:
+        _between_skeletons(bodies, a, b, skeleton_a, skeleton_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate)
     elif not (
-        core_a == LINE and core_b == LINE
+        skeleton_a == LINE and skeleton_b == LINE
         and _between_lines(va, vb, bodies.angular_velocity[a], bodies.angular_velocity[b], ea, eb, n, distance, ra, place, normal_rate)
     ):
         # Sharp corners: half of both.

@@ -38,7 +38,7 @@ from rigidimpulse.dynamics.constraints.rows import (
 )
 from rigidimpulse.dynamics.constraints.softness import end_rate, is_slow, soft_row
 from rigidimpulse.dynamics.solvers.newton import solve_newton
-from rigidimpulse.motion.trajectory import FORCED, Course, begin, make_course, pose_at
+from rigidimpulse.motion.trajectory import FORCED, Trajectories, begin, make_trajectories, pose_at
 
 MAX_ROUNDS = 20
 MOST_FAILURES = 3
@@ -63,7 +63,7 @@ class JointMemory(NamedTuple):
     weight: np.ndarray  # (k,) W of soft rows, see `joint_limits`
     steepness: np.ndarray  # (k,) length of the direction: 1, but for a twist near where it is not defined
     wrench: np.ndarray  # (n, 6) half of the joints' part of the wrench, taken back at the end
-    trial: Course
+    trial: Trajectories
     end_position: np.ndarray  # (n, 3) at the end of the sub-step; right for what is no member of a group
     end_rotation: np.ndarray  # (n, 3, 3)
 
@@ -71,7 +71,7 @@ class JointMemory(NamedTuple):
 def make_memory(joints, inertia: np.ndarray) -> JointMemory:
     """Memory of joints that have not acted yet; inertia (n, 3), principal moments."""
     k, n = len(joints.coordinate), len(inertia)
-    trial = make_course(n)
+    trial = make_trajectories(n)
     trial.inertia[:] = inertia
     hard = (joints.stiffness == np.inf) & (joints.lower == -np.inf) & (joints.upper == np.inf)
     return JointMemory(
@@ -219,15 +219,15 @@ def fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, star
 @jit_making_arrays
 def _end_values(joints, which, bodies, acceleration, members, wrench, h, memory, value):
     """Coordinates - targets (s,) after h under the wrenches (n_world, 6)."""
-    course, q = memory.trial, np.empty(4)
+    trajectory, q = memory.trial, np.empty(4)
     for i in members:
-        course.position[i], course.orientation[i] = bodies.position[i], bodies.orientation[i]
-        course.velocity[i], course.angular_velocity[i] = bodies.velocity[i], bodies.angular_velocity[i]
-        course.acceleration[i] = acceleration[i] + bodies.inv_mass[i] * wrench[i, :3]
-        course.torque[i] = wrench[i, 3:]
-        course.mode[i] = FORCED
-        begin(course, i)
-        pose_at(course, i, h, memory.end_position[i], q)
+        trajectory.position[i], trajectory.orientation[i] = bodies.position[i], bodies.orientation[i]
+        trajectory.velocity[i], trajectory.angular_velocity[i] = bodies.velocity[i], bodies.angular_velocity[i]
+        trajectory.acceleration[i] = acceleration[i] + bodies.inv_mass[i] * wrench[i, :3]
+        trajectory.torque[i] = wrench[i, 3:]
+        trajectory.mode[i] = FORCED
+        begin(trajectory, i)
+        pose_at(trajectory, i, h, memory.end_position[i], q)
         quaternion_to_matrix(q, memory.end_rotation[i])
     joint_values(joints, which, memory.end_position, memory.end_rotation, memory.angle, value)
 

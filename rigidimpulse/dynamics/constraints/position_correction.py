@@ -19,22 +19,22 @@ SOLVE_TOLERANCE = 1e-6
 
 
 @jit
-def needs_lift(contacts, held, delta):
+def needs_correction(contacts, held, contact_margin):
     """Whether a held contact has sunk; held (m,) bool, delta (m,)."""
     for c in range(contacts.gap.shape[0]):
-        if held[c] and contacts.gap[c] < SUNK * delta[c]:
+        if held[c] and contacts.gap[c] < SUNK * contact_margin[c]:
             return True
     return False
 
 
-def lift_contacts(bodies, contacts, held, delta, members, number) -> None:
+def correct_positions(bodies, contacts, held, contact_margin, members, number) -> None:
     """Move the bodies of the group so that held contacts have their gap delta again; others stand."""
     rows, first_row, _ = contact_rows(bodies, contacts, members, number, 0)
     rows = take_rows(rows, first_row)
     for body, end, half in ((contacts.body_a, rows.first, slice(6)), (contacts.body_b, rows.second, slice(6, 12))):
         stands = ~np.isin(body, members)
         end[stands], rows.jacobian[stands, half] = -1, 0.0
-    target = np.where(held, delta, np.minimum(contacts.gap, KEPT * delta))
+    target = np.where(held, contact_margin, np.minimum(contacts.gap, KEPT * contact_margin))
     rows.bias[:] = contacts.gap - target
-    solve_newton(rows, len(members), SOLVE_TOLERANCE * float(delta.max()))
+    solve_newton(rows, len(members), SOLVE_TOLERANCE * float(contact_margin.max()))
     move_bodies(bodies, members, rows)

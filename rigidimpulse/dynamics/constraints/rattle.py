@@ -63,34 +63,34 @@ def forget_forces(state, contacts: Contacts) -> None:
         state.pair_force.pop(pair, None)
 
 
-def arrive(context, group) -> bool:
+def project_velocities(context, island) -> bool:
     """End the sub-steps of the group's pairs; returns whether there were any."""
-    state, now, contacts = context.state, context.state.now, group.contacts
-    start = state.course.start
+    state, now, contacts = context.state, context.state.now, island.contacts
+    start = state.trajectory.start
     ended: dict[tuple[int, int], PairForce] = {}
-    held = group.slow()
+    held = island.slow()
     for pair in set(zip(contacts.body_a[held].tolist(), contacts.body_b[held].tolist(), strict=True)):
         entry = state.pair_force.get(pair)
-        if entry is not None and max(start[pair[0]], start[pair[1]]) <= entry.start < group.time:
+        if entry is not None and max(start[pair[0]], start[pair[1]]) <= entry.start < island.time:
             ended[pair] = state.pair_force.pop(pair)
     if not ended:
         return False
-    before = np.hstack([now.velocity[group.members], now.angular_velocity[group.members]])
+    before = np.hstack([now.velocity[island.members], now.angular_velocity[island.members]])
     for pair, entry in sorted(ended.items()):
-        half = 0.5 * (group.time - entry.start)
+        half = 0.5 * (island.time - entry.start)
         for i, wrench in zip(pair, (entry.on_a, entry.on_b), strict=True):
             now.velocity[i] -= half * now.inv_mass[i] * wrench[:3]
             now.angular_velocity[i] -= half * now.inv_inertia[i] @ wrench[3:]
     of_pair = [ended.get(pair) for pair in zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)]
     which = np.array([c for c, entry in enumerate(of_pair) if entry is not None and held[c]], np.int64)
-    _stop(context, group, select(contacts, which), [(of_pair[c], group.keys[c]) for c in which])
-    state.correction[group.members] = np.hstack([now.velocity[group.members], now.angular_velocity[group.members]]) - before
+    _stop(context, island, select(contacts, which), [(of_pair[c], island.keys[c]) for c in which])
+    state.correction[island.members] = np.hstack([now.velocity[island.members], now.angular_velocity[island.members]]) - before
     return True
 
 
-def _stop(context, group, contacts: Contacts, entries) -> None:
+def _stop(context, island, contacts: Contacts, entries) -> None:
     """The impulses nu of contacts; entries: for each the forces of its pair and its key."""
-    now, members = context.state.now, group.members
+    now, members = context.state.now, island.members
     rows, first_row, frames = contact_rows(now, contacts, members, context.column, 0)
     row_velocities(now, contacts, first_row, frames, rows.bias)
     slides = np.array([key in entry.slides or (key not in entry.force and bool(entry.slides)) for entry, key in entries])

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.quaternion import cross, rotate, rotate_inverse
 from rigidimpulse.engine.plan import Skip
-from rigidimpulse.motion.trajectory import Course, pose_at, state_at
+from rigidimpulse.motion.trajectory import Trajectories, pose_at, state_at
 from rigidimpulse.scene.body import number, vector
 from rigidimpulse.scene.shape import normalized_quaternion
 
@@ -31,18 +31,18 @@ class Instant(NamedTuple):
     time: np.ndarray  # (n,) s
     bodies: BodyState
     rotation: np.ndarray  # (n, 3, 3)
-    course: Course  # of the bodies that no force moves
+    trajectory: Trajectories  # of the bodies that no force moves
 
     def carried_pose(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Centre of mass (3,) and orientation (4,) at `time` of a body on a given path."""
         x, q = np.empty(3), np.empty(4)
-        pose_at(self.course, i, time, x, q)
+        pose_at(self.trajectory, i, time, x, q)
         return x, q
 
     def carried_point(self, i: int, time: float, arm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Place and velocity (3,) at `time` of a point of a body on a given path; arm (3,) m along its principal axes."""
         x, q, v, w = np.empty(3), np.empty(4), np.empty(3), np.empty(3)
-        state_at(self.course, i, time, x, q, v, w)
+        state_at(self.trajectory, i, time, x, q, v, w)
         r = rotate(q, arm)
         return x + r, v + cross(w, r)
 
@@ -219,7 +219,9 @@ def named(kind: str, given: Sequence[str | None], told: Sequence[str]) -> list[s
     return names
 
 
-CAUSES = frozenset(("capture", "contact", "guard", "heap", "impact", "joints", "lift", "mass that left", "overlap"))
+CAUSES = frozenset(
+    ("stick", "contact", "energy correction", "sub-stepping", "impact", "joints", "position correction", "mass that left", "overlap")
+)
 """What the ledger calls other things than forces."""
 
 

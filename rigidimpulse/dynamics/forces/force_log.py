@@ -21,7 +21,7 @@ WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 
 @jit_making_arrays
-def add_line_integrals(course, i, begin, start, end, rows, value, rate, total):
+def add_line_integrals(trajectory, i, begin, start, end, rows, value, rate, total):
     """Add J, H, W from `start` to `end` [s] of lines that began at `begin`, to rows of total (k, 7).
 
     value (k, 6) N and N m at `begin`, rate (k, 6) a second.
@@ -31,7 +31,7 @@ def add_line_integrals(course, i, begin, start, end, rows, value, rate, total):
     for node in range(3):
         time = start + NODES[node] * h
         part = WEIGHTS[node] * h
-        state_at(course, i, time, x, q, v, w)
+        state_at(trajectory, i, time, x, q, v, w)
         for r in rows:
             f0 = value[r, 0] + rate[r, 0] * (time - begin)
             f1 = value[r, 1] + rate[r, 1] * (time - begin)
@@ -99,12 +99,12 @@ class ForceLog:
 
     """
 
-    def __init__(self, times: np.ndarray, body: np.ndarray, course) -> None:
+    def __init__(self, times: np.ndarray, body: np.ndarray, trajectory) -> None:
         """times (f,) s of the frames; body (k,) of each row."""
-        n = len(course.start)
+        n = len(trajectory.start)
         self.at_frames = np.zeros((len(times), len(body), 7))
         self.work = np.zeros(n)
-        self._times, self._course = times, course
+        self._times, self._trajectory = times, trajectory
         self._rows = {int(i): np.flatnonzero(body == i) for i in np.unique(body)}
         self._value, self._rate, self._total = np.zeros((len(body), 6)), np.zeros((len(body), 6)), np.zeros((len(body), 7))
         self._begun = np.zeros(n)
@@ -133,10 +133,10 @@ class ForceLog:
         first, last = int(self._written[i]), int(np.searchsorted(self._times, time, side="left"))
         for f in range(first, last):
             self.at_frames[f, rows] = self._total[rows]
-            add_line_integrals(self._course, i, start, start, self._times[f], rows, self._value, self._rate, self.at_frames[f])
+            add_line_integrals(self._trajectory, i, start, start, self._times[f], rows, self._value, self._rate, self.at_frames[f])
         self._written[i] = last
         before = self._total[rows, 6].sum()
-        add_line_integrals(self._course, i, start, start, time, rows, self._value, self._rate, self._total)
+        add_line_integrals(self._trajectory, i, start, start, time, rows, self._value, self._rate, self._total)
         self.work[i] += self._total[rows, 6].sum() - before
         self._begun[i] = time
 
@@ -146,4 +146,4 @@ class ForceLog:
             for f in range(int(self._written[i]), len(self._times)):
                 self.at_frames[f, rows] = self._total[rows]
                 start = self._begun[i]
-                add_line_integrals(self._course, i, start, start, self._times[f], rows, self._value, self._rate, self.at_frames[f])
+                add_line_integrals(self._trajectory, i, start, start, self._times[f], rows, self._value, self._rate, self.at_frames[f])

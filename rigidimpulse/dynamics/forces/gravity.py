@@ -41,10 +41,10 @@ class SteadyLoad:
         return Bound(set_steady, "what contacts, joints and other forces work against")
 
 
-def set_steady(context, _window, group) -> None:
+def set_steady(context, _window, island) -> None:
     """Gravity and constant forces."""
-    context.acceleration[group.members] = context.world.steady_acceleration[group.members]
-    context.angular_acceleration[group.members] = 0.0
+    context.acceleration[island.members] = context.world.steady_acceleration[island.members]
+    context.angular_acceleration[island.members] = 0.0
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class FreeRotation:
         return Bound(turn, "spins change the load of contacts and joints")
 
 
-def turn(context, _window, group) -> None:
+def turn(context, _window, island) -> None:
     """Gyroscopic term of the members."""
     state = context.state
-    bring_gyroscopic(group.members, state.now, state.rotation, state.course.inertia, context.angular_acceleration)
+    bring_gyroscopic(island.members, state.now, state.rotation, state.trajectory.inertia, context.angular_acceleration)

@@ -37,9 +37,9 @@ def bind_forces(context, plan, times) -> None:
         from rigidimpulse.dynamics.forces.varying import VaryingForces
 
         clocks = {table.kind: partial(plan.clock, table.kind) for table in world.force_tables}
-        context.forces = VaryingForces(world, context.state.course, times, clocks)
-        nets = [table for table in world.force_tables if table.kind == KINDS["FlexibleBody"]]
-        if nets:
-            from rigidimpulse.dynamics.soft_body.in_run import RunningNets
+        context.forces = VaryingForces(world, context.state.trajectory, times, clocks)
+        soft_bodies = [table for table in world.force_tables if table.kind == KINDS["FlexibleBody"]]
+        if soft_bodies:
+            from rigidimpulse.dynamics.soft_body.in_run import RunningSoftBodies
 
-            context.nets = RunningNets(context, nets[0], times, clocks[nets[0].kind])
+            context.soft_bodies = RunningSoftBodies(context, soft_bodies[0], times, clocks[soft_bodies[0].kind])

@@ -27,9 +27,9 @@ class BurningForces(ForceTable):
 class MassFlow:
     """Masses of the bodies of a run, brought up to date when a body is looked at."""
 
-    def __init__(self, tables: list[BurningForces], world, course) -> None:
+    def __init__(self, tables: list[BurningForces], world, trajectory) -> None:
         """Of forces that take mass."""
-        self._tables, self._world, self._course = tables, world, course
+        self._tables, self._world, self._trajectory = tables, world, trajectory
         self.bodies = np.unique(np.concatenate([table.body for table in tables]))
         self._mass, self._inertia = world.mass.copy(), world.inertia.copy()
         self._weighed = np.ones(len(world.mass))
@@ -58,4 +58,4 @@ class MassFlow:
             self._weighed[losing] = share
             self._world.mass[losing] = share * self._mass[losing]
             self._world.inv_mass[losing] = 1.0 / self._world.mass[losing]
-            self._course.inertia[losing] = self._world.inertia[losing] = share[:, None] * self._inertia[losing]
+            self._trajectory.inertia[losing] = self._world.inertia[losing] = share[:, None] * self._inertia[losing]

@@ -23,7 +23,7 @@ from rigidimpulse.dynamics.forces.force import ForceTable, Instant
 from rigidimpulse.dynamics.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.dynamics.forces.mass_flow import BurningForces, MassFlow
 from rigidimpulse.engine.touching import refresh_pose
-from rigidimpulse.motion.force_step import Lines, Room, nystroem, semi_implicit
+from rigidimpulse.motion.force_step import Lines, Workspace, nystroem, semi_implicit
 
 IN_FLIGHT, IN_CONTACT = 0.03, 3.0
 """How far a path may be off, relative to the size, or in rad of turn: in roots of the accuracy's tolerance, inside a step of bodies that
@@ -51,7 +51,7 @@ class VaryingForces:
 
     """
 
-    def __init__(self, world, course, times: np.ndarray, clocks) -> None:
+    def __init__(self, world, trajectory, times: np.ndarray, clocks) -> None:
         """clocks: lines of the plan by kind, which get the time that forces take; times (f,) s of the frames.
 
         Raises SceneError for forces of one name.
@@ -70,8 +70,8 @@ class VaryingForces:
         self._restless = np.zeros(n, bool)
         for table in self._tables:
             self._restless[table.body] |= not table.is_steady
-        self._course = course
-        self._room = Room(course, world.inv_mass)
+        self._trajectory = trajectory
+        self._workspace = Workspace(trajectory, world.inv_mass)
         self._longest = np.full(n, world.accuracy.step)
         for table in self._tables:
             np.minimum.at(self._longest, table.body, table.longest_steps())
@@ -81,10 +81,10 @@ class VaryingForces:
         self._switching = [table for table in self._tables if table.switches]
         self._cut = 0.0
         burners = [table for table in self._tables if isinstance(table, BurningForces)]
-        self.flow = MassFlow(burners, world, course) if burners else None
+        self.flow = MassFlow(burners, world, trajectory) if burners else None
         self._last, self._held_until, self._was_held = np.zeros((n, 6)), np.full(n, -np.inf), np.zeros(n, bool)
         self.value, self.rate = np.zeros((n, 6)), np.zeros((n, 6))
-        self.log = ForceLog(times, self._body, course)
+        self.log = ForceLog(times, self._body, trajectory)
 
     def partners(self, bodies: np.ndarray) -> np.ndarray:
         """All bodies that a force ties to the given ones, themselves included where forces act on them."""
@@ -118,7 +118,7 @@ class VaryingForces:
         if self._world.accuracy.integrator != "exact":
             return self._fly_one_length(members, time, min(rest, self._world.accuracy.step), state)
         for table in self._switching:
-            table.freeze(Instant(np.full(len(self.acts), time), now, state.rotation, self._course))
+            table.freeze(Instant(np.full(len(self.acts), time), now, state.rotation, self._trajectory))
         switches = 0
         h = np.zeros(len(self.acts))
         h[members] = _pieces(rest, self._together(members, self._plan[members], np.minimum))
@@ -130,7 +130,7 @@ class VaryingForces:
             def evaluate(share: float, bodies, rotation, todo=todo):
                 return self._evaluate(time + h * min(share, 1.0 - ASIDE), todo, bodies, rotation)
 
-            rows, sums = nystroem(evaluate, self._room, first, todo, h, now, self._world.steady_acceleration)
+            rows, sums = nystroem(evaluate, self._workspace, first, todo, h, now, self._world.steady_acceleration)
             share = 1.0 if cut else self._share_until_break(rows)
             if share < 1.0:
                 cut, h[todo] = True, np.maximum(share * h[todo], shortest)
@@ -168,18 +168,18 @@ class VaryingForces:
         if self._world.accuracy.integrator == "semi_implicit":
             rows, sums = semi_implicit(first)
         else:
-            rows, sums = nystroem(evaluate, self._room, first, members, h, state.now, self._world.steady_acceleration)
+            rows, sums = nystroem(evaluate, self._workspace, first, members, h, state.now, self._world.steady_acceleration)
         self._keep(members, time, rows, sums, h)
         return h[members]
 
     def _switch(self, time: float, members: np.ndarray, now, sums: Lines, h: np.ndarray) -> float:
         """Part of a step of h (n,) s, the same for all members, after which other forces act; 1 if that is its end, or never."""
-        room, length = self._room, float(h[members[0]])
-        room.follow(members, now, self._world.steady_acceleration, sums.value, sums.change / length)
+        workspace, length = self._workspace, float(h[members[0]])
+        workspace.follow(members, now, self._world.steady_acceleration, sums.value, sums.change / length)
 
         def differ(part: float) -> bool:
-            room.look(members, part * length)
-            at = Instant(np.full(len(self.acts), time + part * length), room.bodies, room.rotation, self._course)
+            workspace.look(members, part * length)
+            at = Instant(np.full(len(self.acts), time + part * length), workspace.bodies, workspace.rotation, self._trajectory)
             return any(table.switched(at) for table in self._switching)
 
         if not differ(1.0):
@@ -193,22 +193,22 @@ class VaryingForces:
             low, high = (low, middle) if differ(middle) else (middle, high)
         return 1.0 if high >= 1.0 - SWITCHED else max(high, least)
 
-    def load(self, context, group, h: float) -> float:
+    def load(self, context, island, h: float) -> float:
         """Forces on a group that contacts or joints hold, over h s at most, into the accelerations and `value`; returns for how long."""
         state, now, world = context.state, context.state.now, self._world
-        members = group.members[self.acts[group.members]]
-        time, step = group.time, world.accuracy.step
+        members = island.members[self.acts[island.members]]
+        time, step = island.time, world.accuracy.step
         plan = float(self._plan[members].min())
-        if not group.loaded:
+        if not island.loaded:
             self._was_held[members] = self._held_until[members] >= time - ASIDE * step
         if not self._was_held[members].any():
             # Nobody knows yet what contacts and joints do: forces that answer the fall would throw what has just landed.
             h = min(h, FIRST * step)
         given = h = min(h, self._next_break(time) - time, plan)
         _, start = self._start(context, time, np.full(len(self.acts), h), members)
-        if not group.loaded:
-            pull = (state.course.acceleration[members] - world.steady_acceleration[members]) * world.mass[members, None]
-            self._last[members] = np.hstack([pull, state.course.torque[members]])
+        if not island.loaded:
+            pull = (state.trajectory.acceleration[members] - world.steady_acceleration[members]) * world.mass[members, None]
+            self._last[members] = np.hstack([pull, state.trajectory.torque[members]])
         # Held bodies go on under the sum of what acted last: contacts and joints of the last sub-step beside forces of this one would not
         # balance each other, and what damps along a held direction would make that grow.
         last = np.where(self._was_held[:, None], self._last, start)
@@ -216,12 +216,12 @@ class VaryingForces:
             if self.flow is not None:
                 # What holds the members feels all their masses: those of the middle.
                 self.flow.weigh(members, time + 0.5 * h)
-                refresh_pose(members, now, state.rotation, state.course.inertia)
+                refresh_pose(members, now, state.rotation, state.trajectory.inertia)
             half = np.full(len(self.acts), 0.5 * h)
-            self._room.fly(members, half, now, world.steady_acceleration, last)
-            value, total = self._evaluate(time + half, members, self._room.bodies, self._room.rotation)
-            self._room.fly(members, 2.0 * half, now, world.steady_acceleration, last)
-            _, end = self._evaluate(time + 2.0 * (1.0 - ASIDE) * half, members, self._room.bodies, self._room.rotation)
+            self._workspace.fly(members, half, now, world.steady_acceleration, last)
+            value, total = self._evaluate(time + half, members, self._workspace.bodies, self._workspace.rotation)
+            self._workspace.fly(members, 2.0 * half, now, world.steady_acceleration, last)
+            _, end = self._evaluate(time + 2.0 * (1.0 - ASIDE) * half, members, self._workspace.bodies, self._workspace.rotation)
             # On both sides of the middle: a path that turns comes back to its force.
             sides = [self._errors(now, members, total - f, 2.0 * half[members], 1.0 / 6.0).max() for f in (start, end)]
             error = max(sides) / (self._in_contact * h / step)
@@ -231,9 +231,9 @@ class VaryingForces:
             h = max(h * grow, SHORTEST * step)
         if np.any(still := ~np.any(now.velocity[members], axis=1) & ~np.any(now.angular_velocity[members], axis=1)):
             # What stands and rests bears the forces of where it is, not of where it would fall to without contacts.
-            self._room.fly(members, half, now, world.steady_acceleration, last)
-            self._room.stay(members[still], now, state.rotation)
-            value, total = self._evaluate(time + half, members, self._room.bodies, self._room.rotation)
+            self._workspace.fly(members, half, now, world.steady_acceleration, last)
+            self._workspace.stay(members[still], now, state.rotation)
+            value, total = self._evaluate(time + half, members, self._workspace.bodies, self._workspace.rotation)
         if error > 1.0:
             self._report(context, time, members, self._in_contact)
         # Where others made it shorter, what was planned still holds.
@@ -242,10 +242,10 @@ class VaryingForces:
         rows, sums = (Lines(f, np.zeros_like(f), np.zeros_like(f)) for f in (value, total))
         self._keep(members, time, rows, sums, np.full(len(self.acts), h))
         self._held_until[members] = time + h
-        group.loaded = True
-        context.acceleration[members] = group.free[0][self.acts[group.members]] + now.inv_mass[members, None] * total[members, :3]
+        island.loaded = True
+        context.acceleration[members] = island.free[0][self.acts[island.members]] + now.inv_mass[members, None] * total[members, :3]
         turned = np.einsum("ijk,ik->ij", now.inv_inertia[members], total[members, 3:])
-        context.angular_acceleration[members] = group.free[1][self.acts[group.members]] + turned
+        context.angular_acceleration[members] = island.free[1][self.acts[island.members]] + turned
         return h
 
     def _start(self, context, time: float, h: np.ndarray, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -269,7 +269,7 @@ class VaryingForces:
         """Forces of all rows (k, 6), 0 for those of other bodies, and their sums (n, 6) on bodies of the mass of now; time (n,) s."""
         value, asked = np.zeros((len(self._body), 6)), np.zeros(len(self.acts), bool)
         asked[members] = True
-        at = Instant(time, bodies, rotation, self._course)
+        at = Instant(time, bodies, rotation, self._trajectory)
         for table, first, clock in zip(self._tables, self._first[:-1], self._clocks, strict=True):
             rows = np.flatnonzero(asked[table.body])
             if len(rows):

@@ -186,7 +186,7 @@ class PenaltyForces(ForceTable):
         for own, given in zip(mine[:4], at.bodies[:4], strict=True):
             own[dynamic] = given[dynamic]
         mine.inv_inertia[dynamic], self._rotation[dynamic] = at.bodies.inv_inertia[dynamic], at.rotation[dynamic]
-        bring_all(at.course, self._carried, float(at.time[dynamic[0]]), mine, self._rotation, *self._unused)
+        bring_all(at.trajectory, self._carried, float(at.time[dynamic[0]]), mine, self._rotation, *self._unused)
         return self._find()
 
     def _push(self, count: int, asked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.collision.geometry import unique_edges
 from rigidimpulse.core.errors import SceneError, unknown_name
-from rigidimpulse.dynamics.soft_body.mass_spring import Net, sheet
+from rigidimpulse.dynamics.soft_body.mass_spring import SpringMesh, sheet
 from rigidimpulse.engine.plan import Skip
 from rigidimpulse.scene.body import DEFAULT_MATERIAL, number, vector
 from rigidimpulse.scene.material import Material
@@ -80,9 +80,9 @@ class FlexibleBody:
             SceneError: naming the body, the value and the remedy.
 
         """
-        from rigidimpulse.dynamics.soft_body.in_run import NetForces
+        from rigidimpulse.dynamics.soft_body.in_run import SoftBodyForces
 
-        return NetForces(world)
+        return SoftBodyForces(world)
 
     @property
     def label(self) -> str:
@@ -104,7 +104,7 @@ class FlexibleBody:
             raise error.within(self.label) from None
         return vertices, faces
 
-    def build(self) -> Net:
+    def build(self) -> SpringMesh:
         """Return its net, in its rest shape, placed where it starts.
 
         Raises:

@@ -15,7 +15,7 @@ import numpy as np
 from rigidimpulse.collision.geometry import ROUND, CompiledShape, Geometry, Primitive, build_geometry
 from rigidimpulse.core.quaternion import cross
 from rigidimpulse.dynamics.soft_body.contact import fit_boxes, sample_points, samples_on_faces, vertices_on_bodies
-from rigidimpulse.dynamics.soft_body.contact_terms import NetContacts
+from rigidimpulse.dynamics.soft_body.contact_terms import SoftContacts
 
 LIFT = 0.2
 """Share of a missing gap that a vertex is moved by, per step, without any velocity."""
@@ -38,7 +38,7 @@ class RigidMotion(NamedTuple):
 
 
 class Touches(NamedTuple):
-    """Places found by `Surfaces.find`: what `NetContacts` needs but for the solver's own numbers."""
+    """Places found by `Surfaces.find`: what `SoftContacts` needs but for the solver's own numbers."""
 
     key: np.ndarray  # (m,)
     node: np.ndarray  # (m, 3)
@@ -101,16 +101,16 @@ class Surfaces:
 
     def _vertices(self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, gap: float) -> Touches:
         """Touches of vertices on bodies."""
-        room = 256
+        capacity = 256
         while True:
-            which, real = np.empty((room, 2), np.int64), np.empty((room, 8))
+            which, real = np.empty((capacity, 2), np.int64), np.empty((capacity, 8))
             count = vertices_on_bodies(
                 self.geometry, self.shape_of_body, self.radius, rigid.position, rigid.rotation, rigid.end_position,
                 rigid.end_rotation, start, end, gap, self.skip, which, real,
             )  # fmt: skip
-            if count <= room:
+            if count <= capacity:
                 break
-            room = 2 * count
+            capacity = 2 * count
         vertex, body, real = which[:count, 0], which[:count, 1], real[:count]
         weight = np.zeros((count, 3))
         weight[:, 0] = 1.0
@@ -134,15 +134,15 @@ class Surfaces:
         p1 = rigid.end_position[body] + np.einsum("sij,sj->si", rigid.end_rotation[body], self.sample)
         low, high = np.empty_like(self.faces.node_min), np.empty_like(self.faces.node_max)
         fit_boxes(self.faces, start, end, low, high)
-        room = len(body)
+        capacity = len(body)
         while True:
-            which, real = np.empty((room, 2), np.int64), np.empty((room, 8))
+            which, real = np.empty((capacity, 2), np.int64), np.empty((capacity, 8))
             count = samples_on_faces(
                 self.faces, low, high, p0, p1, self.sample_radius, body, start, end, gap, self.skip, every & self.is_slim, which, real
             )
-            if count <= room:
+            if count <= capacity:
                 break
-            room = 2 * count
+            capacity = 2 * count
         sample, face, real = which[:count, 0], which[:count, 1], real[:count]
         node, weight, normal, distance, time = self.faces.triangle[face], real[:, :3], real[:, 3:6], real[:, 6], real[:, 7]
         key = self.skip.size + sample
@@ -192,7 +192,7 @@ def make_surfaces(geometry: Geometry, shape_of_body, radius, ball, position, fac
 
 def make_contacts(
     touches: Touches, start: np.ndarray, velocity: np.ndarray, rigid: RigidMotion, unknown: np.ndarray, friction: np.ndarray, slow: float
-) -> NetContacts:
+) -> SoftContacts:
     """Make contacts of touches.
 
     Args:
@@ -214,7 +214,7 @@ def make_contacts(
     slip -= normal * np.einsum("ij,ij->i", slip, normal)[:, None]
     pair = friction[touches.node[:, 0], b]
     grip = np.where(np.linalg.norm(slip, axis=1) > slow, pair[:, 1], pair[:, 0])
-    return NetContacts(
+    return SoftContacts(
         touches.node, touches.weight, b, unknown[b], arm, normal, aim, grip, np.ones(m), np.zeros((m, 3)), np.zeros(m),
         np.zeros(m, bool), touches.key,
     )  # fmt: skip

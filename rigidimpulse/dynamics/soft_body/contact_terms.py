@@ -26,7 +26,7 @@ from rigidimpulse.collision.distance.simplices import along, cross, dot, row, su
 from rigidimpulse.core.kernels import jit
 
 
-class NetContacts(NamedTuple):
+class SoftContacts(NamedTuple):
     """m contacts of nets with rigid bodies."""
 
     node: np.ndarray  # (m, 3) vertices; the first again where there are fewer

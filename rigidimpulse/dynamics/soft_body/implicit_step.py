@@ -21,13 +21,13 @@ import numpy as np
 from rigidimpulse.core.quaternion import cross
 from rigidimpulse.dynamics.soft_body.conjugate_gradients import conjugate_gradients, diagonal_inverses
 from rigidimpulse.dynamics.soft_body.contact_terms import (
-    NetContacts,
+    SoftContacts,
     add_contact_gradient,
     contact_energy,
     contact_forces,
     contact_stiffness,
 )
-from rigidimpulse.dynamics.soft_body.mass_spring import Net
+from rigidimpulse.dynamics.soft_body.mass_spring import SpringMesh
 
 MOST_ITERATIONS = 100
 MOST_LINEAR = 2000
@@ -40,7 +40,7 @@ FLOOR = 1e-15
 class Problem(NamedTuple):
     """What Phi is made of."""
 
-    net: Net  # with its dampers
+    soft_body: SpringMesh  # with its dampers
     h: float  # s
     goal: np.ndarray  # (n, 3) x^
     free: np.ndarray  # (n,) bool
@@ -60,19 +60,19 @@ class Solution(NamedTuple):
     converged: bool
 
 
-def value_of(p: Problem, contacts: NetContacts, z: np.ndarray) -> float:
+def value_of(p: Problem, contacts: SoftContacts, z: np.ndarray) -> float:
     n = len(p.free)
     away = z[:n] - p.goal
     push = z[n:].reshape(-1, 6)
-    inertia = 0.5 / p.h**2 * float(p.net.mass @ np.einsum("ij,ij->i", away, away))
+    inertia = 0.5 / p.h**2 * float(p.soft_body.mass @ np.einsum("ij,ij->i", away, away))
     bodies = 0.5 * float(np.einsum("bi,bij,bj->", push, p.rigid, push))
-    return inertia + bodies + p.net.energy(z[:n]) + contact_energy(z, n, contacts)
+    return inertia + bodies + p.soft_body.energy(z[:n]) + contact_energy(z, n, contacts)
 
 
-def _gradient(p: Problem, contacts: NetContacts, z: np.ndarray, force: np.ndarray) -> np.ndarray:
+def _gradient(p: Problem, contacts: SoftContacts, z: np.ndarray, force: np.ndarray) -> np.ndarray:
     n = len(p.free)
     gradient = np.empty_like(z)
-    gradient[:n] = p.net.mass[:, None] / p.h**2 * (z[:n] - p.goal) + p.net.gradient(z[:n])
+    gradient[:n] = p.soft_body.mass[:, None] / p.h**2 * (z[:n] - p.goal) + p.soft_body.gradient(z[:n])
     gradient[n:] = np.einsum("bij,bj->bi", p.rigid, z[n:].reshape(-1, 6)).reshape(-1, 3)
     contact_forces(z, n, contacts, force)
     add_contact_gradient(n, contacts, force, gradient)
@@ -80,17 +80,17 @@ def _gradient(p: Problem, contacts: NetContacts, z: np.ndarray, force: np.ndarra
 
 
 def _blocks(p: Problem, x: np.ndarray, exact: bool = False) -> np.ndarray:
-    block = p.net.hessian(x, exact)
-    block[p.net.pattern.diagonal] += (p.net.mass / p.h**2)[:, None, None] * np.eye(3)
+    block = p.soft_body.hessian(x, exact)
+    block[p.soft_body.pattern.diagonal] += (p.soft_body.mass / p.h**2)[:, None, None] * np.eye(3)
     return block
 
 
-def set_penalties(p: Problem, contacts: NetContacts, x: np.ndarray) -> None:
+def set_penalties(p: Problem, contacts: SoftContacts, x: np.ndarray) -> None:
     """Set the penalties of contacts: well above the stiffness that the net and the body oppose to them.
 
     A vertex on an immovable body has its penalty in a block of its own, which the preconditioner inverts, so that it may be larger.
     """
-    stiffness = np.trace(_blocks(p, x)[p.net.pattern.diagonal], axis1=1, axis2=2) / 3.0
+    stiffness = np.trace(_blocks(p, x)[p.soft_body.pattern.diagonal], axis1=1, axis2=2) / 3.0
     give = np.einsum("mk,mk->m", contacts.weight**2, 1.0 / stiffness[contacts.node])
     movable = contacts.unknown >= 0
     inverse = np.linalg.inv(p.rigid)[contacts.unknown[movable]] if movable.any() else np.zeros((0, 6, 6))
@@ -100,7 +100,7 @@ def set_penalties(p: Problem, contacts: NetContacts, x: np.ndarray) -> None:
     contacts.penalty[:] = np.where(movable, 1.0, 1.0) / give
 
 
-def minimise(p: Problem, contacts: NetContacts, z: np.ndarray, tolerance: float) -> Solution:
+def minimise(p: Problem, contacts: SoftContacts, z: np.ndarray, tolerance: float) -> Solution:
     """Find where Phi is least, from z (n + 2 r, 3) on; the forces and radii of the contacts are brought up to date in place.
 
     Args:
@@ -111,10 +111,10 @@ def minimise(p: Problem, contacts: NetContacts, z: np.ndarray, tolerance: float)
     """
     n, z = len(p.free), z.copy()
     held = np.concatenate([~p.free, np.zeros(len(z) - n, bool)])
-    mass = np.concatenate([p.net.mass, p.h**2 * p.rigid[:, [0, 3], [0, 3]].reshape(-1)])
-    total = float(p.net.mass.sum())
-    stiffness = np.trace(p.net.hessian(z[:n])[p.net.pattern.diagonal], axis1=1, axis2=2)
-    noise = FLOOR * p.h * np.sqrt(float(np.sum((stiffness * np.abs(z[:n]).max(initial=0.0)) ** 2 / p.net.mass)) / total)
+    mass = np.concatenate([p.soft_body.mass, p.h**2 * p.rigid[:, [0, 3], [0, 3]].reshape(-1)])
+    total = float(p.soft_body.mass.sum())
+    stiffness = np.trace(p.soft_body.hessian(z[:n])[p.soft_body.pattern.diagonal], axis1=1, axis2=2)
+    noise = FLOOR * p.h * np.sqrt(float(np.sum((stiffness * np.abs(z[:n]).max(initial=0.0)) ** 2 / p.soft_body.mass)) / total)
     force = np.empty_like(contacts.force)
     linear, value, previous, iteration, blind, stepped = 0, value_of(p, contacts, z), np.inf, 0, False, False
     last = np.inf
@@ -151,25 +151,25 @@ def minimise(p: Problem, contacts: NetContacts, z: np.ndarray, tolerance: float)
         value = value_of(p, contacts, z) if moved is None else new
 
 
-def _effect(p: Problem, contacts: NetContacts, force: np.ndarray, mass: np.ndarray) -> float:
+def _effect(p: Problem, contacts: SoftContacts, force: np.ndarray, mass: np.ndarray) -> float:
     """Error (m/s) that taking over the forces of the contacts will make."""
     change = np.zeros((len(mass), 3))
     add_contact_gradient(len(p.free), contacts, force - contacts.force, change)
     change[: len(p.free)][~p.free] = 0.0
-    return p.h * float(np.sqrt(np.sum(change**2 / mass[:, None]) / p.net.mass.sum()))
+    return p.h * float(np.sqrt(np.sum(change**2 / mass[:, None]) / p.soft_body.mass.sum()))
 
 
 def _newton_step(
-    p: Problem, contacts: NetContacts, z: np.ndarray, residual: np.ndarray, accuracy: float, exact: bool
+    p: Problem, contacts: SoftContacts, z: np.ndarray, residual: np.ndarray, accuracy: float, exact: bool
 ) -> tuple[np.ndarray, int]:
     """Return a step (n + 2 r, 3) downhill, and the iterations it took."""
-    n, pattern = len(p.free), p.net.pattern
+    n, pattern = len(p.free), p.soft_body.pattern
     block = _blocks(p, z[:n], exact)
     D = np.empty((len(contacts.body), 3, 3))
     contact_stiffness(z, n, contacts, D)
     apart = (contacts.unknown < 0) & (contacts.weight[:, 0] == 1.0)  # of one vertex only: part of its own block
     np.add.at(block, pattern.diagonal[contacts.node[apart, 0]], D[apart])
-    coupling = NetContacts(*(column[~apart] for column in contacts))
+    coupling = SoftContacts(*(column[~apart] for column in contacts))
     linear_part, D = coupling._replace(aim=np.zeros_like(coupling.aim)), D[~apart]
     node_inverse, rigid_inverse, step = np.empty((n, 3, 3)), np.empty_like(p.rigid), np.empty_like(z)
     diagonal_inverses(pattern.diagonal, block, p.rigid, coupling, D, node_inverse, rigid_inverse)
@@ -180,7 +180,7 @@ def _newton_step(
     return step, count
 
 
-def _search(p: Problem, contacts: NetContacts, z, step, value: float, slope: float) -> tuple[np.ndarray | None, float]:
+def _search(p: Problem, contacts: SoftContacts, z, step, value: float, slope: float) -> tuple[np.ndarray | None, float]:
     """First of the steps 1, 1/2, 1/4, ... that lowers Phi by its share of the slope, and Phi there; None where round-off hides it.
 
     There the gradient tells whether Newton's step is any good: it is that of a convex function nearby.

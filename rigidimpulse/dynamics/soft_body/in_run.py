@@ -27,7 +27,7 @@ from rigidimpulse.dynamics.forces.force import ForceTable, Instant, no_links
 from rigidimpulse.dynamics.soft_body.contact_planes import RigidMotion
 from rigidimpulse.dynamics.soft_body.soft_bodies import Flexibles, FlexibleStep
 from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
-from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, begin, make_course, pose_at, state_at
+from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, begin, make_trajectories, pose_at, state_at
 
 KIND = "flexible bodies"
 SCHEME = "midpoint"
@@ -44,7 +44,7 @@ MADE = 1e-6
 """Energy made of nothing, relative to that of the nets, that is reported."""
 
 
-class NetForces(ForceTable):
+class SoftBodyForces(ForceTable):
     """The wrenches of nets on all dynamic bodies, in the present step of the run.
 
     Attributes:
@@ -54,13 +54,14 @@ class NetForces(ForceTable):
     """
 
     def __init__(self, world) -> None:
-        self.nets = Flexibles(world, SCHEME)
+        self.soft_bodies = Flexibles(world, SCHEME)
         self.kind, self.names = KIND, [KIND]
         self.body = np.flatnonzero(world.dynamic)
         self.cause = np.zeros(len(self.body), np.int64)
         self.links = no_links()
         self.is_steady, self.comes_and_goes = False, True
-        self.reason = f"{len(self.nets.bodies)} with {len(self.nets.position)} vertices, stepped implicitly with what they touch"
+        count = f"{len(self.soft_bodies.bodies)} with {len(self.soft_bodies.position)} vertices"
+        self.reason = f"{count}, stepped implicitly with what they touch"
         self._start = self._end = 0.0
         self._value, self._rate = np.zeros((2, len(self.body), 6))
         self.sums = [self._sums()]
@@ -85,12 +86,12 @@ class NetForces(ForceTable):
 
     def step(self, time: float, end: float, motion: RigidMotion, held: np.ndarray) -> tuple[FlexibleStep, np.ndarray]:
         """Step the nets, with bodies that are held, (n,) bool; returns how it went and (n,) bool, the bodies that feel it."""
-        h, before = end - time, copy(self.nets)
-        done = self.nets.step(time, h, _fixed(motion, held) if held.any() else motion)
+        h, before = end - time, copy(self.soft_bodies)
+        done = self.soft_bodies.step(time, h, _fixed(motion, held) if held.any() else motion)
         moved = held & self._might_move(done.impulse, h, motion)
         if moved.any():
-            self.nets, held = before, held & ~moved
-            done = self.nets.step(time, h, _fixed(motion, held))
+            self.soft_bodies, held = before, held & ~moved
+            done = self.soft_bodies.step(time, h, _fixed(motion, held))
         self._value, self._rate = done.ramp[:, self.body]
         steady = held[self.body]
         self._value[steady], self._rate[steady] = done.impulse[self.body[steady]] / h, 0.0
@@ -111,14 +112,14 @@ class NetForces(ForceTable):
         return harder & (gain > self.sums[-1][1:3].sum() - self._sums()[1:3].sum())
 
     def _sums(self) -> np.ndarray:
-        nets = self.nets
-        momentum = nets.net.mass[:, None] * nets.velocity
-        kinetic = 0.5 * float(np.sum(momentum * nets.velocity))
-        stored = nets.net.energy(nets.position) - float(np.sum(nets.weight * nets.position))
-        return np.array([self._end, kinetic, stored, *momentum.sum(axis=0), *cross(nets.position, momentum).sum(axis=0)])
+        soft_bodies = self.soft_bodies
+        momentum = soft_bodies.soft_body.mass[:, None] * soft_bodies.velocity
+        kinetic = 0.5 * float(np.sum(momentum * soft_bodies.velocity))
+        stored = soft_bodies.soft_body.energy(soft_bodies.position) - float(np.sum(soft_bodies.weight * soft_bodies.position))
+        return np.array([self._end, kinetic, stored, *momentum.sum(axis=0), *cross(soft_bodies.position, momentum).sum(axis=0)])
 
 
-class RunningNets:
+class RunningSoftBodies:
     """The nets of a run, between it and their table.
 
     Attributes:
@@ -126,13 +127,13 @@ class RunningNets:
 
     """
 
-    def __init__(self, context, table: NetForces, times: np.ndarray, clock) -> None:
+    def __init__(self, context, table: SoftBodyForces, times: np.ndarray, clock) -> None:
         """times (f,) s of the frames; clock: of the line of the plan."""
         self._table, self._times, self._clock = table, times, clock
         self.pressed = np.zeros(context.world.num_bodies, bool)
-        self._frames = np.empty((len(times), *table.nets.position.shape))
-        self._frames[:] = table.nets.position
-        self._scratch = make_course(context.world.num_bodies)
+        self._frames = np.empty((len(times), *table.soft_bodies.position.shape))
+        self._frames[:] = table.soft_bodies.position
+        self._scratch = make_trajectories(context.world.num_bodies)
 
     def advance(self, context, end: float) -> float:
         """Step the nets from the run's time to `end` [s], or less far where something fast is near; returns how far."""
@@ -141,11 +142,11 @@ class RunningNets:
             return end
         with self._clock():
             motion = self._motion(context, time, end)
-            limit = max(self._table.nets.step_limit(motion, end - time), (end - time) / MOST_PIECES)
+            limit = max(self._table.soft_bodies.step_limit(motion, end - time), (end - time) / MOST_PIECES)
             if limit < end - time:
                 end = time + (end - time) / math.ceil((end - time) / limit)
                 motion = self._motion(context, time, end)
-            before = self._table.nets.position.copy()
+            before = self._table.soft_bodies.position.copy()
             done, pressed = self._table.step(time, end, motion, self._held(context, motion))
             context.forces.let_act(self.pressed | pressed)  # those that are let go need a course without
             self.pressed = pressed
@@ -155,8 +156,8 @@ class RunningNets:
 
     def tracks(self) -> list[FlexibleTrack]:
         """Frames of each flexible body."""
-        nets = self._table.nets
-        parts = zip(nets.bodies, nets.first[:-1], nets.first[1:], strict=True)
+        soft_bodies = self._table.soft_bodies
+        parts = zip(soft_bodies.bodies, soft_bodies.first[:-1], soft_bodies.first[1:], strict=True)
         return [FlexibleTrack(body.name, self._frames[:, first:last].copy(), body.surface()[1]) for body, first, last in parts]
 
     def add_to(self, ledger) -> None:
@@ -173,58 +174,58 @@ class RunningNets:
         limit = STILL * world.accuracy.step * world.steady_strength
         radius = np.where(world.dynamic, world.bound_radius, 0.0)
         speed = np.linalg.norm(motion.velocity, axis=1) + radius * np.linalg.norm(motion.angular_velocity, axis=1)
-        return world.dynamic & (state.under_contact | (state.course.mode == FIXED)) & (speed <= limit)
+        return world.dynamic & (state.under_contact | (state.trajectory.mode == FIXED)) & (speed <= limit)
 
     def _motion(self, context, time: float, end: float) -> RigidMotion:
         """All rigid bodies from `time` to `end`, without the nets."""
-        world, course = context.world, context.state.course
+        world, trajectory = context.world, context.state.trajectory
         n = world.num_bodies
         x, v, w, x1 = np.empty((4, n, 3))
         q, q1 = np.empty((2, n, 4))
         held = np.zeros((n, 6))
         held[self._table.body] = context.forces.present(self._table, time)
         for i in range(n):
-            state_at(course, i, time, x[i], q[i], v[i], w[i])
-            path = course
+            state_at(trajectory, i, time, x[i], q[i], v[i], w[i])
+            path = trajectory
             if held[i].any():
                 path = self._scratch
                 self._let_go(context, i, time, held[i], (x[i], q[i], v[i], w[i]))
             pose_at(path, i, end, x1[i], q1[i])
         rotation, rotation1 = (np.array([to_matrix(turn) for turn in orientation]) for orientation in (q, q1))
-        inv_inertia = np.einsum("nij,nj,nkj->nik", rotation, world.dynamic[:, None] / course.inertia, rotation)
+        inv_inertia = np.einsum("nij,nj,nkj->nik", rotation, world.dynamic[:, None] / trajectory.inertia, rotation)
         return RigidMotion(x, rotation, v, w, x1, rotation1, context.state.now.inv_mass, inv_inertia, world.dynamic)
 
     def _let_go(self, context, i: int, time: float, wrench: np.ndarray, state) -> None:
         """Write a course without the nets' wrench (6,) for body i, from its state (x, q, v, w) at `time`."""
-        course, free = context.state.course, self._scratch
+        trajectory, free = context.state.trajectory, self._scratch
         free.start[i] = time
         free.position[i], free.orientation[i], free.velocity[i], free.angular_velocity[i] = state
-        since = time - course.start[i]
-        free.acceleration[i] = course.acceleration[i] + since * course.jerk[i] - context.state.now.inv_mass[i] * wrench[:3]
+        since = time - trajectory.start[i]
+        free.acceleration[i] = trajectory.acceleration[i] + since * trajectory.jerk[i] - context.state.now.inv_mass[i] * wrench[:3]
         free.torque[i] = -wrench[3:]
-        if course.mode[i] == FORCED:
-            free.torque[i] += course.torque[i] + since * course.torque_rate[i]
+        if trajectory.mode[i] == FORCED:
+            free.torque[i] += trajectory.torque[i] + since * trajectory.torque_rate[i]
         free.jerk[i] = free.torque_rate[i] = 0.0
-        free.inertia[i] = course.inertia[i]
+        free.inertia[i] = trajectory.inertia[i]
         free.mode[i] = FORCED if free.torque[i].any() else FREE
         begin(free, i)
 
     def _write(self, time: float, end: float, before: np.ndarray) -> None:
         """Frames in the step, and from its end on, until more is known, what is there."""
         first, last = np.searchsorted(self._times, (time, end), side="left")
-        now = self._table.nets.position
+        now = self._table.soft_bodies.position
         for f in range(first, last):
             self._frames[f] = before + (self._times[f] - time) / (end - time) * (now - before)
         self._frames[last : last + 2] = now
 
     def _report(self, context, time: float, done: FlexibleStep) -> None:
-        names = tuple(body.name for body in self._table.nets.bodies)
+        names = tuple(body.name for body in self._table.soft_bodies.bodies)
         report = context.log.report
         if not done.converged:
             report(time, "nets jammed", names, "a step was solved without friction, or not to its tolerance; use a smaller step")
         if done.unresolved:
             report(time, "nets inside bodies", names, "contacts were left over; use a smaller step, or start nets clear of bodies")
-        if done.energy_made > MADE * max(self._table.nets.energy(), 0.0):
+        if done.energy_made > MADE * max(self._table.soft_bodies.energy(), 0.0):
             report(time, "nets made energy", names, f"{done.energy_made:.3g} J of nothing; use a smaller step or more damping")
 
 

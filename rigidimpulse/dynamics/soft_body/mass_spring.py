@@ -46,7 +46,7 @@ def _no_faces() -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Net:
+class SpringMesh:
     """n point masses with s springs and g hinges.
 
     Attributes:
@@ -112,7 +112,7 @@ class Net:
         add_hinge_hessian(x, self.hinge, self.hinge_stiffness, self.pattern.hinge_slot, block)
         return block
 
-    def damped(self, x: np.ndarray, h: float) -> Net:
+    def damped(self, x: np.ndarray, h: float) -> SpringMesh:
         """Net whose energy, but for a constant, is E + c (l - l(x))^2 / 2 h + ...: dampers over an implicit step h from x (n, 3).
 
         A spring and a damper of rate (l - l(x)) / h add up to one spring of stiffness k + c / h with another rest length.
@@ -125,7 +125,7 @@ class Net:
         hinge_share = np.divide(self.hinge_damping / h, bending, out=np.zeros_like(bending), where=bending > 0.0)
         turn = self.angles(x) - self.hinge_rest
         turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
-        damped = Net(
+        damped = SpringMesh(
             self.position, self.mass, self.spring, self.spring_rest + share * (self.lengths(x) - self.spring_rest), stiffness,
             self.spring_damping, self.hinge, self.hinge_rest + hinge_share * turn, bending, self.hinge_damping, self.face,
         )  # fmt: skip
@@ -135,7 +135,7 @@ class Net:
 
 def sheet(
     position: np.ndarray, face: np.ndarray, mass: float, stiffness: float, bending: float, inner: float, damping: float
-) -> Net:
+) -> SpringMesh:
     """Net of a triangle mesh.
 
     Args:
@@ -168,24 +168,24 @@ def sheet(
     rest, angle = np.empty(len(spring)), np.empty(len(hinge))
     spring_lengths(x, spring, rest)
     hinge_angles(x, hinge, angle)
-    return Net(
+    return SpringMesh(
         x, mass * vertex_area / vertex_area.sum(), spring, rest, spring_stiffness, damping * spring_stiffness, hinge, angle,
         hinge_stiffness, damping * hinge_stiffness, np.ascontiguousarray(face),
     )  # fmt: skip
 
 
-def join(nets: list[Net]) -> Net:
+def join(soft_bodies: list[SpringMesh]) -> SpringMesh:
     """Return several nets as one; of none an empty one."""
-    first = np.concatenate([[0], np.cumsum([len(net.mass) for net in nets])]).astype(np.int64)
+    first = np.concatenate([[0], np.cumsum([len(soft_body.mass) for soft_body in soft_bodies])]).astype(np.int64)
 
     def all_of(name: str, *shape: int) -> np.ndarray:
-        return np.concatenate([np.zeros((0, *shape)), *(getattr(net, name) for net in nets)])
+        return np.concatenate([np.zeros((0, *shape)), *(getattr(soft_body, name) for soft_body in soft_bodies)])
 
     def indices(name: str, width: int) -> np.ndarray:
-        parts = [getattr(net, name) + start for net, start in zip(nets, first, strict=False)]
+        parts = [getattr(soft_body, name) + start for soft_body, start in zip(soft_bodies, first, strict=False)]
         return np.concatenate([np.zeros((0, width), np.int64), *parts])
 
-    return Net(
+    return SpringMesh(
         all_of("position", 3), all_of("mass"), indices("spring", 2), all_of("spring_rest"), all_of("spring_stiffness"),
         all_of("spring_damping"), indices("hinge", 4), all_of("hinge_rest"), all_of("hinge_stiffness"), all_of("hinge_damping"),
         indices("face", 3),

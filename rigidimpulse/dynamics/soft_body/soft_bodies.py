@@ -23,7 +23,7 @@ from rigidimpulse.core.quaternion import cross, quaternion_from_rotation_vector,
 from rigidimpulse.dynamics.soft_body.balance import lever_place, set_momenta, take_energy
 from rigidimpulse.dynamics.soft_body.body import FlexibleBody
 from rigidimpulse.dynamics.soft_body.contact_planes import LIFT, SLIPS, RigidMotion, Touches, joined, make_contacts, make_surfaces, sides_of
-from rigidimpulse.dynamics.soft_body.contact_terms import NetContacts
+from rigidimpulse.dynamics.soft_body.contact_terms import SoftContacts
 from rigidimpulse.dynamics.soft_body.implicit_step import Problem, Solution, minimise, set_penalties, value_of
 from rigidimpulse.dynamics.soft_body.mass_spring import join
 from rigidimpulse.model.world import World
@@ -86,15 +86,15 @@ class Flexibles:
         names = [*world.names, *(body.name for body in self.bodies)]
         for name in {name for name in names if names.count(name) > 1}:
             raise SceneError("the scene has a body of this name already", "give it another", f"flexible body {name!r}")
-        nets = [body.build() for body in self.bodies]
-        self.first = np.concatenate([[0], np.cumsum([len(net.mass) for net in nets])]).astype(np.int64)
-        self.net = join(nets)
+        soft_bodies = [body.build() for body in self.bodies]
+        self.first = np.concatenate([[0], np.cumsum([len(soft_body.mass) for soft_body in soft_bodies])]).astype(np.int64)
+        self.soft_body = join(soft_bodies)
         self.scheme, self.tolerance = scheme, tolerance
-        self.position = self.net.position.copy()
-        velocities = [body.start_velocity(net.position) for body, net in zip(self.bodies, nets, strict=True)]
+        self.position = self.soft_body.position.copy()
+        velocities = [body.start_velocity(soft_body.position) for body, soft_body in zip(self.bodies, soft_bodies, strict=True)]
         self.velocity = np.concatenate([np.zeros((0, 3)), *velocities])
         factors = np.array([body.gravity_factor for body in self.bodies], float)
-        owner = np.repeat(np.arange(len(nets)), np.diff(self.first))
+        owner = np.repeat(np.arange(len(soft_bodies)), np.diff(self.first))
         self._gravity = factors[owner, None] * np.asarray(world.scene.gravity, float)
         self._fasten(world)
         self._pieces = self._find_pieces(~np.isin(np.arange(len(owner)), self._held[0]))
@@ -121,7 +121,7 @@ class Flexibles:
 
     def _find_pieces(self, free: np.ndarray) -> list[np.ndarray]:
         """Vertices of each connected piece without held vertices."""
-        n, ends = len(free), np.concatenate([self.net.spring, self.net.hinge[:, [0, 2]], self.net.hinge[:, [0, 3]]])
+        n, ends = len(free), np.concatenate([self.soft_body.spring, self.soft_body.hinge[:, [0, 2]], self.soft_body.hinge[:, [0, 3]]])
         links = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(n, n))
         count, label = connected_components(links, directed=False)
         pieces = [np.flatnonzero(label == k) for k in range(count)]
@@ -129,27 +129,27 @@ class Flexibles:
         return [piece for piece in pieces if free[piece].all()]
 
     def _prepare_contact(self, world: World, owner: np.ndarray) -> None:
-        edges = self.net.lengths(self.position) if len(self.net.spring) else np.ones(1)
+        edges = self.soft_body.lengths(self.position) if len(self.soft_body.spring) else np.ones(1)
         skip = np.zeros((len(owner), world.num_bodies), bool)
         for vertices, bodies, _ in (self._held, self._joined):
             skip[vertices[bodies >= 0], bodies[bodies >= 0]] = True
         skip[np.ix_(~self._free, ~world.dynamic)] = True
-        pairs = [[combine(net.material, body.material)[1:3] for body in world.scene.bodies] for net in self.bodies]
+        pairs = [[combine(soft_body.material, body.material)[1:3] for body in world.scene.bodies] for soft_body in self.bodies]
         self._friction = np.array(pairs, float).reshape(len(self.bodies), world.num_bodies, 2)[owner]
         self._edge = float(edges.mean())
         gap = GAP * self._edge
         self._surfaces = make_surfaces(
-            world.geometry, world.shape_of_body, world.bound_radius, world.ball, self.position, self.net.face, skip, self._edge, gap
+            world.geometry, world.shape_of_body, world.bound_radius, world.ball, self.position, self.soft_body.face, skip, self._edge, gap
         )
 
     @property
     def weight(self) -> np.ndarray:
         """Weight (v, 3) N of every vertex."""
-        return self.net.mass[:, None] * self._gravity
+        return self.soft_body.mass[:, None] * self._gravity
 
     def energy(self) -> float:
         """Kinetic and elastic energy in J."""
-        return 0.5 * float(self.net.mass @ np.einsum("ij,ij->i", self.velocity, self.velocity)) + self.net.energy(self.position)
+        return 0.5 * float(self.soft_body.mass @ np.einsum("ij,ij->i", self.velocity, self.velocity)) + self.soft_body.energy(self.position)
 
     def vertices(self, name: str) -> np.ndarray:
         """Vertices (v, 3) m of a flexible body now."""
@@ -193,7 +193,7 @@ class Flexibles:
         self._place_held(rigid, target)
         way = np.where(self._free[:, None], flight, target)
         touches = self._surfaces.find(start, way, rigid, self._sides, self._surfaces.gap, rigid.end_rotation, False)
-        lift = self._lift(touches, rigid, start)
+        lift = self._move_out(touches, rigid, start)
         midpoint = self.scheme == "midpoint" and len(touches.key) == 0 and len(self._joined[0]) == 0
         rounds, unresolved = 0, 0
         while True:
@@ -223,7 +223,7 @@ class Flexibles:
         b = bodies[on]
         target[vertices[on]] = rigid.end_position[b] + np.einsum("kij,kj->ki", rigid.end_rotation[b], places[on])
 
-    def _lift(self, touches: Touches, rigid: RigidMotion, start: np.ndarray) -> np.ndarray:
+    def _move_out(self, touches: Touches, rigid: RigidMotion, start: np.ndarray) -> np.ndarray:
         """Ways (v, 3) m by which vertices that have less than their gap are moved, position only; their targets follow."""
         lift = np.zeros_like(start)
         lacks = (touches.key < self._surfaces.skip.size) & (touches.time == 0.0) & (touches.distance < 0.999 * self._surfaces.gap)
@@ -252,11 +252,11 @@ class Flexibles:
         held = np.flatnonzero(~self._free)
         z = np.concatenate([start, np.zeros((2 * len(slots), 3))])
         z[held] = 0.5 * (start[held] + target[held]) if midpoint else target[held]
-        mass = self.net.mass
+        mass = self.soft_body.mass
         speeds = np.einsum("ij,ij->i", self.velocity, self.velocity) + np.einsum("ij,ij->i", goal - start, goal - start) / span**2
         speeds[held] = np.einsum("ij,ij->i", z[held] - start[held], z[held] - start[held]) / span**2
         speed = float(np.sqrt(mass @ speeds / mass.sum()))
-        problem = Problem(self.net.damped(start, span), span, goal, self._free, M / span**2, speed)
+        problem = Problem(self.soft_body.damped(start, span), span, goal, self._free, M / span**2, speed)
         set_penalties(problem, contacts, z[: len(start)])
         onward = z.copy()
         onward[: len(start)][self._free] += span * self.velocity[self._free]
@@ -271,7 +271,7 @@ class Flexibles:
         self._force_of = dict(zip(contacts.key.tolist(), solution.force, strict=True))
         return solution, contacts, problem, slots
 
-    def _recall(self, contacts: NetContacts) -> None:
+    def _recall(self, contacts: SoftContacts) -> None:
         """Start from the forces of the last step."""
         for c, key in enumerate(contacts.key.tolist()):
             known = self._force_of.get(key)
@@ -306,29 +306,29 @@ class Flexibles:
 
     def _finish(self, start, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h) -> FlexibleStep | None:
         """Take over the new state; see `balance` for what is set right. None if the midpoint rule shall not be taken."""
-        n, net, free = len(start), self.net, self._free
+        n, soft_body, free = len(start), self.soft_body, self._free
         before, x0 = self.velocity.copy(), self.position
         way = end - start
         velocity = 2.0 * way / h - before if midpoint else way / h
         velocity[~free] = way[~free] / h
         impulse = h * solution.force
         self._keep_momenta(start, end, velocity, before, impulse, contacts, rigid, h, midpoint)
-        elastic = problem.net.gradient(solution.z[:n])
+        elastic = problem.soft_body.gradient(solution.z[:n])
         acting = np.zeros_like(elastic)
         np.add.at(acting, contacts.node.ravel(), (contacts.weight[:, :, None] * solution.force[:, None, :]).reshape(-1, 3))
-        acting += net.mass[:, None] * self._gravity
-        hold = np.where(free[:, None], 0.0, net.mass[:, None] * (velocity - before) / h + elastic - acting)
+        acting += soft_body.mass[:, None] * self._gravity
+        hold = np.where(free[:, None], 0.0, soft_body.mass[:, None] * (velocity - before) / h + elastic - acting)
         work = float(np.sum((acting + hold) * way))
-        kinetic = 0.5 * float(net.mass @ (np.einsum("ij,ij->i", velocity, velocity) - np.einsum("ij,ij->i", before, before)))
-        excess = kinetic + net.energy(end) - net.energy(x0) - work
+        kinetic = 0.5 * float(soft_body.mass @ (np.einsum("ij,ij->i", velocity, velocity) - np.einsum("ij,ij->i", before, before)))
+        excess = kinetic + soft_body.energy(end) - soft_body.energy(x0) - work
         if np.any(start != x0):  # what lifting costs is no motion's to give
-            excess -= net.energy(start) - net.energy(x0)
-        if midpoint and excess > MIDPOINT_EXCESS * float(net.mass @ np.einsum("ij,ij->i", velocity, velocity)):
+            excess -= soft_body.energy(start) - soft_body.energy(x0)
+        if midpoint and excess > MIDPOINT_EXCESS * float(soft_body.mass @ np.einsum("ij,ij->i", velocity, velocity)):
             return None
         taken, made = 0.0, 0.0
         if excess > 0.0:
-            made = take_energy(net.mass, end, velocity, self._pieces or [np.flatnonzero(free)], excess)
-            if midpoint and made > MIDPOINT_MADE * float(net.mass @ np.einsum("ij,ij->i", velocity, velocity)):
+            made = take_energy(soft_body.mass, end, velocity, self._pieces or [np.flatnonzero(free)], excess)
+            if midpoint and made > MIDPOINT_MADE * float(soft_body.mass @ np.einsum("ij,ij->i", velocity, velocity)):
                 return None
             taken = excess - made
         self.energy_taken += taken
@@ -340,11 +340,11 @@ class Flexibles:
         self._bear(given[:, :3] / h, rigid, h)
         return FlexibleStep(given, ramp, taken, made, len(contacts.key), solution.converged, unresolved)
 
-    def _keep_momenta(self, start, end, velocity, before, impulse, contacts: NetContacts, rigid, h, midpoint) -> None:
+    def _keep_momenta(self, start, end, velocity, before, impulse, contacts: SoftContacts, rigid, h, midpoint) -> None:
         """Set momentum, angular momentum and the way of the centre of free pieces to what acted on them."""
         if not self._pieces:
             return
-        mass = self.net.mass
+        mass = self.soft_body.mass
         place = np.einsum("mk,mkj->mj", contacts.weight, start[contacts.node])
         on = contacts.unknown >= 0
         shift = 0.5 * h * h * rigid.inv_mass[:, None] * self._load
@@ -374,7 +374,7 @@ class Flexibles:
         strength = np.linalg.norm(force, axis=1)
         self._load = force * np.divide(np.minimum(size, strength), strength, out=np.zeros_like(size), where=strength > 0.0)[:, None]
 
-    def _given(self, contacts: NetContacts, impulse, rigid: RigidMotion, hold, end) -> np.ndarray:
+    def _given(self, contacts: SoftContacts, impulse, rigid: RigidMotion, hold, end) -> np.ndarray:
         """Impulses (n, 6) that the nets gave the bodies."""
         given = np.zeros((len(rigid.inv_mass), 6))
         np.subtract.at(given, contacts.body, np.concatenate([impulse, cross(contacts.arm, impulse)], axis=1))
@@ -385,7 +385,7 @@ class Flexibles:
         return given
 
 
-def _with_fastened(contacts: NetContacts, vertices, bodies, places, rigid: RigidMotion, unknown) -> NetContacts:
+def _with_fastened(contacts: SoftContacts, vertices, bodies, places, rigid: RigidMotion, unknown) -> SoftContacts:
     """Add the vertices that are fastened to dynamic bodies."""
     k = len(vertices)
     if k == 0:
@@ -393,8 +393,8 @@ def _with_fastened(contacts: NetContacts, vertices, bodies, places, rigid: Rigid
     arm = np.einsum("kij,kj->ki", rigid.end_rotation[bodies], places)
     weight, flat = np.zeros((k, 3)), np.zeros((k, 3))
     weight[:, 0] = 1.0
-    added = NetContacts(
+    added = SoftContacts(
         np.tile(vertices[:, None], 3), weight, bodies, unknown[bodies], arm, flat, rigid.end_position[bodies] + arm, np.zeros(k),
         np.ones(k), flat.copy(), np.zeros(k), np.ones(k, bool), -1 - vertices,
     )  # fmt: skip
-    return NetContacts(*(np.concatenate(column) for column in zip(contacts, added, strict=True)))
+    return SoftContacts(*(np.concatenate(column) for column in zip(contacts, added, strict=True)))

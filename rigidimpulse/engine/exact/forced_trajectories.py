@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.engine.exact.trajectories import integrate
-from rigidimpulse.engine.islands import Group
+from rigidimpulse.engine.islands import Island
 from rigidimpulse.engine.plan import Bound, Skip
 
 WHOLE = 1.0 - 1e-9
@@ -45,16 +45,16 @@ class ForcedFlight:
         return Bound(integrate_forced, f"steps of order 4, as long as their error allows{impacts}")
 
 
-def note_free(context, _window, group: Group) -> None:
+def note_free(context, _window, island: Island) -> None:
     """Keep the members' accelerations without varying forces, if these act on one of them."""
-    if context.forces.acts[group.members].any():
-        group.free = context.acceleration[group.members], context.angular_acceleration[group.members]
+    if context.forces.acts[island.members].any():
+        island.free = context.acceleration[island.members], context.angular_acceleration[island.members]
 
 
-def integrate_forced(context, window, group: Group) -> None:
+def integrate_forced(context, pair_events, island: Island) -> None:
     """Give new courses to members, under varying forces where they feel them."""
-    if group.free is not None and not group.loaded:
-        members = group.members[context.forces.acts[group.members]]
-        h = context.forces.fly(context, members, group.time, window.end)
-        window.wake[members] = np.where(h < (window.end - group.time) * WHOLE, group.time + h, np.inf)
-    integrate(context, window, group)
+    if island.free is not None and not island.loaded:
+        members = island.members[context.forces.acts[island.members]]
+        h = context.forces.fly(context, members, island.time, pair_events.end)
+        pair_events.wake[members] = np.where(h < (pair_events.end - island.time) * WHOLE, island.time + h, np.inf)
+    integrate(context, pair_events, island)

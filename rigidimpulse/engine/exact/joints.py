@@ -61,7 +61,7 @@ class JointState:
         self.whole = np.ones(len(joints), bool)
         self.moment = np.zeros((len(joints), 3))
         self.shock = np.zeros((len(joints), 3))
-        self._booked_shock = np.zeros((len(joints), 3))
+        self._accounted_shock = np.zeros((len(joints), 3))
         self.pull = np.zeros((len(joints), 3))
         self.are_closed = True
         self.drift = np.zeros(len(joints))
@@ -111,14 +111,14 @@ class JointState:
     def moving_bodies(self, context) -> np.ndarray:
         """Dynamic bodies with joints that do not rest."""
         bodies = np.array(sorted(self._of_body), np.int64)
-        return bodies[context.state.course.mode[bodies] != FIXED]
+        return bodies[context.state.trajectory.mode[bodies] != FIXED]
 
-    def arrive(self, context, group) -> None:
+    def project_velocities(self, context, island) -> None:
         """End the group's sub-steps: take half of the forces back, close what drifted, stop the joints."""
         state, now, memory = context.state, context.state.now, self.memory
-        members, which = group.members, group.joints
+        members, which = island.members, island.joints
         elapsed = np.zeros(len(self.whole))
-        elapsed[which] = group.time - self.began[which]
+        elapsed[which] = island.time - self.began[which]
         self.moment[which] = 0.0
         before = mechanical_energy(now, context.world, members)
         arrived = np.hstack([now.velocity[members], now.angular_velocity[members]])
@@ -127,15 +127,15 @@ class JointState:
             now.velocity[i] -= now.inv_mass[i] * held[:3]
             now.angular_velocity[i] -= now.inv_inertia[i] @ held[3:]
         moved = close_joints(
-            self.table, which, now, group.contacts, state.rotation, members, context.column, memory.angle, self._allowed
+            self.table, which, now, island.contacts, state.rotation, members, context.column, memory.angle, self._allowed
         )
         if moved:
-            refresh_pose(members, now, state.rotation, state.course.inertia)
-            group.moved = True
+            refresh_pose(members, now, state.rotation, state.trajectory.inertia)
+            island.moved = True
         stop_joints(
             self.table, which, now, state.rotation, members, context.column, memory, elapsed, self.moment
         )
-        self._book(context, which, group.time)
+        self._book(context, which, island.time)
         state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
         if self._limited:
             # An impact at this instant: what came before goes on unchanged.
@@ -145,7 +145,7 @@ class JointState:
         memory.wrench[members] = 0.0
         self.length[which] = elapsed[which]
         after = mechanical_energy(now, context.world, members)
-        context.log.book(group.time, "joints", after - before)
+        context.log.account(island.time, "joints", after - before)
         self._note_drift(which, after, kinetic_energy(now, context.world, members))
 
     def _note_drift(self, which: np.ndarray, energy: float, kinetic: float) -> None:
@@ -162,33 +162,33 @@ class JointState:
             began = float(self.began[j])
             if time > began:
                 context.impulses.add(cause, a, b, began, time, 0.5 * self.pull[j] + self.moment[j] / (time - began))
-            context.impulses.add_at(cause, a, b, time, self.shock[j] - self._booked_shock[j])
-        self._booked_shock[which] = self.shock[which]
+            context.impulses.add_at(cause, a, b, time, self.shock[j] - self._accounted_shock[j])
+        self._accounted_shock[which] = self.shock[which]
 
-    def impact_block(self, context, group):
+    def impact_block(self, context, island):
         """The joints' part in the impulses of an impact (`JointBlock`)."""
         state = context.state
         return impact_rows(
-            self.table, group.joints, state.now, state.rotation, group.members, context.column, self.memory, self._allowed,
+            self.table, island.joints, state.now, state.rotation, island.members, context.column, self.memory, self._allowed,
             self.shock,
         )
 
-    def sub_step(self, context, group, h: float) -> float:
+    def sub_step(self, context, island, h: float) -> float:
         """Length of the next sub-step: h, the rest of the step, or a part of it. Very short rests are planned as longer ones."""
         world, now = context.world, context.state.now
         fastest = 0.0
-        sways, swings = self._tension_rates(context, group.joints)
-        rates = max(sways, self._spring_rate(group.joints))
-        for j in group.joints.tolist():
+        sways, swings = self._tension_rates(context, island.joints)
+        rates = max(sways, self._spring_rate(island.joints))
+        for j in island.joints.tolist():
             a, b = int(self.table.body_a[j]), int(self.table.body_b[j])
             spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
             fastest = max(fastest, float(np.linalg.norm(spins[1] - spins[0])))
             if self._slides[j] and min(a, b) >= 0:
                 fastest = max(fastest, _slide_rate(now, a, b, world.accuracy.step))
-        waits = self.release_time[group.joints] - group.time
+        waits = self.release_time[island.joints] - island.time
         h = min(h, float(waits[waits > 0.0].min(initial=np.inf)))
         step = world.accuracy.step
-        drifts = self.drift[group.joints].max(initial=0.0) > DRIFT
+        drifts = self.drift[island.joints].max(initial=0.0) > DRIFT
         pieces = max(
             math.ceil(fastest * step / TURN),
             min(math.ceil(rates * step / SWAY), MOST_SUB_STEPS if drifts else MOST_SWAYS),
@@ -226,95 +226,95 @@ class JointState:
         own = (square for i, square in squares.items() if i in swinging)
         return math.sqrt(max(others, default=0.0)), math.sqrt(max(own, default=0.0))
 
-    def hold(self, context, group, contacts, turning, force, rest: float, rolling) -> tuple[float, float]:
+    def hold(self, context, island, contacts, turning, force, rest: float, rolling) -> tuple[float, float]:
         """Forces into context.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         state, memory = context.state, self.memory
-        others = self.bodies_of(group.joints)
+        others = self.bodies_of(island.joints)
         others = others[~context.world.dynamic[others]]
-        h, cuts = self.sub_step(context, group, rest), 0
+        h, cuts = self.sub_step(context, island, rest), 0
         while True:
-            h = group.load(context, h)
+            h = island.load(context, h)
             for i in others:
-                memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, group.time + h)
+                memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, island.time + h)
             moment = self.moment.copy()
             residual, worst = hold_jointed(
                 context.solve_rows, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
-                group.members, context.column, force, self.table, group.joints, state.rotation, memory, self._allowed,
+                island.members, context.column, force, self.table, island.joints, state.rotation, memory, self._allowed,
                 context.wrench, moment, rolling,
             )
-            self.pull[group.joints] = 2.0 * (moment[group.joints] - self.moment[group.joints]) / h
-            shorter = self.sub_step(context, group, h)
+            self.pull[island.joints] = 2.0 * (moment[island.joints] - self.moment[island.joints]) / h
+            shorter = self.sub_step(context, island, h)
             if shorter < 0.5 * h:
                 # Only the forces show how short it has to be.
                 h = shorter
                 continue
-            if self._break(context, group):
+            if self._break(context, island):
                 continue
-            switch = next_switch(self.table, group.joints, memory, h, self._allowed)
+            switch = next_switch(self.table, island.joints, memory, h, self._allowed)
             if cuts == MOST_CUTS or switch >= h * (1.0 - SHORT):
                 break
             h, cuts = max(switch, SHORT * context.world.accuracy.step), cuts + 1
         self.moment[:] = moment
-        self._log(group, h)
-        self.began[group.joints] = group.time
-        if not len(group.contacts.gap) and group.free is None and self.are_passive(group.joints):
-            self._energy[group.joints] = mechanical_energy(state.now, context.world, group.members)
-        self._report(context, group, worst)
+        self._log(island, h)
+        self.began[island.joints] = island.time
+        if not len(island.contacts.gap) and island.free is None and self.are_passive(island.joints):
+            self._energy[island.joints] = mechanical_energy(state.now, context.world, island.members)
+        self._report(context, island, worst)
         self.are_closed = worst <= NOT_CLOSED * self._allowed
         return h, residual
 
-    def let_go(self, group) -> None:
+    def let_go(self, island) -> None:
         """Forget the forces of the group's joints, which are not to be used."""
-        self.memory.wrench[group.members] = 0.0
-        self.pull[group.joints] = 0.0
-        for j in group.joints.tolist():
+        self.memory.wrench[island.members] = 0.0
+        self.pull[island.joints] = 0.0
+        for j in island.joints.tolist():
             self.memory.force[self.table.first[j] : self.table.first[j + 1]] = 0.0
 
-    def _report(self, context, group, worst: float) -> None:
+    def _report(self, context, island, worst: float) -> None:
         """Report joints that are off by `worst` m or rad, and those near the singularity of a twist."""
-        names = tuple(context.world.names[i] for i in group.members)
+        names = tuple(context.world.names[i] for i in island.members)
         if worst > NOT_CLOSED * self._allowed:
             far = f"off by {worst:.1e}" if math.isfinite(worst) else "no pose closes them"
-            context.log.report(group.time, "joints not closed", names, f"{far}; use a smaller step")
-        for j in group.joints.tolist():
+            context.log.report(island.time, "joints not closed", names, f"{far}; use a smaller step")
+        for j in island.joints.tolist():
             if self.memory.steepness[self.table.first[j] : self.table.first[j + 1]].max(initial=0.0) > STEEP:
                 pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
                 context.log.report(
-                    group.time, "singular joint", pair,
+                    island.time, "singular joint", pair,
                     f"{self.names[j]}: its axis has swung by half a turn, where the twist about it is not defined; limit the swing",
                 )
 
-    def _break(self, context, group) -> bool:
+    def _break(self, context, island) -> bool:
         """Take out a joint whose time has come, or the most overloaded one, if there is one."""
-        which = group.joints
-        due = which[self.release_time[which] <= group.time]
+        which = island.joints
+        due = which[self.release_time[which] <= island.time]
         if len(due):
-            self._take_out(context, group, int(due[0]), "joint let go", "")
+            self._take_out(context, island, int(due[0]), "joint let go", "")
             return True
         load = np.linalg.norm(self.pull[which], axis=1) / self.break_force[which]
         if not len(which) or load.max() <= 1.0:
             return False
         j = int(which[np.argmax(load)])
-        self._take_out(context, group, j, "joint broke", f": {np.linalg.norm(self.pull[j]):.6g} N")
+        self._take_out(context, island, j, "joint broke", f": {np.linalg.norm(self.pull[j]):.6g} N")
         return True
 
-    def _take_out(self, context, group, j: int, kind: str, why: str) -> None:
+    def _take_out(self, context, island, j: int, kind: str, why: str) -> None:
         """The joint is gone."""
         self.whole[j] = False
-        group.joints = group.joints[group.joints != j]
+        island.joints = island.joints[island.joints != j]
         pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
-        context.log.note(group.time, kind, pair, f"{self.names[j]}{why}")
-        self.reactions.append((group.time, j, np.zeros(3)))
+        context.log.note(island.time, kind, pair, f"{self.names[j]}{why}")
+        self.reactions.append((island.time, j, np.zeros(3)))
 
-    def log_rest(self, group) -> None:
+    def log_rest(self, island) -> None:
         """Forces on b from here on, while the group rests."""
-        for j in group.joints.tolist():
-            self.reactions.append((group.time, j, self.pull[j].copy()))
+        for j in island.joints.tolist():
+            self.reactions.append((island.time, j, self.pull[j].copy()))
 
-    def _log(self, group, h: float) -> None:
+    def _log(self, island, h: float) -> None:
         """Forces on b at this instant: its impulses over half of the sub-steps on both sides."""
-        for j in group.joints.tolist():
-            self.reactions.append((group.time, j, self.moment[j] / (0.5 * (self.length[j] + h))))
+        for j in island.joints.tolist():
+            self.reactions.append((island.time, j, self.moment[j] / (0.5 * (self.length[j] + h))))
 
 
 def _slide_rate(now, a: int, b: int, step: float) -> float:

@@ -18,23 +18,23 @@ from rigidimpulse.core.quaternion import cross
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.impact.point import BodyState, Contacts
 from rigidimpulse.engine.touching import bring_all
-from rigidimpulse.motion.trajectory import FORCED, begin, make_course
+from rigidimpulse.motion.trajectory import FORCED, begin, make_trajectories
 
 ALLOWED = 0.1
 """Part of delta by which a gap may be off at the end of a sub-step."""
 
 
-class Foresight:
+class ErrorEstimate:
     """The state of some bodies at the end of a sub-step, each in a row of its own."""
 
     def __init__(self, world) -> None:
         """Without room for any yet."""
         self._world = world
-        self._make_room(0)
+        self._grow(0)
 
-    def _make_room(self, k: int) -> None:
+    def _grow(self, k: int) -> None:
         """Room for k bodies."""
-        self.course = make_course(k)
+        self.trajectory = make_trajectories(k)
         self.bodies = BodyState(
             np.empty((k, 3)), np.empty((k, 4)), np.empty((k, 3)), np.empty((k, 3)), np.empty(k), np.zeros((k, 3, 3))
         )
@@ -42,25 +42,25 @@ class Foresight:
         self.acceleration = np.empty((k, 3))
         self.angular_acceleration = np.empty((k, 3))
 
-    def gap_errors(self, context, group, contacts: Contacts, subset: np.ndarray, motion, wrench, h: float) -> np.ndarray:
+    def gap_errors(self, context, island, contacts: Contacts, subset: np.ndarray, motion, wrench, h: float) -> np.ndarray:
         """Errors (m,) of the gaps of the held contacts after h [m].
 
         motion: what `contact_motion` said of them; wrench (n, 6): of their forces.
         """
         world = self._world
-        touched = np.unique(np.concatenate([group.members, contacts.body_a, contacts.body_b]))
+        touched = np.unique(np.concatenate([island.members, contacts.body_a, contacts.body_b]))
         if len(touched) > len(self.rotation):
-            self._make_room(2 * len(touched))
+            self._grow(2 * len(touched))
         self._take_over(context, touched)
-        members, a, b = (np.searchsorted(touched, bodies) for bodies in (group.members, contacts.body_a, contacts.body_b))
-        self._bring(members, context.acceleration[group.members], wrench[group.members], h)
+        members, a, b = (np.searchsorted(touched, bodies) for bodies in (island.members, contacts.body_a, contacts.body_b))
+        self._bring(members, context.acceleration[island.members], wrench[island.members], h)
         normal = contacts.normal + h * motion.normal_rate
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         ahead = contacts._replace(
             body_a=a, body_b=b, arm_a=contacts.arm_a + h * motion.arm_rate_a, arm_b=contacts.arm_b + h * motion.arm_rate_b, normal=normal
         )
         turning = contact_motion(
-            world.geometry, world.shape_of_body[touched], self.rotation, self.bodies, ahead, group.kinds[subset], group.features[subset]
+            world.geometry, world.shape_of_body[touched], self.rotation, self.bodies, ahead, island.kinds[subset], island.features[subset]
         ).turning
         point_a = self.acceleration[a] + cross(self.angular_acceleration[a], ahead.arm_a)
         point_b = self.acceleration[b] + cross(self.angular_acceleration[b], ahead.arm_b)
@@ -74,16 +74,16 @@ class Foresight:
         self.bodies.inv_mass[:k] = world.inv_mass[touched]
         self.rotation[:k] = context.state.rotation[touched]
         self.acceleration[:k] = self.angular_acceleration[:k] = 0.0
-        self.course.inertia[:k] = world.inertia[touched]
+        self.trajectory.inertia[:k] = world.inertia[touched]
 
     def _bring(self, members: np.ndarray, acceleration: np.ndarray, wrench: np.ndarray, h: float) -> None:
         """The members (m,) rows after h under constant wrenches (m, 6) and accelerations (m, 3)."""
-        course, now, i = self.course, self.bodies, members
-        course.position[i], course.orientation[i] = now.position[i], now.orientation[i]
-        course.velocity[i], course.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]
-        course.acceleration[i] = acceleration + now.inv_mass[i, None] * wrench[:, :3]
-        course.torque[i] = wrench[:, 3:]
-        course.mode[i] = FORCED
+        trajectory, now, i = self.trajectory, self.bodies, members
+        trajectory.position[i], trajectory.orientation[i] = now.position[i], now.orientation[i]
+        trajectory.velocity[i], trajectory.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]
+        trajectory.acceleration[i] = acceleration + now.inv_mass[i, None] * wrench[:, :3]
+        trajectory.torque[i] = wrench[:, 3:]
+        trajectory.mode[i] = FORCED
         for member in i.tolist():
-            begin(course, member)
-        bring_all(course, i, h, now, self.rotation, self.acceleration, self.angular_acceleration)
+            begin(trajectory, member)
+        bring_all(trajectory, i, h, now, self.rotation, self.acceleration, self.angular_acceleration)

@@ -8,10 +8,10 @@ import numpy as np
 
 from rigidimpulse.collision.geometry import HALF_SPACE
 from rigidimpulse.engine.plan import Bound, Skip
-from rigidimpulse.engine.regime import only_dear, why_no_heaps
+from rigidimpulse.engine.regime import only_expensive, why_not_substepped
 from rigidimpulse.engine.spheres.layout import BALL, OTHER, PLANE
 
-ARRIVED, STEP, GO_ON, NO_ROOM = 0, 1, 2, 3
+ARRIVED, STEP, GO_ON, FULL = 0, 1, 2, 3
 """How a flight of the kernel ends: at its end; at a boundary whose step is not simple; between boundaries, at something that is not
 simple; for want of room in a table."""
 
@@ -48,7 +48,7 @@ def why_not(world) -> str:
         return "triggers are looked at after every step"
     if accuracy.impact_time not in ("bisection", "conservative") or accuracy.response == "kinematic":
         return f"{accuracy.impact_time}, {accuracy.response}"
-    return "" if why_no_heaps(world) or only_dear(world) else "bodies may heap up"
+    return "" if why_not_substepped(world) or only_expensive(world) else "bodies may heap up"
 
 
 def kinds(world) -> np.ndarray:

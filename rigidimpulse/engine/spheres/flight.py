@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import jit
-from rigidimpulse.engine.spheres.effect import ARRIVED, GO_ON, NO_ROOM, STEP
+from rigidimpulse.engine.spheres.effect import ARRIVED, FULL, GO_ON, STEP
 from rigidimpulse.engine.spheres.impact import simple_impact
 from rigidimpulse.engine.spheres.layout import AT_BOUNDARY, AT_ONCE
 from rigidimpulse.engine.spheres.motion import write_frames
@@ -53,80 +53,80 @@ def _next_number(time, number, step):
 
 
 @jit
-def _rebound(fixed, motion, table, book, rebounds, p, time):
+def _rebound(fixed, motion, table, record, rebounds, p, time):
     """Deal with entry p, a contact, at `time`; returns False where that is not simple."""
     a, b = min(table.first[p], table.second[p]), max(table.first[p], table.second[p])
     for i, j in ((a, b), (b, a)):
         if fixed.dynamic[i] and touches_more(table, i, j, time):
             return False
     plane = table.plane[p] if p < len(table.paths) else _NO_PLANE
-    return simple_impact(fixed, motion, book, rebounds, table.paths, table.planes, a, b, plane, time)
+    return simple_impact(fixed, motion, record, rebounds, table.paths, table.planes, a, b, plane, time)
 
 
 @jit
-def _has_room(book, rebounds):
+def _has_capacity(record, rebounds):
     """Whether one more impact can be kept."""
-    return book.count[0] < len(book.energy) and 2 * rebounds.used[0] < len(rebounds.key)
+    return record.count[0] < len(record.energy) and 2 * rebounds.used[0] < len(rebounds.key)
 
 
 @jit
-def _fly_window(fixed, motion, table, book, rebounds, clock):
+def _fly_interval(fixed, motion, table, record, rebounds, clock):
     """Go through the events of a window; returns how it ends and the clock then."""
     while True:
         time_waiting(fixed.apart, table, clock)
         if table.queue.size[0] == 0:
             break
-        p = table.queue.heap[0]
+        p = table.queue.order[0]
         time, leaves = table.queue.key[p], table.leaves[p]
         if leaves == AT_ONCE:
             return GO_ON, clock
         if leaves == AT_BOUNDARY:
             return STEP, Clock(clock.step, clock.live, time, clock.end, _next_number(time, clock.number, clock.step), True)
-        if not _has_room(book, rebounds):
-            return NO_ROOM, clock
+        if not _has_capacity(record, rebounds):
+            return FULL, clock
         clock = Clock(clock.step, clock.live, time, clock.end, _next_number(time, clock.number, clock.step), False)
-        if not _rebound(fixed, motion, table, book, rebounds, p, time):
+        if not _rebound(fixed, motion, table, record, rebounds, p, time):
             return GO_ON, clock
         a, b = table.first[p], table.second[p]
         for i in (a, b):
             if fixed.dynamic[i]:
-                write_path(motion.course, table.paths, i)
+                write_path(motion.trajectory, table.paths, i)
         for i in (a, b):
             if fixed.dynamic[i] and not renew(fixed.apart, table, i, clock):
-                return NO_ROOM, clock
+                return FULL, clock
     return ARRIVED, Clock(clock.step, clock.live, clock.end, clock.end, _next_number(clock.end, clock.number, clock.step), True)
 
 
 @jit
-def fly(fixed, motion, table, book, rebounds, now, end, at_boundary, window, live, window_end):
+def fly(fixed, motion, table, record, rebounds, now, end, at_boundary, interval, live, interval_end):
     """Carry all bodies from `now` towards `end` [s].
 
-    now, end: s; at_boundary: whether `now` is one; window: steps of the first window; live: see `Clock`; window_end: s, of the window to
+    now, end: s; at_boundary: whether `now` is one; window: steps of the first window; live: see `Clock`; interval_end: s, of the window to
     go on with, which a flight left for want of room for impacts, or a time before `now` to begin a new one.
 
     Returns how the flight ends, the time reached, whether that is a boundary, number of the next one, steps of the next window, and
     the end of the present one.
     """
-    course, how = motion.course, ARRIVED
-    clock = Clock(fixed.step, live, now, window_end, _next_number(now, np.int64(0), fixed.step), at_boundary)
+    trajectory, how = motion.trajectory, ARRIVED
+    clock = Clock(fixed.step, live, now, interval_end, _next_number(now, np.int64(0), fixed.step), at_boundary)
     moving = 0
     for i in range(len(table.paths)):
-        write_path(course, table.paths, i)
-        moving += course.mode[i] != FIXED
-    place_planes(course, table.planes)
+        write_path(trajectory, table.paths, i)
+        moving += trajectory.mode[i] != FIXED
+    place_planes(trajectory, table.planes)
     while how == ARRIVED and clock.now < end:
         first = clock.number
         if clock.end <= clock.now:
-            clock = Clock(fixed.step, live, clock.now, min((first + window - 1) * fixed.step, end), first, clock.at_boundary)
+            clock = Clock(fixed.step, live, clock.now, min((first + interval - 1) * fixed.step, end), first, clock.at_boundary)
             if not fill_table(fixed, table, clock):
-                return NO_ROOM, clock.now, clock.at_boundary, clock.number, window, clock.end
+                return FULL, clock.now, clock.at_boundary, clock.number, interval, clock.end
         pairs = table.count[0] - len(table.paths)
-        how, clock = _fly_window(fixed, motion, table, book, rebounds, clock)
-        write_frames(course, book, _FIRST, len(table.paths), clock.now)
+        how, clock = _fly_interval(fixed, motion, table, record, rebounds, clock)
+        write_frames(trajectory, record, _FIRST, len(table.paths), clock.now)
         if how == ARRIVED and pairs <= FEW * moving:
-            window = min(2 * window, LONGEST)
+            interval = min(2 * interval, LONGEST)
         elif how == ARRIVED and pairs > MANY * moving:
-            window = max(window // 2, 1)
+            interval = max(interval // 2, 1)
         elif (how == STEP or how == GO_ON) and clock.number <= first + 1:
-            window = max(window // 2, 1)
-    return how, clock.now, clock.at_boundary, clock.number, window, clock.end
+            interval = max(interval // 2, 1)
+    return how, clock.now, clock.at_boundary, clock.number, interval, clock.end

@@ -28,7 +28,7 @@ from rigidimpulse.engine.exact.impacts import SLOW
 from rigidimpulse.engine.islands import MARGIN
 from rigidimpulse.engine.pair_events import INSTANT
 from rigidimpulse.engine.spheres.layout import PLANE
-from rigidimpulse.engine.spheres.motion import bring_ball, take_free_course, write_frames
+from rigidimpulse.engine.spheres.motion import begin_free_trajectory, bring_ball, write_frames
 from rigidimpulse.engine.spheres.paths import GAP, KIND, MOVES, RADIUS
 from rigidimpulse.recording.events import write_impacts
 
@@ -107,19 +107,19 @@ def _contact(fixed, motion, contacts, paths, planes, a, b, plane, margin):
 
 
 @jit
-def _slow(fixed, motion, contacts, radius, delta):
+def _slow(fixed, motion, contacts, radius, contact_margin):
     """A speed of approach [m/s] that is surely more than what would be held or counts as none."""
     a, b, n = contacts.body_a[0], contacts.body_b[0], contacts.normal[0]
     press = 0.0
     for k in range(3):
-        press += n[k] * (motion.course.acceleration[a, k] - motion.course.acceleration[b, k])
+        press += n[k] * (motion.trajectory.acceleration[a, k] - motion.trajectory.acceleration[b, k])
     if not (fixed.dynamic[a] and fixed.dynamic[b]):
         for i in (a, b):
             pull = fixed.steady[i]
             press = max(press, sqrt(pull[0] ** 2 + pull[1] ** 2 + pull[2] ** 2))
     scale = speed_scale(motion.now, contacts)
     press = max(press, 0.0) + _ROUND_OFF * scale * scale / radius
-    return _CLEAR * sqrt(2.0 * press * delta) * (1.0 + SLOW) + _CLEAR * _APPROACH * scale
+    return _CLEAR * sqrt(2.0 * press * contact_margin) * (1.0 + SLOW) + _CLEAR * _APPROACH * scale
 
 
 @jit
@@ -133,66 +133,66 @@ def _has_changed(now, i, before):
 
 
 @jit_making_arrays
-def _members(fixed, book, a, b):
+def _members(fixed, record, a, b):
     """The movable ones of two bodies, in order of index."""
     count = 0
     for i in (min(a, b), max(a, b)):
         if fixed.dynamic[i]:
-            book.members[count] = i
+            record.members[count] = i
             count += 1
-    return book.members[:count]
+    return record.members[:count]
 
 
 @jit
-def _comes_back(rebounds, key, time, delta, instant):
+def _comes_back(rebounds, key, time, contact_margin, instant):
     """Whether a pair rebounded so lately, or so often after less than its held gap delta, that the loop counts it."""
     last = place_of(rebounds, key)
     if rebounds.key[last] != key:
         return False
     since = time - rebounds.time[last]
-    return rebounds.count[last] > 0 or since * rebounds.speed[last] < _CLEAR * delta or since <= _CLEAR * instant
+    return rebounds.count[last] > 0 or since * rebounds.speed[last] < _CLEAR * contact_margin or since <= _CLEAR * instant
 
 
 @jit_making_arrays
-def simple_impact(fixed, motion, book, rebounds, paths, planes, a, b, plane, time):
+def simple_impact(fixed, motion, record, rebounds, paths, planes, a, b, plane, time):
     """Let bodies a < b, which come to touch at `time` [s], rebound; returns False, with nothing changed, where that is not simple.
 
     plane: the number of the one that is a plane, or -1.
     """
-    delta, radius = min(paths[a, GAP], paths[b, GAP]), min(paths[a, RADIUS], paths[b, RADIUS])
+    contact_margin, radius = min(paths[a, GAP], paths[b, GAP]), min(paths[a, RADIUS], paths[b, RADIUS])
     key = a * len(paths) + b
-    if _comes_back(rebounds, key, time, delta, INSTANT * fixed.step):
+    if _comes_back(rebounds, key, time, contact_margin, INSTANT * fixed.step):
         return False
     for i in (a, b):
         if fixed.dynamic[i] and paths[i, MOVES] == 0.0:
             return False
         bring_ball(motion, i, time)
-    if not _contact(fixed, motion, book.contacts, paths, planes, a, b, plane, MARGIN * delta):
+    if not _contact(fixed, motion, record.contacts, paths, planes, a, b, plane, MARGIN * contact_margin):
         return False
-    if book.contacts.gap[0] < -0.5 * DEEPEST * radius:
+    if record.contacts.gap[0] < -0.5 * DEEPEST * radius:
         return False
-    now, contacts, u = motion.now, book.contacts, np.empty(3)
-    approach, slow = relative_velocity(now, contacts, _NONE, u), _slow(fixed, motion, contacts, radius, delta)
+    now, contacts, u = motion.now, record.contacts, np.empty(3)
+    approach, slow = relative_velocity(now, contacts, _NONE, u), _slow(fixed, motion, contacts, radius, contact_margin)
     e = contacts.restitution[0]
     if not (-approach > slow and -e * approach > slow):
         return False
-    members = _members(fixed, book, a, b)
+    members = _members(fixed, record, a, b)
     before = np.empty((2, 6))
     for m in range(len(members)):
         before[m, :3], before[m, 3:] = now.velocity[members[m]], now.angular_velocity[members[m]]
     energy = kinetic_of(now.velocity, now.angular_velocity, now.orientation, fixed.mass, fixed.inertia, members)
-    resolve_contact(now, contacts, _NONE, e, fixed.law, book.log, _NONE)
-    if not book.log[0, 6] > slow:
+    resolve_contact(now, contacts, _NONE, e, fixed.law, record.log, _NONE)
+    if not record.log[0, 6] > slow:
         return False
     for m in range(len(members)):
         if not _has_changed(now, members[m], before[m]):
             return False
-    at = book.count[0]
-    write_impacts(time, contacts, now.position, book.log, _ONE, book.rows, at)
-    book.energy[at] = kinetic_of(now.velocity, now.angular_velocity, now.orientation, fixed.mass, fixed.inertia, members) - energy
-    book.count[0] = at + 1
-    remember(rebounds, key, time, book.log[0, 6], _NONE)
+    at = record.count[0]
+    write_impacts(time, contacts, now.position, record.log, _ONE, record.rows, at)
+    record.energy[at] = kinetic_of(now.velocity, now.angular_velocity, now.orientation, fixed.mass, fixed.inertia, members) - energy
+    record.count[0] = at + 1
+    remember(rebounds, key, time, record.log[0, 6], _NONE)
     for i in members:
-        write_frames(motion.course, book, i, i + 1, time)
-        take_free_course(motion, i, time, fixed.steady[i])
+        write_frames(motion.trajectory, record, i, i + 1, time)
+        begin_free_trajectory(motion, i, time, fixed.steady[i])
     return True

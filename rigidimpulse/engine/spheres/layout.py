@@ -9,7 +9,7 @@ import numpy as np
 from rigidimpulse.dynamics.impact.point import BodyState, Contacts
 from rigidimpulse.engine.spheres.queue import Queue
 from rigidimpulse.engine.spheres.tree import BoxTree
-from rigidimpulse.motion.trajectory import Course
+from rigidimpulse.motion.trajectory import Trajectories
 
 BALL, PLANE, OTHER = (np.int64(kind) for kind in range(3))
 """Kinds of bodies: one sphere about its centre of mass, with equal moments of inertia; one half space that stands; anything else."""
@@ -34,7 +34,7 @@ class Fixed(NamedTuple):
 class Motion(NamedTuple):
     """Paths, and bodies at the instant being worked on."""
 
-    course: Course
+    trajectory: Trajectories
     now: BodyState
     rotation: np.ndarray  # (n, 3, 3)
 
@@ -63,7 +63,7 @@ class Table(NamedTuple):
 CONTACT, AT_BOUNDARY, AT_ONCE = (np.int8(kind) for kind in range(3))
 
 
-class Book(NamedTuple):
+class SphereRecord(NamedTuple):
     """What is kept of the run: frames (f, n, ...), impacts; and buffers of one contact."""
 
     times: np.ndarray  # (f,) s

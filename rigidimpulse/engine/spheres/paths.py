@@ -32,20 +32,21 @@ _CURVED = 1e-9
 
 
 @jit
-def write_path(course, paths, i):
+def write_path(trajectory, paths, i):
     """Write the row of body i from its course, but for its constants."""
     row = paths[i]
-    row[START], row[MOVES] = course.start[i], course.mode[i] != FIXED
+    row[START], row[MOVES] = trajectory.start[i], trajectory.mode[i] != FIXED
     for k in range(3):
-        row[PLACE + k], row[VELOCITY + k], row[PULL + k] = course.position[i, k], course.velocity[i, k], course.acceleration[i, k]
+        row[PLACE + k], row[VELOCITY + k] = trajectory.position[i, k], trajectory.velocity[i, k]
+        row[PULL + k] = trajectory.acceleration[i, k]
 
 
 @jit
-def place_planes(course, planes):
+def place_planes(trajectory, planes):
     """Write normals and levels of the planes in the world."""
     for p in range(len(planes)):
         row, i = planes[p], np.int64(planes[p, BODY])
-        q, x = course.orientation[i], course.position[i]
+        q, x = trajectory.orientation[i], trajectory.position[i]
         n = rotated(q[0], q[1], q[2], q[3], row[0], row[1], row[2])
         row[NORMAL], row[NORMAL + 1], row[NORMAL + 2] = n
         row[HEIGHT] = row[LEVEL] + n[0] * x[0] + n[1] * x[1] + n[2] * x[2]
@@ -130,15 +131,15 @@ def is_passing(paths, planes, i, other, plane, time, gap, live):
     That is so where they are farther apart than contacts in action, live (relative to the held gap), and approach or part faster than
     what would be held: twice sqrt(2 a delta), with more than all accelerations that may press them.
     """
-    delta = min(paths[i, GAP], paths[other, GAP])
-    if paths[i, KIND] == OTHER or paths[other, KIND] == OTHER or not gap > live * delta:
+    contact_margin = min(paths[i, GAP], paths[other, GAP])
+    if paths[i, KIND] == OTHER or paths[other, KIND] == OTHER or not gap > live * contact_margin:
         return False
     a, b = min(i, other), max(i, other)
     x, v, _ = _relative(paths, a, b, time)
     n = _three(planes, plane, NORMAL) if plane >= 0 else scaled(x, 1.0 / length(x))
     speed, fast = abs(dot(n, v)), length(v)
     pull = length(_three(paths, i, PULL)) + length(_three(paths, other, PULL)) + _CURVED * fast * fast / paths[i, RADIUS]
-    return speed > 2.0 * sqrt(2.0 * pull * delta) + _CURVED * fast
+    return speed > 2.0 * sqrt(2.0 * pull * contact_margin) + _CURVED * fast
 
 
 @jit

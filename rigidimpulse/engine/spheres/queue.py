@@ -1,7 +1,7 @@
-"""The events to come, earliest first: a binary heap that knows where each entry stands, so that its time may change.
+"""The events to come, earliest first: a priority queue that knows where each entry stands, so that its time may change.
 
 Entries are numbered; entry p has the time key[p], and at equal times the lower owner[p] comes first. An entry whose time
-is inf is not in the heap. heap (k,) holds the entries, place (k,) where each stands, -1 outside; size (1,) how many.
+is inf is not in the queue. order (k,) holds the entries, place (k,) where each stands, -1 outside; size (1,) how many.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ class Queue(NamedTuple):
 
     key: np.ndarray  # (k,) s
     owner: np.ndarray  # (k,) int64
-    heap: np.ndarray  # (k,) int64
+    order: np.ndarray  # (k,) int64
     place: np.ndarray  # (k,) int64
     size: np.ndarray  # (1,) int64
 
 
 def make_queue(capacity: int) -> Queue:
     """Make an empty queue for entries 0 ... capacity - 1."""
-    owner, heap = np.zeros((2, capacity), np.int64)
-    return Queue(np.full(capacity, np.inf), owner, heap, np.full(capacity, -1, np.int64), np.zeros(1, np.int64))
+    owner, order = np.zeros((2, capacity), np.int64)
+    return Queue(np.full(capacity, np.inf), owner, order, np.full(capacity, -1, np.int64), np.zeros(1, np.int64))
 
 
 @jit
@@ -38,7 +38,7 @@ def _before(queue, p, q):
 
 @jit
 def _put(queue, at, p):
-    queue.heap[at] = p
+    queue.order[at] = p
     queue.place[p] = at
 
 
@@ -47,19 +47,19 @@ def _sift(queue, at, p):
     """Bring entry p from `at` to where it belongs."""
     while at > 0:
         parent = (at - 1) // 2
-        if not _before(queue, p, queue.heap[parent]):
+        if not _before(queue, p, queue.order[parent]):
             break
-        _put(queue, at, queue.heap[parent])
+        _put(queue, at, queue.order[parent])
         at = parent
     while True:
         child = 2 * at + 1
         if child >= queue.size[0]:
             break
-        if child + 1 < queue.size[0] and _before(queue, queue.heap[child + 1], queue.heap[child]):
+        if child + 1 < queue.size[0] and _before(queue, queue.order[child + 1], queue.order[child]):
             child += 1
-        if not _before(queue, queue.heap[child], p):
+        if not _before(queue, queue.order[child], p):
             break
-        _put(queue, at, queue.heap[child])
+        _put(queue, at, queue.order[child])
         at = child
     _put(queue, at, p)
 
@@ -68,7 +68,7 @@ def _sift(queue, at, p):
 def clear(queue):
     """Take all entries out."""
     for at in range(queue.size[0]):
-        queue.place[queue.heap[at]] = -1
+        queue.place[queue.order[at]] = -1
     queue.size[0] = 0
 
 
@@ -86,4 +86,4 @@ def schedule(queue, p, time, owner):
         queue.size[0] -= 1
         queue.place[p] = -1
         if at < queue.size[0]:
-            _sift(queue, at, queue.heap[queue.size[0]])
+            _sift(queue, at, queue.order[queue.size[0]])

@@ -7,20 +7,20 @@ import numpy as np
 from rigidimpulse.dynamics.impact.restitution import LAWS
 from rigidimpulse.engine.islands import empty_contacts
 from rigidimpulse.engine.pair_table import NEAR, ROUND_OFF
-from rigidimpulse.engine.spheres.effect import NO_ROOM, STEP, kinds
+from rigidimpulse.engine.spheres.effect import FULL, STEP, kinds
 from rigidimpulse.engine.spheres.flight import fly
 from rigidimpulse.engine.spheres.impact import copy_rebounds, remember
-from rigidimpulse.engine.spheres.layout import PLANE, Book, Fixed, Motion, Rebounds, Table, make_rebounds
+from rigidimpulse.engine.spheres.layout import PLANE, Fixed, Motion, Rebounds, SphereRecord, Table, make_rebounds
 from rigidimpulse.engine.spheres.paths import BODY, DYNAMIC, GAP, KIND, LEVEL, PATH_SIZE, PLANE_SIZE, RADIUS
 from rigidimpulse.engine.spheres.queue import make_queue
 from rigidimpulse.engine.spheres.tree import make_tree
 from rigidimpulse.recording.events import ROW_LENGTH
 
-ROOM = 256
+CAPACITY = 256
 """Impacts, pairs and rebounds that there is room for at first; doubled where it does not do."""
 MOST_ROWS = 2**14
 """Impacts at most that are handed over at once."""
-FIRST_WINDOW = 16
+FIRST_INTERVAL = 16
 """Steps in the first window."""
 LIVE = 2.0
 """How much farther away contacts are left to the loop in Python than it takes them for touching."""
@@ -34,19 +34,19 @@ class EventRun:
     def __init__(self, context) -> None:
         """context: of the run, with the first courses."""
         world = context.world
-        self._context, self._pause, self._waits, self._window = context, 0, 0, FIRST_WINDOW
+        self._context, self._pause, self._waits, self._interval = context, 0, 0, FIRST_INTERVAL
         self._fixed = Fixed(
             world.dynamic, world.steady_acceleration, world.mass, world.inertia, world.material_of_body, world.coefficients,
             world.apart, world.static_min, world.static_max, LAWS[world.accuracy.restitution], world.accuracy.step,
         )  # fmt: skip
         self._paths, self._planes = _constants(world)
         state = context.state
-        self._motion = Motion(state.course, state.now, state.rotation)
-        self._pairs, self._rows = ROOM + world.num_bodies, ROOM
-        self._table, self._book = self._make_table(), self._make_book()
-        self._rebounds, self._known = make_rebounds(2 * ROOM), 0
+        self._motion = Motion(state.trajectory, state.now, state.rotation)
+        self._pairs, self._rows = CAPACITY + world.num_bodies, CAPACITY
+        self._table, self._book = self._make_table(), self._make_record()
+        self._rebounds, self._known = make_rebounds(2 * CAPACITY), 0
         self._step_begin = 0.0
-        gap = world.contact_gap
+        gap = world.contact_margin
         self._live = LIVE * (NEAR + ROUND_OFF + 2.0 * world.accuracy.tolerance / gap)
 
     def _make_table(self) -> Table:
@@ -60,9 +60,9 @@ class EventRun:
             np.zeros(2 * capacity, np.int64), np.zeros(3, np.int64),
         )  # fmt: skip
 
-    def _make_book(self) -> Book:
+    def _make_record(self) -> SphereRecord:
         recorder = self._context.recorder
-        return Book(
+        return SphereRecord(
             recorder.times, recorder.written, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
             np.empty((self._rows, ROW_LENGTH)), np.empty(self._rows), np.zeros(1, np.int64), empty_contacts(1),
             np.empty((1, 7)), np.empty(2, np.int64),
@@ -72,8 +72,8 @@ class EventRun:
         """Whether to try the kernel now: not where contacts last, and not at once again where it did not get on."""
         waits, self._waits = self._waits > 0, max(self._waits - 1, 0)
         context = self._context
-        calm = context.heaps is None or context.heaps.is_idle()
-        return not waits and calm and not context.state.under_contact.any() and context.nets is None
+        calm = context.substepped is None or context.substepped.is_idle()
+        return not waits and calm and not context.state.under_contact.any() and context.soft_bodies is None
 
     def fly(self, end: float, at_boundary: bool = True) -> tuple[int, float, float]:
         """Carry the scene from a boundary of steps, or from the middle of one, towards `end` [s] as far as what happens is simple.
@@ -85,15 +85,15 @@ class EventRun:
         begin = now = context.state.time
         if at_boundary:
             self._step_begin = begin
-        how, number, window_end = NO_ROOM, 0, -1.0
-        while how == NO_ROOM:
-            how, now, at_boundary, number, self._window, window_end = fly(
-                self._fixed, self._motion, self._table, self._book, self._rebounds, now, end, at_boundary, self._window,
-                self._live, window_end,
+        how, number, interval_end = FULL, 0, -1.0
+        while how == FULL:
+            how, now, at_boundary, number, self._interval, interval_end = fly(
+                self._fixed, self._motion, self._table, self._book, self._rebounds, now, end, at_boundary, self._interval,
+                self._live, interval_end,
             )
             self._keep_impacts()
-            if how == NO_ROOM and self._make_room():
-                window_end = -1.0
+            if how == FULL and self._grow():
+                interval_end = -1.0
         context.state.time = now
         if how == STEP:
             self._pause = 0 if now > begin else min(2 * self._pause + 1, LONGEST_PAUSE)
@@ -128,7 +128,7 @@ class EventRun:
         context.state.rebounds.update((pair, (t, speed, 0)) for pair, t, speed in zip(pairs, times, speeds, strict=True))
         self._book.count[0] = 0
 
-    def _make_room(self) -> bool:
+    def _grow(self) -> bool:
         """Make the table that is full larger; returns whether that is the one of events, which then has to be filled again."""
         if 2 * self._rebounds.used[0] >= len(self._rebounds.key):
             self._grow_rebounds()
@@ -138,7 +138,7 @@ class EventRun:
             return True
         else:
             self._rows = min(2 * self._rows, MOST_ROWS)
-            self._book = self._make_book()
+            self._book = self._make_record()
         return False
 
     def _grow_rebounds(self) -> None:
@@ -151,7 +151,7 @@ def _constants(world) -> tuple[np.ndarray, np.ndarray]:
     """Rows of paths (n, PATH_SIZE) and planes (q, PLANE_SIZE) with what never changes."""
     kind = kinds(world)
     paths, which = np.zeros((world.num_bodies, PATH_SIZE)), np.flatnonzero(kind == PLANE)
-    paths[:, RADIUS], paths[:, GAP] = world.bound_radius, world.contact_gap * world.size
+    paths[:, RADIUS], paths[:, GAP] = world.bound_radius, world.contact_margin * world.size
     paths[:, KIND], paths[:, DYNAMIC] = kind, world.dynamic
     planes = np.zeros((len(which), PLANE_SIZE))
     planes[:, : LEVEL + 1] = world.geometry.frame[world.geometry.shape_first[world.shape_of_body[which]], : LEVEL + 1]

@@ -15,16 +15,36 @@ from functools import cached_property
 
 import numpy as np
 
-from rigidimpulse.dynamics.constraints.energy_limit import note_arrival
+from rigidimpulse.dynamics.constraints.energy_limit import note_end_energy
 from rigidimpulse.dynamics.energy import mechanical_energy
-from rigidimpulse.engine.exact.trajectories import book_contact_work
-from rigidimpulse.engine.islands import Group, empty_contacts
-from rigidimpulse.engine.regime import FAST, FEW, SPIN, TALL, TOIL, islands, jointed, lively, only_dear, refusals, support_levels
-from rigidimpulse.engine.substepped.contact_forces import HeapStepper, Outcome
-from rigidimpulse.engine.substepped.trajectories import arrive, count_calm, depart, let_fly, mark_slow, most_stray, stirred
+from rigidimpulse.engine.exact.trajectories import account_contact_work
+from rigidimpulse.engine.islands import Island, empty_contacts
+from rigidimpulse.engine.regime import (
+    EXPENSIVE_SOLVES,
+    FAST,
+    FEW,
+    SPIN,
+    TALL,
+    island_roots,
+    jointed,
+    lively,
+    only_expensive,
+    refusals,
+    support_levels,
+)
+from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Outcome
+from rigidimpulse.engine.substepped.trajectories import (
+    advance_sleep_timers,
+    depart,
+    end_trajectories,
+    let_fly,
+    mark_slow,
+    most_stray,
+    wake_by_contact,
+)
 from rigidimpulse.engine.touching import bring_all
 from rigidimpulse.engine.warm_up import prepare_kernels
-from rigidimpulse.motion.trajectory import FIXED, STEPPED
+from rigidimpulse.motion.trajectory import FIXED, LINEAR
 
 REST = 3.0
 """For how long members must have hardly moved to be calm, in sqrt(r / g), see `heap_courses`."""
@@ -33,12 +53,12 @@ LEAVING = 0.1
 MOST_PIECES = 4
 """Parts of what is stepped at once, between which a heap's courses begin anew."""
 STRAY = 10.0
-"""Skins by which courses may stray from the ways of turning bodies, over `Accuracy.heap_motion`: a skin by default."""
+"""Skins by which courses may stray from the ways of turning bodies, over `Accuracy.substep_motion`: a skin by default."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the heap that comes near it."""
 
 
-class Heaps:
+class SubsteppedIslands:
     """The heaps of a run.
 
     Attributes:
@@ -51,15 +71,15 @@ class Heaps:
 
     def __init__(self, world) -> None:
         """No heaps yet."""
-        self._world, self._only_dear, self._movable = world, only_dear(world), world.dynamic.copy()
+        self._world, self._only_expensive, self._movable = world, only_expensive(world), world.dynamic.copy()
         self.label = np.full(world.num_bodies, -1, np.int64)
-        self.calm = np.zeros(world.num_bodies)
+        self.sleep_timer = np.zeros(world.num_bodies)
         self.asleep = np.zeros(world.num_bodies, bool)
         self._stood = np.full((world.num_bodies, 7), np.inf)
         self._taken = np.zeros(world.num_bodies, bool)
         self._auto = world.accuracy.contact_solver == "auto"
         self._jointed = jointed(world)
-        self.toil, self._step_end = np.zeros(world.num_bodies), 0.0
+        self.solve_count, self._step_end = np.zeros(world.num_bodies), 0.0
         self._ends: dict[int, float] = {}
         self._began: dict[int, tuple[float, np.ndarray, float]] = {}
         self._outcome: Outcome | None = None
@@ -68,49 +88,49 @@ class Heaps:
         self._refused: dict[str, int] = {}
 
     @cached_property
-    def stepper(self) -> HeapStepper:
+    def stepper(self) -> ContactStepper:
         """The solver and its contacts; its kernels are compiled here where they were not needed at the start."""
-        prepare_kernels(self._world, with_events=False, with_heaps=True)
-        return HeapStepper(self._world, self._movable, self._only_dear)
+        prepare_kernels(self._world, with_events=False, with_substepped=True)
+        return ContactStepper(self._world, self._movable, self._only_expensive)
 
     def is_idle(self) -> bool:
         """Whether no heap is there and none may begin."""
-        return self._only_dear and self.toil.sum() <= FEW * TOIL and bool(np.all(self.label < 0))
+        return self._only_expensive and self.solve_count.sum() <= FEW * EXPENSIVE_SOLVES and bool(np.all(self.label < 0))
 
     def summary(self) -> str:
         """What became of heaps in the run."""
         refused = ", ".join(f"{reason} ({count})" for reason, count in sorted(self._refused.items()))
-        text = f"{self._steps} steps of heaps, largest {self._most} bodies" if self._steps else "no heaps"
+        text = f"{self._steps} steps, largest {self._most} bodies" if self._steps else "none"
         return f"{text}; left to newton, islands times steps: {refused}" if refused else text
 
-    def gather(self, context, window) -> None:
+    def gather(self, context, pair_events) -> None:
         """Choose the heaps of the step: `window.inside` marks their bodies, `window.still` those at rest."""
-        idle, toil = self.is_idle(), self.toil
-        if window.end > self._step_end:
-            self.toil, self._step_end = np.zeros_like(toil), window.end
+        idle, solve_count = self.is_idle(), self.solve_count
+        if pair_events.end > self._step_end:
+            self.solve_count, self._step_end = np.zeros_like(solve_count), pair_events.end
         if idle:
             return
-        world, course, time = context.world, context.state.course, window.begin
-        ended = course.mode == STEPPED
-        self._end_courses(context, np.flatnonzero(ended), time)
-        chosen = self._choose(context, window, ended, toil) if window.end > time else np.zeros_like(ended)
-        left = np.flatnonzero(ended & ~chosen & (course.mode == STEPPED))
-        let_fly(course, left, world.steady_acceleration)
-        self.calm[left] = 0.0
+        world, trajectory, time = context.world, context.state.trajectory, pair_events.begin
+        ended = trajectory.mode == LINEAR
+        self._end_trajectories(context, np.flatnonzero(ended), time)
+        chosen = self._choose(context, pair_events, ended, solve_count) if pair_events.end > time else np.zeros_like(ended)
+        left = np.flatnonzero(ended & ~chosen & (trajectory.mode == LINEAR))
+        let_fly(trajectory, left, world.steady_acceleration)
+        self.sleep_timer[left] = 0.0
         self._taken &= chosen
         self.asleep &= chosen
-        window.inside |= chosen
-        window.still |= (self.label >= 0) & (course.mode == FIXED)
+        pair_events.inside |= chosen
+        pair_events.asleep |= (self.label >= 0) & (trajectory.mode == FIXED)
 
-    def _choose(self, context, window, brought: np.ndarray, toil: np.ndarray) -> np.ndarray:
+    def _choose(self, context, pair_events, brought: np.ndarray, solve_count: np.ndarray) -> np.ndarray:
         """Which bodies (n,) bool are stepped; those `brought` are at the begin of the window already."""
-        world, course, time = context.world, context.state.course, window.begin
-        member = world.dynamic & ((course.mode != FIXED) | self.asleep)
+        world, trajectory, time = context.world, context.state.trajectory, pair_events.begin
+        member = world.dynamic & ((trajectory.mode != FIXED) | self.asleep)
         if not member.any():
             return member
-        ahead = window.end - time
+        ahead = pair_events.end - time
         bring_all(
-            course, np.flatnonzero(~(brought | self.asleep)), time, context.state.now, context.state.rotation, context.acceleration,
+            trajectory, np.flatnonzero(~(brought | self.asleep)), time, context.state.now, context.state.rotation, context.acceleration,
             context.angular_acceleration,
         )  # fmt: skip
         context.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
@@ -119,12 +139,12 @@ class Heaps:
         while len(woken := self._touched(context, member, a, b)):
             member[woken] = True
             a, b, touch = self._near(context, member, ahead)
-        root = islands(world.num_bodies, a, b, member)
+        root = island_roots(world.num_bodies, a, b, member)
         root[~member] = -1
         moves = lively(context.state.now, world.steady_strength, self.stepper.inner)
-        refused = refusals(world, root, self.label >= 0, self._jointed, moves, toil, a, b, self._auto)
+        refused = refusals(world, root, self.label >= 0, self._jointed, moves, solve_count, a, b, self._auto)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
-        chosen = self._low(context, window, chosen, root, refused)
+        chosen = self._low(context, pair_events, chosen, root, refused)
         for reason in refused.values():
             self._refused[reason] = self._refused.get(reason, 0) + 1
         self.label[member & ~chosen] = -1
@@ -138,14 +158,14 @@ class Heaps:
 
     def _near(self, context, member: np.ndarray, ahead: float) -> np.ndarray:
         # Movable bodies under way that are no members are swept.
-        other = ~member & ~(context.world.dynamic & (context.state.course.mode != FIXED))
+        other = ~member & ~(context.world.dynamic & (context.state.trajectory.mode != FIXED))
         self.stepper.find_pairs(context, np.flatnonzero(member), np.flatnonzero(other), ahead)
         return self.stepper.near(context, member, other, ahead)
 
     def _touched(self, context, member: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Bodies at rest that members touch, and all of the heaps they belong to."""
         world = context.world
-        resting = world.dynamic & ~member & (context.state.course.mode == FIXED)
+        resting = world.dynamic & ~member & (context.state.trajectory.mode == FIXED)
         which = np.flatnonzero(resting[a] | resting[b])
         if not len(which):
             return which
@@ -159,7 +179,7 @@ class Heaps:
         mates = np.flatnonzero(resting & np.isin(self.label, labels[labels >= 0]))
         return np.union1d(touched, mates)
 
-    def _low(self, context, window, chosen: np.ndarray, root: np.ndarray, refused: dict[int, str]) -> np.ndarray:
+    def _low(self, context, pair_events, chosen: np.ndarray, root: np.ndarray, refused: dict[int, str]) -> np.ndarray:
         """Leave out islands that begin as tall columns."""
         begins = chosen & (self.label < 0)
         if not self._auto or not begins.any():
@@ -167,7 +187,7 @@ class Heaps:
         begins &= ~np.isin(root, np.unique(root[chosen & ~begins]))
         if not begins.any():
             return chosen
-        self._set_up(context, np.flatnonzero(begins), window.begin, window.end - window.begin, 0.0)
+        self._set_up(context, np.flatnonzero(begins), pair_events.begin, pair_events.end - pair_events.begin, 0.0)
         stepper = self.stepper
         level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
         tall = np.unique(root[stepper.order[level[: len(root)] == TALL + 1]])
@@ -177,7 +197,7 @@ class Heaps:
 
     def _settle(self, context, chosen, root, a: np.ndarray, b: np.ndarray, touch: np.ndarray, time: float) -> None:
         """Label the heaps; let those that have been calm for long stand still, and members that are far from restless ones."""
-        world, course = context.world, context.state.course
+        world, trajectory = context.world, context.state.trajectory
         inner = self.stepper.inner
         carried = world.moving[a] | world.moving[b]
         moving = np.unique(root[np.where(world.moving[a], b, a)[carried]])
@@ -187,38 +207,39 @@ class Heaps:
             self.label[members] = r
             strength = float(world.steady_strength[members].max())
             if strength > 0.0 and r not in moving:
-                restless[members] = self.calm[members] < REST * np.sqrt(inner[members] / strength)
+                restless[members] = self.sleep_timer[members] < REST * np.sqrt(inner[members] / strength)
         if np.array_equal(restless, chosen):
             self.asleep[:] = False
             return
-        still = chosen & ~stirred(a[touch], b[touch], chosen, restless, context.state.now, world.mass, world.steady_strength, inner)
-        self._stand_still(context, np.flatnonzero(still & (course.mode != FIXED)), time)
+        now, strength = context.state.now, world.steady_strength
+        asleep = chosen & ~wake_by_contact(a[touch], b[touch], chosen, restless, now, world.mass, strength, inner)
+        self._put_to_sleep(context, np.flatnonzero(asleep & (trajectory.mode != FIXED)), time)
         alive = np.zeros(len(root), bool)
         alive[root[restless]] = True
         chosen &= alive[root]
-        self.asleep = still & chosen
+        self.asleep = asleep & chosen
 
-    def _stand_still(self, context, members: np.ndarray, time: float) -> None:
+    def _put_to_sleep(self, context, members: np.ndarray, time: float) -> None:
         """Let members stay where they are."""
-        world, course, now = context.world, context.state.course, context.state.now
+        world, trajectory, now = context.world, context.state.trajectory, context.state.now
         if not len(members):
             return
         before = mechanical_energy(now, world, members)
-        context.recorder.flush_all(course, members, time)
+        context.recorder.flush_all(trajectory, members, time)
         now.velocity[members] = now.angular_velocity[members] = 0.0
-        course.mode[members], course.start[members] = FIXED, time
-        course.velocity[members] = course.angular_velocity[members] = 0.0
+        trajectory.mode[members], trajectory.start[members] = FIXED, time
+        trajectory.velocity[members] = trajectory.angular_velocity[members] = 0.0
         self.stepper.report_crossed(context, members, time)
-        context.log.book(time, "heap", mechanical_energy(now, world, members) - before)
+        context.log.account(time, "sub-stepping", mechanical_energy(now, world, members) - before)
 
-    def _end_courses(self, context, members: np.ndarray, time: float) -> None:
+    def _end_trajectories(self, context, members: np.ndarray, time: float) -> None:
         """Bring members to `time`, the end of their courses; book what the step took of their energy."""
         if not len(members):
             return
         state, world = context.state, context.world
-        context.recorder.flush_all(state.course, members, time)
-        arrive(
-            state.course, members, time, world.steady_acceleration, state.now, state.rotation, context.acceleration,
+        context.recorder.flush_all(state.trajectory, members, time)
+        end_trajectories(
+            state.trajectory, members, time, world.steady_acceleration, state.now, state.rotation, context.acceleration,
             context.angular_acceleration,
         )  # fmt: skip
         for label in np.unique(self.label[members]).tolist():
@@ -228,85 +249,85 @@ class Heaps:
         if label in self._began:
             start, members, energy = self._began.pop(label)
             change = mechanical_energy(context.state.now, context.world, members) - energy
-            context.log.book_over(start, time, "heap", change)
+            context.log.account_over(start, time, "sub-stepping", change)
 
     def close(self, context, time: float) -> None:
         """Book what the steps under way take until `time`, the end of the run."""
-        members = np.flatnonzero(context.state.course.mode == STEPPED)
+        members = np.flatnonzero(context.state.trajectory.mode == LINEAR)
         if not len(members):
             return
-        self._end_courses(context, members, time)
+        self._end_trajectories(context, members, time)
         self.stepper.report_crossed(context, members, time)
-        let_fly(context.state.course, members, context.world.steady_acceleration)
+        let_fly(context.state.trajectory, members, context.world.steady_acceleration)
 
-    def join(self, context, window, time: float, groups: list[Group]) -> list[Group]:
+    def join(self, context, pair_events, time: float, islands: list[Island]) -> list[Island]:
         """The groups at `time` with the heaps that they touch; at the start of a step all of its heaps."""
-        for group in groups:
-            self.toil[group.members] += 1.0
-        if window.end <= window.begin:  # the end of the run: there is no time to step a heap over
-            return [group for group in groups if np.all(self.label[group.members] < 0)]
-        first = not window.heaps_begun
-        window.heaps_begun = True
-        hit = [group for group in groups if np.any(self.label[group.members] >= 0)]
-        members = np.flatnonzero(window.inside) if first else self._due(window, time)
+        for island in islands:
+            self.solve_count[island.members] += 1.0
+        if pair_events.end <= pair_events.begin:  # the end of the run: there is no time to step a heap over
+            return [island for island in islands if np.all(self.label[island.members] < 0)]
+        first = not pair_events.substepped_begun
+        pair_events.substepped_begun = True
+        hit = [island for island in islands if np.any(self.label[island.members] >= 0)]
+        members = np.flatnonzero(pair_events.inside) if first else self._due(pair_events, time)
         if len(members) and not hit:
-            bare = _bare_group(time)
+            bare = _bare_island(time)
             self._bring_in(context, bare, members)
-            return [*groups, bare]
-        for group in hit:
-            labels = self.label[group.members]
+            return [*islands, bare]
+        for island in hit:
+            labels = self.label[island.members]
             members = np.union1d(members, np.flatnonzero(np.isin(self.label, labels[labels >= 0])))
-            self._bring_in(context, group, members)
-        return groups
+            self._bring_in(context, island, members)
+        return islands
 
-    def _due(self, window, time: float) -> np.ndarray:
+    def _due(self, pair_events, time: float) -> np.ndarray:
         """Members of heaps whose courses end at `time`."""
         due = [label for label, end in self._ends.items() if end <= time]
-        return np.flatnonzero(window.inside & np.isin(self.label, due)) if due else np.zeros(0, np.int64)
+        return np.flatnonzero(pair_events.inside & np.isin(self.label, due)) if due else np.zeros(0, np.int64)
 
-    def _bring_in(self, context, group: Group, members: np.ndarray) -> None:
+    def _bring_in(self, context, island: Island, members: np.ndarray) -> None:
         """Let the members be the heap of a group; bring them to its time. (Those that it does not touch are no members of the group.)"""
-        state, time = context.state, group.time
-        stepped = state.course.mode[members] == STEPPED
-        self._end_courses(context, members[stepped & (state.course.start[members] < time)], time)
-        away = np.setdiff1d(members[~(stepped | self.asleep[members])], group.members)
-        bring_all(state.course, away, time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
+        state, time = context.state, island.time
+        stepped = state.trajectory.mode[members] == LINEAR
+        self._end_trajectories(context, members[stepped & (state.trajectory.start[members] < time)], time)
+        away = np.setdiff1d(members[~(stepped | self.asleep[members])], island.members)
+        bring_all(state.trajectory, away, time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
         context.acceleration[away] = context.world.steady_acceleration[away]
-        group.heap = members
+        island.substepped = members
 
-    def step(self, context, window, group: Group) -> None:
+    def step(self, context, pair_events, island: Island) -> None:
         """Step the heap of a group from its time to the end of the window, with what touches it and is slow."""
-        world, members = context.world, group.heap
+        world, members = context.world, island.substepped
         assert members is not None
-        if len(group.members):
+        if len(island.members):
             stays = np.zeros(world.num_bodies, bool)
-            stays[group.members] = True
+            stays[island.members] = True
             self._leave_out_fast(context, stays)
-            stays[group.members] |= ~self._leaves(context, group)
-            near = group.members[stays[group.members] & ~self._jointed[group.members]]
+            stays[island.members] |= ~self._leaves(context, island)
+            near = island.members[stays[island.members] & ~self._jointed[island.members]]
             self.label[np.setdiff1d(near, members)] = self.label[members].max()
-            group.heap = members = np.union1d(members, near)
-            window.inside[members] = True
-            context.wrench[group.members] = 0.0
+            island.substepped = members = np.union1d(members, near)
+            pair_events.inside[members] = True
+            context.wrench[island.members] = 0.0
             self.asleep[members] = False
-            self.calm[group.members] = 0.0
+            self.sleep_timer[island.members] = 0.0
         fresh = members[~self._taken[members]]
-        self._take_in(context, fresh, group.time)
+        self._take_in(context, fresh, island.time)
         self._steps += 1
         self._most = max(self._most, len(members))
         members = members[~self.asleep[members]]
-        end = self._end_of(context, window, group.time, members)
-        self._set_up(context, members, group.time, end - group.time, self.stepper.kept if group.time > window.begin else 0.0)
+        end = self._end_of(context, pair_events, island.time, members)
+        self._set_up(context, members, island.time, end - island.time, self.stepper.kept if island.time > pair_events.begin else 0.0)
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
             self._ends[label] = end
-            self._began[label] = group.time, mine, mechanical_energy(context.state.now, world, mine)
+            self._began[label] = island.time, mine, mechanical_energy(context.state.now, world, mine)
         if len(fresh):
             self.stepper.move_apart(context, fresh)
-        self._outcome = self.stepper.step(context, group.time, end)
+        self._outcome = self.stepper.step(context, island.time, end)
         self._outcome_end = end
-        if end < window.end:
-            window.wake[members] = end
+        if end < pair_events.end:
+            pair_events.wake[members] = end
 
     def _take_in(self, context, fresh: np.ndarray, time: float) -> None:
         """What exact contact did to bodies ends where they come to a heap."""
@@ -314,27 +335,27 @@ class Heaps:
         context.wrench[fresh] = 0.0
         context.contact_log.close(fresh.tolist(), time)
         for i in fresh[context.state.under_contact[fresh]].tolist():
-            note_arrival(context, [i])
-            book_contact_work(context, i, time)
+            note_end_energy(context, [i])
+            account_contact_work(context, i, time)
             context.state.under_contact[i] = False
 
-    def _end_of(self, context, window, time: float, members: np.ndarray) -> float:
+    def _end_of(self, context, pair_events, time: float, members: np.ndarray) -> float:
         """When the courses of members end: before the step does where bodies are tiny, spin fast, or stray from their straight ways."""
         stepper = self.stepper
-        step, allowed, pressed = stepper.step_length, STRAY * stepper.motion, stepper.pressed | self._only_dear
+        step, allowed, pressed = stepper.step_length, STRAY * stepper.motion, stepper.pressed | self._only_expensive
         stray = most_stray(context.state.now, members, pressed, stepper.reach, stepper.skin, allowed)
         spans = max(math.ceil(step / stepper.span(members) - 1e-9), 1)
         pieces = max(min(math.ceil(stray * step), MOST_PIECES * spans), spans)
-        left = max(math.ceil((window.end - time) * pieces / step - 1e-6), 1)
-        return window.end if left == 1 else time + (window.end - time) / left
+        left = max(math.ceil((pair_events.end - time) * pieces / step - 1e-6), 1)
+        return pair_events.end if left == 1 else time + (pair_events.end - time) / left
 
-    def _leaves(self, context, group: Group) -> np.ndarray:
+    def _leaves(self, context, island: Island) -> np.ndarray:
         """Which members (k,) bool leave all that they touch at a speed worth the name."""
         slowest = np.full(context.world.num_bodies, np.inf)
-        np.minimum.at(slowest, group.contacts.body_a, group.approach)
-        np.minimum.at(slowest, group.contacts.body_b, group.approach)
-        speed = np.linalg.norm(context.state.now.velocity[group.members], axis=1)
-        return slowest[group.members] > LEAVING * speed
+        np.minimum.at(slowest, island.contacts.body_a, island.approach)
+        np.minimum.at(slowest, island.contacts.body_b, island.approach)
+        speed = np.linalg.norm(context.state.now.velocity[island.members], axis=1)
+        return slowest[island.members] > LEAVING * speed
 
     def _set_up(self, context, members: np.ndarray, time: float, ahead: float, kept: float) -> None:
         """Put members, in their order, and the bodies near them that stand still before the solver; kept: see `review`."""
@@ -345,36 +366,36 @@ class Heaps:
         fixed = np.flatnonzero(~world.dynamic | self.asleep)
         moving = fixed[world.moving[fixed]]
         bring_all(
-            context.state.course, moving, time, context.state.now, context.state.rotation, context.acceleration,
+            context.state.trajectory, moving, time, context.state.now, context.state.rotation, context.acceleration,
             context.angular_acceleration,
         )  # fmt: skip
         self.stepper.set_up(context, members, fixed, ahead, kept)
 
-    def take_courses(self, context, window, group: Group) -> None:
+    def begin_trajectories(self, context, pair_events, island: Island) -> None:
         """Give the members of a group's heap the courses that the solver found."""
-        out, state, time = self._outcome, context.state, group.time
+        out, state, time = self._outcome, context.state, island.time
         assert out is not None
         length = self._outcome_end - time
-        context.recorder.flush_all(state.course, out.members, time)
-        depart(state.course, out.members, time, length, state.now, out.position, out.orientation, out.velocity)
+        context.recorder.flush_all(state.trajectory, out.members, time)
+        depart(state.trajectory, out.members, time, length, state.now, out.position, out.orientation, out.velocity)
         state.correction[out.members] = 0.0
-        self._note_calm(context, out, length)
-        window.change_courses(out.members, time)
+        self._update_sleep_timers(context, out, length)
+        pair_events.trajectories_changed(out.members, time)
 
-    def _note_calm(self, context, out: Outcome, length: float) -> None:
+    def _update_sleep_timers(self, context, out: Outcome, length: float) -> None:
         """For how long each member has hardly moved from where it was."""
         stepper = self.stepper
-        count_calm(
+        advance_sleep_timers(
             out.members, out.position, out.orientation, out.velocity, context.world.steady_strength, stepper.inner, stepper.skin, length,
-            self._stood, self.calm,
+            self._stood, self.sleep_timer,
         )  # fmt: skip
 
 
-def _bare_group(time: float) -> Group:
+def _bare_island(time: float) -> Island:
     """A group without contacts of the exact kind."""
     none = np.zeros(0, np.int64)
-    return Group(
+    return Island(
         time=time, members=none, pairs=none, contacts=empty_contacts(0), place=none, kinds=none,
-        features=np.zeros((0, 2), np.int64), keys=[], delta=np.zeros(0), approach=np.zeros(0), rest_speed=np.zeros(0),
+        features=np.zeros((0, 2), np.int64), keys=[], contact_margin=np.zeros(0), approach=np.zeros(0), rest_speed=np.zeros(0),
         live=np.zeros(0, bool), velocity=np.zeros((0, 3)), angular_velocity=np.zeros((0, 3)),
     )  # fmt: skip

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.collision.contact_buffer import ContactBuffer, find_together
-from rigidimpulse.collision.contact_cache import classify, look, make_room, most_motion, share_of
-from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT, HeapBodies, load_bodies
-from rigidimpulse.collision.contact_table import HeapTable
+from rigidimpulse.collision.contact_cache import classify, look, make_workspace, most_motion, share_of
+from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT, SolverBodies, load_bodies
+from rigidimpulse.collision.contact_table import ContactTable
 from rigidimpulse.collision.contact_update import FARTHER, convex_polyhedra, inner_radii, shrunk_geometry, store_contacts
-from rigidimpulse.collision.fat_boxes import Cover
+from rigidimpulse.collision.fat_boxes import FatBoxes
 from rigidimpulse.collision.manifold.dispatch import pair_gap
 from rigidimpulse.collision.manifold.inset_surface import cores
 from rigidimpulse.collision.manifold.penetrating import solids
@@ -21,8 +21,8 @@ from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import number_of_cores
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.quaternion import to_matrix
-from rigidimpulse.core.simd import ROW, aligned, machine_lanes
-from rigidimpulse.core.workers import empty_deck
+from rigidimpulse.core.simd import ROW, aligned, machine_simd
+from rigidimpulse.core.workers import empty_work_queue
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import energies, mark_quick, note_pressed, slow_down
 from rigidimpulse.dynamics.solvers.tgs_soft.depenetration import move_apart
 from rigidimpulse.dynamics.solvers.tgs_soft.fill import fill, keep_impulses, place_bodies
@@ -55,7 +55,7 @@ LEAST_SUB_STEPS_BETWEEN = 2
 COARSEST = 0.3
 """Inner radii by which bodies with cores may pass each other from look to look: sub-steps are made shorter for it."""
 SAME, KEPT = 0.02, 0.2
-"""Parts of the motion until a look (`Accuracy.heap_motion`) that a pair may make with the contacts it has: at any time, and in the
+"""Parts of the motion until a look (`Accuracy.substep_motion`) that a pair may make with the contacts it has: at any time, and in the
 middle of a step."""
 QUICK = 0.4
 """Part of `kept` beyond which a body is quick: its contacts are looked for, and their records made anew, in the middle of a step."""
@@ -68,7 +68,7 @@ WORTHWHILE_BATCHES, MOST_SOLVERS = 2000, 2
 _NO_STEADY = 0, np.zeros(1, np.int64)
 """Patches, and edges of the colours of batches, that were made before the last look."""
 FINER_STEP, FINER_SUB_STEP, FINER_MOTION = 1.0 / 8.0, 1.0 / 32.0, 1.0 / 10.0
-"""Parts of `Accuracy.step`, of sub-steps and of `Accuracy.heap_motion` that scenes of few bodies are stepped with: they can afford it."""
+"""Parts of the settings `step` and `substep_motion` that scenes of few bodies are stepped with: they can afford finer ones."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 
@@ -83,13 +83,13 @@ class Outcome:
     velocity: np.ndarray
 
 
-class HeapStepper:
+class ContactStepper:
     """Steps sets of bodies by the sub-stepped solver; holds what does not change, and the contacts.
 
     Attributes:
         order: (n,) bodies by their places at the start of the run; rank: (n,) place of each in it.
         inner: (n,) m, distance from the centre of mass to the nearest face; inf for what cannot be moved. skin: (n,) m.
-        step_length: s, that is stepped at once at most; motion: inner radii, see `Accuracy.heap_motion`.
+        step_length: s, that is stepped at once at most; motion: inner radii, see `Accuracy.substep_motion`.
         kept: inner radii that a pair may come past each other with the contacts it has, in the middle of a step.
         bodies: by rank. table: pairs and contact points. pressed: (n,) bool, contacts acted on the body when it was last stepped.
 
@@ -126,22 +126,22 @@ class HeapStepper:
         self.bodies = self._make_bodies()
         self._masses, self._pull = world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order])
         self._shares, self._looked_at = number_of_cores(), 0
-        self._rooms = [make_room() for _ in range(self._shares)]
+        self._workspaces = [make_workspace() for _ in range(self._shares)]
         self._more_buffers: list[ContactBuffer] = []
-        self.table = HeapTable(self._shares, n)
+        self.table = ContactTable(self._shares, n)
         least = CLEAR * np.where(movable, self.inner, 0.0)
-        self.cover = Cover(world, self.order, self.inner, least)
-        self.lanes = machine_lanes()
+        self.fat_boxes = FatBoxes(world, self.order, self.inner, least)
+        self.simd = machine_simd()
         self._patches, self._count, self._steady = empty_patches(PATCHES_OF_A_BODY * n), 0, _NO_STEADY
         none = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
-        self._batches = more_batches(none, PATCHES_OF_A_BODY * n // self.lanes.width + 1, self.lanes.width)
+        self._batches = more_batches(none, PATCHES_OF_A_BODY * n // self.simd.width + 1, self.simd.width)
         self._begins, self._edges = np.zeros(256, np.int64), np.zeros(1, np.int64)
-        self._deck = empty_deck()
+        self._work_queue = empty_work_queue()
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
         self.step_length = world.accuracy.step * (FINER_STEP if finer else 1.0)
         self._least_sub_steps = LEAST_SUB_STEPS / (FINER_SUB_STEP if finer else 1.0)
-        self.motion = world.accuracy.heap_motion * (FINER_MOTION if finer else 1.0)
+        self.motion = world.accuracy.substep_motion * (FINER_MOTION if finer else 1.0)
         self.kept = KEPT * self.motion
         self._all_quick = bool(world.moving.any() or world.ball.any())
         self._special = self._all_quick or bool(world.coefficients[:, :, 0].any())
@@ -149,7 +149,7 @@ class HeapStepper:
         self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
         self.members, self.ahead, self._parts, self._sub_steps = np.zeros(0, np.int64), 0.0, 1, 1
 
-    def _make_bodies(self) -> HeapBodies:
+    def _make_bodies(self) -> SolverBodies:
         """Rows of all bodies by rank, and one of none."""
         world, n = self.world, self.world.num_bodies
 
@@ -157,7 +157,7 @@ class HeapStepper:
             return np.concatenate([column[self.order], np.full((1, *column.shape[1:]), none, column.dtype)])
 
         unlike = world.inertia.max(axis=1) > world.inertia.min(axis=1)
-        return HeapBodies(
+        return SolverBodies(
             shape=by_rank(world.shape_of_body, 0), material=by_rank(world.material_of_body, 0), inertia=by_rank(world.inertia, 1.0),
             alike=by_rank(~unlike, True), inner=by_rank(self.inner, np.inf), skin=by_rank(self.skin, np.inf),
             reach=by_rank(self.reach, 0.0), radius=by_rank(world.bound_radius, 0.0), part=np.zeros(n + 1, np.int64),
@@ -182,14 +182,14 @@ class HeapStepper:
 
     def find_pairs(self, context, members: np.ndarray, others: np.ndarray, ahead: float) -> None:
         """See that the pairs hold all that members may meet in `ahead` s, among themselves and of the others."""
-        found = self.cover.renewed(context.state.now, context.acceleration, members, others, ahead)
+        found = self.fat_boxes.renewed(context.state.now, context.acceleration, members, others, ahead)
         if found is not None:
             self.table.replace(*found)
             classify(self.table.pairs, self.bodies, self.shapes)
 
     def near(self, context, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
         """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `Cover.near`."""
-        return self.cover.near(self.table.pairs, context.state.now, context.acceleration, member, other, ahead)
+        return self.fat_boxes.near(self.table.pairs, context.state.now, context.acceleration, member, other, ahead)
 
     def set_up(self, context, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0) -> None:
         """Put members and what they may touch before the kernels at the present instant, with their contacts; kept: see `review`."""
@@ -218,13 +218,13 @@ class HeapStepper:
             outcome = look.together([
                 (
                     self.shapes, self._solids, self._inset, self.bodies, table.pairs, share, shares, self.ahead, SAME * self.motion, kept,
-                    self._places, self._margins, table.rows, table.ids, table.free, self.world.coefficients, self._rooms[share],
+                    self._places, self._margins, table.rows, table.ids, table.free, self.world.coefficients, self._workspaces[share],
                 )
                 for share in range(shares)
             ])  # fmt: skip
             if min(waiting for _, waiting in outcome) >= 0:
                 break
-            table.make_room(POINTS)
+            table.grow(POINTS)
         self._looked_at = sum(looked_at for looked_at, _ in outcome)
         begins = [share_of(number, share, shares) for share in range(shares)]
         waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
@@ -254,7 +254,7 @@ class HeapStepper:
         found = find_together(buffers, [(self.geometry, world, now, rotation, a[some], b[some], shown[some]) for some in shares])
         for some, buffer, count in zip(shares, buffers, found, strict=True):
             # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
-            table.make_room(count + POINTS * len(some) + 1)
+            table.grow(count + POINTS * len(some) + 1)
             table.free[0, 0] = store_contacts(
                 world.geometry, self.geometry, self._back, self._solids, self.bodies, pairs, places[some], margin[some], far[some],
                 self._convex, self._factor, self._depth, world.coefficients, buffer.real, buffer.integer, count, self.order, table.rows,
@@ -280,7 +280,7 @@ class HeapStepper:
 
     def _look_again(self, context) -> None:
         """Look at the contacts of quick bodies in the course of a step; those of all others stay in the steady batches, where they are."""
-        bodies, width = self.bodies, self.lanes.width
+        bodies, width = self.bodies, self.simd.width
         all_quick = self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY
         if all_quick:
             bodies.quick[:] = True
@@ -292,7 +292,7 @@ class HeapStepper:
 
     def _fill(self, h: float) -> int:
         """Make patches, colours and records of quick bodies after the steady ones, for sub-steps of h s; returns the number of batches."""
-        bodies, table, width, (begin, edges) = self.bodies, self.table, self.lanes.width, self._steady
+        bodies, table, width, (begin, edges) = self.bodies, self.table, self.simd.width, self._steady
         first = int(edges[-1])
         count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
         if count < 0:
@@ -308,7 +308,7 @@ class HeapStepper:
         self._edges = np.concatenate([edges[:-1], self._begins[: colours + 1]])
         place_patches(width, bodies, table.pairs, self._patches, begin, count, self._batches, first, number)
         place_bodies(bodies, self._places_of_bodies)
-        fill(self.lanes, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
+        fill(self.simd, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
         return number
 
     def move_apart(self, context, fresh: np.ndarray) -> None:
@@ -357,7 +357,7 @@ class HeapStepper:
 
     def _advance(self, sub_steps: int, h: float) -> float:
         """Sub-steps of h s with the contacts as they are known; returns the work of moving supports, J."""
-        bodies, table, width = self.bodies, self.table, self.lanes.width
+        bodies, table, width = self.bodies, self.table, self.simd.width
         number = self._fill(h)
         lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
         balls = rebounds = supports = 0
@@ -367,17 +367,17 @@ class HeapStepper:
                 width, bodies, table.pairs, self._patches, self._steady[0], self._count, table.rows, self._batches,
                 self.world.coefficients, strength, lists, target,
             )
-        shares, calm = min(self._shares, MOST_SOLVERS) if number * sub_steps > WORTHWHILE_BATCHES else 1, len(self._steady[1]) - 1
-        self._deck[:] = empty_deck()
+        shares, sleep_timer = min(self._shares, MOST_SOLVERS) if number * sub_steps > WORTHWHILE_BATCHES else 1, len(self._steady[1]) - 1
+        self._work_queue[:] = empty_work_queue()
         work, *_ = advance.together([
             (
-                self.lanes, bodies, table.pairs, self._patches, self._batches, self._edges, calm, table.rows, lists, balls, rebounds,
-                supports, target, sub_steps, h, self._deck, share, shares,
+                self.simd, bodies, table.pairs, self._patches, self._batches, self._edges, sleep_timer, table.rows, lists, balls, rebounds,
+                supports, target, sub_steps, h, self._work_queue, share, shares,
             )
             for share in range(shares)
         ])  # fmt: skip
-        keep_impulses(self.lanes, self._batches, number, table.lines)
-        if not calm:
+        keep_impulses(self.simd, self._batches, number, table.lines)
+        if not sleep_timer:
             bodies.quick[:] = False
             self._steady = self._count, self._edges
         return work

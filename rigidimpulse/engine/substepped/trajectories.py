@@ -4,7 +4,7 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import product, quaternion_to_matrix
-from rigidimpulse.motion.trajectory import FREE, LENGTH, SPEEDS, STEPPED, begin, begin_straight, stepped_at
+from rigidimpulse.motion.trajectory import FREE, LENGTH, LINEAR, SPEEDS, begin, begin_straight, stepped_at
 
 CALM, PLAY = 0.05, 0.5
 """Speed, in sqrt(g r), and motion, in skins, below which a body is calm."""
@@ -15,11 +15,11 @@ EVEN = 1e-6
 
 
 @jit
-def arrive(course, members, time, steady, bodies, rotation, acceleration, angular_acceleration):
+def end_trajectories(trajectory, members, time, steady, bodies, rotation, acceleration, angular_acceleration):
     """End the courses of members at `time`, bring them there, and let them go straight on; steady (n, 3) m/s2 is what pulls them."""
     for i in members:
-        place, q, v, w = stepped_at(course, i, time)
-        x, y, z = 1.0 / course.inertia[i, 0], 1.0 / course.inertia[i, 1], 1.0 / course.inertia[i, 2]
+        place, q, v, w = stepped_at(trajectory, i, time)
+        x, y, z = 1.0 / trajectory.inertia[i, 0], 1.0 / trajectory.inertia[i, 1], 1.0 / trajectory.inertia[i, 2]
         quaternion_to_matrix(q, rotation[i])
         for c in range(3):
             for d in range(3):
@@ -27,30 +27,30 @@ def arrive(course, members, time, steady, bodies, rotation, acceleration, angula
                     x * rotation[i, c, 0] * rotation[i, d, 0] + y * rotation[i, c, 1] * rotation[i, d, 1]
                     + z * rotation[i, c, 2] * rotation[i, d, 2]
                 )
-        course.start[i], course.top[i, LENGTH] = time, 1.0
+        trajectory.start[i], trajectory.top[i, LENGTH] = time, 1.0
         bodies.position[i, 0], bodies.position[i, 1], bodies.position[i, 2] = place
         bodies.orientation[i, 0], bodies.orientation[i, 1], bodies.orientation[i, 2], bodies.orientation[i, 3] = q
         bodies.velocity[i, 0], bodies.velocity[i, 1], bodies.velocity[i, 2] = v
         bodies.angular_velocity[i, 0], bodies.angular_velocity[i, 1], bodies.angular_velocity[i, 2] = w
         for c in range(4):
-            course.orientation[i, c] = bodies.orientation[i, c]
+            trajectory.orientation[i, c] = bodies.orientation[i, c]
         for c in range(3):
-            course.position[i, c] = bodies.position[i, c]
-            course.velocity[i, c] = course.top[i, SPEEDS + c] = bodies.velocity[i, c]
-            course.angular_velocity[i, c] = course.top[i, SPEEDS + 3 + c] = bodies.angular_velocity[i, c]
-            course.top[i, SPEEDS + 6 + c] = course.top[i, SPEEDS + 9 + c] = course.acceleration[i, c] = 0.0
+            trajectory.position[i, c] = bodies.position[i, c]
+            trajectory.velocity[i, c] = trajectory.top[i, SPEEDS + c] = bodies.velocity[i, c]
+            trajectory.angular_velocity[i, c] = trajectory.top[i, SPEEDS + 3 + c] = bodies.angular_velocity[i, c]
+            trajectory.top[i, SPEEDS + 6 + c] = trajectory.top[i, SPEEDS + 9 + c] = trajectory.acceleration[i, c] = 0.0
             acceleration[i, c], angular_acceleration[i, c] = steady[i, c], 0.0
-        begin_straight(course, i)
+        begin_straight(trajectory, i)
 
 
 @jit
-def let_fly(course, members, steady):
+def let_fly(trajectory, members, steady):
     """Let members that have arrived fly freely from where they are."""
     for i in members:
-        course.mode[i] = FREE
+        trajectory.mode[i] = FREE
         for c in range(3):
-            course.acceleration[i, c] = steady[i, c]
-        begin(course, i)
+            trajectory.acceleration[i, c] = steady[i, c]
+        begin(trajectory, i)
 
 
 @jit
@@ -84,7 +84,7 @@ def most_stray(bodies, members, pressed, reach, skin, allowed):
 
 
 @jit_making_arrays
-def stirred(first, second, member, restless, bodies, mass, strength, inner):
+def wake_by_contact(first, second, member, restless, bodies, mass, strength, inner):
     """Mark (n,) restless members, and calm ones that such a one may move, over pairs (k,) that may touch.
 
     A body of mass m at a speed v that runs into calm ones of mass m_0 sets at most k = m v / (m_0 u) of them going faster than u: behind
@@ -124,7 +124,7 @@ def stirred(first, second, member, restless, bodies, mass, strength, inner):
 
 
 @jit
-def count_calm(members, position, orientation, velocity, strength, inner, skin, length, stood, calm):
+def advance_sleep_timers(members, position, orientation, velocity, strength, inner, skin, length, stood, sleep_timer):
     """Add `length` s to the calm of members (k,) that have hardly moved from where they stood (n, 7); start anew that of the others."""
     for k in range(members.shape[0]):
         i = members[k]
@@ -141,9 +141,9 @@ def count_calm(members, position, orientation, velocity, strength, inner, skin, 
             and 2.0 * inner[i] * np.sqrt(turned) <= play
             and np.sqrt(speed) + inner[i] * np.sqrt(spin) <= CALM * np.sqrt(strength[i] * inner[i])
         ):
-            calm[i] += length
+            sleep_timer[i] += length
             continue
-        calm[i] = 0.0
+        sleep_timer[i] = 0.0
         for c in range(3):
             stood[i, c] = position[k, c]
         for c in range(4):
@@ -151,7 +151,7 @@ def count_calm(members, position, orientation, velocity, strength, inner, skin, 
 
 
 @jit
-def depart(course, members, time, length, bodies, position, orientation, velocity):
+def depart(trajectory, members, time, length, bodies, position, orientation, velocity):
     """Courses from the present poses to the given ones (k, 3), (k, 4), where the velocities are (k, 6).
 
     They are straight, but parabolas of bodies that fly freely: their velocities agree with where they come.
@@ -169,19 +169,19 @@ def depart(course, members, time, length, bodies, position, orientation, velocit
             first, last = bodies.velocity[i, c], velocity[k, c]
             missed += np.abs(position[k, c] - bodies.position[i, c] - 0.5 * length * (first + last))
             way += 0.5 * length * (np.abs(first) + np.abs(last))
-        course.start[i], course.mode[i] = time, STEPPED
-        course.angular_velocity[i, 0] = factor * q1
-        course.angular_velocity[i, 1] = factor * q2
-        course.angular_velocity[i, 2] = factor * q3
+        trajectory.start[i], trajectory.mode[i] = time, LINEAR
+        trajectory.angular_velocity[i, 0] = factor * q1
+        trajectory.angular_velocity[i, 1] = factor * q2
+        trajectory.angular_velocity[i, 2] = factor * q3
         for c in range(3):
-            course.position[i, c] = bodies.position[i, c]
+            trajectory.position[i, c] = bodies.position[i, c]
             pull = (velocity[k, c] - bodies.velocity[i, c]) / length if missed <= EVEN * way else 0.0
-            course.velocity[i, c] = (position[k, c] - bodies.position[i, c]) / length - 0.5 * length * pull
-            course.acceleration[i, c], course.torque[i, c] = pull, 0.0
-            course.top[i, SPEEDS + c], course.top[i, SPEEDS + 3 + c] = bodies.velocity[i, c], bodies.angular_velocity[i, c]
-            course.top[i, SPEEDS + 6 + c] = velocity[k, c] - bodies.velocity[i, c]
-            course.top[i, SPEEDS + 9 + c] = velocity[k, 3 + c] - bodies.angular_velocity[i, c]
+            trajectory.velocity[i, c] = (position[k, c] - bodies.position[i, c]) / length - 0.5 * length * pull
+            trajectory.acceleration[i, c], trajectory.torque[i, c] = pull, 0.0
+            trajectory.top[i, SPEEDS + c], trajectory.top[i, SPEEDS + 3 + c] = bodies.velocity[i, c], bodies.angular_velocity[i, c]
+            trajectory.top[i, SPEEDS + 6 + c] = velocity[k, c] - bodies.velocity[i, c]
+            trajectory.top[i, SPEEDS + 9 + c] = velocity[k, 3 + c] - bodies.angular_velocity[i, c]
         for c in range(4):
-            course.orientation[i, c] = bodies.orientation[i, c]
-        course.top[i, LENGTH] = length
-        begin_straight(course, i)
+            trajectory.orientation[i, c] = bodies.orientation[i, c]
+        trajectory.top[i, LENGTH] = length
+        begin_straight(trajectory, i)

@@ -24,7 +24,7 @@ from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
 GRAVITY = 9.81
-DELTA = TOLERANCES.contact_gap
+DELTA = TOLERANCES.contact_margin
 """Gap of lasting contacts, of a body's size."""
 ROUNDING = 1e-12
 """Of the energy at stake: some thousand operations of sixteen digits."""

@@ -32,7 +32,7 @@ from rigidimpulse.scene.shape import Shape
 
 STILL = "statics: forces in the cones balance every block"
 BRICK = (0.24, 0.115, 0.071)
-COURSES, BRICKS = 8, 5
+LAYERS, BRICKS = 8, 5
 VOUSSOIRS, MEAN_RADIUS, ARCH_DEPTH = 15, 2.0, 0.6
 CARD = (0.004, 0.06, 0.1)
 """m: thickness, width and length of a card; thick ones, of wood."""
@@ -66,20 +66,20 @@ def check_stack(num_boxes: int, run: Recording) -> list[Check]:
 
 
 def wall() -> Scene:
-    """Return a brick wall in running bond: every other course is shifted by half a brick and ends in half bricks."""
+    """Return a brick wall in running bond: every other layer is shifted by half a brick and ends in half bricks."""
     material = dull(0.6, density=1900.0)
     scene = floor_scene(material)
     length, width, height = BRICK
     half = Shape.box((0.5 * length, width, height))
     brick = Shape.box(BRICK)
-    for course in range(COURSES):
-        z = (course + 0.5) * height
-        shifted = course % 2 == 1
+    for layer in range(LAYERS):
+        z = (layer + 0.5) * height
+        shifted = layer % 2 == 1
         places = [(k + (1.0 if shifted else 0.5)) * length for k in range(BRICKS - shifted)]
         for k, x in enumerate(places):
-            scene.add(Body(f"course {course + 1} brick {k + 1}", brick, position=(x, 0.0, z), material=material))
+            scene.add(Body(f"layer {layer + 1} brick {k + 1}", brick, position=(x, 0.0, z), material=material))
         for name, x in (("left", 0.25 * length), ("right", (BRICKS - 0.25) * length)) if shifted else ():
-            scene.add(Body(f"course {course + 1} {name}", half, position=(x, 0.0, z), material=material))
+            scene.add(Body(f"layer {layer + 1} {name}", half, position=(x, 0.0, z), material=material))
     return scene
 
 
@@ -87,7 +87,7 @@ def check_wall(run: Recording) -> list[Check]:
     """Check that no brick moves."""
     return [
         at_most("any brick moves, m", farthest(run, _dynamic(run)), 0.01 * BRICK[2], f"{STILL}; 1 % of a brick's height"),
-        *_still(run, BRICK[0], COURSES),
+        *_still(run, BRICK[0], LAYERS),
     ]
 
 
@@ -144,8 +144,8 @@ def house() -> Scene:
                 scene.add(Body(f"card {storey + 1}.{k + 1} {name}", Shape.box(CARD), position=place, orientation=turn, material=material))
         base += 2.0 * height
         if num_pairs > 1:
-            deck = Shape.box((num_pairs * pitch, width, DECK))
-            scene.add(Body(f"deck {storey + 1}", deck, position=(0.0, 0.0, base + 0.5 * DECK), material=material))
+            work_queue = Shape.box((num_pairs * pitch, width, DECK))
+            scene.add(Body(f"deck {storey + 1}", work_queue, position=(0.0, 0.0, base + 0.5 * DECK), material=material))
             base += DECK
     return scene
 

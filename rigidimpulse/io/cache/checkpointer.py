@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rigidimpulse.engine.plan import Plan
     from rigidimpulse.engine.simulate import Running
 
-DEAR = 20.0
+EXPENSIVE = 20.0
 """How many times longer than the last checkpoint took the run goes on before the next."""
 
 
@@ -46,7 +46,7 @@ class Cache:
     every: float = 5.0
 
 
-class Keeper:
+class Checkpointer:
     """The cache of one run.
 
     Attributes:
@@ -103,7 +103,7 @@ class Keeper:
 
     def look(self, time: float, more: Callable[[float], None] | None = None) -> None:
         """Write a checkpoint if it is time to; call `more` with the time of the run [s]."""
-        if self._file is not None and perf_counter() - self._last >= max(self._cache.every, DEAR * self._cost):
+        if self._file is not None and perf_counter() - self._last >= max(self._cache.every, EXPENSIVE * self._cost):
             self.write(time)
         if more is not None:
             more(time)
@@ -128,9 +128,9 @@ class Keeper:
 
     def _fill_in(self, first: int, last: int) -> None:
         """Write frames until the last one that are not written yet, from the present courses; what writes them comes again."""
-        recorder, course = self.running.context.recorder, self.running.context.state.course
+        recorder, trajectory = self.running.context.recorder, self.running.context.state.trajectory
         behind, frames = np.flatnonzero(recorder.written < last), (getattr(recorder, name) for name in FRAMES)
-        sample_paths(course, behind, recorder.times, last, np.maximum(recorder.written, first), *frames)
+        sample_paths(trajectory, behind, recorder.times, last, np.maximum(recorder.written, first), *frames)
 
     def _content(self, frames: int, time: float, state: bytes, tables: dict[str, Any] | None = None) -> Content:
         context = self.running.context
@@ -143,7 +143,7 @@ class Keeper:
         if self._file is None:
             return
         tables: dict[str, Any] = {"contacts": recording.contacts}
-        for number, track in enumerate(recording.nets):
+        for number, track in enumerate(recording.soft_bodies):
             tables.update(track.arrays(number))
         self._file.finish(self._content(len(recording.times), float(recording.times[-1]), self._state, tables))
 

@@ -34,8 +34,10 @@ CONTAINERS: dict[str, tuple[Any, ...]] = {
 LINE = 64
 """Bytes of a line of the processor's cache."""
 HOMES = (
-    "constrain", "detect", "events", "flexible", "forces", "integrate", "observe", "respond", "sweep",
-    "accuracy", "geometry", "io.cache.freeze", "mass", "plan", "rotation", "simulation", "state", "world",
+    "core.quaternion", "core.simd", "core.workers", "scene.accuracy", "scene.mass", "scene.joint", "scene.joint_six_axis",
+    "collision", "motion", "model", "dynamics", "engine.exact", "engine.substepped", "engine.spheres", "engine.islands",
+    "engine.pair_events", "engine.pair_table", "engine.plan", "engine.regime", "engine.simulate", "engine.triggers",
+    "recording.contact_log", "recording.contacts", "recording.events", "recording.impulses", "recording.recorder", "io.cache.freeze",
 )  # fmt: skip
 """Packages and modules of what a state is made of: nothing in them reads or runs files."""
 NUMPY = ("dtype", "ndarray", "scalar", "_reconstruct", "_frombuffer")

@@ -26,7 +26,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import angle_between, conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
 from rigidimpulse.io.gltf.container import Builder
 from rigidimpulse.io.gltf.draw import Drawing, new_file, node_pose, stage
-from rigidimpulse.io.gltf.morph import add_nets
+from rigidimpulse.io.gltf.morph import add_soft_bodies
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.origin import Origin
 from rigidimpulse.io.keys import Keys
@@ -74,9 +74,9 @@ def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
     for node, times in above.items():
         assert origin
         writer.add(node, origin.animations.keys(node, np.unique(np.concatenate(times)), writer.apart(float(run.times[-1]))))
-    if run.nets:
+    if run.soft_bodies:
         colour = sum(body.motion != "static" for body in scene.bodies)
-        for node, frames, weights in add_nets(builder, run.nets, scene.gravity, colour, options.tolerance):
+        for node, frames, weights in add_soft_bodies(builder, run.soft_bodies, scene.gravity, colour, options.tolerance):
             if len(frames) > 1:
                 writer.add_weights(node, run.times[frames], weights)
     if locals_.sheared:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidimpulse.io.gltf.draw import INDICES, VERTICES, Drawing, stage
-from rigidimpulse.view.materials import net_surface
+from rigidimpulse.view.materials import soft_body_surface
 from rigidimpulse.view.soft_bodies import is_closed
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rigidimpulse.io.gltf.container import Builder
 
 
-def add_nets(builder: Builder, tracks: list[FlexibleTrack], gravity: Any, colour: int, tolerance: float | None) -> list[Any]:
+def add_soft_bodies(builder: Builder, tracks: list[FlexibleTrack], gravity: Any, colour: int, tolerance: float | None) -> list[Any]:
     """Add the nodes of flexible bodies; returns for each its node, the frames it has and their weights (k, targets).
 
     colour: number of the first one's colour. tolerance: m; None: all frames.
@@ -35,7 +35,7 @@ def add_nets(builder: Builder, tracks: list[FlexibleTrack], gravity: Any, colour
         primitive = {
             "attributes": _target(builder, shapes[0], normals[0]),
             "indices": builder.array(np.ravel(track.faces).astype(np.uint32), "SCALAR", target=INDICES),
-            "material": drawing.paint(net_surface(colour + number, is_closed(track.faces))),
+            "material": drawing.paint(soft_body_surface(colour + number, is_closed(track.faces))),
         }
         mesh: dict[str, Any] = {"name": track.name, "primitives": [primitive]}
         if len(frames) > 1:

@@ -19,7 +19,7 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import from_matrix
 from rigidimpulse.io.motion import Motion, MotionOptions
-from rigidimpulse.io.usd.draw import Drawing, draw_net
+from rigidimpulse.io.usd.draw import Drawing, draw_soft_body
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place, quaternions, sample, valid_name, vectors
 from rigidimpulse.io.usd.library import Gf, Sdf, UsdUtils
 from rigidimpulse.io.usd.origin import UsdOrigin
@@ -117,7 +117,7 @@ class _Writer:
         """Write bodies that have no prim, below a root in metres."""
         scene, paths = self.motion.scene, self.motion.paths
         fresh = [body for body in scene.bodies if body.name not in drawn]
-        if not fresh and not self.run.nets:
+        if not fresh and not self.run.soft_bodies:
             return
         self._root(root, scale, bool(drawn))
         drawing, moving = Drawing(self.layer, self.motion.half(), fresh), 0
@@ -130,8 +130,8 @@ class _Writer:
             if self.motion.is_keyed(body.name):
                 self._sample(prim, self.motion.keys(body.name), names)
         codes = self.codes(self.run.times)
-        for number, track in enumerate(self.run.nets):
-            draw_net(self.layer, root.AppendChild(valid_name(track.name, self.used)), track, codes, color(moving + number))
+        for number, track in enumerate(self.run.soft_bodies):
+            draw_soft_body(self.layer, root.AppendChild(valid_name(track.name, self.used)), track, codes, color(moving + number))
 
     def _root(self, path, scale: float, inside: bool) -> None:
         """Write the prim above the bodies; a stage of its own has kilograms, metres and the up axis of the scene, or what is asked for."""

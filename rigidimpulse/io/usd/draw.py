@@ -117,7 +117,7 @@ class Drawing:
         return prim
 
 
-def draw_net(layer: Layer, path: SdfPath, track: Any, codes: list[float], color: str) -> None:
+def draw_soft_body(layer: Layer, path: SdfPath, track: Any, codes: list[float], color: str) -> None:
     """Write a flexible body: a mesh whose points have time samples.
 
     Args:

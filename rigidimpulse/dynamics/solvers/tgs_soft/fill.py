@@ -13,8 +13,6 @@ from __future__ import annotations
 
 from rigidimpulse.collision.contact_records import (
     CARRIER,
-    CORE_A,
-    CORE_B,
     DYNAMIC_FRICTION,
     FRICTION,
     HELD,
@@ -22,6 +20,8 @@ from rigidimpulse.collision.contact_records import (
     INVERSE_MASS,
     ROUND_A,
     ROUND_B,
+    SKELETON_A,
+    SKELETON_B,
     SKIN,
     STATIC_FRICTION,
 )
@@ -76,9 +76,9 @@ def place_bodies(bodies, places):
 
 
 @inlined
-def _rotation(lanes, place):
+def _rotation(simd, place):
     """Rows of the matrices of the orientations in lines of `place_bodies`."""
-    one, two = spread(lanes, 1.0), spread(lanes, 2.0)
+    one, two = spread(simd, 1.0), spread(simd, 2.0)
     w, x, y, z = place[3], place[4], place[5], place[6]
     return (
         (one - two * fma(y, y, z * z), two * fma(x, y, -(w * z)), two * fma(x, z, w * y)),
@@ -100,42 +100,42 @@ def _choose(a, b, x, y):
 
 
 @inlined
-def _normal(lanes, first, second, ra, rb, core_a, core_b):
+def _normal(simd, first, second, ra, rb, skeleton_a, skeleton_b):
     """World normal of a row's lines: that of two rounded surfaces runs between their centres."""
-    zero, tiny = spread(lanes, 0.0), spread(lanes, TINY)
+    zero, tiny = spread(simd, 0.0), spread(simd, TINY)
     own = (first[0], first[1], first[2])
     n = _choose(second[CARRIER - ROW], zero, _turned(rb, own), _turned(ra, own))
-    between = less(core_b, core_a)
+    between = less(skeleton_b, skeleton_a)
     square = dot(between, between)
-    inverse = spread(lanes, 1.0) / root(square + tiny)
+    inverse = spread(simd, 1.0) / root(square + tiny)
     both = first[ROUND_A] * first[ROUND_B]
     return _choose(where_greater(square, tiny, both, zero), zero, (between[0] * inverse, between[1] * inverse, between[2] * inverse), n)
 
 
 @inlined
-def _tangents(lanes, n):
+def _tangents(simd, n):
     """Two unit vectors with t_1 x t_2 = n."""
-    zero, one, tiny = spread(lanes, 0.0), spread(lanes, 1.0), spread(lanes, TINY)
+    zero, one, tiny = spread(simd, 0.0), spread(simd, 1.0), spread(simd, TINY)
     size = where_greater(n[0], zero, n[0], -n[0])
-    steep = spread(lanes, STEEP)
+    steep = spread(simd, STEEP)
     inverse = one / root(fma(n[1], n[1], where_greater(size, steep, n[0] * n[0], n[2] * n[2])) + tiny)
     t = _choose(size, steep, (n[1] * inverse, -(n[0] * inverse), zero), (zero, n[2] * inverse, -(n[1] * inverse)))
     return t, cross(n, t)
 
 
 @inlined
-def _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
+def _points(simd, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
     """Places, from the first of them, and gaps of the points of batch k into its record; returns the first and their mean from it."""
-    w = width_of(lanes)
-    record, zero, one = batches.record, spread(lanes, 0.0), spread(lanes, 1.0)
+    w = width_of(simd)
+    record, zero, one = batches.record, spread(simd, 0.0), spread(simd, 1.0)
     rest, number, base, mean = one - share, zero, (zero, zero, zero), (zero, zero, zero)
     between = less(linear(pb), linear(pa))
     for c in range(batches.points[k]):
         g = (k * FIELDS + POINT + POINT_SIZE * c) * w
         at = (POINTS * k + c) * w
-        first, second = gather(lanes, lines, batches.row, at), gather(lanes, lines[ROW:], batches.row, at)
-        a = _turned(ra, (first[CORE_A], first[CORE_A + 1], first[CORE_A + 2]))
-        b = add(between, _turned(rb, (second[CORE_B - ROW], second[CORE_B + 1 - ROW], second[CORE_B + 2 - ROW])))
+        first, second = gather(simd, lines, batches.row, at), gather(simd, lines[ROW:], batches.row, at)
+        a = _turned(ra, (first[SKELETON_A], first[SKELETON_A + 1], first[SKELETON_A + 2]))
+        b = add(between, _turned(rb, (second[SKELETON_B - ROW], second[SKELETON_B + 1 - ROW], second[SKELETON_B + 2 - ROW])))
         gap = dot(n, less(b, a)) - (first[ROUND_A] + first[ROUND_B]) - second[HELD - ROW]
         a, b = along(a, first[ROUND_A], n), along(b, -first[ROUND_B], n)
         x = (fma(share, a[0], rest * b[0]), fma(share, a[1], rest * b[1]), fma(share, a[2], rest * b[2]))
@@ -155,17 +155,17 @@ def _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
 
 
 @inlined
-def _impulses(lanes, batches, k, lines, middle, t, u):
+def _impulses(simd, batches, k, lines, middle, t, u):
     """Points from the centre of the patch, `middle` from the first, and impulses carried over, into the record of batch k."""
-    w = width_of(lanes)
-    record, zero = batches.record, spread(lanes, 0.0)
+    w = width_of(simd)
+    record, zero = batches.record, spread(simd, 0.0)
     o, x0, y0 = k * FIELDS * w, dot(t, middle), dot(u, middle)
     f1, f2, twist = zero, zero, zero
     for c in range(batches.points[k]):
         g = o + (POINT + POINT_SIZE * c) * w
-        third = gather(lanes, lines[2 * ROW :], batches.row, (POINTS * k + c) * w)
-        here = load(lanes, record, g + MASS * w)
-        x, y = here * (load(lanes, record, g + X * w) - x0), here * (load(lanes, record, g + Y * w) - y0)
+        third = gather(simd, lines[2 * ROW :], batches.row, (POINTS * k + c) * w)
+        here = load(simd, record, g + MASS * w)
+        x, y = here * (load(simd, record, g + X * w) - x0), here * (load(simd, record, g + Y * w) - y0)
         store(record, g + X * w, x)
         store(record, g + Y * w, y)
         store(record, g + LEVER * w, root(fma(x, x, y * y)))
@@ -177,30 +177,30 @@ def _impulses(lanes, batches, k, lines, middle, t, u):
 
 
 @jit
-def fill(lanes, batches, begin, number, places, mass, lines, soft):
+def fill(simd, batches, begin, number, places, mass, lines, soft):
     """Records of the batches from `begin` to `number`.
 
     places: lines (8 (n+1),) of `place_bodies`; lines (8 m,) of the pool; soft (2, 3) from `heap_solver.softness`: movable, immovable.
     """
-    w = width_of(lanes)
-    record, zero, one, half = batches.record, spread(lanes, 0.0), spread(lanes, 1.0), spread(lanes, 0.5)
+    w = width_of(simd)
+    record, zero, one, half = batches.record, spread(simd, 0.0), spread(simd, 1.0), spread(simd, 0.5)
     for k in range(begin, number):
         o = k * FIELDS * w
-        pa, pb = gather(lanes, places, batches.first, k * w), gather(lanes, places, batches.second, k * w)
-        ma, mb = gather(lanes, mass, batches.first, k * w), gather(lanes, mass, batches.second, k * w)
+        pa, pb = gather(simd, places, batches.first, k * w), gather(simd, places, batches.second, k * w)
+        ma, mb = gather(simd, mass, batches.first, k * w), gather(simd, mass, batches.second, k * w)
         at = POINTS * k * w
-        first, second = gather(lanes, lines, batches.row, at), gather(lanes, lines[ROW:], batches.row, at)
-        ra, rb = _rotation(lanes, pa), _rotation(lanes, pb)
+        first, second = gather(simd, lines, batches.row, at), gather(simd, lines[ROW:], batches.row, at)
+        ra, rb = _rotation(simd, pa), _rotation(simd, pb)
         share = where_greater(ma[INVERSE_MASS], zero, where_greater(mb[INVERSE_MASS], zero, half, one), zero)
         between = less(linear(pb), linear(pa))
-        core_a = _turned(ra, (first[CORE_A], first[CORE_A + 1], first[CORE_A + 2]))
-        core_b = add(between, _turned(rb, (second[CORE_B - ROW], second[CORE_B + 1 - ROW], second[CORE_B + 2 - ROW])))
-        n = _normal(lanes, first, second, ra, rb, core_a, core_b)
-        t, u = _tangents(lanes, n)
-        base, middle = _points(lanes, batches, k, lines, pa, pb, ra, rb, share, n, t, u)
+        skeleton_a = _turned(ra, (first[SKELETON_A], first[SKELETON_A + 1], first[SKELETON_A + 2]))
+        skeleton_b = add(between, _turned(rb, (second[SKELETON_B - ROW], second[SKELETON_B + 1 - ROW], second[SKELETON_B + 2 - ROW])))
+        n = _normal(simd, first, second, ra, rb, skeleton_a, skeleton_b)
+        t, u = _tangents(simd, n)
+        base, middle = _points(simd, batches, k, lines, pa, pb, ra, rb, share, n, t, u)
         arm_a = add(base, middle)
         arm_b = less(arm_a, between)
-        _impulses(lanes, batches, k, lines, middle, t, u)
+        _impulses(simd, batches, k, lines, middle, t, u)
         store_three(record, o + NORMAL * w, w, n[0], n[1], n[2])
         store_three(record, o + TANGENT_1 * w, w, t[0], t[1], t[2])
         store_three(record, o + TANGENT_2 * w, w, u[0], u[1], u[2])
@@ -212,18 +212,18 @@ def fill(lanes, batches, begin, number, places, mass, lines, soft):
         store(record, o + MU_DYNAMIC * w, second[DYNAMIC_FRICTION - ROW])
         # In the place of a spring between movable bodies one twice as stiff against what is not.
         both = ma[INVERSE_MASS] * mb[INVERSE_MASS]
-        stiff = where_greater(both, zero, spread(lanes, soft[0, 0]), spread(lanes, soft[1, 0]))
-        hard = where_greater(both, zero, spread(lanes, soft[0, 1]), spread(lanes, soft[1, 1]))
-        store_three(record, o + STIFF * w, w, stiff, hard, where_greater(both, zero, spread(lanes, soft[0, 2]), spread(lanes, soft[1, 2])))
-        store(record, o + DEPTH * w, second[SKIN - ROW] * stiff * spread(lanes, DEEPEST))
-        _couple(lanes, record, o, batches.points[k], ma, mb, arm_a, arm_b, n, t, u)
+        stiff = where_greater(both, zero, spread(simd, soft[0, 0]), spread(simd, soft[1, 0]))
+        hard = where_greater(both, zero, spread(simd, soft[0, 1]), spread(simd, soft[1, 1]))
+        store_three(record, o + STIFF * w, w, stiff, hard, where_greater(both, zero, spread(simd, soft[0, 2]), spread(simd, soft[1, 2])))
+        store(record, o + DEPTH * w, second[SKIN - ROW] * stiff * spread(simd, DEEPEST))
+        _couple(simd, record, o, batches.points[k], ma, mb, arm_a, arm_b, n, t, u)
 
 
 @inlined
-def _couple(lanes, record, o, points, ma, mb, arm_a, arm_b, n, t, u):
+def _couple(simd, record, o, points, ma, mb, arm_a, arm_b, n, t, u):
     """Effective masses and couplings: entries of K and M along (t_1, t_2, n), turns about them numbered 4 to 6."""
-    w = width_of(lanes)
-    one, tiny, half = spread(lanes, 1.0), spread(lanes, TINY), spread(lanes, 0.5)
+    w = width_of(simd)
+    one, tiny, half = spread(simd, 1.0), spread(simd, TINY), spread(simd, 0.5)
     im = ma[INVERSE_MASS] + mb[INVERSE_MASS]
     turning = (ma[0] + mb[0], ma[1] + mb[1], ma[2] + mb[2], ma[3] + mb[3], ma[4] + mb[4], ma[5] + mb[5])
     at_t, at_u, at_n = times(turning, t), times(turning, u), times(turning, n)
@@ -253,51 +253,51 @@ def _couple(lanes, record, o, points, ma, mb, arm_a, arm_b, n, t, u):
     store_three(record, o + TO_TURN_2 * w, w, k15, k25, k56)
     store(record, o + TWIST_TO_1 * w, k16)
     store(record, o + TWIST_TO_2 * w, k26)
-    _couple_points(lanes, record, o, points, k33, k34, k35, k44, k45, k55)
+    _couple_points(simd, record, o, points, k33, k34, k35, k44, k45, k55)
 
 
 @inlined
-def _couple_points(lanes, record, o, points, k33, k34, k35, k44, k45, k55):
+def _couple_points(simd, record, o, points, k33, k34, k35, k44, k45, k55):
     """Effective masses of the points along n, and how they push each other."""
-    w = width_of(lanes)
-    tiny = spread(lanes, TINY)
+    w = width_of(simd)
+    tiny = spread(simd, TINY)
     for c in range(points):
         g = o + (POINT + POINT_SIZE * c) * w
-        x, y = load(lanes, record, g + X * w), load(lanes, record, g + Y * w)
+        x, y = load(simd, record, g + X * w), load(simd, record, g + Y * w)
         own = k33 + (y + y) * k34 - (x + x) * k35 + y * y * k44 - (x + x) * y * k45 + x * x * k55
-        store(record, g + MASS * w, load(lanes, record, g + MASS * w) / (own + tiny))
+        store(record, g + MASS * w, load(simd, record, g + MASS * w) / (own + tiny))
         # Pairs before those of this point: 3 + 2 + 1 of them in all.
         place = o + (BETWEEN + c * (2 * POINTS - 1 - c) // 2) * w
         for d in range(c + 1, points):
             q = o + (POINT + POINT_SIZE * d) * w
-            x1, y1 = load(lanes, record, q + X * w), load(lanes, record, q + Y * w)
+            x1, y1 = load(simd, record, q + X * w), load(simd, record, q + Y * w)
             store(record, place, k33 + (y + y1) * k34 - (x + x1) * k35 + y * y1 * k44 - fma(x, y1, x1 * y) * k45 + x * x1 * k55)
             place += w
 
 
 @jit
-def keep_impulses(lanes, batches, number, lines):
+def keep_impulses(simd, batches, number, lines):
     """Put the impulses of `number` batches back to their rows: friction as forces at the points with the same sum and twist."""
-    w = width_of(lanes)
-    record, zero, one, tiny = batches.record, spread(lanes, 0.0), spread(lanes, 1.0), spread(lanes, TINY)
+    w = width_of(simd)
+    record, zero, one, tiny = batches.record, spread(simd, 0.0), spread(simd, 1.0), spread(simd, TINY)
     for k in range(number):
         o, square, size = k * FIELDS * w, zero, zero
-        f1, f2, twist = three(lanes, record, o + PUSH_1 * w)
-        t, u = three(lanes, record, o + TANGENT_1 * w), three(lanes, record, o + TANGENT_2 * w)
+        f1, f2, twist = three(simd, record, o + PUSH_1 * w)
+        t, u = three(simd, record, o + TANGENT_1 * w), three(simd, record, o + TANGENT_2 * w)
         for c in range(batches.points[k]):
             g = o + (POINT + POINT_SIZE * c) * w
-            lever = load(lanes, record, g + LEVER * w)
+            lever = load(simd, record, g + LEVER * w)
             square = fma(lever, lever, square)
-            size = size + where_greater(load(lanes, record, g + MASS * w), zero, one, zero)
+            size = size + where_greater(load(simd, record, g + MASS * w), zero, one, zero)
         turn = where_greater(square, zero, twist / (square + tiny), zero)
         share = one / where_greater(size, zero, size, one)
         f1, f2 = f1 * share, f2 * share
         for c in range(batches.points[k]):
             g = o + (POINT + POINT_SIZE * c) * w
-            mass = load(lanes, record, g + MASS * w)
-            along_1 = where_greater(mass, zero, fma(-turn, load(lanes, record, g + Y * w), f1), zero)
-            along_2 = where_greater(mass, zero, fma(turn, load(lanes, record, g + X * w), f2), zero)
-            gap = where_greater(mass, zero, load(lanes, record, g + GAP * w), zero)
+            mass = load(simd, record, g + MASS * w)
+            along_1 = where_greater(mass, zero, fma(-turn, load(simd, record, g + Y * w), f1), zero)
+            along_2 = where_greater(mass, zero, fma(turn, load(simd, record, g + X * w), f2), zero)
+            gap = where_greater(mass, zero, load(simd, record, g + GAP * w), zero)
             x, y, z = (fma(along_1, t[0], along_2 * u[0]), fma(along_1, t[1], along_2 * u[1]), fma(along_1, t[2], along_2 * u[2]))
-            press = load(lanes, record, g + PRESS * w)
+            press = load(simd, record, g + PRESS * w)
             scatter(lines[2 * ROW :], batches.row, (POINTS * k + c) * w, (press, x, y, z, gap, zero, zero, zero))

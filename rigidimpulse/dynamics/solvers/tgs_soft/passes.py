@@ -93,10 +93,10 @@ def along(a, f, b):
 
 
 @inlined
-def three(lanes, record, at):
+def three(simd, record, at):
     """The field of three at `at`."""
-    w = width_of(lanes)
-    return load(lanes, record, at), load(lanes, record, at + w), load(lanes, record, at + 2 * w)
+    w = width_of(simd)
+    return load(simd, record, at), load(simd, record, at + w), load(simd, record, at + 2 * w)
 
 
 @inlined
@@ -117,18 +117,18 @@ def store_three(record, at, w, a, b, c):
 
 
 @inlined
-def _arms(lanes, batches, k):
+def _arms(simd, batches, k):
     """The arms of batch k as they were when it was made."""
-    w = width_of(lanes)
+    w = width_of(simd)
     o = k * ARM_FIELDS * w
-    return three(lanes, batches.arm, o + ARM_A * w), three(lanes, batches.arm, o + ARM_B * w)
+    return three(simd, batches.arm, o + ARM_A * w), three(simd, batches.arm, o + ARM_B * w)
 
 
 @inlined
-def _moved_arms(lanes, arm_a, arm_b, share, xa, xb):
+def _moved_arms(simd, arm_a, arm_b, share, xa, xb):
     """The arms to O, and how far b has moved from a."""
     d = (xb[0] - xa[0], xb[1] - xa[1], xb[2] - xa[2])
-    return along(arm_a, spread(lanes, 1.0) - share, d), along(arm_b, -share, d), d
+    return along(arm_a, spread(simd, 1.0) - share, d), along(arm_b, -share, d), d
 
 
 @inlined
@@ -157,63 +157,63 @@ def sum_up(t, u, n, along_t, along_u, along_n):
 
 
 @jit
-def warm_start(lanes, batches, begin, number, velocity, moved, mass):
+def warm_start(simd, batches, begin, number, velocity, moved, mass):
     """Give bodies the impulses carried over of the batches from `begin` to `number`; moved: since these were made."""
-    w = width_of(lanes)
-    record, zero = batches.record, spread(lanes, 0.0)
+    w = width_of(simd)
+    record, zero = batches.record, spread(simd, 0.0)
     for k in range(begin, number):
         o = k * FIELDS * w
-        va, vb = gather(lanes, velocity, batches.first, k * w), gather(lanes, velocity, batches.second, k * w)
-        ma, mb = gather(lanes, mass, batches.first, k * w), gather(lanes, mass, batches.second, k * w)
-        xa, xb = gather(lanes, moved, batches.first, k * w), gather(lanes, moved, batches.second, k * w)
-        arm_a, arm_b = _arms(lanes, batches, k)
-        arm_a, arm_b, _ = _moved_arms(lanes, arm_a, arm_b, load(lanes, record, o + SHARE * w), xa, xb)
+        va, vb = gather(simd, velocity, batches.first, k * w), gather(simd, velocity, batches.second, k * w)
+        ma, mb = gather(simd, mass, batches.first, k * w), gather(simd, mass, batches.second, k * w)
+        xa, xb = gather(simd, moved, batches.first, k * w), gather(simd, moved, batches.second, k * w)
+        arm_a, arm_b = _arms(simd, batches, k)
+        arm_a, arm_b, _ = _moved_arms(simd, arm_a, arm_b, load(simd, record, o + SHARE * w), xa, xb)
         press, turn_1, turn_2 = zero, zero, zero
         for c in range(batches.points[k]):
             g = o + (POINT + POINT_SIZE * c) * w
-            p = load(lanes, record, g + PRESS * w)
+            p = load(simd, record, g + PRESS * w)
             press = press + p
-            turn_1, turn_2 = fma(p, load(lanes, record, g + Y * w), turn_1), fma(-p, load(lanes, record, g + X * w), turn_2)
-        f1 = where_greater(press, zero, load(lanes, record, o + PUSH_1 * w), zero)
-        f2 = where_greater(press, zero, load(lanes, record, o + PUSH_2 * w), zero)
-        twist = where_greater(press, zero, load(lanes, record, o + TWIST * w), zero)
+            turn_1, turn_2 = fma(p, load(simd, record, g + Y * w), turn_1), fma(-p, load(simd, record, g + X * w), turn_2)
+        f1 = where_greater(press, zero, load(simd, record, o + PUSH_1 * w), zero)
+        f2 = where_greater(press, zero, load(simd, record, o + PUSH_2 * w), zero)
+        twist = where_greater(press, zero, load(simd, record, o + TWIST * w), zero)
         store_three(record, o + PUSH_1 * w, w, f1, f2, twist)
-        n = three(lanes, record, o + NORMAL * w)
-        t, u = three(lanes, record, o + TANGENT_1 * w), three(lanes, record, o + TANGENT_2 * w)
+        n = three(simd, record, o + NORMAL * w)
+        t, u = three(simd, record, o + TANGENT_1 * w), three(simd, record, o + TANGENT_2 * w)
         f, torque = sum_up(t, u, n, f1, f2, press), sum_up(t, u, n, turn_1, turn_2, twist)
         _push(velocity, batches, k * w, va, vb, ma, mb, arm_a, arm_b, f, torque)
 
 
 @inlined
-def _clamp(lanes, x, limit):
+def _clamp(simd, x, limit):
     x = where_greater(x, limit, limit, x)
     return where_greater(-limit, x, -limit, x)
 
 
 @inlined
-def _rub(lanes, record, o, points, u1, u2, w3):
+def _rub(simd, record, o, points, u1, u2, w3):
     """Friction of a patch with slip (u1, u2) and spin w3 about n: the changes of its impulses along t_1, t_2 and about n."""
-    w = width_of(lanes)
-    zero, one = spread(lanes, 0.0), spread(lanes, 1.0)
+    w = width_of(simd)
+    zero, one = spread(simd, 0.0), spread(simd, 1.0)
     press, lever = zero, zero
     for c in range(points):
         g = o + (POINT + POINT_SIZE * c) * w
-        p = load(lanes, record, g + PRESS * w)
-        press, lever = press + p, fma(p, load(lanes, record, g + LEVER * w), lever)
-    static, dynamic = load(lanes, record, o + MU_STATIC * w), load(lanes, record, o + MU_DYNAMIC * w)
-    old = load(lanes, record, o + TWIST * w)
-    free = fma(-load(lanes, record, o + STEP_N * w), w3, old)
+        p = load(simd, record, g + PRESS * w)
+        press, lever = press + p, fma(p, load(simd, record, g + LEVER * w), lever)
+    static, dynamic = load(simd, record, o + MU_STATIC * w), load(simd, record, o + MU_DYNAMIC * w)
+    old = load(simd, record, o + TWIST * w)
+    free = fma(-load(simd, record, o + STEP_N * w), w3, old)
     size = where_greater(free, zero, free, -free)
-    new = where_greater(size, static * lever, _clamp(lanes, free, dynamic * lever), free)
+    new = where_greater(size, static * lever, _clamp(simd, free, dynamic * lever), free)
     store(record, o + TWIST * w, new)
     d3 = new - old
-    u1 = fma(load(lanes, record, o + TWIST_TO_1 * w), d3, u1)
-    u2 = fma(load(lanes, record, o + TWIST_TO_2 * w), d3, u2)
-    old_1, old_2 = load(lanes, record, o + PUSH_1 * w), load(lanes, record, o + PUSH_2 * w)
-    step = load(lanes, record, o + STEP_T * w)
+    u1 = fma(load(simd, record, o + TWIST_TO_1 * w), d3, u1)
+    u2 = fma(load(simd, record, o + TWIST_TO_2 * w), d3, u2)
+    old_1, old_2 = load(simd, record, o + PUSH_1 * w), load(simd, record, o + PUSH_2 * w)
+    step = load(simd, record, o + STEP_T * w)
     f1, f2 = fma(-step, u1, old_1), fma(-step, u2, old_2)
     square, most = fma(f1, f1, f2 * f2), static * press
-    factor = where_greater(square, most * most, dynamic * press / root(square + spread(lanes, TINY * TINY)), one)
+    factor = where_greater(square, most * most, dynamic * press / root(square + spread(simd, TINY * TINY)), one)
     f1, f2 = f1 * factor, f2 * factor
     store(record, o + PUSH_1 * w, f1)
     store(record, o + PUSH_2 * w, f2)
@@ -221,17 +221,17 @@ def _rub(lanes, record, o, points, u1, u2, w3):
 
 
 @inlined
-def _press(lanes, record, g, speed, gap, relaxing, per_h, stiff, hard, soft, deepest):
+def _press(simd, record, g, speed, gap, relaxing, per_h, stiff, hard, soft, deepest):
     """Normal impulse of the points at g that approach at -speed, in m/s; returns its change."""
-    w = width_of(lanes)
-    zero = spread(lanes, 0.0)
-    mass, old = load(lanes, record, g + MASS * w), load(lanes, record, g + PRESS * w)
+    w = width_of(simd)
+    zero = spread(simd, 0.0)
+    mass, old = load(simd, record, g + MASS * w), load(simd, record, g + PRESS * w)
     if relaxing:
         new = fma(-mass, fma(where_greater(gap, zero, gap, zero), per_h, speed), old)
     else:
         spring = where_greater(stiff * gap, -deepest, stiff * gap, -deepest)
         bias = where_greater(gap, zero, gap * per_h, spring)
-        share = where_greater(gap, zero, spread(lanes, 1.0), hard)
+        share = where_greater(gap, zero, spread(simd, 1.0), hard)
         kept = where_greater(gap, zero, zero, soft)
         new = fma(-(mass * share), speed + bias, fma(-kept, old, old))
     new = where_greater(new, zero, new, zero)
@@ -248,26 +248,26 @@ def _turned_normal(theta, n, half):
 
 
 @jit
-def solve(lanes, batches, begin, number, velocity, moved, mass, h, relaxing):
+def solve(simd, batches, begin, number, velocity, moved, mass, h, relaxing):
     """One pass over the batches from `begin` to `number`; moved: since these were made.
 
     relaxing: the one with friction and without springs, after the bodies have moved.
     """
-    w = width_of(lanes)
-    record, zero, per_h, half = batches.record, spread(lanes, 0.0), spread(lanes, 1.0 / h), spread(lanes, 0.5)
+    w = width_of(simd)
+    record, zero, per_h, half = batches.record, spread(simd, 0.0), spread(simd, 1.0 / h), spread(simd, 0.5)
     for k in range(begin, number):
         o, points = k * FIELDS * w, batches.points[k]
-        va, vb = gather(lanes, velocity, batches.first, k * w), gather(lanes, velocity, batches.second, k * w)
-        xa, xb = gather(lanes, moved, batches.first, k * w), gather(lanes, moved, batches.second, k * w)
-        n = three(lanes, record, o + NORMAL * w)
-        t, u = three(lanes, record, o + TANGENT_1 * w), three(lanes, record, o + TANGENT_2 * w)
-        arm_a, arm_b = _arms(lanes, batches, k)
+        va, vb = gather(simd, velocity, batches.first, k * w), gather(simd, velocity, batches.second, k * w)
+        xa, xb = gather(simd, moved, batches.first, k * w), gather(simd, moved, batches.second, k * w)
+        n = three(simd, record, o + NORMAL * w)
+        t, u = three(simd, record, o + TANGENT_1 * w), three(simd, record, o + TANGENT_2 * w)
+        arm_a, arm_b = _arms(simd, batches, k)
         # How the gap has changed: at O, and from there along t_1 and t_2.
         ga, gb = _turned_normal(angular(xa), n, half), _turned_normal(angular(xb), n, half)
-        core_a = along(arm_a, -load(lanes, record, o + RADIUS_A * w), n)
-        core_b = along(arm_b, load(lanes, record, o + RADIUS_B * w), n)
-        arm_a, arm_b, d = _moved_arms(lanes, arm_a, arm_b, load(lanes, record, o + SHARE * w), xa, xb)
-        at_o = dot(n, d) + (dot(gb, core_b) - dot(ga, core_a))
+        skeleton_a = along(arm_a, -load(simd, record, o + RADIUS_A * w), n)
+        skeleton_b = along(arm_b, load(simd, record, o + RADIUS_B * w), n)
+        arm_a, arm_b, d = _moved_arms(simd, arm_a, arm_b, load(simd, record, o + SHARE * w), xa, xb)
+        at_o = dot(n, d) + (dot(gb, skeleton_b) - dot(ga, skeleton_a))
         between = less(gb, ga)
         slope_1, slope_2 = dot(t, between), dot(u, between)
         # Relative velocity at O and relative spin, along the axes.
@@ -276,46 +276,46 @@ def solve(lanes, batches, begin, number, velocity, moved, mass, h, relaxing):
         un, w1, w2 = dot(n, slip), dot(t, spin), dot(u, spin)
         f1, f2, f3 = zero, zero, zero
         if relaxing:
-            f1, f2, f3 = _rub(lanes, record, o, points, dot(t, slip), dot(u, slip), dot(n, spin))
-            un = _coupled(lanes, record, o + TO_NORMAL * w, f1, f2, f3, un)
-            w1 = _coupled(lanes, record, o + TO_TURN_1 * w, f1, f2, f3, w1)
-            w2 = _coupled(lanes, record, o + TO_TURN_2 * w, f1, f2, f3, w2)
-        press, turn_1, turn_2 = _press_points(lanes, record, o, points, un, w1, w2, at_o, slope_1, slope_2, relaxing, per_h)
-        ma, mb = gather(lanes, mass, batches.first, k * w), gather(lanes, mass, batches.second, k * w)
+            f1, f2, f3 = _rub(simd, record, o, points, dot(t, slip), dot(u, slip), dot(n, spin))
+            un = _coupled(simd, record, o + TO_NORMAL * w, f1, f2, f3, un)
+            w1 = _coupled(simd, record, o + TO_TURN_1 * w, f1, f2, f3, w1)
+            w2 = _coupled(simd, record, o + TO_TURN_2 * w, f1, f2, f3, w2)
+        press, turn_1, turn_2 = _press_points(simd, record, o, points, un, w1, w2, at_o, slope_1, slope_2, relaxing, per_h)
+        ma, mb = gather(simd, mass, batches.first, k * w), gather(simd, mass, batches.second, k * w)
         f, torque = sum_up(t, u, n, f1, f2, press), sum_up(t, u, n, turn_1, turn_2, f3)
         _push(velocity, batches, k * w, va, vb, ma, mb, arm_a, arm_b, f, torque)
 
 
 @inlined
-def _coupled(lanes, record, at, f1, f2, f3, speed):
-    c = three(lanes, record, at)
+def _coupled(simd, record, at, f1, f2, f3, speed):
+    c = three(simd, record, at)
     return fma(c[0], f1, fma(c[1], f2, fma(c[2], f3, speed)))
 
 
 @inlined
-def _press_points(lanes, record, o, points, un, w1, w2, at_o, slope_1, slope_2, relaxing, per_h):
+def _press_points(simd, record, o, points, un, w1, w2, at_o, slope_1, slope_2, relaxing, per_h):
     """Normal impulses of the points of a patch; returns the sum of their changes along n and its torque about t_1 and t_2."""
-    w = width_of(lanes)
-    zero = spread(lanes, 0.0)
-    stiff, hard = load(lanes, record, o + STIFF * w), load(lanes, record, o + HARD * w)
-    soft, deepest = load(lanes, record, o + SOFT * w), load(lanes, record, o + DEPTH * w)
+    w = width_of(simd)
+    zero = spread(simd, 0.0)
+    stiff, hard = load(simd, record, o + STIFF * w), load(simd, record, o + HARD * w)
+    soft, deepest = load(simd, record, o + SOFT * w), load(simd, record, o + DEPTH * w)
     press, turn_1, turn_2 = zero, zero, zero
     p0, p1, p2 = zero, zero, zero
     for c in range(points):
         g = o + (POINT + POINT_SIZE * c) * w
-        x, y = load(lanes, record, g + X * w), load(lanes, record, g + Y * w)
-        gap = load(lanes, record, g + GAP * w) + (at_o + fma(x, slope_1, y * slope_2))
+        x, y = load(simd, record, g + X * w), load(simd, record, g + Y * w)
+        gap = load(simd, record, g + GAP * w) + (at_o + fma(x, slope_1, y * slope_2))
         speed = fma(y, w1, fma(-x, w2, un))
         if c == 1:
-            speed = fma(load(lanes, record, o + BETWEEN * w), p0, speed)
+            speed = fma(load(simd, record, o + BETWEEN * w), p0, speed)
         elif c == 2:
-            speed = fma(load(lanes, record, o + (BETWEEN + 1) * w), p0, speed)
-            speed = fma(load(lanes, record, o + (BETWEEN + 3) * w), p1, speed)
+            speed = fma(load(simd, record, o + (BETWEEN + 1) * w), p0, speed)
+            speed = fma(load(simd, record, o + (BETWEEN + 3) * w), p1, speed)
         elif c == 3:
-            speed = fma(load(lanes, record, o + (BETWEEN + 2) * w), p0, speed)
-            speed = fma(load(lanes, record, o + (BETWEEN + 4) * w), p1, speed)
-            speed = fma(load(lanes, record, o + (BETWEEN + 5) * w), p2, speed)
-        change = _press(lanes, record, g, speed, gap, relaxing, per_h, stiff, hard, soft, deepest)
+            speed = fma(load(simd, record, o + (BETWEEN + 2) * w), p0, speed)
+            speed = fma(load(simd, record, o + (BETWEEN + 4) * w), p1, speed)
+            speed = fma(load(simd, record, o + (BETWEEN + 5) * w), p2, speed)
+        change = _press(simd, record, g, speed, gap, relaxing, per_h, stiff, hard, soft, deepest)
         if c == 0:
             p0 = change
         elif c == 1:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.contact_cache import GENERAL
-from rigidimpulse.collision.contact_records import CORE_A, CORE_B, HELD, INVERSE_MASS, ROUND_A, ROUND_B, in_play, turned
+from rigidimpulse.collision.contact_records import HELD, INVERSE_MASS, ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, in_play, turned
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.simd import ROW, aligned
@@ -48,7 +48,7 @@ PATCHES_OF_A_BODY = 8
 """For so many there is room at first: what is reserved takes no memory before it is touched."""
 COLOURS = 62
 """Patches that find no colour among these have a batch each."""
-ONE_WALL = 1.0 - 1e-8
+ONE_PATCH = 1.0 - 1e-8
 """Cosine of normals that are one."""
 
 
@@ -105,7 +105,7 @@ def more_batches(batches: Batches, b: int, width: int) -> Batches:
 def list_patches(bodies, pairs, rows, patches, begin):
     """Write the patches of pairs in play of quick bodies from place `begin` on; returns where they end, negative without room."""
     m = begin
-    room, part, quick = patches.pair.shape[0], bodies.part, bodies.quick
+    capacity, part, quick = patches.pair.shape[0], bodies.part, bodies.quick
     taken = np.zeros(64, np.bool_)
     for p in range(pairs.first.shape[0]):
         count = min(pairs.count[p], 64)
@@ -114,7 +114,7 @@ def list_patches(bodies, pairs, rows, patches, begin):
             continue
         start = pairs.start[p]
         if pairs.kind[p] != GENERAL:
-            if m < room:
+            if m < capacity:
                 patches.pair[m], patches.size[m] = p, count
                 for c in range(count):
                     patches.row[m, c] = start + c
@@ -128,15 +128,15 @@ def list_patches(bodies, pairs, rows, patches, begin):
             for d in range(c, count):
                 i, j = start + c, start + d
                 cosine = rows[i, 0] * rows[j, 0] + rows[i, 1] * rows[j, 1] + rows[i, 2] * rows[j, 2]
-                if size < POINTS and not taken[d] and (d == c or cosine > ONE_WALL):
+                if size < POINTS and not taken[d] and (d == c or cosine > ONE_PATCH):
                     taken[d] = True
-                    if m < room:
+                    if m < capacity:
                         patches.row[m, size] = j
                     size += 1
-            if m < room:
+            if m < capacity:
                 patches.pair[m], patches.size[m] = p, size
             m += 1
-    return m if m <= room else -m
+    return m if m <= capacity else -m
 
 
 @jit
@@ -232,8 +232,8 @@ def tangents(nx, ny, nz):
 @jit
 def point_of(position, rotation, rows, r, a, b, nx, ny, nz, share):
     """Where the impulses of row r act, from the centre of a, and the gap less the held one, m."""
-    ax, ay, az = turned(rotation, a, rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2])
-    bx, by, bz = turned(rotation, b, rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2])
+    ax, ay, az = turned(rotation, a, rows[r, SKELETON_A], rows[r, SKELETON_A + 1], rows[r, SKELETON_A + 2])
+    bx, by, bz = turned(rotation, b, rows[r, SKELETON_B], rows[r, SKELETON_B + 1], rows[r, SKELETON_B + 2])
     bx += position[b, 0] - position[a, 0]
     by += position[b, 1] - position[a, 1]
     bz += position[b, 2] - position[a, 2]
@@ -249,8 +249,8 @@ def point_of(position, rotation, rows, r, a, b, nx, ny, nz, share):
 def normal_of(position, rotation, rows, r, a, b, carrier):
     """The world normal of row r of bodies a and b; that of two rounded surfaces runs between their centres."""
     if rows[r, ROUND_A] > 0.0 and rows[r, ROUND_B] > 0.0:
-        ax, ay, az = turned(rotation, a, rows[r, CORE_A], rows[r, CORE_A + 1], rows[r, CORE_A + 2])
-        bx, by, bz = turned(rotation, b, rows[r, CORE_B], rows[r, CORE_B + 1], rows[r, CORE_B + 2])
+        ax, ay, az = turned(rotation, a, rows[r, SKELETON_A], rows[r, SKELETON_A + 1], rows[r, SKELETON_A + 2])
+        bx, by, bz = turned(rotation, b, rows[r, SKELETON_B], rows[r, SKELETON_B + 1], rows[r, SKELETON_B + 2])
         x = position[b, 0] + bx - position[a, 0] - ax
         y = position[b, 1] + by - position[a, 1] - ay
         z = position[b, 2] + bz - position[a, 2] - az

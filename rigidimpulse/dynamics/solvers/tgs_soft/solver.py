@@ -304,48 +304,48 @@ def _extent(bodies, edges, phase, colour):
 
 
 @jit
-def _work_on(lanes, bodies, batches, calm, h, phase, colour, begin, end):
+def _work_on(simd, bodies, batches, calm, h, phase, colour, begin, end):
     """A piece of a round; calm: colours of batches that were made before the last look."""
     moved = bodies.drift if colour < calm else bodies.moved
     if phase == KICK:
         kick(bodies, begin, end, h)
     elif phase == WARM:
-        warm_start(lanes, batches, begin, end, bodies.velocity, moved, bodies.mass)
+        warm_start(simd, batches, begin, end, bodies.velocity, moved, bodies.mass)
     elif phase == MOVE:
         move(bodies, begin, end, h)
     else:
-        solve(lanes, batches, begin, end, bodies.velocity, moved, bodies.mass, h, phase == RELAX)
+        solve(simd, batches, begin, end, bodies.velocity, moved, bodies.mass, h, phase == RELAX)
 
 
 @jit
-def _lead(lanes, bodies, batches, edges, calm, h, deck, is_shared, number):
+def _lead(simd, bodies, batches, edges, calm, h, work_queue, is_shared, number):
     """Work on a round until it is done."""
     phase, colour = _round(number, edges.shape[0] - 1)
     begin, end, each, pieces = _extent(bodies, edges, phase, colour)
     if not is_shared or pieces < 2:
-        _work_on(lanes, bodies, batches, calm, h, phase, colour, begin, end)
+        _work_on(simd, bodies, batches, calm, h, phase, colour, begin, end)
         return
-    open_round(deck, number)
+    open_round(work_queue, number)
     mine = 0
     while True:
-        _, taken = take_piece(deck)
+        _, taken = take_piece(work_queue)
         if taken >= pieces:
             break
         first = begin + mine * each
-        _work_on(lanes, bodies, batches, calm, h, phase, colour, first, min(first + each, end))
+        _work_on(simd, bodies, batches, calm, h, phase, colour, first, min(first + each, end))
         mine += 1
-    wait_for(deck, pieces - mine)
+    wait_for(work_queue, pieces - mine)
 
 
 @jit
-def _help(lanes, bodies, batches, edges, calm, h, deck):
+def _help(simd, bodies, batches, edges, calm, h, work_queue):
     """Work on whatever round is open, to the last."""
     waited, colours, mine, last = 0, edges.shape[0] - 1, 0, NONE
     while waited < PATIENCE:
-        number, taken = look_at(deck)
+        number, taken = look_at(work_queue)
         if number >= 0 and number != LAST and taken < _extent(bodies, edges, *_round(number, colours))[3]:
             # Another round may be open by now.
-            number, taken = take_piece(deck)
+            number, taken = take_piece(work_queue)
         if number == LAST:
             return
         waited += 1
@@ -356,34 +356,35 @@ def _help(lanes, bodies, batches, edges, calm, h, deck):
                 mine = mine + 1 if number == last else 1
                 last, waited = number, 0
                 first = begin + (pieces - mine) * each
-                _work_on(lanes, bodies, batches, calm, h, phase, colour, first, min(first + each, end))
-                report_piece(deck)
+                _work_on(simd, bodies, batches, calm, h, phase, colour, first, min(first + each, end))
+                report_piece(work_queue)
         pause()
 
 
 @jit
 def advance(
-    lanes, bodies, pairs, patches, batches, edges, calm, rows, lists, balls, rebounds, supports, target, sub_steps, h, deck, share, shares
+    simd, bodies, pairs, patches, batches, edges, calm, rows, lists, balls, rebounds, supports, target, sub_steps, h, work_queue, share,
+    shares,
 ):
     """So many sub-steps of length h; returns the work of moving supports, J.
 
     edges (c+1,): where the batches of colours begin; calm: how many colours were made before the last look; what bodies have come since
     then is in `drift`. share: 0 for who leads, 1 for who helps, if `shares` is 2, see `heap_team`.
     """
-    width, colours, work = width_of(lanes), edges.shape[0] - 1, 0.0
+    width, colours, work = width_of(simd), edges.shape[0] - 1, 0.0
     if share > 0:
-        _help(lanes, bodies, batches, edges, calm, h, deck)
+        _help(simd, bodies, batches, edges, calm, h, work_queue)
         return 0.0
     for s in range(sub_steps):
         first = s * (3 * colours + 2)
         for k in range(2 * colours + 2):
-            _lead(lanes, bodies, batches, edges, calm, h, deck, shares > 1, first + k)
+            _lead(simd, bodies, batches, edges, calm, h, work_queue, shares > 1, first + k)
         _turn_balls(width, bodies, pairs, patches, lists[0, :balls], rows, batches)
         for k in range(2 * colours + 2, 3 * colours + 2):
-            _lead(lanes, bodies, batches, edges, calm, h, deck, shares > 1, first + k)
+            _lead(simd, bodies, batches, edges, calm, h, work_queue, shares > 1, first + k)
         # Whatever a rebound takes from the impulses has acted already.
         work += _work_of(width, bodies, patches, lists[2, :supports], batches)
         work += _rebound(width, bodies, patches, lists[1, :rebounds], batches, target)
-    open_round(deck, LAST)
+    open_round(work_queue, LAST)
     finish(bodies)
     return work

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flexible_scene import Run, anchor_scene, cube_mesh, sheet_mesh, spring_net
+from flexible_scene import Run, anchor_scene, cube_mesh, sheet_mesh, spring_mesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import fsolve
@@ -24,15 +24,15 @@ def chain_period(scheme: str, mode: int, steps: int) -> tuple[float, float]:
     """Error of the period of a mode of the chain, relative to the law's, and its amplitude after one period."""
     x = np.column_stack([np.arange(N + 2.0), np.zeros(N + 2), np.zeros(N + 2)])
     springs = np.column_stack([np.arange(N + 1), np.arange(1, N + 2)])
-    run = Run(anchor_scene(spring_net(x, M, springs, K, pinned=(0, N + 1)), gravity=(0, 0, 0)), scheme=scheme, tolerance=1e-12)
+    run = Run(anchor_scene(spring_mesh(x, M, springs, K, pinned=(0, N + 1)), gravity=(0, 0, 0)), scheme=scheme, tolerance=1e-12)
     shape = np.sin(mode * np.pi * np.arange(N + 2) / (N + 1))
     shape[[0, -1]] = 0.0
     period = np.pi / np.sqrt(K / M) / np.sin(mode * np.pi / (2 * (N + 1)))
-    run.nets.position[:, 0] += 0.01 * shape
+    run.soft_bodies.position[:, 0] += 0.01 * shape
     h, amplitude = period / steps, [1.0]
     for _ in range(3 * steps // 2):
         run.step(h)
-        amplitude.append(float((run.nets.position[:, 0] - x[:, 0]) @ shape) / float(shape @ shape) / 0.01)
+        amplitude.append(float((run.soft_bodies.position[:, 0] - x[:, 0]) @ shape) / float(shape @ shape) / 0.01)
     q = np.array(amplitude)
     falls = np.flatnonzero((q[:-1] > 0.0) & (q[1:] <= 0.0))
     zeros = h * (falls + q[falls] / (q[falls] - q[falls + 1]))
@@ -58,15 +58,15 @@ def test_order_of_the_schemes() -> None:
 def test_damping_ratio() -> None:
     """Two masses on a spring with c = tau k: amplitudes fall by exp(-tau w^2 t / 2), w^2 = 2 k / m."""
     tau, w = 0.004, np.sqrt(2.0 * K / M)
-    net = spring_net([[0, 0, 0], [1, 0, 0]], M, [[0, 1]], K, damping=tau)
-    run = Run(anchor_scene(net, gravity=(0, 0, 0)), scheme="midpoint", tolerance=1e-12)
-    run.nets.velocity[:] = [[-0.1, 0, 0], [0.1, 0, 0]]
-    start = run.nets.energy()
+    soft_body = spring_mesh([[0, 0, 0], [1, 0, 0]], M, [[0, 1]], K, damping=tau)
+    run = Run(anchor_scene(soft_body, gravity=(0, 0, 0)), scheme="midpoint", tolerance=1e-12)
+    run.soft_bodies.velocity[:] = [[-0.1, 0, 0], [0.1, 0, 0]]
+    start = run.soft_bodies.energy()
     h = 2.0 * np.pi / w / 200
     for _ in range(400):
         run.step(h)
     expected = np.exp(-tau * w * w * 400 * h)
-    assert run.nets.energy() / start == pytest.approx(expected, rel=2e-3)  # (w h)^2 = 1e-3; no damping at all: 1, expected 0.0065
+    assert run.soft_bodies.energy() / start == pytest.approx(expected, rel=2e-3)  # (w h)^2 = 1e-3; no damping at all: 1, expected 0.0065
 
 
 @settings(max_examples=25, deadline=None)
@@ -76,19 +76,19 @@ def test_energy_never_grows(seed: int, stiffness: float, scheme: str) -> None:
     n, h = 10, 1.0 / 60.0
     x, mass = rng.normal(size=(n, 3)), rng.uniform(0.1, 1.0, n)
     springs = [(i, j) for i in range(n) for j in range(i) if j == i - 1 or rng.random() < 0.4]
-    run = Run(anchor_scene(spring_net(x, mass, springs, stiffness * mass.min() / h**2), gravity=(0, 0, 0)), scheme=scheme)
-    run.nets.velocity += 3.0 * rng.normal(size=x.shape)
-    run.nets.position += 0.3 * rng.normal(size=x.shape)
-    energy = [run.nets.energy()]
-    momentum = mass @ run.nets.velocity
-    angular = (mass[:, None] * np.cross(run.nets.position, run.nets.velocity)).sum(0)
+    run = Run(anchor_scene(spring_mesh(x, mass, springs, stiffness * mass.min() / h**2), gravity=(0, 0, 0)), scheme=scheme)
+    run.soft_bodies.velocity += 3.0 * rng.normal(size=x.shape)
+    run.soft_bodies.position += 0.3 * rng.normal(size=x.shape)
+    energy = [run.soft_bodies.energy()]
+    momentum = mass @ run.soft_bodies.velocity
+    angular = (mass[:, None] * np.cross(run.soft_bodies.position, run.soft_bodies.velocity)).sum(0)
     for _ in range(10):
         run.step(h)
-        energy.append(run.nets.energy())
+        energy.append(run.soft_bodies.energy())
     assert np.all(np.diff(energy) <= 1e-12 * energy[0])
-    scale = mass @ np.linalg.norm(x, axis=1) * np.abs(run.nets.velocity).max() + np.abs(angular).max()
-    np.testing.assert_allclose(mass @ run.nets.velocity, momentum, rtol=0, atol=1e-12 * scale)
-    now = (mass[:, None] * np.cross(run.nets.position, run.nets.velocity)).sum(0)
+    scale = mass @ np.linalg.norm(x, axis=1) * np.abs(run.soft_bodies.velocity).max() + np.abs(angular).max()
+    np.testing.assert_allclose(mass @ run.soft_bodies.velocity, momentum, rtol=0, atol=1e-12 * scale)
+    now = (mass[:, None] * np.cross(run.soft_bodies.position, run.soft_bodies.velocity)).sum(0)
     np.testing.assert_allclose(now, angular, rtol=0, atol=1e-12 * scale)
 
 
@@ -97,52 +97,52 @@ def test_rest_is_kept_to_the_bit(scheme: str) -> None:
     cloth = FlexibleBody("cloth", *sheet_mesh(5), stiffness=1e4, bending=0.1, mass=0.3, damping=0.01, orientation=(1, 2, 3, 4))
     cube = FlexibleBody("cube", *cube_mesh(4), stiffness=1e4, inner_stiffness=1e6, position=(3, 0, 0))
     run = Run(anchor_scene(cloth, cube, gravity=(0, 0, 0)), scheme=scheme)
-    start = run.nets.position.copy()
+    start = run.soft_bodies.position.copy()
     for _ in range(20):
         run.step(1.0 / 60.0)
-    np.testing.assert_array_equal(run.nets.position, start)
-    assert not run.nets.velocity.any()
+    np.testing.assert_array_equal(run.soft_bodies.position, start)
+    assert not run.soft_bodies.velocity.any()
 
 
 def test_free_net_falls_and_turns_with_its_momenta() -> None:
     """P = P0 + M g t to 1e-13; its angular momentum about its centre stays, to 1e-12: plain implicit Euler loses a tenth in 1 s here."""
     body = FlexibleBody("cube", *cube_mesh(4), stiffness=1e3, inner_stiffness=1e4, velocity=(1, 2, 3), angular_velocity=(1, 2, 0.5))
     run = Run(anchor_scene(body))
-    mass, total = run.nets.net.mass, run.nets.net.mass.sum()
+    mass, total = run.soft_bodies.soft_body.mass, run.soft_bodies.soft_body.mass.sum()
 
     def spin() -> np.ndarray:
-        x, v = run.nets.position, run.nets.velocity
+        x, v = run.soft_bodies.position, run.soft_bodies.velocity
         return (mass[:, None] * np.cross(x - mass @ x / total, v)).sum(0)
 
-    start, momentum = spin(), mass @ run.nets.velocity
+    start, momentum = spin(), mass @ run.soft_bodies.velocity
     for _ in range(60):
         run.step(1.0 / 60.0)
     expected = momentum + total * np.array([0.0, 0.0, -9.81])
-    np.testing.assert_allclose(mass @ run.nets.velocity, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+    np.testing.assert_allclose(mass @ run.soft_bodies.velocity, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
     np.testing.assert_allclose(spin(), start, rtol=0, atol=1e-12 * np.abs(start).max())
 
 
 def test_midpoint_rule_falls_on_the_parabola() -> None:
     run = Run(anchor_scene(FlexibleBody("cloth", *sheet_mesh(4), stiffness=1e3, mass=0.3, velocity=(1, 0, 2))), scheme="midpoint")
-    mass = run.nets.net.mass
-    start = mass @ run.nets.position / mass.sum()
+    mass = run.soft_bodies.soft_body.mass
+    start = mass @ run.soft_bodies.position / mass.sum()
     for _ in range(30):
         run.step(1.0 / 60.0)
-    place = mass @ run.nets.position / mass.sum()
+    place = mass @ run.soft_bodies.position / mass.sum()
     np.testing.assert_allclose(place, start + [0.5, 0.0, 1.0 - 0.125 * 9.81], rtol=0, atol=1e-12)
 
 
 def test_gradient_is_that_of_the_energy() -> None:
     """Springs and hinges, at a crumpled sheet, against central differences: 1e-6 m of 0.2 m leave 1e-10 of the force."""
     x, faces = sheet_mesh(5)
-    net = sheet(x, faces, 1.0, 100.0, 0.3, 0.0, 0.0)
+    soft_body = sheet(x, faces, 1.0, 100.0, 0.3, 0.0, 0.0)
     y, e = x + 0.05 * np.random.default_rng(0).normal(size=x.shape), 1e-6
     numeric = np.zeros_like(y)
     for i, k in np.ndindex(y.shape):
         step = np.zeros_like(y)
         step[i, k] = e
-        numeric[i, k] = (net.energy(y + step) - net.energy(y - step)) / (2.0 * e)
-    np.testing.assert_allclose(net.gradient(y), numeric, rtol=0, atol=1e-8 * np.abs(numeric).max())
+        numeric[i, k] = (soft_body.energy(y + step) - soft_body.energy(y - step)) / (2.0 * e)
+    np.testing.assert_allclose(soft_body.gradient(y), numeric, rtol=0, atol=1e-8 * np.abs(numeric).max())
     alone = sheet(x, faces, 1.0, 1e-9, 0.3, 0.0, 0.0)  # hinges only
     assert np.abs(alone.gradient(y)).max() > 0.1
 
@@ -152,8 +152,8 @@ def test_sheet_has_its_stiffness_whatever_the_mesh() -> None:
     forces = []
     for n in (6, 11, 21):
         x, faces = sheet_mesh(n)
-        net = sheet(x, faces, 1.0, 100.0, 0.0, 0.0, 0.0)
-        pull = net.gradient(x * [1.01, 1.0, 1.0])
+        soft_body = sheet(x, faces, 1.0, 100.0, 0.0, 0.0, 0.0)
+        pull = soft_body.gradient(x * [1.01, 1.0, 1.0])
         forces.append(float(pull[x[:, 0] == 1.0, 0].sum()))
     assert max(forces) / min(forces) < 1.01  # springs of equal k each would carry n times as much
     assert 0.8 < forces[-1] / (100.0 * 0.01) < 1.6
@@ -164,9 +164,9 @@ def test_hanging_chain_is_where_statics_puts_it() -> None:
     are found so that the links reach from pin to pin. Settled in long steps, kh^2/m = 1e4."""
     n, k, m, rest, g = 11, 2e3, 0.05, 0.13, 9.81
     x = np.column_stack([np.linspace(0, 1, n), np.zeros(n), np.zeros(n)])
-    net = spring_net(x, m, np.column_stack([np.arange(n - 1), np.arange(1, n)]), k, np.full(n - 1, rest), 0.01, pinned=(0, n - 1))
-    run = Run(anchor_scene(net), tolerance=1e-10)
-    run.nets.position[1:-1, 2] -= 0.01  # straight it would not know where to buckle
+    soft_body = spring_mesh(x, m, np.column_stack([np.arange(n - 1), np.arange(1, n)]), k, np.full(n - 1, rest), 0.01, pinned=(0, n - 1))
+    run = Run(anchor_scene(soft_body), tolerance=1e-10)
+    run.soft_bodies.position[1:-1, 2] -= 0.01  # straight it would not know where to buckle
     for _ in range(400):
         run.step(0.5)
 
@@ -176,4 +176,4 @@ def test_hanging_chain_is_where_statics_puts_it() -> None:
         return np.concatenate([np.zeros((1, 2)), np.cumsum((rest + size / k) * tension / size, axis=0)])
 
     pull = fsolve(lambda f: places(f)[-1] - [1.0, 0.0], [1.0, -0.5 * (n - 2) * m * g], xtol=1e-12)
-    np.testing.assert_allclose(run.nets.position[:, [0, 2]], places(pull), rtol=0, atol=1e-8)
+    np.testing.assert_allclose(run.soft_bodies.position[:, [0, 2]], places(pull), rtol=0, atol=1e-8)

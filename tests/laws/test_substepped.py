@@ -7,14 +7,14 @@ import math
 
 import numpy as np
 import pytest
-from heap_pit import pit
+from box_pit import pit
 
 import rigidimpulse as ri
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.quaternion import to_matrix
 
 GRAVITY = 9.81
-HEAPS = ri.Accuracy(contact_solver="substepped")
+SUBSTEPPED = ri.Accuracy(contact_solver="substepped")
 ROUGH = ri.Material(density=1000.0, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
 SIZE = (0.6, 0.5, 0.2)
 SKIN = TOLERANCES.skin * 0.1
@@ -46,7 +46,7 @@ def test_block_holds_below_and_slides_above_the_critical_angle(degrees):
     # Below, the block stays but for the play of the spring: less than its skin. Above, s = g (sin a - mu cos a) t^2 / 2; the first
     # sub-steps have no friction yet, which loses g sin a h t < 1 cm in 2 s; a friction off by 1 % would move it by 9 cm.
     angle = math.atan(0.5) + math.radians(degrees)
-    run = ri.simulate(block_on_plane(angle), 2.0, accuracy=HEAPS)
+    run = ri.simulate(block_on_plane(angle), 2.0, accuracy=SUBSTEPPED)
     if degrees < 0.0:
         assert travelled(run) < SKIN
         np.testing.assert_array_equal(run.velocities[-1], 0.0)
@@ -85,7 +85,7 @@ def test_wall_built_without_gaps_stays_where_it_was_built():
         scene.add(ri.Body(f"brick {k} {c}", ri.Shape.box(size), position=place, material=ROUGH))
     run = ri.simulate(scene, 3.0)
     skin = TOLERANCES.skin * 0.5 * size[1]
-    assert run.status.message == "finished" and "heaps" in run.plan.explain()
+    assert run.status.message == "finished" and "sub-stepped islands" in run.plan.explain()
     moved = np.abs(run.positions - run.positions[0]).max()
     assert moved < 2.0 * skin
     np.testing.assert_array_equal(run.velocities[-1], 0.0)
@@ -124,15 +124,15 @@ def cloud() -> ri.Scene:
     return scene
 
 
-def test_a_heap_that_must_not_stand_still_comes_to_rest_by_itself(monkeypatch):
+def test_a_substepped_island_that_must_not_stand_still_comes_to_rest_by_itself(monkeypatch):
     """What is left of its speeds is round-off of records in single precision: eps g h is 2e-9 m/s.
 
     With places of the points off by round-off of where their bodies are, single points hold twists, and boxes creep at 2e-3 m/s for ever.
     """
-    from rigidimpulse.engine.substepped import advance as heap
+    from rigidimpulse.engine.substepped import advance
     from rigidimpulse.gallery.pile import pile
 
-    monkeypatch.setattr(heap, "REST", np.inf)
+    monkeypatch.setattr(advance, "REST", np.inf)
     run = ri.simulate(pile(90), 6.0, fps=10.0, accuracy="preview")
     assert run.status.ok
     assert np.abs(run.velocities[-1]).max() < 1e-7
@@ -141,7 +141,7 @@ def test_a_heap_that_must_not_stand_still_comes_to_rest_by_itself(monkeypatch):
 def test_momentum_is_kept_and_energy_only_lost():
     # Impulses are equal and opposite at one point, so momenta hold to round-off (3e-11 of 240 N s), but for the guard of energy, which
     # takes what the rule for rotation gains (1e-11 of it a step) off all speeds: 1e-8. Arms to each own surface would give 0.5.
-    run = ri.simulate(cloud(), 1.5, accuracy=HEAPS)
+    run = ri.simulate(cloud(), 1.5, accuracy=SUBSTEPPED)
     assert run.ledger is not None
     ledger = run.ledger
     assert "largest 8 bodies" in run.plan.explain()
@@ -159,7 +159,7 @@ def test_ball_rebounds():
     scene = ri.Scene(gravity=(0.0, 0.0, -GRAVITY))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=material))
     scene.add(ri.Body("ball", ri.Shape.sphere(0.2), position=(0, 0, 1.2), material=material))
-    run = ri.simulate(scene, 0.9, fps=240, accuracy=HEAPS)
+    run = ri.simulate(scene, 0.9, fps=240, accuracy=SUBSTEPPED)
     assert run.position("ball")[120:, 2].max() - 0.2 == pytest.approx(0.25, abs=5e-3)
 
 
@@ -185,21 +185,21 @@ def mixed(reordered: bool, prefix: str) -> ri.Scene:
 def test_same_bits_again_renamed_and_in_another_order():
     # Bodies and pairs are worked through in an order of places, so not a bit may differ; in any other order the heap, which
     # amplifies round-off tenfold with every impact, would lie differently by centimetres.
-    first = ri.simulate(mixed(False, ""), 2.0, accuracy=HEAPS)
+    first = ri.simulate(mixed(False, ""), 2.0, accuracy=SUBSTEPPED)
     for reordered, prefix in ((False, ""), (True, ""), (False, "z")):
-        run = ri.simulate(mixed(reordered, prefix), 2.0, accuracy=HEAPS)
+        run = ri.simulate(mixed(reordered, prefix), 2.0, accuracy=SUBSTEPPED)
         for k in range(10):
             np.testing.assert_array_equal(run.position(f"{prefix}{k}"), first.position(f"{k}"))
 
 
-def test_bullet_hits_resting_heap_at_the_exact_time():
+def test_bullet_hits_resting_substepped_island_at_the_exact_time():
     # The wall stands still to the bit until the bullet comes; the time of the hit is that of its parabola: (x - r - side) / v.
     scene = ri.Scene(gravity=(0.0, 0.0, -GRAVITY))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
     for k in range(12):
         scene.add(ri.Body(f"box {k}", ri.Shape.box(0.2), position=(0.21 * (k % 4), 0.0, 0.101 + 0.202 * (k // 4)), material=ROUGH))
     scene.add(ri.Body("bullet", ri.Shape.sphere(0.02), position=(-200.0, 0.03, 0.5), velocity=(100.0, 0.0, 9.7), mass=1.0, material=ROUGH))
-    run = ri.simulate(scene, 2.2, fps=120, accuracy=HEAPS)
+    run = ri.simulate(scene, 2.2, fps=120, accuracy=SUBSTEPPED)
     before = int(np.searchsorted(run.times, 1.95))
     still = [run.index(f"box {k}") for k in range(12)]
     np.testing.assert_array_equal(run.positions[before, still], run.positions[before - 12, still])
@@ -231,15 +231,15 @@ def test_pile_rests_with_positive_gaps():
     np.testing.assert_array_equal(run.positions[-1], run.positions[-5])
 
 
-def test_same_bits_at_every_width_of_lanes(monkeypatch):
+def test_same_bits_at_every_width_of_simd_lanes(monkeypatch):
     # Lanes never read each other and products are added by fma, so batches of 2 give the bits of the machine's own width; patches
     # solved in another order, or sums rounded otherwise, would lie centimetres apart after 2 s.
-    from rigidimpulse.core.simd import Lanes
-    from rigidimpulse.engine.substepped import contact_forces as heap_stepper
+    from rigidimpulse.core.simd import Simd
+    from rigidimpulse.engine.substepped import contact_forces
 
-    first = ri.simulate(mixed(False, ""), 2.0, accuracy=HEAPS)
-    monkeypatch.setattr(heap_stepper, "machine_lanes", lambda: Lanes(2))
-    again = ri.simulate(mixed(False, ""), 2.0, accuracy=HEAPS)
+    first = ri.simulate(mixed(False, ""), 2.0, accuracy=SUBSTEPPED)
+    monkeypatch.setattr(contact_forces, "machine_simd", lambda: Simd(2))
+    again = ri.simulate(mixed(False, ""), 2.0, accuracy=SUBSTEPPED)
     np.testing.assert_array_equal(again.positions, first.positions)
     np.testing.assert_array_equal(again.orientations, first.orientations)
 
@@ -304,8 +304,8 @@ def test_boxes_hardly_sink_into_each_other_on_the_way():
     assert max(depths) < 5e-3
 
 
-def test_preview_looks_at_heaps_less_often_and_is_deeper_on_the_way():
-    # The other side of `heap_motion` and `step`: over 0.3 inner radii, 75 mm, boxes come at each other with other edges and corners, in
+def test_preview_looks_at_substepped_islands_less_often_and_is_deeper_on_the_way():
+    # The other side of `substep_motion` and `step`: over 0.3 inner radii, 75 mm, boxes come at each other with other edges and corners, in
     # half of 32 heaps 2.3 to 4.3 mm deep, in the worst 10. At the end all lie in their skins.
     depths, last = depths_of_thrown(5, "preview")
     assert 1.5e-3 < np.median(depths) < 8e-3
@@ -323,13 +323,13 @@ def row_of_boxes(number: int, *others: ri.Body) -> ri.Scene:
     return scene
 
 
-def test_calm_part_of_a_heap_stands_still_while_a_ball_rolls_on_it():
+def test_calm_part_of_a_substepped_island_stands_still_while_a_ball_rolls_on_it():
     # The ball rolls on at 0.04 m/s and is never calm; boxes that it cannot stir keep their bits and have no speed at all. Stepped with
     # it they would sway by some 1e-7 m.
     ball = ri.Body(
         "ball", ri.Shape.sphere(0.1), position=(0.0, 0.0, 0.606), velocity=(0.04, 0, 0), angular_velocity=(0, 0.4, 0), material=ROUGH
     )
-    run = ri.simulate(row_of_boxes(12, ball), 2.0, accuracy=HEAPS)
+    run = ri.simulate(row_of_boxes(12, ball), 2.0, accuracy=SUBSTEPPED)
     far = [run.index(f"box {k}") for k in range(8, 12)]
     assert run.position("ball")[-1, 0] - run.position("ball")[90, 0] == pytest.approx(0.5 * 0.04, rel=0.1)
     np.testing.assert_array_equal(run.positions[90:, far], np.broadcast_to(run.positions[-1, far], (31, 4, 3)))
@@ -344,13 +344,13 @@ def test_calm_boxes_are_no_wall_to_one_that_slides_into_them():
     spin, places = (0, 0.4, 0), ((5.2, 0.0, 0.606), (-11.5, 0.0, 0.252))
     ball = ri.Body("ball", ri.Shape.sphere(0.1), position=places[0], velocity=(0.04, 0, 0), angular_velocity=spin, material=ROUGH)
     pusher = ri.Body("pusher", ri.Shape.box(0.5), position=places[1], velocity=(12.0, 0, 0), mass=625.0, material=ROUGH)
-    run = ri.simulate(row_of_boxes(12, ball, pusher), 3.0, accuracy=HEAPS)
+    run = ri.simulate(row_of_boxes(12, ball, pusher), 3.0, accuracy=SUBSTEPPED)
     np.testing.assert_array_equal(run.velocities[60, run.index("box 5")], 0.0)
     way = (5.0 / 17.0) ** 2 * (144.0 - GRAVITY * 11.0) / GRAVITY
     assert run.position("box 5")[-1, 0] - run.position("box 5")[60, 0] == pytest.approx(way, rel=0.4)
 
 
-def test_bodies_of_a_heap_that_fly_are_on_parabolas_within_a_step():
+def test_bodies_of_a_substepped_island_that_fly_are_on_parabolas_within_a_step():
     # Frames 16 to a step of "preview". Where the velocity changes by g between frames, so must the way: the second difference of
     # positions is g / fps^2 = 43 um. On straight ways it would be 0 within a step and 16 times as much between steps. (Bodies that
     # the solver has pushed off each other, but not to any speed, go straight.)

@@ -5,7 +5,7 @@ import pytest
 
 from rigidimpulse.collision.broad_phase import FEW, overlapping_pairs, overlapping_with
 from rigidimpulse.engine.pair_table import path_box
-from rigidimpulse.motion.trajectory import FIXED, FREE, PRESCRIBED, begin, make_course, pose_at
+from rigidimpulse.motion.trajectory import FIXED, FREE, PRESCRIBED, begin, make_trajectories, pose_at
 
 SIZES = [0, 1, 2, 7, FEW, FEW + 1, 150, 900]
 
@@ -109,17 +109,17 @@ def test_boxes_hold_the_path_and_no_more():
     low, high, centre, q = np.empty((1, 3)), np.empty((1, 3)), np.empty(3), np.empty(4)
     for mode in (FREE, PRESCRIBED, FIXED):
         for _ in range(60):
-            course = make_course(1)
-            course.mode[0], course.start[0], course.position[0] = mode, rng.normal(), rng.normal(size=3)
-            course.velocity[0] = rng.normal(size=3) * 10 ** rng.uniform(-1, 2)
-            course.acceleration[0] = rng.normal(size=3) * 10 ** rng.uniform(-1, 2) * (mode == FREE)
-            course.jerk[0] = rng.normal(size=3) * 10 ** rng.uniform(-1, 3) * (rng.random(3) < 0.7)
-            begin(course, 0)
-            t, radius = course.start[0] + np.array([0.0, 1.0]) + rng.random(2), rng.random()
-            path_box(course, 0, *t, radius, low, high)
+            trajectory = make_trajectories(1)
+            trajectory.mode[0], trajectory.start[0], trajectory.position[0] = mode, rng.normal(), rng.normal(size=3)
+            trajectory.velocity[0] = rng.normal(size=3) * 10 ** rng.uniform(-1, 2)
+            trajectory.acceleration[0] = rng.normal(size=3) * 10 ** rng.uniform(-1, 2) * (mode == FREE)
+            trajectory.jerk[0] = rng.normal(size=3) * 10 ** rng.uniform(-1, 3) * (rng.random(3) < 0.7)
+            begin(trajectory, 0)
+            t, radius = trajectory.start[0] + np.array([0.0, 1.0]) + rng.random(2), rng.random()
+            path_box(trajectory, 0, *t, radius, low, high)
             samples = []
             for time in np.linspace(*t, 10_001):
-                pose_at(course, 0, time, centre, q)
+                pose_at(trajectory, 0, time, centre, q)
                 samples.append(centre.copy())
             slack = 1e-13 * (1.0 + np.abs(samples).max())
             least, most = np.min(samples, axis=0) - radius, np.max(samples, axis=0) + radius

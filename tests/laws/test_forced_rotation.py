@@ -22,8 +22,8 @@ from rigidimpulse.core.quaternion import (
     rotate_inverse,
     rotation_vector,
 )
-from rigidimpulse.motion import forced_rotation as forced_top
-from rigidimpulse.motion import free_rotation as free_top
+from rigidimpulse.motion import forced_rotation as forced_rotation
+from rigidimpulse.motion import free_rotation as free_rotation
 
 EPS = np.finfo(float).eps
 ROUND_OFF = 64.0
@@ -37,12 +37,12 @@ class Top:
     def __init__(self, inertia, q, w_world, torque, torque_rate=(0.0, 0.0, 0.0)):
         values = (inertia, q, w_world, torque, torque_rate)
         self.inertia, self.q, self.w, self.torque, self.rate = (np.asarray(value, dtype=float) for value in values)
-        self.constants, self.series = np.full(forced_top.FORCED_TOP_SIZE, np.nan), np.full(forced_top.SERIES_SIZE, np.nan)
-        assert forced_top.prepare(self.inertia, self.q, self.w, self.torque, self.rate, self.constants, self.series)
+        self.constants, self.series = np.full(forced_rotation.FORCED_ROTATION_SIZE, np.nan), np.full(forced_rotation.SERIES_SIZE, np.nan)
+        assert forced_rotation.prepare(self.inertia, self.q, self.w, self.torque, self.rate, self.constants, self.series)
 
     def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         q, w = np.empty(4), np.empty(3)
-        forced_top.evaluate(self.constants, self.series, float(time), q, w)
+        forced_rotation.evaluate(self.constants, self.series, float(time), q, w)
         return q, w
 
     @property
@@ -51,7 +51,7 @@ class Top:
 
     @property
     def segment(self) -> float:
-        return self.constants[forced_top.SEGMENT]
+        return self.constants[forced_rotation.SEGMENT]
 
 
 CASES = {
@@ -114,7 +114,7 @@ def test_axis_that_stays_is_elementary(spin, push, growth):
     sphere, box = (2.0, 2.0, 2.0), (1.0, 2.0, 3.0)
     for inertia, direction in ((sphere, np.array([0.6, 0.0, 0.8])), (box, rotate(TILTED, [0, 1, 0]))):
         top = Top(inertia, TILTED, spin * direction, 2.0 * push * direction, 2.0 * growth * direction)
-        assert top.kind == forced_top.FORCED_AXIS
+        assert top.kind == forced_rotation.FORCED_AXIS
         for time in (0.02, 30.0):
             q_now, w_now = top.at(time)
             angle = spin * time + push * time**2 / 2.0 + growth * time**3 / 6.0
@@ -137,18 +137,18 @@ def test_vanishing_torque_is_the_free_top():
     """Two methods that share nothing: series over 127 segments, and elliptic functions."""
     inertia, w_start = np.array([3.0, 2.0, 1.0]), np.array([0.5, 0.6, -0.6])
     top = Top(inertia, TILTED, w_start, (1e-30, 0.0, 0.0))
-    constants, q_free, w_free = np.zeros(free_top.FREE_TOP_SIZE), np.empty(4), np.empty(3)
-    free_top.prepare(inertia, TILTED, w_start, constants)
+    constants, q_free, w_free = np.zeros(free_rotation.FREE_ROTATION_SIZE), np.empty(4), np.empty(3)
+    free_rotation.prepare(inertia, TILTED, w_start, constants)
     for time in (0.1, 1.0, 50.0):
-        free_top.evaluate(constants, time, q_free, w_free)
+        free_rotation.evaluate(constants, time, q_free, w_free)
         q_now, w_now = top.at(time)
         assert angle_between(q_now, q_free) < ROUND_OFF * EPS * (1.0 + time)
         assert w_now == pytest.approx(w_free, abs=ROUND_OFF * EPS * (1.0 + time))
 
 
 def test_no_torque_is_left_to_the_free_top():
-    constants, series = np.full(forced_top.FORCED_TOP_SIZE, 7.0), np.full(forced_top.SERIES_SIZE, 7.0)
-    assert not forced_top.prepare(np.ones(3), UPRIGHT, np.ones(3), np.zeros(3), np.zeros(3), constants, series)
+    constants, series = np.full(forced_rotation.FORCED_ROTATION_SIZE, 7.0), np.full(forced_rotation.SERIES_SIZE, 7.0)
+    assert not forced_rotation.prepare(np.ones(3), UPRIGHT, np.ones(3), np.zeros(3), np.zeros(3), constants, series)
     assert (constants == 7.0).all() and (series == 7.0).all()
 
 
@@ -164,10 +164,10 @@ def test_order_of_the_series():
     top = Top(inertia, q, w_start, torque)
     times = top.segment * np.array([2.0, 2.5, 3.0, 3.5])
     exact = reference(inertia, q, w_start, times, torque)
-    top.constants[forced_top.SEGMENT] = np.inf
+    top.constants[forced_rotation.SEGMENT] = np.inf
     errors = [float(angle_between(top.at(t)[0], q_exact)) for t, (q_exact, _) in zip(times, exact, strict=True)]
     slopes = np.diff(np.log(errors)) / np.diff(np.log(times))
-    assert np.all(np.abs(slopes - (forced_top.ORDER + 1)) < 1.0), slopes
+    assert np.all(np.abs(slopes - (forced_rotation.ORDER + 1)) < 1.0), slopes
 
 
 @pytest.mark.parametrize("name", [name for name in CASES | LINEAR if name != "weak"])

@@ -7,7 +7,7 @@ import numpy as np
 import rigidimpulse as ri
 
 
-def test_a_run_ends_where_a_member_of_a_heap_touches_the_floor() -> None:
+def test_a_run_ends_where_a_member_of_a_substepped_island_touches_the_floor() -> None:
     """Hulls in a pit: one had turned on the floor by itself before it came to the heap, and touched the floor at the end.
 
     What was remembered of its own contact made it end a sub-step once more, and the heap was stepped over a time of 0: division by zero.

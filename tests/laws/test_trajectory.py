@@ -13,15 +13,26 @@ from scipy.integrate import solve_ivp
 from rigidimpulse.core.quaternion import angle_between, multiply, quaternion_from_rotation_vector, rotate, rotate_inverse
 from rigidimpulse.dynamics.impact.point import BodyState
 from rigidimpulse.engine.touching import bring
-from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, PRESCRIBED, STEPPED, Course, begin, make_course, pose_at, state_at
+from rigidimpulse.motion.trajectory import (
+    FIXED,
+    FORCED,
+    FREE,
+    LINEAR,
+    PRESCRIBED,
+    Trajectories,
+    begin,
+    make_trajectories,
+    pose_at,
+    state_at,
+)
 
 EPS = np.finfo(float).eps
 TILTED = np.array([0.3, -0.5, 0.7, 0.4]) / np.linalg.norm([0.3, -0.5, 0.7, 0.4])
 INERTIA = np.array([3.0, 2.0, 1.0])
 
 
-def one_body(mode: int, start: float = 0.25, **columns) -> Course:
-    course = make_course(3)
+def one_body(mode: int, start: float = 0.25, **columns) -> Trajectories:
+    trajectory = make_trajectories(3)
     values = {
         "position": (1.0, -2.0, 0.5),
         "orientation": TILTED,
@@ -32,15 +43,15 @@ def one_body(mode: int, start: float = 0.25, **columns) -> Course:
         "inertia": INERTIA,
     }
     for name, value in (values | columns).items():
-        getattr(course, name)[1] = value
-    course.start[1], course.mode[1] = start, mode
-    begin(course, 1)
-    return course
+        getattr(trajectory, name)[1] = value
+    trajectory.start[1], trajectory.mode[1] = start, mode
+    begin(trajectory, 1)
+    return trajectory
 
 
-def state(course: Course, time: float) -> list[np.ndarray]:
+def state(trajectory: Trajectories, time: float) -> list[np.ndarray]:
     out = [np.empty(3), np.empty(4), np.empty(3), np.empty(3)]
-    state_at(course, 1, time, *out)
+    state_at(trajectory, 1, time, *out)
     return out
 
 
@@ -48,14 +59,14 @@ def state(course: Course, time: float) -> list[np.ndarray]:
 @pytest.mark.parametrize("jerk", [(0.0, 0.0, 0.0), (3.0, 0.0, -6.0)])
 def test_parabola_or_cubic(mode, jerk):
     """The jerk moves the body by 8 m; where nothing accelerates it is not read."""
-    course = one_body(mode, jerk=jerk)
-    x, _, v, _ = state(course, 2.25)
-    acceleration, jerk = course.acceleration[1], np.array(jerk) * (mode != PRESCRIBED)
-    assert v == pytest.approx(course.velocity[1] + 2.0 * acceleration + 2.0 * jerk, abs=32 * EPS)
-    assert x == pytest.approx(course.position[1] + 2.0 * course.velocity[1] + 2.0 * acceleration + 4.0 / 3.0 * jerk, abs=64 * EPS)
+    trajectory = one_body(mode, jerk=jerk)
+    x, _, v, _ = state(trajectory, 2.25)
+    acceleration, jerk = trajectory.acceleration[1], np.array(jerk) * (mode != PRESCRIBED)
+    assert v == pytest.approx(trajectory.velocity[1] + 2.0 * acceleration + 2.0 * jerk, abs=32 * EPS)
+    assert x == pytest.approx(trajectory.position[1] + 2.0 * trajectory.velocity[1] + 2.0 * acceleration + 4.0 / 3.0 * jerk, abs=64 * EPS)
 
 
-@pytest.mark.parametrize(("mode", "unread"), [(FIXED, 2), (PRESCRIBED, 2), (STEPPED, 2), (FREE, 1)])
+@pytest.mark.parametrize(("mode", "unread"), [(FIXED, 2), (PRESCRIBED, 2), (LINEAR, 2), (FREE, 1)])
 def test_rates_that_a_mode_does_not_read_change_no_bit(mode, unread):
     rates = dict(zip(("torque_rate", "jerk"), ((7.0, 8.0, 9.0), (1.0, 2.0, 3.0)), strict=True))
     length = np.append(np.zeros(12), 10.0)
@@ -65,9 +76,9 @@ def test_rates_that_a_mode_does_not_read_change_no_bit(mode, unread):
 
 
 def test_prescribed_spin_is_constant_in_the_world():
-    course = one_body(PRESCRIBED)
-    w_start = course.angular_velocity[1]
-    _, q, _, w = state(course, 50.25)
+    trajectory = one_body(PRESCRIBED)
+    w_start = trajectory.angular_velocity[1]
+    _, q, _, w = state(trajectory, 50.25)
     assert np.array_equal(w, w_start)
     expected = multiply(quaternion_from_rotation_vector(50.0 * w_start), TILTED)
     assert angle_between(q, expected) < 32 * EPS * (1.0 + 50.0 * np.linalg.norm(w_start))
@@ -76,30 +87,30 @@ def test_prescribed_spin_is_constant_in_the_world():
 def test_free_and_forced_momentum():
     torque, rate = np.array([0.3, 0.2, -0.1]), np.array([-0.4, 0.1, 0.5])
     for mode, impulse in ((FREE, np.zeros(3)), (FORCED, 1.5 * torque), (FORCED, 1.5 * torque + 1.125 * rate)):
-        course = one_body(mode, torque_rate=rate if impulse[2] > 0.0 else (0.0, 0.0, 0.0))
-        start = rotate(TILTED, INERTIA * rotate_inverse(TILTED, course.angular_velocity[1]))
-        _, q, _, w = state(course, 1.75)
+        trajectory = one_body(mode, torque_rate=rate if impulse[2] > 0.0 else (0.0, 0.0, 0.0))
+        start = rotate(TILTED, INERTIA * rotate_inverse(TILTED, trajectory.angular_velocity[1]))
+        _, q, _, w = state(trajectory, 1.75)
         momentum = rotate(q, INERTIA * rotate_inverse(q, w))
         assert momentum == pytest.approx(start + impulse, abs=64 * EPS * np.linalg.norm(start))
 
 
 def test_accelerations_at_a_time_are_the_slopes_of_the_velocities():
     """Central differences over 2h err by h^2 / 6 of the third derivatives, 1e-8, and EPS / h. Those of the start are off by 4 m/s^2."""
-    course = one_body(FORCED, jerk=(1.0, -2.0, 0.5), torque_rate=(-0.4, 0.1, 0.5))
+    trajectory = one_body(FORCED, jerk=(1.0, -2.0, 0.5), torque_rate=(-0.4, 0.1, 0.5))
     time, h = 2.25, 1e-5
-    before, after = state(course, time - h), state(course, time + h)
+    before, after = state(trajectory, time - h), state(trajectory, time + h)
     bodies = BodyState(*(np.zeros((3, k)) for k in (3, 4, 3, 3)), np.ones(3), np.zeros((3, 3, 3)))
     rotation, acceleration, turning = np.zeros((3, 3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    bring(course, 1, time, bodies, rotation, acceleration, turning)
+    bring(trajectory, 1, time, bodies, rotation, acceleration, turning)
     assert acceleration[1] == pytest.approx((after[2] - before[2]) / (2.0 * h), abs=1e-8)
     assert turning[1] == pytest.approx((after[3] - before[3]) / (2.0 * h), abs=1e-8)
 
 
 def test_fixed_body_ignores_its_rates():
-    course = one_body(FIXED)
-    x, q, v, w = state(course, 17.0)
-    assert x.tobytes() == course.position[1].tobytes()
-    assert q.tobytes() == course.orientation[1].tobytes()
+    trajectory = one_body(FIXED)
+    x, q, v, w = state(trajectory, 17.0)
+    assert x.tobytes() == trajectory.position[1].tobytes()
+    assert q.tobytes() == trajectory.orientation[1].tobytes()
     assert not v.any() and not w.any()
 
 
@@ -107,35 +118,35 @@ def test_fixed_body_ignores_its_rates():
 def test_body_at_rest_keeps_every_bit(mode):
     q = np.array([0.6, -0.0, 0.8000000000000003, -0.0])
     still = dict.fromkeys(("velocity", "angular_velocity", "acceleration", "torque"), (0.0, -0.0, 0.0))
-    course = one_body(mode, orientation=q, position=(-0.0, 0.1, 1e300), **still)
+    trajectory = one_body(mode, orientation=q, position=(-0.0, 0.1, 1e300), **still)
     for time in (0.25, 1.0, 1e6):
-        x_now, q_now, v, w = state(course, time)
-        assert x_now.tobytes() == course.position[1].tobytes()
+        x_now, q_now, v, w = state(trajectory, time)
+        assert x_now.tobytes() == trajectory.position[1].tobytes()
         assert q_now.tobytes() == q.tobytes()
         assert not v.any() and not w.any()
 
 
 @pytest.mark.parametrize("mode", [PRESCRIBED, FREE, FORCED])
 def test_start_is_reproduced_to_the_bit(mode):
-    course = one_body(mode)
-    x, q, v, w = state(course, 0.25)
+    trajectory = one_body(mode)
+    x, q, v, w = state(trajectory, 0.25)
     for now, column in ((x, "position"), (q, "orientation"), (v, "velocity"), (w, "angular_velocity")):
-        assert now.tobytes() == getattr(course, column)[1].tobytes()
+        assert now.tobytes() == getattr(trajectory, column)[1].tobytes()
     # And approached: one unit in the last place of time later nothing has jumped.
-    later = state(course, np.nextafter(0.25, 1.0))
+    later = state(trajectory, np.nextafter(0.25, 1.0))
     for now, soon in zip((x, q, v, w), later, strict=True):
         assert soon == pytest.approx(now, abs=16 * EPS * (1.0 + np.linalg.norm(now)))
 
 
 @pytest.mark.parametrize("mode", [FIXED, PRESCRIBED, FREE, FORCED])
 def test_pose_and_state_agree_to_the_bit_in_any_order(mode):
-    course = one_body(mode)
+    trajectory = one_body(mode)
     times = [7.0, 0.25, 3.1, 0.2500001, 7.0]
     x, q = np.empty(3), np.empty(4)
     seen = {}
     for time in times:
-        pose_at(course, 1, time, x, q)
-        x_state, q_state, _, _ = state(course, time)
+        pose_at(trajectory, 1, time, x, q)
+        x_state, q_state, _, _ = state(trajectory, time)
         assert x.tobytes() == x_state.tobytes() and q.tobytes() == q_state.tobytes()
         assert seen.setdefault(time, q.tobytes()) == q.tobytes()
 
@@ -147,8 +158,8 @@ def test_forced_without_torque_is_free():
 
 
 def test_rows_are_independent():
-    course = one_body(FREE)
-    assert not course.top[0].any() and not course.top[2].any()
+    trajectory = one_body(FREE)
+    assert not trajectory.top[0].any() and not trajectory.top[2].any()
 
 
 STEADY = dict.fromkeys(("jerk", "torque_rate"), (0.0, 0.0, 0.0))
@@ -158,7 +169,7 @@ GROWING = {"jerk": (1.0, -2.0, 0.5), "torque_rate": (-0.04, 0.01, 0.05)}
 @pytest.mark.parametrize(
     ("mode", "duration", "rates"), [(PRESCRIBED, 100.0, STEADY), (FREE, 100.0, STEADY), (FORCED, 10.0, STEADY), (FORCED, 10.0, GROWING)]
 )
-def test_new_course_every_frame_is_the_same_course(mode, duration, rates):
+def test_new_trajectory_every_frame_is_the_same_trajectory(mode, duration, rates):
     """Begun anew every 1/60 s. Required: 1e-9 after 100 s.
 
     Each of n starts rounds orientation and spin by eps, and an error of the spin turns the body ever further: by
@@ -201,16 +212,16 @@ def moments(forces: list[np.ndarray], h: float) -> tuple[np.ndarray, np.ndarray]
 
 def test_the_path_ends_where_a_step_of_runge_kutta_ends():
     """A damped spring and a force of time, to round-off; a force held constant ends h^2 off, 1e-3 m."""
-    course, h = one_body(FREE, start=0.0), 0.1
+    trajectory, h = one_body(FREE, start=0.0), 0.1
 
     def slope(t, y):
         return np.concatenate([y[3:], -40.0 * y[:3] - 2.0 * y[3:] + (0.0, np.sin(9.0 * t), 0.0)])
 
-    start = np.concatenate([course.position[1], course.velocity[1]])
+    start = np.concatenate([trajectory.position[1], trajectory.velocity[1]])
     slopes = runge_kutta(slope, start, 0.0, h)
     end = start + h * (slopes[0] + 2.0 * slopes[1] + 2.0 * slopes[2] + slopes[3]) / 6.0
-    course.acceleration[1], course.jerk[1] = from_moments(*moments([k[3:] for k in slopes], h), h)
-    x, _, v, _ = state(course, h)
+    trajectory.acceleration[1], trajectory.jerk[1] = from_moments(*moments([k[3:] for k in slopes], h), h)
+    x, _, v, _ = state(trajectory, h)
     assert x == pytest.approx(end[:3], abs=64 * EPS)
     assert v == pytest.approx(end[3:], abs=256 * EPS * 8.0)
 
@@ -229,16 +240,16 @@ def turning(t: float, y: np.ndarray) -> np.ndarray:
 
 def turned_by_moments(start: np.ndarray, duration: float, steps: int, linear: bool) -> np.ndarray:
     """Attitude after steps of the course under the line (or the constant) with the moments of a Runge-Kutta step."""
-    course, h, y = one_body(FORCED), duration / steps, start
+    trajectory, h, y = one_body(FORCED), duration / steps, start
     for step in range(steps):
         torques = [slope[4:] for slope in runge_kutta(turning, y, step * h, h)]
         torque, rate = from_moments(*moments(torques, h), h)
-        course.start[1], course.orientation[1] = 0.0, y[:4]
-        course.angular_velocity[1] = rotate(y[:4], rotate_inverse(y[:4], y[4:]) / INERTIA)
-        course.torque[1] = torque if linear else torque + 0.5 * h * rate
-        course.torque_rate[1] = rate if linear else 0.0
-        begin(course, 1)
-        _, q, _, w = state(course, h)
+        trajectory.start[1], trajectory.orientation[1] = 0.0, y[:4]
+        trajectory.angular_velocity[1] = rotate(y[:4], rotate_inverse(y[:4], y[4:]) / INERTIA)
+        trajectory.torque[1] = torque if linear else torque + 0.5 * h * rate
+        trajectory.torque_rate[1] = rate if linear else 0.0
+        begin(trajectory, 1)
+        _, q, _, w = state(trajectory, h)
         y = np.concatenate([q, rotate(q, INERTIA * rotate_inverse(q, w))])
     return y[:4]
 

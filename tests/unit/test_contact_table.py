@@ -10,26 +10,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigidimpulse.collision.contact_records import UNKNOWN
-from rigidimpulse.collision.contact_table import FIRST_ROWS, ROWS_OF_A_BODY, HeapTable
+from rigidimpulse.collision.contact_table import FIRST_ROWS, ROWS_OF_A_BODY, ContactTable
 from rigidimpulse.core.memory import reserve
 
 BODIES = 40
 fixed = settings(deadline=None, derandomize=True)  # no deadline: the first call compiles
 
 
-def contacts_of(table: HeapTable) -> list[tuple]:
+def contacts_of(table: ContactTable) -> list[tuple]:
     """What is known of each pair, its rows included."""
     pairs, out = table.pairs, []
     for p in range(len(pairs.first)):
         mine = slice(pairs.start[p], pairs.start[p] + pairs.count[p])
-        known = [(name, np.array(column[p]).tolist()) for name, column in pairs._asdict().items() if name not in ("start", "room")]
+        known = [(name, np.array(column[p]).tolist()) for name, column in pairs._asdict().items() if name not in ("start", "capacity")]
         out.append((known, table.rows[mine].tolist(), table.ids[mine].tolist()))
     return out
 
 
-def filled(seed: int, shares: int, packed_full: bool) -> HeapTable:
+def filled(seed: int, shares: int, packed_full: bool) -> ContactTable:
     """A table of random pairs, each with rows of its own at places that have nothing to do with its order."""
-    random, table = np.random.default_rng(seed), HeapTable(shares, BODIES)
+    random, table = np.random.default_rng(seed), ContactTable(shares, BODIES)
     first, second = np.triu_indices(BODIES, 1)
     some = np.sort(random.choice(len(first), int(random.integers(1, 200)), replace=False))
     table.replace(first[some].astype(np.int32), second[some].astype(np.int32))
@@ -64,7 +64,7 @@ def test_rows_keep_their_places_where_room_is_made_beyond_what_was_reserved() ->
     table = filled(3, 2, packed_full=True)
     before, reserved = contacts_of(table), len(table.rows)
     assert reserved == max(FIRST_ROWS, ROWS_OF_A_BODY * BODIES)
-    table.make_room(reserved)
+    table.grow(reserved)
     assert contacts_of(table) == before
     assert len(table.rows) > reserved
     assert (table.free[:, 1] - table.free[:, 0]).min() >= reserved

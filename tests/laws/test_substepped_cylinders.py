@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import trimesh
-from heap_pit import inside_each_other, pit
+from box_pit import inside_each_other, pit
 
 import rigidimpulse as ri
 
@@ -17,7 +17,7 @@ OTHERS = [
 
 @pytest.mark.parametrize(("shapes", "seed"), [([DRUM], 3), ([DRUM], 5), (OTHERS, 3)])
 @pytest.mark.parametrize(("accuracy", "bearable"), [("standard", 4e-3), ("preview", 8e-3)])
-def test_cylinders_of_a_heap_stay_out_of_each_other(shapes: list[ri.Shape], seed: int, accuracy: str, bearable: float) -> None:
+def test_cylinders_of_a_substepped_island_stay_out_of_each_other(shapes: list[ri.Shape], seed: int, accuracy: str, bearable: float) -> None:
     """Two that had sunk farther than they are made smaller for the contact kernels had no contact any more.
 
     They passed into each other, to 9 mm from centre to centre, and "contact not resolved" was reported. Now a prism tells where to push.

@@ -25,7 +25,7 @@ from rigidimpulse.core.quaternion import (
     rotate_inverse,
     rotation_vector,
 )
-from rigidimpulse.motion import free_rotation as free_top
+from rigidimpulse.motion import free_rotation as free_rotation
 
 EPS = np.finfo(float).eps
 ROUND_OFF = 32.0
@@ -38,12 +38,12 @@ class Top:
 
     def __init__(self, inertia, q, w_world):
         self.inertia, self.q, self.w = (np.asarray(value, dtype=float) for value in (inertia, q, w_world))
-        self.constants = np.zeros(free_top.FREE_TOP_SIZE)
-        free_top.prepare(self.inertia, self.q, self.w, self.constants)
+        self.constants = np.zeros(free_rotation.FREE_ROTATION_SIZE)
+        free_rotation.prepare(self.inertia, self.q, self.w, self.constants)
 
     def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         q, w = np.empty(4), np.empty(3)
-        free_top.evaluate(self.constants, float(time), q, w)
+        free_rotation.evaluate(self.constants, float(time), q, w)
         return q, w
 
     @property
@@ -172,7 +172,7 @@ def test_symmetric_top_precesses(axis, ratio):
     inertia[axis] *= ratio
     w_start = np.array([0.8, -1.1, 0.6])
     top = Top(inertia, TILTED, rotate(TILTED, w_start))
-    assert top.kind == free_top.SYMMETRIC
+    assert top.kind == free_rotation.SYMMETRIC
     unit = np.eye(3)[axis]
     momentum = rotate(TILTED, inertia * w_start)
     for time in (0.01, 1.0, 77.0):
@@ -190,7 +190,7 @@ def test_limits_of_the_asymmetric_form_agree_with_the_elementary_ones():
     w = np.array([0.8, -1.1, 0.6])
     for equal in ((1.0, 1.0, 1.8), (1.0, 1.8, 1.8), (1.8, 1.8, 1.8)):
         apart = np.array(equal) * (1.0 + np.array([0.0, 2e-14, 5e-14]))
-        assert Top(apart, TILTED, w).kind == free_top.ASYMMETRIC
+        assert Top(apart, TILTED, w).kind == free_rotation.ASYMMETRIC
         for time in (0.5, 20.0):
             q_equal, _ = Top(equal, TILTED, w).at(time)
             q_apart, _ = Top(apart, TILTED, w).at(time)

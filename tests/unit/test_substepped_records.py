@@ -10,7 +10,7 @@ import pytest
 import rigidimpulse as ri
 from rigidimpulse.collision.contact_records import in_play
 from rigidimpulse.dynamics.solvers.tgs_soft.records import LINES, POINTS
-from rigidimpulse.engine.substepped import contact_forces as heap_stepper
+from rigidimpulse.engine.substepped import contact_forces
 
 
 def pile(number: int) -> ri.Scene:
@@ -30,11 +30,11 @@ def test_every_contact_is_in_one_lane_with_the_motion_since_it_was_put_there(mon
 
     And what a body has drifted is how far it has come since the steady batches were made, to round-off of places of 1 m.
     """
-    advance, made, steps = heap_stepper.advance, {}, {"whole": 0, "steady": 0}
+    advance, made, steps = contact_forces.advance, {}, {"whole": 0, "steady": 0}
 
     def checked(calls: list[tuple]) -> list[float]:
-        lanes, bodies, pairs, _, batches, edges, calm, *_ = calls[0]
-        rows = batches.row[: POINTS * edges[-1] * lanes.width]
+        simd, bodies, pairs, _, batches, edges, sleep_timer, *_ = calls[0]
+        rows = batches.row[: POINTS * edges[-1] * simd.width]
         seen = np.sort(rows[rows > 0] // LINES)
         listed = [
             range(start, start + count)
@@ -42,14 +42,14 @@ def test_every_contact_is_in_one_lane_with_the_motion_since_it_was_put_there(mon
             if in_play.py_func(bodies.part, a, b)
         ]
         assert np.array_equal(seen, np.sort(np.concatenate([*listed, []]).astype(np.int64)))
-        steps["steady" if calm else "whole"] += 1
-        if calm == 0:
+        steps["steady" if sleep_timer else "whole"] += 1
+        if sleep_timer == 0:
             made["place"] = bodies.position.copy()
         drift = bodies.drift.reshape(-1, 8)[:, :3]
-        moves = bodies.part == heap_stepper.MEMBER
+        moves = bodies.part == contact_forces.MEMBER
         assert np.abs(drift - (bodies.position - made["place"]))[moves].max(initial=0.0) < 1e-13
         return advance.together(calls)
 
-    monkeypatch.setattr(heap_stepper, "advance", SimpleNamespace(together=checked))
+    monkeypatch.setattr(contact_forces, "advance", SimpleNamespace(together=checked))
     assert ri.simulate(pile(100), 1.2).status.ok
     assert min(steps.values()) > 50

@@ -1,6 +1,6 @@
-"""What accuracy costs in a heap: `python tests/bench/heap_costs.py` runs 1,000 boxes, `... --draw` draws docs/heap_costs.png anew.
+"""What accuracy costs in a heap: `python tests/bench/substepped_costs.py` runs 1,000 boxes, `... --draw` draws docs/heap_costs.png anew.
 
-The pile of `piles`, 5 s, at several values of `Accuracy.heap_motion` and `step`, and in the fastest other engines (see `engines`) at two
+The pile of `piles`, 5 s, at several values of `Accuracy.substep_motion` and `step`, and in the fastest other engines (see `engines`) at two
 steps each. Time is that of the loop for 1/60 s of motion, recording included, the mean over all in which anything moves: a heap that has
 come to rest costs nothing, other engines are not allowed to sleep. Depth is the greatest of any pair in the frames at 0.5, 1 ... 5 s, by
 separating axes from the recorded poses; each needs a run of its own in another engine. Settings here have FALLS falls, which begin a
@@ -29,9 +29,9 @@ LOOKS = tuple(np.arange(0.5, DURATION + 0.25, 0.5))
 """s, when depths are measured."""
 STANDARD, HALVES = 1.0 / 60.0, 1.0 / 30.0
 SETTINGS = {
-    "step 1/60": [ri.Accuracy(heap_motion=motion) for motion in (0.05, 0.1, 0.3, 1.0)],
-    "step 1/30": [ri.Accuracy(step=HALVES, heap_motion=motion) for motion in (0.1, 0.3, 1.0)],
-    "step 1/20": [ri.Accuracy(step=1.0 / 20.0, heap_motion=motion) for motion in (0.3, 1.0)],
+    "step 1/60": [ri.Accuracy(substep_motion=motion) for motion in (0.05, 0.1, 0.3, 1.0)],
+    "step 1/30": [ri.Accuracy(step=HALVES, substep_motion=motion) for motion in (0.1, 0.3, 1.0)],
+    "step 1/20": [ri.Accuracy(step=1.0 / 20.0, substep_motion=motion) for motion in (0.3, 1.0)],
 }
 NAMED = {(STANDARD, 0.1): "standard", (HALVES, 0.3): "preview"}
 PEERS, PEER_STEPS = ("PhysX", "Rapier"), (1.0 / 60.0, 1.0 / 240.0)
@@ -40,8 +40,8 @@ TABLE, PICTURE = DOCS / "accuracy_costs" / "heap_1000.csv", DOCS / "heap_costs.p
 TICKS = (2.0, 3.0, 5.0, 10.0, 20.0, 30.0)
 """ms."""
 BESIDE = {
-    "standard": (7, -12), "preview": (9, -1), "heap_motion 0.05": (9, -3), "step 1/60": (9, 5), "step 1/30": (9, -8),
-    "step 1/20": (-88, -10), "step 1/60, heap_motion 0.3": (9, -11),
+    "standard": (7, -12), "preview": (9, -1), "substep_motion 0.05": (9, -3), "step 1/60": (9, 5), "step 1/30": (9, -8),
+    "step 1/20": (-88, -10), "step 1/60, substep_motion 0.3": (9, -11),
 }  # fmt: skip
 """Points by which names are beside their points, of a setting of a family, a setting, or a family."""
 NO_DEPTH = 0.1
@@ -68,7 +68,7 @@ def ours() -> list[Point]:
     for family, settings in SETTINGS.items():
         for accuracy in settings:
             falls = np.array([_fall(accuracy, k) for k in range(FALLS)])
-            name = NAMED.get((accuracy.step, accuracy.heap_motion), f"heap_motion {accuracy.heap_motion:g}")
+            name = NAMED.get((accuracy.step, accuracy.substep_motion), f"substep_motion {accuracy.substep_motion:g}")
             points.append(Point(family, name, *np.median(falls[:, :2], axis=0).tolist(), *falls[:, 2:].max(axis=0).tolist()))
             print(points[-1], falls.round(2).tolist(), flush=True)
     return points

@@ -7,9 +7,9 @@ import pytest
 
 import rigidimpulse as ri
 from rigidimpulse.collision.contact_cache import review
-from rigidimpulse.collision.contact_records import CORE_A, CORE_B, HELD, SEPARATION
+from rigidimpulse.collision.contact_records import HELD, SEPARATION, SKELETON_A, SKELETON_B
 from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
-from rigidimpulse.engine.substepped.contact_forces import HeapStepper
+from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.model.state import StepContext
 from rigidimpulse.model.world import compile_scene
 from rigidimpulse.recording.events import EventLog
@@ -42,7 +42,7 @@ def stepper_of(seed: int, wanted: float):
         scene.add(ri.Body(f"{k}", ri.Shape.box(SIDES[k]), position=k * direction / np.linalg.norm(direction) * 3.0, orientation=q[k]))
     world = compile_scene(scene, ri.Accuracy(contact_solver="substepped"))
     context = StepContext(world, Recorder(np.zeros(1), 2), EventLog())
-    stepper, now = HeapStepper(world, world.dynamic, finer=False), context.state.now
+    stepper, now = ContactStepper(world, world.dynamic, finer=False), context.state.now
     order = stepper.order
     stepper.set_up(context, np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
     low, high = 0.0, 3.0
@@ -72,11 +72,11 @@ def test_contacts_lie_on_both_boxes_at_the_gap_of_the_best_axis(wanted):
         gaps = []
         for row in rows[start : start + count]:
             n = carrier @ row[:3]
-            points = [bodies.position[k] + bodies.rotation[k] @ row[at : at + 3] for k, at in ((0, CORE_A), (1, CORE_B))]
+            points = [bodies.position[k] + bodies.rotation[k] @ row[at : at + 3] for k, at in ((0, SKELETON_A), (1, SKELETON_B))]
             gap = float((points[1] - points[0]) @ n)
             np.testing.assert_allclose(points[1] - points[0], gap * n, atol=1e-12)
             assert row[SEPARATION] + row[HELD] == pytest.approx(gap, abs=1e-12)
-            for k, at in ((0, CORE_A), (1, CORE_B)):
+            for k, at in ((0, SKELETON_A), (1, SKELETON_B)):
                 # On the surface of the one whose face or edge it is, and at most the depth inside the other.
                 assert np.max(np.abs(row[at : at + 3]) - half[k]) <= 1e-9 + max(gap, 0.0) + max(-wanted, 0.0)
             gaps.append(gap)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from heap_pit import inside_each_other, pit
+from box_pit import inside_each_other, pit
 
 import rigidimpulse as ri
 
@@ -82,14 +82,14 @@ def test_tiny_bodies_are_stepped_as_large_ones_are(accuracy: str) -> None:
     check(pit(shapes, 11, size), accuracy, 0.3, 0.02 * size, 2e-3 * size)
 
 
-def test_a_hundred_boxes_that_still_meet_in_small_groups_are_a_heap() -> None:
+def test_a_hundred_boxes_that_still_meet_in_small_groups_are_a_substepped_island() -> None:
     """Boxes on their way down meet in groups of 2 to 20; solved exactly these took thirty times as long as the heap they become."""
     box = ri.Shape.box((0.1, 0.08, 0.06))
     run = ri.simulate(pit([box], 3), 0.6)
-    heaps = next(line for line in run.plan.explain().splitlines() if "heaps" in line)
+    heaps = next(line for line in run.plan.explain().splitlines() if "sub-stepped islands" in line)
     assert int(heaps.split(" steps of heaps")[0].split()[-1]) >= 20
     alone = ri.Scene(gravity=(0, 0, -9.81))
     for body in list(pit([box], 3).bodies)[:35]:
         alone.add(body)
-    small = next(line for line in ri.simulate(alone, 0.05).plan.explain().splitlines() if "heaps" in line)
-    assert "no heaps" in small
+    small = next(line for line in ri.simulate(alone, 0.05).plan.explain().splitlines() if "sub-stepped islands" in line)
+    assert "none" in small

@@ -7,12 +7,12 @@ import pytest
 
 import rigidimpulse as ri
 from rigidimpulse.collision.contact_cache import HULLS
-from rigidimpulse.collision.contact_records import CORE_A, CORE_B, HELD, SEPARATION
+from rigidimpulse.collision.contact_records import HELD, SEPARATION, SKELETON_A, SKELETON_B
 from rigidimpulse.collision.distance.epa import EXACT
 from rigidimpulse.collision.manifold.convex_convex import SHRINK
 from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
 from rigidimpulse.core.quaternion import multiply, rotate, to_matrix
-from rigidimpulse.engine.substepped.contact_forces import HeapStepper
+from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.model.state import StepContext
 from rigidimpulse.model.world import compile_scene
 from rigidimpulse.recording.events import EventLog
@@ -76,7 +76,7 @@ def moved_together(corners: list[np.ndarray], q: np.ndarray, way: np.ndarray, wa
     for k in range(2):
         scene.add(ri.Body(f"{k}", shapes[k], position=k * high * way, orientation=q[k]))
     world = compile_scene(scene, ri.Accuracy(contact_solver="substepped"))
-    stepper = HeapStepper(world, world.dynamic, finer=False)
+    stepper = ContactStepper(world, world.dynamic, finer=False)
     stepper.set_up(StepContext(world, Recorder(np.zeros(1), 2), EventLog()), np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
     return stepper, world
 
@@ -100,7 +100,7 @@ def test_contacts_are_at_the_gap_of_the_best_axis(wanted):
         gaps = []
         for row in rows[start : start + count]:
             n = carrier @ row[:3]
-            points = [bodies.position[k] + bodies.rotation[k] @ row[at : at + 3] for k, at in ((0, CORE_A), (1, CORE_B))]
+            points = [bodies.position[k] + bodies.rotation[k] @ row[at : at + 3] for k, at in ((0, SKELETON_A), (1, SKELETON_B))]
             gaps.append(float((points[1] - points[0]) @ n))
             np.testing.assert_allclose(points[1] - points[0], gaps[-1] * n, atol=1e-12)
         slack = EDGE_WINS * float(stepper.inner.min())
@@ -142,7 +142,7 @@ def test_issue_005_corner_beside_the_face_that_bears_it_has_a_contact():
     for k, place, turn in zip((1, 10), places, turns, strict=True):
         scene.add(ri.Body(f"{k}", hulls[k], position=place, orientation=turn))
     world = compile_scene(scene, ri.Accuracy(contact_solver="substepped"))
-    stepper = HeapStepper(world, world.dynamic, finer=False)
+    stepper = ContactStepper(world, world.dynamic, finer=False)
     stepper.set_up(StepContext(world, Recorder(np.zeros(1), 2), EventLog()), np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
     pairs, rows = stepper.table.pairs, stepper.table.rows
     start, count = int(pairs.start[0]), int(pairs.count[0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from heap_pit import STONE, inside_each_other, pit
+from box_pit import STONE, inside_each_other, pit
 
 import rigidimpulse as ri
 
@@ -23,9 +23,9 @@ def part_of_pit(shapes: list[ri.Shape], seed: int, number: int) -> ri.Scene:
     return scene
 
 
-def heap_steps(run: ri.Recording) -> int:
+def substep_counts(run: ri.Recording) -> int:
     """How many steps of heaps the plan reports."""
-    line = next(line for line in run.plan.explain().splitlines() if "heaps" in line)
+    line = next(line for line in run.plan.explain().splitlines() if "sub-stepped islands" in line)
     return int(line.split(" steps of heaps")[0].split()[-1]) if "steps of heaps" in line else 0
 
 
@@ -40,7 +40,7 @@ def test_a_fall_of_some_dozen_bodies_is_stepped_finely(kind: str, seed: int, num
     """
     scene = part_of_pit(STONES[kind], seed, number)
     run = ri.simulate(scene, 2.0)
-    assert run.status.ok and heap_steps(run) > 200
+    assert run.status.ok and substep_counts(run) > 200
     for frame in range(0, len(run.times), 6):
         assert inside_each_other(scene, run, frame, 1e-6) == []
     energy = run.ledger.kinetic + run.ledger.potential
@@ -49,7 +49,7 @@ def test_a_fall_of_some_dozen_bodies_is_stepped_finely(kind: str, seed: int, num
 
 
 @pytest.mark.parametrize("number", [11, 20])
-def test_what_is_cheap_stays_exact(number: int) -> None:
+def test_what_is_csubstepped_island_stays_exact(number: int) -> None:
     """A column of boxes with a ball that rolls beside it takes a few exact steps a frame: to the bit what "newton" gives."""
     stone = ri.Material(density=900, static_friction=0.4, dynamic_friction=0.4)
     scene = ri.Scene(gravity=(0.0, 0.0, -9.81))
@@ -58,12 +58,12 @@ def test_what_is_cheap_stays_exact(number: int) -> None:
         scene.add(ri.Body(f"box {k}", ri.Shape.box(0.1), position=(0.0, 0.0, 0.05 + 0.1 * k), material=stone))
     scene.add(ri.Body("ball", ri.Shape.sphere(0.05), position=(0.2, 0.0, 0.05), velocity=(1.0, 0.0, 0.0), material=stone))
     run = ri.simulate(scene, 0.5)
-    assert heap_steps(run) == 0
+    assert substep_counts(run) == 0
     assert ("fewer than 12 movable bodies" in run.plan.explain()) == (number == 11)
     assert run.state_hash() == ri.simulate(scene, 0.5, accuracy=ri.Accuracy(contact_solver="newton")).state_hash()
 
 
-def test_bodies_that_all_rebound_are_no_heap() -> None:
+def test_bodies_that_all_rebound_are_no_substepped_island() -> None:
     """Heaps do not begin where every pair rebounds by more than 0.5: the plan says so, and keeps the kernel of impacts."""
     scene = ri.Scene(gravity=(0.0, 0.0, -9.81))
     rubber = ri.Material(density=900, restitution=0.8)
@@ -71,33 +71,33 @@ def test_bodies_that_all_rebound_are_no_heap() -> None:
     for k in range(100):
         scene.add(ri.Body(f"ball {k}", ri.Shape.sphere(0.04), position=(0.1 * (k % 10), 0.1 * (k // 10), 1.0), material=rubber))
     lines = {line.name: line for line in ri.simulate(scene, 0.01).plan.lines}
-    assert not lines["heaps"].included and "rebound" in lines["heaps"].reason
+    assert not lines["sub-stepped islands"].included and "rebound" in lines["sub-stepped islands"].reason
     assert lines["event kernel"].included
 
 
-def test_a_body_that_is_let_go_joins_the_heap() -> None:
+def test_a_body_that_is_let_go_joins_the_substepped_island() -> None:
     """A lid that is carried above a fall of boxes, and let go when they have long been a heap, comes to rest on them."""
     scene = part_of_pit(STONES["boxes"], 12, 24)
     lid = ri.Body("lid", ri.Shape.box((0.5, 0.5, 0.05)), position=(0, 0, 1.0), motion="kinematic", release_time=0.8, material=STONE)
     scene.add(lid)
     run = ri.simulate(scene, 3.2)
-    assert run.status.ok and heap_steps(run) > 100
+    assert run.status.ok and substep_counts(run) > 100
     height = run.position("lid")[:, 2]
     np.testing.assert_array_equal(height[run.times <= 0.8], 1.0)
     assert 0.05 < height[-1] < 0.6 and np.abs(run.velocities[-1]).max() < 1e-3
     assert inside_each_other(scene, run, len(run.times) - 1, 1e-6) == []
 
 
-def test_heaps_can_be_left_out() -> None:
+def test_substepped_islands_can_be_left_out() -> None:
     """A row of boxes on the floor is a heap; without heaps it is solved exactly, to the bit as "newton" does, and the status says so."""
     stone = ri.Material(density=900, static_friction=0.4, dynamic_friction=0.4)
     scene = ri.Scene(gravity=(0.0, 0.0, -9.81))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=stone))
     for k in range(62):
         scene.add(ri.Body(f"box {k}", ri.Shape.box(0.1), position=(0.1005 * k, 0.0, 0.05), velocity=(1.0, 0.0, 0.0), material=stone))
-    assert heap_steps(ri.simulate(scene, 0.05)) > 0
-    run = ri.simulate(scene, 0.05, effects={"heaps": False})
-    assert heap_steps(run) == 0 and not next(line for line in run.plan.lines if line.name == "heaps").included
+    assert substep_counts(ri.simulate(scene, 0.05)) > 0
+    run = ri.simulate(scene, 0.05, effects={"sub-stepped islands": False})
+    assert substep_counts(run) == 0 and not next(line for line in run.plan.lines if line.name == "sub-stepped islands").included
     assert "effect left out" in {event.kind for event in run.status.events}
     assert run.state_hash() == ri.simulate(scene, 0.05, accuracy=ri.Accuracy(contact_solver="newton")).state_hash()
 

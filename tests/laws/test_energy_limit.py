@@ -20,7 +20,7 @@ import pytest
 import trimesh
 
 import rigidimpulse as ri
-from rigidimpulse.dynamics.constraints import energy_limit as energy_guard
+from rigidimpulse.dynamics.constraints import energy_limit
 from rigidimpulse.dynamics.impact.point import BodyState
 
 G = 9.81
@@ -68,7 +68,7 @@ def test_free_bodies_lose_the_energy_and_keep_both_momenta(seed: int, share: flo
     before, speeds = size_of(now, world), now.velocity[others].copy()
     # Some of the energy is that of the common motion; of the rest, what bodies have against each other, a part is asked for.
     rest = kinetic - rigid_energy(now, world, inertia)
-    energy_guard.take_off(now, world, MEMBERS, share * rest, NO_GROUND)
+    energy_limit.take_off(now, world, MEMBERS, share * rest, NO_GROUND)
     after = kept(now, world, inertia)
     assert kinetic - after[0] == pytest.approx(share * rest, rel=ROUND_OFF / share, abs=0.0)
     np.testing.assert_allclose(after[1], momentum, atol=ROUND_OFF * before)
@@ -91,7 +91,7 @@ def test_no_more_is_taken_than_free_bodies_have_against_each_other(seed: int) ->
     now, world, inertia = moving_bodies(seed)
     kinetic, momentum, angular = kept(now, world, inertia)
     least, before = rigid_energy(now, world, inertia), size_of(now, world)
-    energy_guard.take_off(now, world, MEMBERS, kinetic, NO_GROUND)
+    energy_limit.take_off(now, world, MEMBERS, kinetic, NO_GROUND)
     after = kept(now, world, inertia)
     assert after[0] == pytest.approx(least, rel=ROUND_OFF * kinetic / least)
     np.testing.assert_allclose(after[1], momentum, atol=ROUND_OFF * before)
@@ -103,7 +103,7 @@ def test_on_smooth_ground_level_momentum_and_upright_spin_stay() -> None:
     now, world, inertia = moving_bodies(11)
     kinetic, momentum, angular = kept(now, world, inertia)
     before = size_of(now, world)
-    energy_guard.take_off(now, world, MEMBERS, 0.05 * kinetic, np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]))
+    energy_limit.take_off(now, world, MEMBERS, 0.05 * kinetic, np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]))
     after = kept(now, world, inertia)
     assert kinetic - after[0] == pytest.approx(0.05 * kinetic, rel=ROUND_OFF * 20)
     np.testing.assert_allclose(after[1][:2], momentum[:2], atol=ROUND_OFF * before)
@@ -116,10 +116,10 @@ def test_on_rough_ground_all_motion_is_slowed_by_one_factor() -> None:
     now, world, inertia = moving_bodies(7)
     kinetic, _, _ = kept(now, world, inertia)
     v, w = now.velocity.copy(), now.angular_velocity.copy()
-    energy_guard.take_off(now, world, MEMBERS, 0.19 * kinetic, EVERY_WAY)
+    energy_limit.take_off(now, world, MEMBERS, 0.19 * kinetic, EVERY_WAY)
     np.testing.assert_allclose(now.velocity[MEMBERS], 0.9 * v[MEMBERS], rtol=ROUND_OFF)
     np.testing.assert_allclose(now.angular_velocity[MEMBERS], 0.9 * w[MEMBERS], rtol=ROUND_OFF)
-    energy_guard.take_off(now, world, MEMBERS, 2.0 * kinetic, EVERY_WAY)
+    energy_limit.take_off(now, world, MEMBERS, 2.0 * kinetic, EVERY_WAY)
     assert not now.velocity[MEMBERS].any() and not now.angular_velocity[MEMBERS].any()
 
 
@@ -161,11 +161,11 @@ def rise(run: ri.Recording) -> float:
 def test_energy_never_grows_in_a_run(scene, monkeypatch: pytest.MonkeyPatch) -> None:
     guarded = ri.simulate(scene(), 1.0, fps=60)
     assert guarded.status.ok, guarded.status.message
-    assert guarded.ledger.dissipated["guard"][-1] > 0.0
+    assert guarded.ledger.dissipated["energy correction"][-1] > 0.0
     assert rise(guarded) < 1e-9
-    monkeypatch.setattr(energy_guard, "GAIN", np.inf)
+    monkeypatch.setattr(energy_limit, "GAIN", np.inf)
     loose = ri.simulate(scene(), 1.0, fps=60)
-    assert "guard" not in loose.ledger.dissipated
+    assert "energy correction" not in loose.ledger.dissipated
     assert rise(loose) > 1e-7
 
 
@@ -186,4 +186,4 @@ def test_a_support_that_moves_by_itself_may_give_energy() -> None:
     scene.add(ri.Body("block", ri.Shape.box((0.2, 0.2, 0.1)), position=(0, 0, 0.05), material=rough))
     run = ri.simulate(scene, 0.5)
     np.testing.assert_allclose(run.velocity("block")[:, 0], np.minimum(mu * G * run.times, speed), atol=1e-9)
-    assert "guard" not in run.ledger.dissipated
+    assert "energy correction" not in run.ledger.dissipated

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 
 from rigidimpulse.core.kernels import jit
-from rigidimpulse.core.simd import ROW, Lanes, aligned, fma, gather, load, root, scatter, spread, store, where_greater, width_of
+from rigidimpulse.core.simd import ROW, Simd, aligned, fma, gather, load, root, scatter, spread, store, where_greater, width_of
 
 
 @jit
-def _mix_rows(lanes, rows, index, out):
-    for first in range(0, index.shape[0], width_of(lanes)):
-        a = gather(lanes, rows, index, first)
-        two = spread(lanes, 2.0)
+def _mix_rows(simd, rows, index, out):
+    for first in range(0, index.shape[0], width_of(simd)):
+        a = gather(simd, rows, index, first)
+        two = spread(simd, 2.0)
         mixed = (a[0] + a[1], a[0] - a[1], a[2] * a[3], a[2] / a[3], -a[4], root(a[5]), where_greater(a[6], two, a[6], two), a[7])
         scatter(out, index, first, mixed)
 
 
 @jit
-def _multiply_add(lanes, a, b, c, out):
-    for first in range(0, a.shape[0], width_of(lanes)):
-        store(out, first, fma(load(lanes, a, first), load(lanes, b, first), load(lanes, c, first)))
+def _multiply_add(simd, a, b, c, out):
+    for first in range(0, a.shape[0], width_of(simd)):
+        store(out, first, fma(load(simd, a, first), load(simd, b, first), load(simd, c, first)))
 
 
 @pytest.mark.parametrize("width", [2, 4, 8])
@@ -32,7 +32,7 @@ def test_rows_and_arithmetic(width):
     assert rows.ctypes.data % 64 == 0
     rows[:] = random.uniform(1.0, 3.0, rows.shape)
     index = random.permutation(32)[:24].astype(np.int32)
-    _mix_rows(Lanes(width), rows, index, out)
+    _mix_rows(Simd(width), rows, index, out)
     a, got = rows.reshape(-1, ROW), out.reshape(-1, ROW)
     expected = np.zeros_like(a)
     x = a[index].T
@@ -45,5 +45,5 @@ def test_multiply_add_rounds_once(width):
     # (1 + e)(1 - e) - 1 = -e^2: rounded twice it is 0.
     e = np.ldexp(1.0, -np.arange(27, 43))
     out = np.zeros(16)
-    _multiply_add(Lanes(width), 1.0 + e, 1.0 - e, np.full(16, -1.0), out)
+    _multiply_add(Simd(width), 1.0 + e, 1.0 - e, np.full(16, -1.0), out)
     np.testing.assert_array_equal(out, -(e**2))

@@ -11,7 +11,7 @@ from rigidimpulse.collision.manifold.inset_surface import DEPTH, cores
 from rigidimpulse.scene.shape import Shape
 
 
-def core_of(shape: Shape) -> tuple[np.ndarray, np.ndarray, float]:
+def skeleton_of(shape: Shape) -> tuple[np.ndarray, np.ndarray, float]:
     """Triangles (t, 3, 3) of a shape of one mesh, those of its core, and the depth of that, m."""
     compiled = compile_shape(shape, np.zeros(3), np.eye(3))
     geometry = build_geometry([compiled])
@@ -28,7 +28,7 @@ RING = trimesh.creation.torus(0.045, 0.02, major_sections=16, minor_sections=8)
 def test_every_face_moves_inwards_by_the_depth(mesh: trimesh.Trimesh) -> None:
     # Three faces meet at a corner of the box, planes of several triangles at one of the ring: all are met exactly. A sign that is wrong
     # is off by two depths, corners moved by d along mean normals leave faces of the box at d / sqrt(3).
-    true, core, depth = core_of(Shape.mesh(mesh.vertices, mesh.faces))
+    true, core, depth = skeleton_of(Shape.mesh(mesh.vertices, mesh.faces))
     assert depth == pytest.approx(DEPTH * np.linalg.norm(mesh.vertices, axis=1).max(), rel=1e-6)
     normal = np.cross(true[:, 1] - true[:, 0], true[:, 2] - true[:, 0])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
@@ -38,9 +38,9 @@ def test_every_face_moves_inwards_by_the_depth(mesh: trimesh.Trimesh) -> None:
 def test_what_is_thinner_than_twice_the_depth_does_not_turn_inside_out() -> None:
     # A plate of 1 m, 10 mm thick: the depth is 8.5 mm, and corners move by a quarter of it at most. A sheet has no inside to move to.
     plate = trimesh.creation.box((1.0, 1.0, 0.01))
-    true, core, depth = core_of(Shape.mesh(plate.vertices, plate.faces))
+    true, core, depth = skeleton_of(Shape.mesh(plate.vertices, plate.faces))
     assert depth > 8e-3
     assert 0.0 < np.ptp(core[..., 2]) <= 0.01
     sheet = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
-    true, core, _ = core_of(Shape.mesh(sheet, [(0, 1, 2), (0, 2, 3)]))
+    true, core, _ = skeleton_of(Shape.mesh(sheet, [(0, 1, 2), (0, 2, 3)]))
     np.testing.assert_array_equal(core, true)

@@ -6,18 +6,18 @@ import sys
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.engine import warm_up as compile_ahead
+from rigidimpulse.engine import warm_up
 from rigidimpulse.gallery import load
 from rigidimpulse.model.world import compile_scene
 
 PROGRAM = """
 import rigidimpulse as ri
-from rigidimpulse import compile_ahead
+from rigidimpulse.engine import warm_up
 from rigidimpulse.core.kernels import KERNELS
 from rigidimpulse.gallery import load
 
-for half in (compile_ahead.{first}, compile_ahead.{second}):
-    half(compile_ahead._box_on_floor(False, {jointed}))
+for half in (warm_up.{first}, warm_up.{second}):
+    half(warm_up._box_on_floor(False, {jointed}))
 ahead = {{kernel.name: set(kernel.entry.overloads) for kernel in KERNELS if kernel.entry.overloads}}
 entry = load("{scene}")
 ri.simulate(entry.scene(), 0.3, accuracy=entry.accuracy)
@@ -32,10 +32,10 @@ print(len(ahead), "compared")
     ("first", "second", "jointed", "scene"),
     [
         ("_respond_and_detect", "_move_and_sweep", False, "stack_10"),
-        ("_look_at_heap", "_step_heap", False, "pile"),
+        ("_find_substepped_contacts", "_step_substepped", False, "pile"),
         ("_start_joints", "_close_and_stop_joints", True, "arm"),
     ],
-    ids=["contacts", "heaps", "joints"],
+    ids=["contacts", "sub-stepped islands", "joints"],
 )
 def test_runs_call_what_was_compiled_ahead(first, second, jointed, scene):
     program = PROGRAM.format(first=first, second=second, jointed=jointed, scene=scene)
@@ -47,14 +47,14 @@ def test_runs_call_what_was_compiled_ahead(first, second, jointed, scene):
 
 FIRST_RUN = """
 import rigidimpulse as ri
-from rigidimpulse import compile_ahead
+from rigidimpulse.engine import warm_up
 from rigidimpulse.core.kernels import KERNELS
 
 def used():
     return {kernel.name for kernel in KERNELS if kernel.calls or kernel.preparing}
 
-for half in (compile_ahead._respond_and_detect, compile_ahead._move_and_sweep):
-    half(compile_ahead._box_on_floor(False))
+for half in (warm_up._respond_and_detect, warm_up._move_and_sweep):
+    half(warm_up._box_on_floor(False))
 ahead = used()
 floor = ri.Body("floor", ri.Shape.half_space(), motion="static")
 run = ri.simulate(ri.Scene(bodies=[floor, ri.Body("box", ri.Shape.box(0.2), position=(0, 0, 1))]), 1.0)
@@ -72,9 +72,9 @@ def test_only_what_a_scene_needs_and_the_cache_lacks_is_compiled(monkeypatch):
     ball = ri.Body("ball", ri.Shape.sphere(0.1), position=(0, 0, 1))
     flies = compile_scene(ri.Scene(bodies=[ball]))
     arm = compile_scene(load("arm").scene())
-    monkeypatch.setattr(compile_ahead, "is_cached", lambda _kernel: False)
-    assert compile_ahead.kernels_to_compile(flies, False, False) == []
-    assert compile_ahead.kernels_to_compile(flies, True, True) == ["impacts of balls", "heaps"]
-    assert "joints" in compile_ahead.kernels_to_compile(arm, False, False)
-    monkeypatch.setattr(compile_ahead, "is_cached", lambda _kernel: True)
-    assert compile_ahead.kernels_to_compile(arm, True, True) == []
+    monkeypatch.setattr(warm_up, "is_cached", lambda _kernel: False)
+    assert warm_up.kernels_to_compile(flies, False, False) == []
+    assert warm_up.kernels_to_compile(flies, True, True) == ["impacts of balls", "sub-stepped islands"]
+    assert "joints" in warm_up.kernels_to_compile(arm, False, False)
+    monkeypatch.setattr(warm_up, "is_cached", lambda _kernel: True)
+    assert warm_up.kernels_to_compile(arm, True, True) == []
