@@ -20,9 +20,9 @@ class BroadPhase:
             springs = world.accuracy.response == "penalty"
             return Skip(world.why_no_impacts if springs else "a dynamic body and another are needed for contact")
 
-        def detect(context, pair_events) -> None:
-            if context.substepped is not None:
-                context.substepped.gather(context, pair_events)
+        def detect(run, pair_events) -> None:
+            if run.substepped is not None:
+                run.substepped.gather(run, pair_events)
             pair_events.find_pairs()
 
         return Bound(detect, f"{world.num_bodies} bodies may touch")

@@ -69,7 +69,7 @@ class SubsteppedContact:
         return Bound(step_substepped, f"sub-stepped: {when}")
 
 
-def step_substepped(context, pair_events, island) -> None:
+def step_substepped(run, pair_events, island) -> None:
     """Step the heap of a group to the end of the window."""
     if island.substepped is not None:
-        context.substepped.step(context, pair_events, island)
+        run.substepped.step(run, pair_events, island)

@@ -37,27 +37,27 @@ class ImpactTime:
             return Skip(world.why_no_impacts)
         method = importlib.import_module(f"rigidimpulse.collision.time_of_impact.{MODULES[self.method]}").sweep
 
-        def sweep(context, pair_events) -> None:
-            sweep_stale_pairs(context, pair_events, method)
+        def sweep(run, pair_events) -> None:
+            sweep_stale_pairs(run, pair_events, method)
 
         return Bound(sweep, f"{self.method}: {REASONS[self.method]}")
 
 
-def sweep_stale_pairs(context, pair_events, method) -> None:
+def sweep_stale_pairs(run, pair_events, method) -> None:
     """Sweep the pairs that ask for it, and note when they come to contact."""
     stale = np.flatnonzero(~np.isnan(pair_events.start))
     if not len(stale):
         return
     found = method(
-        context.detector, context.state.trajectory, pair_events.a[stale], pair_events.b[stale], pair_events.start[stale], pair_events.end,
+        run.detector, run.state.trajectory, pair_events.a[stale], pair_events.b[stale], pair_events.start[stale], pair_events.end,
         pair_events.impact_margin[stale], pair_events.tolerance[stale],
     )
     pair_events.time[stale] = found.time
     pair_events.witness[stale] = found.witness
     pair_events.start[stale] = np.nan
     for k in np.flatnonzero(found.status == STALLED):
-        names = context.world.names
-        context.log.report(
+        names = run.world.names
+        run.log.report(
             float(found.time[k]), "sweep stalled", (names[pair_events.a[stale[k]]], names[pair_events.b[stale[k]]]),
             "the budget of gap queries was used up; raise iterations or the tolerance",
         )

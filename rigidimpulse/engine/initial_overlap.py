@@ -54,17 +54,17 @@ class _Demand:
     way: float
 
 
-def resolve_overlaps(context) -> None:
+def resolve_overlaps(run) -> None:
     """Report pairs that overlap by more than DEPTH of the smaller body's size where the run starts, and take them apart."""
-    world = context.world
+    world = run.world
     if not world.can_collide:
         return
-    search = _Search(context)
+    search = _Search(run)
     demands = search.new_demands({})
     if not demands:
         return
     for demand in demands.values():
-        context.log.report(
+        run.log.report(
             0.0, "overlap at the start", (world.names[demand.a], world.names[demand.b]),
             f"the bodies are inside each other by {demand.way:.4g} m; as far as there is room they are moved apart before the "
             "first step, without a change of velocity: move them apart in the scene to see no jump",
@@ -72,17 +72,17 @@ def resolve_overlaps(context) -> None:
     _take_apart(search, demands)
     stuck = sorted(search.overlapping())
     for a, b in stuck:
-        context.log.report(
+        run.log.report(
             0.0, "overlap not resolved", (world.names[a], world.names[b]),
             "there is no room to move the bodies apart, or joints hold them: in this run they do not touch each other; make room",
         )
     if stuck:
         keys = np.array([a * world.num_bodies + b for a, b in stuck])
-        context.world = replace(world, apart=np.union1d(world.apart, keys))
+        run.world = replace(world, apart=np.union1d(world.apart, keys))
     moved = search.position - world.position
     gained = -float(np.sum(np.where(world.dynamic, world.mass, 0.0)[:, None] * world.steady_acceleration * moved))
     # Frame 0 is the state as given: the books change right after it.
-    context.log.account(float(np.nextafter(0.0, 1.0)), "overlap", gained)
+    run.log.account(float(np.nextafter(0.0, 1.0)), "overlap", gained)
 
 
 def _take_apart(search: _Search, demands: dict[tuple[int, int], _Demand]) -> None:
@@ -112,12 +112,12 @@ class _Search:
 
     """
 
-    def __init__(self, context) -> None:
-        self.context = context
-        self.world = context.world
-        self.position = context.world.position.copy()
-        self.narrowphase = Narrowphase(context.world.shapes, context.world.geometry)
-        self.cluster, self.inv_mass = _clusters(context.world)
+    def __init__(self, run) -> None:
+        self.run = run
+        self.world = run.world
+        self.position = run.world.position.copy()
+        self.narrowphase = Narrowphase(run.world.shapes, run.world.geometry)
+        self.cluster, self.inv_mass = _clusters(run.world)
 
     def size(self, a: int, b: int) -> float:
         """Size of the smaller body of a pair, m."""
@@ -133,7 +133,7 @@ class _Search:
 
     def overlapping(self) -> set[tuple[int, int]]:
         """Pairs that overlap."""
-        pair_events = PairEvents(self.context, self.context.state.time)
+        pair_events = PairEvents(self.run, self.run.state.time)
         pair_events.find_pairs()
         near = ~self._surely_apart(pair_events.a, pair_events.b)
         pairs = zip(pair_events.a[near].tolist(), pair_events.b[near].tolist(), strict=True)
@@ -260,7 +260,7 @@ class _Search:
 
     def move_to(self, displacement: np.ndarray) -> None:
         """Put the bodies where they were given plus D (n, 3)."""
-        trajectory = self.context.state.trajectory
+        trajectory = self.run.state.trajectory
         self.position = self.world.position + displacement
         for i in np.flatnonzero(np.any(trajectory.position != self.position, axis=1)).tolist():
             trajectory.position[i] = self.position[i]

@@ -76,9 +76,9 @@ class Island:
     free: tuple[np.ndarray, np.ndarray] | None = None
     loaded: bool = False
 
-    def load(self, context, h: float) -> float:
+    def load(self, run, h: float) -> float:
         """Take varying forces as constant over a sub-step of h s at most; returns how long it may be."""
-        return h if self.free is None else context.forces.load(context, self, h)
+        return h if self.free is None else run.forces.load(run, self, h)
 
     def slow(self) -> np.ndarray:
         """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
@@ -93,14 +93,14 @@ def empty_contacts(m: int) -> Contacts:
     return Contacts(*np.empty((2, m), np.int64), *np.empty((3, m, 3)), *np.empty((5, m)))
 
 
-def collect(context, pair_events, pairs: np.ndarray, time: float, margin: float = MARGIN) -> tuple[np.ndarray, np.ndarray]:
+def collect(run, pair_events, pairs: np.ndarray, time: float, margin: float = MARGIN) -> tuple[np.ndarray, np.ndarray]:
     """Manifolds of window pairs at the present poses within so many held gaps: copies of the filled buffer rows.
 
     A pair that just came to contact but has no manifold (it overlaps, since its sweep does not back up time) has the
     witness of its sweep for a contact.
     """
-    world, state = context.world, context.state
-    buffer, a, b = context.contact_buffer, pair_events.a[pairs], pair_events.b[pairs]
+    world, state = run.world, run.state
+    buffer, a, b = run.contact_buffer, pair_events.a[pairs], pair_events.b[pairs]
     count = buffer.find(world.geometry, world, state.now, state.rotation, a, b, margin * pair_events.contact_margin[pairs])
     real, integer = buffer.real[:count].copy(), buffer.integer[:count].copy()
     for p in pairs[pair_events.time[pairs] <= time].tolist():
@@ -111,13 +111,13 @@ def collect(context, pair_events, pairs: np.ndarray, time: float, margin: float 
     return real, integer
 
 
-def touching_islands(context, pair_events, time: float, bodies: np.ndarray) -> tuple[list[Island], np.ndarray]:
+def touching_islands(run, pair_events, time: float, bodies: np.ndarray) -> tuple[list[Island], np.ndarray]:
     """Groups that the given bodies belong to at `time`, and all bodies looked at, which are brought to it.
 
     Bodies that share the forces of a group come along when one of them is looked at, even if they touch nothing any more: those
     forces end for all of them at once, or momentum would not be kept.
     """
-    world, state = context.world, context.state
+    world, state = run.world, run.state
     seen, near = np.zeros(len(pair_events.a), bool), np.empty(len(pair_events.a), np.int64)
     brought, reached = np.zeros(world.num_bodies, bool), np.zeros(world.num_bodies, bool)
     frontier = np.asarray(bodies, np.int64)
@@ -126,17 +126,17 @@ def touching_islands(context, pair_events, time: float, bodies: np.ndarray) -> t
         reached[frontier] = True
         # All that a lift may come near is brought to `time` with what touches.
         pairs = near[: near_pairs(state.trajectory, time, pair_events.pairs, FAR_MARGIN, world.bound_radius, frontier, seen, near)]
-        partners = _partners(context, frontier)
+        partners = _partners(run, frontier)
         mark = np.zeros(world.num_bodies, bool)
         mark[frontier] = mark[pair_events.a[pairs]] = mark[pair_events.b[pairs]] = mark[partners] = True
         fresh = (mark & ~brought).nonzero()[0]
         brought[fresh] = True
         bring_all(
-            state.trajectory, fresh, time, state.now, state.rotation, context.acceleration, context.angular_acceleration
+            state.trajectory, fresh, time, state.now, state.rotation, run.acceleration, run.angular_acceleration
         )
-        if context.forces is not None and context.forces.flow is not None:
-            context.forces.flow.weigh(fresh, time)
-        real, integer = collect(context, pair_events, pairs, time)
+        if run.forces is not None and run.forces.flow is not None:
+            run.forces.flow.weigh(fresh, time)
+        real, integer = collect(run, pair_events, pairs, time)
         reals.append(real)
         integers.append(integer)
         mark[:] = False
@@ -146,18 +146,18 @@ def touching_islands(context, pair_events, time: float, bodies: np.ndarray) -> t
         return [], frontier
     integer = np.concatenate(integers)
     islands = []
-    if len(integer) or context.joints is not None or context.forces is not None:
-        islands = _components(context, pair_events, time, reached, np.concatenate(reals), integer)
-    _end_sub_steps(context, islands, time, reached.nonzero()[0])
+    if len(integer) or run.joints is not None or run.forces is not None:
+        islands = _components(run, pair_events, time, reached, np.concatenate(reals), integer)
+    _end_sub_steps(run, islands, time, reached.nonzero()[0])
     return islands, reached.nonzero()[0]
 
 
-def _partners(context, bodies: np.ndarray) -> np.ndarray:
+def _partners(run, bodies: np.ndarray) -> np.ndarray:
     """All bodies of the joints at the given ones, those tied by forces, and those that share forces with them; themselves included."""
-    state = context.state
-    partners = np.zeros(0, np.int64) if context.joints is None else context.joints.bodies_of(context.joints.at(bodies))
-    if context.forces is not None:
-        partners = np.concatenate([partners, context.forces.partners(bodies)])
+    state = run.state
+    partners = np.zeros(0, np.int64) if run.joints is None else run.joints.bodies_of(run.joints.at(bodies))
+    if run.forces is not None:
+        partners = np.concatenate([partners, run.forces.partners(bodies)])
     pressed = bodies[state.under_contact[bodies]]
     if not len(pressed):
         return partners
@@ -167,9 +167,9 @@ def _partners(context, bodies: np.ndarray) -> np.ndarray:
     return np.concatenate([partners, sharers])
 
 
-def _components(context, pair_events, time: float, reached, real: np.ndarray, integer: np.ndarray) -> list[Island]:
+def _components(run, pair_events, time: float, reached, real: np.ndarray, integer: np.ndarray) -> list[Island]:
     """Split contacts and joints into groups joined by movable bodies, in order of their first body."""
-    dynamic = context.world.dynamic
+    dynamic = run.world.dynamic
     parent: dict[int, int] = {}
 
     def root(i: int) -> int:
@@ -185,7 +185,7 @@ def _components(context, pair_events, time: float, reached, real: np.ndarray, in
     ends_of_contacts = integer[:, :2].tolist()
     for a, b in ends_of_contacts:
         join(a, b)
-    jointed: JointState | None = context.joints
+    jointed: JointState | None = run.joints
     joints, at = np.zeros(0, np.int64), []
     if jointed is not None:
         joints = jointed.at(np.flatnonzero(reached & dynamic))
@@ -194,9 +194,9 @@ def _components(context, pair_events, time: float, reached, real: np.ndarray, in
             join(ends[0], ends[-1])
             at.append(jointed.movable_end(j))
     forced = np.zeros(0, np.int64)
-    if context.forces is not None:
-        forced = np.flatnonzero(reached & context.forces.acts)
-        for first, i in context.forces.ties(forced):
+    if run.forces is not None:
+        forced = np.flatnonzero(reached & run.forces.acts)
+        for first, i in run.forces.ties(forced):
             join(first, i)
     owner = np.array([root(a if dynamic[a] else b) for a, b in ends_of_contacts], np.int64)
     owner_of_joint = np.array([root(i) for i in at], np.int64)
@@ -204,47 +204,47 @@ def _components(context, pair_events, time: float, reached, real: np.ndarray, in
     owners, islands = sorted({*owner.tolist(), *owner_of_joint.tolist()}), []
     for o in owners:
         tied = forced[owner_of_forced == o]
-        islands.append(make_island(context, pair_events, time, real, integer, owner == o, joints[owner_of_joint == o], tied))
+        islands.append(make_island(run, pair_events, time, real, integer, owner == o, joints[owner_of_joint == o], tied))
     if len(forced) and len(free := forced[~np.isin(owner_of_forced, owners)]):
-        islands.append(_free_island(context, time, free))
+        islands.append(_free_island(run, time, free))
     return islands
 
 
-def _free_island(context, time: float, members: np.ndarray) -> Island:
+def _free_island(run, time: float, members: np.ndarray) -> Island:
     """Bodies that nothing but forces hold: no contacts, no joints."""
-    none, now = np.zeros(0, np.int64), context.state.now
+    none, now = np.zeros(0, np.int64), run.state.now
     return Island(
         time, members, none, empty_contacts(0), none, none, np.zeros((0, 2), np.int64), [], np.zeros(0), np.zeros(0), np.zeros(0),
         np.zeros(0, bool), now.velocity[members], now.angular_velocity[members],
     )
 
 
-def _end_sub_steps(context, islands: list[Island], time: float, bodies: np.ndarray) -> None:
+def _end_sub_steps(run, islands: list[Island], time: float, bodies: np.ndarray) -> None:
     """What happens to all bodies brought at once when forces that were constant over a sub-step end."""
     for island in islands:
-        if project_velocities(context, island):
-            classify(context, island)
-    note_end_energy(context, bodies.tolist())
+        if project_velocities(run, island):
+            classify(run, island)
+    note_end_energy(run, bodies.tolist())
     for island in islands:
         if len(island.joints):
-            context.joints.project_velocities(context, island)
-            classify(context, island)
-    slowed = limit_energy(context, bodies.tolist(), time)
+            run.joints.project_velocities(run, island)
+            classify(run, island)
+    slowed = limit_energy(run, bodies.tolist(), time)
     for island in islands:
         if not slowed.isdisjoint(island.members.tolist()):
-            classify(context, island)
+            classify(run, island)
 
 
 def make_island(
-    context, pair_events, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray, joints: np.ndarray, tied: np.ndarray
+    run, pair_events, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray, joints: np.ndarray, tied: np.ndarray
 ) -> Island:
     """The group of the contacts marked in `which`, sorted by pair, of the given joints, and of the bodies tied to them by forces."""
-    world, state = context.world, context.state
-    rows, contacts = _sorted_contacts(context, real, integer, which.nonzero()[0])
+    world, state = run.world, run.state
+    rows, contacts = _sorted_contacts(run, real, integer, which.nonzero()[0])
     mark = np.zeros(world.num_bodies, bool)
     mark[contacts.body_a] = mark[contacts.body_b] = True
     if len(joints):
-        mark[context.joints.bodies_of(joints)] = True
+        mark[run.joints.bodies_of(joints)] = True
     mark[tied] = True
     members = (mark & world.dynamic).nonzero()[0]
     place = pair_events.find(contacts.body_a, contacts.body_b)
@@ -265,26 +265,26 @@ def make_island(
         angular_velocity=state.now.angular_velocity[members],
         joints=joints,
     )
-    classify(context, island)
+    classify(run, island)
     return island
 
 
-def _sorted_contacts(context, real: np.ndarray, integer: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, Contacts]:
+def _sorted_contacts(run, real: np.ndarray, integer: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, Contacts]:
     """The rows (m,) of the contact buffer sorted by pair, and their contacts."""
     if len(rows) > 1:
         rows = rows[np.lexsort((integer[rows, 4], integer[rows, 3], integer[rows, 2], integer[rows, 1], integer[rows, 0]))]
-    world, contacts = context.world, empty_contacts(len(rows))
-    fill_contacts(context.state.now, real, integer, rows, world.material_of_body, world.coefficients, contacts)
+    world, contacts = run.world, empty_contacts(len(rows))
+    fill_contacts(run.state.now, real, integer, rows, world.material_of_body, world.coefficients, contacts)
     return rows, contacts
 
 
-def near_contacts(context, pair_events, members: np.ndarray, time: float) -> tuple[Contacts, np.ndarray, list[tuple[int, ...]]]:
+def near_contacts(run, pair_events, members: np.ndarray, time: float) -> tuple[Contacts, np.ndarray, list[tuple[int, ...]]]:
     """What a lift of the members of a group may close: contacts with all that is near at `time`, held gaps [m], and keys."""
     near = np.empty(len(pair_events.a), np.int64)
     seen = np.zeros(len(pair_events.a), bool)
-    count = near_pairs(context.state.trajectory, time, pair_events.pairs, FAR_MARGIN, context.world.bound_radius, members, seen, near)
-    real, integer = collect(context, pair_events, near[:count], time, FAR_MARGIN)
-    rows, contacts = _sorted_contacts(context, real, integer, np.arange(len(real)))
+    count = near_pairs(run.state.trajectory, time, pair_events.pairs, FAR_MARGIN, run.world.bound_radius, members, seen, near)
+    real, integer = collect(run, pair_events, near[:count], time, FAR_MARGIN)
+    rows, contacts = _sorted_contacts(run, real, integer, np.arange(len(real)))
     place = pair_events.find(contacts.body_a, contacts.body_b)
     return contacts, pair_events.contact_margin[place], [contact_key(*row) for row in integer[rows].tolist()]
 
@@ -298,13 +298,13 @@ def contact_key(a: int, b: int, kind: int, feature_a: int, feature_b: int) -> tu
     return a, b, kind, feature_a, feature_b
 
 
-def classify(context, island: Island) -> None:
+def classify(run, island: Island) -> None:
     """Measure approach speeds and what presses each contact; slow approaches within the margin count as live.
 
     Where a group is supported, whatever it carries is pressed by its steady acceleration (gravity, constant forces) as soon as the support
     bears, so that is the least that counts.
     """
-    state, world = context.state, context.world
+    state, world = run.state, run.world
     contacts = island.contacts
     force = np.array([state.force_of(key)[0] for key in island.keys])
     least = 0.0
@@ -312,7 +312,7 @@ def classify(context, island: Island) -> None:
         least = float(world.steady_strength[island.members].max())
     pressing(
         world.geometry, world.shape_of_body, state.rotation, state.now, contacts, island.kinds, island.features,
-        context.acceleration, context.angular_acceleration, force, least, world.accuracy.step, island.contact_margin, island.approach,
+        run.acceleration, run.angular_acceleration, force, least, world.accuracy.step, island.contact_margin, island.approach,
         island.rest_speed,
     )
     island.live |= np.abs(island.approach) <= island.rest_speed

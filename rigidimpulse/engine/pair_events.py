@@ -33,16 +33,16 @@ class PairEvents:
         substepped_begun: whether the heaps of the step have been stepped from its start.
     """
 
-    def __init__(self, context, end: float) -> None:
-        self.context = context
-        self.begin, self.end = context.state.time, end
-        self._take(new_pairs(context.world, np.zeros(0, np.int64), np.zeros(0, np.int64), self.begin))
-        self.wake = np.full(context.world.num_bodies, np.inf)
-        self.inside = np.zeros(context.world.num_bodies, bool)
-        self.asleep = ~(context.world.dynamic | context.world.moving)
-        self._looked_around = np.full(context.world.num_bodies, -np.inf)
+    def __init__(self, run, end: float) -> None:
+        self.run = run
+        self.begin, self.end = run.state.time, end
+        self._take(new_pairs(run.world, np.zeros(0, np.int64), np.zeros(0, np.int64), self.begin))
+        self.wake = np.full(run.world.num_bodies, np.inf)
+        self.inside = np.zeros(run.world.num_bodies, bool)
+        self.asleep = ~(run.world.dynamic | run.world.moving)
+        self._looked_around = np.full(run.world.num_bodies, -np.inf)
         self.substepped_begun = False
-        self._moves = (context.state.trajectory.mode != FIXED) | context.world.dynamic
+        self._moves = (run.state.trajectory.mode != FIXED) | run.world.dynamic
 
     def _take(self, pairs: Pairs) -> None:
         """Let `pairs` be the table."""
@@ -52,17 +52,17 @@ class PairEvents:
             self.tries, self.since,
             self.repeats, self.witness,
         ) = pairs  # fmt: skip
-        key = self.a * self.context.world.num_bodies + self.b
+        key = self.a * self.run.world.num_bodies + self.b
         self._order = np.argsort(key, kind="stable")
         self._sorted_key = key[self._order]
 
     def find_pairs(self) -> None:
         """Broad phase: the pairs whose boxes overlap in the step."""
-        context = self.context
-        world, trajectory = context.world, context.state.trajectory
+        run = self.run
+        world, trajectory = run.world, run.state.trajectory
         if self.inside.any() and not np.any(world.dynamic & ~self.inside):
             return
-        box_min, box_max = context.box_min, context.box_max
+        box_min, box_max = run.box_min, run.box_max
         box_min[:], box_max[:] = world.static_min, world.static_max
         members = np.flatnonzero(self._moves)
         path_boxes(trajectory, members, self.begin, self.end, world.bound_radius, box_min, box_max)
@@ -81,16 +81,16 @@ class PairEvents:
 
         A pair is swept from the last change of course of its bodies; when it was last in contact is known from its rebound.
         """
-        trajectory = self.context.state.trajectory
+        trajectory = self.run.state.trajectory
         self.start[:] = np.maximum(np.maximum(trajectory.start[self.a], trajectory.start[self.b]), begin)
         for p, pair in enumerate(zip(self.a.tolist(), self.b.tolist(), strict=True)):
-            last = self.context.state.rebounds.get(pair)
+            last = self.run.state.rebounds.get(pair)
             if last is not None and last[0] >= begin:
                 self.since[p] = last[0]
 
     def is_plain(self, time: float) -> bool:
         """Whether nothing in the window asks to be remembered: no body held or called, no pair met more than once or without an impulse."""
-        state = self.context.state
+        state = self.run.state
         lowered = np.flatnonzero(self.impact_margin != self.least_impact_margin)
         if len(lowered) and not self._is_closed_form(lowered):
             return False
@@ -105,7 +105,7 @@ class PairEvents:
 
     def _is_closed_form(self, places: np.ndarray) -> bool:
         """Whether pairs are balls, or balls and planes that stand, that were in contact at gap 0: that leaves no trace in their times."""
-        detector, trajectory = self.context.detector, self.context.state.trajectory
+        detector, trajectory = self.run.detector, self.run.state.trajectory
         return all(
             is_closed_form(
                 trajectory, detector.sweep_scratch, a, b, detector.shape_of_body[a], detector.shape_of_body[b], self.impact_margin[p]
@@ -115,17 +115,17 @@ class PairEvents:
 
     def touching(self, time: float, bodies: np.ndarray) -> tuple[list[Island], np.ndarray]:
         """Groups of touching bodies that the given ones belong to at `time`, and all bodies looked at."""
-        islands, reached = touching_islands(self.context, self, time, bodies)
-        return islands if self.context.substepped is None else self.context.substepped.join(self.context, self, time, islands), reached
+        islands, reached = touching_islands(self.run, self, time, bodies)
+        return islands if self.run.substepped is None else self.run.substepped.join(self.run, self, time, islands), reached
 
     def _is_shut(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Which pairs are not swept, since a heap's solver looks after them."""
-        free = self.context.world.dynamic & ~self.inside
+        free = self.run.world.dynamic & ~self.inside
         return ~(free[a] | free[b]) | (self.asleep[a] & self.asleep[b])
 
     def _append(self, a: np.ndarray, b: np.ndarray, start: float) -> None:
         """Add pairs whose bodies may meet and that are not there yet."""
-        world = self.context.world
+        world = self.run.world
         keep = world.may_collide(a, b) & ~self._is_shut(a, b)
         if keep.any():
             fresh = new_pairs(world, a[keep], b[keep], start)
@@ -134,11 +134,11 @@ class PairEvents:
 
     def trajectory_changed(self, body: int, time: float) -> None:
         """The body took a new course at `time`: sweep its pairs again, and add those it may now reach."""
-        context, world = self.context, self.context.world
+        run, world = self.run, self.run.world
         partners = np.empty(world.num_bodies, np.int64)
         count = renew_pairs(
-            context.state.trajectory, body, time, self.end, world.bound_radius[body], MARGIN * world.largest_contact_margin, self._moves,
-            world.dynamic, self.inside, self.pairs, context.box_min, context.box_max, partners,
+            run.state.trajectory, body, time, self.end, world.bound_radius[body], MARGIN * world.largest_contact_margin, self._moves,
+            world.dynamic, self.inside, self.pairs, run.box_min, run.box_max, partners,
         )
         if count:
             fresh = partners[:count]
@@ -146,9 +146,9 @@ class PairEvents:
 
     def trajectories_changed(self, bodies: np.ndarray, time: float) -> None:
         """The same for the members of heaps, all at once."""
-        context = self.context
-        free = context.world.dynamic & ~self.inside
-        moved = np.zeros(context.world.num_bodies, bool)
+        run = self.run
+        free = run.world.dynamic & ~self.inside
+        moved = np.zeros(run.world.num_bodies, bool)
         moved[bodies] = True
         known = np.flatnonzero(moved[self.a] | moved[self.b])
         self.sweep_again(known, time)
@@ -157,27 +157,27 @@ class PairEvents:
         self.impact_margin[known] = self.least_impact_margin[known]
         self.tries[known] = 0
         path_boxes(
-            context.state.trajectory, bodies, time, self.end, context.world.bound_radius, context.box_min, context.box_max
+            run.state.trajectory, bodies, time, self.end, run.world.bound_radius, run.box_min, run.box_max
         )
-        context.box_min[bodies] -= MARGIN * context.world.largest_contact_margin
-        context.box_max[bodies] += MARGIN * context.world.largest_contact_margin
+        run.box_min[bodies] -= MARGIN * run.world.largest_contact_margin
+        run.box_max[bodies] += MARGIN * run.world.largest_contact_margin
         pairs = np.empty((len(bodies) + 64, 2), np.int32)
-        low, high = context.box_min.copy(), context.box_max.copy()
+        low, high = run.box_min.copy(), run.box_max.copy()
         low[~(moved | free)], high[~(moved | free)] = np.inf, -np.inf
         count = overlapping_pairs(low, high, free, pairs)
         if count < 0:
             pairs = np.empty((-count, 2), np.int32)
             count = overlapping_pairs(low, high, free, pairs)
-        n = context.world.num_bodies
+        n = run.world.num_bodies
         first, second = pairs[:count].T.astype(np.int64)
         fresh = ~np.isin(first * n + second, self.a * n + self.b)
         self._append(first[fresh], second[fresh], time)
 
     def active_bodies(self) -> np.ndarray:
         """Bodies that move or that a net presses, but for those in heaps."""
-        moves = self.context.state.trajectory.mode != FIXED
-        if self.context.soft_bodies is not None:
-            moves |= self.context.soft_bodies.pressed
+        moves = self.run.state.trajectory.mode != FIXED
+        if self.run.soft_bodies is not None:
+            moves |= self.run.soft_bodies.pressed
         return np.flatnonzero(moves & ~self.inside)
 
     def bodies_at(self, time: float) -> np.ndarray:
@@ -188,7 +188,7 @@ class PairEvents:
         hit = self.time <= time
         mark = np.zeros(len(self.wake), bool)
         mark[self.a[hit]] = mark[self.b[hit]] = True
-        mark &= self.context.world.dynamic
+        mark &= self.run.world.dynamic
         mark |= self.wake <= time
         return mark.nonzero()[0]
 
@@ -202,7 +202,7 @@ class PairEvents:
 
     def find(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Places of the pairs (a, b)."""
-        return self._order[self._sorted_key.searchsorted(a * self.context.world.num_bodies + b)]
+        return self._order[self._sorted_key.searchsorted(a * self.run.world.num_bodies + b)]
 
     def sweep_again(self, places: np.ndarray, time: float) -> None:
         """Let pairs be swept from `time` on, but for those that are given up."""
@@ -214,13 +214,13 @@ class PairEvents:
     def count_contacts(self, time: float) -> None:
         """Count contacts at one instant; a pair with too many is left alone until the end of the step, and reported."""
         hit = (self.time <= time).nonzero()[0]
-        again = time - self.since[hit] <= INSTANT * self.context.world.accuracy.step
+        again = time - self.since[hit] <= INSTANT * self.run.world.accuracy.step
         self.repeats[hit] = np.where(again, self.repeats[hit] + 1, 0)
         self.since[hit[~again]] = time
-        names = self.context.world.names
+        names = self.run.world.names
         for p in hit[self.repeats[hit] > MAX_REPEATS]:
             self.start[p], self.time[p] = np.nan, np.inf
-            self.context.log.report(
+            self.run.log.report(
                 time, "squeezed", (names[self.a[p]], names[self.b[p]]),
                 "no motion keeps the body apart from all that presses on it; make room, or let the pressing bodies move freely",
             )
@@ -236,8 +236,8 @@ class PairEvents:
         self.sweep_again(stuck, time)
         for p in stuck[self.tries[stuck] > MAX_TRIES]:
             self.start[p] = np.nan
-            names = self.context.world.names
-            self.context.log.report(
+            names = self.run.world.names
+            self.run.log.report(
                 time, "contact not resolved", (names[self.a[p]], names[self.b[p]]),
                 "the pair is left alone until the end of the step; use a smaller step",
             )

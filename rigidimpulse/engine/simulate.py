@@ -31,7 +31,7 @@ from rigidimpulse.engine.spheres.effect import ARRIVED, GO_ON, STEP, EventKernel
 from rigidimpulse.engine.step import go_on, react, step
 from rigidimpulse.engine.trigger_effect import TriggerVolumes, bind_triggers
 from rigidimpulse.engine.warm_up import prepare_kernels
-from rigidimpulse.model.state import StepContext
+from rigidimpulse.model.state import Run
 from rigidimpulse.model.world import World, compile_scene
 from rigidimpulse.motion.kinematic import KeyframePaths
 from rigidimpulse.motion.trajectory import FIXED, FREE, PRESCRIBED, begin
@@ -119,14 +119,14 @@ def _simulate(
     log = EventLog()
     for name, reason in left_out.items():
         log.report(0.0, "effect left out", (name,), f"the scene calls for it: {reason}")
-    context = StepContext(world, recorder, log)
-    bind_forces(context, plan, times)
+    run = Run(world, recorder, log)
+    bind_forces(run, plan, times)
     paths = KeyframePaths(world)
-    start_trajectories(context)
-    recorder.start(context.state.trajectory)
-    resolve_overlaps(context)
-    bind_triggers(context, plan)
-    running = Running(context, paths, make_flight(context, plan))
+    start_trajectories(run)
+    recorder.start(run.state.trajectory)
+    resolve_overlaps(run)
+    bind_triggers(run, plan)
+    running = Running(run, paths, make_flight(run, plan))
     settings = RunSettings(float(duration), float(fps), world.accuracy, dict(effects or {}))
     if cache is None:
         run_to_end(running, plan, duration, progress)
@@ -145,31 +145,31 @@ def _simulate(
 class Running(NamedTuple):
     """A run under way: all that it changes, and what keeps its place in the keyframes and in the event kernel."""
 
-    context: StepContext
+    run: Run
     paths: KeyframePaths
     flight: EventRun | None
 
 
 def run_to_end(running: Running, plan: Plan, duration: float, progress: Callable[[float], None] | None) -> None:
     """Step to the end; a run that is under way goes on from where it is."""
-    context, paths, flight = running
+    run, paths, flight = running
     # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
-    for end in (float(duration), max(float(duration), float(context.recorder.times[-1]))):
-        if plan.steps or context.forces is not None or context.triggers is not None:
-            run_steps(context, plan, paths, flight, end, progress)
+    for end in (float(duration), max(float(duration), float(run.recorder.times[-1]))):
+        if plan.steps or run.forces is not None or run.triggers is not None:
+            run_steps(run, plan, paths, flight, end, progress)
         else:
-            paths.start_segments(context, end)
+            paths.start_segments(run, end)
 
 
 def finish_run(running: Running, plan: Plan, duration: float) -> Recording:
     """End what is under way at the end, and return the recording."""
-    context = running.context
-    finish_sub_steps(context, plan, context.state.time)
-    if context.substepped is not None:
-        context.substepped.close(context, context.state.time)
-        plan.tell(SubsteppedContact.name, context.substepped.summary())
-    context.recorder.finish(context.state.trajectory)
-    return make_recording(context, plan, context.recorder.times, duration)
+    run = running.run
+    finish_sub_steps(run, plan, run.state.time)
+    if run.substepped is not None:
+        run.substepped.close(run, run.state.time)
+        plan.tell(SubsteppedContact.name, run.substepped.summary())
+    run.recorder.finish(run.state.trajectory)
+    return make_recording(run, plan, run.recorder.times, duration)
 
 
 def frame_times(duration: float, fps: float) -> np.ndarray:
@@ -225,9 +225,9 @@ def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
     return Plan(world, effects, chosen)
 
 
-def start_trajectories(context: StepContext) -> None:
+def start_trajectories(run: Run) -> None:
     """Give every body its first course."""
-    world, trajectory = context.world, context.state.trajectory
+    world, trajectory = run.world, run.state.trajectory
     trajectory.position[:], trajectory.orientation[:] = world.position, world.orientation
     trajectory.velocity[:], trajectory.angular_velocity[:] = world.velocity, world.angular_velocity
     trajectory.acceleration[:] = np.where(world.dynamic[:, None], world.steady_acceleration, 0.0)
@@ -242,76 +242,76 @@ def has_effect(plan: Plan, name: str) -> bool:
     return any(line.included for line in plan.lines if line.name == name)
 
 
-def make_flight(context: StepContext, plan: Plan) -> EventRun | None:
+def make_flight(run: Run, plan: Plan) -> EventRun | None:
     """The event kernel, made ready, where the plan has it in."""
     if not has_effect(plan, EventKernel.name):
         return None
     from rigidimpulse.engine.spheres.run import EventRun
 
-    return EventRun(context)
+    return EventRun(run)
 
 
-def run_steps(context: StepContext, plan: Plan, paths: KeyframePaths, flight: EventRun | None, end: float, progress) -> None:
+def run_steps(run: Run, plan: Plan, paths: KeyframePaths, flight: EventRun | None, end: float, progress) -> None:
     """Step to the end; steps end on the grid of the accuracy's step and at keyframes.
 
     The event kernel, if there is one, takes all steps in one in which nothing but simple impacts happens.
     """
-    size = context.world.accuracy.step
-    while context.state.time < end:
-        begin = context.state.time
-        paths.start_segments(context, begin)
-        if context.soft_bodies is None and not np.any(context.state.trajectory.mode != FIXED):
-            context.state.time = min(paths.next_key(begin), end)
+    size = run.world.accuracy.step
+    while run.state.time < end:
+        begin = run.state.time
+        paths.start_segments(run, begin)
+        if run.soft_bodies is None and not np.any(run.state.trajectory.mode != FIXED):
+            run.state.time = min(paths.next_key(begin), end)
             continue
         stop = min(paths.next_key(begin), end)
         if progress is not None:
             stop = min(stop, (math.floor(begin / size + 1e-9) + WATCHED) * size)
         how = STEP
         if flight is not None and flight.may_fly():
-            how = fly(context, plan, flight, stop)
+            how = fly(run, plan, flight, stop)
         if how == STEP:
-            index = math.floor(context.state.time / size + 1e-9) + 1
+            index = math.floor(run.state.time / size + 1e-9) + 1
             until = min(index * size, stop)
-            step(context, plan, until if context.soft_bodies is None else context.soft_bodies.advance(context, until))
-        if context.triggers is not None:
+            step(run, plan, until if run.soft_bodies is None else run.soft_bodies.advance(run, until))
+        if run.triggers is not None:
             with plan.clock(TriggerVolumes.name):
-                context.triggers.look(begin, context.state.time)
+                run.triggers.look(begin, run.state.time)
         if progress is not None:
-            progress(context.state.time)
+            progress(run.state.time)
 
 
-def fly(context: StepContext, plan: Plan, flight: EventRun, stop: float) -> int:
+def fly(run: Run, plan: Plan, flight: EventRun, stop: float) -> int:
     """Let the event kernel take the scene towards `stop` [s], and the loop in Python take over where it cannot; returns how that ends."""
-    begin = context.state.time
+    begin = run.state.time
     with plan.clock(EventKernel.name):
         how, step_begin, until = flight.fly(stop)
     while how == GO_ON:
-        go_on(context, plan, step_begin, until, may_leave=context.state.time > begin)
-        if context.state.time >= until:
+        go_on(run, plan, step_begin, until, may_leave=run.state.time > begin)
+        if run.state.time >= until:
             return ARRIVED
-        begin = context.state.time
+        begin = run.state.time
         with plan.clock(EventKernel.name):
             how, step_begin, until = flight.fly(stop, at_boundary=False)
     return how
 
 
-def finish_sub_steps(context: StepContext, plan: Plan, end: float) -> None:
+def finish_sub_steps(run: Run, plan: Plan, end: float) -> None:
     """End the sub-steps of joints and contacts at the end of the run, so that the last frame has the velocities of its instant."""
-    state = context.state
+    state = run.state
     bodies = {i for pair in state.pair_force for i in pair if state.under_contact[i]}
-    if context.joints is not None:
-        bodies.update(context.joints.moving_bodies(context).tolist())
+    if run.joints is not None:
+        bodies.update(run.joints.moving_bodies(run).tolist())
     if bodies:
-        pair_events = PairEvents(context, end)
-        plan.run("detect", context, pair_events)
-        react(context, plan, pair_events, end, np.array(sorted(bodies)))
+        pair_events = PairEvents(run, end)
+        plan.run("detect", run, pair_events)
+        react(run, plan, pair_events, end, np.array(sorted(bodies)))
 
 
-def close_stretches(context: StepContext) -> None:
+def close_stretches(run: Run) -> None:
     """Book the courses under contact forces that are still under way."""
-    state = context.state
+    state = run.state
     for i in np.flatnonzero(state.under_contact).tolist():
-        context.log.stretches.append((state.trajectory.start[i], np.inf, i, state.energy_at_start[i], 0.0))
+        run.log.stretches.append((state.trajectory.start[i], np.inf, i, state.energy_at_start[i], 0.0))
 
 
 def release_times(world: World) -> np.ndarray:
@@ -319,9 +319,9 @@ def release_times(world: World) -> np.ndarray:
     return np.array([0.0 if body.release_time is None else body.release_time for body in world.scene.bodies])
 
 
-def impulses_by_cause(context: StepContext, times: np.ndarray, impacts: np.ndarray, work: ForceWork | None) -> Impulses:
+def impulses_by_cause(run: Run, times: np.ndarray, impacts: np.ndarray, work: ForceWork | None) -> Impulses:
     """What bodies gained, to be split by cause."""
-    world = context.world
+    world = run.world
     mass = np.where(world.dynamic, world.mass, 0.0)
     return Impulses(
         names=list(world.names),
@@ -329,28 +329,28 @@ def impulses_by_cause(context: StepContext, times: np.ndarray, impacts: np.ndarr
         pull=mass[:, None, None] * np.stack([world.gravity, world.push], axis=1),
         mass=mass,
         release=release_times(world),
-        velocity=context.recorder.velocity,
-        accounts=context.impulses,
+        velocity=run.recorder.velocity,
+        accounts=run.impulses,
         forces=work,
         impacts=impacts,
     )
 
 
-def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration: float) -> Recording:
+def make_recording(run: Run, plan: Plan, times: np.ndarray, duration: float) -> Recording:
     """Body-frame poses, impacts and ledger from what the recorder holds."""
-    world, recorder = context.world, context.recorder
+    world, recorder = run.world, run.recorder
     position, orientation = own_frames(recorder.position, recorder.orientation, world.offset, world.turn)
-    impacts = context.log.impacts.table()
-    close_stretches(context)
-    work = None if context.forces is None else context.forces.finish(world, times, recorder)
+    impacts = run.log.impacts.table()
+    close_stretches(run)
+    work = None if run.forces is None else run.forces.finish(world, times, recorder)
     mass = np.where(world.dynamic & (times[:, None] >= release_times(world)), world.mass, 0.0)
     ledger = make_ledger(
         times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
-        mass, world.inertia, world.steady_acceleration, context.log, work,
+        mass, world.inertia, world.steady_acceleration, run.log, work,
     )
-    if context.soft_bodies is not None:
-        context.soft_bodies.add_to(ledger)
-    contacts = context.contact_log.table()
+    if run.soft_bodies is not None:
+        run.soft_bodies.add_to(ledger)
+    contacts = run.contact_log.table()
     return Recording(
         times=times,
         names=list(world.names),
@@ -361,11 +361,11 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
         centers=recorder.position,
         impacts=impacts[impacts["time"] <= duration],
         ledger=ledger,
-        status=Status.of(context.log.events),
+        status=Status.of(run.log.events),
         plan=plan,
         scene=world.scene,
-        reactions=reaction_table(context.joints, times),
+        reactions=reaction_table(run.joints, times),
         contacts=contacts,
-        by_cause=impulses_by_cause(context, times, impacts, work),
-        soft_bodies=[] if context.soft_bodies is None else context.soft_bodies.tracks(),
+        by_cause=impulses_by_cause(run, times, impacts, work),
+        soft_bodies=[] if run.soft_bodies is None else run.soft_bodies.tracks(),
     )

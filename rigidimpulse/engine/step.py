@@ -15,57 +15,57 @@ from rigidimpulse.engine.islands import Island
 from rigidimpulse.engine.pair_events import PairEvents
 
 
-def step(context, plan, end: float) -> None:
+def step(run, plan, end: float) -> None:
     """Advance all courses to `end` [s]."""
-    pair_events = PairEvents(context, end)
-    plan.run("detect", context, pair_events)
-    react(context, plan, pair_events, context.state.time, pair_events.active_bodies())
-    _run_pair_events(context, plan, pair_events, may_leave=False)
+    pair_events = PairEvents(run, end)
+    plan.run("detect", run, pair_events)
+    react(run, plan, pair_events, run.state.time, pair_events.active_bodies())
+    _run_pair_events(run, plan, pair_events, may_leave=False)
 
 
-def go_on(context, plan, begin: float, end: float, may_leave: bool) -> None:
+def go_on(run, plan, begin: float, end: float, may_leave: bool) -> None:
     """Advance all courses to the `end` of a step from the middle of it, where the event kernel stopped; begin: of the step. Both in s.
 
     may_leave: whether to end earlier, at an instant from which on all bodies fly freely again.
     """
-    pair_events = PairEvents(context, end)
-    plan.run("detect", context, pair_events)
+    pair_events = PairEvents(run, end)
+    plan.run("detect", run, pair_events)
     pair_events.recall(begin)
-    _run_pair_events(context, plan, pair_events, may_leave)
+    _run_pair_events(run, plan, pair_events, may_leave)
 
 
-def _run_pair_events(context, plan, pair_events: PairEvents, may_leave: bool) -> None:
+def _run_pair_events(run, plan, pair_events: PairEvents, may_leave: bool) -> None:
     """From contact to contact, to the end of the window, or until no pair of it has a past if it may be left."""
     while True:
-        plan.run("sweep", context, pair_events)
+        plan.run("sweep", run, pair_events)
         time = pair_events.next_time()
         if time >= pair_events.end:
             break
         bodies = pair_events.bodies_at(time)
         pair_events.count_contacts(time)
-        react(context, plan, pair_events, time, bodies)
+        react(run, plan, pair_events, time, bodies)
         if may_leave and pair_events.is_plain(time):
-            context.state.time = time
+            run.state.time = time
             return
-    context.state.time = pair_events.end
+    run.state.time = pair_events.end
 
 
-def react(context, plan, pair_events: PairEvents, time: float, bodies: np.ndarray) -> None:
+def react(run, plan, pair_events: PairEvents, time: float, bodies: np.ndarray) -> None:
     """Everything that happens at `time` to the groups that the given bodies touch."""
     pair_events.wake[bodies] = np.inf
     islands, reached = pair_events.touching(time, bodies)
-    release(context, pair_events, time, reached, islands)
+    release(run, pair_events, time, reached, islands)
     for island in islands:
-        plan.run("respond", context, island)
-        plan.run("forces", context, pair_events, island)
-        plan.run("constrain", context, pair_events, island)
-        plan.run("integrate", context, pair_events, island)
+        plan.run("respond", run, island)
+        plan.run("forces", run, pair_events, island)
+        plan.run("constrain", run, pair_events, island)
+        plan.run("integrate", run, pair_events, island)
     pair_events.settle(time)
 
 
-def release(context, pair_events: PairEvents, time: float, bodies: np.ndarray, islands: list[Island]) -> None:
+def release(run, pair_events: PairEvents, time: float, bodies: np.ndarray, islands: list[Island]) -> None:
     """Let go those bodies that still carry the forces of contacts they have left."""
-    state = context.state
+    state = run.state
     bodies = bodies[state.under_contact[bodies]]
     if not len(bodies):
         return
@@ -77,4 +77,4 @@ def release(context, pair_events: PairEvents, time: float, bodies: np.ndarray, i
     left = leaves.nonzero()[0]
     left = left[(state.trajectory.start[left] < time) & ~pair_events.inside[left]]
     for i in left.tolist():
-        begin_trajectory(context, pair_events, i, time, free, rests=False)
+        begin_trajectory(run, pair_events, i, time, free, rests=False)

@@ -20,10 +20,10 @@ class TriggerVolumes:
         return Bound(None, f"{number} looked at after every step") if number else Skip("the scene has none")
 
 
-def bind_triggers(context, plan) -> None:
+def bind_triggers(run, plan) -> None:
     """Give a run its triggers, if the scene has any."""
-    if context.world.triggers:
+    if run.world.triggers:
         from rigidimpulse.engine.triggers import Triggers
 
         with plan.clock(TriggerVolumes.name):
-            context.triggers = Triggers(context, context.world.triggers)
+            run.triggers = Triggers(run, run.world.triggers)

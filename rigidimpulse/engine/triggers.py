@@ -25,7 +25,7 @@ from rigidimpulse.scene.collision_filter import CollisionFilter, may_meet
 from rigidimpulse.scene.shape import Shape, check_orientation, normalized_quaternion
 
 if TYPE_CHECKING:
-    from rigidimpulse.model.state import StepContext
+    from rigidimpulse.model.state import Run
 
 SHARPNESS = 1e-9
 """s, to which times are found."""
@@ -96,10 +96,10 @@ class _Watched:
 class Triggers:
     """All triggers of a run."""
 
-    def __init__(self, context: StepContext, triggers: list[Trigger]) -> None:
+    def __init__(self, run: Run, triggers: list[Trigger]) -> None:
         """Check the triggers and look at who is inside at the start."""
-        world = context.world
-        self._context = context
+        world = run.world
+        self._run = run
         for trigger in triggers:
             trigger.check(world.names)
         compiled = [compile_shape(trigger.shape, np.zeros(3), np.eye(3)) for trigger in triggers]
@@ -125,7 +125,7 @@ class Triggers:
 
     def _near(self, watched: _Watched, begin: float, end: float) -> list[int]:
         """Bodies that may be inside or have come and gone, by bounding spheres, and those that were inside."""
-        trajectory, world = self._context.state.trajectory, self._context.world
+        trajectory, world = self._run.state.trajectory, self._run.world
         i = watched.may
         if not np.isfinite(watched.reach):
             return i.tolist()
@@ -144,7 +144,7 @@ class Triggers:
 
     def _follow(self, watched: _Watched, i: int, begin: float, end: float) -> None:
         """Find the changes of one pair."""
-        trajectory = self._context.state.trajectory
+        trajectory = self._run.state.trajectory
         low = max(begin, *(float(trajectory.start[k]) for k in (i, watched.body) if k >= 0))
         low = min(low, end)
         count = 1
@@ -173,21 +173,21 @@ class Triggers:
         return high
 
     def _note(self, watched: _Watched, i: int, time: float, begins: bool) -> None:
-        body = self._context.world.names[i]
+        body = self._run.world.names[i]
         (watched.inside.add if begins else watched.inside.discard)(i)
         text = f"{body!r} {'enters' if begins else 'leaves'} trigger {watched.trigger.name!r}"
-        self._context.log.note(time, BEGINS if begins else ENDS, (watched.trigger.name, body), text)
+        self._run.log.note(time, BEGINS if begins else ENDS, (watched.trigger.name, body), text)
 
     def _overlaps(self, watched: _Watched, i: int, time: float) -> bool:
-        shape = int(self._context.world.shape_of_body[i])
+        shape = int(self._run.world.shape_of_body[i])
         return bool(self._narrowphase.overlap(watched.shape, self._pose(watched, time), shape, self._body(i, time)))
 
     def _speed(self, i: int, low: float, high: float, reach: float | None = None) -> float:
         """Bound of the speed of any point of a body on its course, m/s."""
-        trajectory = self._context.state.trajectory
+        trajectory = self._run.state.trajectory
         if i < 0 or trajectory.mode[i] == FIXED:
             return 0.0
-        reach = float(self._context.world.bound_radius[i]) if reach is None else reach
+        reach = float(self._run.world.bound_radius[i]) if reach is None else reach
         fall = float(np.linalg.norm(trajectory.acceleration[i])) * (high - float(trajectory.start[i]))
         spin = float(np.linalg.norm(trajectory.angular_velocity[i])) * (reach if np.isfinite(reach) else 0.0)
         return float(np.linalg.norm(trajectory.velocity[i])) + fall + spin
@@ -195,7 +195,7 @@ class Triggers:
     def _body(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Principal frame of a body."""
         x, q = np.empty(3), np.empty(4)
-        pose_at(self._context.state.trajectory, i, max(time, float(self._context.state.trajectory.start[i])), x, q)
+        pose_at(self._run.state.trajectory, i, max(time, float(self._run.state.trajectory.start[i])), x, q)
         return x, q / np.linalg.norm(q)
 
     def _pose(self, watched: _Watched, time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -203,7 +203,7 @@ class Triggers:
         position, turn = np.asarray(watched.trigger.position, float), normalized_quaternion(watched.trigger.orientation)
         if watched.body < 0:
             return position, turn
-        x, q = self._context.world.body_pose(watched.body, *self._body(watched.body, time))
+        x, q = self._run.world.body_pose(watched.body, *self._body(watched.body, time))
         return x + rotate(q, position), multiply(q, turn)
 
 

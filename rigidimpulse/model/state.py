@@ -95,7 +95,7 @@ class Detector:
     max_queries: int
 
 
-class StepContext:
+class Run:
     """Everything a step needs: world, state, recorder, logs, and buffers that grow when they are too small."""
 
     def __init__(self, world: World, recorder: Recorder, log: EventLog) -> None:

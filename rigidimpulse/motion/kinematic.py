@@ -51,15 +51,15 @@ class KeyframePaths:
         later = self.times[self.times > time]
         return float(later[0]) if len(later) else np.inf
 
-    def start_segments(self, context, time: float) -> None:
+    def start_segments(self, run, time: float) -> None:
         """Put bodies whose key is at or before `time` on their new course, and let go those whose time it is."""
-        trajectory = context.state.trajectory
+        trajectory = run.state.trajectory
         while self._next < len(self.segments) and self.segments[self._next][0] <= time:
             start, i, pose = self.segments[self._next]
             self._next += 1
-            context.recorder.flush(trajectory, i, start, np.zeros(6))
+            run.recorder.flush(trajectory, i, start, np.zeros(6))
             if pose is None:
-                _let_go(context, i, start)
+                _let_go(run, i, start)
             else:
                 x, q, v, w = pose
                 trajectory.start[i], trajectory.mode[i] = start, PRESCRIBED
@@ -68,13 +68,13 @@ class KeyframePaths:
                 begin(trajectory, i)
 
 
-def _let_go(context, i: int, time: float) -> None:
+def _let_go(run, i: int, time: float) -> None:
     """Body i is dynamic from `time` on."""
-    world, trajectory, now = context.world, context.state.trajectory, context.state.now
+    world, trajectory, now = run.world, run.state.trajectory, run.state.now
     state_at(trajectory, i, time, now.position[i], now.orientation[i], now.velocity[i], now.angular_velocity[i])
     world.dynamic[i], world.moving[i], world.inv_mass[i] = True, False, 1.0 / world.mass[i]
     trajectory.position[i], trajectory.orientation[i] = now.position[i], now.orientation[i]
     trajectory.velocity[i], trajectory.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]
     trajectory.acceleration[i], trajectory.start[i], trajectory.mode[i] = world.steady_acceleration[i], time, FREE
     begin(trajectory, i)
-    context.log.account(time, "let go", mechanical_energy(now, world, np.array([i])))
+    run.log.account(time, "let go", mechanical_energy(now, world, np.array([i])))

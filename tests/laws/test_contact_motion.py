@@ -20,7 +20,7 @@ from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.impact.point import Contacts
 from rigidimpulse.engine.simulate import start_trajectories
 from rigidimpulse.engine.touching import bring_all, fill_contacts
-from rigidimpulse.model.state import StepContext
+from rigidimpulse.model.state import Run
 from rigidimpulse.model.world import compile_scene
 from rigidimpulse.motion.trajectory import begin
 from rigidimpulse.recording.events import EventLog
@@ -99,11 +99,11 @@ NAMES = (
 )  # fmt: skip
 
 
-def contact_at(context: StepContext, time: float):
+def contact_at(run: Run, time: float):
     """The nearest contact of the pair at a time: contacts of one, kinds and features."""
-    world, state = context.world, context.state
-    bring_all(state.trajectory, np.arange(2), time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
-    buffer = context.contact_buffer
+    world, state = run.world, run.state
+    bring_all(state.trajectory, np.arange(2), time, state.now, state.rotation, run.acceleration, run.angular_acceleration)
+    buffer = run.contact_buffer
     count = buffer.find(world.geometry, world, state.now, state.rotation, np.array([0]), np.array([1]), np.array([MARGIN]))
     nearest = np.array([np.argmin(buffer.real[:count, 9])])
     one = Contacts(*(np.empty(1, np.int64) for _ in range(2)), *(np.empty((1, 3)) for _ in range(3)), *(np.empty(1) for _ in range(5)))
@@ -112,9 +112,9 @@ def contact_at(context: StepContext, time: float):
     return one, row[:, 2].copy(), row[:, 3:5].copy()
 
 
-def keep_gap(context: StepContext) -> None:
+def keep_gap(run: Run) -> None:
     """Take off the velocity along the normal: what lasts neither opens nor closes, and both arms end at one place."""
-    first, now, trajectory = contact_at(context, 0.0)[0], context.state.now, context.state.trajectory
+    first, now, trajectory = contact_at(run, 0.0)[0], run.state.now, run.state.trajectory
     n = first.normal[0]
     at = [now.velocity[i] + np.cross(now.angular_velocity[i], arm[0]) for i, arm in enumerate((first.arm_a, first.arm_b))]
     trajectory.velocity[1] -= n * (n @ (at[1] - at[0]))
@@ -124,13 +124,13 @@ def keep_gap(context: StepContext) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_places_of_contact_move_as_found_a_moment_later(name: str) -> None:
     scene = ri.Scene(gravity=(0.0, 0.0, 0.0), bodies=pair(name))
-    context = StepContext(compile_scene(scene), Recorder(np.zeros(1), 2), EventLog())
-    start_trajectories(context)
-    keep_gap(context)
-    found = [contact_at(context, k * STEP)[0] for k in range(4)]
-    first, kinds, features = contact_at(context, 0.0)
+    run = Run(compile_scene(scene), Recorder(np.zeros(1), 2), EventLog())
+    start_trajectories(run)
+    keep_gap(run)
+    found = [contact_at(run, k * STEP)[0] for k in range(4)]
+    first, kinds, features = contact_at(run, 0.0)
     assert first.gap[0] == pytest.approx(GAP, abs=1e-12)
-    world, state = context.world, context.state
+    world, state = run.world, run.state
     motion = contact_motion(world.geometry, world.shape_of_body, state.rotation, state.now, first, kinds, features)
 
     def rate(values) -> np.ndarray:
@@ -142,6 +142,6 @@ def test_places_of_contact_move_as_found_a_moment_later(name: str) -> None:
     np.testing.assert_allclose(motion.normal_rate[0], rate([c.normal[0] for c in found]), atol=2e-5)
     gaps = [float(c.gap[0]) for c in found]
     second = (2.0 * gaps[0] - 5.0 * gaps[1] + 4.0 * gaps[2] - gaps[3]) / STEP**2
-    spin = context.angular_acceleration
+    spin = run.angular_acceleration
     turned = np.cross(spin[1], first.arm_b[0]) - np.cross(spin[0], first.arm_a[0])
     assert first.normal[0] @ (motion.turning[0] + turned) == pytest.approx(second, abs=1e-3 * max(1.0, abs(second)))

@@ -10,7 +10,7 @@ from rigidimpulse.collision.contact_cache import review
 from rigidimpulse.collision.contact_records import HELD, SEPARATION, SKELETON_A, SKELETON_B
 from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
-from rigidimpulse.model.state import StepContext
+from rigidimpulse.model.state import Run
 from rigidimpulse.model.world import compile_scene
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
@@ -41,10 +41,10 @@ def stepper_of(seed: int, wanted: float):
     for k in range(2):
         scene.add(ri.Body(f"{k}", ri.Shape.box(SIDES[k]), position=k * direction / np.linalg.norm(direction) * 3.0, orientation=q[k]))
     world = compile_scene(scene, ri.Accuracy(contact_solver="substepped"))
-    context = StepContext(world, Recorder(np.zeros(1), 2), EventLog())
-    stepper, now = ContactStepper(world, world.dynamic, finer=False), context.state.now
+    run = Run(world, Recorder(np.zeros(1), 2), EventLog())
+    stepper, now = ContactStepper(world, world.dynamic, finer=False), run.state.now
     order = stepper.order
-    stepper.set_up(context, np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
+    stepper.set_up(run, np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
     low, high = 0.0, 3.0
     start, way = now.position[order[0]].copy(), now.position[order[1]] - now.position[order[0]]
     principal = stepper.bodies.rotation[:2].copy()
@@ -54,7 +54,7 @@ def stepper_of(seed: int, wanted: float):
         gap = gap_by_axes(np.stack([start, start + middle * way]), principal, half)
         low, high = (middle, high) if gap < wanted else (low, middle)
     now.position[order[1]] = start + high * way
-    stepper.set_up(context, np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
+    stepper.set_up(run, np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
     return stepper, half
 
 

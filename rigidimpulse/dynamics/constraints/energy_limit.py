@@ -40,34 +40,34 @@ class Ground:
     pushes: np.ndarray
 
 
-def note_hold(context, island, contacts, force: np.ndarray) -> None:
+def note_hold(run, island, contacts, force: np.ndarray) -> None:
     """Remember who shares the forces (m, 3) of the held contacts from now on, and whether they may make energy."""
-    state, first = context.state, int(island.members[0])
-    ground = _passive_ground(context, island, contacts, bool(np.any(force[:, 0] > 0.0)))
+    state, first = run.state, int(island.members[0])
+    ground = _passive_ground(run, island, contacts, bool(np.any(force[:, 0] > 0.0)))
     state.sharing[island.members] = first
     state.closed[island.members] = ground is not None
     if ground is not None:
         state.ground[first] = ground
 
 
-def _passive_ground(context, island, contacts, presses: bool) -> Ground | None:
+def _passive_ground(run, island, contacts, presses: bool) -> Ground | None:
     """What stands by a group, or None where forces may make energy.
 
     They may not where all that stands moves with one velocity, joints are neither driven nor springs, and no other force varies.
     presses: whether contacts press.
     """
-    world, now = context.world, context.state.now
+    world, now = run.world, run.state.now
     pairs = np.column_stack([contacts.body_a, contacts.body_b])
     stands = ~world.dynamic[pairs]
     supports, rough = np.unique(pairs[stands]), bool(np.any(stands.any(axis=1) & (contacts.static_friction > 0.0)))
     passive, tied = island.free is None, False
     if len(island.joints):
-        ends = context.joints.bodies_of(island.joints)
-        tied = context.joints.hold_to_world(island.joints)
+        ends = run.joints.bodies_of(island.joints)
+        tied = run.joints.hold_to_world(island.joints)
         rough = rough or tied or not np.all(world.dynamic[ends])
         supports = np.union1d(supports, ends[~world.dynamic[ends]])
         # Without contact joints keep energy by themselves, up and down: what they gain they lose.
-        passive = passive and context.joints.are_passive(island.joints) and presses
+        passive = passive and run.joints.are_passive(island.joints) and presses
     velocity = now.velocity[supports[0]].copy() if len(supports) else np.zeros(3)
     steady = not np.any(now.angular_velocity[supports]) and not np.any(now.velocity[supports] != velocity)
     if not (passive and steady) or (tied and np.any(velocity)):
@@ -75,35 +75,35 @@ def _passive_ground(context, island, contacts, presses: bool) -> Ground | None:
     return Ground(velocity, np.eye(3) if rough else contacts.normal[stands.any(axis=1)])
 
 
-def limit_correction_energy(context, island, contacts, way: np.ndarray, depth: float) -> None:
+def limit_correction_energy(run, island, contacts, way: np.ndarray, depth: float) -> None:
     """Take off the members' speeds what a lift by `way` (k, 3) m gained beyond their weight times the depth [m] that contacts may sink."""
-    world, now, members = context.world, context.state.now, island.members
+    world, now, members = run.world, run.state.now, island.members
     weight = world.mass[members, None] * world.steady_acceleration[members]
     excess = -float((weight * way).sum()) - depth * float(np.linalg.norm(weight, axis=1).sum())
-    ground = _passive_ground(context, island, contacts, True) if excess > 0.0 else None
+    ground = _passive_ground(run, island, contacts, True) if excess > 0.0 else None
     if ground is not None:
         before = kinetic_energy(now, world, members)
         now.velocity[members] -= ground.velocity
         take_off(now, world, members, excess, ground.pushes)
         now.velocity[members] += ground.velocity
-        context.log.account(island.time, "energy correction", kinetic_energy(now, world, members) - before)
+        run.log.account(island.time, "energy correction", kinetic_energy(now, world, members) - before)
 
 
-def note_end_energy(context, bodies: list[int]) -> None:
+def note_end_energy(run, bodies: list[int]) -> None:
     """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows."""
     for i in bodies:
-        if context.state.under_contact[i]:
-            context.state.end_energy[i] = mechanical_energy(context.state.now, context.world, np.array([i]))
+        if run.state.under_contact[i]:
+            run.state.end_energy[i] = mechanical_energy(run.state.now, run.world, np.array([i]))
 
 
-def limit_energy(context, bodies: list[int], time: float) -> set[int]:
+def limit_energy(run, bodies: list[int], time: float) -> set[int]:
     """Take what groups of the bodies gained since they share their forces off their velocities; returns those slowed.
 
     All that share forces arrive together. The energy is that seen from the ground, which has the velocity U:
 
         E - E_0 - sum m (v - v_0).U + sum m a.U (t - t_0),    a: gravity and constant forces.
     """
-    world, state, trajectory, now = context.world, context.state, context.state.trajectory, context.state.now
+    world, state, trajectory, now = run.world, run.state, run.state.trajectory, run.state.now
     slowed: set[int] = set()
     touched = [i for i in bodies if state.under_contact[i]]
     for first in sorted({int(state.sharing[i]) for i in touched if state.closed[i]}):
@@ -120,7 +120,7 @@ def limit_energy(context, bodies: list[int], time: float) -> set[int]:
             now.velocity[island] += ground.velocity
             # Frames on the way have their share of it.
             state.correction[island] += np.hstack([now.velocity[island] - v, now.angular_velocity[island] - w])
-            context.log.account(time, "energy correction", kinetic_energy(now, world, island) - before)
+            run.log.account(time, "energy correction", kinetic_energy(now, world, island) - before)
             slowed.update(island.tolist())
     return slowed
 

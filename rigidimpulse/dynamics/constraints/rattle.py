@@ -63,9 +63,9 @@ def forget_forces(state, contacts: Contacts) -> None:
         state.pair_force.pop(pair, None)
 
 
-def project_velocities(context, island) -> bool:
+def project_velocities(run, island) -> bool:
     """End the sub-steps of the group's pairs; returns whether there were any."""
-    state, now, contacts = context.state, context.state.now, island.contacts
+    state, now, contacts = run.state, run.state.now, island.contacts
     start = state.trajectory.start
     ended: dict[tuple[int, int], PairForce] = {}
     held = island.slow()
@@ -83,15 +83,15 @@ def project_velocities(context, island) -> bool:
             now.angular_velocity[i] -= half * now.inv_inertia[i] @ wrench[3:]
     of_pair = [ended.get(pair) for pair in zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)]
     which = np.array([c for c, entry in enumerate(of_pair) if entry is not None and held[c]], np.int64)
-    _stop(context, island, select(contacts, which), [(of_pair[c], island.keys[c]) for c in which])
+    _stop(run, island, select(contacts, which), [(of_pair[c], island.keys[c]) for c in which])
     state.correction[island.members] = np.hstack([now.velocity[island.members], now.angular_velocity[island.members]]) - before
     return True
 
 
-def _stop(context, island, contacts: Contacts, entries) -> None:
+def _stop(run, island, contacts: Contacts, entries) -> None:
     """The impulses nu of contacts; entries: for each the forces of its pair and its key."""
-    now, members = context.state.now, island.members
-    rows, first_row, frames = contact_rows(now, contacts, members, context.column, 0)
+    now, members = run.state.now, island.members
+    rows, first_row, frames = contact_rows(now, contacts, members, run.column, 0)
     row_velocities(now, contacts, first_row, frames, rows.bias)
     slides = np.array([key in entry.slides or (key not in entry.force and bool(entry.slides)) for entry, key in entries])
     scale = float(np.abs(rows.bias).max(initial=np.finfo(float).tiny))

@@ -41,10 +41,10 @@ class SteadyLoad:
         return Bound(set_steady, "what contacts, joints and other forces work against")
 
 
-def set_steady(context, _window, island) -> None:
+def set_steady(run, _window, island) -> None:
     """Gravity and constant forces."""
-    context.acceleration[island.members] = context.world.steady_acceleration[island.members]
-    context.angular_acceleration[island.members] = 0.0
+    run.acceleration[island.members] = run.world.steady_acceleration[island.members]
+    run.angular_acceleration[island.members] = 0.0
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class FreeRotation:
         return Bound(turn, "spins change the load of contacts and joints")
 
 
-def turn(context, _window, island) -> None:
+def turn(run, _window, island) -> None:
     """Gyroscopic term of the members."""
-    state = context.state
-    bring_gyroscopic(island.members, state.now, state.rotation, state.trajectory.inertia, context.angular_acceleration)
+    state = run.state
+    bring_gyroscopic(island.members, state.now, state.rotation, state.trajectory.inertia, run.angular_acceleration)

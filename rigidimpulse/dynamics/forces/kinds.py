@@ -30,16 +30,16 @@ def force_kinds(world) -> list[KindOfForce]:
     return [KindOfForce(name) for name in dict.fromkeys(names)]
 
 
-def bind_forces(context, plan, times) -> None:
+def bind_forces(run, plan, times) -> None:
     """Give a run its varying forces, if the scene has any."""
-    world = context.world
+    world = run.world
     if world.force_tables:
         from rigidimpulse.dynamics.forces.varying import VaryingForces
 
         clocks = {table.kind: partial(plan.clock, table.kind) for table in world.force_tables}
-        context.forces = VaryingForces(world, context.state.trajectory, times, clocks)
+        run.forces = VaryingForces(world, run.state.trajectory, times, clocks)
         soft_bodies = [table for table in world.force_tables if table.kind == KINDS["FlexibleBody"]]
         if soft_bodies:
             from rigidimpulse.dynamics.soft_body.in_run import RunningSoftBodies
 
-            context.soft_bodies = RunningSoftBodies(context, soft_bodies[0], times, clocks[soft_bodies[0].kind])
+            run.soft_bodies = RunningSoftBodies(run, soft_bodies[0], times, clocks[soft_bodies[0].kind])

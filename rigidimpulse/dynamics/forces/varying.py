@@ -109,9 +109,9 @@ class VaryingForces:
         """Whether the forces on bodies at rest stay as they are."""
         return not self._restless[bodies].any()
 
-    def fly(self, context, members: np.ndarray, time: float, end: float) -> np.ndarray:
+    def fly(self, run, members: np.ndarray, time: float, end: float) -> np.ndarray:
         """Forces on members that nothing holds, from `time` to `end` at most, into `value` and `rate`; returns for how long, (m,) s."""
-        state, now = context.state, context.state.now
+        state, now = run.state, run.state.now
         rest = min(end, self._next_break(time)) - time
         if rest <= 0.0:  # the end of the run
             return np.zeros(len(members))
@@ -125,7 +125,7 @@ class VaryingForces:
         shortest = SHORTEST * self._world.accuracy.step
         todo, cut = members, False
         while len(todo):
-            first = self._start(context, time, h, todo)
+            first = self._start(run, time, h, todo)
 
             def evaluate(share: float, bodies, rotation, todo=todo):
                 return self._evaluate(time + h * min(share, 1.0 - ASIDE), todo, bodies, rotation)
@@ -148,7 +148,7 @@ class VaryingForces:
             follows = np.where(h[ready] < self._plan[ready], np.maximum(self._plan[ready], h[ready] * grow[done]), h[ready] * grow[done])
             self._plan[ready] = np.clip(follows, shortest, self._longest[ready])
             self._keep(ready, time, rows, sums, h)
-            self._report(context, time, ready[error[done] > 1.0], self._in_flight)
+            self._report(run, time, ready[error[done] > 1.0], self._in_flight)
             todo, again = todo[~done], grow[~done]
             h[todo] = self._plan[todo] = _pieces(rest, np.maximum(h[todo] * again, shortest))
         for table in self._switching:
@@ -193,9 +193,9 @@ class VaryingForces:
             low, high = (low, middle) if differ(middle) else (middle, high)
         return 1.0 if high >= 1.0 - SWITCHED else max(high, least)
 
-    def load(self, context, island, h: float) -> float:
+    def load(self, run, island, h: float) -> float:
         """Forces on a group that contacts or joints hold, over h s at most, into the accelerations and `value`; returns for how long."""
-        state, now, world = context.state, context.state.now, self._world
+        state, now, world = run.state, run.state.now, self._world
         members = island.members[self.acts[island.members]]
         time, step = island.time, world.accuracy.step
         plan = float(self._plan[members].min())
@@ -205,7 +205,7 @@ class VaryingForces:
             # Nobody knows yet what contacts and joints do: forces that answer the fall would throw what has just landed.
             h = min(h, FIRST * step)
         given = h = min(h, self._next_break(time) - time, plan)
-        _, start = self._start(context, time, np.full(len(self.acts), h), members)
+        _, start = self._start(run, time, np.full(len(self.acts), h), members)
         if not island.loaded:
             pull = (state.trajectory.acceleration[members] - world.steady_acceleration[members]) * world.mass[members, None]
             self._last[members] = np.hstack([pull, state.trajectory.torque[members]])
@@ -235,7 +235,7 @@ class VaryingForces:
             self._workspace.stay(members[still], now, state.rotation)
             value, total = self._evaluate(time + half, members, self._workspace.bodies, self._workspace.rotation)
         if error > 1.0:
-            self._report(context, time, members, self._in_contact)
+            self._report(run, time, members, self._in_contact)
         # Where others made it shorter, what was planned still holds.
         follows = max(plan, h * grow) if h == given < plan and error <= 1.0 else h * grow
         self._plan[members] = np.minimum(follows, self._longest[members])
@@ -243,20 +243,20 @@ class VaryingForces:
         self._keep(members, time, rows, sums, np.full(len(self.acts), h))
         self._held_until[members] = time + h
         island.loaded = True
-        context.acceleration[members] = island.free[0][self.acts[island.members]] + now.inv_mass[members, None] * total[members, :3]
+        run.acceleration[members] = island.free[0][self.acts[island.members]] + now.inv_mass[members, None] * total[members, :3]
         turned = np.einsum("ijk,ik->ij", now.inv_inertia[members], total[members, 3:])
-        context.angular_acceleration[members] = island.free[1][self.acts[island.members]] + turned
+        run.angular_acceleration[members] = island.free[1][self.acts[island.members]] + turned
         return h
 
-    def _start(self, context, time: float, h: np.ndarray, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _start(self, run, time: float, h: np.ndarray, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Forces at the start of steps of h (n,) s, without those that give way there."""
-        state = context.state
+        state = run.state
         forces = self._evaluate(time + ASIDE * h, members, state.now, state.rotation)
         gone = False
         for table, first in zip(self._tables, self._first[:-1], strict=True):
             for k in table.give_way(forces[0][first : first + len(table.body)], time):
                 bodies = tuple(self._world.names[i] for i in table.body[table.cause == k])
-                context.log.note(time, "force ended", bodies, f"{table.names[k]} exceeded its greatest force")
+                run.log.note(time, "force ended", bodies, f"{table.names[k]} exceeded its greatest force")
                 gone = True
         return self._evaluate(time + ASIDE * h, members, state.now, state.rotation) if gone else forces
 
@@ -312,9 +312,9 @@ class VaryingForces:
     def _next_break(self, time: float) -> float:
         return min(table.next_break(time * (1.0 + 1e-12) + 1e-300) for table in self._tables)
 
-    def _report(self, context, time: float, bodies: np.ndarray, allowed: float) -> None:
+    def _report(self, run, time: float, bodies: np.ndarray, allowed: float) -> None:
         for i in bodies.tolist():
-            context.log.report(
+            run.log.report(
                 time, "forces change too fast", (self._world.names[i],),
                 f"the path may be off by more than {allowed:.1g} of the size in a step; use a smaller step or soften the force",
             )

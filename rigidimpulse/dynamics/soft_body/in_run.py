@@ -127,31 +127,31 @@ class RunningSoftBodies:
 
     """
 
-    def __init__(self, context, table: SoftBodyForces, times: np.ndarray, clock) -> None:
+    def __init__(self, run, table: SoftBodyForces, times: np.ndarray, clock) -> None:
         """times (f,) s of the frames; clock: of the line of the plan."""
         self._table, self._times, self._clock = table, times, clock
-        self.pressed = np.zeros(context.world.num_bodies, bool)
+        self.pressed = np.zeros(run.world.num_bodies, bool)
         self._frames = np.empty((len(times), *table.soft_bodies.position.shape))
         self._frames[:] = table.soft_bodies.position
-        self._scratch = make_trajectories(context.world.num_bodies)
+        self._scratch = make_trajectories(run.world.num_bodies)
 
-    def advance(self, context, end: float) -> float:
+    def advance(self, run, end: float) -> float:
         """Step the nets from the run's time to `end` [s], or less far where something fast is near; returns how far."""
-        time, step = context.state.time, context.world.accuracy.step
+        time, step = run.state.time, run.world.accuracy.step
         if end - time <= SHORTEST * step:
             return end
         with self._clock():
-            motion = self._motion(context, time, end)
+            motion = self._motion(run, time, end)
             limit = max(self._table.soft_bodies.step_limit(motion, end - time), (end - time) / MOST_PIECES)
             if limit < end - time:
                 end = time + (end - time) / math.ceil((end - time) / limit)
-                motion = self._motion(context, time, end)
+                motion = self._motion(run, time, end)
             before = self._table.soft_bodies.position.copy()
-            done, pressed = self._table.step(time, end, motion, self._held(context, motion))
-            context.forces.let_act(self.pressed | pressed)  # those that are let go need a course without
+            done, pressed = self._table.step(time, end, motion, self._held(run, motion))
+            run.forces.let_act(self.pressed | pressed)  # those that are let go need a course without
             self.pressed = pressed
             self._write(time, end, before)
-        self._report(context, time, done)
+        self._report(run, time, done)
         return end
 
     def tracks(self) -> list[FlexibleTrack]:
@@ -168,40 +168,40 @@ class RunningSoftBodies:
         ledger.momentum[:] += sums[:, 2:5]
         ledger.angular_momentum[:] += sums[:, 5:]
 
-    def _held(self, context, motion: RigidMotion) -> np.ndarray:
+    def _held(self, run, motion: RigidMotion) -> np.ndarray:
         """Bodies (n,) bool that stand still on something."""
-        world, state = context.world, context.state
+        world, state = run.world, run.state
         limit = STILL * world.accuracy.step * world.steady_strength
         radius = np.where(world.dynamic, world.bound_radius, 0.0)
         speed = np.linalg.norm(motion.velocity, axis=1) + radius * np.linalg.norm(motion.angular_velocity, axis=1)
         return world.dynamic & (state.under_contact | (state.trajectory.mode == FIXED)) & (speed <= limit)
 
-    def _motion(self, context, time: float, end: float) -> RigidMotion:
+    def _motion(self, run, time: float, end: float) -> RigidMotion:
         """All rigid bodies from `time` to `end`, without the nets."""
-        world, trajectory = context.world, context.state.trajectory
+        world, trajectory = run.world, run.state.trajectory
         n = world.num_bodies
         x, v, w, x1 = np.empty((4, n, 3))
         q, q1 = np.empty((2, n, 4))
         held = np.zeros((n, 6))
-        held[self._table.body] = context.forces.present(self._table, time)
+        held[self._table.body] = run.forces.present(self._table, time)
         for i in range(n):
             state_at(trajectory, i, time, x[i], q[i], v[i], w[i])
             path = trajectory
             if held[i].any():
                 path = self._scratch
-                self._let_go(context, i, time, held[i], (x[i], q[i], v[i], w[i]))
+                self._let_go(run, i, time, held[i], (x[i], q[i], v[i], w[i]))
             pose_at(path, i, end, x1[i], q1[i])
         rotation, rotation1 = (np.array([to_matrix(turn) for turn in orientation]) for orientation in (q, q1))
         inv_inertia = np.einsum("nij,nj,nkj->nik", rotation, world.dynamic[:, None] / trajectory.inertia, rotation)
-        return RigidMotion(x, rotation, v, w, x1, rotation1, context.state.now.inv_mass, inv_inertia, world.dynamic)
+        return RigidMotion(x, rotation, v, w, x1, rotation1, run.state.now.inv_mass, inv_inertia, world.dynamic)
 
-    def _let_go(self, context, i: int, time: float, wrench: np.ndarray, state) -> None:
+    def _let_go(self, run, i: int, time: float, wrench: np.ndarray, state) -> None:
         """Write a course without the nets' wrench (6,) for body i, from its state (x, q, v, w) at `time`."""
-        trajectory, free = context.state.trajectory, self._scratch
+        trajectory, free = run.state.trajectory, self._scratch
         free.start[i] = time
         free.position[i], free.orientation[i], free.velocity[i], free.angular_velocity[i] = state
         since = time - trajectory.start[i]
-        free.acceleration[i] = trajectory.acceleration[i] + since * trajectory.jerk[i] - context.state.now.inv_mass[i] * wrench[:3]
+        free.acceleration[i] = trajectory.acceleration[i] + since * trajectory.jerk[i] - run.state.now.inv_mass[i] * wrench[:3]
         free.torque[i] = -wrench[3:]
         if trajectory.mode[i] == FORCED:
             free.torque[i] += trajectory.torque[i] + since * trajectory.torque_rate[i]
@@ -218,9 +218,9 @@ class RunningSoftBodies:
             self._frames[f] = before + (self._times[f] - time) / (end - time) * (now - before)
         self._frames[last : last + 2] = now
 
-    def _report(self, context, time: float, done: FlexibleStep) -> None:
+    def _report(self, run, time: float, done: FlexibleStep) -> None:
         names = tuple(body.name for body in self._table.soft_bodies.bodies)
-        report = context.log.report
+        report = run.log.report
         if not done.converged:
             report(time, "nets jammed", names, "a step was solved without friction, or not to its tolerance; use a smaller step")
         if done.unresolved:

@@ -59,92 +59,92 @@ class ContactForces:
         return Bound(hold, f"{how}bodies may come to rest on each other")
 
 
-def hold(context, pair_events, island: Island) -> None:
-    """Find the lasting contacts of a group and write the wrenches of its members into context.wrench."""
-    context.contact_log.close(island.members.tolist(), island.time)
+def hold(run, pair_events, island: Island) -> None:
+    """Find the lasting contacts of a group and write the wrenches of its members into run.wrench."""
+    run.contact_log.close(island.members.tolist(), island.time)
     if island.substepped is not None:
         return
-    context.wrench[island.members] = 0.0
-    forget_forces(context.state, island.contacts)
+    run.wrench[island.members] = 0.0
+    forget_forces(run.state, island.contacts)
     island.held = island.slow()
     if not island.held.any() and not len(island.joints):
         return
     if needs_correction(island.contacts, island.held, island.contact_margin):
-        _correct_positions(context, pair_events, island)
+        _correct_positions(run, pair_events, island)
     subset = np.flatnonzero(island.held)
     if not len(subset) and not len(island.joints):
         return
-    state, now = context.state, context.state.now
+    state, now = run.state, run.state.now
     contacts = select(island.contacts, subset)
     motion = contact_motion(
-        context.world.geometry, context.world.shape_of_body, state.rotation, now, contacts, island.kinds[subset],
+        run.world.geometry, run.world.shape_of_body, state.rotation, now, contacts, island.kinds[subset],
         island.features[subset],
     )
     keys = [island.keys[c] for c in subset]
     force = np.array([state.force_of(key) for key in keys]).reshape(-1, 3)
-    before = kinetic_energy(now, context.world, island.members)
+    before = kinetic_energy(now, run.world, island.members)
     rest = pair_events.end - island.time
     if len(island.joints):
-        h, residual = _hold_jointed(context, island, subset, contacts, motion, force, rest)
+        h, residual = _hold_jointed(run, island, subset, contacts, motion, force, rest)
     else:
-        h, residual = _hold_turning(context, island, subset, contacts, keys, motion, force, rest)
-    context.log.account(island.time, "stick", kinetic_energy(now, context.world, island.members) - before)
-    failed = residual > UNSOLVED or (len(island.joints) > 0 and not context.joints.are_closed)
-    if failed and _makes_energy(context, island, h):
-        context.wrench[island.members] = 0.0
+        h, residual = _hold_turning(run, island, subset, contacts, keys, motion, force, rest)
+    run.log.account(island.time, "stick", kinetic_energy(now, run.world, island.members) - before)
+    failed = residual > UNSOLVED or (len(island.joints) > 0 and not run.joints.are_closed)
+    if failed and _makes_energy(run, island, h):
+        run.wrench[island.members] = 0.0
         force[:] = 0.0
         forget_forces(state, contacts)
         if len(island.joints):
-            context.joints.let_go(island)
-    note_hold(context, island, contacts, force)
-    context.contact_log.replace(island.members.tolist(), island.time, contacts, now.position, force)
+            run.joints.let_go(island)
+    note_hold(run, island, contacts, force)
+    run.contact_log.replace(island.members.tolist(), island.time, contacts, now.position, force)
     for key, f in zip(keys, force, strict=True):
         state.contact_force[key] = (f, island.time)
     if residual > UNSOLVED:
-        names = tuple(context.world.names[i] for i in island.members)
-        context.log.report(
+        names = tuple(run.world.names[i] for i in island.members)
+        run.log.report(
             island.time, "contact forces not solved", names, f"residual {residual:.1e}; use a smaller step"
         )
-    island.rests = _rests(context, island, h)
+    island.rests = _rests(run, island, h)
     if island.rests and len(island.joints):
-        context.joints.log_rest(island)
+        run.joints.log_rest(island)
     if h < rest and not island.rests:
         pair_events.wake[island.members] = island.time + h
     if island.shift > 0.0:
         pair_events.look_around(island.members, island.time, island.shift)
 
 
-def _makes_energy(context, island: Island, h: float) -> bool:
+def _makes_energy(run, island: Island, h: float) -> bool:
     """Whether forces that are no solution give the members more kinetic energy than they have, or would have without them.
 
     On the way, too: half of what joints do is taken back before they are stopped.
     """
-    now, i = context.state.now, island.members
+    now, i = run.state.now, island.members
     inertia = np.linalg.inv(now.inv_inertia[i])
-    taken_back = context.joints.memory.wrench[i] if len(island.joints) else np.zeros((len(i), 6))
+    taken_back = run.joints.memory.wrench[i] if len(island.joints) else np.zeros((len(i), 6))
     energies = []
-    for wrench in (np.zeros((len(i), 6)), context.wrench[i], context.wrench[i] - taken_back):
-        v = now.velocity[i] + h * (context.acceleration[i] + now.inv_mass[i, None] * wrench[:, :3])
-        spin = context.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], wrench[:, 3:])
+    for wrench in (np.zeros((len(i), 6)), run.wrench[i], run.wrench[i] - taken_back):
+        v = now.velocity[i] + h * (run.acceleration[i] + now.inv_mass[i, None] * wrench[:, :3])
+        spin = run.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], wrench[:, 3:])
         w = now.angular_velocity[i] + h * spin
-        energies.append(0.5 * float((context.world.mass[i] * (v**2).sum(1)).sum() + np.einsum("ij,ijk,ik->", w, inertia, w)))
-    most = max(energies[0], kinetic_energy(now, context.world, i))
+        energies.append(0.5 * float((run.world.mass[i] * (v**2).sum(1)).sum() + np.einsum("ij,ijk,ik->", w, inertia, w)))
+    most = max(energies[0], kinetic_energy(now, run.world, i))
     return not np.max(energies[1:]) <= (1.0 + PLAY) * most
 
 
 def _hold_turning(
-    context, island: Island, subset, contacts, keys, motion: Motion, force, rest: float
+    run, island: Island, subset, contacts, keys, motion: Motion, force, rest: float
 ) -> tuple[float, float]:
     """Contact forces over a sub-step of at most `rest`; returns its length and the residual."""
-    state, step, contact_margin = context.state, context.world.accuracy.step, island.contact_margin[subset]
-    rolling = rolling_of(context.world, state.now, contacts)
+    state, step, contact_margin = run.state, run.world.accuracy.step, island.contact_margin[subset]
+    rolling = rolling_of(run.world, state.now, contacts)
 
     def hold_over(h: float, excess: np.ndarray) -> Held:
-        h = island.load(context, h)
-        context.wrench[island.members] = 0.0
+        h = island.load(run, h)
+        run.wrench[island.members] = 0.0
         return hold_contacts(
-            context.solve_rows, state.now, contacts, island.members, motion.turning, excess, context.acceleration,
-            context.angular_acceleration, h, SHORTEST_STOP * step, context.column, force, context.wrench, rolling,
+            run.solve_rows, state.now, contacts, island.members, motion.turning, excess, run.acceleration,
+            run.angular_acceleration, h, SHORTEST_STOP * step, run.column, force, run.wrench, rolling,
         )
 
     if motion.fastest * step <= STEADY:
@@ -156,7 +156,7 @@ def _hold_turning(
     plan = GROWTH * state.sub_step[first] if state.under_contact[first] else np.inf
     h = min(h, plan)
     held = hold_over(h, excess)
-    error, share = _foresee(context, island, subset, contacts, motion, force, held.length)
+    error, share = _foresee(run, island, subset, contacts, motion, force, held.length)
     if share < 1.0:
         state.sub_step[first] = share * held.length
         held = hold_over(share * held.length, excess + share**3 * error)
@@ -166,31 +166,31 @@ def _hold_turning(
     return held.length, held.residual
 
 
-def _hold_jointed(context, island: Island, subset, contacts, motion: Motion, force, rest: float) -> tuple[float, float]:
+def _hold_jointed(run, island: Island, subset, contacts, motion: Motion, force, rest: float) -> tuple[float, float]:
     """Forces of joints and contacts over a sub-step of at most `rest`; returns its length and the residual."""
-    joints, step = context.joints, context.world.accuracy.step
-    rolling, moment = rolling_of(context.world, context.state.now, contacts), joints.moment.copy()
-    h, residual = joints.hold(context, island, contacts, motion.turning, force, sub_step(motion.fastest, step, rest), rolling)
+    joints, step = run.joints, run.world.accuracy.step
+    rolling, moment = rolling_of(run.world, run.state.now, contacts), joints.moment.copy()
+    h, residual = joints.hold(run, island, contacts, motion.turning, force, sub_step(motion.fastest, step, rest), rolling)
     if motion.fastest * step > STEADY:
-        _, share = _foresee(context, island, subset, contacts, motion, force, h)
+        _, share = _foresee(run, island, subset, contacts, motion, force, h)
         if share < 1.0:
             joints.moment[:] = moment
-            h, residual = joints.hold(context, island, contacts, motion.turning, force, share * h, rolling)
+            h, residual = joints.hold(run, island, contacts, motion.turning, force, share * h, rolling)
     return h, residual
 
 
-def _foresee(context, island: Island, subset, contacts, motion: Motion, force, h: float) -> tuple[np.ndarray, float]:
+def _foresee(run, island: Island, subset, contacts, motion: Motion, force, h: float) -> tuple[np.ndarray, float]:
     """Errors (m,) of gaps after h [m] under the forces found, and the share of h after which they would be allowed."""
-    error = context.error_estimate.gap_errors(context, island, contacts, subset, motion, context.wrench, h)
+    error = run.error_estimate.gap_errors(run, island, contacts, subset, motion, run.wrench, h)
     error[force[:, 0] == 0.0] = 0.0
     worst = float(np.max(np.abs(error) / (ALLOWED * island.contact_margin[subset])))
     if worst <= 1.0:
         return error, 1.0
-    spin = float(np.linalg.norm(context.state.now.angular_velocity[island.members], axis=1).max())
+    spin = float(np.linalg.norm(run.state.now.angular_velocity[island.members], axis=1).max())
     share = worst ** (-1.0 / 3.0)
     if spin > 0.0:
         share = min(share, TURN_OF_BODY / (spin * h))
-    return error, min(max(share, context.world.accuracy.step / (MOST_SUB_STEPS * h)), 1.0)
+    return error, min(max(share, run.world.accuracy.step / (MOST_SUB_STEPS * h)), 1.0)
 
 
 def sub_step(rate: float, step: float, rest: float) -> float:
@@ -199,45 +199,45 @@ def sub_step(rate: float, step: float, rest: float) -> float:
     return piece if rest > piece * (1.0 + SHORTEST) else max(rest, SHORTEST * step)
 
 
-def _correct_positions(context, pair_events, island: Island) -> None:
+def _correct_positions(run, pair_events, island: Island) -> None:
     """Bring sunken contacts back to their gap and look at the group's contacts again.
 
     A light body turns far to make room for a heavy one: what it may come near is looked for farther away, and what does not belong to the
     group stands meanwhile.
     """
-    state, now = context.state, context.state.now
+    state, now = run.state, run.state.now
     place, turn = now.position[island.members].copy(), now.orientation[island.members].copy()
-    before = mechanical_energy(now, context.world, island.members)
+    before = mechanical_energy(now, run.world, island.members)
     held = dict(zip(island.keys, island.slow().tolist(), strict=True))
-    around, contact_margin, keys = near_contacts(context, pair_events, island.members, island.time)
+    around, contact_margin, keys = near_contacts(run, pair_events, island.members, island.time)
     lifted = np.array([held.get(key, False) for key in keys], bool)
-    correct_positions(now, around, lifted, contact_margin, island.members, context.column)
+    correct_positions(now, around, lifted, contact_margin, island.members, run.column)
     refresh_pose(island.members, now, state.rotation, state.trajectory.inertia)
-    context.log.account(island.time, "position correction", mechanical_energy(now, context.world, island.members) - before)
-    limit_correction_energy(context, island, around, now.position[island.members] - place, float(contact_margin.max()))
+    run.log.account(island.time, "position correction", mechanical_energy(now, run.world, island.members) - before)
+    limit_correction_energy(run, island, around, now.position[island.members] - place, float(contact_margin.max()))
     island.moved = True
-    reach = 2.0 * context.world.bound_radius[island.members] * np.linalg.norm(now.orientation[island.members] - turn, axis=1)
+    reach = 2.0 * run.world.bound_radius[island.members] * np.linalg.norm(now.orientation[island.members] - turn, axis=1)
     island.shift = float((np.linalg.norm(now.position[island.members] - place, axis=1) + reach).max())
-    real, integer = collect(context, pair_events, island.pairs, island.time)
-    again = make_island(context, pair_events, island.time, real, integer, np.ones(len(real), bool), island.joints, island.members)
+    real, integer = collect(run, pair_events, island.pairs, island.time)
+    again = make_island(run, pair_events, island.time, real, integer, np.ones(len(real), bool), island.joints, island.members)
     for name in ("contacts", "place", "kinds", "features", "keys", "contact_margin", "approach", "rest_speed", "live"):
         setattr(island, name, getattr(again, name))
     island.held = island.slow()
 
 
-def _rests(context, island: Island, h: float) -> bool:
+def _rests(run, island: Island, h: float) -> bool:
     """Whether all members stand still and their loads are carried, on supports that do not move."""
-    world, now = context.world, context.state.now
+    world, now = run.world, run.state.now
     i = island.members
     moves = world.moving[island.contacts.body_a].any() or world.moving[island.contacts.body_b].any()
     if len(island.joints):
-        moves = moves or world.moving[context.joints.bodies_of(island.joints)].any()
-    if moves or (island.loaded and not context.forces.may_rest(i)):
+        moves = moves or world.moving[run.joints.bodies_of(island.joints)].any()
+    if moves or (island.loaded and not run.forces.may_rest(i)):
         return False
     limit = TOLERANCES.rest * world.steady_strength[i] * h
-    force, torque = context.wrench[i, :3], context.wrench[i, 3:]
-    spin = context.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], torque)
-    gained = h * (context.acceleration[i] + world.inv_mass[i, None] * force)
+    force, torque = run.wrench[i, :3], run.wrench[i, 3:]
+    spin = run.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], torque)
+    gained = h * (run.acceleration[i] + world.inv_mass[i, None] * force)
     size = np.minimum(world.bound_radius[i], world.size[i])[:, None]
     slow = (
         (np.linalg.norm(now.velocity[i], axis=1) <= limit)

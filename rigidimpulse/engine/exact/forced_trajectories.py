@@ -45,16 +45,16 @@ class ForcedFlight:
         return Bound(integrate_forced, f"steps of order 4, as long as their error allows{impacts}")
 
 
-def note_free(context, _window, island: Island) -> None:
+def note_free(run, _window, island: Island) -> None:
     """Keep the members' accelerations without varying forces, if these act on one of them."""
-    if context.forces.acts[island.members].any():
-        island.free = context.acceleration[island.members], context.angular_acceleration[island.members]
+    if run.forces.acts[island.members].any():
+        island.free = run.acceleration[island.members], run.angular_acceleration[island.members]
 
 
-def integrate_forced(context, pair_events, island: Island) -> None:
+def integrate_forced(run, pair_events, island: Island) -> None:
     """Give new courses to members, under varying forces where they feel them."""
     if island.free is not None and not island.loaded:
-        members = island.members[context.forces.acts[island.members]]
-        h = context.forces.fly(context, members, island.time, pair_events.end)
+        members = island.members[run.forces.acts[island.members]]
+        h = run.forces.fly(run, members, island.time, pair_events.end)
         pair_events.wake[members] = np.where(h < (pair_events.end - island.time) * WHOLE, island.time + h, np.inf)
-    integrate(context, pair_events, island)
+    integrate(run, pair_events, island)

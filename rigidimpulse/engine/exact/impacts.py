@@ -50,55 +50,55 @@ class ImpactResponse:
             return Skip(world.why_no_impacts)
         kernel, law = KERNELS[self.method], LAWS[self.restitution]
 
-        def respond(context, island: Island) -> None:
-            respond_to_impacts(context, island, kernel, law)
+        def respond(run, island: Island) -> None:
+            respond_to_impacts(run, island, kernel, law)
 
         return Bound(respond, f"{self.method}: {REASONS[self.method]}")
 
 
-def respond_to_impacts(context, island: Island, kernel, law: int) -> None:
+def respond_to_impacts(run, island: Island, kernel, law: int) -> None:
     """Apply the impulses of the group's approaching contacts and log them."""
-    collapses = _collapsing(context, island)
+    collapses = _collapsing(run, island)
     live = (island.live | collapses).nonzero()[0]
     if not len(live):
         return
     contacts = island.contacts if len(live) == len(island.live) else select(island.contacts, live)
     rest_speed = np.where(collapses, np.inf, island.rest_speed)[live]
-    scale = speed_scale(context.state.now, contacts)
+    scale = speed_scale(run.state.now, contacts)
     tolerance = TOLERANCES.approach * scale + SLOW * float(island.rest_speed[live].max())
     island.zero_speed, island.scale = tolerance, scale
     if island.approach[live].min() >= -tolerance:
         return
-    now = context.state.now
-    before = kinetic_energy(now, context.world, island.members)
-    joints = context.joints.impact_block(context, island) if len(island.joints) else None
-    together = len(live) > 1 and (bool(collapses.any()) or _bear_each_other(context, island))
+    now = run.state.now
+    before = kinetic_energy(now, run.world, island.members)
+    joints = run.joints.impact_block(run, island) if len(island.joints) else None
+    together = len(live) > 1 and (bool(collapses.any()) or _bear_each_other(run, island))
     for _ in range(MAX_CALLS):
         count, _, capped = kernel(
-            now, contacts, law, together, rest_speed, tolerance, scale, context.column, joints, context.impact_log
+            now, contacts, law, together, rest_speed, tolerance, scale, run.column, joints, run.impact_log
         )
-        context.log.impacts.add(island.time, contacts, now.position, context.impact_log, count)
-        _remember_rebounds(context, island, contacts, context.impact_log[:count])
+        run.log.impacts.add(island.time, contacts, now.position, run.impact_log, count)
+        _remember_rebounds(run, island, contacts, run.impact_log[:count])
         if capped:
-            names = tuple(context.world.names[i] for i in island.members)
-            context.log.report(
+            names = tuple(run.world.names[i] for i in island.members)
+            run.log.report(
                 island.time, "impacts finished without rebound", names,
                 "too many impacts at one instant; try response='simultaneous'",
             )
-        if not count or count + len(contacts.gap) < len(context.impact_log):
+        if not count or count + len(contacts.gap) < len(run.impact_log):
             break
-    context.log.account(island.time, "impact", kinetic_energy(now, context.world, island.members) - before)
-    classify(context, island)
+    run.log.account(island.time, "impact", kinetic_energy(now, run.world, island.members) - before)
+    classify(run, island)
 
 
-def _bear_each_other(context, island: Island) -> bool:
+def _bear_each_other(run, island: Island) -> bool:
     """Whether a contact between two movable bodies of the group carried load before."""
-    state, dynamic = context.state, context.world.dynamic
+    state, dynamic = run.state, run.world.dynamic
     between = dynamic[island.contacts.body_a] & dynamic[island.contacts.body_b]
     return any(state.force_of(island.keys[c])[0] > 0.0 for c in np.flatnonzero(between).tolist())
 
 
-def _collapsing(context, island: Island) -> np.ndarray:
+def _collapsing(run, island: Island) -> np.ndarray:
     """Contacts (m,) of pairs that came back RATTLES times in a row without ever having been farther apart than the held gap.
 
     Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
@@ -106,21 +106,21 @@ def _collapsing(context, island: Island) -> np.ndarray:
     heavy ones in as many impacts as their masses' ratio, and each impact would be followed by the next. A body between two others hits
     them in turn, so pairs on their way rattle as soon as one does.
     """
-    contacts, rebounds = island.contacts, context.state.rebounds
+    contacts, rebounds = island.contacts, run.state.rebounds
     pairs = zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)
     count = np.array([rebounds.get(pair, NEVER)[2] for pair in pairs], np.int64)
     count[contacts.restitution >= 1.0] = 0
     return count >= (COLLAPSE_REBOUNDS // 2 if (count >= COLLAPSE_REBOUNDS).any() else COLLAPSE_REBOUNDS)
 
 
-def _remember_rebounds(context, island: Island, contacts: Contacts, rows: np.ndarray) -> None:
+def _remember_rebounds(run, island: Island, contacts: Contacts, rows: np.ndarray) -> None:
     """Count for each pair how often in a row it came back after less than its held gap."""
     pairs = zip(island.contacts.body_a.tolist(), island.contacts.body_b.tolist())
     contact_margin = dict(zip(pairs, island.contact_margin))
     for row in rows:
         c = int(row[0])
         pair = (int(contacts.body_a[c]), int(contacts.body_b[c]))
-        last, speed, count = context.state.rebounds.get(pair, NEVER)
+        last, speed, count = run.state.rebounds.get(pair, NEVER)
         if island.time > last:
             count = count + 1 if speed * (island.time - last) < contact_margin[pair] else 0
-        context.state.rebounds[pair] = (island.time, float(row[6]), count)
+        run.state.rebounds[pair] = (island.time, float(row[6]), count)

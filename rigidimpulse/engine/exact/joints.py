@@ -108,45 +108,45 @@ class JointState:
         """Whether one of the joints is fixed to the world."""
         return bool(np.any(self.table.body_a[which] < 0) or np.any(self.table.body_b[which] < 0))
 
-    def moving_bodies(self, context) -> np.ndarray:
+    def moving_bodies(self, run) -> np.ndarray:
         """Dynamic bodies with joints that do not rest."""
         bodies = np.array(sorted(self._of_body), np.int64)
-        return bodies[context.state.trajectory.mode[bodies] != FIXED]
+        return bodies[run.state.trajectory.mode[bodies] != FIXED]
 
-    def project_velocities(self, context, island) -> None:
+    def project_velocities(self, run, island) -> None:
         """End the group's sub-steps: take half of the forces back, close what drifted, stop the joints."""
-        state, now, memory = context.state, context.state.now, self.memory
+        state, now, memory = run.state, run.state.now, self.memory
         members, which = island.members, island.joints
         elapsed = np.zeros(len(self.whole))
         elapsed[which] = island.time - self.began[which]
         self.moment[which] = 0.0
-        before = mechanical_energy(now, context.world, members)
+        before = mechanical_energy(now, run.world, members)
         arrived = np.hstack([now.velocity[members], now.angular_velocity[members]])
         for i in members:
             held = memory.wrench[i] * max(elapsed[j] for j in self.at([i])) if int(i) in self._of_body else np.zeros(6)
             now.velocity[i] -= now.inv_mass[i] * held[:3]
             now.angular_velocity[i] -= now.inv_inertia[i] @ held[3:]
         moved = close_joints(
-            self.table, which, now, island.contacts, state.rotation, members, context.column, memory.angle, self._allowed
+            self.table, which, now, island.contacts, state.rotation, members, run.column, memory.angle, self._allowed
         )
         if moved:
             refresh_pose(members, now, state.rotation, state.trajectory.inertia)
             island.moved = True
         stop_joints(
-            self.table, which, now, state.rotation, members, context.column, memory, elapsed, self.moment
+            self.table, which, now, state.rotation, members, run.column, memory, elapsed, self.moment
         )
-        self._book(context, which, island.time)
+        self._book(run, which, island.time)
         state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
         if self._limited:
             # An impact at this instant: what came before goes on unchanged.
             stop_at_limits(
-                self.table, which, now, state.rotation, members, context.column, memory, self._allowed, self.shock
+                self.table, which, now, state.rotation, members, run.column, memory, self._allowed, self.shock
             )
         memory.wrench[members] = 0.0
         self.length[which] = elapsed[which]
-        after = mechanical_energy(now, context.world, members)
-        context.log.account(island.time, "joints", after - before)
-        self._note_drift(which, after, kinetic_energy(now, context.world, members))
+        after = mechanical_energy(now, run.world, members)
+        run.log.account(island.time, "joints", after - before)
+        self._note_drift(which, after, kinetic_energy(now, run.world, members))
 
     def _note_drift(self, which: np.ndarray, energy: float, kinetic: float) -> None:
         """What the sub-step that ends has made or lost of the energy that joints keep by themselves."""
@@ -155,29 +155,29 @@ class JointState:
         if len(which) and np.all(begun == begun[0]) and kinetic > 0.0:
             self.drift[which] = abs(energy - begun[0]) / kinetic
 
-    def _book(self, context, which: np.ndarray, time: float) -> None:
+    def _book(self, run, which: np.ndarray, time: float) -> None:
         """Impulses on b of the sub-steps that end: half of what their forces were, and what stopped the joints."""
         for j in which.tolist():
             a, b, cause = int(self.table.body_a[j]), int(self.table.body_b[j]), f"joint {self.names[j]}"
             began = float(self.began[j])
             if time > began:
-                context.impulses.add(cause, a, b, began, time, 0.5 * self.pull[j] + self.moment[j] / (time - began))
-            context.impulses.add_at(cause, a, b, time, self.shock[j] - self._accounted_shock[j])
+                run.impulses.add(cause, a, b, began, time, 0.5 * self.pull[j] + self.moment[j] / (time - began))
+            run.impulses.add_at(cause, a, b, time, self.shock[j] - self._accounted_shock[j])
         self._accounted_shock[which] = self.shock[which]
 
-    def impact_block(self, context, island):
+    def impact_block(self, run, island):
         """The joints' part in the impulses of an impact (`JointBlock`)."""
-        state = context.state
+        state = run.state
         return impact_rows(
-            self.table, island.joints, state.now, state.rotation, island.members, context.column, self.memory, self._allowed,
+            self.table, island.joints, state.now, state.rotation, island.members, run.column, self.memory, self._allowed,
             self.shock,
         )
 
-    def sub_step(self, context, island, h: float) -> float:
+    def sub_step(self, run, island, h: float) -> float:
         """Length of the next sub-step: h, the rest of the step, or a part of it. Very short rests are planned as longer ones."""
-        world, now = context.world, context.state.now
+        world, now = run.world, run.state.now
         fastest = 0.0
-        sways, swings = self._tension_rates(context, island.joints)
+        sways, swings = self._tension_rates(run, island.joints)
         rates = max(sways, self._spring_rate(island.joints))
         for j in island.joints.tolist():
             a, b = int(self.table.body_a[j]), int(self.table.body_b[j])
@@ -208,12 +208,12 @@ class JointState:
         square = np.where(table.per_mass[works], stiffness, stiffness * memory.weight[works])
         return math.sqrt(square.max(initial=0.0))
 
-    def _tension_rates(self, context, which: np.ndarray) -> tuple[float, float]:
+    def _tension_rates(self, run, which: np.ndarray) -> tuple[float, float]:
         """Bounds of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m r)).
 
         Returns that of all others, and that of bodies that only swing about a point which cannot be moved.
         """
-        world, table, squares = context.world, self.table, {}
+        world, table, squares = run.world, self.table, {}
         force = np.linalg.norm(self.pull[which], axis=1)
         for bodies, anchors in ((table.body_a[which], table.anchor_a[which]), (table.body_b[which], table.anchor_b[which])):
             for i, f, r in zip(bodies.tolist(), force.tolist(), np.linalg.norm(anchors, axis=1).tolist(), strict=True):
@@ -226,40 +226,40 @@ class JointState:
         own = (square for i, square in squares.items() if i in swinging)
         return math.sqrt(max(others, default=0.0)), math.sqrt(max(own, default=0.0))
 
-    def hold(self, context, island, contacts, turning, force, rest: float, rolling) -> tuple[float, float]:
-        """Forces into context.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
-        state, memory = context.state, self.memory
+    def hold(self, run, island, contacts, turning, force, rest: float, rolling) -> tuple[float, float]:
+        """Forces into run.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
+        state, memory = run.state, self.memory
         others = self.bodies_of(island.joints)
-        others = others[~context.world.dynamic[others]]
-        h, cuts = self.sub_step(context, island, rest), 0
+        others = others[~run.world.dynamic[others]]
+        h, cuts = self.sub_step(run, island, rest), 0
         while True:
-            h = island.load(context, h)
+            h = island.load(run, h)
             for i in others:
-                memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, island.time + h)
+                memory.end_position[i], memory.end_rotation[i] = run.pose_matrix(i, island.time + h)
             moment = self.moment.copy()
             residual, worst = hold_jointed(
-                context.solve_rows, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
-                island.members, context.column, force, self.table, island.joints, state.rotation, memory, self._allowed,
-                context.wrench, moment, rolling,
+                run.solve_rows, state.now, contacts, turning, run.acceleration, run.angular_acceleration, h,
+                island.members, run.column, force, self.table, island.joints, state.rotation, memory, self._allowed,
+                run.wrench, moment, rolling,
             )
             self.pull[island.joints] = 2.0 * (moment[island.joints] - self.moment[island.joints]) / h
-            shorter = self.sub_step(context, island, h)
+            shorter = self.sub_step(run, island, h)
             if shorter < 0.5 * h:
                 # Only the forces show how short it has to be.
                 h = shorter
                 continue
-            if self._break(context, island):
+            if self._break(run, island):
                 continue
             switch = next_switch(self.table, island.joints, memory, h, self._allowed)
             if cuts == MOST_CUTS or switch >= h * (1.0 - SHORT):
                 break
-            h, cuts = max(switch, SHORT * context.world.accuracy.step), cuts + 1
+            h, cuts = max(switch, SHORT * run.world.accuracy.step), cuts + 1
         self.moment[:] = moment
         self._log(island, h)
         self.began[island.joints] = island.time
         if not len(island.contacts.gap) and island.free is None and self.are_passive(island.joints):
-            self._energy[island.joints] = mechanical_energy(state.now, context.world, island.members)
-        self._report(context, island, worst)
+            self._energy[island.joints] = mechanical_energy(state.now, run.world, island.members)
+        self._report(run, island, worst)
         self.are_closed = worst <= NOT_CLOSED * self._allowed
         return h, residual
 
@@ -270,40 +270,40 @@ class JointState:
         for j in island.joints.tolist():
             self.memory.force[self.table.first[j] : self.table.first[j + 1]] = 0.0
 
-    def _report(self, context, island, worst: float) -> None:
+    def _report(self, run, island, worst: float) -> None:
         """Report joints that are off by `worst` m or rad, and those near the singularity of a twist."""
-        names = tuple(context.world.names[i] for i in island.members)
+        names = tuple(run.world.names[i] for i in island.members)
         if worst > NOT_CLOSED * self._allowed:
             far = f"off by {worst:.1e}" if math.isfinite(worst) else "no pose closes them"
-            context.log.report(island.time, "joints not closed", names, f"{far}; use a smaller step")
+            run.log.report(island.time, "joints not closed", names, f"{far}; use a smaller step")
         for j in island.joints.tolist():
             if self.memory.steepness[self.table.first[j] : self.table.first[j + 1]].max(initial=0.0) > STEEP:
-                pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
-                context.log.report(
+                pair = tuple(run.world.names[i] for i in self.bodies_of(np.array([j])))
+                run.log.report(
                     island.time, "singular joint", pair,
                     f"{self.names[j]}: its axis has swung by half a turn, where the twist about it is not defined; limit the swing",
                 )
 
-    def _break(self, context, island) -> bool:
+    def _break(self, run, island) -> bool:
         """Take out a joint whose time has come, or the most overloaded one, if there is one."""
         which = island.joints
         due = which[self.release_time[which] <= island.time]
         if len(due):
-            self._take_out(context, island, int(due[0]), "joint let go", "")
+            self._take_out(run, island, int(due[0]), "joint let go", "")
             return True
         load = np.linalg.norm(self.pull[which], axis=1) / self.break_force[which]
         if not len(which) or load.max() <= 1.0:
             return False
         j = int(which[np.argmax(load)])
-        self._take_out(context, island, j, "joint broke", f": {np.linalg.norm(self.pull[j]):.6g} N")
+        self._take_out(run, island, j, "joint broke", f": {np.linalg.norm(self.pull[j]):.6g} N")
         return True
 
-    def _take_out(self, context, island, j: int, kind: str, why: str) -> None:
+    def _take_out(self, run, island, j: int, kind: str, why: str) -> None:
         """The joint is gone."""
         self.whole[j] = False
         island.joints = island.joints[island.joints != j]
-        pair = tuple(context.world.names[i] for i in self.bodies_of(np.array([j])))
-        context.log.note(island.time, kind, pair, f"{self.names[j]}{why}")
+        pair = tuple(run.world.names[i] for i in self.bodies_of(np.array([j])))
+        run.log.note(island.time, kind, pair, f"{self.names[j]}{why}")
         self.reactions.append((island.time, j, np.zeros(3)))
 
     def log_rest(self, island) -> None:

@@ -42,7 +42,7 @@ class ErrorEstimate:
         self.acceleration = np.empty((k, 3))
         self.angular_acceleration = np.empty((k, 3))
 
-    def gap_errors(self, context, island, contacts: Contacts, subset: np.ndarray, motion, wrench, h: float) -> np.ndarray:
+    def gap_errors(self, run, island, contacts: Contacts, subset: np.ndarray, motion, wrench, h: float) -> np.ndarray:
         """Errors (m,) of the gaps of the held contacts after h [m].
 
         motion: what `contact_motion` said of them; wrench (n, 6): of their forces.
@@ -51,9 +51,9 @@ class ErrorEstimate:
         touched = np.unique(np.concatenate([island.members, contacts.body_a, contacts.body_b]))
         if len(touched) > len(self.rotation):
             self._grow(2 * len(touched))
-        self._take_over(context, touched)
+        self._take_over(run, touched)
         members, a, b = (np.searchsorted(touched, bodies) for bodies in (island.members, contacts.body_a, contacts.body_b))
-        self._bring(members, context.acceleration[island.members], wrench[island.members], h)
+        self._bring(members, run.acceleration[island.members], wrench[island.members], h)
         normal = contacts.normal + h * motion.normal_rate
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         ahead = contacts._replace(
@@ -66,13 +66,13 @@ class ErrorEstimate:
         point_b = self.acceleration[b] + cross(self.angular_acceleration[b], ahead.arm_b)
         return np.einsum("ij,ij->i", point_b - point_a + turning, normal) * (h * h / 6.0)
 
-    def _take_over(self, context, touched: np.ndarray) -> None:
+    def _take_over(self, run, touched: np.ndarray) -> None:
         """Rows of bodies as they are now; the velocities of those that are no members are constant."""
-        k, now, world = len(touched), context.state.now, self._world
+        k, now, world = len(touched), run.state.now, self._world
         for ours, theirs in zip(self.bodies[:4], now[:4], strict=True):
             ours[:k] = theirs[touched]
         self.bodies.inv_mass[:k] = world.inv_mass[touched]
-        self.rotation[:k] = context.state.rotation[touched]
+        self.rotation[:k] = run.state.rotation[touched]
         self.acceleration[:k] = self.angular_acceleration[:k] = 0.0
         self.trajectory.inertia[:k] = world.inertia[touched]
 

@@ -35,12 +35,12 @@ class ExactFlight:
         return Bound(integrate, "paths between impacts are exact")
 
 
-def integrate(context, pair_events, island: Island) -> None:
+def integrate(run, pair_events, island: Island) -> None:
     """Give new courses to members whose velocity, pose or wrench changed, and set the gaps at which pairs meet next."""
-    state, now = context.state, context.state.now
+    state, now = run.state, run.state.now
     trajectory = state.trajectory
     if island.substepped is not None:
-        context.substepped.begin_trajectories(context, pair_events, island)
+        run.substepped.begin_trajectories(run, pair_events, island)
     for n, i in enumerate(island.members.tolist()):
         if pair_events.inside[i] or (island.rests and trajectory.mode[i] == FIXED and not island.moved):
             continue
@@ -49,32 +49,32 @@ def integrate(context, pair_events, island: Island) -> None:
             or state.under_contact[i]
             or (now.velocity[i] != island.velocity[n]).any()
             or (now.angular_velocity[i] != island.angular_velocity[n]).any()
-            or context.wrench[i].any()
+            or run.wrench[i].any()
             or island.free is not None
         ):
-            begin_trajectory(context, pair_events, i, island.time, context.wrench[i], island.rests)
-    set_margins(context, pair_events, island)
+            begin_trajectory(run, pair_events, i, island.time, run.wrench[i], island.rests)
+    set_margins(run, pair_events, island)
 
 
-def begin_trajectory(context, pair_events, i: int, time: float, wrench: np.ndarray, rests: bool) -> None:
+def begin_trajectory(run, pair_events, i: int, time: float, wrench: np.ndarray, rests: bool) -> None:
     """Body i leaves its course at `time` for one from its present state, with a constant wrench (6,)."""
-    state, world, now = context.state, context.world, context.state.now
+    state, world, now = run.state, run.world, run.state.now
     trajectory = state.trajectory
     if not isfinite(float(now.velocity[i].sum() + now.angular_velocity[i].sum())):
-        context.quarantine(i, time)
+        run.quarantine(i, time)
         rests = True
-    context.recorder.flush(trajectory, i, time, state.correction[i])
+    run.recorder.flush(trajectory, i, time, state.correction[i])
     state.correction[i] = 0.0
-    context.contact_log.close([i], time)
-    if context.forces is not None:
-        context.forces.log.end(i, time)
-    account_contact_work(context, i, time)
+    run.contact_log.close([i], time)
+    if run.forces is not None:
+        run.forces.log.end(i, time)
+    account_contact_work(run, i, time)
     pressed = not rests and bool(wrench.any())
     if rests:
         now.velocity[i] = now.angular_velocity[i] = 0.0
         take(trajectory, i, time, now, NOTHING, NOTHING, NOTHING, NOTHING, FIXED)
-    elif context.forces is not None and context.forces.acts[i]:
-        total, rate = wrench + context.forces.value[i], context.forces.rate[i]
+    elif run.forces is not None and run.forces.acts[i]:
+        total, rate = wrench + run.forces.value[i], run.forces.rate[i]
         acceleration, jerk = world.steady_acceleration[i] + world.inv_mass[i] * total[:3], world.inv_mass[i] * rate[:3]
         turned = total[3:].any() or rate[3:].any()
         take(trajectory, i, time, now, acceleration, total[3:], jerk, rate[3:], FORCED if turned else FREE)
@@ -86,29 +86,29 @@ def begin_trajectory(context, pair_events, i: int, time: float, wrench: np.ndarr
         take(trajectory, i, time, now, acceleration, wrench[3:], NOTHING, NOTHING, FORCED if turned else FREE)
     state.under_contact[i] = pressed
     if pressed:
-        state.energy_at_start[i] = mechanical_energy(now, world, np.array([i])) - work_of_forces(context, i)
+        state.energy_at_start[i] = mechanical_energy(now, world, np.array([i])) - work_of_forces(run, i)
     if pair_events is not None:
         pair_events.trajectory_changed(i, time)
 
 
-def account_contact_work(context, i: int, time: float) -> None:
+def account_contact_work(run, i: int, time: float) -> None:
     """Work that contact forces did along the course that ends: what its energy changed by."""
-    arrival = context.state.end_energy.pop(i, None)
+    arrival = run.state.end_energy.pop(i, None)
     if arrival is not None:
-        begun, arrival = context.state.energy_at_start[i], arrival - work_of_forces(context, i)
-        context.log.stretches.append((context.state.trajectory.start[i], time, i, begun, arrival - begun))
+        begun, arrival = run.state.energy_at_start[i], arrival - work_of_forces(run, i)
+        run.log.stretches.append((run.state.trajectory.start[i], time, i, begun, arrival - begun))
 
 
-def work_of_forces(context, i: int) -> float:
+def work_of_forces(run, i: int) -> float:
     """What varying forces did on body i until its present course began, J."""
-    return 0.0 if context.forces is None else float(context.forces.log.work[i])
+    return 0.0 if run.forces is None else float(run.forces.log.work[i])
 
 
-def set_margins(context, pair_events, island: Island) -> None:
+def set_margins(run, pair_events, island: Island) -> None:
     """Gaps at which the group's pairs come to contact next."""
     if len(island.place):
         held = np.zeros(len(island.place), bool) if island.held is None else island.held
-        pairs, dynamic = pair_events.pairs, context.world.dynamic
+        pairs, dynamic = pair_events.pairs, run.world.dynamic
         set_impact_margins(pairs, island.place, island.contacts.gap, held, island.time, dynamic, pair_events.inside)
 
 

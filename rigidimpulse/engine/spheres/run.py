@@ -31,16 +31,16 @@ LONGEST_PAUSE = 16
 class EventRun:
     """The kernel's tables for one run."""
 
-    def __init__(self, context) -> None:
-        """context: of the run, with the first courses."""
-        world = context.world
-        self._context, self._pause, self._waits, self._interval = context, 0, 0, FIRST_INTERVAL
+    def __init__(self, run) -> None:
+        """run: of the run, with the first courses."""
+        world = run.world
+        self._run, self._pause, self._waits, self._interval = run, 0, 0, FIRST_INTERVAL
         self._fixed = Fixed(
             world.dynamic, world.steady_acceleration, world.mass, world.inertia, world.material_of_body, world.coefficients,
             world.apart, world.static_min, world.static_max, LAWS[world.accuracy.restitution], world.accuracy.step,
         )  # fmt: skip
         self._paths, self._planes = _constants(world)
-        state = context.state
+        state = run.state
         self._motion = Motion(state.trajectory, state.now, state.rotation)
         self._pairs, self._rows = CAPACITY + world.num_bodies, CAPACITY
         self._table, self._book = self._make_table(), self._make_record()
@@ -50,18 +50,18 @@ class EventRun:
         self._live = LIVE * (NEAR + ROUND_OFF + 2.0 * world.accuracy.tolerance / gap)
 
     def _make_table(self) -> Table:
-        context, n = self._context, self._context.world.num_bodies
+        run, n = self._run, self._run.world.num_bodies
         capacity = n + self._pairs
         first, second = np.zeros((2, capacity), np.int64)
         return Table(
             make_queue(capacity), make_tree(n), self._paths, self._planes,
-            context.box_min, context.box_max, first, second, np.full(n, -1, np.int64), np.zeros(capacity, np.int8),
+            run.box_min, run.box_max, first, second, np.full(n, -1, np.int64), np.zeros(capacity, np.int8),
             np.full(2 * capacity, -1, np.int64), np.full(n, -1, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64),
             np.zeros(2 * capacity, np.int64), np.zeros(3, np.int64),
         )  # fmt: skip
 
     def _make_record(self) -> SphereRecord:
-        recorder = self._context.recorder
+        recorder = self._run.recorder
         return SphereRecord(
             recorder.times, recorder.written, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
             np.empty((self._rows, ROW_LENGTH)), np.empty(self._rows), np.zeros(1, np.int64), empty_contacts(1),
@@ -71,18 +71,18 @@ class EventRun:
     def may_fly(self) -> bool:
         """Whether to try the kernel now: not where contacts last, and not at once again where it did not get on."""
         waits, self._waits = self._waits > 0, max(self._waits - 1, 0)
-        context = self._context
-        calm = context.substepped is None or context.substepped.is_idle()
-        return not waits and calm and not context.state.under_contact.any() and context.soft_bodies is None
+        run = self._run
+        calm = run.substepped is None or run.substepped.is_idle()
+        return not waits and calm and not run.state.under_contact.any() and run.soft_bodies is None
 
     def fly(self, end: float, at_boundary: bool = True) -> tuple[int, float, float]:
         """Carry the scene from a boundary of steps, or from the middle of one, towards `end` [s] as far as what happens is simple.
 
         Returns how the flight ends (see `effect`), and where the step begins and ends in which it does, s.
         """
-        context = self._context
+        run = self._run
         self._learn()
-        begin = now = context.state.time
+        begin = now = run.state.time
         if at_boundary:
             self._step_begin = begin
         how, number, interval_end = FULL, 0, -1.0
@@ -94,7 +94,7 @@ class EventRun:
             self._keep_impacts()
             if how == FULL and self._grow():
                 interval_end = -1.0
-        context.state.time = now
+        run.state.time = now
         if how == STEP:
             self._pause = 0 if now > begin else min(2 * self._pause + 1, LONGEST_PAUSE)
             self._waits = self._pause
@@ -103,29 +103,29 @@ class EventRun:
 
     def _learn(self) -> None:
         """Take over the rebounds since the last flight, and what has become dynamic."""
-        self._paths[:, DYNAMIC] = self._context.world.dynamic
-        rows = self._context.log.impacts
-        known = self._context.state.rebounds
+        self._paths[:, DYNAMIC] = self._run.world.dynamic
+        rows = self._run.log.impacts
+        known = self._run.state.rebounds
         for a, b in rows.rows[self._known : rows.count, 1:3].astype(np.int64).tolist():
             if 2 * self._rebounds.used[0] >= len(self._rebounds.key):
                 self._grow_rebounds()
-            remember(self._rebounds, a * self._context.world.num_bodies + b, *known[a, b])
+            remember(self._rebounds, a * self._run.world.num_bodies + b, *known[a, b])
             if known[a, b][2] > 0:
                 self._live = np.inf  # what came back fast may be dealt with before it touches
         self._known = rows.count
 
     def _keep_impacts(self) -> None:
         """Hand impacts, their energies and rebounds to the run."""
-        context, count = self._context, int(self._book.count[0])
+        run, count = self._run, int(self._book.count[0])
         if not count:
             return
         rows = self._book.rows[:count]
-        context.log.impacts.extend(rows)
-        self._known = context.log.impacts.count
+        run.log.impacts.extend(rows)
+        self._known = run.log.impacts.count
         times, speeds = rows[:, 0].tolist(), rows[:, 14].tolist()
-        context.log.energy.extend((t, "impact", e) for t, e in zip(times, self._book.energy[:count].tolist(), strict=True) if e != 0.0)
+        run.log.energy.extend((t, "impact", e) for t, e in zip(times, self._book.energy[:count].tolist(), strict=True) if e != 0.0)
         pairs = map(tuple, rows[:, 1:3].astype(np.int64).tolist())
-        context.state.rebounds.update((pair, (t, speed, 0)) for pair, t, speed in zip(pairs, times, speeds, strict=True))
+        run.state.rebounds.update((pair, (t, speed, 0)) for pair, t, speed in zip(pairs, times, speeds, strict=True))
         self._book.count[0] = 0
 
     def _grow(self) -> bool:

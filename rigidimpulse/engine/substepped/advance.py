@@ -103,17 +103,17 @@ class SubsteppedIslands:
         text = f"{self._steps} steps, largest {self._most} bodies" if self._steps else "none"
         return f"{text}; left to newton, islands times steps: {refused}" if refused else text
 
-    def gather(self, context, pair_events) -> None:
+    def gather(self, run, pair_events) -> None:
         """Choose the heaps of the step: `window.inside` marks their bodies, `window.still` those at rest."""
         idle, solve_count = self.is_idle(), self.solve_count
         if pair_events.end > self._step_end:
             self.solve_count, self._step_end = np.zeros_like(solve_count), pair_events.end
         if idle:
             return
-        world, trajectory, time = context.world, context.state.trajectory, pair_events.begin
+        world, trajectory, time = run.world, run.state.trajectory, pair_events.begin
         ended = trajectory.mode == LINEAR
-        self._end_trajectories(context, np.flatnonzero(ended), time)
-        chosen = self._choose(context, pair_events, ended, solve_count) if pair_events.end > time else np.zeros_like(ended)
+        self._end_trajectories(run, np.flatnonzero(ended), time)
+        chosen = self._choose(run, pair_events, ended, solve_count) if pair_events.end > time else np.zeros_like(ended)
         left = np.flatnonzero(ended & ~chosen & (trajectory.mode == LINEAR))
         let_fly(trajectory, left, world.steady_acceleration)
         self.sleep_timer[left] = 0.0
@@ -122,64 +122,64 @@ class SubsteppedIslands:
         pair_events.inside |= chosen
         pair_events.asleep |= (self.label >= 0) & (trajectory.mode == FIXED)
 
-    def _choose(self, context, pair_events, brought: np.ndarray, solve_count: np.ndarray) -> np.ndarray:
+    def _choose(self, run, pair_events, brought: np.ndarray, solve_count: np.ndarray) -> np.ndarray:
         """Which bodies (n,) bool are stepped; those `brought` are at the begin of the window already."""
-        world, trajectory, time = context.world, context.state.trajectory, pair_events.begin
+        world, trajectory, time = run.world, run.state.trajectory, pair_events.begin
         member = world.dynamic & ((trajectory.mode != FIXED) | self.asleep)
         if not member.any():
             return member
         ahead = pair_events.end - time
         bring_all(
-            trajectory, np.flatnonzero(~(brought | self.asleep)), time, context.state.now, context.state.rotation, context.acceleration,
-            context.angular_acceleration,
+            trajectory, np.flatnonzero(~(brought | self.asleep)), time, run.state.now, run.state.rotation, run.acceleration,
+            run.angular_acceleration,
         )  # fmt: skip
-        context.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
-        self._leave_out_fast(context, member)
-        a, b, touch = self._near(context, member, ahead)
-        while len(woken := self._touched(context, member, a, b)):
+        run.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
+        self._leave_out_fast(run, member)
+        a, b, touch = self._near(run, member, ahead)
+        while len(woken := self._touched(run, member, a, b)):
             member[woken] = True
-            a, b, touch = self._near(context, member, ahead)
+            a, b, touch = self._near(run, member, ahead)
         root = island_roots(world.num_bodies, a, b, member)
         root[~member] = -1
-        moves = lively(context.state.now, world.steady_strength, self.stepper.inner)
+        moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
         refused = refusals(world, root, self.label >= 0, self._jointed, moves, solve_count, a, b, self._auto)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
-        chosen = self._low(context, pair_events, chosen, root, refused)
+        chosen = self._low(run, pair_events, chosen, root, refused)
         for reason in refused.values():
             self._refused[reason] = self._refused.get(reason, 0) + 1
         self.label[member & ~chosen] = -1
-        self._settle(context, chosen, root, a, b, touch > 0, time)
+        self._settle(run, chosen, root, a, b, touch > 0, time)
         return chosen
 
-    def _leave_out_fast(self, context, member: np.ndarray) -> None:
+    def _leave_out_fast(self, run, member: np.ndarray) -> None:
         """Unmark those that are too fast for sub-steps."""
-        h = self.stepper.sub_step(np.flatnonzero(context.world.dynamic))
-        mark_slow(context.state.now, self.stepper.inner, FAST / h, SPIN / h, member)
+        h = self.stepper.sub_step(np.flatnonzero(run.world.dynamic))
+        mark_slow(run.state.now, self.stepper.inner, FAST / h, SPIN / h, member)
 
-    def _near(self, context, member: np.ndarray, ahead: float) -> np.ndarray:
+    def _near(self, run, member: np.ndarray, ahead: float) -> np.ndarray:
         # Movable bodies under way that are no members are swept.
-        other = ~member & ~(context.world.dynamic & (context.state.trajectory.mode != FIXED))
-        self.stepper.find_pairs(context, np.flatnonzero(member), np.flatnonzero(other), ahead)
-        return self.stepper.near(context, member, other, ahead)
+        other = ~member & ~(run.world.dynamic & (run.state.trajectory.mode != FIXED))
+        self.stepper.find_pairs(run, np.flatnonzero(member), np.flatnonzero(other), ahead)
+        return self.stepper.near(run, member, other, ahead)
 
-    def _touched(self, context, member: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    def _touched(self, run, member: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Bodies at rest that members touch, and all of the heaps they belong to."""
-        world = context.world
-        resting = world.dynamic & ~member & (context.state.trajectory.mode == FIXED)
+        world = run.world
+        resting = world.dynamic & ~member & (run.state.trajectory.mode == FIXED)
         which = np.flatnonzero(resting[a] | resting[b])
         if not len(which):
             return which
         a, b = a[which], b[which]
         margin = TOUCHES * np.minimum(self.stepper.skin[a], self.stepper.skin[b])
-        buffer = context.contact_buffer
-        count = buffer.find(self.stepper.geometry, world, context.state.now, context.state.rotation, a, b, margin)
+        buffer = run.contact_buffer
+        count = buffer.find(self.stepper.geometry, world, run.state.now, run.state.rotation, a, b, margin)
         touched = np.unique(buffer.integer[:count, :2])
         touched = touched[resting[touched]]
         labels = self.label[touched]
         mates = np.flatnonzero(resting & np.isin(self.label, labels[labels >= 0]))
         return np.union1d(touched, mates)
 
-    def _low(self, context, pair_events, chosen: np.ndarray, root: np.ndarray, refused: dict[int, str]) -> np.ndarray:
+    def _low(self, run, pair_events, chosen: np.ndarray, root: np.ndarray, refused: dict[int, str]) -> np.ndarray:
         """Leave out islands that begin as tall columns."""
         begins = chosen & (self.label < 0)
         if not self._auto or not begins.any():
@@ -187,7 +187,7 @@ class SubsteppedIslands:
         begins &= ~np.isin(root, np.unique(root[chosen & ~begins]))
         if not begins.any():
             return chosen
-        self._set_up(context, np.flatnonzero(begins), pair_events.begin, pair_events.end - pair_events.begin, 0.0)
+        self._set_up(run, np.flatnonzero(begins), pair_events.begin, pair_events.end - pair_events.begin, 0.0)
         stepper = self.stepper
         level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
         tall = np.unique(root[stepper.order[level[: len(root)] == TALL + 1]])
@@ -195,9 +195,9 @@ class SubsteppedIslands:
         refused.update(dict.fromkeys(tall.tolist(), "tall"))
         return chosen & ~np.isin(root, tall)
 
-    def _settle(self, context, chosen, root, a: np.ndarray, b: np.ndarray, touch: np.ndarray, time: float) -> None:
+    def _settle(self, run, chosen, root, a: np.ndarray, b: np.ndarray, touch: np.ndarray, time: float) -> None:
         """Label the heaps; let those that have been calm for long stand still, and members that are far from restless ones."""
-        world, trajectory = context.world, context.state.trajectory
+        world, trajectory = run.world, run.state.trajectory
         inner = self.stepper.inner
         carried = world.moving[a] | world.moving[b]
         moving = np.unique(root[np.where(world.moving[a], b, a)[carried]])
@@ -211,56 +211,56 @@ class SubsteppedIslands:
         if np.array_equal(restless, chosen):
             self.asleep[:] = False
             return
-        now, strength = context.state.now, world.steady_strength
+        now, strength = run.state.now, world.steady_strength
         asleep = chosen & ~wake_by_contact(a[touch], b[touch], chosen, restless, now, world.mass, strength, inner)
-        self._put_to_sleep(context, np.flatnonzero(asleep & (trajectory.mode != FIXED)), time)
+        self._put_to_sleep(run, np.flatnonzero(asleep & (trajectory.mode != FIXED)), time)
         alive = np.zeros(len(root), bool)
         alive[root[restless]] = True
         chosen &= alive[root]
         self.asleep = asleep & chosen
 
-    def _put_to_sleep(self, context, members: np.ndarray, time: float) -> None:
+    def _put_to_sleep(self, run, members: np.ndarray, time: float) -> None:
         """Let members stay where they are."""
-        world, trajectory, now = context.world, context.state.trajectory, context.state.now
+        world, trajectory, now = run.world, run.state.trajectory, run.state.now
         if not len(members):
             return
         before = mechanical_energy(now, world, members)
-        context.recorder.flush_all(trajectory, members, time)
+        run.recorder.flush_all(trajectory, members, time)
         now.velocity[members] = now.angular_velocity[members] = 0.0
         trajectory.mode[members], trajectory.start[members] = FIXED, time
         trajectory.velocity[members] = trajectory.angular_velocity[members] = 0.0
-        self.stepper.report_crossed(context, members, time)
-        context.log.account(time, "sub-stepping", mechanical_energy(now, world, members) - before)
+        self.stepper.report_crossed(run, members, time)
+        run.log.account(time, "sub-stepping", mechanical_energy(now, world, members) - before)
 
-    def _end_trajectories(self, context, members: np.ndarray, time: float) -> None:
+    def _end_trajectories(self, run, members: np.ndarray, time: float) -> None:
         """Bring members to `time`, the end of their courses; book what the step took of their energy."""
         if not len(members):
             return
-        state, world = context.state, context.world
-        context.recorder.flush_all(state.trajectory, members, time)
+        state, world = run.state, run.world
+        run.recorder.flush_all(state.trajectory, members, time)
         end_trajectories(
-            state.trajectory, members, time, world.steady_acceleration, state.now, state.rotation, context.acceleration,
-            context.angular_acceleration,
+            state.trajectory, members, time, world.steady_acceleration, state.now, state.rotation, run.acceleration,
+            run.angular_acceleration,
         )  # fmt: skip
         for label in np.unique(self.label[members]).tolist():
-            self._book(context, label, time)
+            self._book(run, label, time)
 
-    def _book(self, context, label: int, time: float) -> None:
+    def _book(self, run, label: int, time: float) -> None:
         if label in self._began:
             start, members, energy = self._began.pop(label)
-            change = mechanical_energy(context.state.now, context.world, members) - energy
-            context.log.account_over(start, time, "sub-stepping", change)
+            change = mechanical_energy(run.state.now, run.world, members) - energy
+            run.log.account_over(start, time, "sub-stepping", change)
 
-    def close(self, context, time: float) -> None:
+    def close(self, run, time: float) -> None:
         """Book what the steps under way take until `time`, the end of the run."""
-        members = np.flatnonzero(context.state.trajectory.mode == LINEAR)
+        members = np.flatnonzero(run.state.trajectory.mode == LINEAR)
         if not len(members):
             return
-        self._end_trajectories(context, members, time)
-        self.stepper.report_crossed(context, members, time)
-        let_fly(context.state.trajectory, members, context.world.steady_acceleration)
+        self._end_trajectories(run, members, time)
+        self.stepper.report_crossed(run, members, time)
+        let_fly(run.state.trajectory, members, run.world.steady_acceleration)
 
-    def join(self, context, pair_events, time: float, islands: list[Island]) -> list[Island]:
+    def join(self, run, pair_events, time: float, islands: list[Island]) -> list[Island]:
         """The groups at `time` with the heaps that they touch; at the start of a step all of its heaps."""
         for island in islands:
             self.solve_count[island.members] += 1.0
@@ -272,12 +272,12 @@ class SubsteppedIslands:
         members = np.flatnonzero(pair_events.inside) if first else self._due(pair_events, time)
         if len(members) and not hit:
             bare = _bare_island(time)
-            self._bring_in(context, bare, members)
+            self._bring_in(run, bare, members)
             return [*islands, bare]
         for island in hit:
             labels = self.label[island.members]
             members = np.union1d(members, np.flatnonzero(np.isin(self.label, labels[labels >= 0])))
-            self._bring_in(context, island, members)
+            self._bring_in(run, island, members)
         return islands
 
     def _due(self, pair_events, time: float) -> np.ndarray:
@@ -285,108 +285,108 @@ class SubsteppedIslands:
         due = [label for label, end in self._ends.items() if end <= time]
         return np.flatnonzero(pair_events.inside & np.isin(self.label, due)) if due else np.zeros(0, np.int64)
 
-    def _bring_in(self, context, island: Island, members: np.ndarray) -> None:
+    def _bring_in(self, run, island: Island, members: np.ndarray) -> None:
         """Let the members be the heap of a group; bring them to its time. (Those that it does not touch are no members of the group.)"""
-        state, time = context.state, island.time
+        state, time = run.state, island.time
         stepped = state.trajectory.mode[members] == LINEAR
-        self._end_trajectories(context, members[stepped & (state.trajectory.start[members] < time)], time)
+        self._end_trajectories(run, members[stepped & (state.trajectory.start[members] < time)], time)
         away = np.setdiff1d(members[~(stepped | self.asleep[members])], island.members)
-        bring_all(state.trajectory, away, time, state.now, state.rotation, context.acceleration, context.angular_acceleration)
-        context.acceleration[away] = context.world.steady_acceleration[away]
+        bring_all(state.trajectory, away, time, state.now, state.rotation, run.acceleration, run.angular_acceleration)
+        run.acceleration[away] = run.world.steady_acceleration[away]
         island.substepped = members
 
-    def step(self, context, pair_events, island: Island) -> None:
+    def step(self, run, pair_events, island: Island) -> None:
         """Step the heap of a group from its time to the end of the window, with what touches it and is slow."""
-        world, members = context.world, island.substepped
+        world, members = run.world, island.substepped
         assert members is not None
         if len(island.members):
             stays = np.zeros(world.num_bodies, bool)
             stays[island.members] = True
-            self._leave_out_fast(context, stays)
-            stays[island.members] |= ~self._leaves(context, island)
+            self._leave_out_fast(run, stays)
+            stays[island.members] |= ~self._leaves(run, island)
             near = island.members[stays[island.members] & ~self._jointed[island.members]]
             self.label[np.setdiff1d(near, members)] = self.label[members].max()
             island.substepped = members = np.union1d(members, near)
             pair_events.inside[members] = True
-            context.wrench[island.members] = 0.0
+            run.wrench[island.members] = 0.0
             self.asleep[members] = False
             self.sleep_timer[island.members] = 0.0
         fresh = members[~self._taken[members]]
-        self._take_in(context, fresh, island.time)
+        self._take_in(run, fresh, island.time)
         self._steps += 1
         self._most = max(self._most, len(members))
         members = members[~self.asleep[members]]
-        end = self._end_of(context, pair_events, island.time, members)
-        self._set_up(context, members, island.time, end - island.time, self.stepper.kept if island.time > pair_events.begin else 0.0)
+        end = self._end_of(run, pair_events, island.time, members)
+        self._set_up(run, members, island.time, end - island.time, self.stepper.kept if island.time > pair_events.begin else 0.0)
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
             self._ends[label] = end
-            self._began[label] = island.time, mine, mechanical_energy(context.state.now, world, mine)
+            self._began[label] = island.time, mine, mechanical_energy(run.state.now, world, mine)
         if len(fresh):
-            self.stepper.move_apart(context, fresh)
-        self._outcome = self.stepper.step(context, island.time, end)
+            self.stepper.move_apart(run, fresh)
+        self._outcome = self.stepper.step(run, island.time, end)
         self._outcome_end = end
         if end < pair_events.end:
             pair_events.wake[members] = end
 
-    def _take_in(self, context, fresh: np.ndarray, time: float) -> None:
+    def _take_in(self, run, fresh: np.ndarray, time: float) -> None:
         """What exact contact did to bodies ends where they come to a heap."""
         self._taken[fresh] = True
-        context.wrench[fresh] = 0.0
-        context.contact_log.close(fresh.tolist(), time)
-        for i in fresh[context.state.under_contact[fresh]].tolist():
-            note_end_energy(context, [i])
-            account_contact_work(context, i, time)
-            context.state.under_contact[i] = False
+        run.wrench[fresh] = 0.0
+        run.contact_log.close(fresh.tolist(), time)
+        for i in fresh[run.state.under_contact[fresh]].tolist():
+            note_end_energy(run, [i])
+            account_contact_work(run, i, time)
+            run.state.under_contact[i] = False
 
-    def _end_of(self, context, pair_events, time: float, members: np.ndarray) -> float:
+    def _end_of(self, run, pair_events, time: float, members: np.ndarray) -> float:
         """When the courses of members end: before the step does where bodies are tiny, spin fast, or stray from their straight ways."""
         stepper = self.stepper
         step, allowed, pressed = stepper.step_length, STRAY * stepper.motion, stepper.pressed | self._only_expensive
-        stray = most_stray(context.state.now, members, pressed, stepper.reach, stepper.skin, allowed)
+        stray = most_stray(run.state.now, members, pressed, stepper.reach, stepper.skin, allowed)
         spans = max(math.ceil(step / stepper.span(members) - 1e-9), 1)
         pieces = max(min(math.ceil(stray * step), MOST_PIECES * spans), spans)
         left = max(math.ceil((pair_events.end - time) * pieces / step - 1e-6), 1)
         return pair_events.end if left == 1 else time + (pair_events.end - time) / left
 
-    def _leaves(self, context, island: Island) -> np.ndarray:
+    def _leaves(self, run, island: Island) -> np.ndarray:
         """Which members (k,) bool leave all that they touch at a speed worth the name."""
-        slowest = np.full(context.world.num_bodies, np.inf)
+        slowest = np.full(run.world.num_bodies, np.inf)
         np.minimum.at(slowest, island.contacts.body_a, island.approach)
         np.minimum.at(slowest, island.contacts.body_b, island.approach)
-        speed = np.linalg.norm(context.state.now.velocity[island.members], axis=1)
+        speed = np.linalg.norm(run.state.now.velocity[island.members], axis=1)
         return slowest[island.members] > LEAVING * speed
 
-    def _set_up(self, context, members: np.ndarray, time: float, ahead: float, kept: float) -> None:
+    def _set_up(self, run, members: np.ndarray, time: float, ahead: float, kept: float) -> None:
         """Put members, in their order, and the bodies near them that stand still before the solver; kept: see `review`."""
-        world, order = context.world, self.stepper.order
+        world, order = run.world, self.stepper.order
         marked = np.zeros(world.num_bodies, bool)
         marked[members] = True
         members = order[marked[order]]
         fixed = np.flatnonzero(~world.dynamic | self.asleep)
         moving = fixed[world.moving[fixed]]
         bring_all(
-            context.state.trajectory, moving, time, context.state.now, context.state.rotation, context.acceleration,
-            context.angular_acceleration,
+            run.state.trajectory, moving, time, run.state.now, run.state.rotation, run.acceleration,
+            run.angular_acceleration,
         )  # fmt: skip
-        self.stepper.set_up(context, members, fixed, ahead, kept)
+        self.stepper.set_up(run, members, fixed, ahead, kept)
 
-    def begin_trajectories(self, context, pair_events, island: Island) -> None:
+    def begin_trajectories(self, run, pair_events, island: Island) -> None:
         """Give the members of a group's heap the courses that the solver found."""
-        out, state, time = self._outcome, context.state, island.time
+        out, state, time = self._outcome, run.state, island.time
         assert out is not None
         length = self._outcome_end - time
-        context.recorder.flush_all(state.trajectory, out.members, time)
+        run.recorder.flush_all(state.trajectory, out.members, time)
         depart(state.trajectory, out.members, time, length, state.now, out.position, out.orientation, out.velocity)
         state.correction[out.members] = 0.0
-        self._update_sleep_timers(context, out, length)
+        self._update_sleep_timers(run, out, length)
         pair_events.trajectories_changed(out.members, time)
 
-    def _update_sleep_timers(self, context, out: Outcome, length: float) -> None:
+    def _update_sleep_timers(self, run, out: Outcome, length: float) -> None:
         """For how long each member has hardly moved from where it was."""
         stepper = self.stepper
         advance_sleep_timers(
-            out.members, out.position, out.orientation, out.velocity, context.world.steady_strength, stepper.inner, stepper.skin, length,
+            out.members, out.position, out.orientation, out.velocity, run.world.steady_strength, stepper.inner, stepper.skin, length,
             self._stood, self.sleep_timer,
         )  # fmt: skip
 

@@ -180,34 +180,34 @@ class ContactStepper:
         strength, step = float(self.world.steady_strength[members].max()), self.step_length
         return min(step, SPAN * math.sqrt(float(self.inner[members].min()) / strength)) if strength > 0.0 else step
 
-    def find_pairs(self, context, members: np.ndarray, others: np.ndarray, ahead: float) -> None:
+    def find_pairs(self, run, members: np.ndarray, others: np.ndarray, ahead: float) -> None:
         """See that the pairs hold all that members may meet in `ahead` s, among themselves and of the others."""
-        found = self.fat_boxes.renewed(context.state.now, context.acceleration, members, others, ahead)
+        found = self.fat_boxes.renewed(run.state.now, run.acceleration, members, others, ahead)
         if found is not None:
             self.table.replace(*found)
             classify(self.table.pairs, self.bodies, self.shapes)
 
-    def near(self, context, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
+    def near(self, run, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
         """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `Cover.near`."""
-        return self.fat_boxes.near(self.table.pairs, context.state.now, context.acceleration, member, other, ahead)
+        return self.fat_boxes.near(self.table.pairs, run.state.now, run.acceleration, member, other, ahead)
 
-    def set_up(self, context, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0) -> None:
+    def set_up(self, run, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0) -> None:
         """Put members and what they may touch before the kernels at the present instant, with their contacts; kept: see `review`."""
-        self.find_pairs(context, members, supports, ahead)
+        self.find_pairs(run, members, supports, ahead)
         self.table.pack()
         self.members = members
         self._part[:] = OUTSIDE
         self._part[supports], self._part[members] = SUPPORT, MEMBER
-        load_bodies(self.bodies, self.order, context.state.now, context.acceleration, self.world.inv_mass, self._part)
+        load_bodies(self.bodies, self.order, run.state.now, run.acceleration, self.world.inv_mass, self._part)
         motion = most_motion(self.bodies, self.table.pairs, ahead)
         needed = math.ceil(motion / COARSEST)
         self._sub_steps = max(math.ceil(ahead / self.sub_step(members) - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
         most = max(self._sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
         self._parts = min(max(math.ceil(motion / self.motion), 1), most)
         self.ahead = ahead / self._parts
-        self._look(context, kept)
+        self._look(run, kept)
 
-    def _look(self, context, kept: float) -> None:
+    def _look(self, run, kept: float) -> None:
         """Look at the contacts of all pairs in play, on several cores where the last look had much to do; kept: see `review`."""
         table, number = self.table, len(self.table.pairs.first)
         shares = self._shares if self._looked_at > WORTHWHILE else 1
@@ -230,16 +230,16 @@ class ContactStepper:
         waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
         if len(waits):
             waits = waits[np.argsort(self._places[waits])]
-            self._look_at_general(context, self._places[waits], self._margins[waits])
+            self._look_at_general(run, self._places[waits], self._margins[waits])
 
-    def _look_at_general(self, context, places: np.ndarray, margin: np.ndarray) -> None:
+    def _look_at_general(self, run, places: np.ndarray, margin: np.ndarray) -> None:
         """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `detect`."""
         table, world, pairs = self.table, self.world, self.table.pairs
         first, second = pairs.first[places], pairs.second[places]
         # A wide margin is dear for meshes.
         far = np.where(self._depth[first] + self._depth[second] > 0.0, margin, FARTHER * margin)
         shown = far + self._taken_off[first] + self._taken_off[second]
-        n, now, rotation = world.num_bodies, context.state.now, context.state.rotation.copy()
+        n, now, rotation = world.num_bodies, run.state.now, run.state.rotation.copy()
         # In the course of a step bodies are elsewhere than at its start.
         now = now._replace(position=now.position.copy(), orientation=now.orientation.copy())
         mine = self.bodies.part[:n] != OUTSIDE
@@ -249,7 +249,7 @@ class ContactStepper:
         shares = np.array_split(np.arange(len(places)), self._shares if len(places) > WORTHWHILE_GENERAL else 1)
         while len(self._more_buffers) < len(shares) - 1:
             self._more_buffers.append(ContactBuffer())
-        buffers = [context.contact_buffer, *self._more_buffers][: len(shares)]
+        buffers = [run.contact_buffer, *self._more_buffers][: len(shares)]
         a, b = self.order[first], self.order[second]
         found = find_together(buffers, [(self.geometry, world, now, rotation, a[some], b[some], shown[some]) for some in shares])
         for some, buffer, count in zip(shares, buffers, found, strict=True):
@@ -261,11 +261,11 @@ class ContactStepper:
                 table.ids, int(table.free[0, 0]),
             )  # fmt: skip
 
-    def report_crossed(self, context, members: np.ndarray, time: float) -> None:
+    def report_crossed(self, run, members: np.ndarray, time: float) -> None:
         """Report pairs of members, brought to the present, whose cores cross: where they press on each other is not known any more."""
         if not self._depth.any():
             return
-        pairs, world, now = self.table.pairs, self.world, context.state.now
+        pairs, world, now = self.table.pairs, self.world, run.state.now
         mine = np.zeros(world.num_bodies, bool)
         mine[self.rank[members]] = True
         asked = (mine[pairs.first] | mine[pairs.second]) & (self._depth[pairs.first] + self._depth[pairs.second] > 0.0)
@@ -273,18 +273,18 @@ class ContactStepper:
             a, b, limit = int(world.shape_of_body[i]), int(world.shape_of_body[j]), CROSSED * min(self.inner[i], self.inner[j])
             rotation = to_matrix(now.orientation[i]), to_matrix(now.orientation[j])
             if pair_gap(self.geometry, a, now.position[i], rotation[0], b, now.position[j], rotation[1], limit, np.zeros(7)) < limit:
-                context.log.report(
+                run.log.report(
                     time, "overlap in a heap", (world.names[min(i, j)], world.names[max(i, j)]),
                     "the bodies are deeper inside each other than their contacts can tell; use a smaller step",
                 )  # fmt: skip
 
-    def _look_again(self, context) -> None:
+    def _look_again(self, run) -> None:
         """Look at the contacts of quick bodies in the course of a step; those of all others stay in the steady batches, where they are."""
         bodies, width = self.bodies, self.simd.width
         all_quick = self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY
         if all_quick:
             bodies.quick[:] = True
-        self._look(context, self.kept)
+        self._look(run, self.kept)
         if all_quick:
             bodies.drift[:] = 0.0
             self._steady = _NO_STEADY
@@ -311,9 +311,9 @@ class ContactStepper:
         fill(self.simd, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
         return number
 
-    def move_apart(self, context, fresh: np.ndarray) -> None:
+    def move_apart(self, run, fresh: np.ndarray) -> None:
         """Move members that are fresh apart from each other and from all else to the gaps that contacts are held at; their speeds pay."""
-        bodies, now, at = self.bodies, context.state.now, self.rank[fresh]
+        bodies, now, at = self.bodies, run.state.now, self.rank[fresh]
         mine = np.zeros(len(bodies.part), bool)
         mine[at] = True
         before = self._energies()[1]
@@ -324,9 +324,9 @@ class ContactStepper:
         now.position[fresh], now.orientation[fresh] = bodies.position[at], bodies.orientation[at]
         now.velocity[self.members] = bodies.velocity.reshape(-1, ROW)[members, :3]
         now.angular_velocity[self.members] = bodies.velocity.reshape(-1, ROW)[members, 3:6]
-        refresh_pose(fresh, now, context.state.rotation, self.world.inertia)
+        refresh_pose(fresh, now, run.state.rotation, self.world.inertia)
 
-    def step(self, context, time: float, end: float) -> Outcome:
+    def step(self, run, time: float, end: float) -> Outcome:
         """Step what `set_up` put before the kernels from `time` to `end`."""
         bodies, members = self.bodies, self.members
         sub_steps = self._sub_steps
@@ -336,7 +336,7 @@ class ContactStepper:
         self._steady = _NO_STEADY
         for part in range(self._parts):
             if part:
-                self._look_again(context)
+                self._look_again(run)
             some = (part + 1) * sub_steps // self._parts - done
             work += self._advance(some, h)
             done += some

@@ -68,7 +68,7 @@ class Checkpointer:
             raise SceneError("it has another suffix", f"use a name that ends in {' or '.join(SUFFIXES)}", where)
         if not self._cache.every >= 0.0:
             raise SceneError(f"every = {self._cache.every!r}", "give the seconds between checkpoints, >= 0", where)
-        world, recorder = running.context.world, running.context.recorder
+        world, recorder = running.run.world, running.run.recorder
         duration, fps, accuracy, effects = settings
         mark = fingerprint(world.scene, duration, fps, accuracy, effects)
         header = Header(mark, rigidimpulse.__version__, duration, fps, list(world.names), recorder.times, world.offset, world.turn)
@@ -76,7 +76,7 @@ class Checkpointer:
         self._frames = self._impacts = 0
         self._state = b""
         self.running = running if kept is None or kept.state is None else self._recall(running, kept)
-        self._written = self.running.context.recorder.written.copy()
+        self._written = self.running.run.recorder.written.copy()
         complete = kept is not None and kept.complete
         self._file = None if complete else CacheFile(self._path, header, kept)
         self._last, self._cost = perf_counter(), 0.0
@@ -94,12 +94,12 @@ class Checkpointer:
 
     def _recall(self, running: Running, kept: Content) -> Running:
         """The run as its checkpoint left it."""
-        recorder, rows = running.context.recorder, running.context.log.impacts
+        recorder, rows = running.run.recorder, running.run.log.impacts
         for name, frames in kept.frames.items():
             getattr(recorder, name)[: len(frames)] = frames
         rows.rows = np.concatenate([kept.impacts, rows.rows])
         self._frames, self._impacts = len(kept.frames["position"]), len(kept.impacts)
-        return thaw(kept.state or b"", _constants(running.context, self._plan))
+        return thaw(kept.state or b"", _constants(running.run, self._plan))
 
     def look(self, time: float, more: Callable[[float], None] | None = None) -> None:
         """Write a checkpoint if it is time to; call `more` with the time of the run [s]."""
@@ -112,13 +112,13 @@ class Checkpointer:
         """Write a checkpoint at the time of the run [s]."""
         if self._file is None:
             return
-        start, context = perf_counter(), self.running.context
-        recorder = context.recorder
+        start, run = perf_counter(), self.running.run
+        recorder = run.recorder
         changed = recorder.written > self._written
         first = min(int(self._written[changed].min(initial=self._frames)), self._frames)
         last = max(int(np.searchsorted(recorder.times, time, side="left")), self._frames)
         self._fill_in(first, last)
-        state = freeze(self.running, _constants(context, self._plan))
+        state = freeze(self.running, _constants(run, self._plan))
         content = self._content(last, time, state)
         self._file.commit(content, first, self._impacts)
         self._state, self._frames, self._impacts = state, last, len(content.impacts)
@@ -128,14 +128,14 @@ class Checkpointer:
 
     def _fill_in(self, first: int, last: int) -> None:
         """Write frames until the last one that are not written yet, from the present courses; what writes them comes again."""
-        recorder, trajectory = self.running.context.recorder, self.running.context.state.trajectory
+        recorder, trajectory = self.running.run.recorder, self.running.run.state.trajectory
         behind, frames = np.flatnonzero(recorder.written < last), (getattr(recorder, name) for name in FRAMES)
         sample_paths(trajectory, behind, recorder.times, last, np.maximum(recorder.written, first), *frames)
 
     def _content(self, frames: int, time: float, state: bytes, tables: dict[str, Any] | None = None) -> Content:
-        context = self.running.context
-        rows = context.log.impacts
-        recorded = {name: getattr(context.recorder, name)[:frames] for name in FRAMES}
+        run = self.running.run
+        rows = run.log.impacts
+        recorded = {name: getattr(run.recorder, name)[:frames] for name in FRAMES}
         return Content(recorded, rows.rows[: rows.count], time, state, tables is not None, tables or {})
 
     def finish(self, recording: Recording) -> None:
@@ -153,10 +153,10 @@ class Checkpointer:
             self._file.close()
 
 
-def _constants(context: Any, plan: Any) -> Constants:
+def _constants(run: Any, plan: Any) -> Constants:
     """What of a run its checkpoints do not hold."""
-    world, recorder = context.world, context.recorder
-    own = [plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), context.log.impacts.rows]
+    world, recorder = run.world, run.recorder
+    own = [plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), run.log.impacts.rows]
     return Constants([world.scene, world.scene.bodies, world.scene.effects, world.shapes, world.geometry, *own])
 
 
