@@ -55,7 +55,7 @@ _HOMES = {
     "Velocity": "dynamics.forces.energy.path",
     "Within": "studies.accuracy_targets",
     "compare": "studies.compare",
-    "compile_scene": "model.world",
+    "compile_scene": "engine.compile_scene",
     "contains": "collision.containment",
     "load_recording": "recording.recording",
     "load_scene": "io.scene_file",

@@ -63,7 +63,7 @@ def _rises(run: Recording) -> float:
     """Work against gravity of lifting every dynamic body by its held gap and those of all below it, J."""
     if run.scene is None:
         return 0.0
-    from rigidimpulse.model.world import compile_scene
+    from rigidimpulse.engine.compile_scene import compile_scene
 
     world = compile_scene(run.scene)
     weight = np.where(world.dynamic, world.mass, 0.0) * np.linalg.norm(world.steady_acceleration, axis=1)
@@ -79,7 +79,7 @@ def assert_no_penetration(run: Recording, depth: float | None = None) -> None:
         depth: m, allowed; 1e-6 of the smallest dynamic body's size by default.
 
     """
-    from rigidimpulse.model.world import compile_scene
+    from rigidimpulse.engine.compile_scene import compile_scene
     from rigidimpulse.studies.measures import penetration
 
     world = compile_scene(_scene_of(run))

@@ -10,8 +10,8 @@ import pytest
 
 from rigidimpulse import gallery
 from rigidimpulse.dynamics.forces import KINDS
-from rigidimpulse.engine.simulate import make_plan
-from rigidimpulse.model.world import compile_scene
+from rigidimpulse.engine.begin import make_plan
+from rigidimpulse.engine.compile_scene import compile_scene
 
 CALLS_FOR = {
     "spot": "contact detection, gravity, gyroscopic term, friction, contact forces",

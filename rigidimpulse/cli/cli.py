@@ -162,8 +162,8 @@ def view(file: str, scene: str | None) -> None:
 @click.option("--accuracy", help="preview, standard or exact.")
 def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
     """Say which effects SCENE calls for, which not, and why."""
-    from rigidimpulse.engine.simulate import make_plan
-    from rigidimpulse.model.world import compile_scene
+    from rigidimpulse.engine.begin import make_plan
+    from rigidimpulse.engine.compile_scene import compile_scene
 
     job = find_job(scene)._replace(**given_options({"accuracy": accuracy, "duration": duration}))
     if duration is None:

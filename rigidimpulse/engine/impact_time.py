@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import importlib
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from rigidimpulse.collision.time_of_impact.result import STALLED
-from rigidimpulse.engine.plan import Bound, Skip
+from rigidimpulse.engine.pair_events import PairEvents
+from rigidimpulse.engine.run import Run
 
 REASONS = {
     "bisection": "first contact in the interval, guarded: never past it",
@@ -22,28 +24,17 @@ MODULES = {"bisection": "bisection", "conservative": "conservative", "linear": "
 """The module of `collision/time_of_impact` that holds each method; all have the same function `sweep`."""
 
 
-@dataclass(frozen=True)
-class ImpactTime:
-    """One of REASONS."""
+def sweep_with(method: str) -> Callable[[Run, PairEvents], None]:
+    """The sweep of one of REASONS; its module is imported here, so that the others are not."""
+    first_contacts = importlib.import_module(f"rigidimpulse.collision.time_of_impact.{MODULES[method]}").sweep
 
-    method: str
-    stage: str = "sweep"
+    def sweep(run: Run, pair_events: PairEvents) -> None:
+        sweep_stale_pairs(run, pair_events, first_contacts)
 
-    name: str = "impact time"
-
-    def bind(self, world) -> Bound | Skip:
-        """In where something can collide."""
-        if not world.can_collide:
-            return Skip(world.why_no_impacts)
-        method = importlib.import_module(f"rigidimpulse.collision.time_of_impact.{MODULES[self.method]}").sweep
-
-        def sweep(run, pair_events) -> None:
-            sweep_stale_pairs(run, pair_events, method)
-
-        return Bound(sweep, f"{self.method}: {REASONS[self.method]}")
+    return sweep
 
 
-def sweep_stale_pairs(run, pair_events, method) -> None:
+def sweep_stale_pairs(run: Run, pair_events: PairEvents, method: Callable[..., Any]) -> None:
     """Sweep the pairs that ask for it, and note when they come to contact."""
     stale = np.flatnonzero(~np.isnan(pair_events.start))
     if not len(stale):

@@ -12,7 +12,7 @@ several are as good the one nearest to that of the centres is taken, else the fi
     min sum of m |D|^2 / 2    with    n.(D_b - D_a) >= s   for all pairs that overlap or came to on the way
 
 gives the displacements D of all bodies together, again and again until no pair overlaps. Bodies do not turn, so what
-joints join moves as one. Velocities stay; the potential energy is booked as "overlap". Pairs for which there is no room
+joints join moves as one. Velocities stay; the potential energy is accounted for as "overlap". Pairs for which there is no room
 are reported, and do not touch each other in that run.
 """
 
@@ -27,6 +27,8 @@ from rigidimpulse.core.quaternion import rotate, to_matrix
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, make_rows
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.engine.pair_events import PairEvents
+from rigidimpulse.engine.run import Run
+from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import begin
 
 DEPTH = 1e-5
@@ -54,7 +56,7 @@ class _Demand:
     way: float
 
 
-def resolve_overlaps(run) -> None:
+def resolve_overlaps(run: Run) -> None:
     """Report pairs that overlap by more than DEPTH of the smaller body's size where the run starts, and take them apart."""
     world = run.world
     if not world.can_collide:
@@ -112,7 +114,7 @@ class _Search:
 
     """
 
-    def __init__(self, run) -> None:
+    def __init__(self, run: Run) -> None:
         self.run = run
         self.world = run.world
         self.position = run.world.position.copy()
@@ -267,7 +269,7 @@ class _Search:
             begin(trajectory, i)
 
 
-def _clusters(world) -> tuple[np.ndarray, np.ndarray]:
+def _clusters(world: World) -> tuple[np.ndarray, np.ndarray]:
     """Number of the cluster of each body (n,), and inverse masses of clusters (k,), 0 with a body or the world that cannot move."""
     number = np.arange(world.num_bodies)
     fixed = ~world.dynamic

@@ -1,100 +1,36 @@
-"""Groups of touching bodies at one instant, found from some of their bodies by following contacts."""
+"""Islands: which bodies hang together at one instant, found from some of them by following contacts, joints and forces.
+
+Bodies that share the forces of an island come along when one of them is looked at, even if they touch nothing any more: those forces end
+for
+all of them at once, or momentum would not be kept. A finder finds: it brings bodies to the instant and looks at their contacts, and changes
+nothing else.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTEX_FACE
-from rigidimpulse.core.conventions import TOLERANCES
-from rigidimpulse.dynamics.constraints.energy_limit import limit_energy, note_end_energy
-from rigidimpulse.dynamics.constraints.rattle import project_velocities
 from rigidimpulse.dynamics.impact.point import Contacts
-from rigidimpulse.engine.pair_table import live_contacts
+from rigidimpulse.engine.pair_table import MARGIN, live_contacts
+from rigidimpulse.engine.regime import island_roots as roots
+from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.touching import bring_all, fill_contacts, near_pairs, pressing
+from rigidimpulse.model.island import Island, empty_contacts, island_without_contacts
 
 if TYPE_CHECKING:
-    from rigidimpulse.engine.exact.joints import JointState
+    from rigidimpulse.engine.pair_events import PairEvents
 
-MARGIN, FAR_MARGIN = 2.0, 30.0
-"""Contacts are looked for within this many delta, and those that a lift of bodies may close."""
-NO_FORCE = np.zeros(3)
-CORRECTED = 10.0
-"""Approach speed that a lift may make, in held gaps of turning (gap over size) times the speed: arms and normals turn a little."""
-SLACK = 1e-9
-"""Contacts that leave or approach slower than the held ones by this part are held."""
+FAR_MARGIN = 30.0
+"""Contacts that a position correction may close are looked for within this many contact margins."""
 
 
-@dataclass
-class Island:
-    """Bodies joined by contacts at `time`.
-
-    Attributes:
-        members: movable bodies, in order of index.
-        pairs: places in the window of the contacting pairs.
-        contacts: all contacts within the margin; `place` (m,) their pairs, `kinds` (m,) and `features` (m, 2) what touches, `keys`
-            who they are.
-        delta: (m,) gap at which lasting contacts are held, m.
-        approach: (m,) u.n, m/s; negative approaches.
-        rest_speed: (m,) a slower rebound is none, m/s.
-        live: (m,) bool, near enough for an impact now.
-        velocity, angular_velocity, position: of the members as they arrived.
-        moved: whether a lift has changed poses. shift: m, how far it moved points of the members at most.
-        held: (m,) bool, contacts that carry forces. rests: whether all members stand still.
-        zero_speed: m/s, approach speed that counts as none. scale: m/s, largest speed of a contact point.
-        joints: the joints of the members.
-        heap: members that are stepped as a heap (see `engine/substepped/advance`), None where there is none.
-        free: accelerations and angular accelerations (k, 3) of the members but for varying forces, None where these do not act.
-        loaded: whether varying forces are constant over the sub-step of contacts or joints.
-
-    """
-
-    time: float
-    members: np.ndarray
-    pairs: np.ndarray
-    contacts: Contacts
-    place: np.ndarray
-    kinds: np.ndarray
-    features: np.ndarray
-    keys: list[tuple[int, ...]]
-    contact_margin: np.ndarray
-    approach: np.ndarray
-    rest_speed: np.ndarray
-    live: np.ndarray
-    velocity: np.ndarray
-    angular_velocity: np.ndarray
-    moved: bool = False
-    shift: float = 0.0
-    held: np.ndarray | None = None
-    rests: bool = False
-    zero_speed: float = 0.0
-    scale: float = 0.0
-    joints: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
-    substepped: np.ndarray | None = None
-    free: tuple[np.ndarray, np.ndarray] | None = None
-    loaded: bool = False
-
-    def load(self, run, h: float) -> float:
-        """Take varying forces as constant over a sub-step of h s at most; returns how long it may be."""
-        return h if self.free is None else run.forces.load(run, self, h)
-
-    def slow(self) -> np.ndarray:
-        """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
-        zero_speed = self.zero_speed
-        if self.moved:
-            zero_speed += CORRECTED * self.scale * TOLERANCES.contact_margin
-        return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + zero_speed
-
-
-def empty_contacts(m: int) -> Contacts:
-    """Arrays for m contacts."""
-    return Contacts(*np.empty((2, m), np.int64), *np.empty((3, m, 3)), *np.empty((5, m)))
-
-
-def collect(run, pair_events, pairs: np.ndarray, time: float, margin: float = MARGIN) -> tuple[np.ndarray, np.ndarray]:
-    """Manifolds of window pairs at the present poses within so many held gaps: copies of the filled buffer rows.
+def collect(
+    run: Run, pair_events: PairEvents, pairs: np.ndarray, time: float, margin: float = MARGIN
+) -> tuple[np.ndarray, np.ndarray]:
+    """Manifolds of window pairs at the present poses within so many contact margins: copies of the filled buffer rows.
 
     A pair that just came to contact but has no manifold (it overlaps, since its sweep does not back up time) has the
     witness of its sweep for a contact.
@@ -111,12 +47,8 @@ def collect(run, pair_events, pairs: np.ndarray, time: float, margin: float = MA
     return real, integer
 
 
-def touching_islands(run, pair_events, time: float, bodies: np.ndarray) -> tuple[list[Island], np.ndarray]:
-    """Groups that the given bodies belong to at `time`, and all bodies looked at, which are brought to it.
-
-    Bodies that share the forces of a group come along when one of them is looked at, even if they touch nothing any more: those
-    forces end for all of them at once, or momentum would not be kept.
-    """
+def touching_islands(run: Run, pair_events: PairEvents, time: float, bodies: np.ndarray) -> tuple[list[Island], np.ndarray]:
+    """Islands that the given bodies belong to at `time`, and all bodies looked at, which are brought to it."""
     world, state = run.world, run.state
     seen, near = np.zeros(len(pair_events.a), bool), np.empty(len(pair_events.a), np.int64)
     brought, reached = np.zeros(world.num_bodies, bool), np.zeros(world.num_bodies, bool)
@@ -124,7 +56,7 @@ def touching_islands(run, pair_events, time: float, bodies: np.ndarray) -> tuple
     reals, integers = [], []
     while len(frontier):
         reached[frontier] = True
-        # All that a lift may come near is brought to `time` with what touches.
+        # All that a position correction may come near is brought to `time` with what touches.
         pairs = near[: near_pairs(state.trajectory, time, pair_events.pairs, FAR_MARGIN, world.bound_radius, frontier, seen, near)]
         partners = _partners(run, frontier)
         mark = np.zeros(world.num_bodies, bool)
@@ -134,8 +66,7 @@ def touching_islands(run, pair_events, time: float, bodies: np.ndarray) -> tuple
         bring_all(
             state.trajectory, fresh, time, state.now, state.rotation, run.acceleration, run.angular_acceleration
         )
-        if run.forces is not None and run.forces.flow is not None:
-            run.forces.flow.weigh(fresh, time)
+        run.forces.weigh(fresh, time)
         real, integer = collect(run, pair_events, pairs, time)
         reals.append(real)
         integers.append(integer)
@@ -144,20 +75,14 @@ def touching_islands(run, pair_events, time: float, bodies: np.ndarray) -> tuple
         frontier = (mark & world.dynamic & ~reached).nonzero()[0]
     if not reals:
         return [], frontier
-    integer = np.concatenate(integers)
-    islands = []
-    if len(integer) or run.joints is not None or run.forces is not None:
-        islands = _components(run, pair_events, time, reached, np.concatenate(reals), integer)
-    _end_sub_steps(run, islands, time, reached.nonzero()[0])
+    islands = _components(run, pair_events, time, reached, np.concatenate(reals), np.concatenate(integers))
     return islands, reached.nonzero()[0]
 
 
-def _partners(run, bodies: np.ndarray) -> np.ndarray:
-    """All bodies of the joints at the given ones, those tied by forces, and those that share forces with them; themselves included."""
+def _partners(run: Run, bodies: np.ndarray) -> np.ndarray:
+    """All bodies of the joints at the given ones, those tied by forces, and those that share forces with them."""
     state = run.state
-    partners = np.zeros(0, np.int64) if run.joints is None else run.joints.bodies_of(run.joints.at(bodies))
-    if run.forces is not None:
-        partners = np.concatenate([partners, run.forces.partners(bodies)])
+    partners = np.concatenate([run.joints.bodies_of(run.joints.at(bodies)), run.forces.partners(bodies)])
     pressed = bodies[state.under_contact[bodies]]
     if not len(pressed):
         return partners
@@ -167,79 +92,41 @@ def _partners(run, bodies: np.ndarray) -> np.ndarray:
     return np.concatenate([partners, sharers])
 
 
-def _components(run, pair_events, time: float, reached, real: np.ndarray, integer: np.ndarray) -> list[Island]:
-    """Split contacts and joints into groups joined by movable bodies, in order of their first body."""
+def _components(
+    run: Run, pair_events: PairEvents, time: float, reached: np.ndarray, real: np.ndarray, integer: np.ndarray
+) -> list[Island]:
+    """Split contacts, joints and forces into islands joined by movable bodies, in order of their first body."""
     dynamic = run.world.dynamic
-    parent: dict[int, int] = {}
-
-    def root(i: int) -> int:
-        while parent.setdefault(i, i) != i:
-            i = parent[i]
-        return i
-
-    def join(a: int, b: int) -> None:
-        if dynamic[a] and dynamic[b]:
-            low, high = sorted((root(a), root(b)))
-            parent[high] = low
-
-    ends_of_contacts = integer[:, :2].tolist()
-    for a, b in ends_of_contacts:
-        join(a, b)
-    jointed: JointState | None = run.joints
-    joints, at = np.zeros(0, np.int64), []
-    if jointed is not None:
-        joints = jointed.at(np.flatnonzero(reached & dynamic))
-        for j in joints.tolist():
-            ends = jointed.bodies_of(np.array([j])).tolist()
-            join(ends[0], ends[-1])
-            at.append(jointed.movable_end(j))
-    forced = np.zeros(0, np.int64)
-    if run.forces is not None:
-        forced = np.flatnonzero(reached & run.forces.acts)
-        for first, i in run.forces.ties(forced):
-            join(first, i)
-    owner = np.array([root(a if dynamic[a] else b) for a, b in ends_of_contacts], np.int64)
-    owner_of_joint = np.array([root(i) for i in at], np.int64)
-    owner_of_forced = np.array([root(i) for i in forced.tolist()], np.int64)
-    owners, islands = sorted({*owner.tolist(), *owner_of_joint.tolist()}), []
-    for o in owners:
-        tied = forced[owner_of_forced == o]
-        islands.append(make_island(run, pair_events, time, real, integer, owner == o, joints[owner_of_joint == o], tied))
-    if len(forced) and len(free := forced[~np.isin(owner_of_forced, owners)]):
-        islands.append(_free_island(run, time, free))
+    joints = run.joints.at(np.flatnonzero(reached & dynamic))
+    ends = [run.joints.bodies_of(np.array([j])) for j in joints.tolist()]
+    tied = np.flatnonzero(reached & run.forces.acts)
+    links = [integer[:, :2], *(end[[[0, -1]]] for end in ends), np.array(run.forces.ties(tied), np.int64).reshape(-1, 2)]
+    first, second = np.concatenate(links).T
+    root = roots(run.world.num_bodies, first, second, dynamic)
+    owner = root[np.where(dynamic[integer[:, 0]], integer[:, 0], integer[:, 1])]
+    owner_of_joint = root[np.array([run.joints.movable_end(j) for j in joints.tolist()], np.int64)]
+    owner_of_tied = root[tied]
+    owners = np.union1d(owner, owner_of_joint)
+    islands = [
+        make_island(run, pair_events, time, (real, integer), owner == o, joints[owner_of_joint == o], tied[owner_of_tied == o])
+        for o in owners.tolist()
+    ]
+    if len(alone := tied[~np.isin(owner_of_tied, owners)]):
+        now = run.state.now
+        islands.append(island_without_contacts(time, alone, now.velocity[alone], now.angular_velocity[alone]))
     return islands
 
 
-def _free_island(run, time: float, members: np.ndarray) -> Island:
-    """Bodies that nothing but forces hold: no contacts, no joints."""
-    none, now = np.zeros(0, np.int64), run.state.now
-    return Island(
-        time, members, none, empty_contacts(0), none, none, np.zeros((0, 2), np.int64), [], np.zeros(0), np.zeros(0), np.zeros(0),
-        np.zeros(0, bool), now.velocity[members], now.angular_velocity[members],
-    )
-
-
-def _end_sub_steps(run, islands: list[Island], time: float, bodies: np.ndarray) -> None:
-    """What happens to all bodies brought at once when forces that were constant over a sub-step end."""
-    for island in islands:
-        if project_velocities(run, island):
-            classify(run, island)
-    note_end_energy(run, bodies.tolist())
-    for island in islands:
-        if len(island.joints):
-            run.joints.project_velocities(run, island)
-            classify(run, island)
-    slowed = limit_energy(run, bodies.tolist(), time)
-    for island in islands:
-        if not slowed.isdisjoint(island.members.tolist()):
-            classify(run, island)
-
-
 def make_island(
-    run, pair_events, time: float, real: np.ndarray, integer: np.ndarray, which: np.ndarray, joints: np.ndarray, tied: np.ndarray
+    run: Run, pair_events: PairEvents, time: float, found: tuple[np.ndarray, np.ndarray], which: np.ndarray, joints: np.ndarray,
+    tied: np.ndarray,
 ) -> Island:
-    """The group of the contacts marked in `which`, sorted by pair, of the given joints, and of the bodies tied to them by forces."""
+    """The island of the contacts marked in `which`, sorted by pair, of the given joints, and of the bodies tied to them by forces.
+
+    found: contacts as `collect` gives them.
+    """
     world, state = run.world, run.state
+    real, integer = found
     rows, contacts = _sorted_contacts(run, real, integer, which.nonzero()[0])
     mark = np.zeros(world.num_bodies, bool)
     mark[contacts.body_a] = mark[contacts.body_b] = True
@@ -269,7 +156,7 @@ def make_island(
     return island
 
 
-def _sorted_contacts(run, real: np.ndarray, integer: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, Contacts]:
+def _sorted_contacts(run: Run, real: np.ndarray, integer: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, Contacts]:
     """The rows (m,) of the contact buffer sorted by pair, and their contacts."""
     if len(rows) > 1:
         rows = rows[np.lexsort((integer[rows, 4], integer[rows, 3], integer[rows, 2], integer[rows, 1], integer[rows, 0]))]
@@ -278,8 +165,10 @@ def _sorted_contacts(run, real: np.ndarray, integer: np.ndarray, rows: np.ndarra
     return rows, contacts
 
 
-def near_contacts(run, pair_events, members: np.ndarray, time: float) -> tuple[Contacts, np.ndarray, list[tuple[int, ...]]]:
-    """What a lift of the members of a group may close: contacts with all that is near at `time`, held gaps [m], and keys."""
+def near_contacts(
+    run: Run, pair_events: PairEvents, members: np.ndarray, time: float
+) -> tuple[Contacts, np.ndarray, list[tuple[int, ...]]]:
+    """What a position correction of the members may close: contacts with all that is near, contact margins [m], and keys."""
     near = np.empty(len(pair_events.a), np.int64)
     seen = np.zeros(len(pair_events.a), bool)
     count = near_pairs(run.state.trajectory, time, pair_events.pairs, FAR_MARGIN, run.world.bound_radius, members, seen, near)
@@ -298,11 +187,11 @@ def contact_key(a: int, b: int, kind: int, feature_a: int, feature_b: int) -> tu
     return a, b, kind, feature_a, feature_b
 
 
-def classify(run, island: Island) -> None:
-    """Measure approach speeds and what presses each contact; slow approaches within the margin count as live.
+def classify(run: Run, island: Island) -> None:
+    """Measure approach speeds and what presses each contact; slow approaches within the margin are live.
 
-    Where a group is supported, whatever it carries is pressed by its steady acceleration (gravity, constant forces) as soon as the support
-    bears, so that is the least that counts.
+    Where an island is supported, whatever it carries is pressed by its steady acceleration (gravity, constant forces) as soon as the
+    support bears, so that is the least that counts.
     """
     state, world = run.state, run.world
     contacts = island.contacts

@@ -1,8 +1,7 @@
 """The pairs of one step: which bodies may meet in it, at which gap a contact is declared, and when each pair comes to it.
 
-Boxes enclose each body's bounding sphere along its path to the end of the step. When a body changes course its box is
-made anew and pairs that it may now reach are added; pairs of which a body changed course are swept again, all others
-keep their time.
+Boxes enclose each body's bounding sphere along its path to the end of the step. When a body gets a new trajectory its box is
+renewed and pairs that it may now reach are added. Pairs of which a body has a new trajectory are swept again; all others keep their time.
 """
 
 from __future__ import annotations
@@ -11,29 +10,30 @@ import numpy as np
 
 from rigidimpulse.collision.broad_phase import overlapping_pairs
 from rigidimpulse.collision.time_of_impact.spheres import is_closed_form
-from rigidimpulse.engine.islands import MARGIN, Island, touching_islands
-from rigidimpulse.engine.pair_table import MAX_REPEATS, Pairs, new_pairs, path_boxes, renew_pairs
+from rigidimpulse.engine.pair_table import MARGIN, MAX_REPEATS, Pairs, new_pairs, path_boxes, renew_pairs
+from rigidimpulse.engine.run import Run
 from rigidimpulse.motion.trajectory import FIXED
 
 STUCK_STEP = 1e-3
-"""Part of delta by which the gap of contact is lowered after a contact without consequence."""
+"""Part of the contact margin by which the gap of contact is lowered after a contact without consequence."""
 MAX_TRIES = 30
 INSTANT = 1e-6
 """Part of a step within which a pair that comes to contact again does so at the same instant."""
 
 
 class PairEvents:
-    """Pairs of the step [begin, end], growing as bodies change course.
+    """Pairs of the step [begin, end], growing as bodies get new trajectories.
 
     Attributes:
         pairs: the table; its columns are attributes of their own, too.
         wake: (n,) s, when bodies must be looked at again though nothing meets them.
-        inside: (n,) bool, members of heaps: their pairs with each other and with immovable bodies are not swept.
-        still: (n,) bool, members of heaps at rest, and bodies that never move: nor are their pairs with each other.
-        substepped_begun: whether the heaps of the step have been stepped from its start.
+        inside: (n,) bool, members of sub-stepped islands: their pairs with each other and with immovable bodies are not swept.
+        asleep: (n,) bool, sleeping members of such islands, and bodies that never move: nor are their pairs with each other.
+        substepped_begun: whether the sub-stepped islands have been stepped from the start of the step.
     """
 
-    def __init__(self, run, end: float) -> None:
+    def __init__(self, run: Run, end: float) -> None:
+        """No pairs yet, of the step from the time of the run to `end` [s]."""
         self.run = run
         self.begin, self.end = run.state.time, end
         self._take(new_pairs(run.world, np.zeros(0, np.int64), np.zeros(0, np.int64), self.begin))
@@ -77,9 +77,9 @@ class PairEvents:
         self._append(first, second, self.begin)
 
     def recall(self, begin: float) -> None:
-        """Let pairs be as if the window had begun at `begin`, where the step did [s], all bodies having flown freely since.
+        """Let pairs be as if the step had begun at `begin`, where the step did [s], all bodies having flown freely since.
 
-        A pair is swept from the last change of course of its bodies; when it was last in contact is known from its rebound.
+        A pair is swept from the last change of trajectory of its bodies; when it was last in contact is known from its rebound.
         """
         trajectory = self.run.state.trajectory
         self.start[:] = np.maximum(np.maximum(trajectory.start[self.a], trajectory.start[self.b]), begin)
@@ -89,7 +89,7 @@ class PairEvents:
                 self.since[p] = last[0]
 
     def is_plain(self, time: float) -> bool:
-        """Whether nothing in the window asks to be remembered: no body held or called, no pair met more than once or without an impulse."""
+        """Whether nothing in the step asks to be remembered: no body held or called, no pair met more than once or without an impulse."""
         state = self.run.state
         lowered = np.flatnonzero(self.impact_margin != self.least_impact_margin)
         if len(lowered) and not self._is_closed_form(lowered):
@@ -113,13 +113,8 @@ class PairEvents:
             for p, a, b in zip(places, self.a[places], self.b[places], strict=True)
         )
 
-    def touching(self, time: float, bodies: np.ndarray) -> tuple[list[Island], np.ndarray]:
-        """Groups of touching bodies that the given ones belong to at `time`, and all bodies looked at."""
-        islands, reached = touching_islands(self.run, self, time, bodies)
-        return islands if self.run.substepped is None else self.run.substepped.join(self.run, self, time, islands), reached
-
     def _is_shut(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Which pairs are not swept, since a heap's solver looks after them."""
+        """Which pairs are not swept, since the sub-stepped solver looks after them."""
         free = self.run.world.dynamic & ~self.inside
         return ~(free[a] | free[b]) | (self.asleep[a] & self.asleep[b])
 
@@ -133,7 +128,7 @@ class PairEvents:
             self._take(Pairs(*map(np.concatenate, both)) if len(self.a) else fresh)
 
     def trajectory_changed(self, body: int, time: float) -> None:
-        """The body took a new course at `time`: sweep its pairs again, and add those it may now reach."""
+        """The body has a new trajectory from `time` on: sweep its pairs again, and add those it may now reach."""
         run, world = self.run, self.run.world
         partners = np.empty(world.num_bodies, np.int64)
         count = renew_pairs(
@@ -145,7 +140,7 @@ class PairEvents:
             self._append(np.minimum(fresh, body), np.maximum(fresh, body), time)
 
     def trajectories_changed(self, bodies: np.ndarray, time: float) -> None:
-        """The same for the members of heaps, all at once."""
+        """The same for the members of sub-stepped islands, all at once."""
         run = self.run
         free = run.world.dynamic & ~self.inside
         moved = np.zeros(run.world.num_bodies, bool)
@@ -174,10 +169,8 @@ class PairEvents:
         self._append(first[fresh], second[fresh], time)
 
     def active_bodies(self) -> np.ndarray:
-        """Bodies that move or that a net presses, but for those in heaps."""
-        moves = self.run.state.trajectory.mode != FIXED
-        if self.run.soft_bodies is not None:
-            moves |= self.run.soft_bodies.pressed
+        """Bodies that move or that a soft body presses, without those of sub-stepped islands."""
+        moves = (self.run.state.trajectory.mode != FIXED) | self.run.soft_bodies.pressed
         return np.flatnonzero(moves & ~self.inside)
 
     def bodies_at(self, time: float) -> np.ndarray:
@@ -193,7 +186,7 @@ class PairEvents:
         return mark.nonzero()[0]
 
     def look_around(self, bodies: np.ndarray, time: float, shift: float) -> None:
-        """Call bodies that a lift moved by `shift` [m] once more at `time`, where others that their group does not know may be near now."""
+        """Call bodies that a position correction moved by `shift` [m] once more: others may be near now."""
         fresh = bodies[self._looked_around[bodies] < time]
         mark = np.zeros(len(self.wake), bool)
         mark[fresh] = True

@@ -1,7 +1,7 @@
 """The table of pairs that may meet in a step, and the kernels that keep it.
 
-A pair is swept again when a body of it takes a new course. The gap at which it comes to contact is `least` for a pair
-without a past; it is lowered where a pair has just been in contact, so that leaving pairs are not in contact again, and
+A pair is swept again when a body of it takes a new trajectory. The gap at which it comes to contact is `least_impact_margin`
+for a pair without a past; it is lowered where a pair has just been in contact, so that leaving pairs are not in contact again, and
 raised where a contact is held, so that the other features of the pair stay guarded.
 """
 
@@ -13,12 +13,15 @@ import numpy as np
 
 from rigidimpulse.collision.broad_phase import overlapping_with
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import FIXED, FREE, JERK, place_at, rate_of, row_at, turning_points
 
 NEAR = 1e-6
 """Contacts that much farther away than the declared gap, relative to it, are in contact too."""
 ROUND_OFF = 1e-6
-"""The same, relative to delta."""
+"""The same, relative to the contact margin."""
+MARGIN = 2.0
+"""Contacts are looked for within this many contact margins."""
 MAX_REPEATS = 100
 """Contacts of a pair at one instant after which there is no motion that its neighbours allow: bodies are squeezed."""
 
@@ -61,7 +64,7 @@ class Pairs(NamedTuple):
 
     a: np.ndarray  # (k,) body indices
     b: np.ndarray
-    time: np.ndarray  # (k,) s, when the pair reaches `touch`; inf if it does not before the end of the step
+    time: np.ndarray  # (k,) s, when the pair reaches its impact margin; inf if it does not before the end of the step
     start: np.ndarray  # (k,) s, from when the pair must be swept again; nan if its time stands
     impact_margin: np.ndarray  # (k,) m, gap at which contact is declared now
     least_impact_margin: np.ndarray  # (k,) m, the same for a pair without a past
@@ -73,7 +76,7 @@ class Pairs(NamedTuple):
     witness: np.ndarray  # (k, 10) points on a and b, normal and gap where the pair comes to contact
 
 
-def new_pairs(world, a: np.ndarray, b: np.ndarray, start: float) -> Pairs:
+def new_pairs(world: World, a: np.ndarray, b: np.ndarray, start: float) -> Pairs:
     """Pairs (k,) without a past, to be swept from `start` [s] on."""
     k = len(a)
     size = np.minimum(world.size[a], world.size[b])
@@ -96,7 +99,7 @@ def new_pairs(world, a: np.ndarray, b: np.ndarray, start: float) -> Pairs:
 
 @jit
 def sweep_pair_again(pairs, p, time, dynamic, inside):
-    """Let pair p be swept from `time` on, unless it is given up or a heap's solver looks after it; dynamic, inside (n,) bool."""
+    """Let pair p be swept from `time` on, unless it is given up or the sub-stepped solver looks after it; dynamic, inside (n,) bool."""
     a, b = pairs.a[p], pairs.b[p]
     swept = (dynamic[a] and not inside[a]) or (dynamic[b] and not inside[b])
     pairs.time[p] = np.inf
@@ -127,7 +130,7 @@ def live_contacts(pairs, place, gap, time):
 
 @jit_making_arrays
 def renew_pairs(trajectory, body, time, end, radius, margin, movable, dynamic, inside, pairs, box_min, box_max, fresh):
-    """Let the pairs of a body that took a new course at `time` be swept again, and look whom it may now reach until `end`.
+    """Let the pairs of a body that took a new trajectory at `time` be swept again, and look whom it may now reach until `end`.
 
     radius, margin: m, about its centre; movable, dynamic, inside (n,) bool; box_min, box_max (n, 3) m: its row is made anew.
     Writes the bodies whose boxes overlap its own and that it has no pair with into fresh (n,), in ascending order; returns their number.

@@ -22,7 +22,9 @@ import numpy as np
 
 from rigidimpulse.collision.contact_records import SEPARATION, SKIN, SUPPORT, in_play
 from rigidimpulse.core.kernels import jit_making_arrays
-from rigidimpulse.engine.substepped.trajectories import CALM
+from rigidimpulse.dynamics.impact.point import BodyState
+from rigidimpulse.engine.sleeping import SLEEP_SPEED
+from rigidimpulse.model.world import World
 
 MANY, SOME, FEW, KEPT = 60, 12, 8, 2
 EXPENSIVE_SOLVES = 6.0
@@ -30,7 +32,7 @@ RATIO, REBOUND, TALL = 30.0, 0.5, 12
 FAST, SPIN = 0.5, 2.5 / 16.0
 
 
-def why_not_substepped(world) -> str:
+def why_not_substepped(world: World) -> str:
     """Why a scene cannot have heaps; empty where it can."""
     solver = world.accuracy.contact_solver
     if "sub-stepped islands" in world.left_out:
@@ -51,12 +53,12 @@ def why_not_substepped(world) -> str:
     return ""
 
 
-def only_expensive(world) -> bool:
+def only_expensive(world: World) -> bool:
     """Whether heaps begin only where the exact solver has become dear: the scene has not MANY bodies."""
     return world.accuracy.contact_solver == "auto" and _number(world) < MANY
 
 
-def jointed(world) -> np.ndarray:
+def jointed(world: World) -> np.ndarray:
     """Which bodies (n,) bool have joints."""
     out = np.zeros(world.num_bodies, bool)
     if world.joints_of_scene:
@@ -65,7 +67,7 @@ def jointed(world) -> np.ndarray:
     return out
 
 
-def _number(world) -> int:
+def _number(world: World) -> int:
     """Movable bodies without joints."""
     return int(np.count_nonzero(world.dynamic & ~jointed(world)))
 
@@ -123,16 +125,17 @@ def support_levels(bodies, pairs, rows, tall):
     return level
 
 
-def lively(now, strength: np.ndarray, inner: np.ndarray) -> np.ndarray:
+def lively(now: BodyState, strength: np.ndarray, inner: np.ndarray) -> np.ndarray:
     """Which bodies (n,) bool are faster than what is calm; strength (n,) m/s2 of what pulls them, inner (n,) m."""
     radius = np.where(np.isfinite(inner), inner, 0.0)
     v, w = now.velocity, now.angular_velocity
     speed = np.sqrt(np.einsum("ij,ij->i", v, v)) + radius * np.sqrt(np.einsum("ij,ij->i", w, w))
-    return speed > CALM * np.sqrt(strength * radius)
+    return speed > SLEEP_SPEED * np.sqrt(strength * radius)
 
 
 def refusals(
-    world, root: np.ndarray, substepped_before: np.ndarray, joined: np.ndarray, moves: np.ndarray, solve_count: np.ndarray, a: np.ndarray,
+    world: World, root: np.ndarray, substepped_before: np.ndarray, joined: np.ndarray, moves: np.ndarray, solve_count: np.ndarray, a:
+    np.ndarray,
     b: np.ndarray,
     auto: bool,
 ) -> dict[int, str]:  # fmt: skip

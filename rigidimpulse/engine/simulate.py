@@ -7,54 +7,27 @@ import os
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError, unknown_name
-from rigidimpulse.dynamics.forces.constant import ConstantForces
-from rigidimpulse.dynamics.forces.gravity import FreeRotation, Gravity, SteadyLoad
-from rigidimpulse.dynamics.forces.kinds import bind_forces, force_kinds
-from rigidimpulse.engine.broad_phase_effect import BroadPhase
-from rigidimpulse.engine.constraint_effects import Friction, JointRows, RollingFriction, SubsteppedContact
-from rigidimpulse.engine.exact.contact_forces import ContactForces
-from rigidimpulse.engine.exact.forced_trajectories import ForcedFlight, VaryingLoad
-from rigidimpulse.engine.exact.impacts import ImpactResponse
-from rigidimpulse.engine.exact.joints import reaction_table
-from rigidimpulse.engine.exact.trajectories import ExactFlight
-from rigidimpulse.engine.impact_time import ImpactTime
-from rigidimpulse.engine.initial_overlap import resolve_overlaps
-from rigidimpulse.engine.pair_events import PairEvents
-from rigidimpulse.engine.plan import Plan
-from rigidimpulse.engine.regime import only_expensive
-from rigidimpulse.engine.spheres.effect import ARRIVED, GO_ON, STEP, EventKernel
-from rigidimpulse.engine.step import go_on, react, step
-from rigidimpulse.engine.trigger_effect import TriggerVolumes, bind_triggers
-from rigidimpulse.engine.warm_up import prepare_kernels
-from rigidimpulse.model.state import Run
-from rigidimpulse.model.world import World, compile_scene
-from rigidimpulse.motion.kinematic import KeyframePaths
-from rigidimpulse.motion.trajectory import FIXED, FREE, PRESCRIBED, begin
-from rigidimpulse.recording.events import EventLog
-from rigidimpulse.recording.impulses import Impulses
-from rigidimpulse.recording.ledger import make_ledger
+from rigidimpulse.engine.begin import begin_run, make_plan
+from rigidimpulse.engine.compile_scene import compile_scene
+from rigidimpulse.engine.effects import EventKernel
+from rigidimpulse.engine.loop import run_to_end
+from rigidimpulse.engine.recording_of import finish_run
 from rigidimpulse.recording.profile import Stopwatch
-from rigidimpulse.recording.recorder import Recorder
-from rigidimpulse.recording.recording import Recording, RunSettings, Status
+from rigidimpulse.recording.recording import Recording, RunSettings
 from rigidimpulse.scene.accuracy import Accuracy
-from rigidimpulse.scene.frames import own_frames
 from rigidimpulse.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from rigidimpulse.dynamics.forces.force_log import ForceWork
-    from rigidimpulse.engine.spheres.run import EventRun
     from rigidimpulse.io.cache.checkpointer import Cache
     from rigidimpulse.studies.accuracy_targets import AccuracyTarget
 
-# Frames whose product with the number of bodies is refused as a slip of the keyboard (about 1e9 poses, 100 GB).
 MOST_POSES = 1_000_000_000
-# Steps at most between two looks at a run that somebody watches.
-WATCHED = 64
+"""Frames times bodies that are refused as a slip of the keyboard (about 100 GB)."""
 
 
 def simulate(
@@ -113,63 +86,20 @@ def _simulate(
     world = compile_scene(scene, accuracy, frozenset(left_out))
     if len(times) * world.num_bodies > MOST_POSES:
         raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
-    plan = make_plan(world, effects)
-    prepare_kernels(world, has_effect(plan, EventKernel.name), has_effect(plan, SubsteppedContact.name) and not only_expensive(world))
-    recorder = Recorder(times, world.num_bodies)
-    log = EventLog()
-    for name, reason in left_out.items():
-        log.report(0.0, "effect left out", (name,), f"the scene calls for it: {reason}")
-    run = Run(world, recorder, log)
-    bind_forces(run, plan, times)
-    paths = KeyframePaths(world)
-    start_trajectories(run)
-    recorder.start(run.state.trajectory)
-    resolve_overlaps(run)
-    bind_triggers(run, plan)
-    running = Running(run, paths, make_flight(run, plan))
+    run = begin_run(world, make_plan(world, effects), times, left_out)
     settings = RunSettings(float(duration), float(fps), world.accuracy, dict(effects or {}))
     if cache is None:
-        run_to_end(running, plan, duration, progress)
-        run = finish_run(running, plan, duration)
+        run_to_end(run, duration, progress)
+        recording = finish_run(run, duration)
     else:
         from rigidimpulse.io.cache.checkpointer import Checkpointer
 
-        with closing(Checkpointer(cache, settings, running, plan)) as checkpointer:
-            run_to_end(checkpointer.running, plan, duration, lambda time: checkpointer.look(time, progress))
+        with closing(Checkpointer(cache, settings, run)) as checkpointer:
+            run_to_end(checkpointer.run, duration, lambda time: checkpointer.look(time, progress))
             checkpointer.write(float(duration))
-            run = finish_run(checkpointer.running, plan, duration)
-            checkpointer.finish(run)
-    return replace(run, profile=stopwatch.read(plan), settings=settings)
-
-
-class Running(NamedTuple):
-    """A run under way: all that it changes, and what keeps its place in the keyframes and in the event kernel."""
-
-    run: Run
-    paths: KeyframePaths
-    flight: EventRun | None
-
-
-def run_to_end(running: Running, plan: Plan, duration: float, progress: Callable[[float], None] | None) -> None:
-    """Step to the end; a run that is under way goes on from where it is."""
-    run, paths, flight = running
-    # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
-    for end in (float(duration), max(float(duration), float(run.recorder.times[-1]))):
-        if plan.steps or run.forces is not None or run.triggers is not None:
-            run_steps(run, plan, paths, flight, end, progress)
-        else:
-            paths.start_segments(run, end)
-
-
-def finish_run(running: Running, plan: Plan, duration: float) -> Recording:
-    """End what is under way at the end, and return the recording."""
-    run = running.run
-    finish_sub_steps(run, plan, run.state.time)
-    if run.substepped is not None:
-        run.substepped.close(run, run.state.time)
-        plan.tell(SubsteppedContact.name, run.substepped.summary())
-    run.recorder.finish(run.state.trajectory)
-    return make_recording(run, plan, run.recorder.times, duration)
+            recording = finish_run(checkpointer.run, duration)
+            checkpointer.finish(recording)
+    return replace(recording, profile=stopwatch.read(run.plan), settings=settings)
 
 
 def frame_times(duration: float, fps: float) -> np.ndarray:
@@ -197,175 +127,3 @@ def chosen_out(scene: Scene, accuracy: str | Accuracy, effects: Mapping[str, boo
     out = {name: lines[name].reason for name, wanted in effects.items() if not wanted and lines[name].included}
     out.pop(EventKernel.name, None)  # it changes no result
     return out
-
-
-def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
-    """Bind every effect there is to the world; the plan keeps those that the scene calls for, and obeys what was chosen by name."""
-    accuracy = world.accuracy
-    effects = [
-        BroadPhase(),
-        ImpactResponse(accuracy.response, accuracy.restitution),
-        Gravity(),
-        ConstantForces(),
-        *force_kinds(world),
-        SteadyLoad(),
-        FreeRotation(),
-        VaryingLoad(),
-        JointRows(),
-        Friction(),
-        RollingFriction(),
-        ContactForces(),
-        SubsteppedContact(),
-        ImpactTime(accuracy.impact_time),
-        EventKernel(),
-        ExactFlight(),
-        ForcedFlight(),
-        TriggerVolumes(),
-    ]
-    return Plan(world, effects, chosen)
-
-
-def start_trajectories(run: Run) -> None:
-    """Give every body its first course."""
-    world, trajectory = run.world, run.state.trajectory
-    trajectory.position[:], trajectory.orientation[:] = world.position, world.orientation
-    trajectory.velocity[:], trajectory.angular_velocity[:] = world.velocity, world.angular_velocity
-    trajectory.acceleration[:] = np.where(world.dynamic[:, None], world.steady_acceleration, 0.0)
-    trajectory.inertia[:] = world.inertia
-    trajectory.mode[:] = np.where(world.dynamic, FREE, np.where(world.moving, PRESCRIBED, FIXED))
-    for i in range(world.num_bodies):
-        begin(trajectory, i)
-
-
-def has_effect(plan: Plan, name: str) -> bool:
-    """Whether the plan has the effect in."""
-    return any(line.included for line in plan.lines if line.name == name)
-
-
-def make_flight(run: Run, plan: Plan) -> EventRun | None:
-    """The event kernel, made ready, where the plan has it in."""
-    if not has_effect(plan, EventKernel.name):
-        return None
-    from rigidimpulse.engine.spheres.run import EventRun
-
-    return EventRun(run)
-
-
-def run_steps(run: Run, plan: Plan, paths: KeyframePaths, flight: EventRun | None, end: float, progress) -> None:
-    """Step to the end; steps end on the grid of the accuracy's step and at keyframes.
-
-    The event kernel, if there is one, takes all steps in one in which nothing but simple impacts happens.
-    """
-    size = run.world.accuracy.step
-    while run.state.time < end:
-        begin = run.state.time
-        paths.start_segments(run, begin)
-        if run.soft_bodies is None and not np.any(run.state.trajectory.mode != FIXED):
-            run.state.time = min(paths.next_key(begin), end)
-            continue
-        stop = min(paths.next_key(begin), end)
-        if progress is not None:
-            stop = min(stop, (math.floor(begin / size + 1e-9) + WATCHED) * size)
-        how = STEP
-        if flight is not None and flight.may_fly():
-            how = fly(run, plan, flight, stop)
-        if how == STEP:
-            index = math.floor(run.state.time / size + 1e-9) + 1
-            until = min(index * size, stop)
-            step(run, plan, until if run.soft_bodies is None else run.soft_bodies.advance(run, until))
-        if run.triggers is not None:
-            with plan.clock(TriggerVolumes.name):
-                run.triggers.look(begin, run.state.time)
-        if progress is not None:
-            progress(run.state.time)
-
-
-def fly(run: Run, plan: Plan, flight: EventRun, stop: float) -> int:
-    """Let the event kernel take the scene towards `stop` [s], and the loop in Python take over where it cannot; returns how that ends."""
-    begin = run.state.time
-    with plan.clock(EventKernel.name):
-        how, step_begin, until = flight.fly(stop)
-    while how == GO_ON:
-        go_on(run, plan, step_begin, until, may_leave=run.state.time > begin)
-        if run.state.time >= until:
-            return ARRIVED
-        begin = run.state.time
-        with plan.clock(EventKernel.name):
-            how, step_begin, until = flight.fly(stop, at_boundary=False)
-    return how
-
-
-def finish_sub_steps(run: Run, plan: Plan, end: float) -> None:
-    """End the sub-steps of joints and contacts at the end of the run, so that the last frame has the velocities of its instant."""
-    state = run.state
-    bodies = {i for pair in state.pair_force for i in pair if state.under_contact[i]}
-    if run.joints is not None:
-        bodies.update(run.joints.moving_bodies(run).tolist())
-    if bodies:
-        pair_events = PairEvents(run, end)
-        plan.run("detect", run, pair_events)
-        react(run, plan, pair_events, end, np.array(sorted(bodies)))
-
-
-def close_stretches(run: Run) -> None:
-    """Book the courses under contact forces that are still under way."""
-    state = run.state
-    for i in np.flatnonzero(state.under_contact).tolist():
-        run.log.stretches.append((state.trajectory.start[i], np.inf, i, state.energy_at_start[i], 0.0))
-
-
-def release_times(world: World) -> np.ndarray:
-    """When bodies that are carried first are let go, (n,) s; 0 for others."""
-    return np.array([0.0 if body.release_time is None else body.release_time for body in world.scene.bodies])
-
-
-def impulses_by_cause(run: Run, times: np.ndarray, impacts: np.ndarray, work: ForceWork | None) -> Impulses:
-    """What bodies gained, to be split by cause."""
-    world = run.world
-    mass = np.where(world.dynamic, world.mass, 0.0)
-    return Impulses(
-        names=list(world.names),
-        times=times,
-        pull=mass[:, None, None] * np.stack([world.gravity, world.push], axis=1),
-        mass=mass,
-        release=release_times(world),
-        velocity=run.recorder.velocity,
-        accounts=run.impulses,
-        forces=work,
-        impacts=impacts,
-    )
-
-
-def make_recording(run: Run, plan: Plan, times: np.ndarray, duration: float) -> Recording:
-    """Body-frame poses, impacts and ledger from what the recorder holds."""
-    world, recorder = run.world, run.recorder
-    position, orientation = own_frames(recorder.position, recorder.orientation, world.offset, world.turn)
-    impacts = run.log.impacts.table()
-    close_stretches(run)
-    work = None if run.forces is None else run.forces.finish(world, times, recorder)
-    mass = np.where(world.dynamic & (times[:, None] >= release_times(world)), world.mass, 0.0)
-    ledger = make_ledger(
-        times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
-        mass, world.inertia, world.steady_acceleration, run.log, work,
-    )
-    if run.soft_bodies is not None:
-        run.soft_bodies.add_to(ledger)
-    contacts = run.contact_log.table()
-    return Recording(
-        times=times,
-        names=list(world.names),
-        positions=position,
-        orientations=orientation,
-        velocities=recorder.velocity,
-        angular_velocities=recorder.angular_velocity,
-        centers=recorder.position,
-        impacts=impacts[impacts["time"] <= duration],
-        ledger=ledger,
-        status=Status.of(run.log.events),
-        plan=plan,
-        scene=world.scene,
-        reactions=reaction_table(run.joints, times),
-        contacts=contacts,
-        by_cause=impulses_by_cause(run, times, impacts, work),
-        soft_bodies=[] if run.soft_bodies is None else run.soft_bodies.tracks(),
-    )

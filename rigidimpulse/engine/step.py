@@ -1,80 +1,79 @@
-"""One step of the loop, and what happens at an instant: detect, respond, forces, constrain, sweep, integrate, observe.
+"""One step: the whole order of what happens.
 
-Every body has a course: its exact path since something last acted on it. A step opens a window of pairs that may meet
-before its end, then goes from contact to contact: at the earliest time at which a pair touches, the group of bodies
-that touch there is brought to that time and gets its impulses and contact forces; those whose course changed are
-swept again. Bodies elsewhere do not notice.
+Every body has a trajectory: its exact path since something last acted on it. A step goes from contact to contact. At the earliest time
+at which
+a pair of bodies touches, the island of bodies that touch there is brought to that time and advanced from it; bodies elsewhere do not
+notice.
+An island is advanced by one of two regimes, `exact/` from event to event or `substepped/` by sub-steps to the end of the step. Both have
+the same four verbs: arrive, impacts, contact forces, trajectories.
+
+What takes part in a verb stands in a list of the plan: an effect that the scene does not call for is in none.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.engine.exact.trajectories import begin_trajectory
-from rigidimpulse.engine.islands import Island
+from rigidimpulse.engine.exact.advance import arrive, let_go
+from rigidimpulse.engine.islands import touching_islands
 from rigidimpulse.engine.pair_events import PairEvents
+from rigidimpulse.engine.run import Run
+from rigidimpulse.model.island import Island
 
 
-def step(run, plan, end: float) -> None:
-    """Advance all courses to `end` [s]."""
-    pair_events = PairEvents(run, end)
-    plan.run("detect", run, pair_events)
-    react(run, plan, pair_events, run.state.time, pair_events.active_bodies())
-    _run_pair_events(run, plan, pair_events, may_leave=False)
+def step(run: Run, end: float) -> None:
+    """Advance all trajectories to `end` [s]."""
+    begin, pair_events = run.state.time, PairEvents(run, end)
+    run.plan.perform(run.plan.pairs, run, pair_events)  # islands that are sub-stepped; broad phase over swept boxes
+    react(run, pair_events, begin, pair_events.active_bodies())  # load: resting, jointed, pushed, sub-stepped
+    _from_event_to_event(run, pair_events, may_leave=False)
+    run.plan.perform(run.plan.observe, run, begin, run.state.time)  # triggers
 
 
-def go_on(run, plan, begin: float, end: float, may_leave: bool) -> None:
-    """Advance all courses to the `end` of a step from the middle of it, where the event kernel stopped; begin: of the step. Both in s.
+def go_on(run: Run, begin: float, end: float, may_leave: bool) -> None:
+    """Advance all trajectories from the middle of a step, where the kernel of balls stopped, to its end; begin, end: of the step, s.
 
     may_leave: whether to end earlier, at an instant from which on all bodies fly freely again.
     """
     pair_events = PairEvents(run, end)
-    plan.run("detect", run, pair_events)
+    run.plan.perform(run.plan.pairs, run, pair_events)
     pair_events.recall(begin)
-    _run_pair_events(run, plan, pair_events, may_leave)
+    _from_event_to_event(run, pair_events, may_leave)
 
 
-def _run_pair_events(run, plan, pair_events: PairEvents, may_leave: bool) -> None:
-    """From contact to contact, to the end of the window, or until no pair of it has a past if it may be left."""
+def _from_event_to_event(run: Run, pair_events: PairEvents, may_leave: bool) -> None:
+    """To the end of the step, or until no pair has a past if it may be left there."""
     while True:
-        plan.run("sweep", run, pair_events)
+        run.plan.perform(run.plan.time_of_impact, run, pair_events)  # of pairs of which a body has a new trajectory
         time = pair_events.next_time()
         if time >= pair_events.end:
             break
         bodies = pair_events.bodies_at(time)
         pair_events.count_contacts(time)
-        react(run, plan, pair_events, time, bodies)
+        react(run, pair_events, time, bodies)
         if may_leave and pair_events.is_plain(time):
             run.state.time = time
             return
     run.state.time = pair_events.end
 
 
-def react(run, plan, pair_events: PairEvents, time: float, bodies: np.ndarray) -> None:
-    """Everything that happens at `time` to the groups that the given bodies touch."""
+def react(run: Run, pair_events: PairEvents, time: float, bodies: np.ndarray) -> None:
+    """Everything that happens at `time` to the islands of the given bodies."""
     pair_events.wake[bodies] = np.inf
-    islands, reached = pair_events.touching(time, bodies)
-    release(run, pair_events, time, reached, islands)
+    islands, reached = touching_islands(run, pair_events, time, bodies)  # the contact graph at that instant
+    arrive(run, islands, time, reached)  # sub-steps end: velocities are projected, joints closed, energy limited
+    islands = run.substepped.join(run, pair_events, time, islands)  # with the sub-stepped islands that they touch
+    let_go(run, pair_events, islands, time, reached)  # bodies that have left what they touched
     for island in islands:
-        plan.run("respond", run, island)
-        plan.run("forces", run, pair_events, island)
-        plan.run("constrain", run, pair_events, island)
-        plan.run("integrate", run, pair_events, island)
-    pair_events.settle(time)
+        advance(run, pair_events, island)
+    pair_events.settle(time)  # pairs that met without consequence
 
 
-def release(run, pair_events: PairEvents, time: float, bodies: np.ndarray, islands: list[Island]) -> None:
-    """Let go those bodies that still carry the forces of contacts they have left."""
-    state = run.state
-    bodies = bodies[state.under_contact[bodies]]
-    if not len(bodies):
-        return
-    free = np.zeros(6)
-    leaves = np.zeros(len(state.under_contact), bool)
-    leaves[bodies] = True
-    for island in islands:
-        leaves[island.members] = False
-    left = leaves.nonzero()[0]
-    left = left[(state.trajectory.start[left] < time) & ~pair_events.inside[left]]
-    for i in left.tolist():
-        begin_trajectory(run, pair_events, i, time, free, rests=False)
+def advance(run: Run, pair_events: PairEvents, island: Island) -> None:
+    """Advance an island from its instant; the only place that knows both regimes."""
+    plan = run.plan
+    regime = plan.exact if island.is_exact else plan.substepped
+    plan.perform(regime.impacts, run, pair_events, island)  # restitution, friction impulses
+    plan.perform(regime.loads, run, pair_events, island)  # gravity, constant and varying forces, gyroscopic terms
+    plan.perform(regime.contact_forces, run, pair_events, island)  # rows of contacts, joints and motors, solved; sleeping
+    plan.perform(regime.trajectories, run, pair_events, island)  # along which path, until when; its pairs are swept again

@@ -9,7 +9,7 @@ body was in an impact since.
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,14 +18,12 @@ from rigidimpulse.collision.distance.fcl import Narrowphase
 from rigidimpulse.collision.geometry import compile_shape
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.quaternion import multiply, rotate
-from rigidimpulse.engine.plan import Skip
+from rigidimpulse.engine.run import Run
+from rigidimpulse.model.effect import Skip
 from rigidimpulse.motion.trajectory import FIXED, pose_at
 from rigidimpulse.scene.body import vector
 from rigidimpulse.scene.collision_filter import CollisionFilter, may_meet
 from rigidimpulse.scene.shape import Shape, check_orientation, normalized_quaternion
-
-if TYPE_CHECKING:
-    from rigidimpulse.model.state import Run
 
 SHARPNESS = 1e-9
 """s, to which times are found."""

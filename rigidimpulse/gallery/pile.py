@@ -73,7 +73,7 @@ def overlaps(run: Recording) -> int:
     """Pairs of bodies that are inside each other in the last frame, asked of FCL."""
     from rigidimpulse.collision.distance.fcl import Narrowphase
     from rigidimpulse.core.quaternion import multiply
-    from rigidimpulse.model.world import compile_scene
+    from rigidimpulse.engine.compile_scene import compile_scene
 
     assert run.scene is not None
     world = compile_scene(run.scene)

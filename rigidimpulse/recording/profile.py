@@ -7,7 +7,8 @@ from time import perf_counter
 from typing import NamedTuple
 
 from rigidimpulse.core.kernels import KERNELS
-from rigidimpulse.engine.plan import STAGES, Plan
+from rigidimpulse.model.effect import STAGES
+from rigidimpulse.model.plan import Plan
 
 MOST_ROWS = 20
 """Kernels in a table."""

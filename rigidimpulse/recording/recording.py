@@ -17,7 +17,7 @@ from rigidimpulse.recording.contacts import CONTACT_DTYPE, forces_on
 
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
-    from rigidimpulse.engine.plan import Plan
+    from rigidimpulse.model.plan import Plan
     from rigidimpulse.recording.events import Event
     from rigidimpulse.recording.impulses import Impulses
     from rigidimpulse.recording.ledger import Ledger

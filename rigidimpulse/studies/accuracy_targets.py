@@ -22,8 +22,9 @@ import numpy as np
 
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.simulate import simulate
-from rigidimpulse.model.world import World, compile_scene
+from rigidimpulse.model.world import World
 from rigidimpulse.recording.events import Event
 from rigidimpulse.recording.recording import Recording, Status
 from rigidimpulse.scene.accuracy import Accuracy

@@ -161,7 +161,7 @@ class Comparison:
         """Largest extents, m, by name; empty without a scene."""
         if self.run_a.scene is None:
             return {}
-        from rigidimpulse.model.world import compile_scene
+        from rigidimpulse.engine.compile_scene import compile_scene
 
         sizes = dict(zip(self.run_a.names, compile_scene(self.run_a.scene).size.tolist(), strict=True))
         for track in self.run_a.soft_bodies:

@@ -15,8 +15,8 @@ import math
 
 import numpy as np
 
+from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.simulate import simulate
-from rigidimpulse.model.world import compile_scene
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.studies.deviation import agree_until, deviation

@@ -8,8 +8,8 @@ from time import perf_counter, process_time
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.engine.plan import STAGES
 from rigidimpulse.engine.simulate import simulate
+from rigidimpulse.model.effect import STAGES
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.scene import Scene

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.engine.plan import STAGES
 from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.gallery.pile import pile
+from rigidimpulse.model.effect import STAGES
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.material import Material

@@ -25,10 +25,11 @@ import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import write_renamed
+from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.fingerprint import fingerprint
 from rigidimpulse.engine.simulate import frame_times
 from rigidimpulse.gallery.record import GalleryScene
-from rigidimpulse.model.world import World, compile_scene
+from rigidimpulse.model.world import World
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.measured_runs import MeasuredRuns, TimeUp, peer_setting
 from rigidimpulse.studies.reference import Reference, converged_reference, exact_reference

@@ -10,7 +10,7 @@ import pytest
 from broken_files import broken, good_files
 
 import rigidimpulse as ri
-from rigidimpulse.model.world import compile_scene
+from rigidimpulse.engine.compile_scene import compile_scene
 
 CASES = int(os.environ.get("BROKEN_FILES", "200"))
 MOST_SECONDS = 5.0

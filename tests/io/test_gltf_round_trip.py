@@ -15,7 +15,8 @@ from gltf_files import unpack
 from player import check_structure
 
 import rigidimpulse as ri
-from rigidimpulse.model.world import World, compile_scene
+from rigidimpulse.engine.compile_scene import compile_scene
+from rigidimpulse.model.world import World
 from rigidimpulse.scene.material import combine, combine_rolling
 
 TURN = np.array([0.8, 0.1, -0.3, 0.5]) / np.linalg.norm([0.8, 0.1, -0.3, 0.5])

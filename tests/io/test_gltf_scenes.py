@@ -10,7 +10,7 @@ import pytest
 from gltf_files import BALL, BOX, CUBE, CUBE_FACES, Gltf, physics, shaped, with_physics
 
 import rigidimpulse as ri
-from rigidimpulse.model.world import compile_scene
+from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.scene.mass import body_mass
 
 TURN = [0.0, 0.0, 0.6, 0.8]

@@ -18,10 +18,10 @@ import rigidimpulse as ri
 from rigidimpulse.core.quaternion import multiply, quaternion_from_axis_angle
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.impact.point import Contacts
+from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.simulate import start_trajectories
 from rigidimpulse.engine.touching import bring_all, fill_contacts
 from rigidimpulse.model.state import Run
-from rigidimpulse.model.world import compile_scene
 from rigidimpulse.motion.trajectory import begin
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 import rigidimpulse as ri
 from rigidimpulse import gallery
 from rigidimpulse.core.quaternion import quaternion_from_rotation_vector, rotate
+from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.fingerprint import fingerprint
-from rigidimpulse.model.world import compile_scene
 from rigidimpulse.studies.measures import penetration
 from rigidimpulse.studies.peers import PEERS
 from rigidimpulse.studies.reference import CLOSED_FORM, NONE, SELF_CONVERGED, Reference

@@ -9,9 +9,9 @@ import rigidimpulse as ri
 from rigidimpulse.collision.contact_cache import review
 from rigidimpulse.collision.contact_records import HELD, SEPARATION, SKELETON_A, SKELETON_B
 from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
+from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.model.state import Run
-from rigidimpulse.model.world import compile_scene
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
 

@@ -12,9 +12,9 @@ from rigidimpulse.collision.distance.epa import EXACT
 from rigidimpulse.collision.manifold.convex_convex import SHRINK
 from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
 from rigidimpulse.core.quaternion import multiply, rotate, to_matrix
+from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.model.state import Run
-from rigidimpulse.model.world import compile_scene
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
 

@@ -7,17 +7,17 @@ import pytest
 
 import rigidimpulse as ri
 from rigidimpulse.engine import warm_up
+from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.gallery import load
-from rigidimpulse.model.world import compile_scene
 
 PROGRAM = """
 import rigidimpulse as ri
-from rigidimpulse.engine import warm_up
+from rigidimpulse.engine import warm_up_parts
 from rigidimpulse.core.kernels import KERNELS
 from rigidimpulse.gallery import load
 
-for half in (warm_up.{first}, warm_up.{second}):
-    half(warm_up._box_on_floor(False, {jointed}))
+for half in (warm_up_parts.{first}, warm_up_parts.{second}):
+    half(warm_up_parts._box_on_floor(False, {jointed}))
 ahead = {{kernel.name: set(kernel.entry.overloads) for kernel in KERNELS if kernel.entry.overloads}}
 entry = load("{scene}")
 ri.simulate(entry.scene(), 0.3, accuracy=entry.accuracy)
@@ -47,14 +47,14 @@ def test_runs_call_what_was_compiled_ahead(first, second, jointed, scene):
 
 FIRST_RUN = """
 import rigidimpulse as ri
-from rigidimpulse.engine import warm_up
+from rigidimpulse.engine import warm_up_parts
 from rigidimpulse.core.kernels import KERNELS
 
 def used():
     return {kernel.name for kernel in KERNELS if kernel.calls or kernel.preparing}
 
-for half in (warm_up._respond_and_detect, warm_up._move_and_sweep):
-    half(warm_up._box_on_floor(False))
+for half in (warm_up_parts._respond_and_detect, warm_up_parts._move_and_sweep):
+    half(warm_up_parts._box_on_floor(False))
 ahead = used()
 floor = ri.Body("floor", ri.Shape.half_space(), motion="static")
 run = ri.simulate(ri.Scene(bodies=[floor, ri.Body("box", ri.Shape.box(0.2), position=(0, 0, 1))]), 1.0)

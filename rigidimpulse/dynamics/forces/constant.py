@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError, unknown_name
-from rigidimpulse.engine.plan import Bound, Skip
+from rigidimpulse.model.effect import Skip
 from rigidimpulse.scene.body import vector
 
 if TYPE_CHECKING:
@@ -74,23 +74,6 @@ class ConstantForce:
 def _strength(value: np.ndarray, _time: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """The same at all times, (r, 3) N."""
     return value[rows]
-
-
-@dataclass(frozen=True)
-class ConstantForces:
-    """Constant forces at centres of mass; they are in all courses."""
-
-    stage: str = "forces"
-    name: str = "constant forces"
-
-    def bind(self, world) -> Bound | Skip:
-        """In where a force that is not zero acts."""
-        if not np.any(world.push):
-            return Skip("no constant force acts")
-
-        pushed = [world.names[i] for i in np.flatnonzero(world.push.any(axis=1))]
-        named = f"{pushed[0]!r}" if len(pushed) == 1 else f"{len(pushed)} bodies"
-        return Bound(None, f"on {named} at the centre of mass: paths stay parabolas")
 
 
 def push_of_forces(forces: Sequence[ConstantForce], names: list[str], inv_mass: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.quaternion import cross, rotate, rotate_inverse
-from rigidimpulse.engine.plan import Skip
+from rigidimpulse.model.effect import Skip
 from rigidimpulse.motion.trajectory import Trajectories, pose_at, state_at
 from rigidimpulse.scene.body import number, vector
 from rigidimpulse.scene.shape import normalized_quaternion

@@ -1,26 +1,28 @@
-"""The stage constrain: which contacts last, kept at their gap, and the forces they carry until the end of the step."""
+"""Contact forces of an exact island: which contacts last, kept at their gap, and the forces they carry until the end of the step."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import Held, hold_contacts
 from rigidimpulse.dynamics.constraints.contact_motion import Motion, contact_motion
-from rigidimpulse.dynamics.constraints.energy_limit import limit_correction_energy, note_hold
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
 from rigidimpulse.dynamics.constraints.position_correction import correct_positions, needs_correction
-from rigidimpulse.dynamics.constraints.rattle import forget_forces, remember_forces
 from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.dynamics.impact.point import select
+from rigidimpulse.dynamics.impact.point import Contacts, select
+from rigidimpulse.engine.exact.energy_limit import limit_correction_energy, note_hold
 from rigidimpulse.engine.exact.step_size import ALLOWED
-from rigidimpulse.engine.islands import Island, collect, make_island, near_contacts
-from rigidimpulse.engine.plan import Bound, Skip
+from rigidimpulse.engine.exact.velocity_projection import forget_forces, remember_forces
+from rigidimpulse.engine.islands import collect, make_island, near_contacts
+from rigidimpulse.engine.loads import load_over
+from rigidimpulse.engine.pair_events import PairEvents
+from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.sleeping import may_sleep
 from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.model.island import Island
 
 PLAY = 1e-3
 """Energy that forces which are no solution may make, relative."""
@@ -40,30 +42,9 @@ STEADY = 1e-9
 """rad in a step; what turns less does not."""
 
 
-@dataclass(frozen=True)
-class ContactForces:
-    """Lasting contact and joints, solved exactly for each group of touching or joined bodies."""
-
-    stage: str = "constrain"
-    name: str = "contact forces"
-
-    def bind(self, world) -> Bound | Skip:
-        """In where something can press bodies together."""
-        how = f"{world.accuracy.contact_solver}: "
-        if world.joints_of_scene:
-            return Bound(hold, f"{how}{len(world.joints_of_scene)} joints")
-        if not world.can_collide:
-            return Skip(world.why_no_impacts)
-        if not world.can_press:
-            return Skip("no force, no moving support and no spin presses bodies together", hold)
-        return Bound(hold, f"{how}bodies may come to rest on each other")
-
-
-def hold(run, pair_events, island: Island) -> None:
-    """Find the lasting contacts of a group and write the wrenches of its members into run.wrench."""
+def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
+    """Find the lasting contacts of an island and write the wrenches of its members into run.wrench."""
     run.contact_log.close(island.members.tolist(), island.time)
-    if island.substepped is not None:
-        return
     run.wrench[island.members] = 0.0
     forget_forces(run.state, island.contacts)
     island.held = island.slow()
@@ -87,7 +68,7 @@ def hold(run, pair_events, island: Island) -> None:
     if len(island.joints):
         h, residual = _hold_jointed(run, island, subset, contacts, motion, force, rest)
     else:
-        h, residual = _hold_turning(run, island, subset, contacts, keys, motion, force, rest)
+        h, residual = _hold_turning(run, island, subset, contacts, motion, force, rest)
     run.log.account(island.time, "stick", kinetic_energy(now, run.world, island.members) - before)
     failed = residual > UNSOLVED or (len(island.joints) > 0 and not run.joints.are_closed)
     if failed and _makes_energy(run, island, h):
@@ -105,7 +86,7 @@ def hold(run, pair_events, island: Island) -> None:
         run.log.report(
             island.time, "contact forces not solved", names, f"residual {residual:.1e}; use a smaller step"
         )
-    island.rests = _rests(run, island, h)
+    island.rests = may_sleep(run, island, h)
     if island.rests and len(island.joints):
         run.joints.log_rest(island)
     if h < rest and not island.rests:
@@ -114,7 +95,7 @@ def hold(run, pair_events, island: Island) -> None:
         pair_events.look_around(island.members, island.time, island.shift)
 
 
-def _makes_energy(run, island: Island, h: float) -> bool:
+def _makes_energy(run: Run, island: Island, h: float) -> bool:
     """Whether forces that are no solution give the members more kinetic energy than they have, or would have without them.
 
     On the way, too: half of what joints do is taken back before they are stopped.
@@ -133,14 +114,14 @@ def _makes_energy(run, island: Island, h: float) -> bool:
 
 
 def _hold_turning(
-    run, island: Island, subset, contacts, keys, motion: Motion, force, rest: float
+    run: Run, island: Island, subset: np.ndarray, contacts: Contacts, motion: Motion, force: np.ndarray, rest: float
 ) -> tuple[float, float]:
     """Contact forces over a sub-step of at most `rest`; returns its length and the residual."""
     state, step, contact_margin = run.state, run.world.accuracy.step, island.contact_margin[subset]
     rolling = rolling_of(run.world, state.now, contacts)
 
     def hold_over(h: float, excess: np.ndarray) -> Held:
-        h = island.load(run, h)
+        h = load_over(run, island, h)
         run.wrench[island.members] = 0.0
         return hold_contacts(
             run.solve_rows, state.now, contacts, island.members, motion.turning, excess, run.acceleration,
@@ -154,34 +135,39 @@ def _hold_turning(
     first = island.members[0]
     h = sub_step(motion.fastest, step, rest)
     plan = GROWTH * state.sub_step[first] if state.under_contact[first] else np.inf
-    h = min(h, plan)
+    h = min(h, float(plan))
     held = hold_over(h, excess)
-    error, share = _foresee(run, island, subset, contacts, motion, force, held.length)
+    error, share = _estimate_error(run, island, subset, contacts, motion, force, held.length)
     if share < 1.0:
         state.sub_step[first] = share * held.length
         held = hold_over(share * held.length, excess + share**3 * error)
     elif h >= plan or not state.under_contact[first]:
         state.sub_step[first] = max(h, step / MOST_SUB_STEPS)
+    keys = [island.keys[c] for c in subset]
     remember_forces(state, island.time, keys, contacts, force, held.force, held.slides)
     return held.length, held.residual
 
 
-def _hold_jointed(run, island: Island, subset, contacts, motion: Motion, force, rest: float) -> tuple[float, float]:
+def _hold_jointed(
+    run: Run, island: Island, subset: np.ndarray, contacts: Contacts, motion: Motion, force: np.ndarray, rest: float
+) -> tuple[float, float]:
     """Forces of joints and contacts over a sub-step of at most `rest`; returns its length and the residual."""
     joints, step = run.joints, run.world.accuracy.step
     rolling, moment = rolling_of(run.world, run.state.now, contacts), joints.moment.copy()
     h, residual = joints.hold(run, island, contacts, motion.turning, force, sub_step(motion.fastest, step, rest), rolling)
     if motion.fastest * step > STEADY:
-        _, share = _foresee(run, island, subset, contacts, motion, force, h)
+        _, share = _estimate_error(run, island, subset, contacts, motion, force, h)
         if share < 1.0:
             joints.moment[:] = moment
             h, residual = joints.hold(run, island, contacts, motion.turning, force, share * h, rolling)
     return h, residual
 
 
-def _foresee(run, island: Island, subset, contacts, motion: Motion, force, h: float) -> tuple[np.ndarray, float]:
+def _estimate_error(
+    run: Run, island: Island, subset: np.ndarray, contacts: Contacts, motion: Motion, force: np.ndarray, h: float
+) -> tuple[np.ndarray, float]:
     """Errors (m,) of gaps after h [m] under the forces found, and the share of h after which they would be allowed."""
-    error = run.error_estimate.gap_errors(run, island, contacts, subset, motion, run.wrench, h)
+    error = run.error_estimate.gap_errors(run, island, contacts, subset, motion, h)
     error[force[:, 0] == 0.0] = 0.0
     worst = float(np.max(np.abs(error) / (ALLOWED * island.contact_margin[subset])))
     if worst <= 1.0:
@@ -199,11 +185,11 @@ def sub_step(rate: float, step: float, rest: float) -> float:
     return piece if rest > piece * (1.0 + SHORTEST) else max(rest, SHORTEST * step)
 
 
-def _correct_positions(run, pair_events, island: Island) -> None:
-    """Bring sunken contacts back to their gap and look at the group's contacts again.
+def _correct_positions(run: Run, pair_events: PairEvents, island: Island) -> None:
+    """Bring sunken contacts back to their gap and look at the island's contacts again.
 
     A light body turns far to make room for a heavy one: what it may come near is looked for farther away, and what does not belong to the
-    group stands meanwhile.
+    island stands meanwhile.
     """
     state, now = run.state, run.state.now
     place, turn = now.position[island.members].copy(), now.orientation[island.members].copy()
@@ -218,31 +204,8 @@ def _correct_positions(run, pair_events, island: Island) -> None:
     island.moved = True
     reach = 2.0 * run.world.bound_radius[island.members] * np.linalg.norm(now.orientation[island.members] - turn, axis=1)
     island.shift = float((np.linalg.norm(now.position[island.members] - place, axis=1) + reach).max())
-    real, integer = collect(run, pair_events, island.pairs, island.time)
-    again = make_island(run, pair_events, island.time, real, integer, np.ones(len(real), bool), island.joints, island.members)
+    found = collect(run, pair_events, island.pairs, island.time)
+    again = make_island(run, pair_events, island.time, found, np.ones(len(found[0]), bool), island.joints, island.members)
     for name in ("contacts", "place", "kinds", "features", "keys", "contact_margin", "approach", "rest_speed", "live"):
         setattr(island, name, getattr(again, name))
     island.held = island.slow()
-
-
-def _rests(run, island: Island, h: float) -> bool:
-    """Whether all members stand still and their loads are carried, on supports that do not move."""
-    world, now = run.world, run.state.now
-    i = island.members
-    moves = world.moving[island.contacts.body_a].any() or world.moving[island.contacts.body_b].any()
-    if len(island.joints):
-        moves = moves or world.moving[run.joints.bodies_of(island.joints)].any()
-    if moves or (island.loaded and not run.forces.may_rest(i)):
-        return False
-    limit = TOLERANCES.rest * world.steady_strength[i] * h
-    force, torque = run.wrench[i, :3], run.wrench[i, 3:]
-    spin = run.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], torque)
-    gained = h * (run.acceleration[i] + world.inv_mass[i, None] * force)
-    size = np.minimum(world.bound_radius[i], world.size[i])[:, None]
-    slow = (
-        (np.linalg.norm(now.velocity[i], axis=1) <= limit)
-        & (np.linalg.norm(gained, axis=1) <= limit)
-        & (np.linalg.norm(size * now.angular_velocity[i], axis=1) <= limit)
-        & (np.linalg.norm(size * h * spin, axis=1) <= limit)
-    )
-    return bool(np.all(slow))

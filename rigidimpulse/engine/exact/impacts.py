@@ -1,8 +1,8 @@
-"""The stage respond: restitution acts on the velocity that bodies brought in."""
+"""Impacts: restitution acts on the velocity that bodies brought in."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from rigidimpulse.dynamics.impact.kinematic import respond_kinematic
 from rigidimpulse.dynamics.impact.point import Contacts, select, speed_scale
 from rigidimpulse.dynamics.impact.restitution import LAWS
 from rigidimpulse.dynamics.impact.sequence import respond_sequential, respond_simultaneous
-from rigidimpulse.engine.islands import Island, classify
-from rigidimpulse.engine.plan import Bound, Skip
+from rigidimpulse.engine.islands import classify
+from rigidimpulse.engine.pair_events import PairEvents
+from rigidimpulse.engine.run import Run
+from rigidimpulse.model.island import Island
 
 KERNELS = {
     "sequential": respond_sequential,
@@ -34,29 +36,13 @@ COLLAPSE_REBOUNDS = 8
 NEVER = (-np.inf, np.inf, 0)
 
 
-@dataclass(frozen=True)
-class ImpactResponse:
-    """Impulses at impacts by one of KERNELS and a law of restitution, one of LAWS."""
-
-    method: str
-    restitution: str
-    stage: str = "respond"
-
-    name: str = "impulses"
-
-    def bind(self, world) -> Bound | Skip:
-        """In where something can collide."""
-        if not world.can_collide:
-            return Skip(world.why_no_impacts)
-        kernel, law = KERNELS[self.method], LAWS[self.restitution]
-
-        def respond(run, island: Island) -> None:
-            respond_to_impacts(run, island, kernel, law)
-
-        return Bound(respond, f"{self.method}: {REASONS[self.method]}")
+def respond(run: Run, _pair_events: PairEvents, island: Island) -> None:
+    """Apply the impulses of the island's approaching contacts, by the response and the law of restitution of the run's accuracy."""
+    accuracy = run.world.accuracy
+    respond_to_impacts(run, island, KERNELS[accuracy.response], LAWS[accuracy.restitution])
 
 
-def respond_to_impacts(run, island: Island, kernel, law: int) -> None:
+def respond_to_impacts(run: Run, island: Island, kernel: Callable[..., tuple[int, int, bool]], law: int) -> None:
     """Apply the impulses of the group's approaching contacts and log them."""
     collapses = _collapsing(run, island)
     live = (island.live | collapses).nonzero()[0]
@@ -91,14 +77,14 @@ def respond_to_impacts(run, island: Island, kernel, law: int) -> None:
     classify(run, island)
 
 
-def _bear_each_other(run, island: Island) -> bool:
+def _bear_each_other(run: Run, island: Island) -> bool:
     """Whether a contact between two movable bodies of the group carried load before."""
     state, dynamic = run.state, run.world.dynamic
     between = dynamic[island.contacts.body_a] & dynamic[island.contacts.body_b]
     return any(state.force_of(island.keys[c])[0] > 0.0 for c in np.flatnonzero(between).tolist())
 
 
-def _collapsing(run, island: Island) -> np.ndarray:
+def _collapsing(run: Run, island: Island) -> np.ndarray:
     """Contacts (m,) of pairs that came back RATTLES times in a row without ever having been farther apart than the held gap.
 
     Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
@@ -113,7 +99,7 @@ def _collapsing(run, island: Island) -> np.ndarray:
     return count >= (COLLAPSE_REBOUNDS // 2 if (count >= COLLAPSE_REBOUNDS).any() else COLLAPSE_REBOUNDS)
 
 
-def _remember_rebounds(run, island: Island, contacts: Contacts, rows: np.ndarray) -> None:
+def _remember_rebounds(run: Run, island: Island, contacts: Contacts, rows: np.ndarray) -> None:
     """Count for each pair how often in a row it came back after less than its held gap."""
     pairs = zip(island.contacts.body_a.tolist(), island.contacts.body_b.tolist())
     contact_margin = dict(zip(pairs, island.contact_margin))

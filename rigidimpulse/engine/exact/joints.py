@@ -1,18 +1,27 @@
-"""Joints in a run: what they remember, what they do when a group arrives, and how they hold it (see `joint_forces`)."""
+"""Joints in a run: what they remember, what they do when an island arrives, and how they hold it (see
+`dynamics/constraints/joint_sub_step.py`)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint import RADIUS
-from rigidimpulse.dynamics.constraints.joint_impact import impact_rows, stop_at_limits
+from rigidimpulse.dynamics.constraints.joint_impact import JointBlock, impact_rows, stop_at_limits
 from rigidimpulse.dynamics.constraints.joint_limits import next_switch
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_jointed, make_memory, stop_joints
+from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
+from rigidimpulse.dynamics.impact.point import BodyState, Contacts
+from rigidimpulse.engine.absent import NoJoints
+from rigidimpulse.engine.loads import load_over
+from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.model.island import Island
+from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import FIXED
 from rigidimpulse.scene.joint import Joint
 
@@ -26,13 +35,13 @@ MOST_SUB_STEPS, MOST_SWAYS, MOST_SWINGS = 4096, 256, 16
 """Sub-steps in a step, and those that bounds of rates may ask for while energy is kept: light links between heavy bodies mostly stand, and
 what only swings about a fixed point has a far lower rate than its bound."""
 DRIFT = 1e-7
-"""Part of its kinetic energy that a group may gain or lose in a sub-step as if nothing swayed."""
+"""Part of its kinetic energy that an island may gain or lose in a sub-step as if nothing swayed."""
 SHORT = 1e-5
 """Part of a step below which a sub-step is planned as a longer one: closing divides by its length."""
 MOST_CUTS = 20
 """Times a sub-step is cut to end where a limit is reached or lets go."""
 STEEP = 1e3
-"""Torque of a twist over that about a fixed axis, above which it counts as undefined: half a turn of swing but for 2e-3 rad."""
+"""Torque of a twist over that about a fixed axis, above which it counts as undefined: half a turn of swing, less 2e-3 rad."""
 
 
 class JointState:
@@ -50,7 +59,7 @@ class JointState:
 
     """
 
-    def __init__(self, world) -> None:
+    def __init__(self, world: World) -> None:
         """All joints whole and without load."""
         joints: list[Joint] = world.joints_of_scene
         self.table = world.joints
@@ -84,7 +93,7 @@ class JointState:
                 if i >= 0 and world.dynamic[i]:
                     self._of_body.setdefault(i, []).append(j)
 
-    def at(self, bodies) -> np.ndarray:
+    def at(self, bodies: Iterable[int]) -> np.ndarray:
         """Whole joints at any of the given dynamic bodies, in order."""
         found = {j for i in bodies for j in self._of_body.get(int(i), ()) if self.whole[j]}
         return np.array(sorted(found), np.int64)
@@ -108,13 +117,13 @@ class JointState:
         """Whether one of the joints is fixed to the world."""
         return bool(np.any(self.table.body_a[which] < 0) or np.any(self.table.body_b[which] < 0))
 
-    def moving_bodies(self, run) -> np.ndarray:
+    def moving_bodies(self, run: Run) -> np.ndarray:
         """Dynamic bodies with joints that do not rest."""
         bodies = np.array(sorted(self._of_body), np.int64)
         return bodies[run.state.trajectory.mode[bodies] != FIXED]
 
-    def project_velocities(self, run, island) -> None:
-        """End the group's sub-steps: take half of the forces back, close what drifted, stop the joints."""
+    def project_velocities(self, run: Run, island: Island) -> None:
+        """End the island's sub-steps: take half of the forces back, close what drifted, stop the joints."""
         state, now, memory = run.state, run.state.now, self.memory
         members, which = island.members, island.joints
         elapsed = np.zeros(len(self.whole))
@@ -155,7 +164,7 @@ class JointState:
         if len(which) and np.all(begun == begun[0]) and kinetic > 0.0:
             self.drift[which] = abs(energy - begun[0]) / kinetic
 
-    def _book(self, run, which: np.ndarray, time: float) -> None:
+    def _book(self, run: Run, which: np.ndarray, time: float) -> None:
         """Impulses on b of the sub-steps that end: half of what their forces were, and what stopped the joints."""
         for j in which.tolist():
             a, b, cause = int(self.table.body_a[j]), int(self.table.body_b[j]), f"joint {self.names[j]}"
@@ -165,7 +174,7 @@ class JointState:
             run.impulses.add_at(cause, a, b, time, self.shock[j] - self._accounted_shock[j])
         self._accounted_shock[which] = self.shock[which]
 
-    def impact_block(self, run, island):
+    def impact_block(self, run: Run, island: Island) -> JointBlock:
         """The joints' part in the impulses of an impact (`JointBlock`)."""
         state = run.state
         return impact_rows(
@@ -173,7 +182,7 @@ class JointState:
             self.shock,
         )
 
-    def sub_step(self, run, island, h: float) -> float:
+    def sub_step(self, run: Run, island: Island, h: float) -> float:
         """Length of the next sub-step: h, the rest of the step, or a part of it. Very short rests are planned as longer ones."""
         world, now = run.world, run.state.now
         fastest = 0.0
@@ -208,7 +217,7 @@ class JointState:
         square = np.where(table.per_mass[works], stiffness, stiffness * memory.weight[works])
         return math.sqrt(square.max(initial=0.0))
 
-    def _tension_rates(self, run, which: np.ndarray) -> tuple[float, float]:
+    def _tension_rates(self, run: Run, which: np.ndarray) -> tuple[float, float]:
         """Bounds of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m r)).
 
         Returns that of all others, and that of bodies that only swing about a point which cannot be moved.
@@ -226,14 +235,16 @@ class JointState:
         own = (square for i, square in squares.items() if i in swinging)
         return math.sqrt(max(others, default=0.0)), math.sqrt(max(own, default=0.0))
 
-    def hold(self, run, island, contacts, turning, force, rest: float, rolling) -> tuple[float, float]:
+    def hold(
+        self, run: Run, island: Island, contacts: Contacts, turning: np.ndarray, force: np.ndarray, rest: float, rolling: Rolling | None
+    ) -> tuple[float, float]:
         """Forces into run.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         state, memory = run.state, self.memory
         others = self.bodies_of(island.joints)
         others = others[~run.world.dynamic[others]]
         h, cuts = self.sub_step(run, island, rest), 0
         while True:
-            h = island.load(run, h)
+            h = load_over(run, island, h)
             for i in others:
                 memory.end_position[i], memory.end_rotation[i] = run.pose_matrix(i, island.time + h)
             moment = self.moment.copy()
@@ -263,14 +274,14 @@ class JointState:
         self.are_closed = worst <= NOT_CLOSED * self._allowed
         return h, residual
 
-    def let_go(self, island) -> None:
-        """Forget the forces of the group's joints, which are not to be used."""
+    def let_go(self, island: Island) -> None:
+        """Forget the forces of the island's joints, which are not to be used."""
         self.memory.wrench[island.members] = 0.0
         self.pull[island.joints] = 0.0
         for j in island.joints.tolist():
             self.memory.force[self.table.first[j] : self.table.first[j + 1]] = 0.0
 
-    def _report(self, run, island, worst: float) -> None:
+    def _report(self, run: Run, island: Island, worst: float) -> None:
         """Report joints that are off by `worst` m or rad, and those near the singularity of a twist."""
         names = tuple(run.world.names[i] for i in island.members)
         if worst > NOT_CLOSED * self._allowed:
@@ -284,7 +295,7 @@ class JointState:
                     f"{self.names[j]}: its axis has swung by half a turn, where the twist about it is not defined; limit the swing",
                 )
 
-    def _break(self, run, island) -> bool:
+    def _break(self, run: Run, island: Island) -> bool:
         """Take out a joint whose time has come, or the most overloaded one, if there is one."""
         which = island.joints
         due = which[self.release_time[which] <= island.time]
@@ -298,7 +309,7 @@ class JointState:
         self._take_out(run, island, j, "joint broke", f": {np.linalg.norm(self.pull[j]):.6g} N")
         return True
 
-    def _take_out(self, run, island, j: int, kind: str, why: str) -> None:
+    def _take_out(self, run: Run, island: Island, j: int, kind: str, why: str) -> None:
         """The joint is gone."""
         self.whole[j] = False
         island.joints = island.joints[island.joints != j]
@@ -306,18 +317,18 @@ class JointState:
         run.log.note(island.time, kind, pair, f"{self.names[j]}{why}")
         self.reactions.append((island.time, j, np.zeros(3)))
 
-    def log_rest(self, island) -> None:
-        """Forces on b from here on, while the group rests."""
+    def log_rest(self, island: Island) -> None:
+        """Forces on b from here on, while the island sleeps."""
         for j in island.joints.tolist():
             self.reactions.append((island.time, j, self.pull[j].copy()))
 
-    def _log(self, island, h: float) -> None:
+    def _log(self, island: Island, h: float) -> None:
         """Forces on b at this instant: its impulses over half of the sub-steps on both sides."""
         for j in island.joints.tolist():
             self.reactions.append((island.time, j, self.moment[j] / (0.5 * (self.length[j] + h))))
 
 
-def _slide_rate(now, a: int, b: int, step: float) -> float:
+def _slide_rate(now: BodyState, a: int, b: int, step: float) -> float:
     """sqrt(w u / r) [1/s] of a body that slides at u in the frame of another, which turns at w, at the distance r; w at most.
 
     The force of the guide, 2 m w u, turns with the frame: constant over h it makes or loses energy, of the order of (w h)^2 u / r a second.
@@ -329,10 +340,8 @@ def _slide_rate(now, a: int, b: int, step: float) -> float:
     return math.sqrt(turn * min(turn, slide / distance)) if distance > 0.0 else turn
 
 
-def reaction_table(joints: JointState | None, times: np.ndarray) -> dict[str, np.ndarray]:
+def reaction_table(joints: JointState | NoJoints, times: np.ndarray) -> dict[str, np.ndarray]:
     """Forces on b by joint name, (f, 3) N at the frame times."""
-    if joints is None:
-        return {}
     table = {}
     for j, name in enumerate(joints.names):
         nodes = [(time, force) for time, k, force in joints.reactions if k == j]

@@ -5,9 +5,9 @@ length h the same forces leave a(h), and a gap that is off by
 
     error = integral of (h - s) a(s) ds = a(h) h^2 / 6,    a(s) = a(h) s / h.
 
-a(h) is taken at the state at the end of the very courses, with the places of contact moved on by their velocities. The
-sub-step is so long that the error is a part of delta, h (allowed / error)^(1/3), and what is left of it is closed by the
-forces (`resting`).
+a(h) is taken at the state at the end of the very trajectories, with the places of contact moved on by their velocities. The
+sub-step is so long that the error is a part of the contact margin, h (allowed / error)^(1/3), and what is left of it is closed by the
+forces (`dynamics/constraints/contact.py`).
 """
 
 from __future__ import annotations
@@ -15,19 +15,22 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.core.quaternion import cross
-from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
+from rigidimpulse.dynamics.constraints.contact_motion import Motion, contact_motion
 from rigidimpulse.dynamics.impact.point import BodyState, Contacts
+from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.touching import bring_all
+from rigidimpulse.model.island import Island
+from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import FORCED, begin, make_trajectories
 
 ALLOWED = 0.1
-"""Part of delta by which a gap may be off at the end of a sub-step."""
+"""Part of the contact margin by which a gap may be off at the end of a sub-step."""
 
 
 class ErrorEstimate:
     """The state of some bodies at the end of a sub-step, each in a row of its own."""
 
-    def __init__(self, world) -> None:
+    def __init__(self, world: World) -> None:
         """Without room for any yet."""
         self._world = world
         self._grow(0)
@@ -42,12 +45,12 @@ class ErrorEstimate:
         self.acceleration = np.empty((k, 3))
         self.angular_acceleration = np.empty((k, 3))
 
-    def gap_errors(self, run, island, contacts: Contacts, subset: np.ndarray, motion, wrench, h: float) -> np.ndarray:
+    def gap_errors(self, run: Run, island: Island, contacts: Contacts, subset: np.ndarray, motion: Motion, h: float) -> np.ndarray:
         """Errors (m,) of the gaps of the held contacts after h [m].
 
-        motion: what `contact_motion` said of them; wrench (n, 6): of their forces.
+        motion: what `contact_motion` said of them; `run.wrench` holds their forces.
         """
-        world = self._world
+        world, wrench = self._world, run.wrench
         touched = np.unique(np.concatenate([island.members, contacts.body_a, contacts.body_b]))
         if len(touched) > len(self.rotation):
             self._grow(2 * len(touched))
@@ -66,7 +69,7 @@ class ErrorEstimate:
         point_b = self.acceleration[b] + cross(self.angular_acceleration[b], ahead.arm_b)
         return np.einsum("ij,ij->i", point_b - point_a + turning, normal) * (h * h / 6.0)
 
-    def _take_over(self, run, touched: np.ndarray) -> None:
+    def _take_over(self, run: Run, touched: np.ndarray) -> None:
         """Rows of bodies as they are now; the velocities of those that are no members are constant."""
         k, now, world = len(touched), run.state.now, self._world
         for ours, theirs in zip(self.bodies[:4], now[:4], strict=True):

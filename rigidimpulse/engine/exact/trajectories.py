@@ -1,46 +1,39 @@
-"""The stage integrate: new courses for the bodies of a group whose motion changed."""
+"""New trajectories for the bodies of an island whose motion changed: parabola and free or forced rotation, or lines of varying forces."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
 
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.dynamics.energy import mechanical_energy
-from rigidimpulse.engine.islands import Island
+from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.pair_table import sweep_pair_again
-from rigidimpulse.engine.plan import Bound, Skip
+from rigidimpulse.engine.run import Run
+from rigidimpulse.model.island import Island
 from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, take
 
 HALF_KEPT = 0.55
-"""Held contacts nearer than this part of delta are guarded at half of their gap."""
+"""Held contacts nearer than this part of the contact margin have half of their gap as impact margin."""
 LEAVING = 1e-6
 """Part of its gap by which a leaving pair may come nearer before it counts as contact again."""
+WHOLE = 1.0 - 1e-9
+"""Part of the rest of a step that counts as all of it."""
 NOTHING = np.zeros(3)
 
 
-@dataclass(frozen=True)
-class ExactFlight:
-    """Parabola and free rotation in closed form; constant contact forces between events."""
+def begin_trajectories(run: Run, pair_events: PairEvents, island: Island) -> None:
+    """New trajectories for members whose velocity, pose or wrench changed, and the gaps at which pairs meet next.
 
-    stage: str = "integrate"
-    name: str = "exact flight"
-
-    def bind(self, world) -> Bound | Skip:
-        """In where no force varies: it is what moves bodies."""
-        if world.force_tables:
-            return Skip("forces vary")
-        return Bound(integrate, "paths between impacts are exact")
-
-
-def integrate(run, pair_events, island: Island) -> None:
-    """Give new courses to members whose velocity, pose or wrench changed, and set the gaps at which pairs meet next."""
+    Members that varying forces act on, and nothing holds, fly under them for as long as the error of a step allows.
+    """
+    if island.free is not None and not island.loaded:
+        members = island.members[run.forces.acts[island.members]]
+        h = run.forces.fly(run, members, island.time, pair_events.end)
+        pair_events.wake[members] = np.where(h < (pair_events.end - island.time) * WHOLE, island.time + h, np.inf)
     state, now = run.state, run.state.now
     trajectory = state.trajectory
-    if island.substepped is not None:
-        run.substepped.begin_trajectories(run, pair_events, island)
     for n, i in enumerate(island.members.tolist()):
         if pair_events.inside[i] or (island.rests and trajectory.mode[i] == FIXED and not island.moved):
             continue
@@ -56,8 +49,8 @@ def integrate(run, pair_events, island: Island) -> None:
     set_margins(run, pair_events, island)
 
 
-def begin_trajectory(run, pair_events, i: int, time: float, wrench: np.ndarray, rests: bool) -> None:
-    """Body i leaves its course at `time` for one from its present state, with a constant wrench (6,)."""
+def begin_trajectory(run: Run, pair_events: PairEvents, i: int, time: float, wrench: np.ndarray, rests: bool) -> None:
+    """Body i gets a new trajectory at `time`, from its present state, with a constant wrench (6,)."""
     state, world, now = run.state, run.world, run.state.now
     trajectory = state.trajectory
     if not isfinite(float(now.velocity[i].sum() + now.angular_velocity[i].sum())):
@@ -66,14 +59,13 @@ def begin_trajectory(run, pair_events, i: int, time: float, wrench: np.ndarray, 
     run.recorder.flush(trajectory, i, time, state.correction[i])
     state.correction[i] = 0.0
     run.contact_log.close([i], time)
-    if run.forces is not None:
-        run.forces.log.end(i, time)
+    run.forces.log.end(i, time)
     account_contact_work(run, i, time)
     pressed = not rests and bool(wrench.any())
     if rests:
         now.velocity[i] = now.angular_velocity[i] = 0.0
         take(trajectory, i, time, now, NOTHING, NOTHING, NOTHING, NOTHING, FIXED)
-    elif run.forces is not None and run.forces.acts[i]:
+    elif run.forces.acts[i]:
         total, rate = wrench + run.forces.value[i], run.forces.rate[i]
         acceleration, jerk = world.steady_acceleration[i] + world.inv_mass[i] * total[:3], world.inv_mass[i] * rate[:3]
         turned = total[3:].any() or rate[3:].any()
@@ -87,25 +79,24 @@ def begin_trajectory(run, pair_events, i: int, time: float, wrench: np.ndarray, 
     state.under_contact[i] = pressed
     if pressed:
         state.energy_at_start[i] = mechanical_energy(now, world, np.array([i])) - work_of_forces(run, i)
-    if pair_events is not None:
-        pair_events.trajectory_changed(i, time)
+    pair_events.trajectory_changed(i, time)
 
 
-def account_contact_work(run, i: int, time: float) -> None:
-    """Work that contact forces did along the course that ends: what its energy changed by."""
+def account_contact_work(run: Run, i: int, time: float) -> None:
+    """Work that contact forces did along the trajectory that ends: what its energy changed by."""
     arrival = run.state.end_energy.pop(i, None)
     if arrival is not None:
         begun, arrival = run.state.energy_at_start[i], arrival - work_of_forces(run, i)
         run.log.stretches.append((run.state.trajectory.start[i], time, i, begun, arrival - begun))
 
 
-def work_of_forces(run, i: int) -> float:
-    """What varying forces did on body i until its present course began, J."""
-    return 0.0 if run.forces is None else float(run.forces.log.work[i])
+def work_of_forces(run: Run, i: int) -> float:
+    """What varying forces did on body i until its present trajectory began, J."""
+    return float(run.forces.log.work[i])
 
 
-def set_margins(run, pair_events, island: Island) -> None:
-    """Gaps at which the group's pairs come to contact next."""
+def set_margins(run: Run, pair_events: PairEvents, island: Island) -> None:
+    """Gaps at which the island's pairs come to contact next."""
     if len(island.place):
         held = np.zeros(len(island.place), bool) if island.held is None else island.held
         pairs, dynamic = pair_events.pairs, run.world.dynamic

@@ -2,37 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from rigidimpulse.collision.geometry import HALF_SPACE
-from rigidimpulse.engine.plan import Bound, Skip
 from rigidimpulse.engine.regime import only_expensive, why_not_substepped
 from rigidimpulse.engine.spheres.layout import BALL, OTHER, PLANE
+from rigidimpulse.model.world import World
 
 ARRIVED, STEP, GO_ON, FULL = 0, 1, 2, 3
 """How a flight of the kernel ends: at its end; at a boundary whose step is not simple; between boundaries, at something that is not
 simple; for want of room in a table."""
 
 
-@dataclass(frozen=True)
-class EventKernel:
-    """Flight of balls from impact to impact in one kernel; it changes nothing but the time that a run takes."""
-
-    stage: str = "sweep"
-    name: str = "event kernel"
-
-    def bind(self, world) -> Bound | Skip:
-        """In where a ball may collide and nothing in the scene needs every step."""
-        reason = why_not(world)
-        if reason:
-            return Skip(reason)
-        count = int(np.count_nonzero((kinds(world) == BALL) & world.dynamic))
-        return Bound(None, f"impacts of {count} balls with each other and with planes, as long as nothing lasting touches")
-
-
-def why_not(world) -> str:
+def why_not(world: World) -> str:
     """Why a scene is left to the loop in Python; empty where it is not."""
     accuracy = world.accuracy
     if not world.can_collide:
@@ -48,10 +30,10 @@ def why_not(world) -> str:
         return "triggers are looked at after every step"
     if accuracy.impact_time not in ("bisection", "conservative") or accuracy.response == "kinematic":
         return f"{accuracy.impact_time}, {accuracy.response}"
-    return "" if why_not_substepped(world) or only_expensive(world) else "bodies may heap up"
+    return "" if why_not_substepped(world) or only_expensive(world) else "bodies may pile up"
 
 
-def kinds(world) -> np.ndarray:
+def kinds(world: World) -> np.ndarray:
     """(n,) BALL, PLANE or OTHER."""
     geometry, shape = world.geometry, world.shape_of_body
     first = geometry.shape_first[shape]

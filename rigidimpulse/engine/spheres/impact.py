@@ -25,8 +25,8 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.energy import kinetic_of
 from rigidimpulse.dynamics.impact.point import relative_velocity, resolve_contact, speed_scale
 from rigidimpulse.engine.exact.impacts import SLOW
-from rigidimpulse.engine.islands import MARGIN
 from rigidimpulse.engine.pair_events import INSTANT
+from rigidimpulse.engine.pair_table import MARGIN
 from rigidimpulse.engine.spheres.layout import PLANE
 from rigidimpulse.engine.spheres.motion import begin_free_trajectory, bring_ball, write_frames
 from rigidimpulse.engine.spheres.paths import GAP, KIND, MOVES, RADIUS

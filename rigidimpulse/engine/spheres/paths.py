@@ -15,7 +15,7 @@ from rigidimpulse.collision.time_of_impact.motion_bound import length, scaled
 from rigidimpulse.collision.time_of_impact.spheres import until_contact
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.quaternion import rotated
-from rigidimpulse.engine.islands import MARGIN
+from rigidimpulse.engine.pair_table import MARGIN
 from rigidimpulse.engine.spheres.layout import OTHER
 from rigidimpulse.motion.trajectory import FIXED
 

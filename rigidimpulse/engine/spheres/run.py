@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.dynamics.impact.restitution import LAWS
-from rigidimpulse.engine.islands import empty_contacts
 from rigidimpulse.engine.pair_table import NEAR, ROUND_OFF
+from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.spheres.effect import FULL, STEP, kinds
 from rigidimpulse.engine.spheres.flight import fly
 from rigidimpulse.engine.spheres.impact import copy_rebounds, remember
@@ -14,6 +14,8 @@ from rigidimpulse.engine.spheres.layout import PLANE, Fixed, Motion, Rebounds, S
 from rigidimpulse.engine.spheres.paths import BODY, DYNAMIC, GAP, KIND, LEVEL, PATH_SIZE, PLANE_SIZE, RADIUS
 from rigidimpulse.engine.spheres.queue import make_queue
 from rigidimpulse.engine.spheres.tree import make_tree
+from rigidimpulse.model.island import empty_contacts
+from rigidimpulse.model.world import World
 from rigidimpulse.recording.events import ROW_LENGTH
 
 CAPACITY = 256
@@ -31,8 +33,8 @@ LONGEST_PAUSE = 16
 class EventRun:
     """The kernel's tables for one run."""
 
-    def __init__(self, run) -> None:
-        """run: of the run, with the first courses."""
+    def __init__(self, run: Run) -> None:
+        """run: with the first trajectories."""
         world = run.world
         self._run, self._pause, self._waits, self._interval = run, 0, 0, FIRST_INTERVAL
         self._fixed = Fixed(
@@ -72,8 +74,8 @@ class EventRun:
         """Whether to try the kernel now: not where contacts last, and not at once again where it did not get on."""
         waits, self._waits = self._waits > 0, max(self._waits - 1, 0)
         run = self._run
-        calm = run.substepped is None or run.substepped.is_idle()
-        return not waits and calm and not run.state.under_contact.any() and run.soft_bodies is None
+        idle = run.substepped.is_idle()
+        return not waits and idle and not run.state.under_contact.any() and not run.soft_bodies.moves
 
     def fly(self, end: float, at_boundary: bool = True) -> tuple[int, float, float]:
         """Carry the scene from a boundary of steps, or from the middle of one, towards `end` [s] as far as what happens is simple.
@@ -147,7 +149,7 @@ class EventRun:
         copy_rebounds(old, self._rebounds)
 
 
-def _constants(world) -> tuple[np.ndarray, np.ndarray]:
+def _constants(world: World) -> tuple[np.ndarray, np.ndarray]:
     """Rows of paths (n, PATH_SIZE) and planes (q, PLANE_SIZE) with what never changes."""
     kind = kinds(world)
     paths, which = np.zeros((world.num_bodies, PATH_SIZE)), np.flatnonzero(kind == PLANE)

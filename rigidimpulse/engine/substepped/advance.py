@@ -1,11 +1,14 @@
-"""Heaps: islands of many bodies, stepped by the sub-stepped solver (`heap_solver`) instead of from contact to contact.
+"""Sub-stepped islands: which bodies are advanced by sub-steps, how they arrive, and when they sleep.
 
-At the start of a step islands are chosen (`heap_islands`); their bodies get courses (mode STEPPED) that end in the poses
-which the solver found for the end of the step. Pairs inside a heap are not swept; pairs of a member and any other body are,
-and at their contact the impulse is found exactly and the heap is stepped anew from there, the other body with it if it is slow
-enough. Contacts are held at a gap, the skin. A member that stays within PLAY skins of one place and below CALM sqrt(g r) for
-REST sqrt(r / g) s (r: inner radius) is calm. Calm members that no restless one stirs (`stirred`) stand still, to the bit, and bear
-the others; a heap whose members are all calm stands still until something touches it.
+At the start of a step islands are chosen (`regime.py`). Their bodies get trajectories (mode LINEAR) that end in the poses which the
+solver found
+for the end of the step. Pairs inside such an island are not swept. Pairs of a member and any other body are: at their contact the
+impulse is
+found exactly and the island is stepped again from there, with the other body if it is slow enough. Contacts are held at a gap, the skin.
+
+A member that stays within SLEEP_MOTION skins of one place and below SLEEP_SPEED sqrt(g r) for REST sqrt(r / g) s (r: inner radius) is
+sleepy. Sleepy members that no moving one wakes (`sleeping.wake_by_contact`) stand still, to the bit, and bear the others. An island whose
+members are all asleep stands still until something touches it.
 """
 
 from __future__ import annotations
@@ -15,10 +18,10 @@ from functools import cached_property
 
 import numpy as np
 
-from rigidimpulse.dynamics.constraints.energy_limit import note_end_energy
 from rigidimpulse.dynamics.energy import mechanical_energy
+from rigidimpulse.engine.exact.energy_limit import note_end_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work
-from rigidimpulse.engine.islands import Island, empty_contacts
+from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.regime import (
     EXPENSIVE_SOLVES,
     FAST,
@@ -32,45 +35,43 @@ from rigidimpulse.engine.regime import (
     refusals,
     support_levels,
 )
+from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.sleeping import advance_sleep_timers, wake_by_contact
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Outcome
-from rigidimpulse.engine.substepped.trajectories import (
-    advance_sleep_timers,
-    depart,
-    end_trajectories,
-    let_fly,
-    mark_slow,
-    most_stray,
-    wake_by_contact,
-)
+from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.touching import bring_all
 from rigidimpulse.engine.warm_up import prepare_kernels
+from rigidimpulse.model.island import Island, island_without_contacts
+from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import FIXED, LINEAR
 
+NAME = "sub-stepped islands"
+"""What `explain` calls them."""
 REST = 3.0
-"""For how long members must have hardly moved to be calm, in sqrt(r / g), see `heap_courses`."""
+"""For how long members must have hardly moved to be sleepy, in sqrt(r / g), see `sleeping.py`."""
 LEAVING = 0.1
-"""Part of its speed at which a fast body must leave a heap that it has hit to be no part of it."""
+"""Part of its speed at which a fast body must leave an island that it has hit to be no part of it."""
 MOST_PIECES = 4
-"""Parts of what is stepped at once, between which a heap's courses begin anew."""
+"""Parts of what is stepped at once, between which trajectories begin again."""
 STRAY = 10.0
-"""Skins by which courses may stray from the ways of turning bodies, over `Accuracy.substep_motion`: a skin by default."""
+"""Skins by which trajectories may stray from the ways of turning bodies, over `Accuracy.substep_motion`: a skin by default."""
 TOUCHES = 5.0
-"""Skins within which a body at rest belongs to the heap that comes near it."""
+"""Skins within which a body at rest belongs to the island that comes near it."""
 
 
 class SubsteppedIslands:
-    """The heaps of a run.
+    """The sub-stepped islands of a run.
 
     Attributes:
-        label: (n,) the heap that a body belongs to, -1 for none; heaps at rest keep theirs.
-        calm: (n,) s, for how long a member has hardly moved.
-        asleep: (n,) bool, members that stand still while others of their heap move.
-        toil: (n,) how often the exact solver has dealt with each body in the step.
+        label: (n,) the island that a body belongs to, -1 for none; sleeping ones keep theirs.
+        sleep_timer: (n,) s, for how long a member has hardly moved.
+        asleep: (n,) bool, members that stand still while others of their island move.
+        solve_count: (n,) how often the exact solver has dealt with each body in the step.
 
     """
 
-    def __init__(self, world) -> None:
-        """No heaps yet."""
+    def __init__(self, world: World) -> None:
+        """No island is sub-stepped yet."""
         self._world, self._only_expensive, self._movable = world, only_expensive(world), world.dynamic.copy()
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.sleep_timer = np.zeros(world.num_bodies)
@@ -94,17 +95,17 @@ class SubsteppedIslands:
         return ContactStepper(self._world, self._movable, self._only_expensive)
 
     def is_idle(self) -> bool:
-        """Whether no heap is there and none may begin."""
+        """Whether no island is sub-stepped and none may begin to be."""
         return self._only_expensive and self.solve_count.sum() <= FEW * EXPENSIVE_SOLVES and bool(np.all(self.label < 0))
 
     def summary(self) -> str:
-        """What became of heaps in the run."""
+        """What became of sub-stepped islands in the run."""
         refused = ", ".join(f"{reason} ({count})" for reason, count in sorted(self._refused.items()))
         text = f"{self._steps} steps, largest {self._most} bodies" if self._steps else "none"
-        return f"{text}; left to newton, islands times steps: {refused}" if refused else text
+        return f"{text}; left to the exact regime, islands times steps: {refused}" if refused else text
 
-    def gather(self, run, pair_events) -> None:
-        """Choose the heaps of the step: `window.inside` marks their bodies, `window.still` those at rest."""
+    def choose(self, run: Run, pair_events: PairEvents) -> None:
+        """Choose the islands of the step: `pair_events.inside` marks their bodies, `pair_events.asleep` the sleepers."""
         idle, solve_count = self.is_idle(), self.solve_count
         if pair_events.end > self._step_end:
             self.solve_count, self._step_end = np.zeros_like(solve_count), pair_events.end
@@ -122,8 +123,8 @@ class SubsteppedIslands:
         pair_events.inside |= chosen
         pair_events.asleep |= (self.label >= 0) & (trajectory.mode == FIXED)
 
-    def _choose(self, run, pair_events, brought: np.ndarray, solve_count: np.ndarray) -> np.ndarray:
-        """Which bodies (n,) bool are stepped; those `brought` are at the begin of the window already."""
+    def _choose(self, run: Run, pair_events: PairEvents, brought: np.ndarray, solve_count: np.ndarray) -> np.ndarray:
+        """Which bodies (n,) bool are stepped; those `brought` are at the begin of the step already."""
         world, trajectory, time = run.world, run.state.trajectory, pair_events.begin
         member = world.dynamic & ((trajectory.mode != FIXED) | self.asleep)
         if not member.any():
@@ -151,19 +152,20 @@ class SubsteppedIslands:
         self._settle(run, chosen, root, a, b, touch > 0, time)
         return chosen
 
-    def _leave_out_fast(self, run, member: np.ndarray) -> None:
+    def _leave_out_fast(self, run: Run, member: np.ndarray) -> None:
         """Unmark those that are too fast for sub-steps."""
         h = self.stepper.sub_step(np.flatnonzero(run.world.dynamic))
         mark_slow(run.state.now, self.stepper.inner, FAST / h, SPIN / h, member)
 
-    def _near(self, run, member: np.ndarray, ahead: float) -> np.ndarray:
+    def _near(self, run: Run, member: np.ndarray, ahead: float) -> np.ndarray:
+        """Pairs (3, k) of members that may meet something in `ahead` s."""
         # Movable bodies under way that are no members are swept.
         other = ~member & ~(run.world.dynamic & (run.state.trajectory.mode != FIXED))
         self.stepper.find_pairs(run, np.flatnonzero(member), np.flatnonzero(other), ahead)
         return self.stepper.near(run, member, other, ahead)
 
-    def _touched(self, run, member: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Bodies at rest that members touch, and all of the heaps they belong to."""
+    def _touched(self, run: Run, member: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Bodies at rest that members touch, and all of the islands they belong to."""
         world = run.world
         resting = world.dynamic & ~member & (run.state.trajectory.mode == FIXED)
         which = np.flatnonzero(resting[a] | resting[b])
@@ -179,7 +181,7 @@ class SubsteppedIslands:
         mates = np.flatnonzero(resting & np.isin(self.label, labels[labels >= 0]))
         return np.union1d(touched, mates)
 
-    def _low(self, run, pair_events, chosen: np.ndarray, root: np.ndarray, refused: dict[int, str]) -> np.ndarray:
+    def _low(self, run: Run, pair_events: PairEvents, chosen: np.ndarray, root: np.ndarray, refused: dict[int, str]) -> np.ndarray:
         """Leave out islands that begin as tall columns."""
         begins = chosen & (self.label < 0)
         if not self._auto or not begins.any():
@@ -195,8 +197,10 @@ class SubsteppedIslands:
         refused.update(dict.fromkeys(tall.tolist(), "tall"))
         return chosen & ~np.isin(root, tall)
 
-    def _settle(self, run, chosen, root, a: np.ndarray, b: np.ndarray, touch: np.ndarray, time: float) -> None:
-        """Label the heaps; let those that have been calm for long stand still, and members that are far from restless ones."""
+    def _settle(
+        self, run: Run, chosen: np.ndarray, root: np.ndarray, a: np.ndarray, b: np.ndarray, touch: np.ndarray, time: float
+    ) -> None:
+        """Label the islands; put to sleep those that have been sleepy for long, and members that are far from moving ones."""
         world, trajectory = run.world, run.state.trajectory
         inner = self.stepper.inner
         carried = world.moving[a] | world.moving[b]
@@ -219,7 +223,7 @@ class SubsteppedIslands:
         chosen &= alive[root]
         self.asleep = asleep & chosen
 
-    def _put_to_sleep(self, run, members: np.ndarray, time: float) -> None:
+    def _put_to_sleep(self, run: Run, members: np.ndarray, time: float) -> None:
         """Let members stay where they are."""
         world, trajectory, now = run.world, run.state.trajectory, run.state.now
         if not len(members):
@@ -232,8 +236,8 @@ class SubsteppedIslands:
         self.stepper.report_crossed(run, members, time)
         run.log.account(time, "sub-stepping", mechanical_energy(now, world, members) - before)
 
-    def _end_trajectories(self, run, members: np.ndarray, time: float) -> None:
-        """Bring members to `time`, the end of their courses; book what the step took of their energy."""
+    def _end_trajectories(self, run: Run, members: np.ndarray, time: float) -> None:
+        """Bring members to `time`, the end of their trajectories; account for what the step took of their energy."""
         if not len(members):
             return
         state, world = run.state, run.world
@@ -243,35 +247,36 @@ class SubsteppedIslands:
             run.angular_acceleration,
         )  # fmt: skip
         for label in np.unique(self.label[members]).tolist():
-            self._book(run, label, time)
+            self._account(run, label, time)
 
-    def _book(self, run, label: int, time: float) -> None:
+    def _account(self, run: Run, label: int, time: float) -> None:
         if label in self._began:
             start, members, energy = self._began.pop(label)
             change = mechanical_energy(run.state.now, run.world, members) - energy
             run.log.account_over(start, time, "sub-stepping", change)
 
-    def close(self, run, time: float) -> None:
-        """Book what the steps under way take until `time`, the end of the run."""
-        members = np.flatnonzero(run.state.trajectory.mode == LINEAR)
+    def finish(self, run: Run) -> None:
+        """Account for what the sub-steps under way take until the end of the run, and tell the plan what was done."""
+        run.plan.tell(NAME, self.summary())
+        members, time = np.flatnonzero(run.state.trajectory.mode == LINEAR), run.state.time
         if not len(members):
             return
         self._end_trajectories(run, members, time)
         self.stepper.report_crossed(run, members, time)
         let_fly(run.state.trajectory, members, run.world.steady_acceleration)
 
-    def join(self, run, pair_events, time: float, islands: list[Island]) -> list[Island]:
-        """The groups at `time` with the heaps that they touch; at the start of a step all of its heaps."""
+    def join(self, run: Run, pair_events: PairEvents, time: float, islands: list[Island]) -> list[Island]:
+        """The islands at `time` with the sub-stepped ones that they touch; at the start of a step all that are sub-stepped."""
         for island in islands:
             self.solve_count[island.members] += 1.0
-        if pair_events.end <= pair_events.begin:  # the end of the run: there is no time to step a heap over
+        if pair_events.end <= pair_events.begin:  # the end of the run: there is no time to step over
             return [island for island in islands if np.all(self.label[island.members] < 0)]
         first = not pair_events.substepped_begun
         pair_events.substepped_begun = True
         hit = [island for island in islands if np.any(self.label[island.members] >= 0)]
         members = np.flatnonzero(pair_events.inside) if first else self._due(pair_events, time)
         if len(members) and not hit:
-            bare = _bare_island(time)
+            bare = island_without_contacts(time, np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
             self._bring_in(run, bare, members)
             return [*islands, bare]
         for island in hit:
@@ -281,12 +286,12 @@ class SubsteppedIslands:
         return islands
 
     def _due(self, pair_events, time: float) -> np.ndarray:
-        """Members of heaps whose courses end at `time`."""
+        """Members whose trajectories end at `time`."""
         due = [label for label, end in self._ends.items() if end <= time]
         return np.flatnonzero(pair_events.inside & np.isin(self.label, due)) if due else np.zeros(0, np.int64)
 
-    def _bring_in(self, run, island: Island, members: np.ndarray) -> None:
-        """Let the members be the heap of a group; bring them to its time. (Those that it does not touch are no members of the group.)"""
+    def _bring_in(self, run: Run, island: Island, members: np.ndarray) -> None:
+        """Let the members be advanced with an island; bring them to its time. (Those that it does not touch are no members of it.)"""
         state, time = run.state, island.time
         stepped = state.trajectory.mode[members] == LINEAR
         self._end_trajectories(run, members[stepped & (state.trajectory.start[members] < time)], time)
@@ -295,8 +300,9 @@ class SubsteppedIslands:
         run.acceleration[away] = run.world.steady_acceleration[away]
         island.substepped = members
 
-    def step(self, run, pair_events, island: Island) -> None:
-        """Step the heap of a group from its time to the end of the window, with what touches it and is slow."""
+    def contact_forces(self, run: Run, pair_events: PairEvents, island: Island) -> None:
+        """Step an island from its time to the end of the step, with what touches it and is slow."""
+        run.contact_log.close(island.members.tolist(), island.time)
         world, members = run.world, island.substepped
         assert members is not None
         if len(island.members):
@@ -329,8 +335,8 @@ class SubsteppedIslands:
         if end < pair_events.end:
             pair_events.wake[members] = end
 
-    def _take_in(self, run, fresh: np.ndarray, time: float) -> None:
-        """What exact contact did to bodies ends where they come to a heap."""
+    def _take_in(self, run: Run, fresh: np.ndarray, time: float) -> None:
+        """What exact contact did to bodies ends where they come to a sub-stepped island."""
         self._taken[fresh] = True
         run.wrench[fresh] = 0.0
         run.contact_log.close(fresh.tolist(), time)
@@ -339,8 +345,8 @@ class SubsteppedIslands:
             account_contact_work(run, i, time)
             run.state.under_contact[i] = False
 
-    def _end_of(self, run, pair_events, time: float, members: np.ndarray) -> float:
-        """When the courses of members end: before the step does where bodies are tiny, spin fast, or stray from their straight ways."""
+    def _end_of(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray) -> float:
+        """When the trajectories of members end: before the step does where bodies are tiny, spin fast, or stray from lines."""
         stepper = self.stepper
         step, allowed, pressed = stepper.step_length, STRAY * stepper.motion, stepper.pressed | self._only_expensive
         stray = most_stray(run.state.now, members, pressed, stepper.reach, stepper.skin, allowed)
@@ -349,7 +355,7 @@ class SubsteppedIslands:
         left = max(math.ceil((pair_events.end - time) * pieces / step - 1e-6), 1)
         return pair_events.end if left == 1 else time + (pair_events.end - time) / left
 
-    def _leaves(self, run, island: Island) -> np.ndarray:
+    def _leaves(self, run: Run, island: Island) -> np.ndarray:
         """Which members (k,) bool leave all that they touch at a speed worth the name."""
         slowest = np.full(run.world.num_bodies, np.inf)
         np.minimum.at(slowest, island.contacts.body_a, island.approach)
@@ -357,7 +363,7 @@ class SubsteppedIslands:
         speed = np.linalg.norm(run.state.now.velocity[island.members], axis=1)
         return slowest[island.members] > LEAVING * speed
 
-    def _set_up(self, run, members: np.ndarray, time: float, ahead: float, kept: float) -> None:
+    def _set_up(self, run: Run, members: np.ndarray, time: float, ahead: float, kept: float) -> None:
         """Put members, in their order, and the bodies near them that stand still before the solver; kept: see `review`."""
         world, order = run.world, self.stepper.order
         marked = np.zeros(world.num_bodies, bool)
@@ -371,8 +377,8 @@ class SubsteppedIslands:
         )  # fmt: skip
         self.stepper.set_up(run, members, fixed, ahead, kept)
 
-    def begin_trajectories(self, run, pair_events, island: Island) -> None:
-        """Give the members of a group's heap the courses that the solver found."""
+    def begin_trajectories(self, run: Run, pair_events: PairEvents, island: Island) -> None:
+        """Give the members the trajectories that the solver found."""
         out, state, time = self._outcome, run.state, island.time
         assert out is not None
         length = self._outcome_end - time
@@ -382,20 +388,10 @@ class SubsteppedIslands:
         self._update_sleep_timers(run, out, length)
         pair_events.trajectories_changed(out.members, time)
 
-    def _update_sleep_timers(self, run, out: Outcome, length: float) -> None:
+    def _update_sleep_timers(self, run: Run, out: Outcome, length: float) -> None:
         """For how long each member has hardly moved from where it was."""
         stepper = self.stepper
         advance_sleep_timers(
             out.members, out.position, out.orientation, out.velocity, run.world.steady_strength, stepper.inner, stepper.skin, length,
             self._stood, self.sleep_timer,
         )  # fmt: skip
-
-
-def _bare_island(time: float) -> Island:
-    """A group without contacts of the exact kind."""
-    none = np.zeros(0, np.int64)
-    return Island(
-        time=time, members=none, pairs=none, contacts=empty_contacts(0), place=none, kinds=none,
-        features=np.zeros((0, 2), np.int64), keys=[], contact_margin=np.zeros(0), approach=np.zeros(0), rest_speed=np.zeros(0),
-        live=np.zeros(0, bool), velocity=np.zeros((0, 3)), angular_velocity=np.zeros((0, 3)),
-    )  # fmt: skip

@@ -39,7 +39,9 @@ from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     place_patches,
 )
 from rigidimpulse.dynamics.solvers.tgs_soft.solver import FREQUENCY, advance, softness, special_patches
+from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.model.world import World
 
 COLUMN = 20.0
 """Bodies whose weight may press the skin in by PRESSED."""
@@ -95,7 +97,7 @@ class ContactStepper:
 
     """
 
-    def __init__(self, world, movable: np.ndarray, finer: bool) -> None:
+    def __init__(self, world: World, movable: np.ndarray, finer: bool) -> None:
         """Make the arrays of the bodies; shrink the shapes for the contact kernels.
 
         Args:
@@ -180,18 +182,18 @@ class ContactStepper:
         strength, step = float(self.world.steady_strength[members].max()), self.step_length
         return min(step, SPAN * math.sqrt(float(self.inner[members].min()) / strength)) if strength > 0.0 else step
 
-    def find_pairs(self, run, members: np.ndarray, others: np.ndarray, ahead: float) -> None:
+    def find_pairs(self, run: Run, members: np.ndarray, others: np.ndarray, ahead: float) -> None:
         """See that the pairs hold all that members may meet in `ahead` s, among themselves and of the others."""
         found = self.fat_boxes.renewed(run.state.now, run.acceleration, members, others, ahead)
         if found is not None:
             self.table.replace(*found)
             classify(self.table.pairs, self.bodies, self.shapes)
 
-    def near(self, run, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
+    def near(self, run: Run, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
         """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `Cover.near`."""
         return self.fat_boxes.near(self.table.pairs, run.state.now, run.acceleration, member, other, ahead)
 
-    def set_up(self, run, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0) -> None:
+    def set_up(self, run: Run, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0) -> None:
         """Put members and what they may touch before the kernels at the present instant, with their contacts; kept: see `review`."""
         self.find_pairs(run, members, supports, ahead)
         self.table.pack()
@@ -207,7 +209,7 @@ class ContactStepper:
         self.ahead = ahead / self._parts
         self._look(run, kept)
 
-    def _look(self, run, kept: float) -> None:
+    def _look(self, run: Run, kept: float) -> None:
         """Look at the contacts of all pairs in play, on several cores where the last look had much to do; kept: see `review`."""
         table, number = self.table, len(self.table.pairs.first)
         shares = self._shares if self._looked_at > WORTHWHILE else 1
@@ -232,7 +234,7 @@ class ContactStepper:
             waits = waits[np.argsort(self._places[waits])]
             self._look_at_general(run, self._places[waits], self._margins[waits])
 
-    def _look_at_general(self, run, places: np.ndarray, margin: np.ndarray) -> None:
+    def _look_at_general(self, run: Run, places: np.ndarray, margin: np.ndarray) -> None:
         """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `detect`."""
         table, world, pairs = self.table, self.world, self.table.pairs
         first, second = pairs.first[places], pairs.second[places]
@@ -261,7 +263,7 @@ class ContactStepper:
                 table.ids, int(table.free[0, 0]),
             )  # fmt: skip
 
-    def report_crossed(self, run, members: np.ndarray, time: float) -> None:
+    def report_crossed(self, run: Run, members: np.ndarray, time: float) -> None:
         """Report pairs of members, brought to the present, whose cores cross: where they press on each other is not known any more."""
         if not self._depth.any():
             return
@@ -278,7 +280,7 @@ class ContactStepper:
                     "the bodies are deeper inside each other than their contacts can tell; use a smaller step",
                 )  # fmt: skip
 
-    def _look_again(self, run) -> None:
+    def _look_again(self, run: Run) -> None:
         """Look at the contacts of quick bodies in the course of a step; those of all others stay in the steady batches, where they are."""
         bodies, width = self.bodies, self.simd.width
         all_quick = self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY
@@ -311,7 +313,7 @@ class ContactStepper:
         fill(self.simd, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
         return number
 
-    def move_apart(self, run, fresh: np.ndarray) -> None:
+    def move_apart(self, run: Run, fresh: np.ndarray) -> None:
         """Move members that are fresh apart from each other and from all else to the gaps that contacts are held at; their speeds pay."""
         bodies, now, at = self.bodies, run.state.now, self.rank[fresh]
         mine = np.zeros(len(bodies.part), bool)
@@ -326,7 +328,7 @@ class ContactStepper:
         now.angular_velocity[self.members] = bodies.velocity.reshape(-1, ROW)[members, 3:6]
         refresh_pose(fresh, now, run.state.rotation, self.world.inertia)
 
-    def step(self, run, time: float, end: float) -> Outcome:
+    def step(self, run: Run, time: float, end: float) -> Outcome:
         """Step what `set_up` put before the kernels from `time` to `end`."""
         bodies, members = self.bodies, self.members
         sub_steps = self._sub_steps

@@ -1,22 +1,20 @@
-"""Courses of the members of heaps: how they end, begin, and for how long bodies have been calm (kernels)."""
+"""Trajectories of the members of sub-stepped islands: how they end and begin (kernels)."""
 
 import numpy as np
 
-from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.quaternion import product, quaternion_to_matrix
 from rigidimpulse.motion.trajectory import FREE, LENGTH, LINEAR, SPEEDS, begin, begin_straight, stepped_at
 
-CALM, PLAY = 0.05, 0.5
-"""Speed, in sqrt(g r), and motion, in skins, below which a body is calm."""
 TURN = 2.5
-"""Angle by which a body may turn in one course, rad."""
+"""Angle by which a body may turn in one trajectory, rad."""
 EVEN = 1e-6
 """Part of its way by which a body may miss where an even acceleration would have brought it, for its path to be a parabola."""
 
 
 @jit
 def end_trajectories(trajectory, members, time, steady, bodies, rotation, acceleration, angular_acceleration):
-    """End the courses of members at `time`, bring them there, and let them go straight on; steady (n, 3) m/s2 is what pulls them."""
+    """End the trajectories of members at `time`, bring them there, and let them go straight on; steady (n, 3) m/s2 is what pulls them."""
     for i in members:
         place, q, v, w = stepped_at(trajectory, i, time)
         x, y, z = 1.0 / trajectory.inertia[i, 0], 1.0 / trajectory.inertia[i, 1], 1.0 / trajectory.inertia[i, 2]
@@ -83,78 +81,11 @@ def most_stray(bodies, members, pressed, reach, skin, allowed):
     return most
 
 
-@jit_making_arrays
-def wake_by_contact(first, second, member, restless, bodies, mass, strength, inner):
-    """Mark (n,) restless members, and calm ones that such a one may move, over pairs (k,) that may touch.
-
-    A body of mass m at a speed v that runs into calm ones of mass m_0 sets at most k = m v / (m_0 u) of them going faster than u: behind
-    that many bodies nothing moves on by more than what calm bodies may. u = CALM sqrt(g r), m_0 is the least mass of a member.
-    """
-    reach, least = np.zeros(member.shape[0]), np.inf
-    for i in range(member.shape[0]):
-        if member[i]:
-            least = min(least, mass[i])
-    for i in range(member.shape[0]):
-        if restless[i]:
-            speed, spin = 0.0, 0.0
-            for c in range(3):
-                speed += bodies.velocity[i, c] ** 2
-                spin += bodies.angular_velocity[i, c] ** 2
-            size = np.sqrt(speed) + inner[i] * np.sqrt(spin)
-            reach[i] = 1.0 + max(mass[i] * size / (least * max(CALM * np.sqrt(strength[i] * inner[i]), 1e-300)), 1.0)
-    left = 0
-    for i in range(member.shape[0]):
-        left += member[i] and reach[i] < 1.0
-    spreads, number, turn = True, first.shape[0], 0
-    while spreads and left > 0:
-        spreads, turn = False, 1 - turn
-        for k in range(number):
-            # To and fro: a stir goes far either way.
-            p = k if turn else number - 1 - k
-            a, b = first[p], second[p]
-            if not (member[a] and member[b]):
-                continue
-            if reach[a] > reach[b]:
-                a, b = b, a
-            if reach[b] - 1.0 > reach[a]:
-                left -= reach[a] < 1.0 <= reach[b] - 1.0
-                reach[a] = reach[b] - 1.0
-                spreads = spreads or reach[a] > 1.0
-    return reach >= 1.0
-
-
-@jit
-def advance_sleep_timers(members, position, orientation, velocity, strength, inner, skin, length, stood, sleep_timer):
-    """Add `length` s to the calm of members (k,) that have hardly moved from where they stood (n, 7); start anew that of the others."""
-    for k in range(members.shape[0]):
-        i = members[k]
-        moved, turned, speed, spin = 0.0, 0.0, 0.0, 0.0
-        for c in range(3):
-            moved += (position[k, c] - stood[i, c]) ** 2
-            speed += velocity[k, c] ** 2
-            spin += velocity[k, 3 + c] ** 2
-        for c in range(4):
-            turned += (orientation[k, c] - stood[i, 3 + c]) ** 2
-        play = PLAY * skin[i]
-        if (
-            np.sqrt(moved) <= play
-            and 2.0 * inner[i] * np.sqrt(turned) <= play
-            and np.sqrt(speed) + inner[i] * np.sqrt(spin) <= CALM * np.sqrt(strength[i] * inner[i])
-        ):
-            sleep_timer[i] += length
-            continue
-        sleep_timer[i] = 0.0
-        for c in range(3):
-            stood[i, c] = position[k, c]
-        for c in range(4):
-            stood[i, 3 + c] = orientation[k, c]
-
-
 @jit
 def depart(trajectory, members, time, length, bodies, position, orientation, velocity):
-    """Courses from the present poses to the given ones (k, 3), (k, 4), where the velocities are (k, 6).
+    """Trajectories from the present poses to the given ones (k, 3), (k, 4), where the velocities are (k, 6).
 
-    They are straight, but parabolas of bodies that fly freely: their velocities agree with where they come.
+    They are straight, and parabolas for bodies that fly freely: the velocities of those agree with where they come.
     """
     for k in range(members.shape[0]):
         i = members[k]

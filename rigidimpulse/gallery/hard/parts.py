@@ -114,7 +114,7 @@ def apart(run: Recording, num_frames: int = 20) -> Check:
     """Return the check that no two bodies are inside each other, at some frames after the given one, asked of FCL."""
     from rigidimpulse.collision.distance.fcl import Narrowphase
     from rigidimpulse.core.quaternion import multiply
-    from rigidimpulse.model.world import compile_scene
+    from rigidimpulse.engine.compile_scene import compile_scene
 
     assert run.scene is not None
     world = compile_scene(run.scene)

@@ -25,8 +25,7 @@ from rigidimpulse.recording.recorder import sample_paths
 from rigidimpulse.recording.recording import Recording, RunSettings
 
 if TYPE_CHECKING:
-    from rigidimpulse.engine.plan import Plan
-    from rigidimpulse.engine.simulate import Running
+    from rigidimpulse.engine.run import Run
 
 EXPENSIVE = 20.0
 """How many times longer than the last checkpoint took the run goes on before the next."""
@@ -50,33 +49,33 @@ class Checkpointer:
     """The cache of one run.
 
     Attributes:
-        running: the run, where its last checkpoint left it if there is one.
+        run: the run, where its last checkpoint left it if there is one.
 
     """
 
-    def __init__(self, cache: Cache | str | os.PathLike[str], settings: RunSettings, running: Running, plan: Plan) -> None:
-        """Take the state of a run's last checkpoint, if there is one, and begin to write; running: the same run at its start.
+    def __init__(self, cache: Cache | str | os.PathLike[str], settings: RunSettings, run: Run) -> None:
+        """Take the state of a run's last checkpoint, if there is one, and begin to write; run: the same run at its start.
 
         Raises:
             SceneError: another suffix, a file that is no cache, or one of another scene, of other settings or of another version.
 
         """
         self._cache = cache if isinstance(cache, Cache) else Cache(cache)
-        self._path, self._plan = Path(self._cache.path), plan
+        self._path = Path(self._cache.path)
         where = f"cache {self._path.name!r}"
         if self._path.suffix not in SUFFIXES:
             raise SceneError("it has another suffix", f"use a name that ends in {' or '.join(SUFFIXES)}", where)
         if not self._cache.every >= 0.0:
             raise SceneError(f"every = {self._cache.every!r}", "give the seconds between checkpoints, >= 0", where)
-        world, recorder = running.run.world, running.run.recorder
+        world, recorder = run.world, run.recorder
         duration, fps, accuracy, effects = settings
         mark = fingerprint(world.scene, duration, fps, accuracy, effects)
         header = Header(mark, rigidimpulse.__version__, duration, fps, list(world.names), recorder.times, world.offset, world.turn)
         kept = self._look_up(header)
         self._frames = self._impacts = 0
         self._state = b""
-        self.running = running if kept is None or kept.state is None else self._recall(running, kept)
-        self._written = self.running.run.recorder.written.copy()
+        self.run = run if kept is None or kept.state is None else self._recall(run, kept)
+        self._written = self.run.recorder.written.copy()
         complete = kept is not None and kept.complete
         self._file = None if complete else CacheFile(self._path, header, kept)
         self._last, self._cost = perf_counter(), 0.0
@@ -92,14 +91,14 @@ class Checkpointer:
             raise SceneError(_difference(known, header), "delete it, or give another name", f"cache {str(self._path)!r}")
         return content
 
-    def _recall(self, running: Running, kept: Content) -> Running:
+    def _recall(self, run: Run, kept: Content) -> Run:
         """The run as its checkpoint left it."""
-        recorder, rows = running.run.recorder, running.run.log.impacts
+        recorder, rows = run.recorder, run.log.impacts
         for name, frames in kept.frames.items():
             getattr(recorder, name)[: len(frames)] = frames
         rows.rows = np.concatenate([kept.impacts, rows.rows])
         self._frames, self._impacts = len(kept.frames["position"]), len(kept.impacts)
-        return thaw(kept.state or b"", _constants(running.run, self._plan))
+        return thaw(kept.state or b"", _constants(run))
 
     def look(self, time: float, more: Callable[[float], None] | None = None) -> None:
         """Write a checkpoint if it is time to; call `more` with the time of the run [s]."""
@@ -112,13 +111,13 @@ class Checkpointer:
         """Write a checkpoint at the time of the run [s]."""
         if self._file is None:
             return
-        start, run = perf_counter(), self.running.run
+        start, run = perf_counter(), self.run
         recorder = run.recorder
         changed = recorder.written > self._written
         first = min(int(self._written[changed].min(initial=self._frames)), self._frames)
         last = max(int(np.searchsorted(recorder.times, time, side="left")), self._frames)
         self._fill_in(first, last)
-        state = freeze(self.running, _constants(run, self._plan))
+        state = freeze(self.run, _constants(run))
         content = self._content(last, time, state)
         self._file.commit(content, first, self._impacts)
         self._state, self._frames, self._impacts = state, last, len(content.impacts)
@@ -128,12 +127,12 @@ class Checkpointer:
 
     def _fill_in(self, first: int, last: int) -> None:
         """Write frames until the last one that are not written yet, from the present courses; what writes them comes again."""
-        recorder, trajectory = self.running.run.recorder, self.running.run.state.trajectory
+        recorder, trajectory = self.run.recorder, self.run.state.trajectory
         behind, frames = np.flatnonzero(recorder.written < last), (getattr(recorder, name) for name in FRAMES)
         sample_paths(trajectory, behind, recorder.times, last, np.maximum(recorder.written, first), *frames)
 
     def _content(self, frames: int, time: float, state: bytes, tables: dict[str, Any] | None = None) -> Content:
-        run = self.running.run
+        run = self.run
         rows = run.log.impacts
         recorded = {name: getattr(run.recorder, name)[:frames] for name in FRAMES}
         return Content(recorded, rows.rows[: rows.count], time, state, tables is not None, tables or {})
@@ -153,10 +152,10 @@ class Checkpointer:
             self._file.close()
 
 
-def _constants(run: Any, plan: Any) -> Constants:
+def _constants(run: Run) -> Constants:
     """What of a run its checkpoints do not hold."""
     world, recorder = run.world, run.recorder
-    own = [plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), run.log.impacts.rows]
+    own = [run.plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), run.log.impacts.rows]
     return Constants([world.scene, world.scene.bodies, world.scene.effects, world.shapes, world.geometry, *own])
 
 

@@ -36,7 +36,7 @@ LINE = 64
 HOMES = (
     "core.quaternion", "core.simd", "core.workers", "scene.accuracy", "scene.mass", "scene.joint", "scene.joint_six_axis",
     "collision", "motion", "model", "dynamics", "engine.exact", "engine.substepped", "engine.spheres", "engine.islands",
-    "engine.pair_events", "engine.pair_table", "engine.plan", "engine.regime", "engine.simulate", "engine.triggers",
+    "engine.pair_events", "engine.pair_table", "engine.regime", "engine.simulate", "engine.triggers",
     "recording.contact_log", "recording.contacts", "recording.events", "recording.impulses", "recording.recorder", "io.cache.freeze",
 )  # fmt: skip
 """Packages and modules of what a state is made of: nothing in them reads or runs files."""

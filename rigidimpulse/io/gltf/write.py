@@ -192,7 +192,7 @@ class _Writer:
             self._leave_out(f"{type(effect).__name__} cannot be said in glTF: not written")
 
     def _add_joint(self, joint: Joint) -> None:
-        from rigidimpulse.model.world import compile_scene
+        from rigidimpulse.engine.compile_scene import compile_scene
 
         if not hasattr(self, "_world"):
             self._world = compile_scene(self.scene)

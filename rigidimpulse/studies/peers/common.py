@@ -8,7 +8,7 @@ import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.dynamics.forces.constant import ConstantForce
-from rigidimpulse.model.world import compile_scene
+from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.joint import BallJoint, HingeJoint
 from rigidimpulse.scene.mass import BodyMass, body_mass

@@ -18,7 +18,8 @@ from rigidimpulse.core.quaternion import multiply, normalize, quaternion_from_ro
 from rigidimpulse.dynamics.forces.energy.minimise import Report, Terms, minimise
 from rigidimpulse.dynamics.forces.energy.pin import CompiledPin
 from rigidimpulse.dynamics.forces.energy.term import CompiledEnergy, Energy, Expansion, Poses, poses
-from rigidimpulse.model.world import World, compile_scene
+from rigidimpulse.engine.compile_scene import compile_scene
+from rigidimpulse.model.world import World
 from rigidimpulse.scene.joint import Joint
 from rigidimpulse.scene.scene import Scene
 

@@ -11,7 +11,10 @@ import numpy as np
 
 from rigidimpulse.core.quaternion import conjugate, multiply, rotate, rotation_vector
 from rigidimpulse.dynamics.energy import mechanical_energy
+from rigidimpulse.engine.run import Run
+from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import FREE, PRESCRIBED, begin, state_at
+from rigidimpulse.scene.keyframes import Keyframes
 
 
 class KeyframePaths:
@@ -20,7 +23,7 @@ class KeyframePaths:
     From key k to k + 1 the centre moves by v = (x1 - x0) / h and the body turns by w = log(q1 q0*) / h; it starts exactly at each key.
     """
 
-    def __init__(self, world) -> None:
+    def __init__(self, world: World) -> None:
         """Segments of a compiled scene; bodies that are let go later are immovable from here on."""
         self.segments: list[tuple[float, int, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None]] = []
         for i, body in enumerate(world.scene.bodies):
@@ -34,7 +37,7 @@ class KeyframePaths:
         self.times = np.array([segment[0] for segment in self.segments])
         self._next = 0
 
-    def _add(self, world, i: int, keys, release: float) -> None:
+    def _add(self, world: World, i: int, keys: Keyframes, release: float) -> None:
         times, positions, turned = keys.arrays(world.scene.bodies[i].orientation)
         centre = positions + rotate(turned, world.offset[i])
         principal = multiply(turned, world.turn[i])
@@ -51,8 +54,8 @@ class KeyframePaths:
         later = self.times[self.times > time]
         return float(later[0]) if len(later) else np.inf
 
-    def start_segments(self, run, time: float) -> None:
-        """Put bodies whose key is at or before `time` on their new course, and let go those whose time it is."""
+    def start_segments(self, run: Run, time: float) -> None:
+        """Put bodies whose key is at or before `time` on their new trajectory, and let go those whose time it is."""
         trajectory = run.state.trajectory
         while self._next < len(self.segments) and self.segments[self._next][0] <= time:
             start, i, pose = self.segments[self._next]
@@ -68,7 +71,7 @@ class KeyframePaths:
                 begin(trajectory, i)
 
 
-def _let_go(run, i: int, time: float) -> None:
+def _let_go(run: Run, i: int, time: float) -> None:
     """Body i is dynamic from `time` on."""
     world, trajectory, now = run.world, run.state.trajectory, run.state.now
     state_at(trajectory, i, time, now.position[i], now.orientation[i], now.velocity[i], now.angular_velocity[i])

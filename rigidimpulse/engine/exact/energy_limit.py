@@ -1,4 +1,4 @@
-"""No energy from constant contact forces.
+"""The energy limiter: no energy from constant contact forces.
 
 Over a sub-step contact forces are constant while contacts move, so they do a little work that they should not. Bodies that
 together touched nothing but each other and ground of one velocity cannot have gained energy, seen from that ground: what they
@@ -13,12 +13,15 @@ a smooth floor: V level, W upright), and are zero where the ground has friction.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from rigidimpulse.core.quaternion import cross
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
+from rigidimpulse.dynamics.impact.point import BodyState, Contacts
+from rigidimpulse.engine.run import Run
+from rigidimpulse.model.island import Island
+from rigidimpulse.model.state import Ground
+from rigidimpulse.model.world import World
 
 GAIN = 1e-11
 """Part of their kinetic energy that bodies may gain by rounding."""
@@ -26,21 +29,7 @@ PARALLEL = 1e-6
 """Sine of the angle of directions that count as one."""
 
 
-@dataclass(frozen=True)
-class Ground:
-    """What stands by a group of bodies.
-
-    Attributes:
-        velocity: (3,) m/s of all that stands, seen from where it does no work.
-        pushes: (k, 3) directions along which it may push.
-
-    """
-
-    velocity: np.ndarray
-    pushes: np.ndarray
-
-
-def note_hold(run, island, contacts, force: np.ndarray) -> None:
+def note_hold(run: Run, island: Island, contacts: Contacts, force: np.ndarray) -> None:
     """Remember who shares the forces (m, 3) of the held contacts from now on, and whether they may make energy."""
     state, first = run.state, int(island.members[0])
     ground = _passive_ground(run, island, contacts, bool(np.any(force[:, 0] > 0.0)))
@@ -50,8 +39,8 @@ def note_hold(run, island, contacts, force: np.ndarray) -> None:
         state.ground[first] = ground
 
 
-def _passive_ground(run, island, contacts, presses: bool) -> Ground | None:
-    """What stands by a group, or None where forces may make energy.
+def _passive_ground(run: Run, island: Island, contacts: Contacts, presses: bool) -> Ground | None:
+    """What stands by an island, or None where forces may make energy.
 
     They may not where all that stands moves with one velocity, joints are neither driven nor springs, and no other force varies.
     presses: whether contacts press.
@@ -75,8 +64,11 @@ def _passive_ground(run, island, contacts, presses: bool) -> Ground | None:
     return Ground(velocity, np.eye(3) if rough else contacts.normal[stands.any(axis=1)])
 
 
-def limit_correction_energy(run, island, contacts, way: np.ndarray, depth: float) -> None:
-    """Take off the members' speeds what a lift by `way` (k, 3) m gained beyond their weight times the depth [m] that contacts may sink."""
+def limit_correction_energy(run: Run, island: Island, contacts: Contacts, way: np.ndarray, depth: float) -> None:
+    """Take off the members' speeds what a position correction by `way` (k, 3) m gained.
+
+    That is beyond their weight times the depth [m] that contacts may sink.
+    """
     world, now, members = run.world, run.state.now, island.members
     weight = world.mass[members, None] * world.steady_acceleration[members]
     excess = -float((weight * way).sum()) - depth * float(np.linalg.norm(weight, axis=1).sum())
@@ -89,15 +81,15 @@ def limit_correction_energy(run, island, contacts, way: np.ndarray, depth: float
         run.log.account(island.time, "energy correction", kinetic_energy(now, world, members) - before)
 
 
-def note_end_energy(run, bodies: list[int]) -> None:
+def note_end_energy(run: Run, bodies: list[int]) -> None:
     """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows."""
     for i in bodies:
         if run.state.under_contact[i]:
             run.state.end_energy[i] = mechanical_energy(run.state.now, run.world, np.array([i]))
 
 
-def limit_energy(run, bodies: list[int], time: float) -> set[int]:
-    """Take what groups of the bodies gained since they share their forces off their velocities; returns those slowed.
+def limit_energy(run: Run, bodies: list[int], time: float) -> set[int]:
+    """Take what islands of the bodies gained since they share their forces off their velocities; returns those slowed.
 
     All that share forces arrive together. The energy is that seen from the ground, which has the velocity U:
 
@@ -125,7 +117,7 @@ def limit_energy(run, bodies: list[int], time: float) -> set[int]:
     return slowed
 
 
-def take_off(now, world, members: np.ndarray, energy: float, ground: np.ndarray) -> None:
+def take_off(now: BodyState, world: World, members: np.ndarray, energy: float, ground: np.ndarray) -> None:
     """Take energy [J], or all there is, off how the members move against each other or the ground, which pushes along `ground` (k, 3)."""
     mass, x = world.mass[members, None], now.position[members]
     v, w = now.velocity[members], now.angular_velocity[members]

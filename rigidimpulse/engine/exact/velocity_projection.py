@@ -1,4 +1,4 @@
-"""The end of a sub-step of contacts whose arms or normals turn.
+"""Velocity projection (RATTLE): the end of a sub-step of contacts whose arms or normals turn.
 
 Forces f of the contacts are constant over a sub-step of length h, along the Jacobian J_0 at its start. At its end half of
 them is taken back, and impulses nu along J_1, that of the end, let no contact approach:
@@ -6,12 +6,10 @@ them is taken back, and impulses nu along J_1, that of the end, let no contact a
     v_1 = v_0 + h M^-1 F + h/2 M^-1 J_0^T f + M^-1 J_1^T nu,    0 <= nu_n  _|_  J_1n v_1 >= 0,  |nu_t| <= mu nu_n
 
 This is velocity Verlet with constraints (RATTLE: Andersen 1983), of second order where the motion is smooth. Without turning
-J_1 = J_0 and nothing would change: such groups do without.
+J_1 = J_0 and nothing would change: such islands do without.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,28 +18,15 @@ from rigidimpulse.dynamics.constraints.contact import SLIP, SOLVE_TOLERANCE
 from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows, row_velocities, solve_with_slip
 from rigidimpulse.dynamics.impact.point import Contacts, select
 from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.engine.run import Run
+from rigidimpulse.model.island import Island
+from rigidimpulse.model.state import PairForce, State
 
 
-@dataclass(frozen=True)
-class PairForce:
-    """Contact forces between two bodies over a sub-step.
-
-    Attributes:
-        start: s, when it began.
-        on_a, on_b: (6,) force [N] and torque about the centre of mass [N m].
-        force: (3,) N of each contact in its frame, by its key.
-        slides: keys of the contacts that slipped at the start.
-
-    """
-
-    start: float
-    on_a: np.ndarray
-    on_b: np.ndarray
-    force: dict[tuple[int, ...], np.ndarray]
-    slides: frozenset[tuple[int, ...]]
-
-
-def remember_forces(state, time: float, keys, contacts: Contacts, force, world_force, slides) -> None:
+def remember_forces(
+    state: State, time: float, keys: list[tuple[int, ...]], contacts: Contacts, force: np.ndarray, world_force: np.ndarray, slides:
+    np.ndarray
+) -> None:
     """Keep the forces of m contacts from `time` on: force (m, 3) in their frames, world_force (m, 3) N on b, slides (m,) bool."""
     torque_a = cross(contacts.arm_a, world_force)
     torque_b = cross(contacts.arm_b, world_force)
@@ -57,14 +42,14 @@ def remember_forces(state, time: float, keys, contacts: Contacts, force, world_f
         )
 
 
-def forget_forces(state, contacts: Contacts) -> None:
+def forget_forces(state: State, contacts: Contacts) -> None:
     """Whatever acted between the bodies of these contacts does not any more."""
     for pair in set(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)):
         state.pair_force.pop(pair, None)
 
 
-def project_velocities(run, island) -> bool:
-    """End the sub-steps of the group's pairs; returns whether there were any."""
+def project_velocities(run: Run, island: Island) -> bool:
+    """End the sub-steps of the island's pairs; returns whether there were any."""
     state, now, contacts = run.state, run.state.now, island.contacts
     start = state.trajectory.start
     ended: dict[tuple[int, int], PairForce] = {}
@@ -83,12 +68,12 @@ def project_velocities(run, island) -> bool:
             now.angular_velocity[i] -= half * now.inv_inertia[i] @ wrench[3:]
     of_pair = [ended.get(pair) for pair in zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)]
     which = np.array([c for c, entry in enumerate(of_pair) if entry is not None and held[c]], np.int64)
-    _stop(run, island, select(contacts, which), [(of_pair[c], island.keys[c]) for c in which])
+    _stop(run, island, select(contacts, which), [(entry, island.keys[c]) for c in which if (entry := of_pair[c]) is not None])
     state.correction[island.members] = np.hstack([now.velocity[island.members], now.angular_velocity[island.members]]) - before
     return True
 
 
-def _stop(run, island, contacts: Contacts, entries) -> None:
+def _stop(run: Run, island: Island, contacts: Contacts, entries: list[tuple[PairForce, tuple[int, ...]]]) -> None:
     """The impulses nu of contacts; entries: for each the forces of its pair and its key."""
     now, members = run.state.now, island.members
     rows, first_row, frames = contact_rows(now, contacts, members, run.column, 0)

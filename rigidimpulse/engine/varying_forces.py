@@ -9,21 +9,28 @@ which is of second order in h as contact forces are, and leaves a body that stan
 path is off by no more than is allowed,  |F(h/2) - F| h^2 / (6 m),  F at both ends.
 
 Where forces begin and end with places (`ForceTable.switches`), a step is flown with those that act at its start and ends, to round-off of
-time, where others do, looked for by bisection along its course: so the steps stay of their order. Steps of one length
+time, where others do, looked for by bisection along its trajectory: so the steps stay of their order. Steps of one length
 (`Accuracy.integrator`) do nothing of the kind.
 
-What each force did, impulse, angular impulse about the world's origin and work, is the integral of its line along the very course.
+What each force did, impulse, angular impulse about the world's origin and work, is the integral of its line along the very trajectory.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
 from rigidimpulse.dynamics.forces.force import ForceTable, Instant
 from rigidimpulse.dynamics.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.dynamics.forces.mass_flow import BurningForces, MassFlow
+from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.model.island import Island
+from rigidimpulse.model.world import World
 from rigidimpulse.motion.force_step import Lines, Workspace, nystroem, semi_implicit
+from rigidimpulse.motion.trajectory import Trajectories
 
 IN_FLIGHT, IN_CONTACT = 0.03, 3.0
 """How far a path may be off, relative to the size, or in rad of turn: in roots of the accuracy's tolerance, inside a step of bodies that
@@ -46,19 +53,19 @@ class VaryingForces:
 
     Attributes:
         acts: (n,) bool, bodies that feel them.
-        value, rate: (n, 6) force and torque on bodies at the start of their courses, and how they change a second.
+        value, rate: (n, 6) force and torque on bodies at the start of their trajectories, and how they change a second.
         flow: masses that change, if there are any. log: what each force did.
 
     """
 
-    def __init__(self, world, trajectory, times: np.ndarray, clocks) -> None:
+    def __init__(self, world: World, trajectory: Trajectories, times: np.ndarray, clocks: Mapping[str, Callable[[], Any]]) -> None:
         """clocks: lines of the plan by kind, which get the time that forces take; times (f,) s of the frames.
 
         Raises SceneError for forces of one name.
         """
         n = world.num_bodies
         self._world = world
-        self._tables: list[ForceTable] = world.force_tables
+        self._tables: list[ForceTable] = list(world.force_tables)
         self._clocks = [clocks[table.kind] for table in self._tables]
         self._first = np.cumsum([0, *(len(table.body) for table in self._tables)])
         self._body = np.concatenate([table.body for table in self._tables])
@@ -86,6 +93,11 @@ class VaryingForces:
         self.value, self.rate = np.zeros((n, 6)), np.zeros((n, 6))
         self.log = ForceLog(times, self._body, trajectory)
 
+    def weigh(self, bodies: np.ndarray, time: float) -> None:
+        """Let bodies whose mass changes have that of `time` [s]."""
+        if self.flow is not None:
+            self.flow.weigh(bodies, time)
+
     def partners(self, bodies: np.ndarray) -> np.ndarray:
         """All bodies that a force ties to the given ones, themselves included where forces act on them."""
         bodies = bodies[self.acts[bodies]]
@@ -109,7 +121,7 @@ class VaryingForces:
         """Whether the forces on bodies at rest stay as they are."""
         return not self._restless[bodies].any()
 
-    def fly(self, run, members: np.ndarray, time: float, end: float) -> np.ndarray:
+    def fly(self, run: Run, members: np.ndarray, time: float, end: float) -> np.ndarray:
         """Forces on members that nothing holds, from `time` to `end` at most, into `value` and `rate`; returns for how long, (m,) s."""
         state, now = run.state, run.state.now
         rest = min(end, self._next_break(time)) - time
@@ -193,9 +205,10 @@ class VaryingForces:
             low, high = (low, middle) if differ(middle) else (middle, high)
         return 1.0 if high >= 1.0 - SWITCHED else max(high, least)
 
-    def load(self, run, island, h: float) -> float:
-        """Forces on a group that contacts or joints hold, over h s at most, into the accelerations and `value`; returns for how long."""
+    def load(self, run: Run, island: Island, h: float) -> float:
+        """Forces on an island that contacts or joints hold, over h s at most, into the accelerations and `value`; returns for how long."""
         state, now, world = run.state, run.state.now, self._world
+        assert island.free is not None
         members = island.members[self.acts[island.members]]
         time, step = island.time, world.accuracy.step
         plan = float(self._plan[members].min())
@@ -248,7 +261,7 @@ class VaryingForces:
         run.angular_acceleration[members] = island.free[1][self.acts[island.members]] + turned
         return h
 
-    def _start(self, run, time: float, h: np.ndarray, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _start(self, run: Run, time: float, h: np.ndarray, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Forces at the start of steps of h (n,) s, without those that give way there."""
         state = run.state
         forces = self._evaluate(time + ASIDE * h, members, state.now, state.rotation)
@@ -312,7 +325,7 @@ class VaryingForces:
     def _next_break(self, time: float) -> float:
         return min(table.next_break(time * (1.0 + 1e-12) + 1e-300) for table in self._tables)
 
-    def _report(self, run, time: float, bodies: np.ndarray, allowed: float) -> None:
+    def _report(self, run: Run, time: float, bodies: np.ndarray, allowed: float) -> None:
         for i in bodies.tolist():
             run.log.report(
                 time, "forces change too fast", (self._world.names[i],),

@@ -1,68 +1,25 @@
-"""The plan: which effects a scene calls for, bound to it, in the order of the loop.
+"""The plan: which effects a scene calls for, bound to it, as the lists that a step goes through.
 
-An effect is a frozen dataclass of settings with a `stage` and `bind(world) -> function | Skip(reason)`. What is
-skipped is not in the plan: it costs nothing, and `explain` says why.
+Every effect there is gets a line, in or out, with the reason (`explain`). The functions of those that are in stand in lists by verb, in the
+order of the effects; a step performs the lists (`engine/step.py`). What is out is in no list and costs nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from time import perf_counter
-from typing import Protocol
+from typing import Any
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.model.effect import EXACT, STAGES, SUBSTEPPED, VERBS, Bound, Effect, Line, Skip
+from rigidimpulse.model.world import World
 
-STAGES = ("detect", "respond", "forces", "constrain", "sweep", "integrate", "observe")
 NEEDED = ("steady load", "varying load", "contact forces", "impact time", "exact flight", "forced flight")
-"""Effects that the loop cannot do without where they are in: bodies would not move, or hit each other without end."""
+"""Effects that the loop cannot do without where they are in: bodies would not move, or would hit each other without end."""
 
-
-@dataclass(frozen=True)
-class Skip:
-    """Why an effect is out, and the function of its stage if it could be in all the same."""
-
-    reason: str
-    function: Callable | None = None
-
-
-@dataclass(frozen=True)
-class Bound:
-    """An effect that is in: the function of its stage (None: others call it, by its clock), and why it is in."""
-
-    function: Callable | None
-    reason: str
-
-
-class Effect(Protocol):
-    """One effect of one stage."""
-
-    @property
-    def stage(self) -> str:
-        """One of STAGES."""
-        ...
-
-    @property
-    def name(self) -> str:
-        """What `explain` calls it."""
-        ...
-
-    def bind(self, world) -> Bound | Skip:
-        """Look at the compiled world once; return the function for the stage, or why there is none."""
-        ...
-
-
-@dataclass
-class Line:
-    """One line of `explain`."""
-
-    stage: str
-    name: str
-    included: bool
-    reason: str
-    seconds: float = 0.0
-    calls: int = 0
+Participants = list[tuple[Callable[..., Any], Line]]
+"""Functions that take part in a verb, each with the line of its effect."""
 
 
 def _as_chosen(bound: Bound | Skip, name: str, wanted: bool | None) -> Bound | Skip:
@@ -72,16 +29,33 @@ def _as_chosen(bound: Bound | Skip, name: str, wanted: bool | None) -> Bound | S
             raise SceneError(f"effects: {name!r} cannot be out: {bound.reason}", "leave out 'contact detection', or what it works for")
         return Skip(f"left out by the caller; {bound.reason}")
     if wanted is True and isinstance(bound, Skip):
-        if bound.function is None:
+        if bound.verbs is None:
             raise SceneError(f"effects: {name!r} cannot be in: {bound.reason}", "give the scene what it needs, or leave it out")
-        return Bound(bound.function, f"wanted by the caller; {bound.reason}")
+        return Bound(f"wanted by the caller; {bound.reason}", bound.verbs)
     return bound
 
 
-class Plan:
-    """The bound effects of a run. Call a stage by its name: `plan.respond(...)` runs all its effects in order."""
+class Regime:
+    """What one regime does with an island at an instant, by verb."""
 
-    def __init__(self, world, effects: Sequence[Effect], chosen: Mapping[str, bool] | None = None) -> None:
+    def __init__(self) -> None:
+        """Nothing takes part yet."""
+        self.impacts: Participants = []
+        self.loads: Participants = []
+        self.contact_forces: Participants = []
+        self.trajectories: Participants = []
+
+
+class Plan:
+    """The bound effects of a run.
+
+    Attributes:
+        lines: of all effects, in or out.
+        pairs, time_of_impact, observe: functions of a step. exact, substepped: those of an island, by its regime.
+
+    """
+
+    def __init__(self, world: World, effects: Sequence[Effect], chosen: Mapping[str, bool] | None = None) -> None:
         """Bind the effects to a world; chosen: names of effects that are to be in or out whatever the scene calls for.
 
         Raises:
@@ -90,19 +64,41 @@ class Plan:
         """
         chosen = chosen or {}
         self.lines: list[Line] = []
-        self._stages: dict[str, list[tuple[Callable, Line]]] = {stage: [] for stage in STAGES}
+        self.pairs: Participants = []
+        self.time_of_impact: Participants = []
+        self.observe: Participants = []
+        self.exact, self.substepped = Regime(), Regime()
         for effect in effects:
             bound = _as_chosen(effect.bind(world), effect.name, chosen.get(effect.name))
             line = Line(effect.stage, effect.name, isinstance(bound, Bound), bound.reason)
             self.lines.append(line)
-            if isinstance(bound, Bound) and bound.function is not None:
-                self._stages[effect.stage].append((bound.function, line))
+            if isinstance(bound, Bound):
+                for verb, function in bound.verbs.items():
+                    for participants in self._lists(verb):
+                        participants.append((function, line))
         self._inner = 0.0
-        self.steps = bool(self._stages["detect"] or self._stages["constrain"])
 
-    def run(self, stage: str, *arguments) -> None:
-        """Run a stage's effects in order, adding up their time."""
-        for function, line in self._stages[stage]:
+    def _lists(self, verb: str) -> list[Participants]:
+        """The lists of a verb: of both regimes where none is named."""
+        regime, _, name = verb.rpartition(".")
+        if name not in VERBS or regime not in ("", EXACT, SUBSTEPPED):
+            raise ValueError(f"{verb!r} is no verb of a step; they are {', '.join(VERBS)}")
+        if hasattr(self, name):
+            return [getattr(self, name)]
+        return [getattr(owner, name) for key, owner in ((EXACT, self.exact), (SUBSTEPPED, self.substepped)) if regime in ("", key)]
+
+    @property
+    def steps(self) -> bool:
+        """Whether a step does anything that could change the trajectories of rigid bodies."""
+        return bool(self.pairs or self.exact.contact_forces)
+
+    def includes(self, name: str) -> bool:
+        """Whether the effect of a name is in."""
+        return any(line.included for line in self.lines if line.name == name)
+
+    def perform(self, participants: Participants, *arguments: Any) -> None:
+        """Call functions in their order, adding up the time of each."""
+        for function, line in participants:
             start, inner = perf_counter(), self._inner
             function(*arguments)
             line.seconds += perf_counter() - start - (self._inner - inner)

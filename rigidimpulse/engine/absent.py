@@ -1,0 +1,114 @@
+"""What stands in for a participant that a scene does not call for: it has nothing to say, so the loop need not ask whether it is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rigidimpulse.model.island import Island
+
+NONE = np.zeros(0, np.int64)
+
+
+class NoJoints:
+    """A run without joints."""
+
+    def __init__(self) -> None:
+        """No force was ever recorded."""
+        self.names: list[str] = []
+        self.reactions: list[tuple[float, int, np.ndarray]] = []
+
+    def at(self, _bodies: Sequence[int] | np.ndarray) -> np.ndarray:
+        """No joint is at any body."""
+        return NONE
+
+    def bodies_of(self, _joints: np.ndarray) -> np.ndarray:
+        """No joint has bodies."""
+        return NONE
+
+    def moving_bodies(self, _run: Any) -> np.ndarray:
+        """No joint moves."""
+        return NONE
+
+
+class NoForces:
+    """A run in which no force varies."""
+
+    def __init__(self, num_bodies: int) -> None:
+        """No force acts on any of the bodies."""
+        self.acts = np.zeros(num_bodies, bool)
+        self.log = _NoForceLog(num_bodies)
+
+    def weigh(self, _bodies: np.ndarray, _time: float) -> None:
+        """All masses stay."""
+
+    def partners(self, _bodies: np.ndarray) -> np.ndarray:
+        """No force ties bodies together."""
+        return NONE
+
+    def ties(self, _bodies: np.ndarray) -> list[tuple[int, int]]:
+        """No force ties bodies together."""
+        return []
+
+    def finish(self, *_recorded: Any) -> None:
+        """No force did any work."""
+
+
+class NoSoftBodies:
+    """A run without soft bodies."""
+
+    moves = False
+
+    def __init__(self, num_bodies: int) -> None:
+        """Nothing presses any of the bodies."""
+        self.pressed = np.zeros(num_bodies, bool)
+
+    def advance(self, _run: Any, end: float) -> float:
+        """The step is as long as it was."""
+        return end
+
+    def tracks(self) -> list[Any]:
+        """No soft body leaves a track."""
+        return []
+
+    def add_to(self, _ledger: Any) -> None:
+        """Nothing is added to the ledger."""
+
+
+class NoSubstepping:
+    """A run in which no island may be sub-stepped."""
+
+    def choose(self, _run: Any, _pair_events: Any) -> None:
+        """No island is chosen."""
+
+    def join(self, _run: Any, _pair_events: Any, _time: float, islands: list[Island]) -> list[Island]:
+        """All islands are exact."""
+        return islands
+
+    def is_idle(self) -> bool:
+        """Nothing is sub-stepped, nor will be."""
+        return True
+
+    def finish(self, _run: Any) -> None:
+        """There is nothing to end."""
+
+
+class NoFlight:
+    """A run without the kernel of balls."""
+
+    def may_fly(self) -> bool:
+        """There is nothing to fly with."""
+        return False
+
+
+class _NoForceLog:
+    """What forces did that do not act."""
+
+    def __init__(self, num_bodies: int) -> None:
+        """No work on any of the bodies."""
+        self.work = np.zeros(num_bodies)
+
+    def end(self, _body: int, _time: float) -> None:
+        """Nothing is recorded."""

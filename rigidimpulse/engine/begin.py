@@ -1,0 +1,105 @@
+"""The beginning of a run: its plan, its participants, the first trajectories, and no overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+
+from rigidimpulse.dynamics.forces import KINDS
+from rigidimpulse.engine.effects import EventKernel, SubsteppedContact, TriggerVolumes, all_effects
+from rigidimpulse.engine.exact.joints import JointState
+from rigidimpulse.engine.exact.step_size import ErrorEstimate
+from rigidimpulse.engine.initial_overlap import resolve_overlaps
+from rigidimpulse.engine.keyframe_paths import KeyframePaths
+from rigidimpulse.engine.regime import only_expensive, why_not_substepped
+from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.substepped.advance import SubsteppedIslands
+from rigidimpulse.engine.warm_up import prepare_kernels
+from rigidimpulse.model.plan import Plan
+from rigidimpulse.model.world import World
+from rigidimpulse.motion.trajectory import FIXED, FREE, PRESCRIBED, begin
+from rigidimpulse.recording.events import EventLog
+from rigidimpulse.recording.recorder import Recorder
+
+
+def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
+    """Bind every effect there is to the world; the plan keeps those that the scene calls for, and obeys what was chosen by name."""
+    return Plan(world, all_effects(world), chosen)
+
+
+def begin_run(world: World, plan: Plan, times: np.ndarray, left_out: Mapping[str, str]) -> Run:
+    """A run at its start: kernels compiled, participants bound, bodies apart.
+
+    Args:
+        world: the compiled scene.
+        plan: of its effects.
+        times: (f,) s, of the frames.
+        left_out: effects that the caller leaves out though the scene calls for them, and why it does.
+
+    """
+    with_substepped = plan.includes(SubsteppedContact.name) and not only_expensive(world)
+    prepare_kernels(world, plan.includes(EventKernel.name), with_substepped)
+    run = make_run(world, plan, Recorder(times, world.num_bodies), EventLog())
+    for name, reason in left_out.items():
+        run.log.report(0.0, "effect left out", (name,), f"the scene calls for it: {reason}")
+    _bind_forces(run, times)
+    run.keyframes = KeyframePaths(world)
+    start_trajectories(run)
+    run.recorder.start(run.state.trajectory)
+    resolve_overlaps(run)
+    _bind_observers(run)
+    return run
+
+
+def make_run(world: World, plan: Plan, recorder: Recorder, log: EventLog) -> Run:
+    """A run with the participants that hold contacts and joints."""
+    run = Run(world, plan, recorder, log)
+    run.error_estimate = ErrorEstimate(world)
+    if world.joints_of_scene:
+        run.joints = JointState(world)
+    if not why_not_substepped(world):
+        run.substepped = SubsteppedIslands(world)
+    return run
+
+
+def _bind_forces(run: Run, times: np.ndarray) -> None:
+    """Give a run its varying forces and soft bodies, if the scene has any; their modules are imported here only."""
+    world = run.world
+    if not world.force_tables:
+        return
+    from rigidimpulse.engine.varying_forces import VaryingForces
+
+    clocks = {table.kind: partial(run.plan.clock, table.kind) for table in world.force_tables}
+    run.forces = VaryingForces(world, run.state.trajectory, times, clocks)
+    soft_bodies = [table for table in world.force_tables if table.kind == KINDS["FlexibleBody"]]
+    if soft_bodies:
+        from rigidimpulse.engine.soft_bodies import RunningSoftBodies
+
+        run.soft_bodies = RunningSoftBodies(run, soft_bodies[0], times, clocks[soft_bodies[0].kind])
+
+
+def _bind_observers(run: Run) -> None:
+    """Give a run its triggers and the kernel of balls, if the plan has them in."""
+    if run.plan.includes(TriggerVolumes.name):
+        from rigidimpulse.engine.triggers import Triggers
+
+        with run.plan.clock(TriggerVolumes.name):
+            run.triggers = Triggers(run, run.world.triggers)
+    if run.plan.includes(EventKernel.name):
+        from rigidimpulse.engine.spheres.run import EventRun
+
+        run.flight = EventRun(run)
+
+
+def start_trajectories(run: Run) -> None:
+    """Give every body its first trajectory."""
+    world, trajectory = run.world, run.state.trajectory
+    trajectory.position[:], trajectory.orientation[:] = world.position, world.orientation
+    trajectory.velocity[:], trajectory.angular_velocity[:] = world.velocity, world.angular_velocity
+    trajectory.acceleration[:] = np.where(world.dynamic[:, None], world.steady_acceleration, 0.0)
+    trajectory.inertia[:] = world.inertia
+    trajectory.mode[:] = np.where(world.dynamic, FREE, np.where(world.moving, PRESCRIBED, FIXED))
+    for i in range(world.num_bodies):
+        begin(trajectory, i)

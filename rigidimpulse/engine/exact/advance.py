@@ -1,0 +1,55 @@
+"""How islands arrive at an instant: the forces that were constant over a sub-step end, and so do those of contacts that were left.
+
+In this order, for all islands at once, since bodies that shared forces may be in several islands by now:
+
+    velocities of contacts are projected (`velocity_projection`), islands one by one
+    the energy with which bodies arrive is noted, from which the work of the contact forces follows
+    joints are closed and stopped (`joints`), islands one by one
+    energy that constant forces made is taken off (`energy_limit`)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.engine.exact.energy_limit import limit_energy, note_end_energy
+from rigidimpulse.engine.exact.trajectories import begin_trajectory
+from rigidimpulse.engine.exact.velocity_projection import project_velocities
+from rigidimpulse.engine.islands import classify
+from rigidimpulse.engine.pair_events import PairEvents
+from rigidimpulse.engine.run import Run
+from rigidimpulse.model.island import Island
+
+NO_WRENCH = np.zeros(6)
+
+
+def arrive(run: Run, islands: list[Island], time: float, bodies: np.ndarray) -> None:
+    """End the sub-steps of all bodies that were brought to `time` with these islands."""
+    for island in islands:
+        if project_velocities(run, island):
+            classify(run, island)
+    note_end_energy(run, bodies.tolist())
+    for island in islands:
+        if len(island.joints):
+            run.joints.project_velocities(run, island)
+            classify(run, island)
+    slowed = limit_energy(run, bodies.tolist(), time)
+    for island in islands:
+        if not slowed.isdisjoint(island.members.tolist()):
+            classify(run, island)
+
+
+def let_go(run: Run, pair_events: PairEvents, islands: list[Island], time: float, bodies: np.ndarray) -> None:
+    """Let those of the bodies fly freely that still carry the forces of contacts they have left: they are in no island any more."""
+    state = run.state
+    bodies = bodies[state.under_contact[bodies]]
+    if not len(bodies):
+        return
+    leaves = np.zeros(len(state.under_contact), bool)
+    leaves[bodies] = True
+    for island in islands:
+        leaves[island.members] = False
+    left = leaves.nonzero()[0]
+    left = left[(state.trajectory.start[left] < time) & ~pair_events.inside[left]]
+    for i in left.tolist():
+        begin_trajectory(run, pair_events, i, time, NO_WRENCH, rests=False)

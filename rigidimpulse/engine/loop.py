@@ -1,0 +1,67 @@
+"""From step to step: steps end on the grid of the accuracy's step, at keyframes, and where soft bodies ask for it.
+
+The kernel of balls (`spheres/`) takes all steps in one in which nothing but simple impacts happens.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from rigidimpulse.engine.effects import EventKernel
+from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.spheres.effect import ARRIVED, GO_ON, STEP
+from rigidimpulse.engine.step import go_on, step
+from rigidimpulse.motion.trajectory import FIXED
+
+WATCHED = 64
+"""Steps at most between two looks at a run that somebody watches."""
+GRID = 1e-9
+"""Part of a step by which a time may miss the grid of steps by rounding."""
+
+
+def run_to_end(run: Run, duration: float, progress: Callable[[float], None] | None) -> None:
+    """Step to the end; a run that is under way goes on from where it is."""
+    # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
+    for end in (float(duration), max(float(duration), float(run.recorder.times[-1]))):
+        if run.plan.steps:
+            run_steps(run, end, progress)
+        else:
+            run.keyframes.start_segments(run, end)
+
+
+def run_steps(run: Run, end: float, progress: Callable[[float], None] | None) -> None:
+    """Step to the end [s]; progress: called with the time of the run after each step, or after WATCHED at most."""
+    size, state = run.world.accuracy.step, run.state
+    while state.time < end:
+        begin = state.time
+        run.keyframes.start_segments(run, begin)
+        stop = min(run.keyframes.next_key(begin), end)
+        if not run.soft_bodies.moves and not np.any(state.trajectory.mode != FIXED):
+            state.time = stop
+            continue
+        if progress is not None:
+            stop = min(stop, (math.floor(begin / size + GRID) + WATCHED) * size)
+        how = fly(run, stop) if run.flight.may_fly() else STEP
+        if how == STEP:
+            index = math.floor(state.time / size + GRID) + 1
+            step(run, run.soft_bodies.advance(run, min(index * size, stop)))
+        if progress is not None:
+            progress(state.time)
+
+
+def fly(run: Run, stop: float) -> int:
+    """Let the kernel of balls take the scene towards `stop` [s], and steps take over where it cannot; returns how that ends."""
+    begin = run.state.time
+    with run.plan.clock(EventKernel.name):
+        how, step_begin, until = run.flight.fly(stop)
+    while how == GO_ON:
+        go_on(run, step_begin, until, may_leave=run.state.time > begin)
+        if run.state.time >= until:
+            return ARRIVED
+        begin = run.state.time
+        with run.plan.clock(EventKernel.name):
+            how, step_begin, until = run.flight.fly(stop, at_boundary=False)
+    return how

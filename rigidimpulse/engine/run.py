@@ -1,0 +1,92 @@
+"""A run under way: the world, its state, the plan, what records it, and the participants that the scene calls for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rigidimpulse.collision.contact_buffer import ContactBuffer
+from rigidimpulse.collision.geometry import Geometry
+from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch, make_scratch
+from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.dynamics.solvers.qp import row_solver
+from rigidimpulse.engine.absent import NoFlight, NoForces, NoJoints, NoSoftBodies, NoSubstepping
+from rigidimpulse.model.plan import Plan
+from rigidimpulse.model.state import State
+from rigidimpulse.model.world import World
+from rigidimpulse.motion.trajectory import pose_at
+from rigidimpulse.recording.contact_log import ContactLog
+from rigidimpulse.recording.events import EventLog
+from rigidimpulse.recording.impulses import ImpulseAccounts
+from rigidimpulse.recording.recorder import Recorder
+
+LOG_CAPACITY = 4096
+
+
+@dataclass(frozen=True)
+class Detector:
+    """What a search for the time of impact needs to know of the scene."""
+
+    geometry: Geometry
+    shape_of_body: np.ndarray
+    sweep_scratch: SweepScratch
+    max_queries: int
+
+
+class Run:
+    """Everything a step needs: world, state, plan, recorder, logs, participants, and buffers that grow when they are too small.
+
+    Attributes:
+        joints, forces, substepped, soft_bodies: participants; what the scene does not call for is one of `absent.py`.
+        triggers: None where the scene has none; only the effect "triggers" asks it. keyframes: paths of kinematic bodies. flight: the
+        kernel of
+            balls.
+
+    """
+
+    def __init__(self, world: World, plan: Plan, recorder: Recorder, log: EventLog) -> None:
+        """A run at its start, without participants."""
+        n = world.num_bodies
+        self.world = world
+        self.plan = plan
+        self.state = State(world)
+        self.recorder = recorder
+        self.log = log
+        self.impulses = ImpulseAccounts(recorder.times)
+        self.contact_log = ContactLog(recorder.times, self.impulses)
+        self.detector = Detector(world.geometry, world.shape_of_body, make_scratch(world.geometry), world.accuracy.iterations)
+        self.contact_buffer = ContactBuffer()
+        self.impact_log = np.empty((LOG_CAPACITY, 7))
+        self.column = np.zeros(n, np.int64)
+        self.acceleration = np.zeros((n, 3))
+        self.angular_acceleration = np.zeros((n, 3))
+        self.wrench = np.zeros((n, 6))
+        self.box_min = np.empty((n, 3))
+        self.box_max = np.empty((n, 3))
+        self.solve_rows = row_solver(world.accuracy.contact_solver)
+        self.error_estimate: Any = None
+        self.joints: Any = NoJoints()
+        self.forces: Any = NoForces(n)
+        self.soft_bodies: Any = NoSoftBodies(n)
+        self.substepped: Any = NoSubstepping()
+        self.triggers: Any = None
+        self.keyframes: Any = None
+        self.flight: Any = NoFlight()
+
+    def pose_matrix(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Position (3,) and rotation matrix (3, 3) of body i at `time` on its present trajectory."""
+        x, q = np.empty(3), np.empty(4)
+        pose_at(self.state.trajectory, i, time, x, q)
+        return x, to_matrix(q)
+
+    def quarantine(self, i: int, time: float) -> None:
+        """Freeze a body whose state stopped being finite where its trajectory last was, and report it."""
+        now, trajectory = self.state.now, self.state.trajectory
+        pose_at(trajectory, i, time, now.position[i], now.orientation[i])
+        now.velocity[i] = now.angular_velocity[i] = 0.0
+        self.log.report(
+            time, "not finite", (self.world.names[i],),
+            "the body's velocity was no finite number; it is frozen: check its mass, inertia and restitution",
+        )

@@ -1,0 +1,110 @@
+"""Sleeping: when bodies stand still for good until something touches them.
+
+An exact island falls asleep as a whole (`may_sleep`). In a sub-stepped island each body has a sleep timer; see `substepped/advance.py`
+for what wakes it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.engine.run import Run
+from rigidimpulse.model.island import Island
+
+SLEEP_SPEED, SLEEP_MOTION = 0.05, 0.5
+"""Speed, in sqrt(g r), and motion, in skins, below which the sleep timer of a body runs."""
+
+
+def may_sleep(run: Run, island: Island, h: float) -> bool:
+    """Whether an exact island falls asleep: all members stand still and their loads are carried, on supports that do not move.
+
+    h: s, length of the sub-step; the speed that counts as none is a part of what the load would give in it.
+    """
+    world, now = run.world, run.state.now
+    i = island.members
+    moves = world.moving[island.contacts.body_a].any() or world.moving[island.contacts.body_b].any()
+    if len(island.joints):
+        moves = moves or world.moving[run.joints.bodies_of(island.joints)].any()
+    if moves or (island.loaded and not run.forces.may_rest(i)):
+        return False
+    limit = TOLERANCES.rest * world.steady_strength[i] * h
+    force, torque = run.wrench[i, :3], run.wrench[i, 3:]
+    spin = run.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], torque)
+    gained = h * (run.acceleration[i] + world.inv_mass[i, None] * force)
+    size = np.minimum(world.bound_radius[i], world.size[i])[:, None]
+    slow = (
+        (np.linalg.norm(now.velocity[i], axis=1) <= limit)
+        & (np.linalg.norm(gained, axis=1) <= limit)
+        & (np.linalg.norm(size * now.angular_velocity[i], axis=1) <= limit)
+        & (np.linalg.norm(size * h * spin, axis=1) <= limit)
+    )
+    return bool(np.all(slow))
+
+
+@jit_making_arrays
+def wake_by_contact(first, second, member, restless, bodies, mass, strength, inner):
+    """Mark (n,) the members that are awake, and sleepers that such a one may move, over pairs (k,) that may touch.
+
+    A moving body of mass m and speed v wakes sleepers up to k contacts away, k = max(1, m v / (m_0 u)), m_0: the least mass of a member,
+    u = SLEEP_SPEED sqrt(g r). Shared by more bodies than that, the impact cannot move any of them faster than the sleep speed u.
+    """
+    reach, least = np.zeros(member.shape[0]), np.inf
+    for i in range(member.shape[0]):
+        if member[i]:
+            least = min(least, mass[i])
+    for i in range(member.shape[0]):
+        if restless[i]:
+            speed, spin = 0.0, 0.0
+            for c in range(3):
+                speed += bodies.velocity[i, c] ** 2
+                spin += bodies.angular_velocity[i, c] ** 2
+            size = np.sqrt(speed) + inner[i] * np.sqrt(spin)
+            reach[i] = 1.0 + max(mass[i] * size / (least * max(SLEEP_SPEED * np.sqrt(strength[i] * inner[i]), 1e-300)), 1.0)
+    left = 0
+    for i in range(member.shape[0]):
+        left += member[i] and reach[i] < 1.0
+    spreads, number, turn = True, first.shape[0], 0
+    while spreads and left > 0:
+        spreads, turn = False, 1 - turn
+        for k in range(number):
+            # To and fro: waking then goes far either way in one pass.
+            p = k if turn else number - 1 - k
+            a, b = first[p], second[p]
+            if not (member[a] and member[b]):
+                continue
+            if reach[a] > reach[b]:
+                a, b = b, a
+            if reach[b] - 1.0 > reach[a]:
+                left -= reach[a] < 1.0 <= reach[b] - 1.0
+                reach[a] = reach[b] - 1.0
+                spreads = spreads or reach[a] > 1.0
+    return reach >= 1.0
+
+
+@jit
+def advance_sleep_timers(members, position, orientation, velocity, strength, inner, skin, length, stood, sleep_timer):
+    """Add `length` s to the sleep timers of members (k,) that have hardly moved from where they stood (n, 7); reset those of others."""
+    for k in range(members.shape[0]):
+        i = members[k]
+        moved, turned, speed, spin = 0.0, 0.0, 0.0, 0.0
+        for c in range(3):
+            moved += (position[k, c] - stood[i, c]) ** 2
+            speed += velocity[k, c] ** 2
+            spin += velocity[k, 3 + c] ** 2
+        for c in range(4):
+            turned += (orientation[k, c] - stood[i, 3 + c]) ** 2
+        play = SLEEP_MOTION * skin[i]
+        if (
+            np.sqrt(moved) <= play
+            and 2.0 * inner[i] * np.sqrt(turned) <= play
+            and np.sqrt(speed) + inner[i] * np.sqrt(spin) <= SLEEP_SPEED * np.sqrt(strength[i] * inner[i])
+        ):
+            sleep_timer[i] += length
+            continue
+        sleep_timer[i] = 0.0
+        for c in range(3):
+            stood[i, c] = position[k, c]
+        for c in range(4):
+            stood[i, 3 + c] = orientation[k, c]

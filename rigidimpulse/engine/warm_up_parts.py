@@ -1,0 +1,217 @@
+"""What is compiled ahead for each kind of kernels, in parts that take about as long and share little; see `warm_up.py`.
+
+As a program it compiles one part, in a process of its own: `python -m rigidimpulse.engine.warm_up_parts KIND PART [cylinders]`.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from rigidimpulse.collision.time_of_impact import bisection
+from rigidimpulse.dynamics.constraints.contact import hold_contacts
+from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
+from rigidimpulse.dynamics.constraints.joint_impact import fill_rates, impact_rows
+from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, count_joint_rows, fill_closing_rows, start_joint_rows, stop_rows
+from rigidimpulse.dynamics.constraints.position_correction import needs_correction
+from rigidimpulse.dynamics.constraints.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
+from rigidimpulse.dynamics.impact.block import log_block
+from rigidimpulse.dynamics.impact.restitution import LAWS
+from rigidimpulse.dynamics.impact.sequence import respond_sequential
+from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
+from rigidimpulse.engine.begin import make_plan, make_run, start_trajectories
+from rigidimpulse.engine.compile_scene import compile_scene
+from rigidimpulse.engine.exact.impacts import respond_to_impacts
+from rigidimpulse.engine.exact.trajectories import set_impact_margins
+from rigidimpulse.engine.islands import touching_islands
+from rigidimpulse.engine.pair_events import PairEvents
+from rigidimpulse.engine.regime import TALL, island_roots, refusals, support_levels
+from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.sleeping import advance_sleep_timers
+from rigidimpulse.engine.spheres.run import EventRun
+from rigidimpulse.engine.substepped.contact_forces import ContactStepper
+from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
+from rigidimpulse.engine.touching import bring_all, bring_gyroscopic, refresh_pose
+from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, SUBSTEPPED
+from rigidimpulse.model.island import empty_contacts
+from rigidimpulse.motion.trajectory import FREE, take
+from rigidimpulse.recording.contact_log import fill_contacts_and_forces
+from rigidimpulse.recording.events import EventLog
+from rigidimpulse.recording.recorder import Recorder
+from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.joint import HingeJoint
+from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import Shape
+
+STEP = 1.0 / 60.0
+
+
+def _run_of(scene: Scene) -> Run:
+    """A run of a scene that nothing has happened in yet."""
+    world = compile_scene(scene)
+    return make_run(world, make_plan(world), Recorder(np.zeros(1), 2), EventLog())
+
+
+def _box_on_floor(with_cylinder: bool, jointed: bool = False):
+    """Context of a scene that has a contact from the start, and a joint if it is to."""
+    scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static")])
+    shape = Shape.cylinder(1, 1) if with_cylinder else Shape.box((1, 1, 1))
+    scene.add(Body("body", shape, position=(0, 0, 0.5), velocity=(0, 0, -1)))
+    if jointed:
+        scene.add(HingeJoint("body", None, (0, 0, 1), (1, 0, 0)))
+    return _run_of(scene)
+
+
+def _contact():
+    """One contact of the two bodies."""
+    contacts = empty_contacts(1)
+    for column in contacts:
+        column[...] = 0
+    contacts.body_b[:] = 1
+    contacts.normal[:] = (0.0, 0.0, 1.0)
+    return contacts
+
+
+def _respond_and_detect(run) -> None:
+    """Impulses first: by then the other process has rows and what moves bodies in the cache, which these need too."""
+    state, world, now, one, contacts = run.state, run.world, run.state.now, np.ones(1), _contact()
+    members = np.array([1])
+    now.inv_inertia[1] = np.eye(3)
+    respond_sequential(now, contacts, LAWS["auto"], False, one, 1.0, 1.0, run.column, None, run.impact_log)
+    needs_correction(contacts, np.ones(1, bool), one)
+    refresh_pose(members, now, state.rotation, state.trajectory.inertia)
+    bring_gyroscopic(members, now, state.rotation, state.trajectory.inertia, run.angular_acceleration)
+    fill_contacts_and_forces(contacts, now.position, np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)))
+    motion = contact_motion(
+        world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
+    )
+    solve_newton(make_rows.py_func(0), 1, 1.0)
+    hold_contacts(
+        _leave_unsolved, now, contacts, members, motion.turning, np.zeros(1), run.acceleration, run.angular_acceleration,
+        1.0, 1.0, run.column, np.zeros((1, 3)), run.wrench,
+    )
+    start_trajectories(run)
+    pair_events = PairEvents(run, 1.0 / 60.0)
+    pair_events.find_pairs()
+    islands, _ = touching_islands(run, pair_events, 0.0, members)
+    island = islands[0]
+    respond_to_impacts(run, island, respond_sequential, LAWS["auto"])
+
+
+def _leave_unsolved(_rows, _n: int, _target: float) -> float:
+    """In the place of a solver of rows."""
+    return 0.0
+
+
+def _move_and_sweep(run) -> None:
+    """Rows of contacts, courses, frames and the sweep."""
+    _fill_rows(run)
+    _move(run)
+
+
+def _fill_rows(run) -> None:
+    now, contacts, members = run.state.now, _contact(), np.array([1])
+    now.inv_inertia[1] = np.eye(3)
+    rows, first_row, frames = contact_rows(now, contacts, members, run.column, 0)
+    row_velocities(now, contacts, first_row, frames, rows.bias)
+    response_to(rows, 1, rows.impulse)
+    log_block(now, contacts, rows, first_row, frames, np.zeros(1), run.impact_log, 0)
+    change_velocities(now, members, rows)
+    changes_of(now, members, rows)
+
+
+def _move(run) -> None:
+    state, now, world = run.state, run.state.now, run.world
+    zero = np.zeros(1)
+    start_trajectories(run)
+    run.recorder.start(state.trajectory)
+    bring_all(state.trajectory, np.array([1]), 0.0, now, state.rotation, run.acceleration, run.angular_acceleration)
+    take(state.trajectory, 1, 0.0, now, *np.zeros((4, 3)), FREE)
+    pair_events = PairEvents(run, 1.0 / 60.0)
+    pair_events.find_pairs()
+    pair_events.trajectory_changed(1, 0.0)
+    set_impact_margins(pair_events.pairs, np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool), 0.0, world.dynamic, pair_events.inside)
+    bisection.sweep(run.detector, state.trajectory, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
+
+
+def _find_substepped_contacts(run) -> None:
+    """What comes before the solver of heaps: pairs and their contacts."""
+    world, state, member = run.world, run.state, np.array([False, True])
+    state.now.inv_inertia[1] = np.eye(3)
+    stepper = ContactStepper(world, world.dynamic, finer=False)
+    for _ in range(2):  # The second time there is a cover.
+        stepper.set_up(run, np.array([1]), np.array([0]), STEP)
+    stepper.near(run, member, ~member, STEP)
+    # Columns of one row only would be another type.
+    a, b = np.array([[0, 1], [0, 1]]).T
+    refusals(world, island_roots(world.num_bodies, a, b, member), member, ~member, member, np.zeros(world.num_bodies), a, b, True)
+
+
+def _step_substepped(run) -> None:
+    """The solver of heaps, and what brings bodies from step to step."""
+    state, now, members = run.state, run.state.now, np.array([1])
+    stepper = ContactStepper(run.world, run.world.dynamic, finer=False)
+    stepper.members = members
+    support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
+    mark_quick(stepper.bodies, STEP, 1.0)
+    out = stepper.step(run, 0.0, STEP)
+    steady = run.world.steady_acceleration
+    end_trajectories(state.trajectory, members, 0.0, steady, now, state.rotation, run.acceleration, run.angular_acceleration)
+    depart(state.trajectory, members, 0.0, STEP, now, out.position, out.orientation, out.velocity)
+    let_fly(state.trajectory, members, steady)
+    mark_slow(now, stepper.inner, 1.0, 1.0, np.array([False, True]))
+    most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin, 0.5)
+    advance_sleep_timers(
+        members, out.position, out.orientation, out.velocity, run.world.steady_strength, stepper.inner, stepper.skin, STEP,
+        np.zeros((2, 7)), np.zeros(2),
+    )  # fmt: skip
+
+
+def _start_joints(run) -> None:
+    """Rows of joints at the start of a sub-step and at impacts, and those that close them."""
+    state, joints, which, members = run.state, run.joints, np.array([0]), np.array([1])
+    now, table, memory = state.now, joints.table, joints.memory
+    rows = make_rows.py_func(int(count_joint_rows(table, which)))
+    fill_closing_rows(table, which, now, state.rotation, run.column, memory.angle, rows, 0)
+    start_joint_rows(table, which, now, state.rotation, run.column, memory, STEP, 1.0, rows, 0)
+    impact_rows(table, which, now, state.rotation, members, run.column, memory, 1.0, joints.moment)
+    fill_rates(table, which, now, state.rotation, run.column, memory, 1.0, rows)
+
+
+def _close_and_stop_joints(run) -> None:
+    """Rows of joints at the end of a sub-step."""
+    state, joints, which, members = run.state, run.joints, np.array([0]), np.array([1])
+    count = int(count_joint_rows.py_func(joints.table, which))
+    rows = make_rows.py_func(count)
+    close_at_end(
+        joints.table, which, state.now, run.acceleration, members, STEP, joints.memory, rows, 0, np.zeros(count), run.wrench
+    )
+    stop_rows(joints.table, which, state.now, state.rotation, members, run.column, joints.memory, np.zeros(1))
+
+
+def _fly(_run) -> None:
+    """The event kernel; it knows balls only."""
+    scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static"), Body("ball", Shape.sphere(1.0), position=(0, 0, 9))])
+    run = _run_of(scene)
+    start_trajectories(run)
+    EventRun(run).fly(1.0)
+
+
+PARTS = {
+    CONTACTS: (_respond_and_detect, _move_and_sweep),
+    EVENTS: (_fly,),
+    SUBSTEPPED: (_find_substepped_contacts, _step_substepped),
+    JOINTS: (_start_joints, _close_and_stop_joints),
+}
+"""What is compiled at once, by kind; each gets a context."""
+
+
+def compile_part(kind: str, part: int, with_cylinder: bool) -> None:
+    """Compile one part."""
+    PARTS[kind][part](_box_on_floor(with_cylinder, kind == JOINTS))
+
+
+if __name__ == "__main__":
+    compile_part(sys.argv[1], int(sys.argv[2]), CYLINDERS in sys.argv[3:])

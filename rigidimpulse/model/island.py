@@ -1,0 +1,94 @@
+"""An island: bodies joined by contacts, joints or forces at one instant, and all that is known of their contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.dynamics.impact.point import Contacts
+
+NO_FORCE = np.zeros(3)
+CORRECTED = 10.0
+"""Approach speed that a position correction may make, in contact margins of turning (margin over size) times the speed: arms and normals
+turn a little."""
+SLACK = 1e-9
+"""Contacts that leave or approach slower than the held ones by this part are held."""
+
+
+@dataclass
+class Island:
+    """Bodies joined by contacts at `time`.
+
+    Attributes:
+        members: movable bodies, in order of index.
+        pairs: places of the contacting pairs in the table of pairs.
+        contacts: all contacts within the margin; `place` (m,) their pairs, `kinds` (m,) and `features` (m, 2) what touches, `keys`
+            who they are.
+        contact_margin: (m,) gap at which lasting contacts are held, m.
+        approach: (m,) u.n, m/s; negative approaches.
+        rest_speed: (m,) a slower rebound is none, m/s.
+        live: (m,) bool, near enough for an impact now.
+        velocity, angular_velocity: of the members before anything happened at this instant.
+        moved: whether a position correction has changed poses. shift: m, how far it moved points of the members at most.
+        held: (m,) bool, contacts that carry forces. rests: whether all members stand still.
+        zero_speed: m/s, approach speed that counts as none. scale: m/s, largest speed of a contact point.
+        joints: the joints of the members.
+        substepped: bodies that the sub-stepped regime advances with this island, None where the island is exact.
+        free: accelerations and angular accelerations (k, 3) of the members without varying forces, None where these do not act.
+        loaded: whether varying forces are constant over the sub-step of contacts or joints.
+
+    """
+
+    time: float
+    members: np.ndarray
+    pairs: np.ndarray
+    contacts: Contacts
+    place: np.ndarray
+    kinds: np.ndarray
+    features: np.ndarray
+    keys: list[tuple[int, ...]]
+    contact_margin: np.ndarray
+    approach: np.ndarray
+    rest_speed: np.ndarray
+    live: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    moved: bool = False
+    shift: float = 0.0
+    held: np.ndarray | None = None
+    rests: bool = False
+    zero_speed: float = 0.0
+    scale: float = 0.0
+    joints: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    substepped: np.ndarray | None = None
+    free: tuple[np.ndarray, np.ndarray] | None = None
+    loaded: bool = False
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the exact regime advances it."""
+        return self.substepped is None
+
+    def slow(self) -> np.ndarray:
+        """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the contact margin."""
+        zero_speed = self.zero_speed
+        if self.moved:
+            zero_speed += CORRECTED * self.scale * TOLERANCES.contact_margin
+        return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + zero_speed
+
+
+def empty_contacts(m: int) -> Contacts:
+    """Arrays for m contacts."""
+    return Contacts(*np.empty((2, m), np.int64), *np.empty((3, m, 3)), *np.empty((5, m)))
+
+
+def island_without_contacts(time: float, members: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray) -> Island:
+    """Bodies that touch nothing: what only forces hold, or what only the sub-stepped regime knows the contacts of."""
+    none = np.zeros(0, np.int64)
+    return Island(
+        time=time, members=members, pairs=none, contacts=empty_contacts(0), place=none, kinds=none,
+        features=np.zeros((0, 2), np.int64), keys=[], contact_margin=np.zeros(0), approach=np.zeros(0), rest_speed=np.zeros(0),
+        live=np.zeros(0, bool), velocity=velocity, angular_velocity=angular_velocity,
+    )  # fmt: skip
