@@ -87,9 +87,12 @@ EFFECTS = {
 """Name in the plan: the plain scene, what calls for the effect, modules of the package whose kernels are the effect's."""
 KERNELS = {"springs", "joints", "rolling friction", "sub-stepped islands", "contact forces", "contact detection", "event kernel"}
 """Effects with kernels of their own."""
-ASKED_FOR = ("rigidimpulse.dynamics.forces.", "rigidimpulse.dynamics.soft_body", "rigidimpulse.io", "rigidimpulse.engine.triggers")
+ASKED_FOR = (
+    "rigidimpulse.dynamics.forces.", "rigidimpulse.dynamics.soft_body", "rigidimpulse.io", "rigidimpulse.engine.triggers",
+    "rigidimpulse.engine.varying_forces", "rigidimpulse.engine.soft_bodies",
+)  # fmt: skip
 """Modules that are imported where a scene asks for them only, but for those of forces that do not vary."""
-ALWAYS = {"rigidimpulse.dynamics.forces.gravity", "rigidimpulse.dynamics.forces.constant", "rigidimpulse.dynamics.forces.kinds"}
+ALWAYS = {"rigidimpulse.dynamics.forces.constant"}
 OPTIONAL = {"clarabel", "defusedxml", "meshcat", "mujoco", "pybullet", "dask", "h5py", "pxr", "matplotlib", "playwright"}
 
 REPORT = '''

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from rigidimpulse.dynamics.forces.force_log import ForceWork
 from rigidimpulse.engine.exact.joints import reaction_table
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
@@ -14,6 +15,9 @@ from rigidimpulse.recording.impulses import Impulses
 from rigidimpulse.recording.ledger import make_ledger
 from rigidimpulse.recording.recording import Recording, Status
 from rigidimpulse.scene.frames import own_frames
+
+if TYPE_CHECKING:
+    from rigidimpulse.dynamics.forces.force_log import ForceWork
 
 
 def finish_run(run: Run, duration: float) -> Recording:

@@ -90,7 +90,7 @@ class Plan:
     @property
     def steps(self) -> bool:
         """Whether a step does anything that could change the trajectories of rigid bodies."""
-        return bool(self.pairs or self.exact.contact_forces)
+        return bool(self.pairs or self.exact.loads or self.exact.contact_forces or self.observe)
 
     def includes(self, name: str) -> bool:
         """Whether the effect of a name is in."""

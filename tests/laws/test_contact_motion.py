@@ -18,10 +18,11 @@ import rigidimpulse as ri
 from rigidimpulse.core.quaternion import multiply, quaternion_from_axis_angle
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.impact.point import Contacts
+from rigidimpulse.engine.begin import start_trajectories
 from rigidimpulse.engine.compile_scene import compile_scene
-from rigidimpulse.engine.simulate import start_trajectories
+from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.touching import bring_all, fill_contacts
-from rigidimpulse.model.state import Run
+from rigidimpulse.model.plan import Plan
 from rigidimpulse.motion.trajectory import begin
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
@@ -124,7 +125,8 @@ def keep_gap(run: Run) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_places_of_contact_move_as_found_a_moment_later(name: str) -> None:
     scene = ri.Scene(gravity=(0.0, 0.0, 0.0), bodies=pair(name))
-    run = Run(compile_scene(scene), Recorder(np.zeros(1), 2), EventLog())
+    world = compile_scene(scene)
+    run = Run(world, Plan(world, []), Recorder(np.zeros(1), 2), EventLog())
     start_trajectories(run)
     keep_gap(run)
     found = [contact_at(run, k * STEP)[0] for k in range(4)]

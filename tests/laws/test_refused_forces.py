@@ -13,7 +13,7 @@ import pytest
 import rigidimpulse as ri
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.dynamics.solvers.newton import solve_newton
-from rigidimpulse.model import state
+from rigidimpulse.engine import run as run_module
 
 G, SIZE, SPEED = 9.81, 0.2, 2.0
 GAP = 2.0 * TOLERANCES.contact_margin * SIZE
@@ -37,7 +37,7 @@ def spoilt(factor: float, start: float, end: float = np.inf):
 
 def sliding_box(monkeypatch: pytest.MonkeyPatch, solver, hinged: bool = False) -> ri.Recording:
     """Run of a box of 1 kg that slides on a floor, maybe with a flap hinged to it."""
-    monkeypatch.setattr(state, "row_solver", lambda name: solver)
+    monkeypatch.setattr(run_module, "row_solver", lambda name: solver)
     rough = ri.Material(static_friction=0.2, dynamic_friction=0.2, restitution=0.0)
     scene = ri.Scene(gravity=(0, 0, -G))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=rough))

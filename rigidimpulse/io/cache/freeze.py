@@ -35,9 +35,10 @@ LINE = 64
 """Bytes of a line of the processor's cache."""
 HOMES = (
     "core.quaternion", "core.simd", "core.workers", "scene.accuracy", "scene.mass", "scene.joint", "scene.joint_six_axis",
-    "collision", "motion", "model", "dynamics", "engine.exact", "engine.substepped", "engine.spheres", "engine.islands",
-    "engine.pair_events", "engine.pair_table", "engine.regime", "engine.simulate", "engine.triggers",
-    "recording.contact_log", "recording.contacts", "recording.events", "recording.impulses", "recording.recorder", "io.cache.freeze",
+    "collision", "motion", "model", "dynamics", "engine.exact", "engine.substepped", "engine.spheres", "engine.absent", "engine.islands",
+    "engine.keyframe_paths", "engine.pair_events", "engine.pair_table", "engine.regime", "engine.run", "engine.soft_bodies",
+    "engine.triggers", "engine.varying_forces", "recording.contact_log", "recording.contacts", "recording.events", "recording.impulses",
+    "recording.recorder", "io.cache.freeze",
 )  # fmt: skip
 """Packages and modules of what a state is made of: nothing in them reads or runs files."""
 NUMPY = ("dtype", "ndarray", "scalar", "_reconstruct", "_frombuffer")
