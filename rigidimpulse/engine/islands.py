@@ -101,7 +101,7 @@ def _components(
     ends = [run.joints.bodies_of(np.array([j])) for j in joints.tolist()]
     tied = np.flatnonzero(reached & run.forces.acts)
     links = [integer[:, :2], *(end[[[0, -1]]] for end in ends), np.array(run.forces.ties(tied), np.int64).reshape(-1, 2)]
-    first, second = np.concatenate(links).T
+    first, second = np.ascontiguousarray(np.concatenate(links).T)
     root = roots(run.world.num_bodies, first, second, dynamic)
     owner = root[np.where(dynamic[integer[:, 0]], integer[:, 0], integer[:, 1])]
     owner_of_joint = root[np.array([run.joints.movable_end(j) for j in joints.tolist()], np.int64)]

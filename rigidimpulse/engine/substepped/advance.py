@@ -140,7 +140,7 @@ class SubsteppedIslands:
         while len(woken := self._touched(run, member, a, b)):
             member[woken] = True
             a, b, touch = self._near(run, member, ahead)
-        root = island_roots(world.num_bodies, a, b, member)
+        root = island_roots(world.num_bodies, np.ascontiguousarray(a), np.ascontiguousarray(b), member)
         root[~member] = -1
         moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
         refused = refusals(world, root, self.label >= 0, self._jointed, moves, solve_count, a, b, self._auto)
