@@ -1,8 +1,12 @@
-"""Where the numbers of a results page come from: machine, date, commit and command, kept beside the data as JSON."""
+"""Where the numbers of a results page come from: machine, date, commit and command, kept beside the data as JSON.
+
+`python docs/results/provenance.py FILE.csv "COMMAND"` notes it for data that another script has just measured.
+"""
 
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from datetime import UTC, datetime
@@ -19,12 +23,13 @@ def git(*arguments: str) -> str:
     return subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
 
 
-def note(data: Path, command: str) -> None:
+def note(data: Path, command: str, **more: object) -> None:
     """Write machine, date and commit of data that have just been measured to a file beside them, with the suffix .json.
 
     Args:
         data: the file with the numbers.
         command: what was typed to measure them.
+        more: what else is to be known of the data.
 
     """
     about = {
@@ -32,29 +37,30 @@ def note(data: Path, command: str) -> None:
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "commit": git("rev-parse", "--short", "HEAD"),
         "command": command,
+        "load": [round(load, 2) for load in os.getloadavg()],
+        **more,
     }
     data.with_suffix(".json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
 
 
-def origin(data: Path, command: str) -> str:
-    """Say in Markdown where the numbers of a file come from.
+def known(data: Path) -> dict:
+    """What is noted beside a file of data."""
+    return json.loads(data.with_suffix(".json").read_text(encoding="utf-8"))
 
-    Args:
-        data: the file with the numbers.
-        command: what measures them again, where no note beside the file says so.
 
-    """
-    beside = data.with_suffix(".json")
-    if beside.is_file():
-        about = json.loads(beside.read_text(encoding="utf-8"))
-        versions = ", ".join(f"{name} {about[name]}" for name in ("python", "numpy", "numba"))
-        where = f"{about['processor']}, {about['cores']} cores; {versions}"
-        date, commit, command = about["date"], about["commit"], about["command"]
-    else:
-        date, commit = git("log", "--follow", "--diff-filter=AM", "-1", "--format=%cs %h", "--", str(data)).split()
-        named = data.parent.name
-        where = named.replace("-", " ") if "cores" in named else "not recorded with the data (x86-64)"
-    rows = [("machine", where), ("date", date), ("commit", f"`{commit}`"), ("command", f"`{command}`"), ("data", f"`{data.relative_to(ROOT)}`")]
+def origin(data: Path) -> str:
+    """Say in Markdown where the numbers of a file come from, as noted beside it."""
+    about = known(data)
+    where = str(about["processor"]) + (f", {about['cores']} cores" if "cores" in about else "")
+    versions = ", ".join(f"{name} {about[name]}" for name in ("python", "numpy", "numba") if name in about)
+    rows = [
+        ("machine", f"{where}; {versions}" if versions else where),
+        ("other work", f"load {about['load'][0]:g} when it ended" if "load" in about else "not recorded; other work may have run on the machine"),
+        ("date", about["date"]),
+        ("commit", f"`{about['commit']}`"),
+        ("command", f"`{about['command']}`"),
+        ("data", f"`{data.relative_to(ROOT)}`"),
+    ]
     return "\n".join(["| measured | |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows)]) + "\n"
 
 
@@ -64,4 +70,4 @@ def generated(script: str) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit("this module is imported by the scripts beside it")
+    note(Path(sys.argv[1]).resolve(), sys.argv[2])
