@@ -1,4 +1,4 @@
-"""Draw the small pictures of docs/effects.md and docs/gallery.md from runs of their scenes: `python docs/make_stills.py [NAME ...]`.
+"""Draw the small pictures of the effects and the gallery from runs of their scenes: `python docs/pictures/make_stills.py [NAME ...]`.
 
 Needs pillow, which comes with `pip install 'rigidimpulse[study]'`.
 """
