@@ -66,7 +66,12 @@ def check_rows(rows: Iterable[dict[str, str]]) -> list[tuple[str, ...]]:
     """Cells of checks: what, value, relation and bound, law."""
     words = {"at most": "≤", "at least": "≥", "equal to": "="}
     return [
-        (row["what"] if row["passed"] == "True" else f"**failed:** {row['what']}", number(row["value"]), f"{words.get(row['relation'], '')} {number(row['bound'])}", code(row["law"]))
+        (
+            row["what"] if row["passed"] == "True" else f"**failed:** {row['what']}",
+            number(row["value"]),
+            f"{words.get(row['relation'], '')} {number(row['bound'])}",
+            code(row["law"]),
+        )
         for row in rows
     ]
 
@@ -90,15 +95,19 @@ def accuracy() -> str:
     scenes = by_scene(rows)
     passed = sum(row["passed"] == "True" for row in rows)
     parts = [
-        "Each gallery scene is compared with a law of physics in closed form, or with an exact reference. The bound follows from the law and its\n"
+        "Each gallery scene is compared with a law of physics in closed form, or with an exact reference. The bound "
+        "follows from the law and its\n"
         "tolerances, never from what the library reaches. `rigidimpulse demo NAME` repeats the checks of one scene.\n",
         origin(GALLERY),
         f"{passed} of {len(rows)} checks hold, in {len(scenes)} scenes.\n",
         "## Known limits\n\n"
-        "- While bodies stay in contact, contact forces are constant over a sub-step. The motion is of second order in it. The ledger counts what is\n"
+        "- While bodies stay in contact, contact forces are constant over a sub-step. The motion is of second order "
+        "in it. The ledger counts what is\n"
         '  corrected as "energy correction".\n'
-        "- A block of several contact points knows one slip direction per phase of an impact. A single point follows its slip as it turns.\n"
-        "- The default response takes touching pairs one after the other. A body that is struck from both sides at once may leave unevenly.\n"
+        "- A block of several contact points knows one slip direction per phase of an impact. A single point "
+        "follows its slip as it turns.\n"
+        "- The default response takes touching pairs one after the other. A body that is struck from both sides at "
+        "once may leave unevenly.\n"
         '  `response="simultaneous"` keeps the symmetry.\n',
         "## Checks\n",
     ]
@@ -135,7 +144,8 @@ def validation() -> str:
         ("Same bits", "determinism"), ("Whole scenes", "invariants"), ("Files", "io"),
     )  # fmt: skip
     parts = [
-        "Each line is a file of tests. Its text is the first sentence of the file. The file states the law, the bound and how far a wrong implementation\n"
+        "Each line is a file of tests. Its text is the first sentence of the file. The file states the law, the "
+        "bound and how far a wrong implementation\n"
         "would be off. `python tests/run.py` runs all tests, `python tests/run.py tests/laws/test_impulse.py` runs one file.\n",
         "Measured values are on the pages [accuracy](accuracy.md) and [hard cases](hard_cases.md).\n",
     ]
@@ -177,13 +187,16 @@ def what_accuracy_costs() -> str:
         lines.append((f"`{name}`", *cells))
     pile = KEPT / "pile_1000.csv"
     parts = [
-        "Errors are the largest of any body at any frame. Costs are processor seconds of the loop (of the steps, in other engines). How to study your\n"
+        "Errors are the largest of any body at any frame. Costs are processor seconds of the loop (of the steps, in "
+        "other engines). How to study your\n"
         "own scene is in the [guide](../guide/studies.md). What to choose is in the guide, too: [accuracy](../guide/accuracy.md).\n",
         origin(KEPT / "spot.csv"),
         "## Side by side\n\nThe least error of the place that a method reached, m, and what that cost, s.\n",
         table(("scene", *METHODS), lines),
-        "## A pile\n\nBoxes fall into a pit and are [sub-stepped](../theory/sub_stepping.md). There is no reference for where they land. The table shows how deep\n"
-        "they are inside each other on the way. Two settings matter: `substep_motion` and `step`. Time is that of the loop for 1/60 s of motion.\n",
+        "## A pile\n\nBoxes fall into a pit and are [sub-stepped](../theory/sub_stepping.md). There is no reference "
+        "for where they land. The table shows how deep\n"
+        "they are inside each other on the way. Two settings matter: `substep_motion` and `step`. Time is that of "
+        "the loop for 1/60 s of motion.\n",
         origin(pile),
         table(
             ("engine or step", "setting", "mean, ms", "median, ms", "deepest overlap, mm", "at the end, mm"),
@@ -221,7 +234,8 @@ def section(name: str, study: Study) -> str:
 def speed() -> str:
     """Times beside other engines and of the main scenes."""
     parts = [
-        "`run.profile` or `--profile` shows where the time of a run goes. `rigidimpulse study --scaling` measures how the cost grows with the number of\n"
+        "`run.profile` or `--profile` shows where the time of a run goes. `rigidimpulse study --scaling` measures "
+        "how the cost grows with the number of\n"
         "bodies. `tests/bench/memory.py` measures memory.\n"
     ]
     for path in sorted(BENCH.glob("*/scenes.csv")):
@@ -230,7 +244,8 @@ def speed() -> str:
     for path in sorted(BENCH.glob("*/against_peers.csv")):
         rows = read(path)
         parts += [
-            "## Beside other engines\n\nThe same scenes run in all engines in turn, on one core each. Times are those of the loop here and of the steps there.\n"
+            "## Beside other engines\n\nThe same scenes run in all engines in turn, on one core each. Times are "
+            "those of the loop here and of the steps there.\n"
             "The ratio is to the fastest other engine, the median over the rounds. Overlap is the deepest at any time and at the end.\n",
             origin(path),
         ]
@@ -263,7 +278,11 @@ def tosses() -> str:
     for row in read(TOSSES / "fits.csv"):
         fitted = f"{row['position fitted']} %, {row['rotation fitted']}°" if row["position fitted"] else ""
         lines.append(
-            (row["body"], row["fitted on"], row["friction"], row["restitution"], row["inertia"], fitted, f"{row['position judged']} %, {row['rotation judged']}°")
+            (
+                *(row[name] for name in ("body", "fitted on", "friction", "restitution", "inertia")),
+                fitted,
+                f"{row['position judged']} %, {row['rotation judged']}°",
+            )
         )
     middle = []
     for name, rows in halves.items():
@@ -272,15 +291,19 @@ def tosses() -> str:
             mean = sum(values) / len(values)
             middle.append((name, what, f"{values[len(values) // 2]:.3g} {unit}", f"{mean:.3g} {unit}", f"{values[-1]:.3g} {unit}"))
     parts = [
-        "Recorded tosses of an acrylic cube on a board (`assets/README.md`) are compared with the same throws simulated. `rigidimpulse demo toss` shows\n"
+        "Recorded tosses of an acrylic cube on a board (`assets/README.md`) are compared with the same throws "
+        "simulated. `rigidimpulse demo toss` shows\n"
         "one. `rigidimpulse/gallery/tosses.py` loads, starts and scores them.\n",
         origin(TOSSES / "fits.csv"),
         "## Method\n\n"
-        "- **Data.** The recorded lengths read a little short, as free fall and the height at rest show. Lengths stay as recorded, with a matching gravity.\n"
+        "- **Data.** The recorded lengths read a little short, as free fall and the height at rest show. Lengths "
+        "stay as recorded, with a matching gravity.\n"
         "  Errors are divided by the stated width of the cube.\n"
-        "- **Start.** Three frames before the lowest corner can touch. Pose, velocity and spin are those of the exact flight that fits all frames before best.\n"
+        "- **Start.** Three frames before the lowest corner can touch. Pose, velocity and spin are those of the "
+        "exact flight that fits all frames before best.\n"
         "- **Run.** From there to the last frame, at the default accuracy.\n"
-        "- **Errors.** The mean distance over the width and the mean angle over the frames, averaged over tosses. The symmetry of the cube is not used.\n"
+        "- **Errors.** The mean distance over the width and the mean angle over the frames, averaged over tosses. "
+        "The symmetry of the cube is not used.\n"
         "- **Fit.** One friction and one restitution from a grid, fitted on one half of the tosses and judged on the other half.\n",
         "## Fits\n\nErrors are position and rotation. A row may also fit the moment of inertia, or round the corners. "
         f"The goal was {100.0 * GOALS[0]:g} % and {math.degrees(GOALS[1]):g}° on the judged half.\n",
@@ -289,10 +312,14 @@ def tosses() -> str:
         table(("half", "error", "median", "mean", "largest"), middle),
         "![Errors of the tosses](tosses.png)\n",
         "## What limits the errors\n\n"
-        "`tests/bench/fit_tosses.py` also varies the start within the noise of the measurement, and the step of the contact forces. Both matter less than\n"
-        "the law. One coefficient of friction is a compromise: the measured ratio of tangential to normal impulse falls with the speed. A friction that\n"
-        "falls in the same way did not lower the errors, so this is not the only cause. A toss that ends on another face than the recorded one has a large\n"
-        "rotation error; a few such tosses make much of the mean. One toss of the source is moved after it has come to rest, as by a hand. It is left in.\n",
+        "`tests/bench/fit_tosses.py` also varies the start within the noise of the measurement, and the step of the "
+        "contact forces. Both matter less than\n"
+        "the law. One coefficient of friction is a compromise: the measured ratio of tangential to normal impulse "
+        "falls with the speed. A friction that\n"
+        "falls in the same way did not lower the errors, so this is not the only cause. A toss that ends on another "
+        "face than the recorded one has a large\n"
+        "rotation error; a few such tosses make much of the mean. One toss of the source is moved after it has come "
+        "to rest, as by a hand. It is left in.\n",
     ]
     return page("Real tosses", *parts)
 

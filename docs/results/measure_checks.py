@@ -61,10 +61,8 @@ def scene_rows(name: str, hard: bool, limit: float) -> list[tuple]:
             checks, seconds, impacts, status = json.loads(answer.read_text()) if code == 0 else ([], limit, 0, lost)
     if not checks:
         return [(name, lost, "", "", "", False, "", f"{seconds:.2f}", impacts, status.splitlines()[0])]
-    return [
-        (name, *(check[key] for key in ("what", "value", "relation", "bound", "passed", "law")), f"{seconds:.2f}", impacts, status.splitlines()[0])
-        for check in checks
-    ]
+    keys = ("what", "value", "relation", "bound", "passed", "law")
+    return [(name, *(check[key] for key in keys), f"{seconds:.2f}", impacts, status.splitlines()[0]) for check in checks]
 
 
 def run_here(name: str) -> tuple[list[dict], float, int, str]:

@@ -53,9 +53,10 @@ def origin(data: Path) -> str:
     about = known(data)
     where = str(about["processor"]) + (f", {about['cores']} cores" if "cores" in about else "")
     versions = ", ".join(f"{name} {about[name]}" for name in ("python", "numpy", "numba") if name in about)
+    other = f"load {about['load'][0]:g} when it ended" if "load" in about else "not recorded; other work may have run on the machine"
     rows = [
         ("machine", f"{where}; {versions}" if versions else where),
-        ("other work", f"load {about['load'][0]:g} when it ended" if "load" in about else "not recorded; other work may have run on the machine"),
+        ("other work", other),
         ("date", about["date"]),
         ("commit", f"`{about['commit']}`"),
         ("command", f"`{about['command']}`"),

@@ -34,7 +34,7 @@ def free_rotation() -> None:
     b = np.sqrt((squared - energy * largest) / (middle * (middle - largest)))
     c = np.sqrt((squared - energy * largest) / (least * (least - largest)))
     rate = np.sqrt((largest - middle) * (squared - energy * least) / (moments.prod()))
-    parameter = (middle - least) * (squared - energy * largest) / ((largest - middle) * (squared - energy * least))
+    parameter = (middle - least) * (energy * largest - squared) / ((largest - middle) * (squared - energy * least))
     times = np.linspace(0.0, 30.0, 1200)
     sn, cn, dn, _ = ellipj(rate * times, parameter)
     figure, axes = plt.subplots(figsize=(6.4, 2.6))
