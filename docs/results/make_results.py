@@ -125,7 +125,8 @@ def hard_cases() -> str:
         "Hard cases are scenes that rigid-body engines fail on. They run at default settings. How to run them is in the\n"
         "[guide](../guide/gallery.md#hard-cases). A check that names other settings shows that these are not enough.\n",
         origin(HARD),
-        f"{good} of {len(scenes)} cases pass. Times are those of the simulation and its checks in a process of its own, kernels loaded from disk.\n",
+        f"{good} of {len(scenes)} cases pass. Times are those of the simulation and its checks in a process of its own, "
+        "kernels loaded from disk.\n",
     ]
     for title, cases in FAMILIES.values():
         lines = []
@@ -223,7 +224,8 @@ def section(name: str, study: Study) -> str:
         ratios = [ratio for row, _, ratio in found if row.family == peer]
         faster = sum(row.family == peer and row.ran for row in study.rows) - len(ratios)
         if ratios:
-            parts.append(f"At equal time the error of {peer} is {small(min(ratios))} to {small(max(ratios))} times as large, over its steps.\n")
+            between = f"{small(min(ratios))} to {small(max(ratios))}"
+            parts.append(f"At equal time the error of {peer} is {between} times as large, over its steps.\n")
         if faster:
             parts.append(f"{peer} is faster than any run here with {faster} of its steps.\n")
     if study.left:
