@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import importlib
 import inspect
 import re
 import shlex
@@ -123,6 +124,75 @@ def test_files_that_pages_name_are_there() -> None:
     assert not lost
 
 
+def how_to_lists() -> dict[str, list[str]]:
+    """Paths that each section "How to add ..." of docs/architecture.md lists, by heading."""
+    lists: dict[str, list[str]] = {}
+    heading = ""
+    for line in (DOCS / "architecture.md").read_text(encoding="utf-8").splitlines():
+        if line.startswith("#"):
+            heading = line.lstrip("# ")
+        elif heading.startswith("How to add") and (found := re.match(r"- `([^`]+)`", line)):
+            lists.setdefault(heading, []).append(found[1])
+    return lists
+
+
+def test_what_one_must_touch_to_add_something_is_there() -> None:
+    lists = how_to_lists()
+    assert set(lists) >= {f"How to add {what}" for what in ("a joint", "a force", "a shape kind", "a narrow-phase pair", "an exporter")}
+    lost = [f"{heading}: {path}" for heading, paths in lists.items() for path in paths if not (ROOT / path).is_file()]
+    assert not lost
+
+
+def test_terms_of_the_glossary_are_defined_once() -> None:
+    terms = re.findall(r"^\| ([^|]+) \| ", (DOCS / "glossary.md").read_text(encoding="utf-8"), re.M)
+    terms = [term for term in terms if term != "term"]
+    assert len(terms) > 60
+    assert len(set(terms)) == len(terms)
+
+
+GENERATED = ("accuracy", "hard_cases", "validation", "what_accuracy_costs", "speed", "tosses")
+"""Pages of docs/results that a script writes."""
+
+
+@pytest.mark.parametrize("name", [name for name in GENERATED if name != "validation"])
+def test_results_say_where_they_were_measured(name: str) -> None:
+    text = (DOCS / "results" / f"{name}.md").read_text(encoding="utf-8")
+    for word in ("machine", "date", "commit", "command", "data"):
+        assert re.search(rf"^\| {word} \| .+ \|$", text, re.M), word
+
+
+def test_results_are_those_of_their_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every generated page, and the table of the README, is what its script makes of the data: no number is typed by hand."""
+    monkeypatch.syspath_prepend(str(DOCS / "results"))
+    script = importlib.import_module("make_results")
+    assert set(script.PAGES) == set(GENERATED)
+    for name, make in script.PAGES.items():
+        assert (DOCS / "results" / f"{name}.md").read_text(encoding="utf-8") == make(), f"run `python docs/results/make_results.py {name}`"
+    assert (ROOT / "README.md").read_text(encoding="utf-8") == script.readme(), "run `python docs/results/make_results.py`"
+
+
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 80
+
+
+OLD_WORDS = (
+    r"heaps?", r"guard(?:s|ed|ing)?", r"(?<!of )courses?", r"foresight", r"toil", r"partings?", r"stirred", r"wish(?:es|ed)?", r"anew",
+    r"so many", r"but for", r"nets", r"dear(?:er|est)?", r"rattles",
+)  # fmt: skip
+"""Words that the field has other words for."""
+MESSAGES = r"overlap in a heap|nets (?:jammed|inside bodies|made energy)"
+"""Kinds of events as the code reports them."""
+WORDS_OF_CODE = [DOCS / "results" / f"{name}.md" for name in ("validation", "accuracy", "hard_cases")]
+"""Generated pages whose words are those of checks and of tests."""
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page not in WORDS_OF_CODE], ids=named)
+def test_pages_use_the_words_of_the_field(page: Path) -> None:
+    text = re.sub(MESSAGES, "", page.read_text(encoding="utf-8"))
+    text = re.sub(r"`[^`\n]*`|\]\([^)]*\)", "", text)
+    assert not re.findall(rf"\b(?:{'|'.join(OLD_WORDS)})\b", text, re.I)
+
+
 def test_pictures_are_small() -> None:
     """1.5 MB in all, so that a clone stays quick; the pictures that are there take half of it."""
     pictures = [path for path in DOCS.rglob("*") if path.suffix in (".png", ".jpg") and "_build" not in path.parts]
@@ -132,16 +202,16 @@ def test_pictures_are_small() -> None:
 def test_every_public_name_has_one_entry_in_the_reference() -> None:
     entries = [
         name
-        for page in (DOCS / "api").glob("*.md")
+        for page in (DOCS / "reference").glob("*.md")
         for name in re.findall(r"auto(?:class|function|exception):: rigidimpulse\.(\w+)$", page.read_text(encoding="utf-8"), re.M)
     ]
     assert sorted(entries) == sorted(ri.__all__)
 
 
 def parameter_rows() -> list[tuple[str, str, str]]:
-    """Class, parameter and default of each row of the tables of docs/parameters.md below a heading that names a class."""
+    """Class, parameter and default of each row of the tables of docs/reference/parameters.md below a heading that names a class."""
     rows, owner = [], ""
-    for line in (DOCS / "parameters.md").read_text(encoding="utf-8").splitlines():
+    for line in (DOCS / "reference" / "parameters.md").read_text(encoding="utf-8").splitlines():
         if line.startswith("#"):
             words = re.findall(r"`(\w+)`", line)
             owner = words[0] if words and words[0] in ri.__all__ else ""
@@ -207,5 +277,5 @@ def reported_kinds() -> set[str]:
 def test_every_status_is_explained() -> None:
     kinds = reported_kinds()
     assert len(kinds) > 12
-    page = (DOCS / "tuning.md").read_text(encoding="utf-8")
+    page = (DOCS / "reference" / "recording.md").read_text(encoding="utf-8")
     assert not {kind for kind in kinds if f"| {kind} |" not in page}

@@ -25,9 +25,9 @@ def load_scene(
 ) -> Scene:
     """Read a scene from a file: the suffix says how.
 
-    .glb, .gltf: glTF 2.0 with KHR_physics_rigid_bodies and KHR_implicit_shapes, or without physics, see docs/gltf.md.
-    .usda, .usdc, .usd, .usdz: USD with UsdPhysics (extra `usd`), see docs/usd.md.
-    .urdf: robots, URDF; .xml, .mjcf: MuJoCo models, MJCF (extra `robot`), see docs/robots.md.
+    .glb, .gltf: glTF 2.0 with KHR_physics_rigid_bodies and KHR_implicit_shapes, or without physics, see docs/guide/gltf.md.
+    .usda, .usdc, .usd, .usdz: USD with UsdPhysics (extra `usd`), see docs/guide/usd.md.
+    .urdf: robots, URDF; .xml, .mjcf: MuJoCo models, MJCF (extra `robot`), see docs/guide/robots.md.
 
     Bodies have the names of their nodes, prims or links. Units become metres, kilograms and radians; the up axis stays.
 

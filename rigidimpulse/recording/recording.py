@@ -265,8 +265,8 @@ class Recording:
 
         .npz: arrays. .csv: a table, one row a frame and body. .html: a page that plays it. .glb, .gltf: animated nodes of glTF.
         .usda, .usdc, .usd, .usdz: animated prims of USD (extra `usd`). A scene from a glTF or USD file is written as that file
-        with its nodes or prims animated, into its own kind of file; any other as a node or prim a body. See docs/gltf.md and
-        docs/usd.md.
+        with its nodes or prims animated, into its own kind of file; any other as a node or prim a body. See docs/guide/gltf.md and
+        docs/guide/usd.md.
 
         Args:
             path: where to.

@@ -4,18 +4,18 @@ Slots
     impact_time     how the first contact in an interval is found (stage sweep)
     response        how impulses are computed (stage respond); "penalty": none are, springs push bodies apart that are inside each other,
                     with penalty_stiffness [N/m] and penalty_damping [N s/m] at every point that is inside; None: from weights, speeds
-                    and restitutions, see docs/penalty.md
+                    and restitutions, see docs/theory/penalty.md
     restitution     law that ends an impact: "newton" (speeds), "poisson" (impulses), "energetic" (works; Stronge), or "auto":
                     energetic where a contact has friction, Newton's where it has none. They differ only with friction, and
                     there where the contact couples normal and tangential motion (see dynamics/impact/restitution.py)
     integrator      how bodies move between impacts (stage integrate): "exact" (forces that vary: steps of order 4, as long as their error
                     allows), or in steps of one length, where forces vary and nothing collides by impulses: "runge_kutta" (of order 4),
                     "semi_implicit" (Euler's, of order 1)
-    contact_solver  how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for heaps of many bodies: see
-                    docs/heaps.md), "qp" (the exact laws by a convex solver library: a reference), or "auto": per island of bodies
-                    that may touch in a step, newton unless it is a large heap
-    substep_motion     how far touching bodies of a heap may come past each other until their contacts are looked for anew, as a fraction of
-                    the distance from the centre of mass to the nearest face
+    contact_solver  how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for large islands:
+                    see docs/theory/sub_stepping.md), "qp" (the exact laws by a convex solver library: a reference), or "auto":
+                    newton, and sub-stepped for large islands of bodies that may touch in a step
+    substep_motion  how far touching bodies of a sub-stepped island may move past each other until their contacts are searched
+                    again, as a fraction of the distance from the centre of mass to the nearest face
     step            s; contact forces are constant over it, impacts are found inside it at any time
     tolerance       gap error at an impact, as a fraction of the size of the smaller body
     iterations      limit of gap queries for one pair and one interval

@@ -1,4 +1,4 @@
-"""Draw docs/tosses.png from tests/bench/tosses/each.csv: `python tests/bench/plot_tosses.py`. Needs matplotlib."""
+"""Draw docs/results/tosses.png from tests/bench/tosses/each.csv: `python tests/bench/plot_tosses.py`. Needs matplotlib."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 FOLDER = Path(__file__).parent
-PICTURE = FOLDER.parent.parent / "docs" / "tosses.png"
+PICTURE = FOLDER.parent.parent / "docs" / "results" / "tosses.png"
 
 
 def main() -> None:

@@ -1,11 +1,11 @@
-"""What accuracy costs in a heap: `python tests/bench/substepped_costs.py` runs 1,000 boxes, `... --draw` draws docs/heap_costs.png anew.
+"""What accuracy costs in a pile: `python tests/bench/substepped_costs.py` runs 1,000 boxes, `... --draw` draws docs/results/pile_costs.png.
 
 The pile of `piles`, 5 s, at several values of `Accuracy.substep_motion` and `step`, and in the fastest other engines (see `engines`) at two
-steps each. Time is that of the loop for 1/60 s of motion, recording included, the mean over all in which anything moves: a heap that has
+steps each. Time is that of the loop for 1/60 s of motion, recording included, the mean over all in which anything moves: a pile that has
 come to rest costs nothing, other engines are not allowed to sleep. Depth is the greatest of any pair in the frames at 0.5, 1 ... 5 s, by
 separating axes from the recorded poses; each needs a run of its own in another engine. Settings here have FALLS falls, which begin a
 nanometre apart and end differently, by a third in time and tenfold in depth: what counts is the median time and the greatest depth. Lines
-go to docs/accuracy_costs/heap_1000.csv.
+go to docs/results/accuracy_costs/pile_1000.csv.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ SETTINGS = {
 }
 NAMED = {(STANDARD, 0.1): "standard", (HALVES, 0.3): "preview"}
 PEERS, PEER_STEPS = ("PhysX", "Rapier"), (1.0 / 60.0, 1.0 / 240.0)
-DOCS = Path(__file__).resolve().parent.parent.parent / "docs"
-TABLE, PICTURE = DOCS / "accuracy_costs" / "heap_1000.csv", DOCS / "heap_costs.png"
+RESULTS = Path(__file__).resolve().parent.parent.parent / "docs" / "results"
+TABLE, PICTURE = RESULTS / "accuracy_costs" / "pile_1000.csv", RESULTS / "pile_costs.png"
 TICKS = (2.0, 3.0, 5.0, 10.0, 20.0, 30.0)
 """ms."""
 BESIDE = {
@@ -140,7 +140,7 @@ def draw(points: list[Point]) -> None:
 
 def main() -> None:
     """Measure and write, or read; draw."""
-    parser = argparse.ArgumentParser(description="What accuracy costs in a heap.")
+    parser = argparse.ArgumentParser(description="What accuracy costs in a pile.")
     parser.add_argument("--draw", action="store_true", help="only draw, from the lines written last time")
     if not parser.parse_args().draw:
         print(machine())

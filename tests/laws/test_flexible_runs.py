@@ -49,7 +49,8 @@ def test_a_ball_bounces_on_a_trampoline_by_the_impulses_of_the_net(trampoline) -
 
 
 def test_energy_balances_and_does_not_rise(trampoline) -> None:
-    # 3.0 kg fall 0.25 m: 7 J. The balance is round-off; what a step may make is of second order, J (h L - J) / 2 m (docs/flexible.md).
+    # 3.0 kg fall 0.25 m: 7 J. The balance is round-off; what a step may make is of second order,
+    # J (h L - J) / 2 m (docs/theory/soft_bodies.md).
     ledger = trampoline.ledger
     taken = np.sum(list(ledger.dissipated.values()), axis=0)
     assert np.abs(ledger.total + taken - ledger.total[0]).max() < 1e-11

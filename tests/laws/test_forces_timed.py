@@ -2,7 +2,7 @@
 
 Laws. Harmonic A sin(w t + phi) at the centre of mass, m = 1.7: I = A (cos phi - cos(w t + phi)) / w, and the path is its integral.
 Sampled: the impulse is the trapezium rule's. A force at a point turns with nothing but its point; the reference integrates the box.
-Tolerance: inside a step a path is off by at most 1e-8 of the size (docs/forces.md), at its end by less than that, so 1e-8 m for each
+Tolerance: inside a step a path is off by at most 1e-8 of the size (docs/theory/forces.md), at its end by less than that, so 1e-8 m for each
 second or period is asked: 60 steps that were off by as much as they may, all to one side, would be at 6e-7. A sampled force is a line
 between its samples, which a path carries exactly: rounding, 1e-12. Frequencies taken for rad/s, or a phase left out, are off by 1.
 """

@@ -1,7 +1,7 @@
 """Real tosses of a cube: the roll-outs of the half that was not fitted to stay within the errors reached on it.
 
 Law. With one friction and one restitution fitted on the tosses of even index, the 60 of odd index come out at the mean errors of
-docs/tosses.md: 14.3 % of the width and 20.0 degrees. A run repeats to the last bit on one machine; another rounding may send a
+docs/results/tosses.md: 14.3 % of the width and 20.0 degrees. A run repeats to the last bit on one machine; another rounding may send a
 toss that nearly stands on an edge to another face, which moves the means by about 0.3 % and 1 degree. The bounds leave room for
 two of those. A wrong law of friction is far off: 0.04 too low or too high gives 33 and 28 % of the width.
 """

@@ -31,5 +31,5 @@ def test_a_mesh_that_rocks_in_another_one_does_not_stall_the_sweep(throw: dict) 
     accuracy = ri.Accuracy(iterations=1000)  # a tenth of the default; the stalls needed more than 10,000
     run = ri.simulate(scene, 3.5, accuracy=accuracy)
     assert run.status.ok, run.status.message
-    # What docs/accuracy.md states of contact points that move over a mesh; forces held over the step are off by that.
+    # What docs/results/accuracy.md states of contact points that move over a mesh; forces held over the step are off by that.
     assert np.all(np.diff(run.ledger.total) < 1e-5 * run.ledger.total[0])

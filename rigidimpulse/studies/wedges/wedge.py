@@ -91,7 +91,7 @@ def wedge(
     Args:
         scene: a gallery name, a scene file, a Scene, or a function that returns one, whose arguments may be varied.
         vary: values by parameter: an argument of the function, seed, duration, accuracy, gravity.z, material.restitution, NAME.FIELD, ...
-            See docs/wedges.md.
+            See docs/guide/wedges.md.
         folder: for the files; also of workers on other machines.
         duration, fps, accuracy: as `simulate` has them; by default those of a gallery scene, else 4 s, 60 and "standard".
         processes: how many at a time; by default one a core. 1: in this process.

@@ -1,0 +1,356 @@
+"""Write the pages of docs/results/ from their data: `python docs/results/make_results.py [PAGE ...]`.
+
+Pages: accuracy, hard_cases, validation, what_accuracy_costs, speed, tosses; none: all. No number is typed here: each comes from
+a file of data, and the page says which machine, commit and command made it. The table in README.md is written, too.
+"""
+
+from __future__ import annotations
+
+import ast
+import csv
+import math
+import re
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from provenance import DATA, ROOT, generated, known, origin
+from topics import KEPT, METHODS, TOPICS
+
+sys.path.insert(0, str(ROOT / "tests" / "bench"))
+
+from fit_tosses import GOALS
+
+from rigidimpulse.gallery.hard import FAMILIES
+from rigidimpulse.gallery.record import figure
+from rigidimpulse.studies.peers import PEERS
+from rigidimpulse.studies.reference import Reference
+from rigidimpulse.studies.row import Row
+from rigidimpulse.studies.work_precision import Study
+
+HERE = Path(__file__).resolve().parent
+GALLERY, HARD = DATA / "gallery_checks.csv", DATA / "hard_checks.csv"
+BENCH = ROOT / "tests" / "bench"
+TOSSES = BENCH / "tosses"
+README_CHECKS = (
+    ("bounce", "energy, relative change"), ("disks_in_a_box", "error of final positions"), ("wing_nut", "error of the attitude"),
+    ("galperin_3", "impacts"), ("superball", "error of the final place"), ("spot", "error of the ledger"),
+    ("rolling", "steel: error of the way"), ("planets", "comet: way from its start"),
+)  # fmt: skip
+"""Scene and the beginning of the check that the README shows."""
+
+
+def read(path: Path) -> list[dict[str, str]]:
+    """Rows of a table of data, by column."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table in Markdown."""
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    return "\n".join([*lines, *(f"| {' | '.join(str(cell).replace('|', chr(92) + '|') for cell in row)} |" for row in rows)]) + "\n"
+
+
+def page(title: str, *parts: str) -> str:
+    """A page of parts."""
+    return "\n".join([f"# {title}\n", generated(__file__), *parts]).rstrip() + "\n"
+
+
+def number(text: str | float) -> str:
+    """A number for a table; a dash where there is none."""
+    return figure(float(text)) if text not in ("", None) else "-"
+
+
+def check_rows(rows: Iterable[dict[str, str]]) -> list[tuple[str, ...]]:
+    """Cells of checks: what, value, relation and bound, law."""
+    words = {"at most": "≤", "at least": "≥", "equal to": "="}
+    return [
+        (
+            row["what"] if row["passed"] == "True" else f"**failed:** {row['what']}",
+            number(row["value"]),
+            f"{words.get(row['relation'], '')} {number(row['bound'])}",
+            code(row["law"]),
+        )
+        for row in rows
+    ]
+
+
+def code(text: str) -> str:
+    """A formula in a table, as it is."""
+    return f"`{text}`" if text else ""
+
+
+def by_scene(rows: list[dict[str, str]]) -> dict[str, list[dict[str, str]]]:
+    """Checks of each scene."""
+    found: dict[str, list[dict[str, str]]] = {}
+    for row in rows:
+        found.setdefault(row["scene"], []).append(row)
+    return found
+
+
+def accuracy() -> str:
+    """All checks of the gallery."""
+    rows = read(GALLERY)
+    scenes = by_scene(rows)
+    passed = sum(row["passed"] == "True" for row in rows)
+    parts = [
+        "Each gallery scene is compared with a law of physics in closed form, or with an exact reference. The bound "
+        "follows from the law and its\n"
+        "tolerances, never from what the library reaches. `rigidimpulse demo NAME` repeats the checks of one scene.\n",
+        origin(GALLERY),
+        f"{passed} of {len(rows)} checks hold, in {len(scenes)} scenes.\n",
+        "## Known limits\n\n"
+        "- While bodies stay in contact, contact forces are constant over a sub-step. The motion is of second order "
+        "in it. The ledger counts what is\n"
+        '  corrected as "energy correction".\n'
+        "- A block of several contact points knows one slip direction per phase of an impact. A single point "
+        "follows its slip as it turns.\n"
+        "- The default response takes touching pairs one after the other. A body that is struck from both sides at "
+        "once may leave unevenly.\n"
+        '  `response="simultaneous"` keeps the symmetry.\n',
+        "## Checks\n",
+    ]
+    for name, checks in scenes.items():
+        parts += [f"### `{name}`\n", table(("quantity", "value", "bound", "law"), check_rows(checks))]
+    return page("Accuracy", *parts)
+
+
+def hard_cases() -> str:
+    """All checks of the hard cases."""
+    rows = read(HARD)
+    scenes = by_scene(rows)
+    good = sum(all(row["passed"] == "True" for row in checks) for checks in scenes.values())
+    parts = [
+        "Hard cases are scenes that rigid-body engines fail on. They run at default settings. How to run them is in the\n"
+        "[guide](../guide/gallery.md#hard-cases). A check that names other settings shows that these are not enough.\n",
+        origin(HARD),
+        f"{good} of {len(scenes)} cases pass. Times are those of the simulation and its checks in a process of its own, "
+        "kernels loaded from disk.\n",
+    ]
+    for title, cases in FAMILIES.values():
+        lines = []
+        for name in cases:
+            for k, cells in enumerate(check_rows(scenes[name])):
+                first = scenes[name][0]
+                lines.append((f"`{name}`" if k == 0 else "", *cells[:3], f"{float(first['seconds']):.1f}" if k == 0 else "", cells[3]))
+        parts += [f"## {title}\n", table(("case", "quantity", "value", "bound", "time, s", "law"), lines)]
+    return page("Hard cases", *parts)
+
+
+def validation() -> str:
+    """What the tests of laws say of themselves."""
+    folders = (
+        ("Laws in closed form", "laws"), ("Order of errors in the step", "order"), ("Both sides of an option", "both_sides"),
+        ("Same bits", "determinism"), ("Whole scenes", "invariants"), ("Files", "io"),
+    )  # fmt: skip
+    parts = [
+        "Each line is a file of tests. Its text is the first sentence of the file. The file states the law, the "
+        "bound and how far a wrong implementation\n"
+        "would be off. `python tests/run.py` runs all tests, `python tests/run.py tests/laws/test_impulse.py` runs one file.\n",
+        "Measured values are on the pages [accuracy](accuracy.md) and [hard cases](hard_cases.md).\n",
+    ]
+    for title, folder in folders:
+        lines = []
+        for path in sorted((ROOT / "tests" / folder).glob("test_*.py")):
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            words = (ast.get_docstring(tree) or "").split("\n\n")[0].replace("\n", " ")
+            sentence = re.split(r"(?<=[a-z)])\. |:$", words)[0].rstrip(".:")
+            count = sum(isinstance(node, ast.FunctionDef) and node.name.startswith("test_") for node in tree.body)
+            lines.append((sentence, count, f"`{path.relative_to(ROOT)}`"))
+        parts += [f"## {title}\n", table(("what is tested", "tests", "file"), lines)]
+    return page("Validation", *parts)
+
+
+def study_of(name: str) -> Study:
+    """A study as it was kept."""
+    path = KEPT / f"{name}.csv"
+    about = known(path)
+    reference = Reference(about["reference"], "", None, {}, about["uncertainty"])
+    return Study(name, TOPICS[name].duration, reference, [Row.of(cells) for cells in read(path)], [""] * about["left"])
+
+
+def small(value: float) -> str:
+    """A number for a table of errors."""
+    return "-" if math.isnan(value) else "0" if value == 0.0 else f"{value:.1e}"
+
+
+def what_accuracy_costs() -> str:
+    """Studies of ten scenes and of a pile."""
+    studies = {name: study_of(name) for name in TOPICS}
+    lines = []
+    for name, study in studies.items():
+        cells = []
+        for family in METHODS.values():
+            rows = [row for row in study.rows if row.family == family and row.ran and not math.isnan(row.whole.position)]
+            best = min(rows, key=lambda row: row.whole.position, default=None)
+            cells.append("-" if best is None else f"{small(best.whole.position)} in {small(best.cost)}")
+        lines.append((f"`{name}`", *cells))
+    pile = KEPT / "pile_1000.csv"
+    parts = [
+        "Errors are the largest of any body at any frame. Costs are processor seconds of the loop (of the steps, in "
+        "other engines). How to study your\n"
+        "own scene is in the [guide](../guide/studies.md). What to choose is in the guide, too: [accuracy](../guide/accuracy.md).\n",
+        origin(KEPT / "spot.csv"),
+        "## Side by side\n\nThe least error of the place that a method reached, m, and what that cost, s.\n",
+        table(("scene", *METHODS), lines),
+        "## A pile\n\nBoxes fall into a pit and are [sub-stepped](../theory/sub_stepping.md). There is no reference "
+        "for where they land. The table shows how deep\n"
+        "they are inside each other on the way. Two settings matter: `substep_motion` and `step`. Time is that of "
+        "the loop for 1/60 s of motion.\n",
+        origin(pile),
+        table(
+            ("engine or step", "setting", "mean, ms", "median, ms", "deepest overlap, mm", "at the end, mm"),
+            [(row["family"], row["setting"], row["mean"], row["median"], row["depth"], row["last_depth"]) for row in read(pile)],
+        ),
+        "![Depth against time of a pile](pile_costs.png)\n",
+        *(section(name, study) for name, study in studies.items()),
+    ]
+    return page("What accuracy costs", *parts)
+
+
+def section(name: str, study: Study) -> str:
+    """What is said of one scene."""
+    rows = [row for row in study.rows if row.family == "presets"] + [row for row in study.front() if row.family != "presets"]
+    least, cells = study.reference.uncertainty, []
+    for row in rows:
+        whole = row.whole
+        place = small(whole.position) if whole.position >= least else f"< {small(least)}"
+        cells.append((row.name, small(row.cost), place, *(small(value) for value in (whole.energy, whole.impact_time, whole.penetration))))
+    parts = [f"## `{name}`\n", TOPICS[name].words + "\n", f"Reference: {study.reference.kind}.\n"]
+    parts.append(table(("setting", "cost, s", "place, m", "energy", "impact times, s", "overlap, m"), cells))
+    found = study.advantage()
+    for peer in PEERS:
+        ratios = [ratio for row, _, ratio in found if row.family == peer]
+        faster = sum(row.family == peer and row.ran for row in study.rows) - len(ratios)
+        if ratios:
+            between = f"{small(min(ratios))} to {small(max(ratios))}"
+            parts.append(f"At equal time the error of {peer} is {between} times as large, over its steps.\n")
+        if faster:
+            parts.append(f"{peer} is faster than any run here with {faster} of its steps.\n")
+    if study.left:
+        parts.append(f"The budget had no time for {len(study.left)} settings.\n")
+    return "\n".join([*parts, f"![{name}](accuracy_costs/{name}.png)\n"])
+
+
+def speed() -> str:
+    """Times beside other engines and of the main scenes."""
+    parts = [
+        "`run.profile` or `--profile` shows where the time of a run goes. `rigidimpulse study --scaling` measures "
+        "how the cost grows with the number of\n"
+        "bodies. `tests/bench/memory.py` measures memory.\n"
+    ]
+    for path in sorted(BENCH.glob("*/scenes.csv")):
+        rows = [(row["what"], *(f"{float(row[name]):.3f}" for name in ("median", "least", "bound")), row["runs"]) for row in read(path)]
+        parts += ["## Main scenes\n", origin(path), table(("what", "median, s", "least, s", "bound, s", "runs"), rows)]
+    for path in sorted(BENCH.glob("*/against_peers.csv")):
+        rows = read(path)
+        parts += [
+            "## Beside other engines\n\nThe same scenes run in all engines in turn, on one core each. Times are "
+            "those of the loop here and of the steps there.\n"
+            "The ratio is to the fastest other engine, the median over the rounds. Overlap is the deepest at any time and at the end.\n",
+            origin(path),
+        ]
+        for scene in dict.fromkeys(row["scene"] for row in rows):
+            unit = "ms for 1/60 s" if scene.startswith(("boxes", "hulls")) else "s in all"
+            lines = [
+                (
+                    row["engine"], f"{float(row['mean']):.3g}", f"{float(row['median']):.3g}", f"{float(row['mean of the fastest']):.2f}",
+                    length(row["deepest"]), length(row["at the end"]), row["note"].split(";")[0],
+                )
+                for row in rows if row["scene"] == scene
+            ]  # fmt: skip
+            parts += [
+                f"### `{scene}`\n",
+                table(("engine or setting", f"mean, {unit}", f"median, {unit}", "ratio", "overlap, mm", "at the end, mm", "note"), lines),
+            ]
+    return page("Speed", *parts)
+
+
+def length(text: str) -> str:
+    """A depth in mm, or a dash."""
+    return "-" if math.isnan(float(text)) else f"{float(text):.2g}"
+
+
+def tosses() -> str:
+    """Errors of recorded throws."""
+    each = read(TOSSES / "each.csv")
+    halves = {"even": each[::2], "odd": each[1::2]}
+    lines = []
+    for row in read(TOSSES / "fits.csv"):
+        fitted = f"{row['position fitted']} %, {row['rotation fitted']}°" if row["position fitted"] else ""
+        lines.append(
+            (
+                *(row[name] for name in ("body", "fitted on", "friction", "restitution", "inertia")),
+                fitted,
+                f"{row['position judged']} %, {row['rotation judged']}°",
+            )
+        )
+    middle = []
+    for name, rows in halves.items():
+        for what, unit in (("position", "%"), ("rotation", "°")):
+            values = sorted(float(row[what]) for row in rows)
+            mean = sum(values) / len(values)
+            middle.append((name, what, f"{values[len(values) // 2]:.3g} {unit}", f"{mean:.3g} {unit}", f"{values[-1]:.3g} {unit}"))
+    parts = [
+        "Recorded tosses of an acrylic cube on a board (`assets/README.md`) are compared with the same throws "
+        "simulated. `rigidimpulse demo toss` shows\n"
+        "one. `rigidimpulse/gallery/tosses.py` loads, starts and scores them.\n",
+        origin(TOSSES / "fits.csv"),
+        "## Method\n\n"
+        "- **Data.** The recorded lengths read a little short, as free fall and the height at rest show. Lengths "
+        "stay as recorded, with a matching gravity.\n"
+        "  Errors are divided by the stated width of the cube.\n"
+        "- **Start.** Three frames before the lowest corner can touch. Pose, velocity and spin are those of the "
+        "exact flight that fits all frames before best.\n"
+        "- **Run.** From there to the last frame, at the default accuracy.\n"
+        "- **Errors.** The mean distance over the width and the mean angle over the frames, averaged over tosses. "
+        "The symmetry of the cube is not used.\n"
+        "- **Fit.** One friction and one restitution from a grid, fitted on one half of the tosses and judged on the other half.\n",
+        "## Fits\n\nErrors are position and rotation. A row may also fit the moment of inertia, or round the corners. "
+        f"The goal was {100.0 * GOALS[0]:g} % and {math.degrees(GOALS[1]):g}° on the judged half.\n",
+        table(("what is fitted", "fitted on", "friction", "restitution", "inertia, kg m²", "fitted half", "judged half"), lines),
+        "## Each toss\n\nErrors over the tosses of each half.\n",
+        table(("half", "error", "median", "mean", "largest"), middle),
+        "![Errors of the tosses](tosses.png)\n",
+        "## What limits the errors\n\n"
+        "`tests/bench/fit_tosses.py` also varies the start within the noise of the measurement, and the step of the "
+        "contact forces. Both matter less than\n"
+        "the law. One coefficient of friction is a compromise: the measured ratio of tangential to normal impulse "
+        "falls with the speed. A friction that\n"
+        "falls in the same way did not lower the errors, so this is not the only cause. A toss that ends on another "
+        "face than the recorded one has a large\n"
+        "rotation error; a few such tosses make much of the mean. One toss of the source is moved after it has come "
+        "to rest, as by a hand. It is left in.\n",
+    ]
+    return page("Real tosses", *parts)
+
+
+def readme() -> str:
+    """The README with its table of checks."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    scenes, lines = by_scene(read(GALLERY)), []
+    for name, what in README_CHECKS:
+        check = next(row for row in scenes[name] if row["what"].startswith(what))
+        quantity, value, bound, law = check_rows([check])[0]
+        lines.append((f"`{name}`", quantity, value, bound, law))
+    begin, end = "<!-- checks: begin -->\n", "<!-- checks: end -->"
+    before, after = text.split(begin)[0], text.split(end)[1]
+    return before + begin + table(("scene", "quantity", "value", "bound", "law"), lines) + end + after
+
+
+PAGES: dict[str, Callable[[], str]] = {
+    "accuracy": accuracy, "hard_cases": hard_cases, "validation": validation, "what_accuracy_costs": what_accuracy_costs, "speed": speed,
+    "tosses": tosses,
+}  # fmt: skip
+
+
+def main() -> None:
+    """Write the pages that are asked for."""
+    for name in sys.argv[1:] or PAGES:
+        (HERE / f"{name}.md").write_text(PAGES[name](), encoding="utf-8")
+    (ROOT / "README.md").write_text(readme(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
