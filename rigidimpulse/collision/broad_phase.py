@@ -147,7 +147,7 @@ def _sort_pairs(pairs, count, num_bodies):
 
 @inner
 def _keep(pairs_out, count, i, j):
-    """Write the pair (i, j), lower index first, if there is room; return `count + 1`."""
+    """Write the pair (i, j), lower index first, if the buffer is large enough; return `count + 1`."""
     if count < pairs_out.shape[0]:
         pairs_out[count, 0] = min(i, j)
         pairs_out[count, 1] = max(i, j)

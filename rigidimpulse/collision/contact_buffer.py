@@ -1,4 +1,4 @@
-"""Room for what `contacts_of_pairs` finds, which grows when it is too little."""
+"""Buffers for the contacts that `contacts_of_pairs` finds; they grow when they are too small."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ class ContactBuffer:
     """Contacts as they are found.
 
     Attributes:
-        real: (c, 10) and integer: (c, 5), a row for each contact, see `detect.manifold`. scratch: (p, 2) pairs of primitives on the way.
+        real: (c, 10) and integer: (c, 5), contacts, see `manifold.dispatch`. scratch: (p, 2), for the walk through two trees.
 
     """
 
     def __init__(self) -> None:
-        """Room for a small scene."""
+        """Buffers for a small scene."""
         self.real, self.integer = np.empty((CONTACT_CAPACITY, 10)), np.empty((CONTACT_CAPACITY, 5), np.int64)
         self.scratch = np.empty((PAIR_CAPACITY, 2), np.int64)
 
@@ -31,7 +31,7 @@ class ContactBuffer:
         return count
 
     def grow(self, needed: int) -> None:
-        """Make room for at least so many contacts, and for twice as many as before."""
+        """Grow to at least `needed` contacts, and to twice the present capacity."""
         capacity = max(needed, 2 * len(self.real))
         self.real, self.integer = np.empty((capacity, 10)), np.empty((capacity, 5), np.int64)
         self.scratch = np.empty((4 * capacity, 2), np.int64)
@@ -43,7 +43,7 @@ class ContactBuffer:
 
 
 def find_together(buffers: list[ContactBuffer], questions: list[tuple]) -> list[int]:
-    """Numbers of contacts found for each question, see `ContactBuffer.arguments`, in the buffer of the same place; on several cores."""
+    """Numbers of contacts found for each question, see `ContactBuffer.arguments`, each in its own buffer; on several cores."""
     asked = list(zip(buffers, questions, strict=True))
     counts = contacts_of_pairs.together([buffer.arguments(*question) for buffer, question in asked])
     for k, (buffer, question) in enumerate(asked):

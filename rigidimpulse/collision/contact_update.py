@@ -1,8 +1,8 @@
-"""Contacts of heaps that the kernels of `detect` find: of all pairs but those that `heap_narrow` knows by itself.
+"""Contacts of general pairs: those for which the contact cache has no kernel of its own.
 
-Those kernels want bodies apart. So that soft contacts may sink in, convex bodies are shown to them shrunk about their centre of
-mass by `shrunk` of all lengths: normals stay the same, and points are put back to where they are on the true body. Other bodies
-that move are shown by their cores (`heap_cores`); where even these overlap, the contacts they had before they did are kept.
+The kernels of `manifold.dispatch` need bodies that are apart, and soft contacts sink in. So the search is done with smaller shapes. Convex
+bodies are shrunk about their centre of mass by the factor SHRINK: normals stay the same, and points are put back on the true body. Other
+bodies that move have an inset surface (`manifold.inset_surface`). If even these shapes overlap, a pair keeps the contacts it had before.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.collision.contact_cache import note_seen
-from rigidimpulse.collision.contact_matching import NEAR, hand_over, take_up, write_row
+from rigidimpulse.collision.contact_matching import NEAR, match_contacts, set_contact_margin, write_point
 from rigidimpulse.collision.contact_records import ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SKIN, turned
 from rigidimpulse.collision.distance.epa import make_polytope
 from rigidimpulse.collision.distance.gjk import make_simplex
@@ -24,17 +24,17 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.constraints.contact_motion import only_primitive, side_radius
 
 SHRINK = 1.5 * TOLERANCES.skin
-"""Part of their lengths by which convex bodies are shrunk for the contact kernels."""
+"""Part of their lengths by which convex bodies are shrunk for the search."""
 PER_NORMAL = np.int64(4)
-"""Contacts kept of one normal, beside the deepest."""
+"""Contacts kept of one normal, in addition to the deepest."""
 FARTHER = 1.5
-"""Margins within which contacts are looked for, so that a pair without any is known to be apart for a while."""
+"""Distance of the search in margins: a pair without contacts is then known to be apart for some time."""
 
 
 def inner_radii(geometry: Geometry) -> np.ndarray:
     """Distance (s,) from the centre of mass of each shape to its nearest face, m; inf for half spaces.
 
-    Shapes that are no single convex piece count with a tenth of the radius that encloses them.
+    For shapes that are not one convex piece it is a tenth of the radius that encloses them.
     """
     out = np.full(len(geometry.shape_first) - 1, np.inf)
     for s in range(len(out)):
@@ -48,7 +48,7 @@ def inner_radii(geometry: Geometry) -> np.ndarray:
 
 
 def _convex_depth(geometry: Geometry, p: int) -> float:
-    """Distance from the centre of mass to the nearest face of a convex primitive, m; 0 where it is none or does not hold the centre."""
+    """Distance from the centre of mass to the nearest face of a convex primitive, m; 0 if it is not convex or the centre is outside."""
     if geometry.kind[p] == CYLINDER:
         centre, axis, half = geometry.frame[p, :3], geometry.frame[p, 3:6], geometry.frame[p, 6]
         along = float(centre @ axis)
@@ -78,7 +78,7 @@ def convex_polyhedra(geometry: Geometry) -> np.ndarray:
 
 
 def shrunk_geometry(geometry: Geometry, dynamic_shapes: np.ndarray) -> tuple[Geometry, np.ndarray]:
-    """The shapes as the contact kernels are shown them, and the factor (s,) of their lengths; 1 where they are as they were.
+    """The shapes for the search, and the factor (s,) of their lengths; 1 where a shape is unchanged.
 
     dynamic_shapes (s,) bool: shapes of bodies that move freely.
     """
@@ -108,12 +108,12 @@ def shrunk_geometry(geometry: Geometry, dynamic_shapes: np.ndarray) -> tuple[Geo
 
 
 @jit
-def _contradicts(bodies, pairs, p, rows, new, new_end):
-    """Whether the new contacts of a pair cannot be: there are none though an old one is closed, or its normal has turned round."""
+def _contradicts(bodies, pairs, p, points, new, new_end):
+    """Whether the new contacts of a pair are impossible: there are none though an old one is closed, or its normal has turned round."""
     a, b = pairs.first[p], pairs.second[p]
     carrier = b if pairs.carrier[p] else a
     for o in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
-        row = rows[o]
+        row = points[o]
         nx, ny, nz = turned(bodies.rotation, carrier, row[0], row[1], row[2])
         ax, ay, az = turned(bodies.rotation, a, row[SKELETON_A], row[SKELETON_A + 1], row[SKELETON_A + 2])
         bx, by, bz = turned(bodies.rotation, b, row[SKELETON_B], row[SKELETON_B + 1], row[SKELETON_B + 2])
@@ -128,9 +128,9 @@ def _contradicts(bodies, pairs, p, rows, new, new_end):
             continue
         lowest, highest = 1.0, -1.0
         for c in range(new, new_end):
-            cosine = rows[c, 0] * row[0] + rows[c, 1] * row[1] + rows[c, 2] * row[2]
+            cosine = points[c, 0] * row[0] + points[c, 1] * row[1] + points[c, 2] * row[2]
             lowest, highest = min(lowest, cosine), max(highest, cosine)
-        # (Bodies that hook into each other have normals either way.)
+        # Bodies that hook into each other have normals in both directions.
         if lowest < -0.5 and highest < 0.0:
             return True
     return False
@@ -138,7 +138,7 @@ def _contradicts(bodies, pairs, p, rows, new, new_end):
 
 @jit
 def _is_sound(geometry, bodies, factor, a, b, real, first, last):
-    """Whether the shrunk bodies are apart along the normal of a contact found for them."""
+    """Whether the shrunk bodies are apart along the normal of one of their contacts."""
     p, q = geometry.shape_first[bodies.shape[a]], geometry.shape_first[bodies.shape[b]]
     for s in range(first, last):
         gap = gap_along(geometry, bodies, a, b, p, q, real[s, 6:9])
@@ -157,30 +157,30 @@ def _shrunk_by(geometry, bodies, factor, a, b, p, q, n):
 
 
 @jit_making_arrays
-def _write(geometry, bodies, held, a, b, carrier, real, c, factor_a, factor_b, coefficients, rows, r):
-    """A new row r of the contact real[c] (10,) of bodies a and b, with places in the world; returns its separation."""
+def _write(geometry, bodies, margin_at_rest, a, b, carrier, real, c, factor_a, factor_b, coefficients, points, r):
+    """Write point r from the contact real[c] (10,) of bodies a and b, given in the world; returns its separation."""
     round_a = side_radius(geometry, only_primitive(geometry, bodies.shape[a]), bodies.rotation[a], real[c, 6:9])
     round_b = side_radius(geometry, only_primitive(geometry, bodies.shape[b]), bodies.rotation[b], real[c, 6:9])
     for k in range(3):
         real[c, k] -= bodies.position[a, k]
         real[c, 3 + k] -= bodies.position[a, k]
-    return write_row(
-        bodies.position, bodies.rotation, bodies.material, bodies.skin, held, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b,
-        coefficients, rows, r,
+    return write_point(
+        bodies.position, bodies.rotation, bodies.material, bodies.skin, margin_at_rest, a, b, carrier, real, c, round_a, round_b,
+        factor_a, factor_b, coefficients, points, r,
     )  # fmt: skip
 
 
 @jit_making_arrays
 def store_contacts(
     geometry, shown, back, polyhedra, bodies, pairs, places, margins, far, convex, factor, depth, coefficients, real, integer, count, order,
-    rows, ids, used,
+    points, ids, used,
 ):
-    """Put the contacts found for the pairs at `places` into rows from `used` on, with the impulses of those they replace.
+    """Store the contacts found for the pairs at `places` in points from `used` on, with the impulses of those they replace.
 
     real, integer: `count` contacts in the order of the places, `integer[:, :2]` by indices of the scene, order (n,) indices by rank;
-    geometry: the true shapes; shown: as the contacts were found; back, depth (n,) m by rank: see `heap_cores`; polyhedra: by which bodies
-    inside each other are found, of those that are convex (n,) bool, see `heap_overlap`; these and factor (n,) by rank; margins (k,) m,
-    far (k,) m: up to where pairs without contacts are known to be apart. Returns the rows used.
+    geometry: the true shapes; shown: the shapes for the search; back, depth (n,) m by rank: see `inset_surface`; polyhedra: for convex
+    bodies (n,) bool inside each other, see `penetrating`; factor (n,), by rank as well; margins (k,) m; far (k,) m: distance of the
+    search. Returns the points used.
     """
     c = np.int64(0)
     deep, deep_ids = np.empty((POINTS + 1, 10)), np.empty((POINTS + 1, 3), np.int64)
@@ -196,29 +196,31 @@ def store_contacts(
         size = min(bodies.inner[a], bodies.inner[b])
         carrier = pairs.carrier[p]
         if pairs.count[p] == 0:
-            pairs.held[p] = min(bodies.skin[a], bodies.skin[b])
-        held = pairs.held[p]
-        sunk = 0
+            pairs.contact_margin[p] = min(bodies.skin[a], bodies.skin[b])
+        margin_at_rest = pairs.contact_margin[p]
+        deep_count = 0
         if convex[a] and convex[b] and factor[a] * factor[b] < 1.0 and not _is_sound(geometry, bodies, factor, a, b, real, first, last):
-            sunk = overlap_contacts(polyhedra, bodies, a, b, size, work, deep, deep_ids)
-        for s in range(sunk if sunk > 0 else last - first):
-            if sunk > 0:
-                separation = _write(geometry, bodies, held, a, b, carrier, deep, s, 1.0, 1.0, coefficients, rows, used)
+            deep_count = overlap_contacts(polyhedra, bodies, a, b, size, work, deep, deep_ids)
+        for s in range(deep_count if deep_count > 0 else last - first):
+            if deep_count > 0:
+                separation = _write(geometry, bodies, margin_at_rest, a, b, carrier, deep, s, 1.0, 1.0, coefficients, points, used)
                 ids[used] = deep_ids[s]
             else:
                 put_back(shown, back, depth, bodies, a, b, real, integer, first + s)
-                separation = _write(geometry, bodies, held, a, b, carrier, real, first + s, factor[a], factor[b], coefficients, rows, used)
+                separation = _write(
+                    geometry, bodies, margin_at_rest, a, b, carrier, real, first + s, factor[a], factor[b], coefficients, points, used
+                )
                 ids[used] = integer[first + s, 2:]
             if separation <= margins[k]:
                 used += 1
-        if sunk == 0 and _contradicts(bodies, pairs, p, rows, new, used):
+        if deep_count == 0 and _contradicts(bodies, pairs, p, points, new, used):
             used = new
         else:
             if pairs.count[p] == 0:
-                take_up(pairs.held, p, rows, new, used)
+                set_contact_margin(pairs.contact_margin, p, points, new, used)
             old = pairs.start[p]
-            hand_over(rows, ids, old, old + pairs.count[p], rows, ids, new, used, NEAR * size)
+            match_contacts(points, ids, old, old + pairs.count[p], points, ids, new, used, NEAR * size)
             pairs.start[p], pairs.count[p], pairs.capacity[p] = new, used - new, used - new
-        pairs.apart[p] = far[k] if pairs.count[p] == 0 and sunk == 0 and last == first else 0.0
+        pairs.apart[p] = far[k] if pairs.count[p] == 0 and deep_count == 0 and last == first else 0.0
         note_seen(bodies, pairs, p)
     return used

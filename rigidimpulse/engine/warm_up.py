@@ -222,7 +222,7 @@ def _step_substepped(context) -> None:
     state, now, members = context.state, context.state.now, np.array([1])
     stepper = ContactStepper(context.world, context.world.dynamic, finer=False)
     stepper.members = members
-    support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
+    support_levels(stepper.bodies, stepper.table.pairs, stepper.table.points, TALL)
     mark_quick(stepper.bodies, STEP, 1.0)
     out = stepper.step(context, 0.0, STEP)
     steady = context.world.steady_acceleration

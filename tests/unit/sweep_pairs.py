@@ -1,4 +1,4 @@
-"""Pairs of bodies on their courses, to be swept, and the gap along their paths."""
+"""Pairs of bodies on their trajectories, to be swept, and the gap along their paths."""
 
 from types import SimpleNamespace
 
@@ -47,7 +47,7 @@ NAMES = list(SHAPES)
 
 
 class Pair:
-    """Two bodies on their courses; body 0 is fixed at the origin unless set otherwise."""
+    """Two bodies on their trajectories; body 0 is fixed at the origin unless set otherwise."""
 
     def __init__(self, name_a, name_b, geometry=GEOMETRY, scratch=SCRATCH, names=NAMES):
         self.shapes = names.index(name_a), names.index(name_b)

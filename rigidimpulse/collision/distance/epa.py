@@ -1,7 +1,7 @@
 """How deep two convex polyhedra are inside each other: the expanding polytope algorithm (van den Bergen 2001).
 
-With X_a, X_b the corners of the bodies, 0 is inside the hull of all w = y - x, and the shortest way to its surface parts the bodies.
-A polytope inside that hull, at first the tetrahedron about 0 that the algorithm of Gilbert, Johnson and Keerthi found, has a face n.w = h
+With X_a, X_b the corners of the bodies, 0 is inside the hull of all w = y - x. The shortest displacement to its surface separates the
+bodies. A polytope inside that hull, at first the tetrahedron about 0 that the algorithm of Gilbert, Johnson and Keerthi found, has a face n.w = h
 nearest to 0. The hull's farthest corner w along n is added where n.w > h: faces that it sees are replaced by those of w and the
 edges around them. Where n.w = h, n is the axis of least depth, and the corners of the face bear it.
 """
@@ -36,7 +36,7 @@ class Polytope(NamedTuple):
 
 @jit_making_arrays
 def make_polytope():
-    """Room for one pair."""
+    """Scratch memory for one pair."""
     return Polytope(
         np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 2), np.int64), np.empty((MOST_FACES, 3), np.int64), np.empty((MOST_FACES, 4)),
         np.empty((3 * MOST_FACES, 2), np.int64), np.empty(3),
@@ -91,7 +91,7 @@ def _nearest_face(polytope, faces):
 
 @jit
 def _add_corner(polytope, corners, faces):
-    """Take corner number `corners` in; returns the number of faces, 0 where there is no more room."""
+    """Take corner number `corners` in; returns the number of faces, 0 if the polytope is full."""
     w, face, plane, rim = polytope.w, polytope.face, polytope.plane, polytope.rim
     edges, f = 0, 0
     while f < faces:

@@ -1,8 +1,8 @@
 """Separation and overlap of two shapes, measured with FCL (the only file that uses it).
 
-Every finite ROUND primitive is a core (triangles, a segment or a point; the last two are triangles without area)
-grown by a radius. Cores go to FCL as trees of triangles, for which its distance is exact to round-off; the gap is the
-distance of the cores less both radii. Half spaces have closed forms and cylinders exact kernels of their own
+Every finite ROUND primitive is a skeleton (triangles, a segment or a point; the last two are triangles without area)
+grown by a radius. Skeletons go to FCL as trees of triangles, for which its distance is exact to round-off; the gap is the
+distance of the skeletons less both radii. Half spaces have closed forms and cylinders exact kernels of their own
 (`manifold.pair_gap`).
 
 Nothing that aborts, hangs or lies is in reach: FCL sees only unsigned distance and yes-or-no collision of non-empty
@@ -39,7 +39,7 @@ class Separation(NamedTuple):
     """How far two shapes are apart.
 
     The gap is positive if they are separate. Where they overlap it is minus the depth for half spaces, and for spheres
-    and capsules whose cores are outside the other body; otherwise it is not positive, and points and normal are NaN.
+    and capsules whose skeletons are outside the other body; otherwise it is not positive, and points and normal are NaN.
     """
 
     gap: float  # m
@@ -61,7 +61,7 @@ class _Solid(NamedTuple):
     half_spaces: list[np.ndarray]  # normal, offset
     skeletons: list[_Skeleton]
     cylinders: list[Primitive]
-    vertices: np.ndarray  # (v, 3) all corners of cores
+    vertices: np.ndarray  # (v, 3) all corners of skeletons
     radii: np.ndarray  # (v,) their radii
     parts: np.ndarray  # (k, 3) a point of each connected part
     centre: np.ndarray  # (3,) bounding sphere of what is finite
@@ -151,7 +151,7 @@ class Narrowphase:
         return best
 
     def _skeleton_separation(self, a: int, b: int, R: np.ndarray, t: np.ndarray) -> Separation:
-        """Return the least separation of pairs of cores."""
+        """Return the least separation of pairs of skeletons."""
         best = _NOTHING
         placed = fcl.Transform(R, t * self._scale)
         for skeleton_a in self._solid(a).skeletons:

@@ -34,7 +34,7 @@ class Simplex(NamedTuple):
 
 @jit_making_arrays
 def make_simplex():
-    """Room for one pair."""
+    """Scratch memory for one pair."""
     return Simplex(
         np.zeros((4, 3)), np.zeros((4, 2), np.int64), np.zeros(4), np.zeros(4), np.zeros((3, 3)), np.zeros((3, 2), np.int64), np.zeros(4)
     )
@@ -147,7 +147,7 @@ def reduce_simplex(simplex, count):
 
 @inlined
 def _keep(simplex, count):
-    """Remember a simplex of so many corners."""
+    """Store a simplex of `count` corners."""
     for n in range(count):
         for m in range(3):
             simplex.old_w[n, m] = simplex.w[n, m]

@@ -176,7 +176,7 @@ def in_edge_arc(direction, edge_direction, normal_0, normal_1, kind, tolerance):
 
 @inner
 def write_contact(contact_real, contact_int, index, point_a, point_b, normal, gap, kind, feature_a, feature_b):
-    """Write a contact into a row if there is room; return `index + 1` in any case, so that the room needed is known."""
+    """Write a contact at `index` if the buffer is large enough; return `index + 1` in any case, so that the size needed is known."""
     if index < contact_real.shape[0]:
         for axis in range(3):
             contact_real[index, axis] = point_a[axis]

@@ -1,4 +1,4 @@
-"""Separating axis of two boxes, and the contacts of their faces and edges; see `heap_polyhedra` for what is found.
+"""Separating axis of two boxes, and the contacts of their faces and edges; see `polyhedra` for the method.
 
 In the axes of a, with half sides h and k, d from centre to centre and C = R_a^T R_b, the gap along a face normal of a is
 
@@ -8,8 +8,8 @@ along one of b likewise, and along the common normal of the edges e_i of a and f
 
     s_ij = (|d_i'' C_i'j - d_i' C_i''j| - h_i' |C_i''j| - h_i'' |C_i'j| - k_j' |C_ij''| - k_j'' |C_ij'|) / sqrt(1 - C_ij^2).
 
-Where a face has the largest gap, the face of the other box that looks most squarely at it is cut by its sides, in the axes of its box.
-Where two edges have it see `heap_polyhedra`.
+Where a face has the largest gap, the face of the other box that faces it most squarely is cut by its sides, in the axes of its box.
+Where two edges have it see `polyhedra`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PARALLEL = 1e-6
 SECOND_WINS = 1e-6
 """Part of the sides by which a face of b must have the larger gap."""
 OTHER = MOST_CORNERS // 2
-"""Rows of a polygon are from 0 or from here on."""
+"""A polygon lies in the scratch memory from 0 or from here on."""
 
 
 @inlined
@@ -105,7 +105,7 @@ def _cut_side(polygon, ids, base, count, axis, sign, limit, side):
 
 @inlined
 def _facing(half, other, c, of_b, yu, yv, ym, m, sign, polygon):
-    """The face of the other box, of half sides half[other], that looks at the face of axis m: corners into polygon; returns its code.
+    """The face of the other box, of half sides half[other], that faces the face of axis m: corners into polygon; returns its code.
 
     y: its centre, along m', m'' and m. Corners are written along axes m', m'' and as gaps less the half side of m, see `face_contacts`.
     """
@@ -135,7 +135,7 @@ def _along(r, i, axis, x, y, z):
 
 @inlined
 def _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon):
-    """How far corners of box j beside a face of box i come over its four sides, +m', -m', +m'', -m'', in `ahead` s: four numbers."""
+    """How far corners of box j come over the four sides of a face of box i, +m', -m', +m'', -m'', in `ahead` s: four numbers."""
     a, b = 8 * i, 8 * j
     x, y, z = velocity[b] - velocity[a], velocity[b + 1] - velocity[a + 1], velocity[b + 2] - velocity[a + 2]
     xu, xv = _along(r, i, u, x, y, z), _along(r, i, v, x, y, z)
@@ -156,11 +156,11 @@ def _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon):
 
 @inlined
 def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c, scratch, real, out_ids):
-    """Contacts of the face of `axis` (0-2 of a, 3-5 of b) with the face of the other box that looks at it; returns their number.
+    """Contacts of the face of `axis` (0-2 of a, 3-5 of b) with the face of the other box that faces it; returns their number.
 
-    What is beside the face and comes over it in `ahead` s counts. between: from a to b; places are written relative to a.
+    Parts beside the face that come over it in `ahead` s count as well. between: from a to b; places are written relative to a.
     """
-    polygon, ids, _, _, ways, height, chosen = scratch
+    polygon, ids, _, _, paths, height, chosen = scratch
     of_b = axis >= 3
     i, j, m, own, other = (b, a, axis - 3, t, s) if of_b else (a, b, axis, s, t)
     turn, u, v = -1.0 if of_b else 1.0, (m + 1) % 3, (m + 2) % 3
@@ -170,10 +170,10 @@ def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c
     code = _facing(half, other, c, of_b, yu, yv, ym, m, sign, polygon)
     for k in range(4):
         ids[k] = k
-    ways[0, 0], ways[1, 0], ways[2, 0], ways[3, 0] = _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon)
+    paths[0, 0], paths[1, 0], paths[2, 0], paths[3, 0] = _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon)
     base, count = np.int64(0), np.int64(4)
     for side in range(4):
-        limit = half[own, u if side < 2 else v] + ways[side, 0]
+        limit = half[own, u if side < 2 else v] + paths[side, 0]
         base, count = _cut_side(polygon, ids, base, count, side // 2, 1.0 if side % 2 == 0 else -1.0, limit, side)
     kept = np.int64(0)
     for k in range(base, base + count):
@@ -201,7 +201,7 @@ def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c
 
 @inlined
 def edge_contact(half, s, t, r, a, dx, dy, dz, axis, gap, c, work, real, ids):
-    """The contact of two edges of boxes, with the gap found for their axis; returns 1. work: room (3, 3)."""
+    """The contact of two edges of boxes, with the gap found for their axis; returns 1. work: scratch (3, 3)."""
     i, j = (axis - 6) // 3, (axis - 6) % 3
     i1, i2 = (i + 1) % 3, (i + 2) % 3
     d = turned_back(r, a, dx, dy, dz)

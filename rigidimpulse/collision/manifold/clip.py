@@ -1,4 +1,4 @@
-"""Contacts of a face of one convex polyhedron with a face of another: the polygon cut by the face's sides; see `heap_polyhedra`."""
+"""Contacts of a face of one convex polyhedron with a face of another: the polygon cut by the face's sides; see `polyhedra`."""
 
 from __future__ import annotations
 
@@ -48,25 +48,26 @@ def _cut(polygon, ids, count, spare, spare_ids, px, py, pz, offset, side):
 
 
 @jit
-def _coming(polygon, count, velocity, i, x, j, y, ahead, ways):
-    """How far (m) each corner, moving with body j at y, comes in `ahead` s as seen from body i at x, into ways (count, 3)."""
+def _coming(polygon, count, velocity, i, x, j, y, ahead, paths):
+    """Write to paths (count, 3) how far (m) each corner, moving with body j at y, comes in `ahead` s as seen from body i at x."""
     a, b = 8 * i, 8 * j
     for k in range(count):
         rx, ry, rz = polygon[k, 0] - x[0], polygon[k, 1] - x[1], polygon[k, 2] - x[2]
         sx, sy, sz = polygon[k, 0] - y[0], polygon[k, 1] - y[1], polygon[k, 2] - y[2]
         wx, wy, wz, ox, oy, oz = velocity[a + 3], velocity[a + 4], velocity[a + 5], velocity[b + 3], velocity[b + 4], velocity[b + 5]
-        ways[k, 0] = ahead * (velocity[b] - velocity[a] + (oy * sz - oz * sy) - (wy * rz - wz * ry))
-        ways[k, 1] = ahead * (velocity[b + 1] - velocity[a + 1] + (oz * sx - ox * sz) - (wz * rx - wx * rz))
-        ways[k, 2] = ahead * (velocity[b + 2] - velocity[a + 2] + (ox * sy - oy * sx) - (wx * ry - wy * rx))
+        paths[k, 0] = ahead * (velocity[b] - velocity[a] + (oy * sz - oz * sy) - (wy * rz - wz * ry))
+        paths[k, 1] = ahead * (velocity[b + 1] - velocity[a + 1] + (oz * sx - ox * sz) - (wz * rx - wx * rz))
+        paths[k, 2] = ahead * (velocity[b + 2] - velocity[a + 2] + (ox * sy - oy * sx) - (wx * ry - wy * rx))
 
 
 @jit
 def clip_faces(shapes, velocity, r, s, i, x, face, t, j, y, other, margin, ahead, sign, scratch, real, out_ids):
     """Contacts of a face of shape s at (x, r[i]) with the face `other` of shape t at (y, r[j]); returns their number.
 
-    sign: 1 where the face is a's, else -1; positions are relative to a. What is beside the face and comes over it in `ahead` s counts.
+    sign: 1 where the face is a's, else -1; positions are relative to a. Parts beside the face that come over it in
+    `ahead` s count as well.
     """
-    polygon, ids, spare, spare_ids, ways, height, chosen = scratch
+    polygon, ids, spare, spare_ids, paths, height, chosen = scratch
     nx, ny, nz = turned(r, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
     count = np.int64(0)
     for k in range(shapes.loop_first[other], min(shapes.loop_first[other + 1], shapes.loop_first[other] + MOST_CORNERS)):
@@ -75,7 +76,7 @@ def clip_faces(shapes, velocity, r, s, i, x, face, t, j, y, other, margin, ahead
         polygon[count, 0], polygon[count, 1], polygon[count, 2] = vx + (y[0] - x[0]), vy + (y[1] - x[1]), vz + (y[2] - x[2])
         ids[count] = v
         count += 1
-    _coming(polygon, count, velocity, i, x, j, y, ahead, ways)
+    _coming(polygon, count, velocity, i, x, j, y, ahead, paths)
     first, last, corners = shapes.loop_first[face], shapes.loop_first[face + 1], count
     for k in range(first, last):
         v, w = shapes.loop[k], shapes.loop[k + 1 if k + 1 < last else first]
@@ -85,7 +86,7 @@ def clip_faces(shapes, velocity, r, s, i, x, face, t, j, y, other, margin, ahead
         px, py, pz = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
         offset, nearer = px * ax + py * ay + pz * az, 0.0
         for c in range(corners):
-            nearer = max(nearer, -(px * ways[c, 0] + py * ways[c, 1] + pz * ways[c, 2]))
+            nearer = max(nearer, -(px * paths[c, 0] + py * paths[c, 1] + pz * paths[c, 2]))
         count = _cut(polygon, ids, count, spare, spare_ids, px, py, pz, offset + nearer, k - first)
     kept = 0
     for k in range(count):

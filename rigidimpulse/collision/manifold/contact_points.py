@@ -1,4 +1,4 @@
-"""What the contact kernels of ROUND primitives share: tolerances, one body seen from the other, the rows they fill."""
+"""What the contact kernels of ROUND primitives share: tolerances, one body seen from the other, the contacts they write."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""Contacts of two convex polyhedra that are not both boxes: closest points, clipping, four points; see `heap_polyhedra`.
+"""Contacts of two convex polyhedra that are not both boxes: closest points, clipping, four points; see `polyhedra`.
 
-The axis of largest gap is that of the closest points (`heap_closest`). For bodies inside each other it is sought again with both taken
-smaller about their centres by SHRINK: normals of faces stay the same, and gaps are those of the true bodies along them. Where these are
-inside each other, too, the axis is that of their least depth (`heap_depth`).
+The axis of largest gap is that of the closest points (`gjk`). For bodies inside each other it is searched for again with both shrunk
+about their centres by SHRINK. Normals of faces stay the same, and gaps are those of the true bodies along them. Where the shrunk bodies
+are inside each other, too, the axis is that of their least depth (`epa`).
 
-Where a face has the largest gap, but for EDGE_WINS of the smaller inner radius, it is cut with the face that looks at it; else the
-closest points are the contact.
+Where a face has the largest gap, to EDGE_WINS of the smaller inner radius, it is cut with the face of the other body that faces it; else
+the closest points are the contact.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from rigidimpulse.collision.manifold.polyhedra import ALIKE, EDGE_WINS, POINTS, 
 from rigidimpulse.core.kernels import inlined, jit
 
 SHRINK = 0.012
-"""Part of their lengths by which bodies are taken smaller while their closest points are sought."""
+"""Part of their lengths by which bodies are shrunk while their closest points are searched for."""
 SECOND_WINS = 1e-6
 """Part of the inner radius by which a face of b must have the larger gap."""
 CLOSEST, CORNER, CODE = -3, -4, 4096
-"""First id of the contact of closest points, and of that of a corner and a plane; corners in a code of features."""
+"""First id of the contact of closest points, and of that of a corner and a plane; base of the code of several corners."""
 
 
 @jit
@@ -94,7 +94,7 @@ def seen_from(rotation, a, b, between, c):
 def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, polytope, scratch, real, ids):
     """Contacts of two convex polyhedra relative to the first body; returns their number and a bound of the gap.
 
-    between: from a to b, world; origin: (0, 0, 0); size: smaller inner radius, m; c: room (3, 3); real, ids: POINTS + 1 rows.
+    between: from a to b, world; origin: (0, 0, 0); size: smaller inner radius, m; c: scratch (3, 3); real, ids: POINTS + 1 rows.
     """
     d = seen_from(rotation, a, b, between, c)
     nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0, margin, simplex)
@@ -121,7 +121,7 @@ def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size,
     if edges:
         if cosine < ALIKE:
             return np.int64(1), gap
-        # What hangs down beside a tilted face is not to be held up by it.
+        # A part that hangs down beside a tilted face must not get a contact with it.
         ahead = 0.0
     if of_b:
         other = _face_at(shapes, s, corner_a, rotation, a, t, b, face_b)
@@ -134,11 +134,11 @@ def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size,
             copy_contact(real, ids, POINTS, 0)
             found = np.int64(1)
     elif found == 0 and max(gap_a, gap_b) <= margin:
-        # The face that looks at it lies wholly beside it.
+        # The other face lies completely beside it.
         face, corner, i, j = (face_b, corner_a, b, a) if gap_b > gap_a else (face_a, corner_b, a, b)
         found = _corner_contact(shapes, rotation, face, corner, i, j, i == a, between, max(gap_a, gap_b), real, ids)
     elif count < 5 and found > 0 and cosine >= ALIKE and nearest_of(real, found) > max(gap_a, gap_b) + EDGE_WINS * size:
-        # What is deepest lies beside the face.
+        # The deepest point lies beside the face.
         along_edges(real, found, POINTS, cosine, of_b, gap, size)
         found = add_contact(real, ids, found, POINTS)
     return found, max(gap, gap_a, gap_b)
@@ -167,7 +167,7 @@ def _corner_contact(shapes, rotation, face, corner, i, j, of_a, between, gap, re
 
 @jit
 def _face_at(shapes, s, corner, r, i, t, j, face):
-    """The face of shape s, turned by r[i], at one of its corners that looks most squarely at a face of shape t, turned by r[j]."""
+    """The face of shape s, turned by r[i], at one of its corners that faces most squarely a face of shape t, turned by r[j]."""
     x, y, z = turned(r, j, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
     x, y, z = turned_back(r, i, x, y, z)
     best, at = inf, shapes.face_first[s]

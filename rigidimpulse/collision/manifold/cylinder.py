@@ -1,6 +1,6 @@
 """Contacts and least gaps of cylinders, in the frame of the cylinder's body (see `manifold`).
 
-    cylinder_half_space_contacts, cylinder_round_contacts, cylinder_cylinder_contacts    append rows, give the new count
+    cylinder_half_space_contacts, cylinder_round_contacts, cylinder_cylinder_contacts    append contacts, return the new count
     cylinder_half_space_gap, cylinder_round_gap, cylinder_cylinder_gap                   least gap below a limit
 
 Features within the margin make contacts; each normal comes from the surfaces that meet, not from the difference of
@@ -14,7 +14,7 @@ two points:
 - two cylinders: side - side as two edges; rim - cap as rim - plane; rim - side and rim - rim at the local least
   distances.
 Side against a parallel edge or side has its contacts at the ends of the overlap, which are vertices and rims. A
-sphere or capsule is its core grown by a radius; its closest point is a contact in any case. If nothing else is found,
+sphere or capsule is its skeleton grown by a radius; its closest point is a contact in any case. If nothing else is found,
 the closest pair is.
 
 The least distances of `cylinder_features` can be imported from here as well:

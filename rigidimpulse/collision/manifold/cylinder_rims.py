@@ -171,8 +171,8 @@ def closest_to_ring(centre, u, v, rim_radius, s, radius, level, axial):
 def ring_contact(q, tangent, curvature, solid, level, skeleton):
     """Return (found, p, normal, distance) for the point q of a curve that is locally closest to a rim.
 
-    `core`: radius by which the curve is grown. The normal lies between those of cap and side; distance and q are of
-    the core.
+    `skeleton`: radius by which the curve is grown. The normal lies between those of cap and side; distance and q are of
+    the skeleton.
     """
     rho = hypot(q[0], q[1])
     out = (q[0] / rho, q[1] / rho, 0.0)

@@ -212,7 +212,7 @@ def _edge_contacts(solid, rows, count, a, d, arc, kind, skeleton, other):
 
 @inner
 def _closest_triangle(geometry, solid, view, round_, limit, stack):
-    """Return the closest pair of the cylinder and a core, and its triangle, -1 if it is not below `limit`."""
+    """Return the closest pair of the cylinder and a skeleton, and its triangle, -1 if it is not below `limit`."""
     best, near = (limit, ZERO, ZERO, ZERO), -1
     stack[0, 0] = geometry.node_first[round_]
     depth = 1
@@ -241,7 +241,7 @@ def _closest_triangle(geometry, solid, view, round_, limit, stack):
 
 @inner
 def cylinder_round_gap(geometry, cylinder, round_, R, t, limit, stack, out):
-    """Return the least gap, minus the radius if the core is inside; `limit` with `out` untouched if not below."""
+    """Return the least gap, minus the radius if the skeleton is inside; `limit` with `out` untouched if not below."""
     solid = solid_of(geometry.frame, geometry.radius, cylinder, 0.0)
     skeleton = geometry.radius[round_]
     pair, near = _closest_triangle(geometry, solid, _view(solid, R, t), round_, limit + skeleton, stack)

@@ -61,7 +61,7 @@ SCRATCH_ROWS = 8 * STACK_ROWS
 MAX_PER_NORMAL = 8
 """Directions in which the extreme contacts of one normal are kept."""
 SAME_PATCH = 0.999
-"""Cosine of the angle below which normals belong to one wall."""
+"""Cosine of the angle between normals above which contacts belong to one patch."""
 TIE = 1e-9
 """Difference of two positions along a direction, relative to the extent, below which they are equally extreme."""
 STEEP = 0.77
@@ -204,7 +204,7 @@ def pair_gap(geometry, shape_a, x_a, R_a, shape_b, x_b, R_b, limit, out):
 
 @inner
 def _deepest_left(contact_real, patch, first):
-    """Return the deepest contact that has no wall yet, or -1."""
+    """Return the deepest contact without a patch, or -1."""
     deepest = -1
     for i in range(len(patch)):
         if patch[i] < 0 and (deepest < 0 or contact_real[first + i, 9] < contact_real[deepest, 9]):
@@ -224,7 +224,7 @@ def _tangents(normal):
 
 @inner
 def _extreme(contact_real, contact_int, patch, label, first, direction):
-    """Return the contact of a wall that lies farthest along a direction; of equal ones that of the least features."""
+    """Return the contact of a patch that lies farthest along a direction; of equal ones that of the least features."""
     best = -1
     farthest = 0.0
     for i in range(len(patch)):
@@ -244,7 +244,7 @@ def _extreme(contact_real, contact_int, patch, label, first, direction):
 def reduce_contacts(contact_real, contact_int, first, count, max_per_normal=MAX_PER_NORMAL):
     """Keep the contacts that carry load, of rows [first, count), which belong to one pair of bodies.
 
-    Contacts whose normals agree (`SAME_PATCH`) form a wall. Of a wall with more than `max_per_normal` contacts the
+    Contacts whose normals agree (`SAME_PATCH`) form a patch. Of a patch with more than `max_per_normal` contacts the
     deepest and the extreme ones in that many directions stay, unchanged and in their order. Returns the new count.
     """
     if count - first <= max_per_normal:

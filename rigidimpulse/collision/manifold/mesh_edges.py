@@ -53,7 +53,7 @@ def _arcs_miss(edge_normal, edge_kind, R_back, R, edge_a, edge_b, d, e, normal):
 def _crossing(p, d, q, e, skeleton):
     """Return (near, point_a, point_b, c, distance) for the common normal c of two edges p + s d, q + t e.
 
-    `near`: both closest points lie on the edges and are at most `core` apart; c points from a to b.
+    `near`: both closest points lie on the edges and are at most `skeleton` apart; c points from a to b.
     """
     c = cross(d, e)
     c_squared = dot(c, c)

@@ -1,6 +1,6 @@
 """Contacts of two ROUND primitives: triangles, a segment or a point, grown by a radius.
 
-The features of two cores at distance d <= margin + r_a + r_b that are locally closest make the contacts; the radii are
+The features of two skeletons at distance d <= margin + r_a + r_b that are locally closest make the contacts; the radii are
 then taken off along the normal: gap = d - r_a - r_b.
 - vertex - face: the vertex projects into the face, and no edge that leaves it dives below by more than the margin
   (else the vertex of a box that stands flush on another one would meet its side). All corners within the margin
@@ -66,7 +66,7 @@ CREASE = 2.0 * TOLERANCES.flat_angle
 
 @inner
 def _append_vertex(view, rows, count, skeleton_v, skeleton_t, normal, distance, kind, feature_v, feature_t, merge):
-    """Append a contact of a vertex (core point `skeleton_v`) with a triangle (`skeleton_t`), given in the triangle's frame."""
+    """Append a contact of a vertex (skeleton point `skeleton_v`) with a triangle (`skeleton_t`), given in the triangle's frame."""
     gap = distance - view.radius_v - view.radius_t
     point_v = along(skeleton_v, view.radius_v, normal)
     point_t = along(skeleton_t, -view.radius_t, normal)
@@ -81,7 +81,7 @@ def _append_vertex(view, rows, count, skeleton_v, skeleton_t, normal, distance, 
 
 @inner
 def _in_vertex_cone(vertex, edge, vertex_edge_first, vertex_edge, corner, direction, slack, tolerance):
-    """Tell whether no edge that leaves a vertex runs along the direction, but for a length `slack` [m] or an angle."""
+    """Tell whether no edge that leaves a vertex runs along the direction, with a tolerance of a length `slack` [m] or an angle."""
     origin = row(vertex, corner)
     for i in range(vertex_edge_first[corner], vertex_edge_first[corner + 1]):
         leaving = subtract(row(vertex, edge[vertex_edge[i], 0] + edge[vertex_edge[i], 1] - corner), origin)

@@ -1,6 +1,6 @@
 """Pairs with closed forms: a half space against a ROUND primitive, and two spheres.
 
-Half space: solid where n . x <= o. The gap of a vertex p of a core of radius r is n . p - o - r; all corners within the
+Half space: solid where n . x <= o. The gap of a vertex p of a skeleton with radius r is n . p - o - r; all corners within the
 margin are contacts, so a flat face gives its corners and nothing else. Spheres: gap = |c_b - c_a| - r_a - r_b.
 Kernels work in the frame of their first primitive, as `manifold` describes.
 """

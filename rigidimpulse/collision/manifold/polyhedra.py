@@ -5,9 +5,9 @@ of faces and the cross products of edges (the separating axes; Gottschalk, Lin a
 are nearest, at most the gap elsewhere, and minus the depth of bodies inside each other. Where a face has it, the polygon of
 the other body that faces it most squarely is cut by its sides (Sutherland and Hodgman 1974), and of the points within
 the margin four stay: the deepest, the one farthest from it, and the ones farthest from their line on either side. Where two
-edges have it by more than EDGE_WINS of the smaller inner radius, their closest points are the contact, unless their normal is within
-ALIKE of that of a face: then what is cut out there are the contacts, along the normal of the edges, since bodies that lie crosswise on
-each other, and rock, come to touch at the next of these points before they are looked at again.
+edges have it by more than EDGE_WINS of the smaller inner radius, their closest points are the contact. There is one exception: if the
+normal of the edges is within ALIKE of that of a face, the polygon cut out on that face gives the contacts, along the normal of the edges.
+Bodies that lie crosswise on each other and rock touch at the next of these points before their contacts are found again.
 
 Contacts are written as (x, y, z on a, x, y, z on b, normal, gap) in world axes relative to the position of a.
 """
@@ -25,30 +25,30 @@ from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 
 EDGE_WINS = 2e-3
 ALIKE = 0.95
-"""Cosine of the angle of the normal of two edges and that of a face above which it is the faces that come to touch."""
+"""Cosine of the angle between the normal of two edges and that of a face above which the face gives the contacts."""
 POINTS = 4
 """Contacts of two convex polyhedra."""
 MOST_CORNERS = 64
-"""Corners of a polygon that is cut."""
+"""Most corners of a polygon that is cut."""
 FROM_EDGE = 1 << 20
 """Added to the numbers of corners that clipping made."""
 
 
 class Scratch(NamedTuple):
-    """What contacts are worked out in."""
+    """Scratch memory for the contacts of one pair."""
 
     polygon: np.ndarray  # (MOST_CORNERS, 3) m
     ids: np.ndarray  # (MOST_CORNERS,)
     spare: np.ndarray  # (MOST_CORNERS, 3)
     spare_ids: np.ndarray  # (MOST_CORNERS,)
-    ways: np.ndarray  # (MOST_CORNERS, 3) m
+    paths: np.ndarray  # (MOST_CORNERS, 3) m, relative motion of corners
     height: np.ndarray  # (MOST_CORNERS,) m
     chosen: np.ndarray  # (4,)
 
 
 @jit_making_arrays
 def make_scratch():
-    """Room for one pair."""
+    """Scratch memory for one pair."""
     return Scratch(
         np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64), np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64),
         np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS), np.empty(4, np.int64),
@@ -126,7 +126,7 @@ def _loop(flat: list[int], geometry: Geometry, low: int) -> list[int]:
 
 @inlined
 def four_of(points, height, count, chosen):
-    """Write the places of the points (count, 3) that carry all the others' load to chosen (4,); returns their number."""
+    """Choose up to four points (count, 3) that can carry the load of all: writes their places to chosen (4,), returns their number."""
     deepest = 0
     for k in range(1, count):
         if height[k] < height[deepest]:

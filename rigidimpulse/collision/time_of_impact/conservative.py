@@ -1,6 +1,6 @@
-"""Backing up time by safe steps alone: conservative advancement until the gap is at `touch`.
+"""Backing up time by safe steps alone: conservative advancement until the gap is at `impact_margin`.
 
-Every step is one that the guard vouches for, so no contact is passed (Mirtich 1996). Each step leaves a third-order
+Every step is a safe one, so no contact is passed (Mirtich 1996). Each step leaves a third-order
 remainder of the time to contact, so few are needed; where bodies graze, each halves what is left.
 """
 

@@ -2,7 +2,7 @@
 
 Several directions n are tried and the best counts: the normal of either face, carried by its body; the direction of
 the closest features, carried by either body; and, for crossing edges, n turning with both of them. For a carried n
-every corner has its own offset and speed (`guard_root`): one offset with the largest speed would stall a body that
+every corner has its own offset and speed (`separating_quadratic`): one offset with the largest speed would stall a body that
 rolls or slides.
 
 n turning with both edges e_a (at rest in A) and e_b, seen from A: n stays across both to first order if n' = m,
@@ -13,7 +13,7 @@ and for D the vector from a corner of A to one of B, f_ij = n.D:   f' = m.D + n.
 |f'''| <= J + 3 nu |y''| + 3 nu^2 |y'| + nu^3 |D|, the lengths bounded over [0, h]. A cylinder whose side touches takes part as its axis, an
 edge grown by its radius: no point of it is outside of that.
 
-Records lie in the arrays `work` and `index` (`guard_layout`). The argument `cylinders` is None where no shape is a
+Records lie in the arrays `work` and `index` (`scratch_layout`). The argument `cylinders` is None where no shape is a
 cylinder: then nothing of them is compiled.
 """
 
@@ -197,7 +197,7 @@ def pieces_safe_until(work, index, threshold, horizon, cylinders):
     tells what limits it. Of the record at LIMIT the direction is tried first (zeros if there is none).
 
     Args:
-        work, index: see `guard_layout`.
+        work, index: see `scratch_layout`.
         threshold: m, radii of the pieces included.
         horizon: s.
         cylinders: None, or an int where there are cylinders.

@@ -77,7 +77,7 @@ def sweep(
     """Report the pairs that are in contact at `end`; arguments as for `bisection.sweep`, `tolerance` is not read.
 
     Returns:
-        `end` for pairs that overlap there or are closer than `touch`.
+        `end` for pairs that overlap there or are closer than `impact_margin`.
 
     """
     result = no_impacts(len(pairs_a))

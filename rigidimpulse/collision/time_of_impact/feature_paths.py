@@ -13,7 +13,7 @@ pair of corners stays apart for
 
     g - c s - 1/2 (|p_a''| + |p_b''|) s^2 > 0,    g = n.(p_b - p_a),   c = -n.(p_b' - p_a')
 
-The least such time is a step that passes no contact; steps are repeated until the gap is at `touch` (conservative
+The least such time is a step that passes no contact; steps are repeated until the gap is at `impact_margin` (conservative
 advancement).
 """
 
@@ -130,8 +130,8 @@ def first_contact(
         path_a: its pose from tau = 0 to 1.
         corners_b: as corners_a, of the other feature.
         path_b: its pose.
-        touch: m, distance that counts as contact.
-        tolerance: m, how far above `touch` the distance may be at the time found; rounding sets a limit to it.
+        impact_margin: m, distance that counts as contact.
+        tolerance: m, how far above `impact_margin` the distance may be at the time found; rounding sets a limit to it.
 
     Returns:
         tau of the first contact in [0, 1], inf if there is none.

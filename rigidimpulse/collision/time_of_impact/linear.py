@@ -1,6 +1,6 @@
 """Backing up time by a linear approximation: the gap is taken to shrink at the speed it has at the start.
 
-    t = start + (gap - touch) / c,     c = -n.(v_b + w_b x r_b - v_a - w_a x r_a)
+    t = start + (gap - impact_margin) / c,     c = -n.(v_b + w_b x r_b - v_a - w_a x r_a)
 
 with the points that are closest then, and the normal n from a to b.
 

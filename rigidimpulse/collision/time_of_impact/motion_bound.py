@@ -45,7 +45,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
 from rigidimpulse.motion.trajectory import FIXED, FORCED, JERK, LINEAR, PRESCRIBED, TORQUE_RATE, motion_at, rate_of, row_at
 
-# Offsets are numpy integers because numba would compile a kernel anew for every literal int that it is called with.
+# Offsets are numpy integers because numba would compile a kernel again for every literal int that it is called with.
 
 POSITION, VELOCITY, SPIN, ACCELERATION, SPIN_RATE, AXES, ORIENTATION = np.array([0, 3, 6, 9, 12, 15, 24])
 SPIN_BOUND, SPIN_RATE_BOUND, JERK_BOUND, CENTRE_JERK, MOTION_SIZE = np.array([28, 29, 30, 31, 34])
@@ -163,7 +163,7 @@ def _write_spin_bounds(moments, torque_world, torque_rate, horizon, row):
 def motion_bound(trajectory, i, t, horizon, row):
     """Write the motion of body i at time t, with bounds that hold until t + horizon, into row (MOTION_SIZE,).
 
-    Works for every mode of a course: fixed, prescribed, free, and turning under a world torque.
+    Works for every mode of a trajectory: fixed, prescribed, free, and turning under a world torque.
     """
     motion_at(
         trajectory, i, t, row[POSITION:VELOCITY], row[ORIENTATION:SPIN_BOUND], row[VELOCITY:SPIN], row[SPIN:ACCELERATION]

@@ -1,15 +1,15 @@
 """What every sweep answers.
 
-A sweep looks for the first time in [start, end] at which the gap of a pair of bodies comes down to `touch`. Its
+A sweep looks for the first time in [start, end] at which the gap of a pair of bodies comes down to `impact_margin`. Its
 answer is a status and a time:
 
     SEPARATE   the pair stays apart: time inf
-    IMPACT     the gap comes down to `touch` at `time`
-    TOUCHING   the gap is at or below `touch` at the start and shrinks: time = start
+    IMPACT     the gap comes down to `impact_margin` at `time`
+    TOUCHING   the gap is at or below `impact_margin` at the start and shrinks: time = start
     STALLED    the budget of queries is used up; until `time` there is no contact
 
 Methods, one module each with the same function `sweep`: `bisection` (the default) and `conservative` never pass a
-contact and leave a gap in [touch - round-off, touch + tolerance]; `linear` and `after` are cheaper and may miss one.
+contact and leave a gap in [impact_margin - round-off, impact_margin + tolerance]; `linear` and `after` are cheaper and may miss one.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """How long two moving shapes stay apart for certain: one safe step, whatever the shapes.
 
 `safe_time` looks at two bodies at one instant and returns a span over which their gap stays above a threshold. It
-holds for exactly the motion that `bound` describes, turning and accelerating bodies included, so stepping by safe
+holds for exactly the motion that `motion_bound` describes, turning and accelerating bodies included, so stepping by safe
 spans never passes a contact (conservative advancement, Mirtich 1996; Zhang, Lee and Kim 2006, here with exact first
 and second derivatives and bounded third ones).
 
-Primitives are walked through by `guard_tree`, their convex pieces are bounded by `guard_pieces`. The body of the
+Primitives are walked through by `bvh_walk`, their convex pieces are bounded by `convex_pieces`. The body of the
 first primitive carries the frame: a half space before a ROUND primitive before a cylinder. Bodies that start at or
 below the threshold but leave it are let go: until they come back, the gap is not below the present one.
 """
@@ -79,7 +79,7 @@ class SweepScratch(NamedTuple):
     ball: np.ndarray  # (s,) bool: one sphere about the centre of mass, on which no rotation can be seen
     plane: np.ndarray  # (s,) the half space that is all of the shape, or -1
     work: np.ndarray  # (WORK_SIZE,) and
-    index: np.ndarray  # (INDEX_SIZE,) int64, see `guard_layout`
+    index: np.ndarray  # (INDEX_SIZE,) int64, see `scratch_layout`
 
 
 def make_scratch(geometry: Geometry) -> SweepScratch:
@@ -244,7 +244,7 @@ def safe_time(geometry, shape_a, shape_b, work, index, threshold, horizon, cylin
     Args:
         geometry: the compiled shapes.
         shape_a: index of a's shape; likewise shape_b.
-        work: scratch with the motions of a and b (`bound.motion_bound`) at MOTION, their bounds valid over the horizon.
+        work: scratch with the motions of a and b (`motion_bound`) at MOTION, their bounds valid over the horizon.
         index: scratch.
         threshold: m.
         horizon: s.

@@ -1,14 +1,14 @@
-"""The search that both guarded sweeps share: safe steps until the gap is at `touch`.
+"""The search that both safe methods share, bisection and conservative advancement: safe steps until the gap is at `impact_margin`.
 
-Each step asks the bounding spheres, then the shapes (`guard`). If the shapes limit the step by features that are at
-`touch` already and approach, the pair is in contact. Features at `touch` that hover (they approach by less than
-rounding until the end), slide or leave are let go: they may come closer by the slack for rounding, so that neither
+Each step asks the bounding spheres, then the shapes (`safe_step`). If the shapes limit the step by features that are at
+`impact_margin` already and approach, the pair is in contact. Features at `impact_margin` that hover (they approach by less than
+rounding until the end), slide or leave do not count: they may come closer by the slack for rounding, so that neither
 lasting contact nor a rebound is taken for an impact. Surfaces that cross are in contact however they move.
 
-Balls, and balls and planes that stand, have their time in closed form (`ball_time`), but where they hover.
+Balls, and balls and planes that stand, have their time in closed form (`ball_time`), unless they hover.
 
-With `ahead`, the time at which the limiting features come down to `touch` is found by bisection
-(`guard_witness`); the steps then only have to confirm that nothing is earlier. Without it, they are repeated until
+With `ahead`, the time at which the limiting features come down to `impact_margin` is found by bisection
+(`witness`); the steps then only have to confirm that nothing is earlier. Without it, they are repeated until
 they are there (conservative advancement).
 """
 
@@ -128,9 +128,9 @@ def first_contacts(
             is_free = s >= horizon or (not exact and s > _WORTHWHILE * horizon)
             if not is_free:
                 span = _bring_motions(trajectory, scratch, a, b, shape_a, shape_b, t, horizon)
-                guarded = safe_time(geometry, shape_a, shape_b, work, index, floor, span, cylinders)
-                is_free = guarded >= span
-                s = s if exact and not is_free else guarded
+                safe = safe_time(geometry, shape_a, shape_b, work, index, floor, span, cylinders)
+                is_free = safe >= span
+                s = s if exact and not is_free else safe
             if is_free:
                 if s >= rest and target == end:
                     t, status = inf, SEPARATE

@@ -1,15 +1,15 @@
-"""When two balls, or a ball and a plane, meet: in closed form, from their courses alone.
+"""When two balls, or a ball and a plane, meet: in closed form, from their trajectories alone.
 
 With x, v, a the position, velocity and acceleration of b's centre as seen from a's at t0, the instant since which both
-courses hold, and s = t - t0:
+trajectories hold, and s = t - t0:
 
     ball and plane     g(s) = n.x - r + n.v s + 1/2 n.a s^2 = 0         the root at which g falls
     two balls, a = 0   |x + v s| = r,   s = s_c - sqrt(r^2 - |x + v s_c|^2) / |v|,   s_c = -x.v / v^2
-    two balls          Newton's method from the safe side (`guard_flight.spheres_safe_until`)
+    two balls          Newton's method from the safe side (`free_flight.spheres_safe_until`)
 
 The distance of closest approach x + v s_c is small where it matters, so s has no cancellation. A pair that touches and
 leaves needs no gap of its own: the root at which it came is not the one at which g falls again. So the time depends on
-the courses and on nothing else, in particular not on when it is asked for.
+the trajectories and on nothing else, in particular not on when it is asked for.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ _NEWTON_ERROR = 10.0
 def is_closed_form(trajectory, scratch, a, b, shape_a, shape_b, impact_margin):
     """Whether the pair is two balls, or a ball and a plane that stands, and is to meet at gap 0.
 
-    Where it has just been in contact `touch` [m] may be lower by round-off; lower still, the pair was in contact without consequence.
+    Where it has just been in contact `impact_margin` [m] may be lower by round-off. Lower still, the pair was in contact without
+    consequence.
     """
     plane_a, plane_b = scratch.plane[shape_a] >= 0, scratch.plane[shape_b] >= 0
     if not ((scratch.ball[shape_a] or plane_a) and (scratch.ball[shape_b] or plane_b)) or (plane_a and plane_b):
@@ -97,9 +98,9 @@ def until_contact(x, v, acceleration, reach, size, speed, normal, level):
 
 @jit
 def ball_time(frame, trajectory, scratch, a, b, shape_a, shape_b, start):
-    """Time from `start` on at which a pair of `is_closed_form` meets, inf if it never does; nan where the guard must look.
+    """Time from `start` on at which a pair of `is_closed_form` meets, inf if it never does; nan where the general search must be used.
 
-    frame (p, 7): that of the geometry; course: paths of all bodies, since before `start` [s]; scratch: `SweepScratch`.
+    frame (p, 7): that of the geometry; trajectory: paths of all bodies, since before `start` [s]; scratch: `SweepScratch`.
     """
     since = max(trajectory.start[a], trajectory.start[b])
     x, v, acceleration, jerk = relative_flight(trajectory, a, b, since)

@@ -2,7 +2,7 @@
 
 The direction is carried by one of the bodies, so the gap along it at any other pose costs two support functions and
 no search. It is a lower bound of the distance of the features, and equals it for a vertex over a face. The time at
-which it reaches a value is found cheaply; the guard then says whether anything was earlier.
+which it reaches a value is found cheaply; the conservative bound then tells whether anything was earlier.
 """
 
 from __future__ import annotations
@@ -104,13 +104,13 @@ def _next_trial(low, above, high, below, truncation, least, left):
 
 @jit_making_arrays
 def witness_root(geometry, trajectory, work, index, a, b, low, high, impact_margin, tolerance):
-    """Find where the witness of bodies a and b comes down to `touch` between two times.
+    """Find where the witness of bodies a and b comes down to `impact_margin` between two times.
 
     Bisection with interpolation (ITP: Oliveira and Takahashi 2020): at most log2((high - low) / rounding) + 1
     evaluations after those at the ends, mostly far fewer.
 
     Returns:
-        (t, evaluations): the last time known to be above, where its gap is at most touch + tolerance or t is one
+        (t, evaluations): the last time known to be above, where its gap is at most impact_margin + tolerance or t is one
         rounding from the root; inf if it is not above at low and below at high.
 
     """

@@ -189,7 +189,7 @@ class SubsteppedIslands:
             return chosen
         self._set_up(context, np.flatnonzero(begins), pair_events.begin, pair_events.end - pair_events.begin, 0.0)
         stepper = self.stepper
-        level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
+        level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.points, TALL)
         tall = np.unique(root[stepper.order[level[: len(root)] == TALL + 1]])
         tall = tall[tall >= 0]
         refused.update(dict.fromkeys(tall.tolist(), "tall"))

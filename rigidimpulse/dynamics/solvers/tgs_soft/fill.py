@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from rigidimpulse.collision.contact_records import (
     CARRIER,
+    CONTACT_MARGIN,
     DYNAMIC_FRICTION,
     FRICTION,
-    HELD,
     IMPULSE,
     INVERSE_MASS,
     ROUND_A,
@@ -136,7 +136,7 @@ def _points(simd, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
         first, second = gather(simd, lines, batches.row, at), gather(simd, lines[ROW:], batches.row, at)
         a = _turned(ra, (first[SKELETON_A], first[SKELETON_A + 1], first[SKELETON_A + 2]))
         b = add(between, _turned(rb, (second[SKELETON_B - ROW], second[SKELETON_B + 1 - ROW], second[SKELETON_B + 2 - ROW])))
-        gap = dot(n, less(b, a)) - (first[ROUND_A] + first[ROUND_B]) - second[HELD - ROW]
+        gap = dot(n, less(b, a)) - (first[ROUND_A] + first[ROUND_B]) - second[CONTACT_MARGIN - ROW]
         a, b = along(a, first[ROUND_A], n), along(b, -first[ROUND_B], n)
         x = (fma(share, a[0], rest * b[0]), fma(share, a[1], rest * b[1]), fma(share, a[2], rest * b[2]))
         # A single point lies at the centre of its patch to the bit: with a lever of round-off it would hold a twist, by whatever force.

@@ -27,7 +27,7 @@ def test_open_sheet_is_touched_from_both_sides():
 
 
 class TestBuffers:
-    def test_tells_how_many_rows_it_needs(self):
+    def test_tells_how_many_contacts_it_needs(self):
         small = Scene(mesh(box()), mesh(box()), capacity=3)
         pose_b = (np.array([0.1, 0.2, 1.0 + 1e-5]), np.eye(3))
         arguments = (0, *IDENTITY, 1, *pose_b, 2e-5)
@@ -64,7 +64,7 @@ class TestReduction:
         spread = np.sort(np.delete(angle[kept], list(kept).index(13)))
         assert np.diff([*spread, spread[0] + 2 * np.pi]).max() < 2.1 * np.pi / 4
 
-    def test_walls_are_not_mixed_and_few_contacts_stay(self):
+    def test_patches_are_not_mixed_and_few_contacts_stay(self):
         rng = np.random.default_rng(14)
         rows, integer = np.zeros((60, 10)), np.zeros((60, 5), dtype=np.int64)
         rows[:, :2] = rng.normal(size=(60, 2))
@@ -79,7 +79,7 @@ class TestReduction:
         # The hull's support in the kept directions is that of all.
         assert before[:40, :2].max() == before[kept[kept < 40], :2].max()
 
-    def test_rows_outside_the_range_are_left_alone(self):
+    def test_contacts_outside_the_range_are_left_alone(self):
         rows, integer = np.zeros((30, 10)), np.zeros((30, 5), dtype=np.int64)
         rows[:, 0], rows[:, 8], rows[:5, 3] = np.arange(30), 1.0, 9.0
         count = reduce_contacts(rows, integer, 5, 30)
