@@ -60,8 +60,9 @@ def stepper_of(seed: int, wanted: float):
 
 @pytest.mark.parametrize("wanted", [1e-3, -1e-2])
 def test_contacts_lie_on_both_boxes_at_the_gap_of_the_best_axis(wanted):
-    # The deepest contact is at the largest gap of all axes, to the amount by which an edge must win over faces, EDGE_WINS of the
-    # least half side (0.3 m): 0.6 mm. All lie on the surfaces of both boxes along one normal. A wrong axis, sign or clipped corner is off by centimetres.
+    # The deepest contact is at the largest gap of all axes, to the amount by which an edge must win over faces, EDGE_WINS of the least
+    # half side (0.3 m): 0.6 mm. All lie on the surfaces of both boxes along one normal. A wrong axis, sign or clipped corner is off by
+    # centimetres.
     for seed in range(40):
         stepper, half = stepper_of(seed, wanted)
         pairs, rows, bodies = stepper.table.pairs, stepper.table.points, stepper.bodies

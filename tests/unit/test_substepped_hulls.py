@@ -84,11 +84,11 @@ def moved_together(corners: list[np.ndarray], q: np.ndarray, way: np.ndarray, wa
 @pytest.mark.parametrize("wanted", [5e-3, 1e-4, -3e-3, -3e-2, -0.1, -0.2])
 def test_contacts_are_at_the_gap_of_the_best_axis(wanted):
     # The deepest contact is at the gap of the best axis n*, to the amount by which an edge must win over faces: EDGE_WINS of the inner
-    # radius (0.1 to 0.2 m), 0.2 to 0.4 mm. Inside each other the axis n is the best of bodies shorter by the factor f: f s(n) + (1 - f) n.d is
-    # largest, d from centre to centre, so s(n*) - s(n) <= (1/f - 1) (n - n*).d <= (1/f - 1) (|d| - s(n*) - both inner radii): 2 mm.
-    # Where even these are inside each other the least depth is found to EXACT of the inner radius, 0.2 mm. (The deepest corner may lie
-    # beside the face that bears it, one time in 40: then the deepest point over the face counts, at a quarter less.)
-    # A wrong sign, simplex or face is off by centimetres.
+    # radius (0.1 to 0.2 m), 0.2 to 0.4 mm. Inside each other the axis n is the best of bodies shorter by the factor f: f s(n) + (1 - f)
+    # n.d is largest, d from centre to centre, so s(n*) - s(n) <= (1/f - 1) (n - n*).d <= (1/f - 1) (|d| - s(n*) - both inner radii): 2
+    # mm. Where even these are inside each other the least depth is found to EXACT of the inner radius, 0.2 mm. (The deepest corner may
+    # lie beside the face that bears it, one time in 40: then the deepest point over the face counts, at a quarter less.) A wrong sign,
+    # simplex or face is off by centimetres.
     beside = 0
     for seed in range(40):
         stepper, world = stepper_at(seed, wanted)

@@ -1,8 +1,8 @@
 """How deep two convex polyhedra are inside each other: the expanding polytope algorithm (van den Bergen 2001).
 
 With X_a, X_b the corners of the bodies, 0 is inside the hull of all w = y - x. The shortest displacement to its surface separates the
-bodies. A polytope inside that hull, at first the tetrahedron about 0 that the algorithm of Gilbert, Johnson and Keerthi found, has a face n.w = h
-nearest to 0. The hull's farthest corner w along n is added where n.w > h: faces that it sees are replaced by those of w and the
+bodies. A polytope inside that hull, at first the tetrahedron about 0 that the algorithm of Gilbert, Johnson and Keerthi found, has a face
+n.w = h nearest to 0. The hull's farthest corner w along n is added where n.w > h: faces that it sees are replaced by those of w and the
 edges around them. Where n.w = h, n is the axis of least depth, and the corners of the face bear it.
 """
 
