@@ -9,20 +9,22 @@ import numpy as np
 
 from rigidimpulse.collision.contact_buffer import ContactBuffer, find_together
 from rigidimpulse.collision.contact_cache import classify, find_contacts, make_workspace, most_motion, share_of
-from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT, SolverBodies, load_bodies
+from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
 from rigidimpulse.collision.contact_table import ContactTable
-from rigidimpulse.collision.contact_update import FARTHER, convex_polyhedra, inner_radii, shrunk_geometry, store_contacts
+from rigidimpulse.collision.contact_update import FARTHER, store_contacts
 from rigidimpulse.collision.fat_boxes import FatBoxes
 from rigidimpulse.collision.manifold.dispatch import pair_gap
 from rigidimpulse.collision.manifold.inset_surface import inset_surfaces
 from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
+from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, inner_radii, shrunk_geometry
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import number_of_cores
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.core.simd import ROW, aligned, machine_simd
 from rigidimpulse.core.workers import empty_work_queue
+from rigidimpulse.dynamics.solvers.tgs_soft.bodies import SolverBodies, load_bodies
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import energies, mark_quick, note_pressed, slow_down
 from rigidimpulse.dynamics.solvers.tgs_soft.depenetration import move_apart
 from rigidimpulse.dynamics.solvers.tgs_soft.fill import fill, keep_impulses, place_bodies

@@ -17,7 +17,6 @@ from rigidimpulse.collision.contact_records import (
     DYNAMIC_FRICTION,
     FRICTION,
     IMPULSE,
-    INVERSE_MASS,
     ROUND_A,
     ROUND_B,
     SKELETON_A,
@@ -27,6 +26,7 @@ from rigidimpulse.collision.contact_records import (
 )
 from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.simd import ROW, fma, gather, load, root, scatter, spread, store, where_greater, width_of
+from rigidimpulse.dynamics.solvers.tgs_soft.bodies import INVERSE_MASS
 from rigidimpulse.dynamics.solvers.tgs_soft.passes import DEEPEST, TINY, add, along, cross, dot, less, linear, store_three, three, times
 from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     ARM_A,

@@ -15,10 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.contact_cache import GENERAL
-from rigidimpulse.collision.contact_records import CONTACT_MARGIN, INVERSE_MASS, ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, in_play, turned
+from rigidimpulse.collision.contact_records import CONTACT_MARGIN, ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, in_play, turned
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.simd import ROW, aligned
+from rigidimpulse.dynamics.solvers.tgs_soft.bodies import INVERSE_MASS
 
 ARM_A, ARM_B, ARM_FIELDS = 0, 3, 6
 """Fields of three of the arms: from the centres of the bodies to O, m."""
