@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.engine.touching import contacts_of_pairs
+from rigidimpulse.collision.geometry import Shapes
+from rigidimpulse.collision.manifold.contact_points import Contacts
+from rigidimpulse.collision.manifold.dispatch import PairQuery, contacts_of_pairs
 
 CONTACT_CAPACITY, PAIR_CAPACITY = 1024, 4096
 
@@ -38,8 +40,8 @@ class ContactBuffer:
 
     def arguments(self, geometry, world, bodies, rotation, a: np.ndarray, b: np.ndarray, margin: np.ndarray) -> tuple:
         """Of `contacts_of_pairs`: contacts of bodies a with bodies b (k,) at their poses, within margins (k,) m."""
-        places = bodies, rotation, a, b, margin
-        return geometry, world.shape_of_body, *places, self.scratch, self.real, self.integer, world.cylinders
+        shapes = Shapes(geometry, world.shape_of_body, world.cylinders)
+        return shapes, bodies, rotation, PairQuery(a, b, margin), Contacts(self.real, self.integer, self.scratch)
 
 
 def find_together(buffers: list[ContactBuffer], questions: list[tuple]) -> list[int]:

@@ -7,6 +7,10 @@ a stack built without gaps would rise. Bodies that join an island closer than th
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+
 from rigidimpulse.collision.contact_records import (
     CARRIER,
     CONTACT_MARGIN,
@@ -31,15 +35,32 @@ LEAST_MARGIN = 0.2
 """Least contact margin of a pair, in skins: as far as the load of a column presses a contact in."""
 
 
-@inlined
-def write_point(
-    position, rotation, material, skin, contact_margin, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b, coefficients,
-    points, r,
-):
-    """Write point r, without impulse, from the contact real[c] (10,) of bodies a and b, relative to a; carrier: whether it is b.
+class Source(NamedTuple):
+    """A contact as it was found, relative to the first body, for shapes that may be smaller than the true ones."""
 
-    factor_a, factor_b: lengths of the shapes for which the contact was found, as a part of the true ones. Returns the separation.
-    """
+    real: np.ndarray  # (k, 10) on a, on b, normal, gap
+    place: int  # of the contact in it
+    round_a: float  # m, radius of the rounded surface of a at the contact
+    round_b: float
+    factor_a: float  # lengths of the shape, as a part of the true ones
+    factor_b: float
+
+
+class Points(NamedTuple):
+    """Contact points of one pair."""
+
+    points: np.ndarray  # (P, POINT_FIELDS)
+    ids: np.ndarray  # (P, 3)
+    begin: int
+    end: int
+
+
+@inlined
+def write_point(bodies, pairs, p, source, coefficients, points, r):
+    """Write point r of pair p, without impulse; returns its separation. coefficients (k, k, 4): of two materials."""
+    real, c, round_a, round_b, factor_a, factor_b = source
+    position, rotation, material, skin = bodies.position, bodies.rotation, bodies.material, bodies.skin
+    a, b, carrier, contact_margin = pairs.first[p], pairs.second[p], pairs.carrier[p], pairs.contact_margin[p]
     nx, ny, nz = real[c, 6], real[c, 7], real[c, 8]
     dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
     ax, ay, az = real[c, 0] / factor_a - round_a * nx, real[c, 1] / factor_a - round_a * ny, real[c, 2] / factor_a - round_a * nz
@@ -73,16 +94,18 @@ def set_contact_margin(margins, p, points, begin, end):
 
 
 @inlined
-def match_contacts(old_points, old_ids, old, old_end, points, ids, new, new_end, near):
-    """Give new points the impulses of the old points of the same features, else of one nearby with almost the same normal.
+def match_contacts(old, new, near):
+    """Give new points the impulses of the old points of the same features, else of one within `near` with almost the same normal.
 
-    An old point gives its impulse once.
+    old, new: `Points`. An old point gives its impulse once.
     """
+    old_points, old_ids, old_begin, old_end = old
+    points, ids, new_begin, new_end = new
     for nearby in range(2):
-        for c in range(new, new_end):
+        for c in range(new_begin, new_end):
             if points[c, IMPULSE] > 0.0:
                 continue
-            for o in range(old, old_end):
+            for o in range(old_begin, old_end):
                 if old_points[o, IMPULSE] == 0.0:
                     continue
                 cosine = points[c, 0] * old_points[o, 0] + points[c, 1] * old_points[o, 1] + points[c, 2] * old_points[o, 2]

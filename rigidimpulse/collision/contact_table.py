@@ -6,6 +6,8 @@ place.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rigidimpulse.collision.contact_records import POINT_FIELDS, UNKNOWN, ContactPairs
@@ -19,6 +21,15 @@ MORE = 1.0 / 8.0
 """Part of the points by which their number grows."""
 LOW, FULL = 0.03, 0.9
 """Parts of the points taken: they are packed where fewer than LOW are free and fewer than FULL are in use."""
+
+
+class Table(NamedTuple):
+    """The arrays of a `ContactTable`, for kernels."""
+
+    pairs: ContactPairs
+    points: np.ndarray  # (P, POINT_FIELDS)
+    ids: np.ndarray  # (P, 3)
+    free: np.ndarray  # (shares, 2)
 
 
 def empty_pairs(k: int) -> ContactPairs:
@@ -113,6 +124,11 @@ class ContactTable:
         self.pairs, self.taken = empty_pairs(0), FIRST_POINTS
         self.lines, self.points, self.ids = _make_points(max(FIRST_POINTS, POINTS_OF_A_BODY * bodies))
         self.free = _parts(1, FIRST_POINTS, shares)
+
+    @property
+    def arrays(self) -> Table:
+        """The arrays as they are now: growing replaces them."""
+        return Table(self.pairs, self.points, self.ids, self.free)
 
     def replace(self, first: np.ndarray, second: np.ndarray) -> None:
         """Replace the pairs by these, ascending; pairs that stay keep what is known of them."""

@@ -7,17 +7,19 @@ bodies that move have an inset surface (`manifold.inset_surface`). If even these
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rigidimpulse.collision.contact_cache import note_seen
-from rigidimpulse.collision.contact_matching import NEAR, match_contacts, set_contact_margin, write_point
+from rigidimpulse.collision.contact_matching import NEAR, Points, Source, match_contacts, set_contact_margin, write_point
 from rigidimpulse.collision.contact_records import ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SKIN, turned
-from rigidimpulse.collision.distance.epa import make_polytope
-from rigidimpulse.collision.distance.gjk import make_simplex
-from rigidimpulse.collision.manifold.dispatch import reduce_contacts
+from rigidimpulse.collision.geometry import Geometry
 from rigidimpulse.collision.manifold.inset_surface import put_back
 from rigidimpulse.collision.manifold.penetrating import gap_along, overlap_contacts, support
-from rigidimpulse.collision.manifold.polyhedra import POINTS, make_scratch
+from rigidimpulse.collision.manifold.polyhedra import POINTS, Polyhedra, make_scratch
+from rigidimpulse.collision.manifold.polyhedra import Points as Found
+from rigidimpulse.collision.manifold.reduce import reduce_contacts
 from rigidimpulse.collision.manifold.rounding import only_primitive, side_radius
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 
@@ -25,6 +27,26 @@ PER_NORMAL = np.int64(4)
 """Contacts kept of one normal, in addition to the deepest."""
 FARTHER = 1.5
 """Distance of the search in margins: a pair without contacts is then known to be apart for some time."""
+
+
+class SmallerShapes(NamedTuple):
+    """The true shapes of the n bodies, by rank, and the smaller ones for the search."""
+
+    true: Geometry
+    geometry: Geometry  # shrunk convex shapes, inset surfaces
+    factor: np.ndarray  # (n,) lengths of a shrunk shape, as a part of the true ones; 1 for others
+    back: np.ndarray  # (V, 4) and
+    depth: np.ndarray  # (n,) m, of the inset surface; see `inset_surface`
+    convex: np.ndarray  # (n,) bool, bodies whose contacts inside each other `solids` give
+    solids: Polyhedra  # see `penetrating`
+
+
+class Searched(NamedTuple):
+    """Pairs (k,) that were searched, in the order of the contacts found."""
+
+    places: np.ndarray  # (k,) in the table
+    margins: np.ndarray  # (k,) m, greatest gap of a contact that is kept
+    far: np.ndarray  # (k,) m, distance of the search
 
 
 @jit
@@ -57,56 +79,53 @@ def _contradicts(bodies, pairs, p, points, new, new_end):
 
 
 @jit
-def _is_sound(geometry, bodies, factor, a, b, real, first, last):
+def _is_sound(smaller, bodies, a, b, real, first, last):
     """Whether the shrunk bodies are apart along the normal of one of their contacts."""
-    p, q = geometry.shape_first[bodies.shape[a]], geometry.shape_first[bodies.shape[b]]
     for s in range(first, last):
-        gap = gap_along(geometry, bodies, a, b, p, q, real[s, 6:9])
-        if gap + _shrunk_by(geometry, bodies, factor, a, b, p, q, real[s, 6:9]) > 0.0:
+        gap = gap_along(smaller.true, bodies, a, b, real[s, 6:9])
+        if gap + _shrunk_by(smaller, bodies, a, b, real[s, 6:9]) > 0.0:
             return True
     return False
 
 
 @jit
-def _shrunk_by(geometry, bodies, factor, a, b, p, q, n):
+def _shrunk_by(smaller, bodies, a, b, n):
     """How much wider the gap along n is between the shrunk bodies, m."""
-    x, y = bodies.position[a], bodies.position[b]
+    geometry, factor, x, y = smaller.true, smaller.factor, bodies.position[a], bodies.position[b]
+    p, q = geometry.shape_first[bodies.shape[a]], geometry.shape_first[bodies.shape[b]]
     reach_a = support(geometry, p, x, bodies.rotation[a], n, 1.0) - (n[0] * x[0] + n[1] * x[1] + n[2] * x[2])
     reach_b = support(geometry, q, y, bodies.rotation[b], n, -1.0) + (n[0] * y[0] + n[1] * y[1] + n[2] * y[2])
     return (1.0 - factor[a]) * reach_a + (1.0 - factor[b]) * reach_b
 
 
 @jit_making_arrays
-def _write(geometry, bodies, margin_at_rest, a, b, carrier, real, c, factor_a, factor_b, coefficients, points, r):
-    """Write point r from the contact real[c] (10,) of bodies a and b, given in the world; returns its separation."""
+def _write(geometry, bodies, pairs, p, contact, coefficients, points, r):
+    """Write point r of pair p from a contact in the world, (real, place, factor of a, factor of b); returns its separation."""
+    real, c, factor_a, factor_b = contact
+    a, b = pairs.first[p], pairs.second[p]
     round_a = side_radius(geometry, only_primitive(geometry, bodies.shape[a]), bodies.rotation[a], real[c, 6:9])
     round_b = side_radius(geometry, only_primitive(geometry, bodies.shape[b]), bodies.rotation[b], real[c, 6:9])
     for k in range(3):
         real[c, k] -= bodies.position[a, k]
         real[c, 3 + k] -= bodies.position[a, k]
-    return write_point(
-        bodies.position, bodies.rotation, bodies.material, bodies.skin, margin_at_rest, a, b, carrier, real, c, round_a, round_b,
-        factor_a, factor_b, coefficients, points, r,
-    )  # fmt: skip
+    return write_point(bodies, pairs, p, Source(real, c, round_a, round_b, factor_a, factor_b), coefficients, points, r)
 
 
 @jit_making_arrays
-def store_contacts(
-    geometry, shown, back, polyhedra, bodies, pairs, places, margins, far, convex, factor, depth, coefficients, real, integer, count, order,
-    points, ids, used,
-):
-    """Store the contacts found for the pairs at `places` in points from `used` on, with the impulses of those they replace.
+def store_contacts(smaller, bodies, table, searched, found, count, order, coefficients):
+    """Store the contacts found for the pairs `searched` in the points that are free for share 0, with the impulses of those they replace.
 
-    real, integer: `count` contacts in the order of the places, `integer[:, :2]` by indices of the scene, order (n,) indices by rank;
-    geometry: the true shapes; shown: the shapes for the search; back, depth (n,) m by rank: see `inset_surface`; polyhedra: for convex
-    bodies (n,) bool inside each other, see `penetrating`; factor (n,), by rank as well; margins (k,) m; far (k,) m: distance of the
-    search. Returns the points used.
+    smaller: `SmallerShapes`; table: `contact_table.Table`; found: (real, integer) of `count` contacts in the order of the pairs, with
+    `integer[:, :2]` by indices of the scene; order (n,): indices by rank; coefficients (k, k, 4) of two materials.
     """
-    c = np.int64(0)
+    geometry, factor, convex = smaller.true, smaller.factor, smaller.convex
+    pairs, points, ids, free = table
+    real, integer = found
+    c, used = np.int64(0), free[0, 0]
     deep, deep_ids = np.empty((POINTS + 1, 10)), np.empty((POINTS + 1, 3), np.int64)
-    work = np.empty(3), np.zeros(3), np.empty((3, 3)), make_simplex(), make_polytope(), make_scratch()
-    for k in range(places.shape[0]):
-        p = places[k]
+    scratch = make_scratch()
+    for k in range(searched.places.shape[0]):
+        p = searched.places[k]
         a, b = pairs.first[p], pairs.second[p]
         first = c
         while c < count and integer[c, 0] == order[a] and integer[c, 1] == order[b]:
@@ -114,24 +133,21 @@ def store_contacts(
         last = reduce_contacts(real, integer, first, c, PER_NORMAL)
         new = used
         size = min(bodies.inner[a], bodies.inner[b])
-        carrier = pairs.carrier[p]
         if pairs.count[p] == 0:
             pairs.contact_margin[p] = min(bodies.skin[a], bodies.skin[b])
-        margin_at_rest = pairs.contact_margin[p]
         deep_count = 0
-        if convex[a] and convex[b] and factor[a] * factor[b] < 1.0 and not _is_sound(geometry, bodies, factor, a, b, real, first, last):
-            deep_count = overlap_contacts(polyhedra, bodies, a, b, size, work, deep, deep_ids)
+        if convex[a] and convex[b] and factor[a] * factor[b] < 1.0 and not _is_sound(smaller, bodies, a, b, real, first, last):
+            deep_count = overlap_contacts(smaller.solids, bodies, a, b, size, scratch, Found(deep, deep_ids))
         for s in range(deep_count if deep_count > 0 else last - first):
             if deep_count > 0:
-                separation = _write(geometry, bodies, margin_at_rest, a, b, carrier, deep, s, 1.0, 1.0, coefficients, points, used)
+                separation = _write(geometry, bodies, pairs, p, (deep, s, 1.0, 1.0), coefficients, points, used)
                 ids[used] = deep_ids[s]
             else:
-                put_back(shown, back, depth, bodies, a, b, real, integer, first + s)
-                separation = _write(
-                    geometry, bodies, margin_at_rest, a, b, carrier, real, first + s, factor[a], factor[b], coefficients, points, used
-                )
+                put_back(smaller, bodies, a, b, real, integer, first + s)
+                contact = (real, first + s, factor[a], factor[b])
+                separation = _write(geometry, bodies, pairs, p, contact, coefficients, points, used)
                 ids[used] = integer[first + s, 2:]
-            if separation <= margins[k]:
+            if separation <= searched.margins[k]:
                 used += 1
         if deep_count == 0 and _contradicts(bodies, pairs, p, points, new, used):
             used = new
@@ -139,8 +155,8 @@ def store_contacts(
             if pairs.count[p] == 0:
                 set_contact_margin(pairs.contact_margin, p, points, new, used)
             old = pairs.start[p]
-            match_contacts(points, ids, old, old + pairs.count[p], points, ids, new, used, NEAR * size)
+            match_contacts(Points(points, ids, old, old + pairs.count[p]), Points(points, ids, new, used), NEAR * size)
             pairs.start[p], pairs.count[p], pairs.capacity[p] = new, used - new, used - new
-        pairs.apart[p] = far[k] if pairs.count[p] == 0 and deep_count == 0 and last == first else 0.0
+        pairs.apart[p] = searched.far[k] if pairs.count[p] == 0 and deep_count == 0 and last == first else 0.0
         note_seen(bodies, pairs, p)
-    return used
+    free[0, 0] = used

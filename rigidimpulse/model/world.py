@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
+from rigidimpulse.collision.geometry import (
+    CYLINDER,
+    HALF_SPACE,
+    ROUND,
+    CompiledShape,
+    Geometry,
+    build_geometry,
+    compile_shape,
+    cylinders_of,
+)
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import from_matrix, multiply, rotate
@@ -95,9 +104,9 @@ class World:
         return len(self.names)
 
     @cached_property
-    def cylinders(self) -> int | None:
-        """None where no shape is a cylinder: kernels then leave their part out, also when they are compiled."""
-        return 1 if np.any(self.geometry.kind == CYLINDER) else None
+    def cylinders(self) -> np.ndarray | None:
+        """Primitives (c,) that are cylinders, None where there is none; see `geometry.Shapes`."""
+        return cylinders_of(self.geometry)
 
     @cached_property
     def steady_strength(self) -> np.ndarray:

@@ -7,7 +7,8 @@ from contact_scenes import IDENTITY, ROUND_OFF, SQUARE, Scene, approached, box, 
 
 from rigidimpulse.collision.bvh import STACK_ROWS
 from rigidimpulse.collision.geometry import CYLINDER, Primitive
-from rigidimpulse.collision.manifold.dispatch import pair_contacts, reduce_contacts
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_contacts
+from rigidimpulse.collision.manifold.reduce import reduce_contacts
 
 
 def test_open_sheet_is_touched_from_both_sides():
@@ -30,11 +31,11 @@ class TestBuffers:
     def test_tells_how_many_contacts_it_needs(self):
         small = Scene(mesh(box()), mesh(box()), capacity=3)
         pose_b = (np.array([0.1, 0.2, 1.0 + 1e-5]), np.eye(3))
-        arguments = (0, *IDENTITY, 1, *pose_b, 2e-5)
-        assert pair_contacts(small.geometry, *arguments, small.scratch, small.real, small.integer, 0) == -4
+        arguments = (Posed(0, *IDENTITY), Posed(1, *pose_b), 2e-5)
+        assert pair_contacts(small.shapes, *arguments, small.buffers, 0) == -4
         enough = Scene(mesh(box()), mesh(box()), capacity=6)
         enough.real[:2] = 5.0
-        assert pair_contacts(enough.geometry, *arguments, enough.scratch, enough.real, enough.integer, 2) == 6
+        assert pair_contacts(enough.shapes, *arguments, enough.buffers, 2) == 6
         assert np.all(enough.real[:2] == 5.0) and np.all(enough.integer[:, :2] == -7)
 
     def test_chunks_of_leaf_pairs_change_nothing(self):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.collision.contact_cache import HULLS
 from rigidimpulse.collision.contact_records import CONTACT_MARGIN, SEPARATION, SKELETON_A, SKELETON_B
 from rigidimpulse.collision.distance.epa import EXACT
 from rigidimpulse.collision.manifold.convex_convex import SHRINK
+from rigidimpulse.collision.manifold.dispatch import HULLS
 from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
 from rigidimpulse.core.quaternion import multiply, rotate, to_matrix
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper

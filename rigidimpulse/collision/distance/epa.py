@@ -126,8 +126,12 @@ def _toggle(rim, edges, i, j):
 
 
 @jit
-def least_deep(shapes, s, t, d, c, small, exact, simplex, polytope):
-    """Axis of the least depth of bodies inside each other, as `closest` gives it, from its simplex; 5 corners where there is none."""
+def least_deep(shapes, s, t, pose, small, exact, simplex, polytope):
+    """Axis of the least depth of bodies inside each other, as `closest` gives it, from its simplex; 5 corners where there is none.
+
+    pose: (d, c), see `closest`.
+    """
+    d, c = pose
     corner, w = shapes.corner, polytope.w
     a0, a1, b0, b1 = shapes.corner_first[s], shapes.corner_first[s + 1], shapes.corner_first[t], shapes.corner_first[t + 1]
     faces, gap = _start(polytope, simplex), 0.0
@@ -137,7 +141,7 @@ def least_deep(shapes, s, t, d, c, small, exact, simplex, polytope):
             return 1.0, 0.0, 0.0, 0.0, np.int64(5)
         f = _nearest_face(polytope, faces)
         x, y, z = -polytope.plane[f, 0], -polytope.plane[f, 1], -polytope.plane[f, 2]
-        i, high, j, low = farthest_of_both(corner, a0, a1, b0, b1, c, x, y, z)
+        i, high, j, low = farthest_of_both(corner, (a0, a1), (b0, b1), c, x, y, z)
         middle = d[0] * x + d[1] * y + d[2] * z
         gap = middle - low - high
         if corners == MOST_CORNERS or -(middle - small * (low + high)) <= polytope.plane[f, 3] + exact:

@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 
 from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, Primitive, build_geometry
-from rigidimpulse.collision.manifold.dispatch import pair_gap
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import quaternion_to_matrix
@@ -192,7 +192,7 @@ class Narrowphase:
             return _NOTHING
         out = np.zeros(7)
         farthest = float(np.linalg.norm(R @ solid_b.centre + t - solid_a.centre)) + solid_a.reach + solid_b.reach
-        gap = pair_gap(self.geometry, a, np.zeros(3), np.eye(3), b, t, R, min(limit, farthest), out)
+        gap = pair_gap(self.geometry, Posed(a, np.zeros(3), np.eye(3)), Posed(b, t, R), min(limit, farthest), out)
         if gap >= limit:
             return _NOTHING
         between = out[3:6] - out[:3]

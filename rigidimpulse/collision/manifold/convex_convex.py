@@ -17,8 +17,8 @@ import numpy as np
 from rigidimpulse.collision.contact_records import turned, turned_back
 from rigidimpulse.collision.distance.epa import EXACT, least_deep
 from rigidimpulse.collision.distance.gjk import closest, farthest
-from rigidimpulse.collision.manifold.clip import clip_faces, face_like
-from rigidimpulse.collision.manifold.polyhedra import ALIKE, EDGE_WINS, POINTS, add_contact, along_edges, copy_contact, nearest_of
+from rigidimpulse.collision.manifold.clip import Side, clip_faces, face_like
+from rigidimpulse.collision.manifold.polyhedra import ALIKE, EDGE_WINS, POINTS, Query, add_contact, along_edges, copy_contact, nearest_of
 from rigidimpulse.core.kernels import inlined, jit
 
 SHRINK = 0.012
@@ -60,8 +60,9 @@ def _best_face(shapes, s, t, d, c, sign):
 
 
 @jit
-def _one_contact(shapes, rotation, a, d, c, n, gap, count, simplex, real, ids):
-    """The contact of the closest points, half-way between those of the true bodies; returns 1."""
+def _one_contact(shapes, pair, d, axis, count, scratch, points):
+    """The contact of the closest points, half-way between those of the true bodies, along axis = (n, gap); returns 1."""
+    c, simplex, rotation, a, (n, gap), (real, ids) = scratch.axes, scratch.simplex, pair.rotation, pair.a, axis, points
     code_a, code_b = np.int64(0), np.int64(0)
     middle = (0.0, 0.0, 0.0)
     for k in range(count):
@@ -91,17 +92,17 @@ def seen_from(rotation, a, b, between, c):
 
 
 @jit
-def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, polytope, scratch, real, ids):
-    """Contacts of two convex polyhedra relative to the first body; returns their number and a bound of the gap.
-
-    between: from a to b, world; origin: (0, 0, 0); size: smaller inner radius, m; c: scratch (3, 3); real, ids: POINTS + 1 rows.
-    """
+def hull_contacts(shapes, pair, query, scratch, points):
+    """Contacts of two convex polyhedra relative to the first body; returns their number and a bound of the gap."""
+    rotation, _, a, b, s, t = pair
+    margin, ahead, size = query
+    polygon, simplex, _, _, c, between, origin = scratch
     d = seen_from(rotation, a, b, between, c)
     nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0, margin, simplex)
     if count == 5:
         nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0 - SHRINK, margin, simplex)
     if count == 5:
-        nx, ny, nz, gap, count = least_deep(shapes, s, t, d, c, 1.0 - SHRINK, EXACT * size, simplex, polytope)
+        nx, ny, nz, gap, count = least_deep(shapes, s, t, (d, c), 1.0 - SHRINK, EXACT * size, simplex, scratch.polytope)
     if count == 0:
         return count, gap
     x, y, z = turned(rotation, a, nx, ny, nz)
@@ -116,8 +117,8 @@ def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size,
         of_b = cosine_b > cosine + SECOND_WINS
     cosine = cosine_b if of_b else cosine
     if count < 5:
-        _one_contact(shapes, rotation, a, d, c, (nx, ny, nz), gap, count, simplex, real, ids)
-        copy_contact(real, ids, 0, POINTS)
+        _one_contact(shapes, pair, d, ((nx, ny, nz), gap), count, scratch, points)
+        copy_contact(points, 0, POINTS)
     if edges:
         if cosine < ALIKE:
             return np.int64(1), gap
@@ -125,22 +126,24 @@ def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size,
         ahead = 0.0
     if of_b:
         other = _face_at(shapes, s, corner_a, rotation, a, t, b, face_b)
-        found = clip_faces(shapes, velocity, rotation, t, b, between, face_b, s, a, origin, other, margin, ahead, -1.0, scratch, real, ids)
+        own, facing = Side(t, b, between, face_b), Side(s, a, origin, other)
+        found = clip_faces(shapes, pair, own, facing, Query(margin, ahead, size), polygon, points)
     else:
         other = _face_at(shapes, t, corner_b, rotation, b, s, a, face_a)
-        found = clip_faces(shapes, velocity, rotation, s, a, origin, face_a, t, b, between, other, margin, ahead, 1.0, scratch, real, ids)
+        own, facing = Side(s, a, origin, face_a), Side(t, b, between, other)
+        found = clip_faces(shapes, pair, own, facing, Query(margin, ahead, size), polygon, points)
     if edges:
-        if not along_edges(real, found, POINTS, cosine, of_b, gap, size):
-            copy_contact(real, ids, POINTS, 0)
+        if not along_edges(points.real, found, POINTS, cosine, of_b, gap, size):
+            copy_contact(points, POINTS, 0)
             found = np.int64(1)
     elif found == 0 and max(gap_a, gap_b) <= margin:
         # The other face lies completely beside it.
-        face, corner, i, j = (face_b, corner_a, b, a) if gap_b > gap_a else (face_a, corner_b, a, b)
-        found = _corner_contact(shapes, rotation, face, corner, i, j, i == a, between, max(gap_a, gap_b), real, ids)
-    elif count < 5 and found > 0 and cosine >= ALIKE and nearest_of(real, found) > max(gap_a, gap_b) + EDGE_WINS * size:
+        face, corner = (face_b, corner_a) if gap_b > gap_a else (face_a, corner_b)
+        found = _corner_contact(shapes, pair, face, corner, not gap_b > gap_a, (between, max(gap_a, gap_b)), points)
+    elif count < 5 and found > 0 and cosine >= ALIKE and nearest_of(points.real, found) > max(gap_a, gap_b) + EDGE_WINS * size:
         # The deepest point lies beside the face.
-        along_edges(real, found, POINTS, cosine, of_b, gap, size)
-        found = add_contact(real, ids, found, POINTS)
+        along_edges(points.real, found, POINTS, cosine, of_b, gap, size)
+        found = add_contact(points, found, POINTS)
     return found, max(gap, gap_a, gap_b)
 
 
@@ -152,8 +155,13 @@ def _cosine(shapes, face, r, i, n):
 
 
 @jit
-def _corner_contact(shapes, rotation, face, corner, i, j, of_a, between, gap, real, ids):
-    """The contact of a corner of body j at `gap` from the plane of a face of body i; of_a: whether i is the first; returns 1."""
+def _corner_contact(shapes, pair, face, corner, of_a, apart, points):
+    """The contact of a corner of one body with the plane of a face of the other; of_a: whether the face is a's; returns 1.
+
+    apart: (from a to b in world axes, gap of the corner in m).
+    """
+    rotation, i, j = pair.rotation, pair.a if of_a else pair.b, pair.b if of_a else pair.a
+    (between, gap), (real, ids) = apart, points
     n = turned(rotation, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
     p = turned(rotation, j, shapes.corner[corner, 0], shapes.corner[corner, 1], shapes.corner[corner, 2])
     on_i, on_j, sign = (0, 3, 1.0) if of_a else (3, 0, -1.0)

@@ -19,7 +19,7 @@ from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
 from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Geometry, Primitive, build_geometry
 from rigidimpulse.collision.manifold.cylinder_rims import CYLINDER_CONTACT
-from rigidimpulse.collision.manifold.dispatch import pair_gap
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.core.kernels import jit
 
 DEPTH = 0.012
@@ -99,7 +99,7 @@ def _moved_in(p: Primitive, d: float) -> np.ndarray:
 
 def _distance(surface: Geometry, point: np.ndarray, limit: float) -> float:
     """Distance of a point to the second shape, at most `limit` m."""
-    return pair_gap(surface, 0, point, np.eye(3), 1, np.zeros(3), np.eye(3), limit, np.zeros(7))
+    return pair_gap(surface, Posed(0, point, np.eye(3)), Posed(1, np.zeros(3), np.eye(3)), limit, np.zeros(7))
 
 
 def _area_vectors(x: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -122,11 +122,12 @@ def _directions(x: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 @jit
-def put_back(geometry, back, depth, bodies, a, b, real, integer, c):
+def put_back(smaller, bodies, a, b, real, integer, c):
     """Move the points of contact c of bodies a and b from the inset surfaces to the true bodies, along the normal.
 
-    geometry, back: see `inset_surfaces`; depth (n,) by rank, m; real (k, 10), in the world, and integer (k, 5): contacts.
+    smaller: `contact_update.SmallerShapes`; real (k, 10), in the world, and integer (k, 5): contacts.
     """
+    geometry, back, depth = smaller.geometry, smaller.back, smaller.depth
     kind = integer[c, 2]
     for side in range(2):
         i, sign, at = (a, 1.0, 0) if side == 0 else (b, -1.0, 3)

@@ -13,7 +13,7 @@ import numpy as np
 
 from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
 from rigidimpulse.collision.manifold.convex_convex import hull_contacts
-from rigidimpulse.collision.manifold.polyhedra import Polyhedra, make_polyhedra
+from rigidimpulse.collision.manifold.polyhedra import Pair, Polyhedra, Query, make_polyhedra
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.scene.shape import Shape
 
@@ -68,25 +68,24 @@ def support(geometry, p, x, r, n, sign):
 
 
 @jit
-def gap_along(geometry, bodies, a, b, p, q, n):
-    """s(n) of bodies a and b with the primitives p and q, m."""
+def gap_along(geometry, bodies, a, b, n):
+    """s(n) of bodies a and b, each of one primitive, m."""
+    p, q = geometry.shape_first[bodies.shape[a]], geometry.shape_first[bodies.shape[b]]
     low = -support(geometry, q, bodies.position[b], bodies.rotation[b], n, -1.0)
     return low - support(geometry, p, bodies.position[a], bodies.rotation[a], n, 1.0)
 
 
 @jit
-def overlap_contacts(polyhedra, bodies, a, b, size, work, real, ids):
-    """Contacts into real (5, 10), in the world, and ids (5, 3) of two bodies inside each other; their number.
+def overlap_contacts(polyhedra, bodies, a, b, size, scratch, points):
+    """Write the contacts, in the world, of two bodies inside each other; returns their number.
 
-    polyhedra: with prisms for cylinders; size: smaller inner radius, m; work: scratch for `hull_contacts`.
+    polyhedra: with prisms for cylinders; size: smaller inner radius, m.
     """
-    between, origin, c, simplex, polytope, scratch = work
+    between, real = scratch.between, points.real
     for k in range(3):
         between[k] = bodies.position[b, k] - bodies.position[a, k]
-    count, gap = hull_contacts(
-        polyhedra, bodies.velocity, bodies.rotation, a, b, bodies.shape[a], bodies.shape[b], between, origin, size, FLUSH * size, 0.0, c,
-        simplex, polytope, scratch, real, ids,
-    )  # fmt: skip
+    pair = Pair(bodies.rotation, bodies.velocity, a, b, bodies.shape[a], bodies.shape[b])
+    count, gap = hull_contacts(polyhedra, pair, Query(FLUSH * size, 0.0, size), scratch, points)
     if gap > 0.0:
         return np.int64(0)
     for n in range(count):

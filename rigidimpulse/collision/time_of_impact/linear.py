@@ -17,7 +17,7 @@ from math import inf
 import numpy as np
 
 from rigidimpulse.collision.distance.simplices import along, cross, dot, subtract
-from rigidimpulse.collision.manifold.dispatch import pair_gap
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.collision.time_of_impact.bvh_walk import row
 from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled
 from rigidimpulse.collision.time_of_impact.result import IMPACT, TOUCHING, ImpactTimes, SweepDetector, no_impacts
@@ -38,7 +38,8 @@ def measure(geometry, trajectory, shape_of_body, a, b, t, witness):
     for side in range(2):
         motion_at(trajectory, b if side else a, t, x[side], q[side], v[side], w[side])
         quaternion_to_matrix(q[side], axes[side])
-    gap = pair_gap(geometry, shape_of_body[a], x[0], axes[0], shape_of_body[b], x[1], axes[1], inf, points)
+    posed_a, posed_b = Posed(shape_of_body[a], x[0], axes[0]), Posed(shape_of_body[b], x[1], axes[1])
+    gap = pair_gap(geometry, posed_a, posed_b, inf, points)
     point_a, point_b = (points[0], points[1], points[2]), (points[3], points[4], points[5])
     between = scaled(subtract(point_b, point_a), 1.0 if gap >= 0.0 else -1.0)
     if dot(between, between) == 0.0:

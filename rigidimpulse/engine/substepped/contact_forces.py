@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.collision.contact_buffer import ContactBuffer, find_together
-from rigidimpulse.collision.contact_cache import classify, find_contacts, make_workspace, most_motion, share_of
+from rigidimpulse.collision.contact_cache import Convex, Limits, Share, classify, find_contacts, make_workspace, most_motion, share_of
 from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
 from rigidimpulse.collision.contact_table import ContactTable
-from rigidimpulse.collision.contact_update import FARTHER, store_contacts
+from rigidimpulse.collision.contact_update import FARTHER, Searched, SmallerShapes, store_contacts
 from rigidimpulse.collision.fat_boxes import FatBoxes
-from rigidimpulse.collision.manifold.dispatch import pair_gap
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.collision.manifold.inset_surface import inset_surfaces
 from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
@@ -217,10 +217,11 @@ class ContactStepper:
         if room > len(self._places):
             self._places, self._margins = reserve((2 * room,), np.int64), reserve((2 * room,), np.float64)
         while True:
+            convex, limits = Convex(self.shapes, self._solids, self._inset), Limits(self.ahead, SAME * self.motion, kept)
             outcome = find_contacts.together([
                 (
-                    self.shapes, self._solids, self._inset, self.bodies, table.pairs, share, shares, self.ahead, SAME * self.motion, kept,
-                    self._places, self._margins, table.points, table.ids, table.free, self.world.coefficients, self._workspaces[share],
+                    convex, self.bodies, table.arrays, Share(share, shares, self._places, self._margins), limits, self.world.coefficients,
+                    self._workspaces[share],
                 )
                 for share in range(shares)
             ])  # fmt: skip
@@ -254,13 +255,13 @@ class ContactStepper:
         buffers = [context.contact_buffer, *self._more_buffers][: len(shares)]
         a, b = self.order[first], self.order[second]
         found = find_together(buffers, [(self.geometry, world, now, rotation, a[some], b[some], shown[some]) for some in shares])
+        smaller = SmallerShapes(world.geometry, self.geometry, self._factor, self._back, self._depth, self._convex, self._solids)
         for some, buffer, count in zip(shares, buffers, found, strict=True):
             # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
             table.grow(count + POINTS * len(some) + 1)
-            table.free[0, 0] = store_contacts(
-                world.geometry, self.geometry, self._back, self._solids, self.bodies, pairs, places[some], margin[some], far[some],
-                self._convex, self._factor, self._depth, world.coefficients, buffer.real, buffer.integer, count, self.order, table.points,
-                table.ids, int(table.free[0, 0]),
+            store_contacts(
+                smaller, self.bodies, table.arrays, Searched(places[some], margin[some], far[some]), (buffer.real, buffer.integer), count,
+                self.order, world.coefficients,
             )  # fmt: skip
 
     def report_crossed(self, context, members: np.ndarray, time: float) -> None:
@@ -274,7 +275,8 @@ class ContactStepper:
         for i, j in zip(self.order[pairs.first[asked]].tolist(), self.order[pairs.second[asked]].tolist(), strict=True):
             a, b, limit = int(world.shape_of_body[i]), int(world.shape_of_body[j]), CROSSED * min(self.inner[i], self.inner[j])
             rotation = to_matrix(now.orientation[i]), to_matrix(now.orientation[j])
-            if pair_gap(self.geometry, a, now.position[i], rotation[0], b, now.position[j], rotation[1], limit, np.zeros(7)) < limit:
+            posed = Posed(a, now.position[i], rotation[0]), Posed(b, now.position[j], rotation[1])
+            if pair_gap(self.geometry, *posed, limit, np.zeros(7)) < limit:
                 context.log.report(
                     time, "overlap in a heap", (world.names[min(i, j)], world.names[max(i, j)]),
                     "the bodies are deeper inside each other than their contacts can tell; use a smaller step",

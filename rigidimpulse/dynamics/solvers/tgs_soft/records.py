@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.contact_cache import GENERAL
 from rigidimpulse.collision.contact_records import CONTACT_MARGIN, ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, in_play, turned
+from rigidimpulse.collision.manifold.dispatch import GENERAL
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.simd import ROW, aligned
