@@ -17,11 +17,10 @@ Side against a parallel edge or side has its contacts at the ends of the overlap
 sphere or capsule is its skeleton grown by a radius; its closest point is a contact in any case. If nothing else is found,
 the closest pair is.
 
-The least distances of `cylinder_features` can be imported from here as well:
+The least distances of `distance.cylinder` can be imported from here as well:
     cylinder_support(axis, half_height, radius, n) -> greatest n . (p - centre)
     cylinder_triangle_distance(centre, axis, half_height, radius, triangle (3, 3), out (9,)) -> distance
-    cylinder_cylinder_distance(centre_a, axis_a, half_height_a, radius_a, centre_b, axis_b, half_height_b, radius_b,
-        out (9,)) -> distance
+    cylinder_cylinder_distance(first, second, out (9,)) -> distance, each a tuple (centre, axis, half_height, radius)
 """
 
 from __future__ import annotations

@@ -88,8 +88,9 @@ def _bend(corners, path, k):
 
 
 @jit
-def _first_contact(corners_a, path_a, corners_b, path_b, impact_margin, tolerance, work, index, speeds):
-    """Return (tau, steps); tau is inf without contact, nan if the steps were used up."""
+def _first_contact(first, second, impact_margin, tolerance, work, index, speeds):
+    """Return (tau, steps) of two features, each (corners, path); tau is inf without contact, nan if the steps were used up."""
+    (corners_a, path_a), (corners_b, path_b) = first, second
     index[COUNT], index[COUNT + 1] = corners_a.shape[0], corners_b.shape[0]
     tau = 0.0
     for step in range(1, MAX_STEPS + 1):
@@ -150,7 +151,7 @@ def first_contact(
             raise ValueError("corners and paths must be finite")
         if len(arrays[0]) == 3 and not np.cross(arrays[0][1] - arrays[0][0], arrays[0][2] - arrays[0][0]).any():
             raise ValueError("a triangle without area: give its longest edge")
-        features += [arrays[0], FeaturePath(arrays[1], arrays[2])]
+        features.append((arrays[0], FeaturePath(arrays[1], arrays[2])))
     work, index, speeds = np.zeros(WORK_SIZE), np.zeros(INDEX_SIZE, np.int64), np.zeros(18)
     tau, steps = _first_contact(*features, float(impact_margin), float(tolerance), work, index, speeds)
     if np.isnan(tau):

@@ -20,7 +20,7 @@ from rigidimpulse.collision.distance.simplices import along, cross, dot, subtrac
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.collision.time_of_impact.bvh_walk import row
 from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled
-from rigidimpulse.collision.time_of_impact.result import IMPACT, TOUCHING, ImpactTimes, SweepDetector, no_impacts
+from rigidimpulse.collision.time_of_impact.result import IMPACT, TOUCHING, ImpactTimes, PairsToSweep, SweepDetector, no_impacts
 from rigidimpulse.collision.time_of_impact.scratch_layout import FIRST, GAP, NORMAL, POINT_FIRST, POINT_SECOND, SECOND
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
@@ -56,9 +56,10 @@ def measure(geometry, trajectory, shape_of_body, a, b, t, witness):
 
 
 @jit
-def _sweep(geometry, trajectory, shape_of_body, pairs_a, pairs_b, start, end, impact_margin, result):
-    for k in range(pairs_a.shape[0]):
-        a, b, witness = pairs_a[k], pairs_b[k], result.witness[k]
+def _sweep(geometry, trajectory, shape_of_body, pairs, end, result):
+    start, impact_margin = pairs.start, pairs.impact_margin
+    for k in range(pairs.a.shape[0]):
+        a, b, witness = pairs.a[k], pairs.b[k], result.witness[k]
         closing = measure(geometry, trajectory, shape_of_body, a, b, start[k], witness)
         result.queries[k] = 1
         if closing <= 0.0:
@@ -89,5 +90,6 @@ def sweep(
 
     """
     result = no_impacts(len(pairs_a))
-    _sweep(detector.geometry, trajectory, detector.shape_of_body, pairs_a, pairs_b, start, float(end), impact_margin, result)
+    pairs = PairsToSweep(pairs_a, pairs_b, start, impact_margin, tolerance)
+    _sweep(detector.geometry, trajectory, detector.shape_of_body, pairs, float(end), result)
     return result

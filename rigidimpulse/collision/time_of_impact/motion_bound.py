@@ -197,8 +197,14 @@ def stop_turning(row):
 
 
 @jit
-def _centre_jerk(spin, rate, jerk, distance, speed, velocity, acceleration, pull, pull_rate, horizon):
-    """J_c from W, A, K of the carrier, |d|, the largest |v_b - v_a|, |u|, |c|, the largest |acc_b - acc_a| and |jerk_b - jerk_a|."""
+def _centre_jerk(turning, seen, pulls, horizon):
+    """J_c from turning = (W, A, K) of the carrier, seen = (|d|, largest |v_b - v_a|, |u|, |c|) and pulls.
+
+    pulls: (largest |acc_b - acc_a|, |jerk_b - jerk_a|).
+    """
+    spin, rate, jerk = turning
+    distance, speed, velocity, acceleration = seen
+    pull, pull_rate = pulls
     if spin == 0.0 and rate == 0.0:
         return pull_rate * _WIDEN
     far = distance + horizon * speed
@@ -260,9 +266,8 @@ def relative_motion(work, carrier, other, axes, horizon, seen):
     most, growing = max(length(pull), length(along(pull, horizon, growth))), length(growth)
     speed = max(length(dv), length(along(dv, horizon, along(pull, 0.5 * horizon, growth))))
     speed += 0.125 * horizon * horizon * growing  # what the path of a velocity bulges beyond its chord
-    work[seen + SEEN_JERK] = _centre_jerk(
-        spin, rate, jerk, length(d), speed, length(u), length(c), most, growing, horizon
-    )
+    distances = (length(d), speed, length(u), length(c))
+    work[seen + SEEN_JERK] = _centre_jerk((spin, rate, jerk), distances, (most, growing), horizon)
     both_spins, both_rates = spin + work[other + SPIN_BOUND], rate + work[other + SPIN_RATE_BOUND]
     both_jerks, spin_now, turn_now = jerk + work[other + JERK_BOUND], length(w), length(beta)
     work[seen + SEEN_ARM_JERK] = _arm_jerk(spin, both_spins, both_rates, both_jerks, spin_now, turn_now, horizon)

@@ -36,6 +36,23 @@ class ImpactTimes(NamedTuple):
     )  # (k, 10) m, points on a and b, normal from a to b (zeros if unknown) and gap where contact is made
 
 
+class PairsToSweep(NamedTuple):
+    """Pairs (k,) whose first contact is wanted."""
+
+    a: np.ndarray  # (k,) bodies
+    b: np.ndarray  # (k,)
+    start: np.ndarray  # (k,) s, from when on
+    impact_margin: np.ndarray  # (k,) m, gap at which contact is declared
+    tolerance: np.ndarray  # (k,) m, how far above it the gap may be
+
+
+class SearchEffort(NamedTuple):
+    """How contacts are searched for."""
+
+    ahead: float  # how far past a safe step the root is looked for, relative to the step; 0 for safe steps only
+    max_queries: int  # gap evaluations a pair may use
+
+
 class SweepDetector(Protocol):
     """What a sweep needs to know of the scene."""
 

@@ -8,6 +8,8 @@ One array instead of many: numba passes an array as seven numbers from kernel to
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rigidimpulse.collision.time_of_impact.motion_bound import MOTION_SIZE, SEEN_SIZE
@@ -60,3 +62,11 @@ INDEX_SIZE = STACK + 2 * STACK_SIZE
 """Places in the integer array. The witness: primitives of a and b, their elements (a triangle, or -1 - vertex), and
 which of them carries the direction (0: a, 1: b). Then the number of corners of both pieces, 0 for a cylinder, and the
 stack of pairs of nodes, with the depth at which the last opened pair lay."""
+
+
+class PairScratch(NamedTuple):
+    """The two arrays, and whether there are cylinders."""
+
+    work: np.ndarray  # (WORK_SIZE,)
+    index: np.ndarray  # (INDEX_SIZE,) int64
+    cylinders: np.ndarray | None  # as in `geometry.Shapes`: where it is None, kernels of cylinders are not compiled

@@ -15,6 +15,7 @@ the trajectories and on nothing else, in particular not on when it is asked for.
 from __future__ import annotations
 
 from math import inf, nan, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,15 @@ DEEPEST = 1e-10
 """Gap below 0 that counts as round-off, relative to the radius of a ball."""
 _NEWTON_ERROR = 10.0
 """Round-offs that may be left of the gap where Newton's method ends."""
+
+
+class Pair(NamedTuple):
+    """Two bodies and their shapes."""
+
+    a: int
+    b: int
+    shape_a: int
+    shape_b: int
 
 
 @jit
@@ -97,11 +107,12 @@ def until_contact(x, v, acceleration, reach, size, speed, normal, level):
 
 
 @jit
-def ball_time(frame, trajectory, scratch, a, b, shape_a, shape_b, start):
+def ball_time(frame, trajectory, scratch, pair, start):
     """Time from `start` on at which a pair of `is_closed_form` meets, inf if it never does; nan where the general search must be used.
 
-    frame (p, 7): that of the geometry; trajectory: paths of all bodies, since before `start` [s]; scratch: `SweepScratch`.
+    frame (p, 7): that of the geometry; trajectory: paths of all bodies, since before `start` [s]; scratch: `SweepScratch`; pair: `Pair`.
     """
+    a, b, shape_a, shape_b = pair
     since = max(trajectory.start[a], trajectory.start[b])
     x, v, acceleration, jerk = relative_flight(trajectory, a, b, since)
     if jerk[0] != 0.0 or jerk[1] != 0.0 or jerk[2] != 0.0:
@@ -122,8 +133,9 @@ def ball_time(frame, trajectory, scratch, a, b, shape_a, shape_b, start):
 
 
 @jit_making_arrays
-def write_ball_witness(frame, trajectory, scratch, a, b, shape_a, shape_b, t, witness):
+def write_ball_witness(frame, trajectory, scratch, pair, t, witness):
     """Write points on a and b, the normal from a to b and the gap at t [s] into witness (10,); pairs of `is_closed_form`."""
+    a, b, shape_a, shape_b = pair
     centre = np.empty((2, 3))
     place_at(trajectory, a, t, centre[0])
     place_at(trajectory, b, t, centre[1])
