@@ -64,7 +64,7 @@ class Contact(NamedTuple):
     point_b: tuple[float, float, float]  # on that of the second, m
     normal: tuple[float, float, float]  # unit, from first to second
     gap: float  # m
-    kind: int
+    kind: int | np.integer
     feature_a: int
     feature_b: int
 

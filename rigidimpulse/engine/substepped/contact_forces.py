@@ -12,7 +12,7 @@ from rigidimpulse.collision.contact_cache import Convex, Limits, Share, classify
 from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
 from rigidimpulse.collision.contact_table import ContactTable
 from rigidimpulse.collision.contact_update import FARTHER, Searched, SmallerShapes, store_contacts
-from rigidimpulse.collision.fat_boxes import FatBoxes
+from rigidimpulse.collision.fat_boxes import BodyBounds, FatBoxes
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.collision.manifold.inset_surface import inset_surfaces
 from rigidimpulse.collision.manifold.penetrating import solids
@@ -132,7 +132,9 @@ class ContactStepper:
         self._more_buffers: list[ContactBuffer] = []
         self.table = ContactTable(self._shares, n)
         least = CLEAR * np.where(movable, self.inner, 0.0)
-        self.fat_boxes = FatBoxes(world, self.order, self.inner, least)
+        moves = world.dynamic | world.moving
+        bounds = BodyBounds(self.order, moves, world.bound_radius, self.inner, least, world.static_min, world.static_max)
+        self.fat_boxes = FatBoxes(bounds, world.dynamic, world.may_collide if len(world.apart) else None)
         self.simd = machine_simd()
         self._patches, self._count, self._steady = empty_patches(PATCHES_OF_A_BODY * n), 0, _NO_STEADY
         none = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
