@@ -79,16 +79,16 @@ def _pack(pairs, points, ids, target):
             target[r] = used
             used += 1
         pairs.start[p], pairs.capacity[p] = used - pairs.count[p], pairs.count[p]
-    row, kind = np.empty(POINT_FIELDS), np.empty(3, ids.dtype)
+    point, kind = np.empty(POINT_FIELDS), np.empty(3, ids.dtype)
     for r in range(1, target.shape[0]):
         # A point that moves displaces the one at its target, which moves next, until a target is free.
         t, target[r] = target[r], 0
         if t == 0 or t == r:
             continue
-        row[:], kind[:] = points[r], ids[r]
+        point[:], kind[:] = points[r], ids[r]
         while t > 0:
             for k in range(POINT_FIELDS):
-                row[k], points[t, k] = points[t, k], row[k]
+                point[k], points[t, k] = points[t, k], point[k]
             for k in range(3):
                 kind[k], ids[t, k] = ids[t, k], kind[k]
             following, target[t] = target[t], 0

@@ -55,22 +55,22 @@ def _contradicts(bodies, pairs, p, points, new, new_end):
     a, b = pairs.first[p], pairs.second[p]
     carrier = b if pairs.carrier[p] else a
     for o in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
-        row = points[o]
-        nx, ny, nz = turned(bodies.rotation, carrier, row[0], row[1], row[2])
-        ax, ay, az = turned(bodies.rotation, a, row[SKELETON_A], row[SKELETON_A + 1], row[SKELETON_A + 2])
-        bx, by, bz = turned(bodies.rotation, b, row[SKELETON_B], row[SKELETON_B + 1], row[SKELETON_B + 2])
+        old = points[o]
+        nx, ny, nz = turned(bodies.rotation, carrier, old[0], old[1], old[2])
+        ax, ay, az = turned(bodies.rotation, a, old[SKELETON_A], old[SKELETON_A + 1], old[SKELETON_A + 2])
+        bx, by, bz = turned(bodies.rotation, b, old[SKELETON_B], old[SKELETON_B + 1], old[SKELETON_B + 2])
         gap = (
             (bodies.position[b, 0] - bodies.position[a, 0] + bx - ax) * nx
             + (bodies.position[b, 1] - bodies.position[a, 1] + by - ay) * ny
             + (bodies.position[b, 2] - bodies.position[a, 2] + bz - az) * nz
-        ) - (row[ROUND_A] + row[ROUND_B])
-        if new == new_end and gap < row[SKIN]:
+        ) - (old[ROUND_A] + old[ROUND_B])
+        if new == new_end and gap < old[SKIN]:
             return True
-        if gap > row[SKIN]:
+        if gap > old[SKIN]:
             continue
         lowest, highest = 1.0, -1.0
         for c in range(new, new_end):
-            cosine = points[c, 0] * row[0] + points[c, 1] * row[1] + points[c, 2] * row[2]
+            cosine = points[c, 0] * old[0] + points[c, 1] * old[1] + points[c, 2] * old[2]
             lowest, highest = min(lowest, cosine), max(highest, cosine)
         # Bodies that hook into each other have normals in both directions.
         if lowest < -0.5 and highest < 0.0:

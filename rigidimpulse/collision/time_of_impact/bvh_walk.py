@@ -6,7 +6,7 @@ safe time found so far are opened. A cylinder counts as one box.
 
 from __future__ import annotations
 
-from rigidimpulse.collision.distance.simplices import along, dot, subtract
+from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.time_of_impact.convex_pieces import pieces_safe_until
 from rigidimpulse.collision.time_of_impact.motion_bound import SEEN_SIZE, length, put, scaled, turned, turned_back, vector
 from rigidimpulse.collision.time_of_impact.scratch_layout import (
@@ -43,12 +43,6 @@ from rigidimpulse.core.kernels import jit
 
 NO_NODE = -1
 """In place of a tree node: the cylinder."""
-
-
-@jit
-def row(array, i):
-    """Return row i of an array (k, 3) as a tuple."""
-    return array[i, 0], array[i, 1], array[i, 2]
 
 
 @jit

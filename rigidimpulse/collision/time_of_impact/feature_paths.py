@@ -25,8 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, subtract
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
+from rigidimpulse.collision.distance.simplices import along, cross, dot, row, subtract
 from rigidimpulse.collision.time_of_impact.closest_direction import closest_simplices
 from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled, vector
 from rigidimpulse.collision.time_of_impact.scratch_layout import CLOSEST, CORNER, COUNT, FACE, FIRST, INDEX_SIZE, NORMAL, SECOND, WORK_SIZE

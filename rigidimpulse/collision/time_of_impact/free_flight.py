@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from math import inf
 
-from rigidimpulse.collision.distance.simplices import along, dot
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
+from rigidimpulse.collision.distance.simplices import along, dot, row
 from rigidimpulse.collision.time_of_impact.motion_bound import length, scaled
 from rigidimpulse.collision.time_of_impact.separating_quadratic import cubic_safe_until
 from rigidimpulse.core.conventions import TOLERANCES

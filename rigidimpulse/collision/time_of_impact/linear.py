@@ -16,9 +16,8 @@ from math import inf
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, subtract
+from rigidimpulse.collision.distance.simplices import along, cross, dot, row, subtract
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
 from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled
 from rigidimpulse.collision.time_of_impact.result import IMPACT, TOUCHING, ImpactTimes, PairsToSweep, SweepDetector, no_impacts
 from rigidimpulse.collision.time_of_impact.scratch_layout import FIRST, GAP, NORMAL, POINT_FIRST, POINT_SECOND, SECOND

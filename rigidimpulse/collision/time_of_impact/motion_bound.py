@@ -131,19 +131,19 @@ def _fastest_spin(moments, energy, momentum):
 
 
 @jit
-def _write_spin_bounds(moments, torque_world, torque_rate, horizon, row):
+def _write_spin_bounds(moments, torque_world, torque_rate, horizon, record):
     """Write alpha, W, A and K of a body that turns freely or under a torque that changes at `torque_rate`."""
-    spin, torque = turned_back(row, AXES, vector(row, SPIN)), turned_back(row, AXES, torque_world)
+    spin, torque = turned_back(record, AXES, vector(record, SPIN)), turned_back(record, AXES, torque_world)
     i, j, k = moments
     momentum = (i * spin[0], j * spin[1], k * spin[2])
     moment_of_force = subtract(torque, cross(spin, momentum))
     rate = (moment_of_force[0] / i, moment_of_force[1] / j, moment_of_force[2] / k)
-    put(row, SPIN_RATE, turned(row, AXES, rate))
+    put(record, SPIN_RATE, turned(record, AXES, rate))
 
     least = min(i, j, k)
     kappa = max(abs(i - j) / k, abs(j - k) / i, abs(k - i) / j)
     torque_size, spin_now, rate_now = length(torque), length(spin), length(rate)
-    torque_size = max(torque_size, length(turned_back(row, AXES, along(torque_world, horizon, torque_rate))))
+    torque_size = max(torque_size, length(turned_back(record, AXES, along(torque_world, horizon, torque_rate))))
     kick, kick_rate = torque_size / least, length(torque_rate) / least
     energy = (sqrt(dot(spin, momentum)) + horizon * torque_size / sqrt(least)) ** 2
     spin_bound = max(_fastest_spin(moments, energy, max(length(momentum) - horizon * torque_size, 0.0) ** 2), spin_now)
@@ -154,46 +154,46 @@ def _write_spin_bounds(moments, torque_world, torque_rate, horizon, row):
         jerk_bound = spin_bound * kick + 2.0 / sqrt(3.0) * kappa * spin_bound * rate_bound + kick_rate
         rate_bound = max(rate_now, min(rate_bound, rate_now + horizon * jerk_bound))
         spin_bound = max(spin_now, min(spin_bound, spin_now + horizon * rate_bound))
-    row[SPIN_BOUND] = spin_bound * _WIDEN
-    row[SPIN_RATE_BOUND] = rate_bound * _WIDEN
-    row[JERK_BOUND] = jerk_bound * _WIDEN
+    record[SPIN_BOUND] = spin_bound * _WIDEN
+    record[SPIN_RATE_BOUND] = rate_bound * _WIDEN
+    record[JERK_BOUND] = jerk_bound * _WIDEN
 
 
 @jit_making_arrays
-def motion_bound(trajectory, i, t, horizon, row):
-    """Write the motion of body i at time t, with bounds that hold until t + horizon, into row (MOTION_SIZE,).
+def motion_bound(trajectory, i, t, horizon, record):
+    """Write the motion of body i at time t, with bounds that hold until t + horizon, into record (MOTION_SIZE,).
 
     Works for every mode of a trajectory: fixed, prescribed, free, and turning under a world torque.
     """
     motion_at(
-        trajectory, i, t, row[POSITION:VELOCITY], row[ORIENTATION:SPIN_BOUND], row[VELOCITY:SPIN], row[SPIN:ACCELERATION]
+        trajectory, i, t, record[POSITION:VELOCITY], record[ORIENTATION:SPIN_BOUND], record[VELOCITY:SPIN], record[SPIN:ACCELERATION]
     )
-    quaternion_to_matrix(row[ORIENTATION:SPIN_BOUND], row[AXES:ORIENTATION].reshape((3, 3)))
+    quaternion_to_matrix(record[ORIENTATION:SPIN_BOUND], record[AXES:ORIENTATION].reshape((3, 3)))
     mode, s = trajectory.mode[i], t - trajectory.start[i]
     none = (0.0, 0.0, 0.0)
     growth = rate_of(trajectory, i, JERK)
-    put(row, ACCELERATION, none if mode == FIXED else row_at(trajectory.acceleration, i, growth, s))
-    put(row, CENTRE_JERK, none if mode == FIXED else growth)
+    put(record, ACCELERATION, none if mode == FIXED else row_at(trajectory.acceleration, i, growth, s))
+    put(record, CENTRE_JERK, none if mode == FIXED else growth)
     if mode == FIXED or mode == PRESCRIBED or mode == LINEAR:
-        put(row, SPIN_RATE, none)
-        row[SPIN_BOUND] = length(vector(row, SPIN))
-        row[SPIN_RATE_BOUND] = 0.0
-        row[JERK_BOUND] = 0.0
+        put(record, SPIN_RATE, none)
+        record[SPIN_BOUND] = length(vector(record, SPIN))
+        record[SPIN_RATE_BOUND] = 0.0
+        record[JERK_BOUND] = 0.0
         return
     moments = (trajectory.inertia[i, 0], trajectory.inertia[i, 1], trajectory.inertia[i, 2])
     torque_rate = rate_of(trajectory, i, TORQUE_RATE)
     torque = row_at(trajectory.torque, i, torque_rate, s) if mode == FORCED else none
-    _write_spin_bounds(moments, torque, torque_rate, horizon, row)
+    _write_spin_bounds(moments, torque, torque_rate, horizon, record)
 
 
 @jit
-def stop_turning(row):
-    """Take the rotation out of a motion row: for a sphere about its own centre, on which no rotation can be seen."""
+def stop_turning(record):
+    """Take the rotation out of a motion record: for a sphere about its own centre, on which no rotation can be seen."""
     for k in range(SPIN_RATE, ORIENTATION):
-        row[k] = 0.0
-    put(row, SPIN, (0.0, 0.0, 0.0))
-    row[AXES] = row[AXES + 4] = row[AXES + 8] = 1.0
-    row[SPIN_BOUND] = row[SPIN_RATE_BOUND] = row[JERK_BOUND] = 0.0
+        record[k] = 0.0
+    put(record, SPIN, (0.0, 0.0, 0.0))
+    record[AXES] = record[AXES + 4] = record[AXES + 8] = 1.0
+    record[SPIN_BOUND] = record[SPIN_RATE_BOUND] = record[JERK_BOUND] = 0.0
 
 
 @jit

@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.distance.cylinder import basis
-from rigidimpulse.collision.distance.simplices import along, dot, subtract
+from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER as CYLINDER_KIND
 from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, Geometry, cylinders_of
-from rigidimpulse.collision.time_of_impact.bvh_walk import NO_NODE, half_space_safe_until, row, trees_safe_until
+from rigidimpulse.collision.time_of_impact.bvh_walk import NO_NODE, half_space_safe_until, trees_safe_until
 from rigidimpulse.collision.time_of_impact.convex_pieces import pieces_safe_until
 from rigidimpulse.collision.time_of_impact.motion_bound import (
     AXES,

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from math import inf
 
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
+from rigidimpulse.collision.distance.simplices import row
 from rigidimpulse.collision.time_of_impact.free_flight import plane_safe_until, relative_flight, rounding_slack, spheres_safe_until
 from rigidimpulse.collision.time_of_impact.motion_bound import MOTION_SIZE, length, motion_bound, stop_turning
 from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE, STALLED, TOUCHING

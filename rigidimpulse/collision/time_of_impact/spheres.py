@@ -19,8 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, dot, subtract
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
+from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.time_of_impact.free_flight import relative_flight, spheres_safe_until
 from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled
 from rigidimpulse.collision.time_of_impact.scratch_layout import FIRST, GAP, NORMAL, POINT_FIRST, POINT_SECOND, SECOND

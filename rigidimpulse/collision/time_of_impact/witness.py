@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from math import inf, log2
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, subtract
+from rigidimpulse.collision.distance.simplices import along, cross, dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
 from rigidimpulse.collision.time_of_impact.motion_bound import (
     MOTION_SIZE,
     POSITION,
