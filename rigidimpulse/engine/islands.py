@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigidimpulse.collision.contact_buffer import Question
 from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTEX_FACE
+from rigidimpulse.collision.geometry import Shapes
+from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.dynamics.constraints.energy_limit import limit_energy, note_end_energy
 from rigidimpulse.dynamics.constraints.rattle import project_velocities
@@ -101,7 +104,9 @@ def collect(context, pair_events, pairs: np.ndarray, time: float, margin: float 
     """
     world, state = context.world, context.state
     buffer, a, b = context.contact_buffer, pair_events.a[pairs], pair_events.b[pairs]
-    count = buffer.find(world.geometry, world, state.now, state.rotation, a, b, margin * pair_events.contact_margin[pairs])
+    query = PairQuery(a, b, margin * pair_events.contact_margin[pairs])
+    shapes = Shapes(world.geometry, world.shape_of_body, world.cylinders)
+    count = buffer.find(Question(shapes, state.now, state.rotation, query))
     real, integer = buffer.real[:count].copy(), buffer.integer[:count].copy()
     for p in pairs[pair_events.time[pairs] <= time].tolist():
         a, b = pair_events.a[p], pair_events.b[p]

@@ -19,7 +19,7 @@ first to second) and gap are given in that frame:
     ..._contacts(geometry, first, second, pose, margin, contacts, count) -> new count, which goes on when the buffers are full
     ..._gap(geometry, first, second, pose, limit, scratch, out) -> gap, or `limit` with `out` untouched where the gap is not below it;
         out[0:3], out[3:6] are points of the first and the second surface
-where `first` and `second` are numbers of primitives of the kinds that the name tells. Kernels for convex shapes have the signature
+where `first` and `second` are numbers of primitives of the kinds that the name tells. PairKernels for convex shapes have the signature
     ..._contacts(shapes, pair, query, scratch, points) -> number of contacts, bound of the gap
 with the records of `polyhedra`.
 """
@@ -58,7 +58,7 @@ BALL, POLYHEDRON, BOX = 3, 4, 5
 """Kinds of whole shapes, beside the kinds of primitives HALF_SPACE, ROUND and CYLINDER."""
 
 
-class Kernels(NamedTuple):
+class PairKernels(NamedTuple):
     """What is known of a pair of kinds."""
 
     contacts: Any
@@ -66,15 +66,15 @@ class Kernels(NamedTuple):
 
 
 TABLE = {
-    (BOX, BOX): Kernels(box_box_contacts, None),
-    (POLYHEDRON, HALF_SPACE): Kernels(polyhedron_half_space_contacts, None),
-    (POLYHEDRON, POLYHEDRON): Kernels(hull_contacts, None),
-    (BALL, BALL): Kernels(sphere_sphere_contacts, round_round_gap),
-    (ROUND, ROUND): Kernels(round_round_contacts, round_round_gap),
-    (ROUND, HALF_SPACE): Kernels(round_half_space_contacts, round_half_space_gap),
-    (CYLINDER, HALF_SPACE): Kernels(cylinder_half_space_contacts, cylinder_half_space_gap),
-    (CYLINDER, ROUND): Kernels(cylinder_round_contacts, cylinder_round_gap),
-    (CYLINDER, CYLINDER): Kernels(cylinder_cylinder_contacts, cylinder_cylinder_gap),
+    (BOX, BOX): PairKernels(box_box_contacts, None),
+    (POLYHEDRON, HALF_SPACE): PairKernels(polyhedron_half_space_contacts, None),
+    (POLYHEDRON, POLYHEDRON): PairKernels(hull_contacts, None),
+    (BALL, BALL): PairKernels(sphere_sphere_contacts, round_round_gap),
+    (ROUND, ROUND): PairKernels(round_round_contacts, round_round_gap),
+    (ROUND, HALF_SPACE): PairKernels(round_half_space_contacts, round_half_space_gap),
+    (CYLINDER, HALF_SPACE): PairKernels(cylinder_half_space_contacts, cylinder_half_space_gap),
+    (CYLINDER, ROUND): PairKernels(cylinder_round_contacts, cylinder_round_gap),
+    (CYLINDER, CYLINDER): PairKernels(cylinder_cylinder_contacts, cylinder_cylinder_gap),
 }
 """The kernels of every pair of kinds. A BOX is a POLYHEDRON, a POLYHEDRON and a BALL are ROUND: the first pair that fits counts."""
 

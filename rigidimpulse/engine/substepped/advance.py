@@ -15,6 +15,9 @@ from functools import cached_property
 
 import numpy as np
 
+from rigidimpulse.collision.contact_buffer import Question
+from rigidimpulse.collision.geometry import Shapes
+from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.dynamics.constraints.energy_limit import note_end_energy
 from rigidimpulse.dynamics.energy import mechanical_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work
@@ -172,7 +175,8 @@ class SubsteppedIslands:
         a, b = a[which], b[which]
         margin = TOUCHES * np.minimum(self.stepper.skin[a], self.stepper.skin[b])
         buffer = context.contact_buffer
-        count = buffer.find(self.stepper.geometry, world, context.state.now, context.state.rotation, a, b, margin)
+        shapes = Shapes(self.stepper.geometry, world.shape_of_body, world.cylinders)
+        count = buffer.find(Question(shapes, context.state.now, context.state.rotation, PairQuery(a, b, margin)))
         touched = np.unique(buffer.integer[:count, :2])
         touched = touched[resting[touched]]
         labels = self.label[touched]

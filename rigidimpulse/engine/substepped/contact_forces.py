@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.collision.contact_buffer import ContactBuffer, find_together
+from rigidimpulse.collision.contact_buffer import ContactBuffer, Question, find_together
 from rigidimpulse.collision.contact_cache import Convex, Limits, Share, classify, find_contacts, make_workspace, most_motion, share_of
 from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
 from rigidimpulse.collision.contact_table import ContactTable
 from rigidimpulse.collision.contact_update import FARTHER, Searched, SmallerShapes, store_contacts
 from rigidimpulse.collision.fat_boxes import BodyBounds, FatBoxes
-from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
+from rigidimpulse.collision.geometry import Shapes
+from rigidimpulse.collision.manifold.dispatch import PairQuery, Posed, pair_gap
 from rigidimpulse.collision.manifold.inset_surface import inset_surfaces
 from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
@@ -256,7 +257,9 @@ class ContactStepper:
             self._more_buffers.append(ContactBuffer())
         buffers = [context.contact_buffer, *self._more_buffers][: len(shares)]
         a, b = self.order[first], self.order[second]
-        found = find_together(buffers, [(self.geometry, world, now, rotation, a[some], b[some], shown[some]) for some in shares])
+        shapes = Shapes(self.geometry, world.shape_of_body, world.cylinders)
+        questions = [Question(shapes, now, rotation, PairQuery(a[some], b[some], shown[some])) for some in shares]
+        found = find_together(buffers, questions)
         smaller = SmallerShapes(world.geometry, self.geometry, self._factor, self._back, self._depth, self._convex, self._solids)
         for some, buffer, count in zip(shares, buffers, found, strict=True):
             # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
