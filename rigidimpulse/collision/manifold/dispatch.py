@@ -19,7 +19,7 @@ first to second) and gap are given in that frame:
     ..._contacts(geometry, first, second, pose, margin, contacts, count) -> new count, which goes on when the buffers are full
     ..._gap(geometry, first, second, pose, limit, scratch, out) -> gap, or `limit` with `out` untouched where the gap is not below it;
         out[0:3], out[3:6] are points of the first and the second surface
-where `first` and `second` are numbers of primitives of the kinds that the name tells. PairKernels for convex shapes have the signature
+where `first` and `second` are numbers of primitives of the kinds that the name tells. Kernels for convex shapes have the signature
     ..._contacts(shapes, pair, query, scratch, points) -> number of contacts, bound of the gap
 with the records of `polyhedra`.
 """
