@@ -6,12 +6,13 @@ pair is reported in the first strip that both reach. In each strip the sorted li
 size: n log n and a factor that grows as the number of boxes stacked along the third axis. Boxes may be infinite (half
 spaces).
 
-The pairs do not depend on anything but the boxes and come in ascending order.
+The pairs depend on the boxes only and come in ascending order. `fat_boxes` keeps pairs from step to step.
 """
 
 from __future__ import annotations
 
 from math import inf, isfinite, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -147,7 +148,7 @@ def _sort_pairs(pairs, count, num_bodies):
 
 @inner
 def _keep(pairs_out, count, i, j):
-    """Write the pair (i, j), lower index first, if there is room; return `count + 1`."""
+    """Write the pair (i, j), lower index first, if the buffer is large enough; return `count + 1`."""
     if count < pairs_out.shape[0]:
         pairs_out[count, 0] = min(i, j)
         pairs_out[count, 1] = max(i, j)
@@ -163,12 +164,23 @@ def _column(bounds, axis, members):
     return column
 
 
+class _Strips(NamedTuple):
+    """Bodies in strips across an axis, in each of them sorted along another."""
+
+    axis: int  # along which they are sorted
+    across: int  # the axis that is cut into strips
+    reach: np.ndarray  # (n, 2) first and last strip of each body
+    first: np.ndarray  # (s + 2,) where the bodies of each strip begin
+    members: np.ndarray  # (m,) bodies, strip by strip
+
+
 @jit_making_arrays
-def _sweep(box_min, box_max, movable, axis, across, reach, first, members, pairs_out):
+def _sweep(box_min, box_max, movable, strips, pairs_out):
     """Write all overlapping pairs, in no particular order; return how many there are.
 
     Candidates of a body are first listed without a branch, as the outcome of a test can hardly be predicted.
     """
+    axis, across, reach, first, members = strips
     low, high = _column(box_min, axis, members), _column(box_max, axis, members)
     low_u, high_u = _column(box_min, across, members), _column(box_max, across, members)
     low_v, high_v = _column(box_min, 3 - axis - across, members), _column(box_max, 3 - axis - across, members)
@@ -219,11 +231,21 @@ def overlapping_pairs(box_min, box_max, movable, pairs_out):
     across = (1 if y >= z else 2) if axis == 0 else (0 if x >= (z if axis == 1 else y) else 3 - axis)
     num_strips, reach = _strips(box_min, box_max, across)
     first, members = _strip_lists(_sorted_order(box_min, axis), num_strips, reach)
-    count = _sweep(box_min, box_max, movable, axis, across, reach, first, members, pairs_out)
+    count = _sweep(box_min, box_max, movable, _Strips(axis, across, reach, first, members), pairs_out)
     if count > pairs_out.shape[0]:
         return -count
     _sort_pairs(pairs_out, count, n)
     return count
+
+
+def find_overlapping(box_min: np.ndarray, box_max: np.ndarray, movable: np.ndarray, capacity: int) -> np.ndarray:
+    """Pairs (k, 2) int32 of boxes that overlap, see `overlapping_pairs`; capacity: number of pairs that is expected."""
+    pairs = np.empty((capacity, 2), np.int32)
+    count = overlapping_pairs(box_min, box_max, movable, pairs)
+    if count < 0:
+        pairs = np.empty((-count, 2), np.int32)
+        count = overlapping_pairs(box_min, box_max, movable, pairs)
+    return pairs[:count]
 
 
 @jit

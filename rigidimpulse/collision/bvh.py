@@ -43,7 +43,7 @@ def splits_first(low_a, high_a, low_b, high_b):
 
 @inner
 def gather_leaf_pairs(node_min, node_max, node_child, R, t, skeleton, pairs, depth):
-    """Walk on from the stack in rows [0, depth) of `pairs`, for boxes within the distance `core`.
+    """Walk on from the stack in rows [0, depth) of `pairs`, for boxes within the distance `skeleton`.
 
     Returns (depth, end): what is left of the stack, and the pairs of leaves in rows [STACK_ROWS, end).
     """

@@ -1,53 +1,75 @@
-"""Room for what `contacts_of_pairs` finds, which grows when it is too little."""
+"""Buffers for the contacts that `contacts_of_pairs` finds; they grow when they are too small."""
 
 from __future__ import annotations
 
+from typing import NamedTuple, Protocol
+
 import numpy as np
 
-from rigidimpulse.engine.touching import contacts_of_pairs
+from rigidimpulse.collision.geometry import Shapes
+from rigidimpulse.collision.manifold.contact_points import Contacts
+from rigidimpulse.collision.manifold.dispatch import PairQuery, contacts_of_pairs
 
 CONTACT_CAPACITY, PAIR_CAPACITY = 1024, 4096
+
+
+class PosedBodies(Protocol):
+    """Where n bodies are."""
+
+    @property
+    def position(self) -> np.ndarray:
+        """(n, 3) m, of the principal frames."""
+        ...
+
+
+class Question(NamedTuple):
+    """Pairs of bodies whose contacts are wanted, at their poses."""
+
+    shapes: Shapes
+    bodies: PosedBodies
+    rotation: np.ndarray  # (n, 3, 3)
+    pairs: PairQuery
 
 
 class ContactBuffer:
     """Contacts as they are found.
 
     Attributes:
-        real: (c, 10) and integer: (c, 5), a row for each contact, see `detect.manifold`. scratch: (p, 2) pairs of primitives on the way.
+        real: (c, 10) and integer: (c, 5), contacts, see `manifold.dispatch`. scratch: (p, 2), for the walk through two trees.
 
     """
 
     def __init__(self) -> None:
-        """Room for a small scene."""
+        """Buffers for a small scene."""
         self.real, self.integer = np.empty((CONTACT_CAPACITY, 10)), np.empty((CONTACT_CAPACITY, 5), np.int64)
         self.scratch = np.empty((PAIR_CAPACITY, 2), np.int64)
 
-    def find(self, *question) -> int:
-        """Find the contacts of pairs, see `arguments`; returns their number."""
-        count = contacts_of_pairs(*self.arguments(*question))
+    def find(self, question: Question) -> int:
+        """Find the contacts of pairs; returns their number."""
+        count = contacts_of_pairs(*question, self.contacts)
         while count < 0:
             self.grow(-count)
-            count = contacts_of_pairs(*self.arguments(*question))
+            count = contacts_of_pairs(*question, self.contacts)
         return count
 
     def grow(self, needed: int) -> None:
-        """Make room for at least so many contacts, and for twice as many as before."""
+        """Grow to at least `needed` contacts, and to twice the present capacity."""
         capacity = max(needed, 2 * len(self.real))
         self.real, self.integer = np.empty((capacity, 10)), np.empty((capacity, 5), np.int64)
         self.scratch = np.empty((4 * capacity, 2), np.int64)
 
-    def arguments(self, geometry, world, bodies, rotation, a: np.ndarray, b: np.ndarray, margin: np.ndarray) -> tuple:
-        """Of `contacts_of_pairs`: contacts of bodies a with bodies b (k,) at their poses, within margins (k,) m."""
-        places = bodies, rotation, a, b, margin
-        return geometry, world.shape_of_body, *places, self.scratch, self.real, self.integer, world.cylinders
+    @property
+    def contacts(self) -> Contacts:
+        """The arrays as they are now: growing replaces them."""
+        return Contacts(self.real, self.integer, self.scratch)
 
 
-def find_together(buffers: list[ContactBuffer], questions: list[tuple]) -> list[int]:
-    """Numbers of contacts found for each question, see `ContactBuffer.arguments`, in the buffer of the same place; on several cores."""
+def find_together(buffers: list[ContactBuffer], questions: list[Question]) -> list[int]:
+    """Numbers of contacts found for each question, each in its own buffer; on several cores."""
     asked = list(zip(buffers, questions, strict=True))
-    counts = contacts_of_pairs.together([buffer.arguments(*question) for buffer, question in asked])
+    counts = contacts_of_pairs.together([(*question, buffer.contacts) for buffer, question in asked])
     for k, (buffer, question) in enumerate(asked):
         if counts[k] < 0:
             buffer.grow(-counts[k])
-            counts[k] = buffer.find(*question)
+            counts[k] = buffer.find(question)
     return counts

@@ -1,11 +1,15 @@
-"""Narrow phase of heaps, with memory: what a pair's contacts were, and how its bodies lay to each other when they were found.
+"""Contact cache: the contacts of a pair are kept as long as its bodies have hardly moved relative to each other.
 
-Let m bound how far points of the pair have moved past each other since: m = |dp| + 2 r |dq|, p and q the pose of one body in the axes of
-the other, the carrier, and r its reach. Then a pair that was s apart is at least s - m apart, and is left alone while that
-is more than the margin within which contacts are looked for; contacts of touching ones are used again while m is below a
-part of the smaller inner radius (their points are fixed in the bodies, so separations are exact, and the normal in the carrier).
+Let p and q be the position and the orientation of one body in the axes of the other, the carrier, and r the reach of the first. Since the
+contacts were found, points of the pair have moved past each other by at most
 
-The margin is what the pair may come in the step, so that contacts are known before they close.
+    m = |dp| + 2 r |dq|.
+
+A pair that was s apart is still at least s - m apart. It needs no search while s - m is above the margin. The contacts of a touching pair
+are used again while m is below a part of the smaller inner radius. Their points are fixed in the bodies, so that separations stay exact.
+Their normals are fixed in the carrier.
+
+The margin is the distance that the pair may come closer in the step (speculative contacts): contacts are known before they close.
 """
 
 from __future__ import annotations
@@ -15,58 +19,76 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.contact_matching import NEAR, hand_over, take_up, write_row
-from rigidimpulse.collision.contact_records import IMPULSE, ROW_SIZE, UNKNOWN, closing_speed, in_play, turned, turned_back
-from rigidimpulse.collision.distance.epa import Polytope, make_polytope
-from rigidimpulse.collision.distance.gjk import Simplex, closest, make_simplex
-from rigidimpulse.collision.manifold.box_box import box_axis, edge_contact, face_along, face_contacts
-from rigidimpulse.collision.manifold.convex_convex import hull_contacts, seen_from
-from rigidimpulse.collision.manifold.polyhedra import ALIKE, POINTS, Scratch, along_edges, copy_contact, half_space_contacts, make_scratch
+from rigidimpulse.collision.contact_matching import NEAR, Points, Source, match_contacts, set_contact_margin, write_point
+from rigidimpulse.collision.contact_records import IMPULSE, POINT_FIELDS, UNKNOWN, closing_speed, in_play, turned_back
+from rigidimpulse.collision.distance.epa import make_polytope
+from rigidimpulse.collision.distance.gjk import closest, make_simplex
+from rigidimpulse.collision.manifold.convex_convex import seen_from
+from rigidimpulse.collision.manifold.dispatch import GENERAL, MOST_HULL_CORNERS, convex_contacts, num_corners, pair_kind
+from rigidimpulse.collision.manifold.polyhedra import POINTS, Pair, Polyhedra, Query, Scratch, make_polygon
+from rigidimpulse.collision.manifold.polyhedra import Points as Found
 from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.quaternion import product
 
-BOXES, PLANE, GENERAL, HULLS = 0, 1, 2, 3
-"""Kinds of pairs: two boxes, a half space and a convex polyhedron, all others, two convex polyhedra."""
-MOST_HULL_CORNERS = 256
-"""Corners of a polyhedron that are all asked for the farthest one."""
 AHEAD, AHEAD_GENERAL, FARTHEST = 0.05, 0.12, 2.0
-"""Contacts are looked for at least and at most that many inner radii away, at least somewhat farther where pairs are general ones."""
+"""Least margin, least margin of general pairs, and greatest margin of the search for contacts, in inner radii."""
 SAME_GENERAL = 0.02
-"""Part of the inner radius that touching general pairs may move past each other until they are looked at again, at least."""
+"""Least relative motion, in inner radii, after which the contacts of a touching general pair are found again."""
 FAR = 4.0
-"""Margins within which it is found how far convex bodies are apart."""
+"""Distance, in margins, up to which the gap of convex bodies is measured."""
 BLOCK = 64
-"""Pairs that are dealt out together."""
+"""Pairs that go to one share together."""
+
+
+class Convex(NamedTuple):
+    """The convex shapes of a scene."""
+
+    shapes: Polyhedra  # boxes, polyhedra and half spaces
+    solids: Polyhedra  # the same, and convex bodies inside the other shapes, see `penetrating.solids`
+    inset: np.ndarray  # (s,) m, how far each of those is inside its shape
+
+
+class Share(NamedTuple):
+    """A part of the pairs, and where the pairs are listed whose contacts must be found."""
+
+    number: int  # which of the shares
+    shares: int
+    places: np.ndarray  # (k,) pairs
+    margins: np.ndarray  # (k,) m
+
+
+class Limits(NamedTuple):
+    """How far pairs may move with the contacts they have."""
+
+    ahead: float  # s, until the next search
+    same: float  # inner radii, relative motion within which touching pairs keep their contacts
+    kept: float  # the same until the next search, in the middle of a step; 0 at its start
 
 
 class Workspace(NamedTuple):
-    """What a share of the pairs is looked at in."""
+    """Scratch memory of one share of the pairs."""
 
-    real: np.ndarray  # (POINTS + 1, 10) the contacts of a pair
-    found: np.ndarray  # (POINTS + 1, 3) their ids
-    old: np.ndarray  # (POINTS, ROW_SIZE) rows that they replace
+    found: Found  # the contacts of a pair
+    old: np.ndarray  # (POINTS, POINT_FIELDS) points that they replace
     old_ids: np.ndarray  # (POINTS, 3)
     scratch: Scratch
-    simplex: Simplex
-    polytope: Polytope
-    work: np.ndarray  # (3, 3)
-    axes: np.ndarray  # (3, 3) R_a^T R_b
-    between: np.ndarray  # (3,) m, from a to b
-    origin: np.ndarray  # (3,) zeros
 
 
 def make_workspace() -> Workspace:
-    """Room for one share."""
+    """Scratch memory for one share."""
     number = POINTS + 1
+    scratch = Scratch(
+        make_polygon.py_func(), make_simplex.py_func(), make_polytope.py_func(), *np.empty((2, 3, 3)), *np.zeros((2, 3))
+    )
     return Workspace(
-        np.empty((number, 10)), np.empty((number, 3), np.int64), np.empty((POINTS, ROW_SIZE)), np.empty((POINTS, 3), np.int64),
-        make_scratch.py_func(), make_simplex.py_func(), make_polytope.py_func(), *np.empty((2, 3, 3)), *np.zeros((2, 3)),
+        Found(np.empty((number, 10)), np.empty((number, 3), np.int64)), np.empty((POINTS, POINT_FIELDS)), np.empty((POINTS, 3), np.int64),
+        scratch,
     )  # fmt: skip
 
 
 @jit
 def classify(pairs, bodies, shapes):
-    """Fill what follows from the bodies of pairs, where that is not known yet."""
+    """Fill in kind and carrier of the new pairs."""
     for p in range(pairs.first.shape[0]):
         if pairs.kind[p] != UNKNOWN:
             continue
@@ -74,27 +96,7 @@ def classify(pairs, bodies, shapes):
         s, t = bodies.shape[a], bodies.shape[b]
         pairs.carrier[p] = bodies.reach[a] <= bodies.reach[b]
         pairs.round[p] = (bodies.reach[a] if pairs.carrier[p] else bodies.reach[b]) == 0.0
-        solid_s, solid_t = shapes.face_first[s] < shapes.face_first[s + 1], shapes.face_first[t] < shapes.face_first[t + 1]
-        half_space_s, half_space_t = _is_half_space(shapes.half_space, s), _is_half_space(shapes.half_space, t)
-        pairs.kind[p] = GENERAL
-        if shapes.half[s, 0] > 0.0 and shapes.half[t, 0] > 0.0:
-            pairs.kind[p] = BOXES
-        elif (solid_s and half_space_t) or (half_space_s and solid_t):
-            pairs.kind[p] = PLANE
-        elif solid_s and solid_t and max(_corners(shapes, s), _corners(shapes, t)) <= MOST_HULL_CORNERS:
-            pairs.kind[p] = HULLS
-
-
-@inlined
-def _is_half_space(half_space, s):
-    """Whether shape s is a half space."""
-    return half_space[s, 0] != 0.0 or half_space[s, 1] != 0.0 or half_space[s, 2] != 0.0
-
-
-@inlined
-def _corners(shapes, s):
-    """Number of corners of shape s."""
-    return shapes.corner_first[s + 1] - shapes.corner_first[s]
+        pairs.kind[p] = pair_kind(shapes, s, t)
 
 
 @inlined
@@ -110,18 +112,18 @@ def _relative_pose(position, orientation, rotation, carrier, other):
 
 @inlined
 def _motion(seen, p, is_round, reach, place, turn):
-    """m: how far points of a pair have moved past each other at most since contacts were looked for."""
+    """m: upper bound of how far points of a pair have moved past each other since its contacts were found."""
     d = (place[0] - seen[p, 0]) ** 2 + (place[1] - seen[p, 1]) ** 2 + (place[2] - seen[p, 2]) ** 2
     if is_round:
         return sqrt(d)
     same = turn[0] * seen[p, 3] + turn[1] * seen[p, 4] + turn[2] * seen[p, 5] + turn[3] * seen[p, 6]
-    # |q - q'|^2 of unit quaternions, of which the one and its negative are the same rotation.
+    # |q - q'|^2 of unit quaternions; q and -q are the same rotation.
     return sqrt(d) + 2.0 * reach * sqrt(max(2.0 - 2.0 * abs(same), 0.0))
 
 
 @inlined
 def note_seen(bodies, pairs, p):
-    """Remember how the bodies of a pair lie to each other now."""
+    """Store the present relative pose of a pair."""
     a, b = pairs.first[p], pairs.second[p]
     carrier, other = (b, a) if pairs.carrier[p] else (a, b)
     place, turn = _relative_pose(bodies.position, bodies.orientation, bodies.rotation, carrier, other)
@@ -132,7 +134,7 @@ def note_seen(bodies, pairs, p):
 
 @jit
 def most_motion(bodies, pairs, ahead):
-    """How far, in inner radii, pairs in play that have contacts come past each other in `ahead` s, at most."""
+    """Greatest relative motion, in inner radii, in `ahead` s of the pairs that take part and have contacts."""
     part, count, most = bodies.part, pairs.count, 0.0
     for p in range(pairs.first.shape[0]):
         a, b = pairs.first[p], pairs.second[p]
@@ -144,25 +146,26 @@ def most_motion(bodies, pairs, ahead):
 
 @jit
 def share_of(number, share, shares):
-    """Where the places of a share of so many pairs begin: pairs are dealt out in blocks, so that all shares are alike."""
+    """Where the places of a share of `number` pairs begin. Pairs are divided in blocks, so that all shares have equal work."""
     return share * (number // (BLOCK * shares) + 1) * BLOCK
 
 
 @jit
-def review(bodies, pairs, share, shares, ahead, same, kept, places, margins):
-    """Write the pairs in play of quick bodies whose contacts must be looked for, and their margins, m: how far they come in `ahead` s.
+def review(bodies, pairs, share, limits):
+    """Write the pairs of quick bodies whose contacts must be found again to a `Share`, and their margins, m.
 
-    share: which of the `shares` of pairs. same: inner radii that touching pairs may have come past each other with the contacts they
-    have; kept: the same, by the next look, in the middle of a step; 0 at its start. Pairs that are too far apart lose their contacts.
-    Returns where the places (k,) and margins (k,) of the share begin and end.
+    The margin is how far a pair comes in `limits.ahead` s, see `Limits`. Pairs that are too far apart lose their contacts. Returns where
+    the places and margins of the share begin and end.
     """
+    number, shares, places, margins = share
+    ahead, same, kept = limits
     part, position, orientation, rotation, velocity = bodies.part, bodies.position, bodies.orientation, bodies.rotation, bodies.velocity
     inner, skin, radius, reach, quick = bodies.inner, bodies.skin, bodies.radius, bodies.reach, bodies.quick
     seen, known, count, apart = pairs.seen, pairs.known, pairs.count, pairs.apart
     total = pairs.first.shape[0]
-    begin = share_of(total, share, shares)
+    begin = share_of(total, number, shares)
     end = begin
-    for block in range(share * BLOCK, total, shares * BLOCK):
+    for block in range(number * BLOCK, total, shares * BLOCK):
         for p in range(block, min(block + BLOCK, total)):
             a, b, is_second = pairs.first[p], pairs.second[p], pairs.carrier[p]
             if not (quick[a] or quick[b]) or not in_play(part, a, b):
@@ -191,57 +194,17 @@ def review(bodies, pairs, share, shares, ahead, same, kept, places, margins):
     return begin, end
 
 
-@inlined
-def _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, ids):
-    """Contacts of a half space and a convex polyhedron relative to the first body; returns their number and the gap."""
-    half_space_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
-    half_space, w, i, sign = shapes.half_space, s if half_space_is_a else t, a if half_space_is_a else b, 1.0 if half_space_is_a else -1.0
-    nx, ny, nz = turned(rotation, i, half_space[w, 0], half_space[w, 1], half_space[w, 2])
-    offset = half_space[w, 3] - sign * (nx * between[0] + ny * between[1] + nz * between[2])
-    solid, j = (t, b) if half_space_is_a else (s, a)
-    count, least = half_space_contacts(shapes, solid, rotation, j, nx, ny, nz, offset, margin, sign, scratch, real, ids)
-    if half_space_is_a:
-        for k in range(count):
-            for c in range(3):
-                real[k, c] += between[c]
-                real[k, 3 + c] += between[c]
-    return count, least
-
-
-@inlined
-def _of_boxes(half, velocity, rotation, a, b, s, t, between, margin, ahead, c, work, scratch, real, ids):
-    """Contacts of two boxes relative to the first body; returns their number and a bound of the gap."""
-    dx, dy, dz = between[0], between[1], between[2]
-    gap, axis = box_axis(half, s, t, rotation, a, b, dx, dy, dz, margin, c)
-    if gap > margin:
-        return np.int64(0), gap
-    cosine, edges = 1.0, axis
-    if edges >= 6:
-        edge_contact(half, s, t, rotation, a, dx, dy, dz, edges, gap, c, work, real, ids)
-        axis, cosine = face_along(work[0], c)
-        if cosine < ALIKE:
-            return np.int64(1), gap
-        copy_contact(real, ids, 0, POINTS)
-        # What hangs down beside a tilted face is not to be held up by it.
-        ahead = 0.0
-    count = face_contacts(half, velocity, rotation, a, b, s, t, between, axis, margin, ahead, c, scratch, real, ids)
-    if edges >= 6:
-        size = min(half[s, 0], half[s, 1], half[s, 2], half[t, 0], half[t, 1], half[t, 2])
-        if not along_edges(real, count, POINTS, cosine, axis >= 3, gap, size):
-            copy_contact(real, ids, POINTS, 0)
-            count = np.int64(1)
-    return count, gap
-
-
 @jit
-def _are_apart(solids, inset, bodies, pairs, p, between, margin, c, simplex):
-    """Whether the bodies of a general pair are known by `solids` to be farther apart than the margin; how far is noted."""
+def _are_apart(convex, bodies, pairs, p, margin, workspace):
+    """Whether `convex.solids` show that the bodies of a general pair are farther apart than the margin; if so, stores the gap."""
+    solids, inset, scratch = convex.solids, convex.inset, workspace.scratch
     a, b = pairs.first[p], pairs.second[p]
     s, t = bodies.shape[a], bodies.shape[b]
-    if min(_corners(solids, s), _corners(solids, t)) == 0 or max(_corners(solids, s), _corners(solids, t)) > MOST_HULL_CORNERS:
+    if min(num_corners(solids, s), num_corners(solids, t)) == 0 or max(num_corners(solids, s), num_corners(solids, t)) > MOST_HULL_CORNERS:
         return False
-    d, wanted = seen_from(bodies.rotation, a, b, between, c), margin + inset[s] + inset[t]
-    _, _, _, gap, corners = closest(solids, s, t, d, c, 1.0, FAR * wanted, simplex)
+    c = scratch.axes
+    d, wanted = seen_from(bodies.rotation, a, b, scratch.between, c), margin + inset[s] + inset[t]
+    _, _, _, gap, corners = closest(solids, s, t, d, c, 1.0, FAR * wanted, scratch.simplex)
     if corners == 5 or gap <= wanted:
         return False
     pairs.count[p], pairs.apart[p] = 0, gap - inset[s] - inset[t]
@@ -249,73 +212,70 @@ def _are_apart(solids, inset, bodies, pairs, p, between, margin, c, simplex):
     return True
 
 
-@jit
-def look(shapes, solids, inset, bodies, pairs, share, shares, ahead, same, kept, places, margins, rows, ids, free, coefficients, workspace):
-    """Find the contacts of a share of the pairs where `review` says so, but for general ones, which are left at the begin of its places.
+@inlined
+def _take_points(table, p, number):
+    """Give pair p places for POINTS points from those free for share `number`; returns whether there are enough."""
+    pairs, points, ids, free = table
+    used = free[number, 0]
+    if used + POINTS > free[number, 1]:
+        return False
+    before = pairs.start[p]
+    pairs.start[p], pairs.capacity[p] = used, POINTS
+    for i in range(pairs.count[p]):
+        for j in range(POINT_FIELDS):
+            points[used + i, j] = points[before + i, j]
+        for j in range(3):
+            ids[used + i, j] = ids[before + i, j]
+    free[number, 0] = used + POINTS
+    return True
 
-    solids, inset: see `heap_overlap`; ahead: length of the step, s; free (shares, 2): where the rows of the pool that each share may take
-    begin and end; coefficients (k, k, 4) of two materials; room: of its own. Returns how many pairs were looked at, and how many general
-    ones there are, -1 where there are too few rows (get more and call it again).
+
+@jit
+def find_contacts(convex, bodies, table, share, limits, coefficients, workspace):
+    """Find the contacts of a share of the pairs where `review` asks for them. General pairs are left at the begin of its places.
+
+    convex: `Convex`; table: `contact_table.Table`; coefficients (k, k, 4) of two materials; workspace: of the share. Returns the number of
+    pairs that were searched, and the number of general ones, -1 if there are too few points (grow the table and call again).
     """
-    real, found, old, old_ids, scratch, simplex, polytope, work, c, between, origin = workspace
-    position, rotation, velocity, shape = bodies.position, bodies.rotation, bodies.velocity, bodies.shape
+    found, old, old_ids, scratch = workspace
+    pairs, points, ids, _ = table
+    position, rotation, velocity, shape, between = bodies.position, bodies.rotation, bodies.velocity, bodies.shape, scratch.between
     waiting = 0
-    begin, end = review(bodies, pairs, share, shares, ahead, same, kept, places, margins)
+    begin, end = review(bodies, pairs, share, limits)
     for k in range(begin, end):
-        p, margin = places[k], margins[k]
+        p, margin = share.places[k], share.margins[k]
         a, b = pairs.first[p], pairs.second[p]
         for i in range(3):
             between[i] = position[b, i] - position[a, i]
         if pairs.kind[p] == GENERAL:
-            if not _are_apart(solids, inset, bodies, pairs, p, between, margin, c, simplex):
-                places[begin + waiting], margins[begin + waiting] = p, margin
+            if not _are_apart(convex, bodies, pairs, p, margin, workspace):
+                share.places[begin + waiting], share.margins[begin + waiting] = p, margin
                 waiting += 1
             continue
-        s, t = shape[a], shape[b]
-        if pairs.kind[p] == PLANE:
-            count, gap = _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, found)
-        elif pairs.kind[p] == HULLS:
-            size = min(bodies.inner[a], bodies.inner[b])
-            count, gap = hull_contacts(
-                shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, polytope, scratch, real, found
-            )
-        else:
-            count, gap = _of_boxes(shapes.half, velocity, rotation, a, b, s, t, between, margin, ahead, c, work, scratch, real, found)
-        if count > pairs.capacity[p]:
-            used = free[share, 0]
-            if used + POINTS > free[share, 1]:
-                return end - begin, -1
-            before = pairs.start[p]
-            pairs.start[p], pairs.capacity[p] = used, POINTS
-            for i in range(pairs.count[p]):
-                for j in range(ROW_SIZE):
-                    rows[used + i, j] = rows[before + i, j]
-                for j in range(3):
-                    ids[used + i, j] = ids[before + i, j]
-            free[share, 0] = used + POINTS
+        size = min(bodies.inner[a], bodies.inner[b])
+        pair, query = Pair(rotation, velocity, a, b, shape[a], shape[b]), Query(margin, limits.ahead, size)
+        count, gap = convex_contacts(pairs.kind[p], convex.shapes, pair, query, scratch, found)
+        if count > pairs.capacity[p] and not _take_points(table, p, share.number):
+            return end - begin, -1
         start, handed = pairs.start[p], 0
         for i in range(start, start + pairs.count[p]):
-            # An old contact without impulse has nothing to hand over.
-            if rows[i, IMPULSE] > 0.0:
-                for j in range(ROW_SIZE):
-                    old[handed, j] = rows[i, j]
+            # An old contact without impulse gives nothing to a new one.
+            if points[i, IMPULSE] > 0.0:
+                for j in range(POINT_FIELDS):
+                    old[handed, j] = points[i, j]
                 for j in range(3):
                     old_ids[handed, j] = ids[i, j]
                 handed += 1
         if pairs.count[p] == 0:
-            pairs.held[p] = min(bodies.skin[a], bodies.skin[b])
-        held = pairs.held[p]
+            pairs.contact_margin[p] = min(bodies.skin[a], bodies.skin[b])
         for i in range(count):
-            write_row(
-                position, rotation, bodies.material, bodies.skin, held, a, b, pairs.carrier[p], real, i, 0.0, 0.0, 1.0, 1.0, coefficients,
-                rows, start + i,
-            )  # fmt: skip
+            write_point(bodies, pairs, p, Source(found.real, i, 0.0, 0.0, 1.0, 1.0), coefficients, points, start + i)
             for j in range(3):
-                ids[start + i, j] = found[i, j]
+                ids[start + i, j] = found.ids[i, j]
         if pairs.count[p] == 0:
-            take_up(pairs.held, p, rows, start, start + count)
+            set_contact_margin(pairs.contact_margin, p, points, start, start + count)
         if count > 0 and handed > 0:
-            hand_over(old, old_ids, np.int64(0), handed, rows, ids, start, start + count, NEAR * min(bodies.inner[a], bodies.inner[b]))
+            match_contacts(Points(old, old_ids, 0, handed), Points(points, ids, start, start + count), NEAR * size)
         pairs.count[p] = count
         pairs.apart[p] = max(gap, 0.0) if count == 0 else 0.0
         note_seen(bodies, pairs, p)

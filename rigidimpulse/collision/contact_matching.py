@@ -1,21 +1,25 @@
-"""New rows of contacts, their impulses from the ones they replace, and the gap at which the contacts of a pair are held.
+"""New contact points, the impulses they take over from the points they replace (a warm start), and the contact margin of a pair.
 
-That gap is the skin, which soft contact may sink into. Pairs that are closer when they first have contacts, flush or inside each
-other, are held where they are, but no closer than LEAST_HELD skins: driven out of the skin, a block that slides would hop, and a flush
-wall would rise. Bodies that come to a heap closer than that are moved apart at once, without speed (`heap_parting`).
+The contact margin is the gap at which contacts rest. It is the skin, into which soft contacts may sink. Pairs that are closer when they
+first have contacts keep the gap they have, down to LEAST_MARGIN skins. If they were pushed out to the skin, a sliding block would hop, and
+a stack built without gaps would rise. Bodies that join an island closer than that are moved apart at once, without speed (depenetration).
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+
 from rigidimpulse.collision.contact_records import (
     CARRIER,
+    CONTACT_MARGIN,
     DYNAMIC_FRICTION,
     FRICTION,
-    HELD,
     IMPULSE,
+    POINT_FIELDS,
     ROUND_A,
     ROUND_B,
-    ROW_SIZE,
     SEPARATION,
     SKELETON_A,
     SKELETON_B,
@@ -26,74 +30,93 @@ from rigidimpulse.collision.contact_records import (
 from rigidimpulse.core.kernels import inlined, jit
 
 NEAR = 0.2
-"""Inner radii within which an old contact hands its impulse to a new one of other features."""
-LEAST_HELD = 0.2
-"""Skins that pairs are held apart, however close they were: as far as a column presses them in."""
+"""Distance, in inner radii, within which a new point takes over the impulse of an old one of other features."""
+LEAST_MARGIN = 0.2
+"""Least contact margin of a pair, in skins: as far as the load of a column presses a contact in."""
+
+
+class Source(NamedTuple):
+    """A contact as it was found, relative to the first body, for shapes that may be smaller than the true ones."""
+
+    real: np.ndarray  # (k, 10) on a, on b, normal, gap
+    place: int  # of the contact in it
+    round_a: float  # m, radius of the rounded surface of a at the contact
+    round_b: float
+    factor_a: float  # lengths of the shape, as a part of the true ones
+    factor_b: float
+
+
+class Points(NamedTuple):
+    """Contact points of one pair."""
+
+    points: np.ndarray  # (P, POINT_FIELDS)
+    ids: np.ndarray  # (P, 3)
+    begin: int
+    end: int
 
 
 @inlined
-def write_row(
-    position, rotation, material, skin, held, a, b, carrier, real, c, round_a, round_b, factor_a, factor_b, coefficients, rows, r
-):
-    """A new row r, without impulse, of the contact real[c] (10,) of bodies a and b, with places relative to a; carrier: whether it is b.
-
-    held: gap at which it is held, m; factor_a, factor_b: lengths of the bodies as the contact was found, parts of their true ones.
-    Returns the separation.
-    """
+def write_point(bodies, pairs, p, source, coefficients, points, r):
+    """Write point r of pair p, without impulse; returns its separation. coefficients (k, k, 4): of two materials."""
+    real, c, round_a, round_b, factor_a, factor_b = source
+    position, rotation, material, skin = bodies.position, bodies.rotation, bodies.material, bodies.skin
+    a, b, carrier, contact_margin = pairs.first[p], pairs.second[p], pairs.carrier[p], pairs.contact_margin[p]
     nx, ny, nz = real[c, 6], real[c, 7], real[c, 8]
     dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
     ax, ay, az = real[c, 0] / factor_a - round_a * nx, real[c, 1] / factor_a - round_a * ny, real[c, 2] / factor_a - round_a * nz
     bx, by, bz = (real[c, 3] - dx) / factor_b, (real[c, 4] - dy) / factor_b, (real[c, 5] - dz) / factor_b
     bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz
     m, t = material[a], material[b]
-    for k in range(IMPULSE, ROW_SIZE):
-        rows[r, k] = 0.0
-    rows[r, 0], rows[r, 1], rows[r, 2] = turned_back(rotation, b if carrier else a, nx, ny, nz)
-    rows[r, SKELETON_A], rows[r, SKELETON_A + 1], rows[r, SKELETON_A + 2] = turned_back(rotation, a, ax, ay, az)
-    rows[r, SKELETON_B], rows[r, SKELETON_B + 1], rows[r, SKELETON_B + 2] = turned_back(rotation, b, bx, by, bz)
-    rows[r, ROUND_A], rows[r, ROUND_B], rows[r, CARRIER] = round_a, round_b, 1.0 if carrier else 0.0
-    rows[r, STATIC_FRICTION], rows[r, DYNAMIC_FRICTION] = coefficients[m, t, 1], coefficients[m, t, 2]
-    rows[r, SKIN], rows[r, HELD] = min(skin[a], skin[b]), held
+    for k in range(IMPULSE, POINT_FIELDS):
+        points[r, k] = 0.0
+    points[r, 0], points[r, 1], points[r, 2] = turned_back(rotation, b if carrier else a, nx, ny, nz)
+    points[r, SKELETON_A], points[r, SKELETON_A + 1], points[r, SKELETON_A + 2] = turned_back(rotation, a, ax, ay, az)
+    points[r, SKELETON_B], points[r, SKELETON_B + 1], points[r, SKELETON_B + 2] = turned_back(rotation, b, bx, by, bz)
+    points[r, ROUND_A], points[r, ROUND_B], points[r, CARRIER] = round_a, round_b, 1.0 if carrier else 0.0
+    points[r, STATIC_FRICTION], points[r, DYNAMIC_FRICTION] = coefficients[m, t, 1], coefficients[m, t, 2]
+    points[r, SKIN], points[r, CONTACT_MARGIN] = min(skin[a], skin[b]), contact_margin
     apart = nx * (dx + (bx - ax)) + ny * (dy + (by - ay)) + nz * (dz + (bz - az))
-    rows[r, SEPARATION] = apart - (round_a + round_b) - held
-    return rows[r, SEPARATION]
+    points[r, SEPARATION] = apart - (round_a + round_b) - contact_margin
+    return points[r, SEPARATION]
 
 
 @jit
-def take_up(held, p, rows, begin, end):
-    """Hold pair p, whose first contacts are those from `begin` to `end`, where it is, if that is between LEAST_HELD and the skin."""
+def set_contact_margin(margins, p, points, begin, end):
+    """Let pair p, with first contacts from `begin` to `end`, rest at the gap it has, if that is between LEAST_MARGIN and the skin."""
     closer = 0.0
     for r in range(begin, end):
-        closer = max(closer, min(-rows[r, SEPARATION], held[p] - LEAST_HELD * rows[r, SKIN]))
+        closer = max(closer, min(-points[r, SEPARATION], margins[p] - LEAST_MARGIN * points[r, SKIN]))
     if closer > 0.0:
-        held[p] -= closer
+        margins[p] -= closer
         for r in range(begin, end):
-            rows[r, HELD] -= closer
-            rows[r, SEPARATION] += closer
+            points[r, CONTACT_MARGIN] -= closer
+            points[r, SEPARATION] += closer
 
 
 @inlined
-def hand_over(old_rows, old_ids, old, old_end, rows, ids, new, new_end, near):
-    """Give new rows the impulses of the old ones of the same features, else of one nearby with much the same normal.
+def match_contacts(old, new, near):
+    """Give new points the impulses of the old points of the same features, else of one within `near` with almost the same normal.
 
-    An old one that has given its impulse has none.
+    old, new: `Points`. An old point gives its impulse once.
     """
+    old_points, old_ids, old_begin, old_end = old
+    points, ids, new_begin, new_end = new
     for nearby in range(2):
-        for c in range(new, new_end):
-            if rows[c, IMPULSE] > 0.0:
+        for c in range(new_begin, new_end):
+            if points[c, IMPULSE] > 0.0:
                 continue
-            for o in range(old, old_end):
-                if old_rows[o, IMPULSE] == 0.0:
+            for o in range(old_begin, old_end):
+                if old_points[o, IMPULSE] == 0.0:
                     continue
-                cosine = rows[c, 0] * old_rows[o, 0] + rows[c, 1] * old_rows[o, 1] + rows[c, 2] * old_rows[o, 2]
+                cosine = points[c, 0] * old_points[o, 0] + points[c, 1] * old_points[o, 1] + points[c, 2] * old_points[o, 2]
                 same = ids[c, 0] == old_ids[o, 0] and ids[c, 1] == old_ids[o, 1] and ids[c, 2] == old_ids[o, 2]
                 if nearby == 1:
-                    x, y = rows[c, SKELETON_A] - old_rows[o, SKELETON_A], rows[c, SKELETON_A + 1] - old_rows[o, SKELETON_A + 1]
-                    z = rows[c, SKELETON_A + 2] - old_rows[o, SKELETON_A + 2]
+                    x, y = points[c, SKELETON_A] - old_points[o, SKELETON_A], points[c, SKELETON_A + 1] - old_points[o, SKELETON_A + 1]
+                    z = points[c, SKELETON_A + 2] - old_points[o, SKELETON_A + 2]
                     same = x * x + y * y + z * z < near * near
                 if not same or cosine < 0.9:
                     continue
-                rows[c, IMPULSE], old_rows[o, IMPULSE] = old_rows[o, IMPULSE], 0.0
+                points[c, IMPULSE], old_points[o, IMPULSE] = old_points[o, IMPULSE], 0.0
                 for k in range(FRICTION, FRICTION + 3):
-                    rows[c, k] = old_rows[o, k]
+                    points[c, k] = old_points[o, k]
                 break

@@ -1,24 +1,35 @@
-"""The pairs and contact points of all heaps, kept from step to step; see `heap_rows` for what the kernels read.
+"""The contact table: pairs and contact points, kept from step to step; see `contact_records` for their fields.
 
-More room is reserved (`reserve`) than most scenes ever need, and taken from the front bit by bit: growing copies nothing. Packing is done
-in place.
+More memory is reserved (`reserve`) than most scenes need. It is taken from the front, so that growing copies nothing. Packing is done in
+place.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from rigidimpulse.collision.contact_records import ROW_SIZE, UNKNOWN, ContactPairs
+from rigidimpulse.collision.contact_records import POINT_FIELDS, UNKNOWN, ContactPairs
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.simd import ROW, aligned
 
-FIRST_ROWS, ROWS_OF_A_BODY = 1024, 32
-"""Rows that are taken at first, and at least when more are needed; rows that are reserved for each body."""
+FIRST_POINTS, POINTS_OF_A_BODY = 1024, 32
+"""Points that are taken at first, and at least when more are needed; points that are reserved for each body."""
 MORE = 1.0 / 8.0
-"""Part of the rows by which they become more."""
+"""Part of the points by which their number grows."""
 LOW, FULL = 0.03, 0.9
-"""Parts of the rows taken: free below which they are packed, in use beyond which it is not worth it."""
+"""Parts of the points taken: they are packed where fewer than LOW are free and fewer than FULL are in use."""
+
+
+class Table(NamedTuple):
+    """The arrays of a `ContactTable`, for kernels."""
+
+    pairs: ContactPairs
+    points: np.ndarray  # (P, POINT_FIELDS)
+    ids: np.ndarray  # (P, 3)
+    free: np.ndarray  # (shares, 2)
 
 
 def empty_pairs(k: int) -> ContactPairs:
@@ -29,14 +40,14 @@ def empty_pairs(k: int) -> ContactPairs:
 
     return ContactPairs(
         first=numbers(), second=numbers(), carrier=np.zeros(k, bool), round=np.zeros(k, bool), kind=np.full(k, UNKNOWN, np.int8),
-        start=numbers(), count=numbers(), capacity=numbers(), known=np.zeros(k, bool), apart=np.zeros(k), held=np.zeros(k),
+        start=numbers(), count=numbers(), capacity=numbers(), known=np.zeros(k, bool), apart=np.zeros(k), contact_margin=np.zeros(k),
         seen=np.zeros((k, 7)),
     )  # fmt: skip
 
 
 @jit
 def _carry_over(old, new, places):
-    """Give new pairs (k,) what is known of the same old ones, but for `seen`, and write where they were, -1: nowhere. Both ascend."""
+    """Copy what is known of old pairs to new ones (k,), except `seen`, and write the places of the old ones, -1: none. Both ascend."""
     o = 0
     for p in range(new.first.shape[0]):
         a, b = new.first[p], new.second[p]
@@ -46,13 +57,13 @@ def _carry_over(old, new, places):
         if o < old.first.shape[0] and old.first[o] == a and old.second[o] == b:
             places[p] = o
             new.start[p], new.count[p], new.capacity[p] = old.start[o], old.count[o], old.capacity[o]
-            new.known[p], new.apart[p], new.held[p] = old.known[o], old.apart[o], old.held[o]
+            new.known[p], new.apart[p], new.contact_margin[p] = old.known[o], old.apart[o], old.contact_margin[o]
             new.kind[p], new.carrier[p], new.round[p] = old.kind[o], old.carrier[o], old.round[o]
 
 
 @jit
 def _carry_seen(seen, places, new_seen):
-    """The same for `seen` alone."""
+    """Copy `seen` in the same way."""
     for p in range(places.shape[0]):
         if places[p] >= 0:
             for k in range(7):
@@ -60,24 +71,24 @@ def _carry_seen(seen, places, new_seen):
 
 
 @jit_making_arrays
-def _pack(pairs, rows, ids, target):
-    """Put the rows of all pairs one after the other, in place; target (taken,): zeros. Returns where they end."""
+def _pack(pairs, points, ids, target):
+    """Move the points of all pairs one behind the other, in place; target (taken,): zeros. Returns where they end."""
     used = 1
     for p in range(pairs.first.shape[0]):
         for r in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
             target[r] = used
             used += 1
         pairs.start[p], pairs.capacity[p] = used - pairs.count[p], pairs.count[p]
-    row, kind = np.empty(ROW_SIZE), np.empty(3, ids.dtype)
+    point, kind = np.empty(POINT_FIELDS), np.empty(3, ids.dtype)
     for r in range(1, target.shape[0]):
-        # A row pushes the one that lies at its place on to its own, until it comes to a place that is free.
+        # A point that moves displaces the one at its target, which moves next, until a target is free.
         t, target[r] = target[r], 0
         if t == 0 or t == r:
             continue
-        row[:], kind[:] = rows[r], ids[r]
+        point[:], kind[:] = points[r], ids[r]
         while t > 0:
-            for k in range(ROW_SIZE):
-                row[k], rows[t, k] = rows[t, k], row[k]
+            for k in range(POINT_FIELDS):
+                point[k], points[t, k] = points[t, k], point[k]
             for k in range(3):
                 kind[k], ids[t, k] = ids[t, k], kind[k]
             following, target[t] = target[t], 0
@@ -85,10 +96,10 @@ def _pack(pairs, rows, ids, target):
     return used
 
 
-def _make_pool(number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Lines, the same as rows, and ids of a pool of so many rows."""
-    lines = aligned(number * ROW_SIZE // ROW)
-    return lines, lines.reshape(number, ROW_SIZE), reserve((number, 3), np.int32)
+def _make_points(number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lines, the same memory as points, and ids of `number` points."""
+    lines = aligned(number * POINT_FIELDS // ROW)
+    return lines, lines.reshape(number, POINT_FIELDS), reserve((number, 3), np.int32)
 
 
 def _parts(begin: int, end: int, shares: int) -> np.ndarray:
@@ -98,46 +109,51 @@ def _parts(begin: int, end: int, shares: int) -> np.ndarray:
 
 
 class ContactTable:
-    """Pairs and their rows in a pool.
+    """Pairs and their contact points.
 
     Attributes:
         pairs: ascending by first, then second.
-        lines: (8 m,) the pool as lines of 8, and rows: (P, ROW_SIZE), the same memory. ids: (P, 3) kind and features of each row.
-        taken: rows of the pool that are in use or free; those behind are reserved.
-        free: (shares, 2) where the rows that are free for each share of the pairs begin and end; the first row of all is none.
+        points: (P, POINT_FIELDS) contact points. lines: (8 m,) the same memory as lines of 8. ids: (P, 3) kind and features of each point.
+        taken: points that are in use or free; those behind are reserved.
+        free: (shares, 2) begin and end of the points that are free for each share of the pairs. Point 0 stands for none.
 
     """
 
     def __init__(self, shares: int, bodies: int) -> None:
-        """Nothing; shares: into which pairs are dealt out at most."""
-        self.pairs, self.taken = empty_pairs(0), FIRST_ROWS
-        self.lines, self.rows, self.ids = _make_pool(max(FIRST_ROWS, ROWS_OF_A_BODY * bodies))
-        self.free = _parts(1, FIRST_ROWS, shares)
+        """An empty table; shares: number of parts into which the pairs are divided at most."""
+        self.pairs, self.taken = empty_pairs(0), FIRST_POINTS
+        self.lines, self.points, self.ids = _make_points(max(FIRST_POINTS, POINTS_OF_A_BODY * bodies))
+        self.free = _parts(1, FIRST_POINTS, shares)
+
+    @property
+    def arrays(self) -> Table:
+        """The arrays as they are now: growing replaces them."""
+        return Table(self.pairs, self.points, self.ids, self.free)
 
     def replace(self, first: np.ndarray, second: np.ndarray) -> None:
-        """Let these (ascending) be the pairs; known ones keep what they have."""
+        """Replace the pairs by these, ascending; pairs that stay keep what is known of them."""
         fresh, places = empty_pairs(len(first)), np.empty(len(first), np.int32)
         fresh.first[:], fresh.second[:] = first, second
         _carry_over(self.pairs, fresh, places)
-        # The rest of the old pairs is let go first.
+        # The rest of the old pairs is freed first.
         seen, self.pairs = self.pairs.seen, fresh
         _carry_seen(seen, places, fresh.seen)
 
     def grow(self, needed: int) -> None:
-        """Room for at least `needed` more rows in each share; all rows keep their numbers."""
+        """Make space for at least `needed` more points in each share; all points keep their numbers."""
         if (self.free[:, 1] - self.free[:, 0]).min() >= needed:
             return
         old, shares = self.taken, len(self.free)
-        self.taken = old + max(needed * shares, FIRST_ROWS, int(MORE * old))
-        if self.taken > len(self.rows):
-            lines, rows, ids = _make_pool(2 * self.taken)
-            rows[:old], ids[:old] = self.rows[:old], self.ids[:old]
-            self.lines, self.rows, self.ids = lines, rows, ids
+        self.taken = old + max(needed * shares, FIRST_POINTS, int(MORE * old))
+        if self.taken > len(self.points):
+            lines, points, ids = _make_points(2 * self.taken)
+            points[:old], ids[:old] = self.points[:old], self.ids[:old]
+            self.lines, self.points, self.ids = lines, points, ids
         self.free = _parts(old, self.taken, shares)
 
     def pack(self) -> None:
-        """Put the rows of all pairs one after the other, with other numbers, where a share has little room left but rows are to be had."""
+        """Move the points of all pairs one behind the other where a share has little space left and enough of the points are free."""
         shares, least = len(self.free), int((self.free[:, 1] - self.free[:, 0]).min())
         if least * shares < LOW * self.taken and int(self.pairs.count.sum()) < FULL * self.taken:
-            used = _pack(self.pairs, self.rows, self.ids, np.zeros(self.taken, np.int32))
+            used = _pack(self.pairs, self.points, self.ids, np.zeros(self.taken, np.int32))
             self.free = _parts(used, self.taken, shares)

@@ -1,29 +1,72 @@
-"""Broad phase of heaps: pairs of bodies whose covers overlap, kept until a body leaves its cover.
+"""Fat boxes: pairs of bodies whose enlarged boxes overlap, kept until a body leaves its fat box.
 
-The cover of a body is the sphere that holds it, widened by a slack for the way it may go; immovable bodies are covered by
-their boxes.
+The fat box of a body is the box of its bounding sphere, enlarged by a slack for its motion (Box2D: enlarged AABB). Immovable bodies have
+the box of their shape. As long as every body stays within its slack, the pairs found before hold all that may touch, and nothing is
+searched.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import sqrt
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from rigidimpulse.collision.broad_phase import overlapping_pairs
+from rigidimpulse.collision.broad_phase import find_overlapping
+from rigidimpulse.collision.contact_records import ContactPairs
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 
 SLACK = 0.1
-"""Inner radii of slack that every body gets beside what it needs."""
+"""Slack in inner radii that every body gets in addition to what it needs."""
 CLOSE = 0.02
-"""Inner radii within which two slow bodies stay of where they were to each other; contacts are looked for farther away than that."""
+"""Relative motion in inner radii of two slow bodies that makes no new contact: contacts are searched for farther away than that."""
 INTERVALS = 2.0
-"""Lengths of time ahead for whose motion bodies get slack, too."""
+"""Slack for motion, in lengths of the time ahead."""
+
+
+class BodyBounds(NamedTuple):
+    """What does not change of n bodies."""
+
+    order: np.ndarray  # (n,) bodies by their positions at the start of the run
+    moves: np.ndarray  # (n,) bool, dynamic or kinematic
+    radius: np.ndarray  # (n,) m, of the bounding sphere about the centre of mass
+    inner: np.ndarray  # (n,) m, distance from the centre of mass to the nearest face
+    clearance: np.ndarray  # (n,) m, slack that a moving body needs in addition to its path
+    low: np.ndarray  # (n, 3) m, box of a body that does not move
+    high: np.ndarray  # (n, 3) m
+
+
+class _Fat(NamedTuple):
+    """Fat boxes of n bodies."""
+
+    boxed: np.ndarray  # (n,) bool, the body has one
+    centre: np.ndarray  # (n, 3) m
+    slack: np.ndarray  # (n,) m
+
+
+class MovingBodies(Protocol):
+    """What is known of n bodies at one instant, in the world."""
+
+    @property
+    def position(self) -> np.ndarray:
+        """(n, 3) m."""
+        ...
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(n, 3) m/s."""
+        ...
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """(n, 3) rad/s."""
+        ...
 
 
 @jit
-def _way(velocity, acceleration, i, ahead):
-    """How far (m) body i may come in `ahead` s."""
+def _path_length(velocity, acceleration, i, ahead):
+    """Upper bound of the path (m) of body i in `ahead` s."""
     speed, pull = 0.0, 0.0
     for k in range(3):
         speed += velocity[i, k] ** 2
@@ -32,29 +75,31 @@ def _way(velocity, acceleration, i, ahead):
 
 
 @jit
-def _left_fat_box(members, now, acceleration, least, ahead, covered, centre, slack):
-    """Whether a member may leave its cover in `ahead` s, or has none."""
+def _left_fat_box(members, now, acceleration, bounds, ahead, fat):
+    """Whether a member may leave its fat box in `ahead` s, or has none."""
     for i in members:
-        if not covered[i]:
+        if not fat.boxed[i]:
             return True
         away = 0.0
         for k in range(3):
-            away += (now.position[i, k] - centre[i, k]) ** 2
-        if sqrt(away) + least[i] + _way(now.velocity, acceleration, i, ahead) > slack[i]:
+            away += (now.position[i, k] - fat.centre[i, k]) ** 2
+        if sqrt(away) + bounds.clearance[i] + _path_length(now.velocity, acceleration, i, ahead) > fat.slack[i]:
             return True
     return False
 
 
 @jit
-def _boxes(order, now, acceleration, least, ahead, world_min, world_max, moves, radius, inner, covered, centre, slack, low, high):
-    """Covers at the present places, and their boxes (n, 3) by rank."""
-    for r in range(order.shape[0]):
-        i = order[r]
-        if not (covered[i] and moves[i]):
+def _make_boxes(now, acceleration, bounds, ahead, fat, low, high):
+    """Make fat boxes at the present positions, and write their corners (n, 3) by rank."""
+    boxed, centre, slack = fat
+    radius, inner, clearance = bounds.radius, bounds.inner, bounds.clearance
+    for r in range(bounds.order.shape[0]):
+        i = bounds.order[r]
+        if not (boxed[i] and bounds.moves[i]):
             for k in range(3):
-                low[r, k], high[r, k] = (world_min[i, k], world_max[i, k]) if covered[i] else (np.inf, -np.inf)
+                low[r, k], high[r, k] = (bounds.low[i, k], bounds.high[i, k]) if boxed[i] else (np.inf, -np.inf)
             continue
-        slack[i] = least[i] + INTERVALS * _way(now.velocity, acceleration, i, ahead) + SLACK * min(inner[i], radius[i])
+        slack[i] = clearance[i] + INTERVALS * _path_length(now.velocity, acceleration, i, ahead) + SLACK * min(inner[i], radius[i])
         for k in range(3):
             centre[i, k] = now.position[i, k]
             low[r, k] = now.position[i, k] - radius[i] - slack[i]
@@ -62,10 +107,11 @@ def _boxes(order, now, acceleration, least, ahead, world_min, world_max, moves, 
 
 
 @jit
-def _drop_far(order, now, moves, radius, slack, pairs, count):
-    """Leave out pairs whose covering spheres are apart; returns how many stay."""
+def _drop_far(now, bounds, slack, pairs):
+    """Leave out pairs whose enlarged bounding spheres are apart; returns the number of pairs left."""
+    order, moves, radius = bounds.order, bounds.moves, bounds.radius
     kept = 0
-    for p in range(count):
+    for p in range(pairs.shape[0]):
         i, j = order[pairs[p, 0]], order[pairs[p, 1]]
         if moves[i] and moves[j]:
             reach = radius[i] + radius[j] + slack[i] + slack[j]
@@ -80,22 +126,23 @@ def _drop_far(order, now, moves, radius, slack, pairs, count):
 
 
 @jit_making_arrays
-def near_pairs(order, pairs, now, acceleration, least, inner, ahead, world_min, world_max, moves, radius, member, other, out):
-    """Write pairs (a, b, touch) by index, of members with each other and with others, that may meet in `ahead` s; their number.
+def _near_pairs(bounds, pairs, now, acceleration, ahead, member, other, out):
+    """Write pairs (a, b, may touch) by index, of members with each other and with others, that may meet in `ahead` s; their number.
 
-    member, other: (n,) bool; out (k, 3). Others stay where they are, or nearly so. touch is 0 where the pair had no contact when it
-    was looked at, and neither body has gone or goes far enough to make one.
+    member, other: (n,) bool; out (k, 3). Others stand almost still. The third number is 0 where the pair had no contact when its contacts
+    were last found, and the bodies move too little to make one.
     """
+    order, moves, radius = bounds.order, bounds.moves, bounds.radius
     reach, x, count = radius.copy(), now.position, 0
-    way = np.zeros(radius.shape[0])
+    path = np.zeros(radius.shape[0])
     for i in range(radius.shape[0]):
         if member[i]:
-            reach[i] += least[i] + _way(now.velocity, acceleration, i, ahead)
+            reach[i] += bounds.clearance[i] + _path_length(now.velocity, acceleration, i, ahead)
             spin = 0.0
             for k in range(3):
-                way[i] += now.velocity[i, k] ** 2
+                path[i] += now.velocity[i, k] ** 2
                 spin += now.angular_velocity[i, k] ** 2
-            way[i] = ahead * (sqrt(way[i]) + radius[i] * sqrt(spin)) / inner[i]
+            path[i] = ahead * (sqrt(path[i]) + radius[i] * sqrt(spin)) / bounds.inner[i]
     for p in range(pairs.first.shape[0]):
         i, j = order[pairs.first[p]], order[pairs.second[p]]
         if not ((member[i] and (member[j] or other[j])) or (member[j] and other[i])):
@@ -107,74 +154,66 @@ def near_pairs(order, pairs, now, acceleration, least, inner, ahead, world_min, 
         else:
             m, f = (i, j) if moves[i] else (j, i)
             for k in range(3):
-                apart = apart or x[m, k] - reach[m] > world_max[f, k] or x[m, k] + reach[m] < world_min[f, k]
+                apart = apart or x[m, k] - reach[m] > bounds.high[f, k] or x[m, k] + reach[m] < bounds.low[f, k]
         if apart:
             continue
         out[count, 0], out[count, 1] = i, j
-        out[count, 2] = pairs.count[p] > 0 or not pairs.known[p] or way[i] + way[j] > CLOSE
+        out[count, 2] = pairs.count[p] > 0 or not pairs.known[p] or path[i] + path[j] > CLOSE
         count += 1
     return count
 
 
 class FatBoxes:
-    """Covers of the bodies of a scene.
+    """Fat boxes of the bodies of a scene.
 
     Attributes:
-        order: (n,) bodies by their places at the start of the run.
-        least: (n,) m, what a body that moves needs beside its way.
+        bounds: what does not change of the bodies.
 
     """
 
-    def __init__(self, world, order: np.ndarray, inner: np.ndarray, least: np.ndarray) -> None:
-        """Nobody is covered."""
-        n = world.num_bodies
-        self.world, self.order, self.least = world, order, least
-        self._moves = world.dynamic | world.moving
-        self._inner = inner
-        self._covered = np.zeros(n, bool)
-        self._centre, self._slack = np.zeros((n, 3)), np.zeros(n)
-        self._most = max(64, 16 * n)
+    def __init__(self, bounds: BodyBounds, dynamic: np.ndarray, may_collide: Callable[[np.ndarray, np.ndarray], np.ndarray] | None) -> None:
+        """No body has a fat box yet.
 
-    def renewed(self, now, acceleration, members: np.ndarray, others: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray] | None:
-        """Ranks (k,) int32 of pairs that may meet, ascending, where they had to be found anew; None where the known ones hold.
+        Args:
+            bounds: of n bodies.
+            dynamic: (n,) bool; a pair without a dynamic body is left out.
+            may_collide: tells which pairs (k,), (k,) of bodies take part; None if all do.
 
-        members: (k,) bodies that move; others: (m,) more bodies that are to be covered where they are.
         """
-        world = self.world
-        # A body that came to rest elsewhere is looked at as a member of those that move.
-        if np.all(self._covered[others]) and not _left_fat_box(
-            members, now, acceleration, self.least, ahead, self._covered, self._centre, self._slack
-        ):
+        n = len(bounds.order)
+        self.bounds, self._dynamic, self._may_collide = bounds, dynamic, may_collide
+        self._fat = _Fat(np.zeros(n, bool), np.zeros((n, 3)), np.zeros(n))
+        self._capacity = max(64, 16 * n)
+
+    def renewed(
+        self, now: MovingBodies, acceleration: np.ndarray, members: np.ndarray, others: np.ndarray, ahead: float
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Ranks (k,) int32 of pairs that may meet, ascending, if they had to be searched; None if the pairs found before still hold.
+
+        members: (k,) bodies that move; others: (m,) bodies that stand.
+        """
+        bounds, fat = self.bounds, self._fat
+        # A body that came to rest elsewhere counts as a member, since it moved.
+        if np.all(fat.boxed[others]) and not _left_fat_box(members, now, acceleration, bounds, ahead, fat):
             return None
-        self._covered[:] = ~world.dynamic
-        self._covered[members] = self._covered[others] = True
-        n = world.num_bodies
-        low, high = np.empty((n, 3)), np.empty((n, 3))
-        _boxes(
-            self.order, now, acceleration, self.least, ahead, world.static_min, world.static_max, self._moves, world.bound_radius,
-            self._inner, self._covered, self._centre, self._slack, low, high,
-        )  # fmt: skip
-        movable = world.dynamic[self.order]
-        pairs = np.empty((self._most, 2), np.int32)
-        count = overlapping_pairs(low, high, movable, pairs)
-        if count < 0:
-            self._most = -count - count // 4
-            pairs = np.empty((self._most, 2), np.int32)
-            count = overlapping_pairs(low, high, movable, pairs)
-        count = _drop_far(self.order, now, self._moves, world.bound_radius, self._slack, pairs, count)
+        fat.boxed[:] = ~self._dynamic
+        fat.boxed[members] = fat.boxed[others] = True
+        low, high = np.empty((2, len(bounds.order), 3))
+        _make_boxes(now, acceleration, bounds, ahead, fat, low, high)
+        pairs = find_overlapping(low, high, self._dynamic[bounds.order], self._capacity)
+        self._capacity = max(self._capacity, 5 * len(pairs) // 4)
+        count = _drop_far(now, bounds, fat.slack, pairs)
         first, second = np.ascontiguousarray(pairs[:count].T)
-        if len(world.apart):
-            a, b = self.order[first], self.order[second]
-            may = world.may_collide(np.minimum(a, b), np.maximum(a, b))
+        if self._may_collide is not None:
+            a, b = bounds.order[first], bounds.order[second]
+            may = self._may_collide(np.minimum(a, b), np.maximum(a, b))
             first, second = first[may], second[may]
         return first, second
 
-    def near(self, pairs, now, acceleration, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
-        """Pairs (a, b, touch) by index, a of lower rank, of members with each other and with others that may meet in `ahead` s, (3, k)."""
-        world = self.world
+    def near(
+        self, pairs: ContactPairs, now: MovingBodies, acceleration: np.ndarray, member: np.ndarray, other: np.ndarray, ahead: float
+    ) -> np.ndarray:
+        """Pairs (a, b, may touch) by index, a of lower rank, of members with each other and others that may meet in `ahead` s, (3, k)."""
         out = np.empty((len(pairs.first), 3), np.int64)
-        count = near_pairs(
-            self.order, pairs, now, acceleration, self.least, self._inner, ahead, world.static_min, world.static_max, self._moves,
-            world.bound_radius, member, other, out,
-        )  # fmt: skip
+        count = _near_pairs(self.bounds, pairs, now, acceleration, ahead, member, other, out)
         return out[:count].T

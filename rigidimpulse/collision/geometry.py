@@ -102,6 +102,15 @@ class Geometry(NamedTuple):
     node_count: np.ndarray  # (N,) number of triangles
 
 
+class Shapes(NamedTuple):
+    """The shapes of the bodies of a scene."""
+
+    geometry: Geometry
+    of_body: np.ndarray  # (n,) shape of each body
+    cylinders: np.ndarray | None
+    """(c,) primitives that are cylinders; None where there is none: then numba compiles no kernel of cylinders"""
+
+
 class _Surface(NamedTuple):
     """Arrays of one primitive, with indices that start at 0; names as in `Geometry`."""
 
@@ -172,6 +181,12 @@ def build_geometry(shapes: Sequence[CompiledShape]) -> Geometry:
         node_start=_join([s.node_start for s in surfaces], (0,), np.int64, triangle_first),
         node_count=_join([s.node_count for s in surfaces], (0,), np.int64),
     )
+
+
+def cylinders_of(geometry: Geometry) -> np.ndarray | None:
+    """Primitives (c,) that are cylinders, None where there is none; see `Shapes`."""
+    cylinders = np.flatnonzero(geometry.kind == CYLINDER)
+    return cylinders if len(cylinders) else None
 
 
 def compile_shape(shape: Shape, center_of_mass: ArrayLike, principal_rotation: ArrayLike) -> CompiledShape:

@@ -12,7 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigidimpulse.collision.contact_buffer import Question
 from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTEX_FACE
+from rigidimpulse.collision.geometry import Shapes
+from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.dynamics.impact.point import Contacts
 from rigidimpulse.engine.pair_table import MARGIN, live_contacts
 from rigidimpulse.engine.regime import island_roots as roots
@@ -37,7 +40,9 @@ def collect(
     """
     world, state = run.world, run.state
     buffer, a, b = run.contact_buffer, pair_events.a[pairs], pair_events.b[pairs]
-    count = buffer.find(world.geometry, world, state.now, state.rotation, a, b, margin * pair_events.contact_margin[pairs])
+    query = PairQuery(a, b, margin * pair_events.contact_margin[pairs])
+    shapes = Shapes(world.geometry, world.shape_of_body, world.cylinders)
+    count = buffer.find(Question(shapes, state.now, state.rotation, query))
     real, integer = buffer.real[:count].copy(), buffer.integer[:count].copy()
     for p in pairs[pair_events.time[pairs] <= time].tolist():
         a, b = pair_events.a[p], pair_events.b[p]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.collision.broad_phase import overlapping_pairs
+from rigidimpulse.collision.broad_phase import find_overlapping
 from rigidimpulse.collision.time_of_impact.spheres import is_closed_form
 from rigidimpulse.engine.pair_table import MARGIN, MAX_REPEATS, Pairs, new_pairs, path_boxes, renew_pairs
 from rigidimpulse.engine.run import Run
@@ -68,12 +68,7 @@ class PairEvents:
         path_boxes(trajectory, members, self.begin, self.end, world.bound_radius, box_min, box_max)
         box_min[members] -= MARGIN * world.largest_contact_margin
         box_max[members] += MARGIN * world.largest_contact_margin
-        pairs = np.empty((max(64, 8 * world.num_bodies), 2), np.int32)
-        count = overlapping_pairs(box_min, box_max, self._moves, pairs)
-        if count < 0:
-            pairs = np.empty((-count, 2), np.int32)
-            count = overlapping_pairs(box_min, box_max, self._moves, pairs)
-        first, second = pairs[:count].T.astype(np.int64)
+        first, second = find_overlapping(box_min, box_max, self._moves, max(64, 8 * world.num_bodies)).T.astype(np.int64)
         self._append(first, second, self.begin)
 
     def recall(self, begin: float) -> None:
@@ -156,15 +151,10 @@ class PairEvents:
         )
         run.box_min[bodies] -= MARGIN * run.world.largest_contact_margin
         run.box_max[bodies] += MARGIN * run.world.largest_contact_margin
-        pairs = np.empty((len(bodies) + 64, 2), np.int32)
         low, high = run.box_min.copy(), run.box_max.copy()
         low[~(moved | free)], high[~(moved | free)] = np.inf, -np.inf
-        count = overlapping_pairs(low, high, free, pairs)
-        if count < 0:
-            pairs = np.empty((-count, 2), np.int32)
-            count = overlapping_pairs(low, high, free, pairs)
         n = run.world.num_bodies
-        first, second = pairs[:count].T.astype(np.int64)
+        first, second = find_overlapping(low, high, free, len(bodies) + 64).T.astype(np.int64)
         fresh = ~np.isin(first * n + second, self.a * n + self.b)
         self._append(first[fresh], second[fresh], time)
 

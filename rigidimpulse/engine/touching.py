@@ -15,7 +15,6 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.manifold.dispatch import MAX_PER_NORMAL, pair_contacts, reduce_contacts
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
@@ -115,32 +114,6 @@ def refresh_pose(members, bodies, rotation, inertia):
     for i in members:
         quaternion_to_matrix(bodies.orientation[i], rotation[i])
         world_inverse_inertia(rotation[i], inertia[i], bodies.inv_inertia[i])
-
-
-@jit
-def contacts_of_pairs(
-    geometry, shape_of_body, bodies, rotation, pairs_a, pairs_b, margin, scratch, real, integer, cylinders
-):
-    """Reduced manifolds of the pairs, margin (k,) m; returns the number of contacts, or -(needed) if a buffer is too small.
-
-    cylinders: None where no shape is a cylinder.
-    """
-    # Not a literal: that would compile everything below twice.
-    count = np.int64(0)
-    for k in range(pairs_a.shape[0]):
-        a, b = pairs_a[k], pairs_b[k]
-        first = count
-        count = pair_contacts(
-            geometry, shape_of_body[a], bodies.position[a], rotation[a],
-            shape_of_body[b], bodies.position[b], rotation[b], margin[k], scratch, real, integer, count, cylinders,
-        )
-        if count < 0:
-            return count
-        count = reduce_contacts(real, integer, first, count, MAX_PER_NORMAL)
-        for c in range(first, count):
-            integer[c, 0] = a
-            integer[c, 1] = b
-    return count
 
 
 @jit

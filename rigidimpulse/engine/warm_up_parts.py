@@ -155,7 +155,7 @@ def _step_substepped(run) -> None:
     state, now, members = run.state, run.state.now, np.array([1])
     stepper = ContactStepper(run.world, run.world.dynamic, finer=False)
     stepper.members = members
-    support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
+    support_levels(stepper.bodies, stepper.table.pairs, stepper.table.points, TALL)
     mark_quick(stepper.bodies, STEP, 1.0)
     out = stepper.step(run, 0.0, STEP)
     steady = run.world.steady_acceleration
@@ -206,7 +206,7 @@ PARTS = {
     SUBSTEPPED: (_find_substepped_contacts, _step_substepped),
     JOINTS: (_start_joints, _close_and_stop_joints),
 }
-"""What is compiled at once, by kind; each gets a context."""
+"""What is compiled at once, by kind; each gets a run."""
 
 
 def compile_part(kind: str, part: int, with_cylinder: bool) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.collision.geometry import CYLINDER, CompiledShape, Geometry
+from rigidimpulse.collision.geometry import CompiledShape, Geometry, cylinders_of
 from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.frames import own_pose
 from rigidimpulse.scene.joint import Joint
@@ -87,9 +87,9 @@ class World:
         return len(self.names)
 
     @cached_property
-    def cylinders(self) -> int | None:
-        """None where no shape is a cylinder: kernels then leave their part out, also when they are compiled."""
-        return 1 if np.any(self.geometry.kind == CYLINDER) else None
+    def cylinders(self) -> np.ndarray | None:
+        """Primitives (c,) that are cylinders, None where there is none; see `geometry.Shapes`."""
+        return cylinders_of(self.geometry)
 
     @cached_property
     def steady_strength(self) -> np.ndarray:

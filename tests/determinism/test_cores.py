@@ -14,7 +14,7 @@ import trimesh
 import rigidimpulse as ri
 from rigidimpulse.collision import contact_table
 from rigidimpulse.collision.contact_buffer import ContactBuffer
-from rigidimpulse.collision.contact_cache import BLOCK, look, share_of
+from rigidimpulse.collision.contact_cache import BLOCK, find_contacts, share_of
 from rigidimpulse.core.kernels import MOST_CORES, number_of_cores
 from rigidimpulse.dynamics.solvers.tgs_soft.solver import BATCHES_EACH, advance
 from rigidimpulse.engine.substepped import contact_forces
@@ -47,16 +47,16 @@ def test_substepped_islands_have_the_same_bits_on_one_core_and_on_several(monkey
 
     def together(calls):
         dealt.append(len(calls))
-        return type(look).together(look, calls)
+        return type(find_contacts).together(find_contacts, calls)
 
-    monkeypatch.setattr(look, "together", together, raising=False)
+    monkeypatch.setattr(find_contacts, "together", together, raising=False)
     monkeypatch.setattr(contact_forces, "WORTHWHILE", 20)
     monkeypatch.setattr(contact_forces, "WORTHWHILE_GENERAL", 4)
     # The third has so little room at first that rows, patches and batches are moved when they become more.
     for cores, rows, rows_of_a_body, patches_of_a_body in ((1, 1024, 32, 8), (2, 1024, 32, 8), (3, 48, 0, 0)):
         monkeypatch.setattr(contact_forces, "number_of_cores", lambda cores=cores: cores)
-        monkeypatch.setattr(contact_table, "FIRST_ROWS", rows)
-        monkeypatch.setattr(contact_table, "ROWS_OF_A_BODY", rows_of_a_body)
+        monkeypatch.setattr(contact_table, "FIRST_POINTS", rows)
+        monkeypatch.setattr(contact_table, "POINTS_OF_A_BODY", rows_of_a_body)
         monkeypatch.setattr(contact_forces, "PATCHES_OF_A_BODY", patches_of_a_body)
         dealt.clear()
         run = ri.simulate(cloud(shapes, number), duration)

@@ -15,6 +15,9 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
+from rigidimpulse.collision.contact_buffer import Question
+from rigidimpulse.collision.geometry import Shapes
+from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.core.quaternion import multiply, quaternion_from_axis_angle
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.impact.point import Contacts
@@ -105,7 +108,9 @@ def contact_at(run: Run, time: float):
     world, state = run.world, run.state
     bring_all(state.trajectory, np.arange(2), time, state.now, state.rotation, run.acceleration, run.angular_acceleration)
     buffer = run.contact_buffer
-    count = buffer.find(world.geometry, world, state.now, state.rotation, np.array([0]), np.array([1]), np.array([MARGIN]))
+    query = PairQuery(np.array([0]), np.array([1]), np.array([MARGIN]))
+    shapes = Shapes(world.geometry, world.shape_of_body, world.cylinders)
+    count = buffer.find(Question(shapes, state.now, state.rotation, query))
     nearest = np.array([np.argmin(buffer.real[:count, 9])])
     one = Contacts(*(np.empty(1, np.int64) for _ in range(2)), *(np.empty((1, 3)) for _ in range(3)), *(np.empty(1) for _ in range(5)))
     fill_contacts(state.now, buffer.real, buffer.integer, nearest, world.material_of_body, world.coefficients, one)

@@ -1,10 +1,10 @@
 """How the error of the impact time depends on the tolerance and on the step: animation notes A3 and A4.
 
-Guarded sweeps: a gap of at most touch + tolerance at a closing speed c means a time early by at most tolerance / c, never late; the cost is
-that of bisection, log2(h / (tolerance / c)) evaluations and a few safe steps, or less. Linear approximation: with the gap's second
-derivative g'' the estimate is off by g'' t^2 / (2 c), so the error falls with the square of the time to the impact.
+Safe methods: a gap of at most impact_margin + tolerance at a closing speed c means a time early by at most tolerance / c, never late; the
+cost is that of bisection, log2(h / (tolerance / c)) evaluations and a few safe steps, or less. Linear approximation: with the gap's
+second derivative g'' the estimate is off by g'' t^2 / (2 c), so the error falls with the square of the time to the impact.
 
-The body is a tumbling box over a plane: its gap is no polynomial. The reference is the guarded sweep to rounding, which is checked against
+The body is a tumbling box over a plane: its gap is no polynomial. The reference is the safe method to rounding, which is checked against
 the closed form of a ball in tests/unit/test_sweep.py.
 """
 

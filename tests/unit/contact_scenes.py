@@ -10,8 +10,10 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
-from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS, pair_contacts, pair_gap, reduce_contacts
+from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, CompiledShape, Primitive, Shapes, build_geometry, cylinders_of
+from rigidimpulse.collision.manifold.contact_points import Contacts as Buffers
+from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS, Posed, pair_contacts, pair_gap
+from rigidimpulse.collision.manifold.reduce import reduce_contacts
 
 ROUND_OFF = 2e-14
 VERTEX_FACE, FACE_VERTEX, EDGE_EDGE, CORNER, PLANE = range(5)
@@ -87,11 +89,13 @@ class Scene:
         self.scratch = np.empty((scratch_rows, 2), dtype=np.int64)
         self.real = np.full((capacity, 10), np.nan)
         self.integer = np.full((capacity, 5), -7, dtype=np.int64)
+        self.shapes = Shapes(self.geometry, np.arange(len(shapes)), cylinders_of(self.geometry))
+        self.buffers = Buffers(self.real, self.integer, self.scratch)
 
     def contacts(self, pose_a, pose_b, margin, shapes=(0, 1), reduced=False):
         a, b = shapes
         (x_a, R_a), (x_b, R_b) = pose_a, pose_b
-        count = pair_contacts(self.geometry, a, x_a, R_a, b, x_b, R_b, margin, self.scratch, self.real, self.integer, 0)
+        count = pair_contacts(self.shapes, Posed(a, x_a, R_a), Posed(b, x_b, R_b), margin, self.buffers, 0)
         if reduced:
             count = reduce_contacts(self.real, self.integer, 0, count)
         return Contacts(self.real[:count].copy(), self.integer[:count].copy())
@@ -99,7 +103,7 @@ class Scene:
     def gap(self, pose_a, pose_b, limit=10.0, shapes=(0, 1)):
         out = np.zeros(7)
         (x_a, R_a), (x_b, R_b) = pose_a, pose_b
-        return pair_gap(self.geometry, shapes[0], x_a, R_a, shapes[1], x_b, R_b, limit, out), out[:3], out[3:6]
+        return pair_gap(self.geometry, Posed(shapes[0], x_a, R_a), Posed(shapes[1], x_b, R_b), limit, out), out[:3], out[3:6]
 
 
 class Contacts:

@@ -6,6 +6,8 @@ import numpy as np
 import trimesh
 
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
+from rigidimpulse.collision.manifold.contact_points import Contacts as Buffers
+from rigidimpulse.collision.manifold.contact_points import Pose
 from rigidimpulse.collision.manifold.cylinder import (
     cylinder_cylinder_contacts,
     cylinder_cylinder_gap,
@@ -20,21 +22,21 @@ Z = np.array([0.0, 0.0, 1.0])
 
 
 @jit
-def contacts_kernel(geometry, i, j, R, t, margin, stack, real, integer):
+def contacts_kernel(geometry, i, j, pose, margin, buffers):
     if geometry.kind[j] == HALF_SPACE:
-        return cylinder_half_space_contacts(geometry, i, j, R, t, margin, real, integer, np.int64(0))
+        return cylinder_half_space_contacts(geometry, i, j, pose, margin, buffers, np.int64(0))
     if geometry.kind[j] == ROUND:
-        return cylinder_round_contacts(geometry, i, j, R, t, margin, stack, real, integer, np.int64(0))
-    return cylinder_cylinder_contacts(geometry, i, j, R, t, margin, real, integer, np.int64(0))
+        return cylinder_round_contacts(geometry, i, j, pose, margin, buffers, np.int64(0))
+    return cylinder_cylinder_contacts(geometry, i, j, pose, margin, buffers, np.int64(0))
 
 
 @jit
-def gap_kernel(geometry, i, j, R, t, limit, stack, out):
+def gap_kernel(geometry, i, j, pose, limit, stack, out):
     if geometry.kind[j] == HALF_SPACE:
-        return cylinder_half_space_gap(geometry, i, j, R, t, limit, out)
+        return cylinder_half_space_gap(geometry, i, j, pose, limit, stack, out)
     if geometry.kind[j] == ROUND:
-        return cylinder_round_gap(geometry, i, j, R, t, limit, stack, out)
-    return cylinder_cylinder_gap(geometry, i, j, R, t, limit, out)
+        return cylinder_round_gap(geometry, i, j, pose, limit, stack, out)
+    return cylinder_cylinder_gap(geometry, i, j, pose, limit, stack, out)
 
 
 def cylinder(radius=1.0, half=1.0, centre=(0.0, 0.0, 0.0), axis=Z):
@@ -68,15 +70,15 @@ class Contacts:
     def __init__(self, first, second, position=(0.0, 0.0, 0.0), rotation=None, margin=1e-4):
         self.geometry = build_geometry([CompiledShape((first,)), CompiledShape((second,))])
         self.R = np.ascontiguousarray(np.eye(3) if rotation is None else rotation.as_matrix())
-        self.t = np.array(position, dtype=float)
+        self.pose = Pose(self.R, np.array(position, dtype=float))
         self.stack, real, integer = np.zeros((200, 2), np.int64), np.zeros((200, 10)), np.zeros((200, 5), np.int64)
-        count = contacts_kernel(self.geometry, 0, 1, self.R, self.t, margin, self.stack, real, integer)
+        count = contacts_kernel(self.geometry, 0, 1, self.pose, margin, Buffers(real, integer, self.stack))
         self.point_a, self.point_b, self.normal = real[:count, :3], real[:count, 3:6], real[:count, 6:9]
         self.gap, self.features = real[:count, 9], integer[:count, 3:5]
 
     def least_gap(self, limit=1e9):
         out = np.zeros(9)
-        return gap_kernel(self.geometry, 0, 1, self.R, self.t, limit, self.stack, out), out[:3], out[3:6]
+        return gap_kernel(self.geometry, 0, 1, self.pose, limit, self.stack, out), out[:3], out[3:6]
 
     def expect(self, points, normals, gap=None, tolerance=1e-12):
         """Check that the points on the first body are these, in any order, and the normals too."""

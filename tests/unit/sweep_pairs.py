@@ -1,4 +1,4 @@
-"""Pairs of bodies on their courses, to be swept, and the gap along their paths."""
+"""Pairs of bodies on their trajectories, to be swept, and the gap along their paths."""
 
 from types import SimpleNamespace
 
@@ -8,7 +8,7 @@ import trimesh
 from contact_scenes import box, capsule, half_space, mesh, prism, sphere
 
 from rigidimpulse.collision.geometry import CYLINDER, CompiledShape, Primitive, build_geometry
-from rigidimpulse.collision.manifold.dispatch import pair_gap
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.collision.time_of_impact import bisection, conservative
 from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE
 from rigidimpulse.collision.time_of_impact.safe_step import make_scratch
@@ -47,7 +47,7 @@ NAMES = list(SHAPES)
 
 
 class Pair:
-    """Two bodies on their courses; body 0 is fixed at the origin unless set otherwise."""
+    """Two bodies on their trajectories; body 0 is fixed at the origin unless set otherwise."""
 
     def __init__(self, name_a, name_b, geometry=GEOMETRY, scratch=SCRATCH, names=NAMES):
         self.shapes = names.index(name_a), names.index(name_b)
@@ -84,7 +84,7 @@ def gap_at(geometry, trajectory, shape_a, shape_b, t):
     for i in range(2):
         pose_at(trajectory, i, t, x[i], q[i])
         quaternion_to_matrix(q[i], axes[i])
-    return pair_gap(geometry, shape_a, x[0], axes[0], shape_b, x[1], axes[1], np.inf, points)
+    return pair_gap(geometry, Posed(shape_a, x[0], axes[0]), Posed(shape_b, x[1], axes[1]), np.inf, points)
 
 
 @jit

@@ -100,7 +100,7 @@ def test_one_body_against_all():
 
 
 def test_boxes_hold_the_path_and_no_more():
-    """Parabolas and cubics, from any time of the course: the box is that of 10,000 samples, to what a path turns between two of them.
+    """Parabolas and cubics, from any time of the trajectory: the box is that of 10,000 samples, to what a path turns between two of them.
 
     That is |a| (h / 10,000)^2 / 8 with accelerations of some 1e3 m/s^2: 1e-5 m at most. Boxes that missed the turns of the cubics would be
     off by metres.

@@ -65,7 +65,7 @@ def test_spinning_edge_and_post():
 
 
 def test_touch_and_tolerance():
-    """A point falls 1 m onto a triangle: it comes within `touch` at 1 - touch, and at most `tolerance` before."""
+    """A point falls 1 m onto a triangle: it comes within `impact_margin` at 1 - impact_margin, and at most `tolerance` before."""
     face = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]]
     rest = FeaturePath(np.zeros((2, 3)), np.zeros((2, 3)))
     fall = FeaturePath(np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]), np.zeros((2, 3)))

@@ -1,4 +1,4 @@
-"""Pairs and contact points of heaps keep what is known of them when they are packed, when room is made, and when pairs come and go."""
+"""Pairs and contact points keep what is known of them when they are packed, when the table grows, and when pairs come and go."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigidimpulse.collision.contact_records import UNKNOWN
-from rigidimpulse.collision.contact_table import FIRST_ROWS, ROWS_OF_A_BODY, ContactTable
+from rigidimpulse.collision.contact_table import FIRST_POINTS, POINTS_OF_A_BODY, ContactTable
 from rigidimpulse.core.memory import reserve
 
 BODIES = 40
@@ -18,17 +18,17 @@ fixed = settings(deadline=None, derandomize=True)  # no deadline: the first call
 
 
 def contacts_of(table: ContactTable) -> list[tuple]:
-    """What is known of each pair, its rows included."""
+    """What is known of each pair, its points included."""
     pairs, out = table.pairs, []
     for p in range(len(pairs.first)):
         mine = slice(pairs.start[p], pairs.start[p] + pairs.count[p])
         known = [(name, np.array(column[p]).tolist()) for name, column in pairs._asdict().items() if name not in ("start", "capacity")]
-        out.append((known, table.rows[mine].tolist(), table.ids[mine].tolist()))
+        out.append((known, table.points[mine].tolist(), table.ids[mine].tolist()))
     return out
 
 
 def filled(seed: int, shares: int, packed_full: bool) -> ContactTable:
-    """A table of random pairs, each with rows of its own at places that have nothing to do with its order."""
+    """A table of random pairs, each with points of its own at places that do not depend on its order."""
     random, table = np.random.default_rng(seed), ContactTable(shares, BODIES)
     first, second = np.triu_indices(BODIES, 1)
     some = np.sort(random.choice(len(first), int(random.integers(1, 200)), replace=False))
@@ -40,7 +40,7 @@ def filled(seed: int, shares: int, packed_full: bool) -> ContactTable:
     for p in random.permutation(len(some)):
         place += 0 if packed_full else int(random.integers(0, 2))
         pairs.start[p] = place
-        table.rows[place : place + pairs.count[p]] = random.normal(size=(pairs.count[p], table.rows.shape[1]))
+        table.points[place : place + pairs.count[p]] = random.normal(size=(pairs.count[p], table.points.shape[1]))
         table.ids[place : place + pairs.count[p]] = random.integers(0, 99, (pairs.count[p], 3))
         place += pairs.count[p]
     table.free[:] = table.taken
@@ -49,7 +49,7 @@ def filled(seed: int, shares: int, packed_full: bool) -> ContactTable:
 
 @fixed
 @given(st.integers(0, 10_000), st.integers(1, 3))
-def test_packing_in_place_keeps_every_row(seed: int, shares: int) -> None:
+def test_packing_in_place_keeps_every_point(seed: int, shares: int) -> None:
     table = filled(seed, shares, packed_full=False)
     before, used = contacts_of(table), 1 + int(table.pairs.count.sum())
     table.pack()
@@ -57,18 +57,18 @@ def test_packing_in_place_keeps_every_row(seed: int, shares: int) -> None:
     # One after the other, in order; what is behind them is free.
     assert np.array_equal(table.pairs.start, np.concatenate([[1], 1 + np.cumsum(table.pairs.count)[:-1]]))
     assert (table.free[0, 0], table.free[-1, 1]) == (used, table.taken)
-    assert not table.rows[0].any()
+    assert not table.points[0].any()
 
 
-def test_rows_keep_their_places_where_room_is_made_beyond_what_was_reserved() -> None:
+def test_points_keep_their_places_where_the_table_grows_beyond_what_was_reserved() -> None:
     table = filled(3, 2, packed_full=True)
-    before, reserved = contacts_of(table), len(table.rows)
-    assert reserved == max(FIRST_ROWS, ROWS_OF_A_BODY * BODIES)
+    before, reserved = contacts_of(table), len(table.points)
+    assert reserved == max(FIRST_POINTS, POINTS_OF_A_BODY * BODIES)
     table.grow(reserved)
     assert contacts_of(table) == before
-    assert len(table.rows) > reserved
+    assert len(table.points) > reserved
     assert (table.free[:, 1] - table.free[:, 0]).min() >= reserved
-    assert np.shares_memory(table.lines, table.rows)
+    assert np.shares_memory(table.lines, table.points)
 
 
 @fixed

@@ -28,6 +28,8 @@ from cylinder_arrangements import (
 from scipy.spatial.transform import Rotation
 
 from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Primitive, build_geometry
+from rigidimpulse.collision.manifold.contact_points import Contacts as Buffers
+from rigidimpulse.collision.manifold.contact_points import Pose
 
 EIGHTHS = 2.0 * np.pi * np.arange(8) / 8
 GAP = 1e-5
@@ -349,6 +351,7 @@ def test_full_buffer_counts_on_and_limit_is_kept():
     geometry = build_geometry([CompiledShape((cylinder(),)), CompiledShape((half_space(offset=-1.0 - GAP),))])
     real, integer = np.zeros((3, 10)), np.zeros((3, 5), np.int64)
     stack, out = np.zeros((200, 2), np.int64), np.full(9, 7.0)
-    assert contacts_kernel(geometry, 0, 1, np.eye(3), np.zeros(3), 1e-4, stack, real, integer) == 8
-    assert gap_kernel(geometry, 0, 1, np.eye(3), np.zeros(3), 1e-6, stack, out) == 1e-6
+    pose = Pose(np.eye(3), np.zeros(3))
+    assert contacts_kernel(geometry, 0, 1, pose, 1e-4, Buffers(real, integer, stack)) == 8
+    assert gap_kernel(geometry, 0, 1, pose, 1e-6, stack, out) == 1e-6
     assert np.all(out == 7.0)

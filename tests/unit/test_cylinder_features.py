@@ -54,8 +54,8 @@ def test_distance_of_cylinders_is_certain():
         reach = support(a, half_a, radius_a, d) + support(b, half_b, radius_b, d)
         sideways = np.cross(d, unit(rng)) * scale * rng.choice([0.0, 0.1, 1.0])
         centre_b = centre_a + d * (reach + gap) + sideways
-        distance = cylinder_cylinder_distance(centre_a, a, half_a, radius_a, centre_b, b, half_b, radius_b, out)
-        swapped = cylinder_cylinder_distance(centre_b, b, half_b, radius_b, centre_a, a, half_a, radius_a, np.zeros(9))
+        distance = cylinder_cylinder_distance((centre_a, a, half_a, radius_a), (centre_b, b, half_b, radius_b), out)
+        swapped = cylinder_cylinder_distance((centre_b, b, half_b, radius_b), (centre_a, a, half_a, radius_a), np.zeros(9))
         p, q, n = out[:3], out[3:6], out[6:]
         size = np.linalg.norm(centre_b - centre_a) + np.linalg.norm(centre_a) + half_a + radius_a + half_b + radius_b
         assert outside(p, centre_a, a, half_a, radius_a) < 1e-14 * size
@@ -117,4 +117,4 @@ def test_plane_of_a_large_triangle_through_the_cylinder_overlaps():
     assert cylinder_triangle_distance(np.array([0.0, 0.0, 3.0]), Z, 1.0, 0.5, triangle, out) > 1.0
     # a thin rod through both caps, away from the axis: sides, rims and axes are all apart
     rod = (np.array([0.5, 0.2, 0.0]), Z, 9.0, 0.01)
-    assert cylinder_cylinder_distance(np.zeros(3), Z, 1.0, 1.0, *rod, out) == 0.0
+    assert cylinder_cylinder_distance((np.zeros(3), Z, 1.0, 1.0), rod, out) == 0.0

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
+from rigidimpulse.collision.distance.point import STACK, first_touch, first_touch_of_triangle, signed_distance
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import rotate_inverse
 from rigidimpulse.dynamics.soft_body import FlexibleBody, Flexibles, FlexibleTrack
-from rigidimpulse.dynamics.soft_body.distance import STACK, first_touch, first_touch_of_triangle, signed_distance
 from rigidimpulse.dynamics.soft_body.track import tracks_in
 from rigidimpulse.view.soft_bodies import soft_body_messages
 

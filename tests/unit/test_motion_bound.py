@@ -1,8 +1,8 @@
 """The motion bound is exact in its first two derivatives and never optimistic in the third.
 
-Law: with y the path of a point of B seen from A, |y(s) - y - y' s - y'' s^2 / 2| <= (J_c + J_r |r|) s^3 / 6 for s <= h, and
-|w(s)| <= W. The left side is computed from the poses of the course, which carry rounding of about 1e-13 of the coordinates and of the way
-travelled; a wrong y' or y'' would show as an error of first or second order in s, many orders above it.
+Law: with y the path of a point of B seen from A, |y(s) - y - y' s - y'' s^2 / 2| <= (J_c + J_r |r|) s^3 / 6 for s <= h, and |w(s)| <= W.
+The left side is computed from the poses of the trajectory, which carry rounding of about 1e-13 of the coordinates and of the path length;
+a wrong y' or y'' would show as an error of first or second order in s, many orders above it.
 """
 
 import numpy as np

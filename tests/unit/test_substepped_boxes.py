@@ -1,4 +1,4 @@
-"""Contacts of boxes as heaps find them, against separating axes by brute force."""
+"""Contacts of boxes in sub-stepped islands, against separating axes by brute force."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.collision.contact_cache import review
-from rigidimpulse.collision.contact_records import HELD, SEPARATION, SKELETON_A, SKELETON_B
+from rigidimpulse.collision.contact_cache import Limits, Share, review
+from rigidimpulse.collision.contact_records import CONTACT_MARGIN, SEPARATION, SKELETON_A, SKELETON_B
 from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.run import Run
@@ -61,11 +61,12 @@ def stepper_of(seed: int, wanted: float):
 
 @pytest.mark.parametrize("wanted", [1e-3, -1e-2])
 def test_contacts_lie_on_both_boxes_at_the_gap_of_the_best_axis(wanted):
-    # The deepest contact is at the largest gap of all axes, but for what an edge must win over faces by, EDGE_WINS of the least half side
-    # (0.3 m): 0.6 mm. All lie on the surfaces of both boxes along one normal. A wrong axis, sign or clipped corner is off by centimetres.
+    # The deepest contact is at the largest gap of all axes, to the amount by which an edge must win over faces, EDGE_WINS of the least
+    # half side (0.3 m): 0.6 mm. All lie on the surfaces of both boxes along one normal. A wrong axis, sign or clipped corner is off by
+    # centimetres.
     for seed in range(40):
         stepper, half = stepper_of(seed, wanted)
-        pairs, rows, bodies = stepper.table.pairs, stepper.table.rows, stepper.bodies
+        pairs, rows, bodies = stepper.table.pairs, stepper.table.points, stepper.bodies
         assert len(pairs.first) == 1
         count, start = int(pairs.count[0]), int(pairs.start[0])
         assert 1 <= count <= 4
@@ -76,7 +77,7 @@ def test_contacts_lie_on_both_boxes_at_the_gap_of_the_best_axis(wanted):
             points = [bodies.position[k] + bodies.rotation[k] @ row[at : at + 3] for k, at in ((0, SKELETON_A), (1, SKELETON_B))]
             gap = float((points[1] - points[0]) @ n)
             np.testing.assert_allclose(points[1] - points[0], gap * n, atol=1e-12)
-            assert row[SEPARATION] + row[HELD] == pytest.approx(gap, abs=1e-12)
+            assert row[SEPARATION] + row[CONTACT_MARGIN] == pytest.approx(gap, abs=1e-12)
             for k, at in ((0, SKELETON_A), (1, SKELETON_B)):
                 # On the surface of the one whose face or edge it is, and at most the depth inside the other.
                 assert np.max(np.abs(row[at : at + 3]) - half[k]) <= 1e-9 + max(gap, 0.0) + max(-wanted, 0.0)
@@ -89,12 +90,12 @@ def test_pairs_that_have_not_moved_are_not_looked_at_again():
     stepper, _ = stepper_of(3, 1e-3)
     table, bodies = stepper.table, stepper.bodies
     places, margins = np.zeros(1, np.int64), np.zeros(1)
-    before = table.rows.copy()
+    before = table.points.copy()
     for moved, looked in ((0.0, 0), (5e-4, 0), (7e-4, 1)):
         bodies.position[1, 0] += moved
-        assert review(bodies, table.pairs, 0, 1, 1.0 / 60.0, 2e-3, 0.0, places, margins) == (0, looked)
+        assert review(bodies, table.pairs, Share(0, 1, places, margins), Limits(1.0 / 60.0, 2e-3, 0.0)) == (0, looked)
         bodies.position[1, 0] -= moved
-    np.testing.assert_array_equal(table.rows, before)
+    np.testing.assert_array_equal(table.points, before)
     bodies.position[1] += bodies.position[1] - bodies.position[0]
-    assert review(bodies, table.pairs, 0, 1, 1.0 / 60.0, 2e-3, 0.0, places, margins) == (0, 0)
+    assert review(bodies, table.pairs, Share(0, 1, places, margins), Limits(1.0 / 60.0, 2e-3, 0.0)) == (0, 0)
     assert table.pairs.count[0] == 0

@@ -1,4 +1,4 @@
-"""Contacts of convex polyhedra as heaps find them, against separating axes by brute force."""
+"""Contacts of convex polyhedra in sub-stepped islands, against separating axes by brute force."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.collision.contact_cache import HULLS
-from rigidimpulse.collision.contact_records import HELD, SEPARATION, SKELETON_A, SKELETON_B
+from rigidimpulse.collision.contact_records import CONTACT_MARGIN, SEPARATION, SKELETON_A, SKELETON_B
 from rigidimpulse.collision.distance.epa import EXACT
 from rigidimpulse.collision.manifold.convex_convex import SHRINK
+from rigidimpulse.collision.manifold.dispatch import HULLS
 from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
 from rigidimpulse.core.quaternion import multiply, rotate, to_matrix
 from rigidimpulse.engine.compile_scene import compile_scene
@@ -84,16 +84,16 @@ def moved_together(corners: list[np.ndarray], q: np.ndarray, way: np.ndarray, wa
 
 @pytest.mark.parametrize("wanted", [5e-3, 1e-4, -3e-3, -3e-2, -0.1, -0.2])
 def test_contacts_are_at_the_gap_of_the_best_axis(wanted):
-    # The deepest contact is at the gap of the best axis n*, but for what an edge must win over faces by: EDGE_WINS of the inner radius
-    # (0.1 to 0.2 m), 0.2 to 0.4 mm. Inside each other the axis n is the best of bodies shorter by the factor f: f s(n) + (1 - f) n.d is
-    # largest, d from centre to centre, so s(n*) - s(n) <= (1/f - 1) (n - n*).d <= (1/f - 1) (|d| - s(n*) - both inner radii): 2 mm.
-    # Where even these are inside each other the least depth is found to EXACT of the inner radius, 0.2 mm. (The deepest corner may lie
-    # beside the face that bears it, one time in 40: then the deepest point over the face counts, at a quarter less.)
-    # A wrong sign, simplex or face is off by centimetres.
+    # The deepest contact is at the gap of the best axis n*, to the amount by which an edge must win over faces: EDGE_WINS of the inner
+    # radius (0.1 to 0.2 m), 0.2 to 0.4 mm. Inside each other the axis n is the best of bodies shorter by the factor f: f s(n) + (1 - f)
+    # n.d is largest, d from centre to centre, so s(n*) - s(n) <= (1/f - 1) (n - n*).d <= (1/f - 1) (|d| - s(n*) - both inner radii): 2
+    # mm. Where even these are inside each other the least depth is found to EXACT of the inner radius, 0.2 mm. (The deepest corner may
+    # lie beside the face that bears it, one time in 40: then the deepest point over the face counts, at a quarter less.) A wrong sign,
+    # simplex or face is off by centimetres.
     beside = 0
     for seed in range(40):
         stepper, world = stepper_at(seed, wanted)
-        pairs, rows, bodies = stepper.table.pairs, stepper.table.rows, stepper.bodies
+        pairs, rows, bodies = stepper.table.pairs, stepper.table.points, stepper.bodies
         assert pairs.kind[0] == HULLS
         count, start = int(pairs.count[0]), int(pairs.start[0])
         assert 1 <= count <= 4
@@ -118,13 +118,13 @@ def test_contacts_are_at_the_gap_of_the_best_axis(wanted):
 @pytest.mark.parametrize("wanted", [3e-3, 6e-4, 1e-5])
 def test_issue_005_parallel_edges_do_not_lead_astray(wanted):
     # Corners that tie make flat simplices. Where which side of them 0 is on is left to round-off, the axis of one pair in 300 (the first
-    # four seeds here) is any other: contacts 0.1 m deep, or 0.4 mm apart too much. The gap must be that of the best axis, but for what an
-    # edge must win over faces by.
+    # four seeds here) is any other: contacts 0.1 m deep, or 0.4 mm apart too much. The gap must be that of the best axis, to the
+    # amount by which an edge must win over faces.
     for seed in (55, 128, 552, 582, *range(30)):
         stepper, _ = with_parallel_edges(seed, wanted)
-        pairs, rows = stepper.table.pairs, stepper.table.rows
+        pairs, rows = stepper.table.pairs, stepper.table.points
         start, count = int(pairs.start[0]), int(pairs.count[0])
-        gaps = rows[start : start + count, SEPARATION] + rows[start : start + count, HELD]
+        gaps = rows[start : start + count, SEPARATION] + rows[start : start + count, CONTACT_MARGIN]
         assert count > 0
         assert gaps.min() == pytest.approx(wanted, abs=EDGE_WINS * float(stepper.inner.min()) + 1e-9)
 
@@ -145,8 +145,8 @@ def test_issue_005_corner_beside_the_face_that_bears_it_has_a_contact():
     world = compile_scene(scene, ri.Accuracy(contact_solver="substepped"))
     stepper = ContactStepper(world, world.dynamic, finer=False)
     stepper.set_up(Run(world, Plan(world, []), Recorder(np.zeros(1), 2), EventLog()), np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
-    pairs, rows = stepper.table.pairs, stepper.table.rows
+    pairs, rows = stepper.table.pairs, stepper.table.points
     start, count = int(pairs.start[0]), int(pairs.count[0])
-    gaps = rows[start : start + count, SEPARATION] + rows[start : start + count, HELD]
+    gaps = rows[start : start + count, SEPARATION] + rows[start : start + count, CONTACT_MARGIN]
     assert count == 4
     assert gaps.min() == pytest.approx(-2.24e-3, abs=1e-5)

@@ -1,6 +1,6 @@
 """The sweeps find the first contact, to rounding, and never pass one.
 
-Where a closed form exists it is the law; elsewhere the least gap of the two bodies (`detect.manifold.pair_gap`, tested on its own) is
+Where a closed form exists it is the law; elsewhere the least gap of the two bodies (`manifold.dispatch.pair_gap`, tested on its own) is
 sampled along the paths. Coordinates are a few metres, so gaps are good to ROUND_OFF = 1e-13 m, way travelled included.
 """
 
@@ -39,7 +39,7 @@ def test_swapped_bodies_meet_at_the_same_time():
 
 @pytest.mark.parametrize("method", GUARDED)
 def test_ball_falls_on_a_plane(method):
-    """1/2 g t^2 = z - r - touch."""
+    """1/2 g t^2 = z - r - impact_margin."""
     pair = Pair("half space", "sphere").set(1, FREE, (0, 0, 2), acceleration=(0, 0, -9.81), spin=(3, 2, 1))
     time, status, queries, witness = pair.sweep(method, end=1.0, impact_margin=0.0)
     assert status == IMPACT
@@ -104,7 +104,7 @@ def test_bullet_against_a_thin_wall(method, name):
 @pytest.mark.parametrize("method", GUARDED)
 def test_bar_at_500_radians_per_second_meets_a_thin_post(method):
     """The side of a bar, half as wide as a, turning at w, meets a post of radius r at the distance D when
-    sin(phi - w t) = (a + r + touch) / D: here after up to half a turn, of 1.3 turns in the step. Two posts: the first one counts.
+    sin(phi - w t) = (a + r + impact_margin) / D: here after up to half a turn, of 1.3 turns in the step. Two posts: the first one counts.
     """
     names = ["bar", "post"]
     geometry = build_geometry([shape(mesh(box(2.0, 0.01, 0.01))), shape(cylinder(0.002, 1.0))])
@@ -176,7 +176,7 @@ def test_what_slides_or_rolls_at_a_gap_does_not_stall(method, floor, name):
 @pytest.mark.parametrize("method", GUARDED)
 @pytest.mark.parametrize("name", ["ball", "box", "cylinder"])
 def test_at_the_gap_of_contact(method, name):
-    """At `touch`: leaving is free until the return, hovering is free, approaching is contact at once."""
+    """At `impact_margin`: leaving is free until the return, hovering is free, approaching is contact at once."""
     impact_margin = 1e-3
     pair = Pair("half space", name)
     height = {"ball": 0.05, "box": 0.2, "cylinder": 0.4}[name] + impact_margin
@@ -189,7 +189,7 @@ def test_at_the_gap_of_contact(method, name):
     pair.set(1, FREE, (0, 0, height - 1e-16), velocity=(1, 0, -1.0))
     time, status, _, _ = pair.sweep(method, impact_margin=impact_margin)
     assert (time, status) == (0.0, TOUCHING) or (status == IMPACT and time < 1e-15)
-    # Thrown up at 1 m/s it is back after 2 v / g; and from half the gap, it passes `touch` upwards and comes down on it.
+    # Thrown up at 1 m/s it is back after 2 v / g; and from half the gap, it passes `impact_margin` upwards and comes down on it.
     pair.set(1, FREE, (0, 0, height), velocity=(1, 0, 1), acceleration=(0, 0, -9.81))
     assert pair.sweep(method, end=0.5, impact_margin=impact_margin)[0] == pytest.approx(2.0 / 9.81, abs=1e-12)
     pair.set(1, FREE, (0, 0, height - 0.5 * impact_margin), velocity=(1, 0, 1), acceleration=(0, 0, -9.81))
@@ -240,7 +240,7 @@ def test_scaling_by_a_power_of_two_changes_no_bit():
 
 
 def test_linear_may_miss_what_is_not_yet_approaching():
-    """A ball dropped from rest: the guarded sweeps find it, the linear one does not look again."""
+    """A ball dropped from rest: the safe methods find it, the linear one does not look again."""
     pair = Pair("half space", "sphere").set(1, FREE, (0, 0, 0.55), acceleration=(0, 0, -9.81))
     assert pair.sweep(linear, end=0.5)[1] == SEPARATE
     assert pair.sweep(end=0.5)[1] == IMPACT

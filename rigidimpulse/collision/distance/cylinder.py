@@ -2,8 +2,7 @@
 
     cylinder_support(axis, half_height, radius, n) -> s, the greatest n . (p - centre) over the cylinder, |n| = 1
     cylinder_triangle_distance(centre, axis, half_height, radius, triangle (3, 3), out (9,)) -> distance
-    cylinder_cylinder_distance(centre_a, axis_a, half_height_a, radius_a, centre_b, axis_b, half_height_b, radius_b,
-        out (9,)) -> distance
+    cylinder_cylinder_distance(first, second, out (9,)) -> distance, each a tuple (centre, axis, half_height, radius)
     Centres and axes are (3,) arrays or 3-tuples, axes of unit length. A triangle may be a segment (a, b, b) or a point.
     out = point on the first cylinder, point on the second shape, unit normal from first to second. Where they overlap
     the distance is 0, both points are a common one, and the normal is 0.
@@ -58,10 +57,9 @@ def cylinder_triangle_distance(centre, axis, half_height, radius, triangle, out)
 
 
 @jit_making_arrays
-def cylinder_cylinder_distance(
-    centre_a, axis_a, half_height_a, radius_a, centre_b, axis_b, half_height_b, radius_b, out
-):
+def cylinder_cylinder_distance(first, second, out):
     """Write the closest points and the normal to `out`; return the distance, 0 where they overlap."""
+    (centre_a, axis_a, half_height_a, radius_a), (centre_b, axis_b, half_height_b, radius_b) = first, second
     u, v, w = basis(axis_a)
     centre = to_frame(centre_a, u, v, w, centre_b)
     axis = to_axes(u, v, w, axis_b)

@@ -1,8 +1,8 @@
 """How deep two convex polyhedra are inside each other: the expanding polytope algorithm (van den Bergen 2001).
 
-With X_a, X_b the corners of the bodies, 0 is inside the hull of all w = y - x, and the shortest way to its surface parts the bodies.
-A polytope inside that hull, at first the tetrahedron about 0 that the algorithm of Gilbert, Johnson and Keerthi found, has a face n.w = h
-nearest to 0. The hull's farthest corner w along n is added where n.w > h: faces that it sees are replaced by those of w and the
+With X_a, X_b the corners of the bodies, 0 is inside the hull of all w = y - x. The shortest displacement to its surface separates the
+bodies. A polytope inside that hull, at first the tetrahedron about 0 that the algorithm of Gilbert, Johnson and Keerthi found, has a face
+n.w = h nearest to 0. The hull's farthest corner w along n is added where n.w > h: faces that it sees are replaced by those of w and the
 edges around them. Where n.w = h, n is the axis of least depth, and the corners of the face bear it.
 """
 
@@ -36,7 +36,7 @@ class Polytope(NamedTuple):
 
 @jit_making_arrays
 def make_polytope():
-    """Room for one pair."""
+    """Scratch memory for one pair."""
     return Polytope(
         np.empty((MOST_CORNERS, 3)), np.empty((MOST_CORNERS, 2), np.int64), np.empty((MOST_FACES, 3), np.int64), np.empty((MOST_FACES, 4)),
         np.empty((3 * MOST_FACES, 2), np.int64), np.empty(3),
@@ -91,7 +91,7 @@ def _nearest_face(polytope, faces):
 
 @jit
 def _add_corner(polytope, corners, faces):
-    """Take corner number `corners` in; returns the number of faces, 0 where there is no more room."""
+    """Take corner number `corners` in; returns the number of faces, 0 if the polytope is full."""
     w, face, plane, rim = polytope.w, polytope.face, polytope.plane, polytope.rim
     edges, f = 0, 0
     while f < faces:
@@ -126,8 +126,12 @@ def _toggle(rim, edges, i, j):
 
 
 @jit
-def least_deep(shapes, s, t, d, c, small, exact, simplex, polytope):
-    """Axis of the least depth of bodies inside each other, as `closest` gives it, from its simplex; 5 corners where there is none."""
+def least_deep(shapes, s, t, pose, small, exact, simplex, polytope):
+    """Axis of the least depth of bodies inside each other, as `closest` gives it, from its simplex; 5 corners where there is none.
+
+    pose: (d, c), see `closest`.
+    """
+    d, c = pose
     corner, w = shapes.corner, polytope.w
     a0, a1, b0, b1 = shapes.corner_first[s], shapes.corner_first[s + 1], shapes.corner_first[t], shapes.corner_first[t + 1]
     faces, gap = _start(polytope, simplex), 0.0
@@ -137,7 +141,7 @@ def least_deep(shapes, s, t, d, c, small, exact, simplex, polytope):
             return 1.0, 0.0, 0.0, 0.0, np.int64(5)
         f = _nearest_face(polytope, faces)
         x, y, z = -polytope.plane[f, 0], -polytope.plane[f, 1], -polytope.plane[f, 2]
-        i, high, j, low = farthest_of_both(corner, a0, a1, b0, b1, c, x, y, z)
+        i, high, j, low = farthest_of_both(corner, (a0, a1), (b0, b1), c, x, y, z)
         middle = d[0] * x + d[1] * y + d[2] * z
         gap = middle - low - high
         if corners == MOST_CORNERS or -(middle - small * (low + high)) <= polytope.plane[f, 3] + exact:

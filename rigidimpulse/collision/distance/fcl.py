@@ -1,8 +1,8 @@
 """Separation and overlap of two shapes, measured with FCL (the only file that uses it).
 
-Every finite ROUND primitive is a core (triangles, a segment or a point; the last two are triangles without area)
-grown by a radius. Cores go to FCL as trees of triangles, for which its distance is exact to round-off; the gap is the
-distance of the cores less both radii. Half spaces have closed forms and cylinders exact kernels of their own
+Every finite ROUND primitive is a skeleton (triangles, a segment or a point; the last two are triangles without area)
+grown by a radius. Skeletons go to FCL as trees of triangles, for which its distance is exact to round-off; the gap is the
+distance of the skeletons less both radii. Half spaces have closed forms and cylinders exact kernels of their own
 (`manifold.pair_gap`).
 
 Nothing that aborts, hangs or lies is in reach: FCL sees only unsigned distance and yes-or-no collision of non-empty
@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 
 from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, Primitive, build_geometry
-from rigidimpulse.collision.manifold.dispatch import pair_gap
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import quaternion_to_matrix
@@ -39,7 +39,7 @@ class Separation(NamedTuple):
     """How far two shapes are apart.
 
     The gap is positive if they are separate. Where they overlap it is minus the depth for half spaces, and for spheres
-    and capsules whose cores are outside the other body; otherwise it is not positive, and points and normal are NaN.
+    and capsules whose skeletons are outside the other body; otherwise it is not positive, and points and normal are NaN.
     """
 
     gap: float  # m
@@ -61,7 +61,7 @@ class _Solid(NamedTuple):
     half_spaces: list[np.ndarray]  # normal, offset
     skeletons: list[_Skeleton]
     cylinders: list[Primitive]
-    vertices: np.ndarray  # (v, 3) all corners of cores
+    vertices: np.ndarray  # (v, 3) all corners of skeletons
     radii: np.ndarray  # (v,) their radii
     parts: np.ndarray  # (k, 3) a point of each connected part
     centre: np.ndarray  # (3,) bounding sphere of what is finite
@@ -151,7 +151,7 @@ class Narrowphase:
         return best
 
     def _skeleton_separation(self, a: int, b: int, R: np.ndarray, t: np.ndarray) -> Separation:
-        """Return the least separation of pairs of cores."""
+        """Return the least separation of pairs of skeletons."""
         best = _NOTHING
         placed = fcl.Transform(R, t * self._scale)
         for skeleton_a in self._solid(a).skeletons:
@@ -192,7 +192,7 @@ class Narrowphase:
             return _NOTHING
         out = np.zeros(7)
         farthest = float(np.linalg.norm(R @ solid_b.centre + t - solid_a.centre)) + solid_a.reach + solid_b.reach
-        gap = pair_gap(self.geometry, a, np.zeros(3), np.eye(3), b, t, R, min(limit, farthest), out)
+        gap = pair_gap(self.geometry, Posed(a, np.zeros(3), np.eye(3)), Posed(b, t, R), min(limit, farthest), out)
         if gap >= limit:
             return _NOTHING
         between = out[3:6] - out[:3]

@@ -34,7 +34,7 @@ class Simplex(NamedTuple):
 
 @jit_making_arrays
 def make_simplex():
-    """Room for one pair."""
+    """Scratch memory for one pair."""
     return Simplex(
         np.zeros((4, 3)), np.zeros((4, 2), np.int64), np.zeros(4), np.zeros(4), np.zeros((3, 3)), np.zeros((3, 2), np.int64), np.zeros(4)
     )
@@ -147,7 +147,7 @@ def reduce_simplex(simplex, count):
 
 @inlined
 def _keep(simplex, count):
-    """Remember a simplex of so many corners."""
+    """Store a simplex of `count` corners."""
     for n in range(count):
         for m in range(3):
             simplex.old_w[n, m] = simplex.w[n, m]
@@ -179,13 +179,16 @@ def farthest(corner, first, last, x, y, z):
 
 
 @jit
-def farthest_of_both(corner, a0, a1, b0, b1, c, x, y, z):
-    """The corner of a farthest along (x, y, z), and how far; that of b farthest the other way, and how far."""
-    i, high = farthest(corner, a0, a1, x, y, z)
+def farthest_of_both(corner, of_a, of_b, c, x, y, z):
+    """The corner of a farthest along (x, y, z), and how far; that of b farthest the other way, and how far.
+
+    of_a, of_b: begin and end of the corners of each.
+    """
+    i, high = farthest(corner, of_a[0], of_a[1], x, y, z)
     bx, by, bz = (
         c[0, 0] * x + c[1, 0] * y + c[2, 0] * z, c[0, 1] * x + c[1, 1] * y + c[2, 1] * z, c[0, 2] * x + c[1, 2] * y + c[2, 2] * z
     )  # fmt: skip
-    j, low = farthest(corner, b0, b1, -bx, -by, -bz)
+    j, low = farthest(corner, of_b[0], of_b[1], -bx, -by, -bz)
     return i, high, j, low
 
 
@@ -200,7 +203,7 @@ def closest(shapes, s, t, d, c, small, margin, simplex):
     count, square, greatest = np.int64(0), inf, 0.0
     x, y, z, gap = d[0], d[1], d[2], 0.0
     for _ in range(MOST_ROUNDS):
-        i, high, j, low = farthest_of_both(corner, a0, a1, b0, b1, c, x, y, z)
+        i, high, j, low = farthest_of_both(corner, (a0, a1), (b0, b1), c, x, y, z)
         length = sqrt(x * x + y * y + z * z)
         if length == 0.0:
             return x, y, z, 0.0, np.int64(5)

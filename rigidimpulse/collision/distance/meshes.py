@@ -125,13 +125,13 @@ def _leaf_distance(geometry, a, b, R, t, best):
 
 
 @jit_making_arrays
-def round_round_gap(geometry, first, second, R, t, limit, stack, out):
+def round_round_gap(geometry, first, second, pose, limit, stack, out):
     """Return the least gap of two ROUND primitives, or `limit`, with `out` untouched, if it is not below.
 
-    R, t: pose of the second body in the frame of the first; out[0:6]: a closest point of each surface in that frame;
+    pose: `Pose` of the second body in the frame of the first; out[0:6]: a closest point of each surface in that frame;
     `stack`: scratch of at least `STACK_ROWS` rows. Crossing triangles have the distance 0 (gap minus both radii).
     """
-    node_min, node_max, node_child = geometry.node_min, geometry.node_max, geometry.node_child
+    node_min, node_max, node_child, R, t = geometry.node_min, geometry.node_max, geometry.node_child, pose.R, pose.t
     reach = geometry.radius[first] + geometry.radius[second]
     skeleton = limit + reach
     if skeleton <= 0.0:

@@ -172,18 +172,3 @@ def arc_miss(direction, edge_direction, normal_0, normal_1, kind):
 def in_edge_arc(direction, edge_direction, normal_0, normal_1, kind, tolerance):
     """Tell whether a unit direction across an edge misses its arc by no more than a tolerance (see `arc_miss`)."""
     return arc_miss(direction, edge_direction, normal_0, normal_1, kind)[0] <= tolerance
-
-
-@inner
-def write_contact(contact_real, contact_int, index, point_a, point_b, normal, gap, kind, feature_a, feature_b):
-    """Write a contact into a row if there is room; return `index + 1` in any case, so that the room needed is known."""
-    if index < contact_real.shape[0]:
-        for axis in range(3):
-            contact_real[index, axis] = point_a[axis]
-            contact_real[index, 3 + axis] = point_b[axis]
-            contact_real[index, 6 + axis] = normal[axis]
-        contact_real[index, 9] = gap
-        contact_int[index, 2] = kind
-        contact_int[index, 3] = feature_a
-        contact_int[index, 4] = feature_b
-    return index + 1

@@ -1,4 +1,4 @@
-"""Separating axis of two boxes, and the contacts of their faces and edges; see `heap_polyhedra` for what is found.
+"""Separating axis of two boxes, and the contacts of their faces and edges; see `polyhedra` for the method.
 
 In the axes of a, with half sides h and k, d from centre to centre and C = R_a^T R_b, the gap along a face normal of a is
 
@@ -8,18 +8,29 @@ along one of b likewise, and along the common normal of the edges e_i of a and f
 
     s_ij = (|d_i'' C_i'j - d_i' C_i''j| - h_i' |C_i''j| - h_i'' |C_i'j| - k_j' |C_ij''| - k_j'' |C_ij'|) / sqrt(1 - C_ij^2).
 
-Where a face has the largest gap, the face of the other box that looks most squarely at it is cut by its sides, in the axes of its box.
-Where two edges have it see `heap_polyhedra`.
+Where a face has the largest gap, the face of the other box that faces it most squarely is cut by its sides, in the axes of its box.
+Where two edges have it see `polyhedra`.
 """
 
 from __future__ import annotations
 
 from math import inf, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from rigidimpulse.collision.contact_records import turned, turned_back
-from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS, FROM_EDGE, MOST_CORNERS, four_of
+from rigidimpulse.collision.manifold.polyhedra import (
+    ALIKE,
+    EDGE_WINS,
+    FROM_EDGE,
+    MOST_CORNERS,
+    POINTS,
+    Query,
+    along_edges,
+    copy_contact,
+    four_of,
+)
 from rigidimpulse.core.kernels import inlined
 
 PARALLEL = 1e-6
@@ -27,16 +38,17 @@ PARALLEL = 1e-6
 SECOND_WINS = 1e-6
 """Part of the sides by which a face of b must have the larger gap."""
 OTHER = MOST_CORNERS // 2
-"""Rows of a polygon are from 0 or from here on."""
+"""A polygon lies in the scratch memory from 0 or from here on."""
 
 
 @inlined
-def box_axis(half, s, t, r, a, b, dx, dy, dz, far, c):
+def box_axis(half, pair, between, far, c):
     """The axis of largest gap: 0-2 faces of a, 3-5 of b, 6 + 3 i + j edges; and that gap, or some gap above `far`, m.
 
-    half[s], half[t] (3,) m: half sides; r[a], r[b]: rotations; d: from centre to centre, world; c (3, 3) is set to C.
+    half[s], half[t] (3,) m: half sides; between: from centre to centre, in world axes; c (3, 3) is set to C.
     """
-    d = turned_back(r, a, dx, dy, dz)
+    r, _, a, b, s, t = pair
+    d = turned_back(r, a, between[0], between[1], between[2])
     h, k = (half[s, 0], half[s, 1], half[s, 2]), (half[t, 0], half[t, 1], half[t, 2])
     for i in range(3):
         for j in range(3):
@@ -75,9 +87,9 @@ def box_axis(half, s, t, r, a, b, dx, dy, dz, far, c):
 
 @inlined
 def _cut_side(polygon, ids, base, count, axis, sign, limit, side):
-    """Keep the part of the polygon where sign times the coordinate `axis` is at most `limit`; returns its first row and number of corners.
+    """Keep the part of the polygon where sign times coordinate `axis` is at most `limit`; returns its first place and number of corners.
 
-    The polygon has `count` rows from row `base` on, and goes to the other rows (from 0 or OTHER on) where it is cut.
+    The polygon has `count` corners from place `base` on. If it is cut, the rest goes to the other places (from 0 or OTHER on).
     """
     outside = False
     for k in range(base, base + count):
@@ -103,12 +115,28 @@ def _cut_side(polygon, ids, base, count, axis, sign, limit, side):
     return OTHER - base, kept - (OTHER - base)
 
 
-@inlined
-def _facing(half, other, c, of_b, yu, yv, ym, m, sign, polygon):
-    """The face of the other box, of half sides half[other], that looks at the face of axis m: corners into polygon; returns its code.
+class _Face(NamedTuple):
+    """A face of axis m of box i, m' = u and m'' = v the other axes, and the centre y of box j along u, v and m."""
 
-    y: its centre, along m', m'' and m. Corners are written along axes m', m'' and as gaps less the half side of m, see `face_contacts`.
+    i: int
+    j: int
+    of_b: bool  # box i is b
+    u: int
+    v: int
+    m: int
+    yu: float  # m
+    yv: float
+    ym: float
+    sign: float  # 1 where the face looks along its axis, else -1
+
+
+@inlined
+def _write_facing(half, other, c, face, polygon):
+    """The face of the other box, of half sides half[other], that faces a face: writes its corners to polygon; returns its code.
+
+    Corners are written along the axes m', m'' and as gaps less the half side of m, see `face_contacts`.
     """
+    of_b, yu, yv, ym, m, sign = face.of_b, face.yu, face.yv, face.ym, face.m, face.sign
     q, most = np.int64(0), -inf
     for n in range(3):
         cosine = abs(c[n, m] if of_b else c[m, n])
@@ -134,9 +162,11 @@ def _along(r, i, axis, x, y, z):
 
 
 @inlined
-def _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon):
-    """How far corners of box j beside a face of box i come over its four sides, +m', -m', +m'', -m'', in `ahead` s: four numbers."""
-    a, b = 8 * i, 8 * j
+def _reach(pair, face, ahead, polygon):
+    """How far corners of box j come over the four sides of a face of box i, +m', -m', +m'', -m'', in `ahead` s: four numbers."""
+    velocity, r, i, u, v, m, sign = pair.velocity, pair.rotation, face.i, face.u, face.v, face.m, face.sign
+    yu, yv, ym = face.yu, face.yv, face.ym
+    a, b = 8 * i, 8 * face.j
     x, y, z = velocity[b] - velocity[a], velocity[b + 1] - velocity[a + 1], velocity[b + 2] - velocity[a + 2]
     xu, xv = _along(r, i, u, x, y, z), _along(r, i, v, x, y, z)
     x, y, z = velocity[a + 3], velocity[a + 4], velocity[a + 5]
@@ -155,30 +185,33 @@ def _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon):
 
 
 @inlined
-def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c, scratch, real, out_ids):
-    """Contacts of the face of `axis` (0-2 of a, 3-5 of b) with the face of the other box that looks at it; returns their number.
+def face_contacts(half, pair, axis, query, scratch, points):
+    """Contacts of the face of `axis` (0-2 of a, 3-5 of b) with the face of the other box that faces it; returns their number.
 
-    What is beside the face and comes over it in `ahead` s counts. between: from a to b; places are written relative to a.
+    Parts beside the face that come over it in `query.ahead` s count as well. Points are written relative to a.
     """
-    polygon, ids, _, _, ways, height, chosen = scratch
+    polygon, ids, _, _, paths, height, chosen = scratch.polygon
+    r, _, a, b, s, t = pair
+    between, (real, out_ids) = scratch.between, points
     of_b = axis >= 3
     i, j, m, own, other = (b, a, axis - 3, t, s) if of_b else (a, b, axis, s, t)
     turn, u, v = -1.0 if of_b else 1.0, (m + 1) % 3, (m + 2) % 3
     x, y, z = turn * between[0], turn * between[1], turn * between[2]
     yu, yv, ym = _along(r, i, u, x, y, z), _along(r, i, v, x, y, z), _along(r, i, m, x, y, z)
     sign = 1.0 if ym > 0.0 else -1.0
-    code = _facing(half, other, c, of_b, yu, yv, ym, m, sign, polygon)
+    face = _Face(i, j, of_b, u, v, m, yu, yv, ym, sign)
+    code = _write_facing(half, other, scratch.axes, face, polygon)
     for k in range(4):
         ids[k] = k
-    ways[0, 0], ways[1, 0], ways[2, 0], ways[3, 0] = _reach(velocity, r, i, j, yu, yv, ym, u, v, m, sign, ahead, polygon)
+    paths[0, 0], paths[1, 0], paths[2, 0], paths[3, 0] = _reach(pair, face, query.ahead, polygon)
     base, count = np.int64(0), np.int64(4)
     for side in range(4):
-        limit = half[own, u if side < 2 else v] + ways[side, 0]
+        limit = half[own, u if side < 2 else v] + paths[side, 0]
         base, count = _cut_side(polygon, ids, base, count, side // 2, 1.0 if side % 2 == 0 else -1.0, limit, side)
     kept = np.int64(0)
     for k in range(base, base + count):
         gap = polygon[k, 2] - half[own, m]
-        if gap <= margin:
+        if gap <= query.margin:
             polygon[kept, 0], polygon[kept, 1], polygon[kept, 2] = polygon[k, 0], polygon[k, 1], polygon[k, 2]
             height[kept], ids[kept] = gap, ids[k]
             kept += 1
@@ -200,11 +233,13 @@ def face_contacts(half, velocity, r, a, b, s, t, between, axis, margin, ahead, c
 
 
 @inlined
-def edge_contact(half, s, t, r, a, dx, dy, dz, axis, gap, c, work, real, ids):
-    """The contact of two edges of boxes, with the gap found for their axis; returns 1. work: room (3, 3)."""
+def edge_contact(half, pair, axis, gap, scratch, points):
+    """The contact of two edges of boxes, with the gap found for their axis; returns 1."""
+    r, _, a, _, s, t = pair
+    c, work, (real, ids) = scratch.axes, scratch.work, points
     i, j = (axis - 6) // 3, (axis - 6) % 3
     i1, i2 = (i + 1) % 3, (i + 2) % 3
-    d = turned_back(r, a, dx, dy, dz)
+    d = turned_back(r, a, scratch.between[0], scratch.between[1], scratch.between[2])
     n, p, o = work[0], work[1], work[2]
     length = sqrt(1.0 - c[i, j] * c[i, j])
     # e_i x f_j in the axes of a.
@@ -253,3 +288,29 @@ def face_along(n, c):
         if cosine > most + SECOND_WINS:
             face, most = 3 + m, cosine
     return face, most
+
+
+@inlined
+def box_box_contacts(shapes, pair, query, scratch, points):
+    """Contacts of two boxes relative to the first body; returns their number and a bound of the gap."""
+    half, c, work, ahead = shapes.half, scratch.axes, scratch.work, query.ahead
+    gap, axis = box_axis(half, pair, scratch.between, query.margin, c)
+    if gap > query.margin:
+        return np.int64(0), gap
+    cosine, edges = 1.0, axis
+    if edges >= 6:
+        edge_contact(half, pair, edges, gap, scratch, points)
+        axis, cosine = face_along(work[0], c)
+        if cosine < ALIKE:
+            return np.int64(1), gap
+        copy_contact(points, 0, POINTS)
+        # A part that hangs down beside a tilted face must not get a contact with it.
+        ahead = 0.0
+    count = face_contacts(half, pair, axis, Query(query.margin, ahead, query.size), scratch, points)
+    if edges >= 6:
+        s, t = pair.s, pair.t
+        size = min(half[s, 0], half[s, 1], half[s, 2], half[t, 0], half[t, 1], half[t, 2])
+        if not along_edges(points.real, count, POINTS, cosine, axis >= 3, gap, size):
+            copy_contact(points, POINTS, 0)
+            count = np.int64(1)
+    return count, gap

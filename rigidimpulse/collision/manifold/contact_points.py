@@ -1,4 +1,9 @@
-"""What the contact kernels of ROUND primitives share: tolerances, one body seen from the other, the rows they fill."""
+"""Contacts as kernels write them, and what the kernels of ROUND primitives share: tolerances, and one body seen from the other.
+
+A contact of two bodies a and b is a point on the surface of each, the unit normal n from a to b, and the gap g along it:
+point_b - point_a = g n. Its kind and its two features tell which vertex, edge or face of each body it belongs to. They are its id: a
+contact of the same id in the next step is the same contact (a warm start needs that).
+"""
 
 from __future__ import annotations
 
@@ -6,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import CORNER, inner, write_contact
+from rigidimpulse.collision.distance.simplices import CORNER, inner
 
 INSIDE = 1e-11
 """How far outside a face or an edge a point still counts as inside, relative to the edge."""
@@ -45,14 +50,64 @@ class View(NamedTuple):
     two_sided: bool  # the triangles bound no solid: their back is outside too
 
 
+class Pose(NamedTuple):
+    """The second body's frame in that of the first: y_first = R y_second + t."""
+
+    R: np.ndarray  # (3, 3)
+    t: np.ndarray  # (3,) m
+
+
+class Contact(NamedTuple):
+    """One contact of a first and a second body."""
+
+    point_a: tuple[float, float, float]  # on the surface of the first, m
+    point_b: tuple[float, float, float]  # on that of the second, m
+    normal: tuple[float, float, float]  # unit, from first to second
+    gap: float  # m
+    kind: int | np.integer
+    feature_a: int
+    feature_b: int
+
+
+class Contacts(NamedTuple):
+    """Buffers for contacts, and scratch memory for finding them; they belong to the caller."""
+
+    real: np.ndarray  # (c, 10) point_a (3), point_b (3), normal (3), gap; m
+    integer: np.ndarray  # (c, 5) body_a, body_b (left to the caller), kind, feature_a, feature_b
+    scratch: np.ndarray  # (p, 2) int64, p > STACK_ROWS: a stack of nodes, and pairs of leaves
+
+
+class Found(NamedTuple):
+    """The contacts of one pair of primitives, among which none is to be there twice."""
+
+    real: np.ndarray
+    integer: np.ndarray
+    first: int  # place of the pair's first contact
+
+
 @inner
-def append_contact(rows, count, point_a, point_b, normal, gap, kind, feature_a, feature_b, merge):
-    """Append a contact to `rows` (contact_real, contact_int, first row) unless it is there already.
+def write_contact(real, integer, index, contact):
+    """Write a contact at `index` if the buffer is large enough; return `index + 1` in any case, so that the size needed is known."""
+    if index < real.shape[0]:
+        for axis in range(3):
+            real[index, axis] = contact.point_a[axis]
+            real[index, 3 + axis] = contact.point_b[axis]
+            real[index, 6 + axis] = contact.normal[axis]
+        real[index, 9] = contact.gap
+        integer[index, 2] = contact.kind
+        integer[index, 3] = contact.feature_a
+        integer[index, 4] = contact.feature_b
+    return index + 1
+
+
+@inner
+def append_contact(found, count, contact, merge):
+    """Append a contact to those `found` unless it is there already; `count`: contacts in the buffer, of all pairs.
 
     Of two that coincide within `merge` [m] the one of the lower kind stays.
     """
-    real, integer, first_row = rows
-    for other in range(first_row, min(count, real.shape[0])):
+    real, integer, point_a, normal = found.real, found.integer, contact.point_a, contact.normal
+    for other in range(found.first, min(count, real.shape[0])):
         if (
             abs(real[other, 0] - point_a[0]) > merge
             or abs(real[other, 1] - point_a[1]) > merge
@@ -60,12 +115,12 @@ def append_contact(rows, count, point_a, point_b, normal, gap, kind, feature_a, 
         ):
             continue
         cosine = real[other, 6] * normal[0] + real[other, 7] * normal[1] + real[other, 8] * normal[2]
-        uncertain = kind == CORNER or integer[other, 2] == CORNER
+        uncertain = contact.kind == CORNER or integer[other, 2] == CORNER
         if cosine > (ALIKE_NORMAL if uncertain else SAME_NORMAL):
-            if kind < integer[other, 2]:
-                write_contact(real, integer, other, point_a, point_b, normal, gap, kind, feature_a, feature_b)
+            if contact.kind < integer[other, 2]:
+                write_contact(real, integer, other, contact)
             return count
-    return write_contact(real, integer, count, point_a, point_b, normal, gap, kind, feature_a, feature_b)
+    return write_contact(real, integer, count, contact)
 
 
 @inner

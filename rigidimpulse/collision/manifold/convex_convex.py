@@ -1,11 +1,11 @@
-"""Contacts of two convex polyhedra that are not both boxes: closest points, clipping, four points; see `heap_polyhedra`.
+"""Contacts of two convex polyhedra that are not both boxes: closest points, clipping, four points; see `polyhedra`.
 
-The axis of largest gap is that of the closest points (`heap_closest`). For bodies inside each other it is sought again with both taken
-smaller about their centres by SHRINK: normals of faces stay the same, and gaps are those of the true bodies along them. Where these are
-inside each other, too, the axis is that of their least depth (`heap_depth`).
+The axis of largest gap is that of the closest points (`gjk`). For bodies inside each other it is searched for again with both shrunk
+about their centres by SHRINK. Normals of faces stay the same, and gaps are those of the true bodies along them. Where the shrunk bodies
+are inside each other, too, the axis is that of their least depth (`epa`).
 
-Where a face has the largest gap, but for EDGE_WINS of the smaller inner radius, it is cut with the face that looks at it; else the
-closest points are the contact.
+Where a face has the largest gap, to EDGE_WINS of the smaller inner radius, it is cut with the face of the other body that faces it; else
+the closest points are the contact.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ import numpy as np
 from rigidimpulse.collision.contact_records import turned, turned_back
 from rigidimpulse.collision.distance.epa import EXACT, least_deep
 from rigidimpulse.collision.distance.gjk import closest, farthest
-from rigidimpulse.collision.manifold.clip import clip_faces, face_like
-from rigidimpulse.collision.manifold.polyhedra import ALIKE, EDGE_WINS, POINTS, add_contact, along_edges, copy_contact, nearest_of
+from rigidimpulse.collision.manifold.clip import Side, clip_faces, face_like
+from rigidimpulse.collision.manifold.polyhedra import ALIKE, EDGE_WINS, POINTS, Query, add_contact, along_edges, copy_contact, nearest_of
 from rigidimpulse.core.kernels import inlined, jit
 
 SHRINK = 0.012
-"""Part of their lengths by which bodies are taken smaller while their closest points are sought."""
+"""Part of their lengths by which bodies are shrunk while their closest points are searched for."""
 SECOND_WINS = 1e-6
 """Part of the inner radius by which a face of b must have the larger gap."""
 CLOSEST, CORNER, CODE = -3, -4, 4096
-"""First id of the contact of closest points, and of that of a corner and a plane; corners in a code of features."""
+"""First id of the contact of closest points, and of that of a corner and a plane; base of the code of several corners."""
 
 
 @jit
@@ -60,8 +60,9 @@ def _best_face(shapes, s, t, d, c, sign):
 
 
 @jit
-def _one_contact(shapes, rotation, a, d, c, n, gap, count, simplex, real, ids):
-    """The contact of the closest points, half-way between those of the true bodies; returns 1."""
+def _one_contact(shapes, pair, d, axis, count, scratch, points):
+    """The contact of the closest points, half-way between those of the true bodies, along axis = (n, gap); returns 1."""
+    c, simplex, rotation, a, (n, gap), (real, ids) = scratch.axes, scratch.simplex, pair.rotation, pair.a, axis, points
     code_a, code_b = np.int64(0), np.int64(0)
     middle = (0.0, 0.0, 0.0)
     for k in range(count):
@@ -91,17 +92,17 @@ def seen_from(rotation, a, b, between, c):
 
 
 @jit
-def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size, margin, ahead, c, simplex, polytope, scratch, real, ids):
-    """Contacts of two convex polyhedra relative to the first body; returns their number and a bound of the gap.
-
-    between: from a to b, world; origin: (0, 0, 0); size: smaller inner radius, m; c: room (3, 3); real, ids: POINTS + 1 rows.
-    """
+def hull_contacts(shapes, pair, query, scratch, points):
+    """Contacts of two convex polyhedra relative to the first body; returns their number and a bound of the gap."""
+    rotation, _, a, b, s, t = pair
+    margin, ahead, size = query
+    polygon, simplex, _, _, c, between, origin = scratch
     d = seen_from(rotation, a, b, between, c)
     nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0, margin, simplex)
     if count == 5:
         nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0 - SHRINK, margin, simplex)
     if count == 5:
-        nx, ny, nz, gap, count = least_deep(shapes, s, t, d, c, 1.0 - SHRINK, EXACT * size, simplex, polytope)
+        nx, ny, nz, gap, count = least_deep(shapes, s, t, (d, c), 1.0 - SHRINK, EXACT * size, simplex, scratch.polytope)
     if count == 0:
         return count, gap
     x, y, z = turned(rotation, a, nx, ny, nz)
@@ -116,31 +117,33 @@ def hull_contacts(shapes, velocity, rotation, a, b, s, t, between, origin, size,
         of_b = cosine_b > cosine + SECOND_WINS
     cosine = cosine_b if of_b else cosine
     if count < 5:
-        _one_contact(shapes, rotation, a, d, c, (nx, ny, nz), gap, count, simplex, real, ids)
-        copy_contact(real, ids, 0, POINTS)
+        _one_contact(shapes, pair, d, ((nx, ny, nz), gap), count, scratch, points)
+        copy_contact(points, 0, POINTS)
     if edges:
         if cosine < ALIKE:
             return np.int64(1), gap
-        # What hangs down beside a tilted face is not to be held up by it.
+        # A part that hangs down beside a tilted face must not get a contact with it.
         ahead = 0.0
     if of_b:
         other = _face_at(shapes, s, corner_a, rotation, a, t, b, face_b)
-        found = clip_faces(shapes, velocity, rotation, t, b, between, face_b, s, a, origin, other, margin, ahead, -1.0, scratch, real, ids)
+        own, facing = Side(t, b, between, face_b), Side(s, a, origin, other)
+        found = clip_faces(shapes, pair, own, facing, Query(margin, ahead, size), polygon, points)
     else:
         other = _face_at(shapes, t, corner_b, rotation, b, s, a, face_a)
-        found = clip_faces(shapes, velocity, rotation, s, a, origin, face_a, t, b, between, other, margin, ahead, 1.0, scratch, real, ids)
+        own, facing = Side(s, a, origin, face_a), Side(t, b, between, other)
+        found = clip_faces(shapes, pair, own, facing, Query(margin, ahead, size), polygon, points)
     if edges:
-        if not along_edges(real, found, POINTS, cosine, of_b, gap, size):
-            copy_contact(real, ids, POINTS, 0)
+        if not along_edges(points.real, found, POINTS, cosine, of_b, gap, size):
+            copy_contact(points, POINTS, 0)
             found = np.int64(1)
     elif found == 0 and max(gap_a, gap_b) <= margin:
-        # The face that looks at it lies wholly beside it.
-        face, corner, i, j = (face_b, corner_a, b, a) if gap_b > gap_a else (face_a, corner_b, a, b)
-        found = _corner_contact(shapes, rotation, face, corner, i, j, i == a, between, max(gap_a, gap_b), real, ids)
-    elif count < 5 and found > 0 and cosine >= ALIKE and nearest_of(real, found) > max(gap_a, gap_b) + EDGE_WINS * size:
-        # What is deepest lies beside the face.
-        along_edges(real, found, POINTS, cosine, of_b, gap, size)
-        found = add_contact(real, ids, found, POINTS)
+        # The other face lies completely beside it.
+        face, corner = (face_b, corner_a) if gap_b > gap_a else (face_a, corner_b)
+        found = _corner_contact(shapes, pair, face, corner, not gap_b > gap_a, (between, max(gap_a, gap_b)), points)
+    elif count < 5 and found > 0 and cosine >= ALIKE and nearest_of(points.real, found) > max(gap_a, gap_b) + EDGE_WINS * size:
+        # The deepest point lies beside the face.
+        along_edges(points.real, found, POINTS, cosine, of_b, gap, size)
+        found = add_contact(points, found, POINTS)
     return found, max(gap, gap_a, gap_b)
 
 
@@ -152,8 +155,13 @@ def _cosine(shapes, face, r, i, n):
 
 
 @jit
-def _corner_contact(shapes, rotation, face, corner, i, j, of_a, between, gap, real, ids):
-    """The contact of a corner of body j at `gap` from the plane of a face of body i; of_a: whether i is the first; returns 1."""
+def _corner_contact(shapes, pair, face, corner, of_a, apart, points):
+    """The contact of a corner of one body with the plane of a face of the other; of_a: whether the face is a's; returns 1.
+
+    apart: (from a to b in world axes, gap of the corner in m).
+    """
+    rotation, i, j = pair.rotation, pair.a if of_a else pair.b, pair.b if of_a else pair.a
+    (between, gap), (real, ids) = apart, points
     n = turned(rotation, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
     p = turned(rotation, j, shapes.corner[corner, 0], shapes.corner[corner, 1], shapes.corner[corner, 2])
     on_i, on_j, sign = (0, 3, 1.0) if of_a else (3, 0, -1.0)
@@ -167,7 +175,7 @@ def _corner_contact(shapes, rotation, face, corner, i, j, of_a, between, gap, re
 
 @jit
 def _face_at(shapes, s, corner, r, i, t, j, face):
-    """The face of shape s, turned by r[i], at one of its corners that looks most squarely at a face of shape t, turned by r[j]."""
+    """The face of shape s, turned by r[i], at one of its corners that faces most squarely a face of shape t, turned by r[j]."""
     x, y, z = turned(r, j, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
     x, y, z = turned_back(r, i, x, y, z)
     best, at = inf, shapes.face_first[s]

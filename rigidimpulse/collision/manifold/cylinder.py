@@ -1,6 +1,6 @@
-"""Contacts and least gaps of cylinders, in the frame of the cylinder's body (see `manifold`).
+"""Contacts and least gaps of cylinders, in the frame of the cylinder's body (see `dispatch`).
 
-    cylinder_half_space_contacts, cylinder_round_contacts, cylinder_cylinder_contacts    append rows, give the new count
+    cylinder_half_space_contacts, cylinder_round_contacts, cylinder_cylinder_contacts    append contacts, return the new count
     cylinder_half_space_gap, cylinder_round_gap, cylinder_cylinder_gap                   least gap below a limit
 
 Features within the margin make contacts; each normal comes from the surfaces that meet, not from the difference of
@@ -14,14 +14,13 @@ two points:
 - two cylinders: side - side as two edges; rim - cap as rim - plane; rim - side and rim - rim at the local least
   distances.
 Side against a parallel edge or side has its contacts at the ends of the overlap, which are vertices and rims. A
-sphere or capsule is its core grown by a radius; its closest point is a contact in any case. If nothing else is found,
+sphere or capsule is its skeleton grown by a radius; its closest point is a contact in any case. If nothing else is found,
 the closest pair is.
 
-The least distances of `cylinder_features` can be imported from here as well:
+The least distances of `distance.cylinder` can be imported from here as well:
     cylinder_support(axis, half_height, radius, n) -> greatest n . (p - centre)
     cylinder_triangle_distance(centre, axis, half_height, radius, triangle (3, 3), out (9,)) -> distance
-    cylinder_cylinder_distance(centre_a, axis_a, half_height_a, radius_a, centre_b, axis_b, half_height_b, radius_b,
-        out (9,)) -> distance
+    cylinder_cylinder_distance(first, second, out (9,)) -> distance, each a tuple (centre, axis, half_height, radius)
 """
 
 from __future__ import annotations
@@ -39,6 +38,7 @@ from rigidimpulse.collision.distance.cylinder import (
     to_axes,
 )
 from rigidimpulse.collision.distance.simplices import along, dot, inner, subtract
+from rigidimpulse.collision.manifold.contact_points import Found
 from rigidimpulse.collision.manifold.cylinder_rims import (
     CAP,
     RIM,
@@ -68,27 +68,27 @@ __all__ = [
 
 
 @inner
-def _plane(geometry, solid, half_space, R, t):
+def _plane(geometry, solid, half_space, pose):
     """Return the unit normal of a half space and a point on its surface, in the axes of the cylinder."""
-    normal, offset = plane_in_frame(geometry.frame, half_space, R, t)
+    normal, offset = plane_in_frame(geometry.frame, half_space, pose.R, pose.t)
     m = to_axes(solid.u, solid.v, solid.w, normal)
     return m, along(ZERO, offset - dot(normal, solid.origin), m)
 
 
 @inner
-def cylinder_half_space_contacts(geometry, cylinder, half_space, R, t, margin, contact_real, contact_int, count):
+def cylinder_half_space_contacts(geometry, cylinder, half_space, pose, margin, contacts, count):
     """Append the rim points of a cylinder within `margin` of a half space."""
     solid = solid_of(geometry.frame, geometry.radius, cylinder, margin)
-    m, a = _plane(geometry, solid, half_space, R, t)
-    rows = (contact_real, contact_int, count)
-    return rims_on_plane(solid, rows, count, m, a, a, a, WHOLE_PLANE, half_space)
+    m, a = _plane(geometry, solid, half_space, pose)
+    found = Found(contacts.real, contacts.integer, count)
+    return rims_on_plane(solid, found, count, m, (a, a, a), WHOLE_PLANE, half_space)
 
 
 @inner
-def cylinder_half_space_gap(geometry, cylinder, half_space, R, t, limit, out):
+def cylinder_half_space_gap(geometry, cylinder, half_space, pose, limit, _scratch, out):
     """Return the least gap, negative if they overlap, or `limit` with `out` untouched if it is not below."""
     solid = solid_of(geometry.frame, geometry.radius, cylinder, 0.0)
-    m, a = _plane(geometry, solid, half_space, R, t)
+    m, a = _plane(geometry, solid, half_space, pose)
     gap = -dot(m, a) - cylinder_support(AXIS, solid.half, solid.radius, m)
     if gap < limit:
         flat = hypot(m[0], m[1])
@@ -100,11 +100,11 @@ def cylinder_half_space_gap(geometry, cylinder, half_space, R, t, limit, out):
 
 
 @inner
-def cylinder_cylinder_contacts(geometry, first, second, R, t, margin, contact_real, contact_int, count):
+def cylinder_cylinder_contacts(geometry, first, second, pose, margin, contacts, count):
     """Append every touching pair of features of two cylinders."""
     solid = solid_of(geometry.frame, geometry.radius, first, margin)
-    other = carried(solid_of(geometry.frame, geometry.radius, second, margin), R, t)
-    rows = (contact_real, contact_int, count)
+    other = carried(solid_of(geometry.frame, geometry.radius, second, margin), pose.R, pose.t)
+    found = Found(contacts.real, contacts.integer, count)
     for turn in range(2):
         u, v, w = solid.u, solid.v, solid.w
         centre = to_axes(u, v, w, subtract(other.origin, solid.origin))
@@ -112,20 +112,20 @@ def cylinder_cylinder_contacts(geometry, first, second, R, t, margin, contact_re
         if turn == 0:
             distance, p, q, n = closest_sides(centre, axis, other.radius, other.half, solid.radius, solid.half)
             if 0.0 < distance <= margin:
-                count = append(solid, rows, count, p, q, n, distance, SIDE, other.feature + SIDE)
+                count = append(solid, found, count, (p, q, n, distance), SIDE, other.feature + SIDE)
         for bottom in range(2):
             sign = 1.0 - 2.0 * bottom
             outward, across = along(ZERO, sign, axis), along(ZERO, sign, y)
             middle = along(centre, other.half, outward)
             cap, rim = other.feature + CAP + bottom, other.feature + RIM + bottom
-            count = rims_on_plane(solid, rows, count, outward, middle, middle, middle, other.radius, cap)
+            count = rims_on_plane(solid, found, count, outward, (middle, middle, middle), other.radius, cap)
             for target in range(-1, 2 - 2 * turn):  # the side; in the first turn both rims as well
-                count = circle_contacts(solid, rows, count, middle, x, across, other.radius, target, rim)
+                count = circle_contacts(solid, found, count, (middle, x, across, other.radius), target, rim)
         solid, other = other, solid
-    if count == rows[2]:
+    if count == found.first:
         distance, p, q, n = _closest_pair(solid, other)
         if 0.0 < distance <= margin:
-            count = append(solid, rows, count, p, q, n, distance, SIDE, other.feature + SIDE)
+            count = append(solid, found, count, (p, q, n, distance), SIDE, other.feature + SIDE)
     return count
 
 
@@ -137,10 +137,10 @@ def _closest_pair(solid, other):
 
 
 @inner
-def cylinder_cylinder_gap(geometry, first, second, R, t, limit, out):
+def cylinder_cylinder_gap(geometry, first, second, pose, limit, _scratch, out):
     """Return the least gap, 0 if they overlap, or `limit` with `out` untouched if it is not below."""
     solid = solid_of(geometry.frame, geometry.radius, first, 0.0)
-    other = carried(solid_of(geometry.frame, geometry.radius, second, 0.0), R, t)
+    other = carried(solid_of(geometry.frame, geometry.radius, second, 0.0), pose.R, pose.t)
     distance, p, q, _ = _closest_pair(solid, other)
     if distance < limit:
         write_points(solid, p, q, out)

@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidimpulse.collision.distance.cylinder import ZERO, basis, from_axes, on_circle
 from rigidimpulse.collision.distance.simplices import along, cross, dot, inner, moved, over_triangle, row, subtract, turned
-from rigidimpulse.collision.manifold.contact_points import PENETRATION, STRICT, TILT, append_contact
+from rigidimpulse.collision.manifold.contact_points import PENETRATION, STRICT, TILT, Contact, append_contact
 
 CYLINDER_CONTACT = np.int64(5)
 """Kind of all contacts of cylinders."""
@@ -70,13 +70,14 @@ def carried(solid, R, t):
 
 
 @inner
-def append(solid, rows, count, p, q, n, gap, feature, other):
-    """Append a contact of the cylinder at p with the other body at q, given in the axes of the cylinder.
+def append(solid, found, count, touch, feature, other):
+    """Append a contact of the cylinder with another body, unless it is there already.
 
-    `feature`: number among the cylinder's; `other`: feature of the other body. Contacts that are there already are
-    left out.
+    touch: (point of the cylinder, of the other body, normal from the one to the other, gap), in the axes of the cylinder; `feature`: number
+    among the cylinder's; `other`: feature of the other body.
     """
     u, v, w = solid.u, solid.v, solid.w
+    p, q, n, gap = touch
     p = along(solid.origin, 1.0, from_axes(u, v, w, p))
     q = along(solid.origin, 1.0, from_axes(u, v, w, q))
     n = from_axes(u, v, w, n)
@@ -84,8 +85,8 @@ def append(solid, rows, count, p, q, n, gap, feature, other):
     feature += solid.feature
     if solid.second:
         n = (-n[0], -n[1], -n[2])
-        return append_contact(rows, count, q, p, n, gap, CYLINDER_CONTACT, other, feature, merge)
-    return append_contact(rows, count, p, q, n, gap, CYLINDER_CONTACT, feature, other, merge)
+        return append_contact(found, count, Contact(q, p, n, gap, CYLINDER_CONTACT, other, feature), merge)
+    return append_contact(found, count, Contact(p, q, n, gap, CYLINDER_CONTACT, feature, other), merge)
 
 
 @inner
@@ -99,11 +100,12 @@ def write_points(solid, p, q, out):
 
 
 @inner
-def rims_on_plane(solid, rows, count, m, a, b, c, bound, other):
+def rims_on_plane(solid, found, count, m, corners, bound, other):
     """Append the contacts of both rims with a plane through `a`, unit normal m out of the other body.
 
-    The plane is bounded by the triangle abc (`bound` TRIANGLE) or a circle of radius `bound` about a.
+    The plane is bounded by the triangle `corners` = (a, b, c) (`bound` TRIANGLE) or a circle of radius `bound` about a.
     """
+    a, b, c = corners
     radius, half, margin = solid.radius, solid.half, solid.margin
     border = BORDER * (radius + half)
     deepest = -inf if bound == WHOLE_PLANE else -PENETRATION * (radius + half)
@@ -132,7 +134,7 @@ def rims_on_plane(solid, rows, count, m, a, b, c, bound, other):
             elif bound < WHOLE_PLANE and dot(subtract(q, a), subtract(q, a)) > (bound + border) ** 2:
                 continue
             feature = LOWEST + bottom if k == 0 else FIXED + RIM_POINTS * bottom + k - 1
-            count = append(solid, rows, count, p, q, (-m[0], -m[1], -m[2]), gap, feature, other)
+            count = append(solid, found, count, (p, q, (-m[0], -m[1], -m[2]), gap), feature, other)
     return count
 
 
@@ -171,8 +173,8 @@ def closest_to_ring(centre, u, v, rim_radius, s, radius, level, axial):
 def ring_contact(q, tangent, curvature, solid, level, skeleton):
     """Return (found, p, normal, distance) for the point q of a curve that is locally closest to a rim.
 
-    `core`: radius by which the curve is grown. The normal lies between those of cap and side; distance and q are of
-    the core.
+    `skeleton`: radius by which the curve is grown. The normal lies between those of cap and side; distance and q are of
+    the skeleton.
     """
     rho = hypot(q[0], q[1])
     out = (q[0] / rho, q[1] / rho, 0.0)
@@ -195,11 +197,12 @@ def ring_contact(q, tangent, curvature, solid, level, skeleton):
 
 
 @inner
-def circle_contacts(solid, rows, count, centre, u, v, rim_radius, bottom, other):
+def circle_contacts(solid, found, count, circle, bottom, other):
     """Append the contacts of another cylinder's rim with the side (`bottom` -1) or a rim (0 top, 1 bottom) of this one.
 
-    centre, u, v, rim_radius: the other rim, with u x v out of its cap; `other`: feature of its rim.
+    circle: (centre, u, v, radius) of the other rim, with u x v out of its cap; `other`: feature of its rim.
     """
+    centre, u, v, rim_radius = circle
     radius, half, margin = solid.radius, solid.half, solid.margin
     beside = max(0.0, hypot(centre[0], centre[1]) - radius)
     if hypot(beside, max(0.0, abs(centre[2]) - half)) > margin + rim_radius:
@@ -227,12 +230,12 @@ def circle_contacts(solid, rows, count, centre, u, v, rim_radius, bottom, other)
                 n = (q[0] / rho, q[1] / rho, 0.0)
                 gap = rho - radius
                 p = (radius * n[0], radius * n[1], q[2])
-                found = abs(q[2]) <= half * (1.0 + BORDER) and -PENETRATION * radius <= gap <= margin
+                met = abs(q[2]) <= half * (1.0 + BORDER) and -PENETRATION * radius <= gap <= margin
                 feature, going_out = SIDE, dot(cross(outward, q), (0.0, 0.0, 1.0)) > 0.0
             else:
-                found, p, n, gap = ring_contact(q, tangent, bend, solid, level, 0.0)
+                met, p, n, gap = ring_contact(q, tangent, bend, solid, level, 0.0)
                 feature, going_out = RIM + bottom, dot(tangent, q) - tangent[2] * q[2] > 0.0
             in_arc = dot(n, inward) >= -solid.tilt * rim_radius and dot(n, outward) <= solid.tilt
-            if found and in_arc and gap <= margin:
-                count = append(solid, rows, count, p, q, n, gap, feature, other + (2 if going_out else 0))
+            if met and in_arc and gap <= margin:
+                count = append(solid, found, count, (p, q, n, gap), feature, other + (2 if going_out else 0))
     return count

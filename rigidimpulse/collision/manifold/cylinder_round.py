@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rigidimpulse.collision.distance.cylinder import ZERO, closest_on_curve, closest_on_triangle, from_axes, to_axes
 from rigidimpulse.collision.distance.simplices import along, dot, edge_normals, in_edge_arc, inner, row, subtract
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
-from rigidimpulse.collision.manifold.contact_points import PENETRATION
+from rigidimpulse.collision.manifold.contact_points import PENETRATION, Found
 from rigidimpulse.collision.manifold.cylinder_rims import (
     BORDER,
     RIM,
@@ -34,6 +34,16 @@ class _View(NamedTuple):
     z: tuple[float, float, float]  # also the cylinder's axis in the frame of the primitive
     shift: tuple[float, float, float]
     centre: tuple[float, float, float]
+
+
+class _Edge(NamedTuple):
+    """An edge a + t d of a ROUND primitive in the axes of the cylinder, grown by a radius."""
+
+    a: tuple[float, float, float]
+    d: tuple[float, float, float]
+    arc: tuple[tuple[float, float, float], tuple[float, float, float]]  # normals of its faces
+    kind: int
+    skeleton: float  # the radius, m
 
 
 @inner
@@ -96,13 +106,13 @@ def _corner_gap(solid, a, b, c):
 
 
 @inner
-def cylinder_round_contacts(geometry, cylinder, round_, R, t, margin, stack, contact_real, contact_int, count):
-    """Append every touching pair of features of a cylinder and a ROUND primitive; `stack` (n, 2) is scratch."""
+def cylinder_round_contacts(geometry, cylinder, round_, pose, margin, contacts, count):
+    """Append every touching pair of features of a cylinder and a ROUND primitive."""
     vertex, edge_kind = geometry.vertex, geometry.edge_kind
     solid = solid_of(geometry.frame, geometry.radius, cylinder, margin)
-    view = _view(solid, R, t)
-    skeleton = geometry.radius[round_]
-    rows = (contact_real, contact_int, count)
+    view = _view(solid, pose.R, pose.t)
+    skeleton, stack = geometry.radius[round_], contacts.scratch
+    found = Found(contacts.real, contacts.integer, count)
     stack[0, 0] = geometry.node_first[round_]
     depth = 1
     while depth > 0:
@@ -127,28 +137,30 @@ def cylinder_round_contacts(geometry, cylinder, round_, R, t, margin, stack, con
             owns = geometry.triangle_owns[triangle] >> k
             corner, edge = geometry.triangle[triangle, k], geometry.triangle_edge[triangle, k]
             if owns & 1 and geometry.vertex_corner[corner]:
-                count = _vertex_contact(geometry, solid, view, rows, count, corner, skeleton)
+                count = _vertex_contact(geometry, solid, view, found, count, corner, skeleton)
             if owns >> 3 & 1 and edge_kind[edge] != EDGE_HIDDEN:
                 tail = _seen(view, row(vertex, geometry.edge[edge, 0]))
                 d = subtract(_seen(view, row(vertex, geometry.edge[edge, 1])), tail)
                 normal_0, normal_1 = edge_normals(geometry.edge_normal, edge)
                 arc = (to_axes(view.x, view.y, view.z, normal_0), to_axes(view.x, view.y, view.z, normal_1))
-                count = _edge_contacts(solid, rows, count, tail, d, arc, edge_kind[edge], skeleton, 3 * edge + 1)
+                seen_edge = _Edge(tail, d, arc, edge_kind[edge], skeleton)
+                count = _edge_contacts(solid, found, count, seen_edge, 3 * edge + 1)
             if skeleton == 0.0 and k < (1 if geometry.closed[round_] else 2):  # an open surface has two sides
                 m = to_axes(view.x, view.y, view.z, row(geometry.triangle_normal, triangle))
                 m = along(ZERO, 1.0 - 2.0 * k, m)
-                count = rims_on_plane(solid, rows, count, m, a, b, c, TRIANGLE, 3 * triangle + 2)
+                count = rims_on_plane(solid, found, count, m, (a, b, c), TRIANGLE, 3 * triangle + 2)
                 a, b = b, a
-    if skeleton > 0.0 or count == rows[2]:  # the closest point of a smooth body is a contact in any case
+    if skeleton > 0.0 or count == found.first:  # the closest point of a smooth body is a contact in any case
         pair, triangle = _closest_triangle(geometry, solid, view, round_, margin + skeleton, stack)
         distance, p, q, n = pair
         if triangle >= 0 and dot(n, n) > 0.0:
-            count = append(solid, rows, count, p, along(q, -skeleton, n), n, distance - skeleton, SIDE, 3 * triangle + 2)
+            touch = (p, along(q, -skeleton, n), n, distance - skeleton)
+            count = append(solid, found, count, touch, SIDE, 3 * triangle + 2)
     return count
 
 
 @inner
-def _vertex_contact(geometry, solid, view, rows, count, vertex, skeleton):
+def _vertex_contact(geometry, solid, view, found, count, vertex, skeleton):
     """Append the contact of a vertex if no edge that leaves it comes closer; over a cap that needs not be so."""
     q = _seen(view, row(geometry.vertex, vertex))
     border = BORDER * solid.radius
@@ -170,12 +182,13 @@ def _vertex_contact(geometry, solid, view, rows, count, vertex, skeleton):
         length = sqrt(dot(leaving, leaving))
         if not flat and dot(n, leaving) < -min(solid.margin, solid.tilt * length):
             return count
-    return append(solid, rows, count, p, along(q, -skeleton, n), n, distance - skeleton, RIM, 3 * vertex)
+    return append(solid, found, count, (p, along(q, -skeleton, n), n, distance - skeleton), RIM, 3 * vertex)
 
 
 @inner
-def _edge_contacts(solid, rows, count, a, d, arc, kind, skeleton, other):
-    """Append the contacts of an edge a + t d with the side and the rims; `arc`: normals of its faces."""
+def _edge_contacts(solid, found, count, edge, other):
+    """Append the contacts of an edge with the side and the rims."""
+    a, d, arc, kind, skeleton = edge
     radius, half, reach = solid.radius, solid.half, solid.margin + skeleton
     length = sqrt(dot(d, d))
     direction = along(ZERO, 1.0 / length, d)
@@ -189,7 +202,7 @@ def _edge_contacts(solid, rows, count, a, d, arc, kind, skeleton, other):
         n = (q[0] / rho, q[1] / rho, 0.0)
         if in_edge_arc((-n[0], -n[1], 0.0), direction, arc[0], arc[1], kind, solid.tilt):
             p = (radius * n[0], radius * n[1], q[2])
-            count = append(solid, rows, count, p, along(q, -skeleton, n), n, rho - radius - skeleton, SIDE, other)
+            count = append(solid, found, count, (p, along(q, -skeleton, n), n, rho - radius - skeleton), SIDE, other)
     chord = sqrt((radius - rho) * (radius + rho) / across) if rho < radius and across > 0.0 else 0.0
     steep = d[2] * d[2] >= across
     for start in range(4):  # both rims; both places where a shallow line crosses the side
@@ -203,16 +216,16 @@ def _edge_contacts(solid, rows, count, a, d, arc, kind, skeleton, other):
         if curvature < 0.0 or not 0.0 < t < 1.0:
             continue
         q = along(a, t, d)
-        found, p, n, distance = ring_contact(q, d, curvature, solid, level, skeleton)
-        if found and in_edge_arc((-n[0], -n[1], -n[2]), direction, arc[0], arc[1], kind, solid.tilt):
+        met, p, n, distance = ring_contact(q, d, curvature, solid, level, skeleton)
+        if met and in_edge_arc((-n[0], -n[1], -n[2]), direction, arc[0], arc[1], kind, solid.tilt):
             feature = RIM + (0 if start < 2 else 1) + (2 if q[0] * d[0] + q[1] * d[1] > 0.0 else 0)
-            count = append(solid, rows, count, p, along(q, -skeleton, n), n, distance - skeleton, feature, other)
+            count = append(solid, found, count, (p, along(q, -skeleton, n), n, distance - skeleton), feature, other)
     return count
 
 
 @inner
 def _closest_triangle(geometry, solid, view, round_, limit, stack):
-    """Return the closest pair of the cylinder and a core, and its triangle, -1 if it is not below `limit`."""
+    """Return the closest pair of the cylinder and a skeleton, and its triangle, -1 if it is not below `limit`."""
     best, near = (limit, ZERO, ZERO, ZERO), -1
     stack[0, 0] = geometry.node_first[round_]
     depth = 1
@@ -240,11 +253,11 @@ def _closest_triangle(geometry, solid, view, round_, limit, stack):
 
 
 @inner
-def cylinder_round_gap(geometry, cylinder, round_, R, t, limit, stack, out):
-    """Return the least gap, minus the radius if the core is inside; `limit` with `out` untouched if not below."""
+def cylinder_round_gap(geometry, cylinder, round_, pose, limit, stack, out):
+    """Return the least gap, minus the radius if the skeleton is inside; `limit` with `out` untouched if not below."""
     solid = solid_of(geometry.frame, geometry.radius, cylinder, 0.0)
     skeleton = geometry.radius[round_]
-    pair, near = _closest_triangle(geometry, solid, _view(solid, R, t), round_, limit + skeleton, stack)
+    pair, near = _closest_triangle(geometry, solid, _view(solid, pose.R, pose.t), round_, limit + skeleton, stack)
     if near < 0:
         return limit
     distance, p, q, n = pair

@@ -1,48 +1,42 @@
-"""Contacts of two shapes: dispatch over their primitives and kinds, world frame, reduction for solving.
+"""Contacts and gaps of two shapes: the ONE table of the kernels for every pair of kinds, and the kernels that ask it.
 
-The buffers belong to the caller:
-    contact_real (cap, 10)     point_a on the surface of a, point_b on that of b, unit normal from a to b, gap; world, m
-    contact_int (cap, 5)       body_a, body_b (left to the caller), kind, feature_a, feature_b (see `features`)
-    scratch_pairs (P, 2)       int64, P > STACK_ROWS; `SCRATCH_ROWS` serves well
+A shape is a list of primitives: half spaces, ROUND primitives (triangles, a segment or a point, grown by a radius) and cylinders. Shapes of
+one primitive may belong to a closer kind: BALL (a ROUND primitive of one point), POLYHEDRON (convex, with sharp edges, around its centre of
+mass) and BOX (a polyhedron along the principal axes). `TABLE` lists for each pair of kinds, the higher kind first, the kernel that finds
+its contacts and the one that measures its least gap. Two dispatching kernels ask it:
 
-Kernels of a pair of primitives work in the frame of their FIRST primitive's body. `R` (3, 3) and `t` (3,) carry the
-second body's frame into it, y_first = R y_second + t; points, normal (from first to second) and gap are given in that
-frame. They append rows with `features.write_contact`, which goes on counting when the buffer is full, and return the
-new count:
-    round_half_space_contacts(geometry, first, second, R, t, margin, scratch_pairs, contact_real, contact_int, count)
-    round_round_contacts(geometry, first, second, R, t, margin, scratch_pairs, contact_real, contact_int, count)
-    cylinder_half_space_contacts(geometry, first, second, R, t, margin, contact_real, contact_int, count)
-    cylinder_round_contacts(geometry, first, second, R, t, margin, scratch_pairs, contact_real, contact_int, count)
-    cylinder_cylinder_contacts(geometry, first, second, R, t, margin, contact_real, contact_int, count)
-where `first` and `second` are absolute indices of primitives, of the kinds that the name tells. Least distances
-return the gap, or `limit` with `out` untouched where the gap is not below it; out[0:3], out[3:6] are points of the
-first and the second surface:
-    round_half_space_gap, round_round_gap, cylinder_round_gap(geometry, first, second, R, t, limit, scratch_pairs, out)
-    cylinder_half_space_gap, cylinder_cylinder_gap(geometry, first, second, R, t, limit, out)
+- `convex_contacts`: pairs of the kinds BOX and POLYHEDRON, and of a POLYHEDRON and a half space, for gaps of EITHER sign. The sub-stepped
+  regime finds the contacts of such pairs with it (`contact_cache`).
+- `pair_contacts`, and `pair_gap` for the least gap: any two shapes, primitive by primitive. Bodies are taken to be apart; overlap keeps its
+  meaning (gap < 0, the right normal) for half spaces, and for spheres and capsules until an axis is touched. The exact regime uses them for
+  all pairs, the sub-stepped regime for the pairs that are left, with smaller shapes (`contact_update`).
+
+Numba cannot call a function by a number that it knows only at run time. So each dispatching kernel has one chain of tests, in the order
+of the table, and takes its kernels from there.
+
+Kernels for primitives work in the frame of the FIRST primitive's body. `pose` carries the second body's frame into it. Points, normal (from
+first to second) and gap are given in that frame:
+    ..._contacts(geometry, first, second, pose, margin, contacts, count) -> new count, which goes on when the buffers are full
+    ..._gap(geometry, first, second, pose, limit, scratch, out) -> gap, or `limit` with `out` untouched where the gap is not below it;
+        out[0:3], out[3:6] are points of the first and the second surface
+where `first` and `second` are numbers of primitives of the kinds that the name tells. Kernels for convex shapes have the signature
+    ..._contacts(shapes, pair, query, scratch, points) -> number of contacts, bound of the gap
+with the records of `polyhedra`.
 """
 
 from __future__ import annotations
 
-from math import cos, pi, sin, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rigidimpulse.collision.bvh import STACK_ROWS
 from rigidimpulse.collision.distance.meshes import round_round_gap
-from rigidimpulse.collision.distance.simplices import (
-    FACE_VERTEX,
-    VERTEX_FACE,
-    along,
-    cross,
-    dot,
-    inner,
-    moved,
-    relative_pose,
-    row,
-    turned,
-    write_contact,
-)
+from rigidimpulse.collision.distance.simplices import FACE_VERTEX, VERTEX_FACE, inner, moved, relative_pose, turned
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND
+from rigidimpulse.collision.manifold.box_box import box_box_contacts
+from rigidimpulse.collision.manifold.contact_points import Contact, Pose, write_contact
+from rigidimpulse.collision.manifold.convex_convex import hull_contacts
 from rigidimpulse.collision.manifold.cylinder import (
     cylinder_cylinder_contacts,
     cylinder_cylinder_gap,
@@ -52,235 +46,275 @@ from rigidimpulse.collision.manifold.cylinder import (
     cylinder_round_gap,
 )
 from rigidimpulse.collision.manifold.mesh_mesh import round_round_contacts
-from rigidimpulse.collision.manifold.plane import round_half_space_contacts, round_half_space_gap, sphere_sphere_contact
-from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.collision.manifold.plane import round_half_space_contacts, round_half_space_gap, sphere_sphere_contacts
+from rigidimpulse.collision.manifold.polyhedra import polyhedron_half_space_contacts
+from rigidimpulse.collision.manifold.reduce import MAX_PER_NORMAL, reduce_contacts
+from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 
 SCRATCH_ROWS = 8 * STACK_ROWS
-"""Rows of `scratch_pairs` that serve well; it needs more than `STACK_ROWS`."""
+"""A good size of `Contacts.scratch`; it must be larger than `STACK_ROWS`."""
 
-MAX_PER_NORMAL = 8
-"""Directions in which the extreme contacts of one normal are kept."""
-SAME_PATCH = 0.999
-"""Cosine of the angle below which normals belong to one wall."""
-TIE = 1e-9
-"""Difference of two positions along a direction, relative to the extent, below which they are equally extreme."""
-STEEP = 0.77
-"""|n_z| from which on the tangents of a normal are built on x instead of z (no common slope has this value)."""
+BALL, POLYHEDRON, BOX = 3, 4, 5
+"""Kinds of whole shapes, beside the kinds of primitives HALF_SPACE, ROUND and CYLINDER."""
+
+
+class PairKernels(NamedTuple):
+    """What is known of a pair of kinds."""
+
+    contacts: Any
+    gap: Any
+
+
+TABLE = {
+    (BOX, BOX): PairKernels(box_box_contacts, None),
+    (POLYHEDRON, HALF_SPACE): PairKernels(polyhedron_half_space_contacts, None),
+    (POLYHEDRON, POLYHEDRON): PairKernels(hull_contacts, None),
+    (BALL, BALL): PairKernels(sphere_sphere_contacts, round_round_gap),
+    (ROUND, ROUND): PairKernels(round_round_contacts, round_round_gap),
+    (ROUND, HALF_SPACE): PairKernels(round_half_space_contacts, round_half_space_gap),
+    (CYLINDER, HALF_SPACE): PairKernels(cylinder_half_space_contacts, cylinder_half_space_gap),
+    (CYLINDER, ROUND): PairKernels(cylinder_round_contacts, cylinder_round_gap),
+    (CYLINDER, CYLINDER): PairKernels(cylinder_cylinder_contacts, cylinder_cylinder_gap),
+}
+"""The kernels of every pair of kinds. A BOX is a POLYHEDRON, a POLYHEDRON and a BALL are ROUND: the first pair that fits counts."""
+
+BOXES, PLANE, GENERAL, HULLS = 0, 1, 2, 3
+"""Kinds of pairs of bodies: (BOX, BOX), (POLYHEDRON, HALF_SPACE), any other pair, (POLYHEDRON, POLYHEDRON)."""
+MOST_HULL_CORNERS = 256
+"""Most corners of a polyhedron among which the farthest one is found by trying all."""
+
+# Numba takes kernels from names of the module only.
+_box_box, _polyhedron_half_space = TABLE[BOX, BOX].contacts, TABLE[POLYHEDRON, HALF_SPACE].contacts
+_polyhedron_polyhedron = TABLE[POLYHEDRON, POLYHEDRON].contacts
+_ball_ball = TABLE[BALL, BALL].contacts
+_round_round, _round_round_gap = TABLE[ROUND, ROUND]
+_round_half_space, _round_half_space_gap = TABLE[ROUND, HALF_SPACE]
+_cylinder_half_space, _cylinder_half_space_gap = TABLE[CYLINDER, HALF_SPACE]
+_cylinder_round, _cylinder_round_gap = TABLE[CYLINDER, ROUND]
+_cylinder_cylinder, _cylinder_cylinder_gap = TABLE[CYLINDER, CYLINDER]
+
+
+class Posed(NamedTuple):
+    """A shape at a place."""
+
+    shape: int
+    position: np.ndarray  # (3,) m, of the principal frame
+    rotation: np.ndarray  # (3, 3)
+
+
+class PairQuery(NamedTuple):
+    """Pairs of bodies (k,) whose contacts are wanted."""
+
+    a: np.ndarray  # (k,)
+    b: np.ndarray  # (k,)
+    margin: np.ndarray  # (k,) m, greatest gap
+
+
+@inlined
+def is_half_space(half_space, s):
+    """Whether shape s is a half space."""
+    return half_space[s, 0] != 0.0 or half_space[s, 1] != 0.0 or half_space[s, 2] != 0.0
+
+
+@inlined
+def num_corners(shapes, s):
+    """Number of corners of shape s."""
+    return shapes.corner_first[s + 1] - shapes.corner_first[s]
+
+
+@inlined
+def pair_kind(shapes, s, t):
+    """Kind of a pair of bodies with the shapes s and t, of `Polyhedra`."""
+    solid_s, solid_t = shapes.face_first[s] < shapes.face_first[s + 1], shapes.face_first[t] < shapes.face_first[t + 1]
+    half_space_s, half_space_t = is_half_space(shapes.half_space, s), is_half_space(shapes.half_space, t)
+    if shapes.half[s, 0] > 0.0 and shapes.half[t, 0] > 0.0:
+        return BOXES
+    if (solid_s and half_space_t) or (half_space_s and solid_t):
+        return PLANE
+    if solid_s and solid_t and max(num_corners(shapes, s), num_corners(shapes, t)) <= MOST_HULL_CORNERS:
+        return HULLS
+    return GENERAL
+
+
+@inlined
+def convex_contacts(kind, shapes, pair, query, scratch, points):
+    """Contacts of two convex bodies, relative to the first, for a gap of either sign; returns their number and a bound of the gap.
+
+    kind: of the pair, not GENERAL.
+    """
+    if kind == PLANE:
+        count, gap = _polyhedron_half_space(shapes, pair, query, scratch, points)
+    elif kind == HULLS:
+        count, gap = _polyhedron_polyhedron(shapes, pair, query, scratch, points)
+    else:
+        count, gap = _box_box(shapes, pair, query, scratch, points)
+    return count, gap
 
 
 @inner
-def _out_of_reach(bound_centre, bound_radius, a, b, R, t, margin):
+def _out_of_reach(geometry, p, q, pose, margin):
     """Tell whether the bounding spheres of two primitives are farther apart than `margin`."""
+    bound_centre, bound_radius, R, t = geometry.bound_centre, geometry.bound_radius, pose.R, pose.t
     squared = 0.0
     for i in range(3):
-        offset = t[i] - bound_centre[a, i]
+        offset = t[i] - bound_centre[p, i]
         for k in range(3):
-            offset += R[i, k] * bound_centre[b, k]
+            offset += R[i, k] * bound_centre[q, k]
         squared += offset * offset
-    reach = margin + bound_radius[a] + bound_radius[b]
+    reach = margin + bound_radius[p] + bound_radius[q]
     return reach < 0.0 or squared > reach * reach
 
 
 @inner
-def _rows_to_world(contact_real, contact_int, start, end, R, x, swapped):
-    """Move rows from a body's frame into the world; where first and second are b and a, swap them."""
+def _to_world(contacts, start, end, first, swapped):
+    """Move contacts from the frame of the posed body `first` into the world; where first and second are b and a, swap them."""
+    real, integer, R, x = contacts.real, contacts.integer, first.rotation, first.position
     for i in range(start, end):
-        point_a = moved(R, x, (contact_real[i, 0], contact_real[i, 1], contact_real[i, 2]))
-        point_b = moved(R, x, (contact_real[i, 3], contact_real[i, 4], contact_real[i, 5]))
-        normal = turned(R, (contact_real[i, 6], contact_real[i, 7], contact_real[i, 8]))
-        gap, kind, feature_a, feature_b = contact_real[i, 9], contact_int[i, 2], contact_int[i, 3], contact_int[i, 4]
+        point_a = moved(R, x, (real[i, 0], real[i, 1], real[i, 2]))
+        point_b = moved(R, x, (real[i, 3], real[i, 4], real[i, 5]))
+        normal = turned(R, (real[i, 6], real[i, 7], real[i, 8]))
+        gap, kind, feature_a, feature_b = real[i, 9], integer[i, 2], integer[i, 3], integer[i, 4]
         if swapped:
             point_a, point_b = point_b, point_a
             normal = (-normal[0], -normal[1], -normal[2])
             feature_a, feature_b = feature_b, feature_a
             if kind == VERTEX_FACE or kind == FACE_VERTEX:
                 kind = VERTEX_FACE + FACE_VERTEX - kind
-        write_contact(contact_real, contact_int, i, point_a, point_b, normal, gap, kind, feature_a, feature_b)
+        write_contact(real, integer, i, Contact(point_a, point_b, normal, gap, kind, feature_a, feature_b))
 
 
-@jit_making_arrays
-def pair_contacts(
-    geometry, shape_a, x_a, R_a, shape_b, x_b, R_b, margin, scratch_pairs, contact_real, contact_int, count, cylinders=1
-):
-    """Append every touching pair of features of two shapes with gap <= margin [m].
+@inner
+def _is_point(geometry, primitive):
+    """Whether a ROUND primitive is one point with a radius."""
+    return geometry.vertex_first[primitive + 1] == geometry.vertex_first[primitive] + 1
 
-    x (3,), R (3, 3): poses of the principal frames; `count`: rows in use; buffers: see the top of this module;
-    `cylinders`: None where no shape is a cylinder, which then is not compiled either. Returns the new count, or minus
-    the rows needed if there are fewer: then the rows from `count` on mean nothing.
 
-    Bodies are taken to be apart. Overlap keeps its meaning (gap < 0, the right normal) for half spaces, and for spheres
-    and capsules until an axis is touched; meshes allow only what round-off makes.
+@inner
+def _cylinder_contacts(cylinders, geometry, i, j, pose, margin, contacts, count):
+    """Append the contacts of a cylinder i with the primitive j.
+
+    cylinders: None where the scene has no cylinder. Numba removes a branch on an argument that is None before it compiles what is in it.
     """
-    kind, radius = geometry.kind, geometry.radius
-    R, t, R_back, t_back = _relative_poses(x_a, R_a, x_b, R_b)
-    for a in range(geometry.shape_first[shape_a], geometry.shape_first[shape_a + 1]):
-        for b in range(geometry.shape_first[shape_b], geometry.shape_first[shape_b + 1]):
-            if _out_of_reach(geometry.bound_centre, geometry.bound_radius, a, b, R, t, margin):
-                continue
-            start = count
-            swapped = kind[b] > kind[a]
-            i, j = (b, a) if swapped else (a, b)  # the kind of i is not below that of j
-            U, s = (R_back, t_back) if swapped else (R, t)
-            if kind[i] == ROUND and kind[j] == ROUND:
-                p, q = geometry.vertex_first[i], geometry.vertex_first[j]
-                if geometry.vertex_first[i + 1] == p + 1 and geometry.vertex_first[j + 1] == q + 1:
-                    centre_a = row(geometry.vertex, p)
-                    centre_b = moved(U, s, row(geometry.vertex, q))
-                    count = sphere_sphere_contact(
-                        centre_a, radius[i], p, centre_b, radius[j], q, margin, contact_real, contact_int, count
-                    )
-                else:
-                    count = round_round_contacts(
-                        geometry, i, j, U, s, margin, scratch_pairs, contact_real, contact_int, count
-                    )
-            elif kind[i] == ROUND:
-                count = round_half_space_contacts(
-                    geometry, i, j, U, s, margin, scratch_pairs, contact_real, contact_int, count
-                )
-            elif cylinders is not None:
-                if kind[i] == CYLINDER and kind[j] == HALF_SPACE:
-                    count = cylinder_half_space_contacts(geometry, i, j, U, s, margin, contact_real, contact_int, count)
-                elif kind[i] == CYLINDER and kind[j] == ROUND:
-                    count = cylinder_round_contacts(
-                        geometry, i, j, U, s, margin, scratch_pairs, contact_real, contact_int, count
-                    )
-                elif kind[i] == CYLINDER:
-                    count = cylinder_cylinder_contacts(geometry, i, j, U, s, margin, contact_real, contact_int, count)
-            end = min(count, contact_real.shape[0])
-            R_first, x_first = (R_b, x_b) if swapped else (R_a, x_a)
-            _rows_to_world(contact_real, contact_int, start, end, R_first, x_first, swapped)
-    return count if count <= contact_real.shape[0] else -count
+    if cylinders is None:
+        return count
+    if geometry.kind[j] == HALF_SPACE:
+        return _cylinder_half_space(geometry, i, j, pose, margin, contacts, count)
+    if geometry.kind[j] == ROUND:
+        return _cylinder_round(geometry, i, j, pose, margin, contacts, count)
+    return _cylinder_cylinder(geometry, i, j, pose, margin, contacts, count)
+
+
+@inner
+def _primitive_contacts(shapes, i, j, pose, margin, contacts, count):
+    """Append the contacts of two primitives; the kind of i is not below that of j."""
+    geometry, kind = shapes.geometry, shapes.geometry.kind
+    if kind[i] == ROUND and kind[j] == ROUND:
+        if _is_point(geometry, i) and _is_point(geometry, j):
+            return _ball_ball(geometry, i, j, pose, margin, contacts, count)
+        return _round_round(geometry, i, j, pose, margin, contacts, count)
+    if kind[i] == ROUND:
+        return _round_half_space(geometry, i, j, pose, margin, contacts, count)
+    if kind[i] == CYLINDER:
+        return _cylinder_contacts(shapes.cylinders, geometry, i, j, pose, margin, contacts, count)
+    return count
+
+
+@inner
+def _primitive_gap(geometry, i, j, pose, limit, scratch, out):
+    """Return the least gap of two primitives, or `limit`; the kind of i is not below that of j."""
+    kind = geometry.kind
+    if kind[i] == ROUND and kind[j] == ROUND:
+        return _round_round_gap(geometry, i, j, pose, limit, scratch, out)
+    if kind[i] == ROUND:
+        return _round_half_space_gap(geometry, i, j, pose, limit, scratch, out)
+    if kind[i] == CYLINDER and kind[j] == HALF_SPACE:
+        return _cylinder_half_space_gap(geometry, i, j, pose, limit, scratch, out)
+    if kind[i] == CYLINDER and kind[j] == ROUND:
+        return _cylinder_round_gap(geometry, i, j, pose, limit, scratch, out)
+    if kind[i] == CYLINDER:
+        return _cylinder_cylinder_gap(geometry, i, j, pose, limit, scratch, out)
+    return limit
 
 
 @jit_making_arrays
-def _relative_poses(x_a, R_a, x_b, R_b):
-    """Return R, t with y_a = R y_b + t and the pose the other way."""
+def _relative_poses(a, b):
+    """Return the `Pose` of b in the frame of a, and that of a in the frame of b."""
     R, t = np.empty((3, 3)), np.empty(3)
     R_back, t_back = np.empty((3, 3)), np.empty(3)
-    relative_pose(R_a, x_a, R_b, x_b, R, t)
-    relative_pose(R_b, x_b, R_a, x_a, R_back, t_back)
-    return R, t, R_back, t_back
+    relative_pose(a.rotation, a.position, b.rotation, b.position, R, t)
+    relative_pose(b.rotation, b.position, a.rotation, a.position, R_back, t_back)
+    return Pose(R, t), Pose(R_back, t_back)
 
 
 @jit_making_arrays
-def pair_gap(geometry, shape_a, x_a, R_a, shape_b, x_b, R_b, limit, out):
-    """Return the least gap of two shapes [m], or `limit`, with `out` untouched, if it is not below.
+def pair_contacts(shapes, a, b, margin, contacts, count):
+    """Append every touching pair of features of two posed shapes with gap <= margin [m].
+
+    shapes: `geometry.Shapes`; a, b: `Posed`; contacts: `Contacts`; count: contacts in use. Returns the new count, or minus the contacts
+    needed if the buffers are too small: then what is there from `count` on means nothing.
+    """
+    geometry, kind = shapes.geometry, shapes.geometry.kind
+    pose, back = _relative_poses(a, b)
+    for p in range(geometry.shape_first[a.shape], geometry.shape_first[a.shape + 1]):
+        for q in range(geometry.shape_first[b.shape], geometry.shape_first[b.shape + 1]):
+            if _out_of_reach(geometry, p, q, pose, margin):
+                continue
+            start = count
+            swapped = kind[q] > kind[p]
+            i, j = (q, p) if swapped else (p, q)
+            count = _primitive_contacts(shapes, i, j, back if swapped else pose, margin, contacts, count)
+            _to_world(contacts, start, min(count, contacts.real.shape[0]), b if swapped else a, swapped)
+    return count if count <= contacts.real.shape[0] else -count
+
+
+@jit
+def contacts_of_pairs(shapes, bodies, rotation, query, contacts):
+    """Find the reduced manifolds of the pairs of a `PairQuery`; returns the number of contacts, or -(needed) if the buffers are too small.
+
+    bodies: a record with `position` (n, 3) m; rotation (n, 3, 3).
+    """
+    # Not a literal: that would compile everything below twice.
+    count = np.int64(0)
+    real, integer = contacts.real, contacts.integer
+    for k in range(query.a.shape[0]):
+        a, b = query.a[k], query.b[k]
+        first = count
+        posed_a = Posed(shapes.of_body[a], bodies.position[a], rotation[a])
+        posed_b = Posed(shapes.of_body[b], bodies.position[b], rotation[b])
+        count = pair_contacts(shapes, posed_a, posed_b, query.margin[k], contacts, count)
+        if count < 0:
+            return count
+        count = reduce_contacts(real, integer, first, count, MAX_PER_NORMAL)
+        for c in range(first, count):
+            integer[c, 0] = a
+            integer[c, 1] = b
+    return count
+
+
+@jit_making_arrays
+def pair_gap(geometry, a, b, limit, out):
+    """Return the least gap of two posed shapes [m], or `limit`, with `out` untouched, if it is not below.
 
     out (7,): a closest point of a in [0:3], of b in [3:6], world. Surfaces that cross have the distance 0 less their
     radii; one body inside another is not seen. Two half spaces are never near. Other arguments as for `pair_contacts`.
     """
     kind = geometry.kind
-    R, t, R_back, t_back = _relative_poses(x_a, R_a, x_b, R_b)
+    pose, back = _relative_poses(a, b)
     stack = np.empty((STACK_ROWS + 1, 2), np.int64)
     points = np.empty(7)
-    for a in range(geometry.shape_first[shape_a], geometry.shape_first[shape_a + 1]):
-        for b in range(geometry.shape_first[shape_b], geometry.shape_first[shape_b + 1]):
-            if _out_of_reach(geometry.bound_centre, geometry.bound_radius, a, b, R, t, limit):
+    for p in range(geometry.shape_first[a.shape], geometry.shape_first[a.shape + 1]):
+        for q in range(geometry.shape_first[b.shape], geometry.shape_first[b.shape + 1]):
+            if _out_of_reach(geometry, p, q, pose, limit):
                 continue
-            swapped = kind[b] > kind[a]
-            i, j = (b, a) if swapped else (a, b)  # the kind of i is not below that of j
-            U, s = (R_back, t_back) if swapped else (R, t)
-            gap = limit
-            if kind[i] == ROUND and kind[j] == ROUND:
-                gap = round_round_gap(geometry, i, j, U, s, limit, stack, points)
-            elif kind[i] == ROUND:
-                gap = round_half_space_gap(geometry, i, j, U, s, limit, stack, points)
-            elif kind[i] == CYLINDER and kind[j] == HALF_SPACE:
-                gap = cylinder_half_space_gap(geometry, i, j, U, s, limit, points)
-            elif kind[i] == CYLINDER and kind[j] == ROUND:
-                gap = cylinder_round_gap(geometry, i, j, U, s, limit, stack, points)
-            elif kind[i] == CYLINDER:
-                gap = cylinder_cylinder_gap(geometry, i, j, U, s, limit, points)
+            swapped = kind[q] > kind[p]
+            i, j = (q, p) if swapped else (p, q)
+            gap = _primitive_gap(geometry, i, j, back if swapped else pose, limit, stack, points)
             if gap < limit:
                 limit = gap
-                R_first, x_first = (R_b, x_b) if swapped else (R_a, x_a)
-                p = moved(R_first, x_first, (points[0], points[1], points[2]))
-                q = moved(R_first, x_first, (points[3], points[4], points[5]))
+                R_first, x_first = (b.rotation, b.position) if swapped else (a.rotation, a.position)
+                first = moved(R_first, x_first, (points[0], points[1], points[2]))
+                second = moved(R_first, x_first, (points[3], points[4], points[5]))
                 for k in range(3):
-                    out[k] = q[k] if swapped else p[k]
-                    out[3 + k] = p[k] if swapped else q[k]
+                    out[k] = second[k] if swapped else first[k]
+                    out[3 + k] = first[k] if swapped else second[k]
     return limit
-
-
-@inner
-def _deepest_left(contact_real, patch, first):
-    """Return the deepest contact that has no wall yet, or -1."""
-    deepest = -1
-    for i in range(len(patch)):
-        if patch[i] < 0 and (deepest < 0 or contact_real[first + i, 9] < contact_real[deepest, 9]):
-            deepest = first + i
-    return deepest
-
-
-@inner
-def _tangents(normal):
-    """Return two unit tangents of a normal, the same for all normals near it."""
-    pole = (1.0, 0.0, 0.0) if abs(normal[2]) > STEEP else (0.0, 0.0, 1.0)
-    tangent = cross(pole, normal)
-    length = sqrt(dot(tangent, tangent))
-    tangent = (tangent[0] / length, tangent[1] / length, tangent[2] / length)
-    return tangent, cross(normal, tangent)
-
-
-@inner
-def _extreme(contact_real, contact_int, patch, label, first, direction):
-    """Return the contact of a wall that lies farthest along a direction; of equal ones that of the least features."""
-    best = -1
-    farthest = 0.0
-    for i in range(len(patch)):
-        if patch[i] != label:
-            continue
-        at = first + i
-        place = dot(row(contact_real, at), direction)
-        tie = TIE * (abs(place) + abs(farthest))
-        earlier = best >= 0 and (contact_int[at, 3], contact_int[at, 4]) < (contact_int[best, 3], contact_int[best, 4])
-        if best < 0 or place > farthest + tie or (place >= farthest - tie and earlier):
-            best = at
-            farthest = place
-    return best
-
-
-@jit_making_arrays
-def reduce_contacts(contact_real, contact_int, first, count, max_per_normal=MAX_PER_NORMAL):
-    """Keep the contacts that carry load, of rows [first, count), which belong to one pair of bodies.
-
-    Contacts whose normals agree (`SAME_PATCH`) form a wall. Of a wall with more than `max_per_normal` contacts the
-    deepest and the extreme ones in that many directions stay, unchanged and in their order. Returns the new count.
-    """
-    if count - first <= max_per_normal:
-        return count
-    patch = np.full(count - first, -1, np.int64)
-    kept = np.zeros(count - first, np.bool_)
-    label = np.int64(0)  # (a literal would compile `_extreme` twice)
-    while True:
-        leader = _deepest_left(contact_real, patch, first)
-        if leader < 0:
-            break
-        normal = (contact_real[leader, 6], contact_real[leader, 7], contact_real[leader, 8])
-        members = 0
-        for i in range(len(patch)):
-            at = first + i
-            cosine = normal[0] * contact_real[at, 6] + normal[1] * contact_real[at, 7] + normal[2] * contact_real[at, 8]
-            if patch[i] < 0 and (at == leader or cosine > SAME_PATCH):
-                patch[i] = label
-                kept[i] = True
-                members += 1
-        if members > max_per_normal:
-            for i in range(len(patch)):
-                kept[i] = kept[i] and patch[i] != label
-            kept[leader - first] = True
-            u, v = _tangents(normal)
-            for k in range(max_per_normal):
-                angle = 2.0 * pi * k / max_per_normal
-                direction = along((cos(angle) * u[0], cos(angle) * u[1], cos(angle) * u[2]), sin(angle), v)
-                kept[_extreme(contact_real, contact_int, patch, label, first, direction) - first] = True
-        label += 1
-    end = first
-    for i in range(len(patch)):
-        if kept[i]:
-            for column in range(contact_real.shape[1]):
-                contact_real[end, column] = contact_real[first + i, column]
-            for column in range(contact_int.shape[1]):
-                contact_int[end, column] = contact_int[first + i, column]
-            end += 1
-    return end

@@ -1,10 +1,10 @@
-"""Cores of bodies of a heap that are no single convex piece: the surface moved inwards by a depth d.
+"""Inset surfaces of bodies that are not one convex piece: the surface moved inwards by a depth d.
 
-Soft contacts let bodies sink into each other by a little, and contact kernels want them apart. So these bodies are shown to them by
-their cores, and the points that they give are put back along the normal: contacts stay right until the cores touch. A corner p of faces
-with normals n_f moves by d u, where u is the least vector with  n_f.u = -1  for all of them, by least squares in the weights of the
-angles: every face moves by d. Where a part is too thin its corners move by a half of that, a quarter, or not at all. A contact with
-normal n at a corner is put back by the rise  -d u.n,  on an edge or in a face by the mean of its corners' at that place.
+Soft contacts let bodies sink into each other a little, and the contact kernels need bodies that are apart. So the search uses the inset
+surfaces, and the points found are put back along the normal. Contacts stay right until the inset surfaces touch. A corner p of faces with
+normals n_f moves by d u. Here u is the shortest vector with  n_f.u = -1  for all of them, by least squares with the angles as weights, so
+that every face moves by d. Where a part is too thin its corners move by a half of that, a quarter, or not at all. A contact with normal n
+at a corner is put back by the rise  -d u.n,  on an edge or in a face by the mean of the rises of its corners at that place.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
 from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Geometry, Primitive, build_geometry
 from rigidimpulse.collision.manifold.cylinder_rims import CYLINDER_CONTACT
-from rigidimpulse.collision.manifold.dispatch import pair_gap
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.core.kernels import jit
 
 DEPTH = 0.012
@@ -27,25 +27,25 @@ DEPTH = 0.012
 THIN = 0.25
 """Part of the radius of a ball, capsule or cylinder that d may be."""
 CLEAR = 0.7
-"""Part of its way that a corner must be away from all of the surface when it has moved, to have moved into the body."""
+"""Distance from the surface that a moved corner must have, as a part of its displacement, to count as moved into the body."""
 LONGEST = 2.0
 """Length of u at most."""
 SAME = 0.02
 """Part of the largest eigenvalue of sum n n^T below which faces are the same."""
 
 
-def cores(
+def inset_surfaces(
     shapes: Sequence[CompiledShape], geometry: Geometry, convex: np.ndarray, dynamic_shapes: np.ndarray
 ) -> tuple[Geometry, np.ndarray, np.ndarray]:
-    """The shapes with cores for those that move freely (s,) bool and are no single convex piece.
+    """The shapes, with inset surfaces for those that move freely (s,) bool and are not one convex piece.
 
     Args:
         shapes: all shapes of the scene; geometry: their arrays.
         convex: (s,) bool, convex polyhedra; dynamic_shapes: (s,) bool.
 
     Returns:
-        The arrays with cores; their depths (s,), m, 0 for none; and (V, 4) m, in the frame of the body, from every vertex of a core to
-        where it was, and by how much its rounding radius is less.
+        The arrays with inset surfaces; their depths (s,), m, 0 for none; and (V, 4) m, in the frame of the body, from every inset vertex
+        to where it was, and by how much its rounding radius is less.
 
     """
     out, depth = list(shapes), np.zeros(len(shapes))
@@ -56,15 +56,15 @@ def cores(
         first, last = int(geometry.shape_first[s]), int(geometry.shape_first[s + 1])
         reach = np.linalg.norm(geometry.bound_centre[first:last], axis=1) + geometry.bound_radius[first:last]
         d = min([DEPTH * float(reach.max()), *(THIN * _radius(p) for p in primitives if not len(p.faces))])
-        out[s], depth[s] = CompiledShape(tuple(_core(p, d) for p in primitives)), d
+        out[s], depth[s] = CompiledShape(tuple(_inset(p, d) for p in primitives)), d
     back = np.zeros((len(geometry.vertex), 4))
     if not depth.any():
         return geometry, depth, back
-    cored = build_geometry(out)
-    back[:, :3] = geometry.vertex - cored.vertex
+    inset = build_geometry(out)
+    back[:, :3] = geometry.vertex - inset.vertex
     for p in range(len(geometry.kind)):
-        back[geometry.vertex_first[p] : geometry.vertex_first[p + 1], 3] = geometry.radius[p] - cored.radius[p]
-    return cored, depth, back
+        back[geometry.vertex_first[p] : geometry.vertex_first[p + 1], 3] = geometry.radius[p] - inset.radius[p]
+    return inset, depth, back
 
 
 def _radius(p: Primitive) -> float:
@@ -72,8 +72,8 @@ def _radius(p: Primitive) -> float:
     return min(p.radius, float(p.frame[6])) if p.kind == CYLINDER else p.radius
 
 
-def _core(p: Primitive, d: float) -> Primitive:
-    """The core of a primitive, at a depth of d m."""
+def _inset(p: Primitive, d: float) -> Primitive:
+    """The inset surface of a primitive, at a depth of d m."""
     if p.kind == CYLINDER:
         return replace(p, radius=p.radius - d, frame=np.append(p.frame[:6], p.frame[6] - d))
     return replace(p, vertices=_moved_in(p, d)) if len(p.faces) else replace(p, radius=p.radius - d)
@@ -82,24 +82,24 @@ def _core(p: Primitive, d: float) -> Primitive:
 def _moved_in(p: Primitive, d: float) -> np.ndarray:
     """Vertices (v, 3) of a triangulated primitive moved inwards by d m, or less where it is thin."""
     x, faces = p.vertices, p.faces
-    ways = d * _ways(x, faces)
+    displacement = d * _directions(x, faces)
     surface = build_geometry([CompiledShape((Primitive(ROUND, vertices=np.zeros((1, 3))),)), CompiledShape((p,))])
     share, normals = np.ones(len(x)), _area_vectors(x, faces)
     for factor in (0.5, 0.25, 0.0):
-        y = x + share[:, None] * ways
-        length = share * np.linalg.norm(ways, axis=1)
+        y = x + share[:, None] * displacement
+        length = share * np.linalg.norm(displacement, axis=1)
         wrong = (length > 0.0) & ~points_inside(surface, 1, y)
         for v in np.flatnonzero((length > 0.0) & ~wrong):
             wrong[v] = _distance(surface, y[v], length[v]) < CLEAR * min(share[v] * d, length[v])
         turned = np.einsum("ij,ij->i", _area_vectors(y, faces), normals) < 0.0
         wrong[faces[turned]] = True
         share[wrong] = factor
-    return x + share[:, None] * ways
+    return x + share[:, None] * displacement
 
 
 def _distance(surface: Geometry, point: np.ndarray, limit: float) -> float:
     """Distance of a point to the second shape, at most `limit` m."""
-    return pair_gap(surface, 0, point, np.eye(3), 1, np.zeros(3), np.eye(3), limit, np.zeros(7))
+    return pair_gap(surface, Posed(0, point, np.eye(3)), Posed(1, np.zeros(3), np.eye(3)), limit, np.zeros(7))
 
 
 def _area_vectors(x: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -107,7 +107,7 @@ def _area_vectors(x: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.cross(x[faces[:, 1]] - x[faces[:, 0]], x[faces[:, 2]] - x[faces[:, 0]])
 
 
-def _ways(x: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def _directions(x: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """u (v, 3) of every vertex."""
     normal = _area_vectors(x, faces)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
@@ -122,11 +122,12 @@ def _ways(x: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 @jit
-def put_back(geometry, back, depth, bodies, a, b, real, integer, c):
-    """Move the points of contact c of bodies a and b from cores to where the true bodies are, along the normal.
+def put_back(smaller, bodies, a, b, real, integer, c):
+    """Move the points of contact c of bodies a and b from the inset surfaces to the true bodies, along the normal.
 
-    geometry, back: see `cores`; depth (n,) by rank, m; real (k, 10), in the world, and integer (k, 5): contacts.
+    smaller: `contact_update.SmallerShapes`; real (k, 10), in the world, and integer (k, 5): contacts.
     """
+    geometry, back, depth = smaller.geometry, smaller.back, smaller.depth
     kind = integer[c, 2]
     for side in range(2):
         i, sign, at = (a, 1.0, 0) if side == 0 else (b, -1.0, 3)
@@ -144,7 +145,7 @@ def put_back(geometry, back, depth, bodies, a, b, real, integer, c):
         elif kind == HALF_SPACE_CONTACT:
             rise = _rise(back, feature, n)
         elif kind == CYLINDER_CONTACT and not _has_cylinder(geometry, bodies.shape[i]):
-            # (Features of cylinders have other numbers, and their rise is the depth.)
+            # Features of cylinders have other numbers, and their rise is the depth.
             f = feature // 3
             if feature % 3 == 2:
                 rise = _rise_of_face(geometry, back, f, p, n)

@@ -1,8 +1,9 @@
-"""Contacts of the edges of two ROUND primitives: crossing edges, and nearly parallel ones (see `triangles`)."""
+"""Contacts of the edges of two ROUND primitives: crossing edges, and nearly parallel ones (see `mesh_mesh`)."""
 
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 from rigidimpulse.collision.bvh import STACK_ROWS
 from rigidimpulse.collision.distance.simplices import (
@@ -20,7 +21,17 @@ from rigidimpulse.collision.distance.simplices import (
     turned,
 )
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
-from rigidimpulse.collision.manifold.contact_points import INSIDE, MERGE, PENETRATION, ROUND_OFF, STRICT, TILT, append_contact, outside_box
+from rigidimpulse.collision.manifold.contact_points import (
+    INSIDE,
+    MERGE,
+    PENETRATION,
+    ROUND_OFF,
+    STRICT,
+    TILT,
+    Contact,
+    append_contact,
+    outside_box,
+)
 
 CROSSING = 1e-7
 """Least sine of the angle of two edges that are taken to cross at one point."""
@@ -30,12 +41,25 @@ SIDEWAYS = 0.5
 """Greatest offset across the normal, relative to the distance, of the ends of such a length."""
 
 
+class _Edges(NamedTuple):
+    """Two edges in the frame of the first body: p + s d and q + t e, with s and t in [0, 1]."""
+
+    a: int  # number of the first
+    b: int
+    p: tuple[float, float, float]  # m
+    d: tuple[float, float, float]
+    q: tuple[float, float, float]
+    e: tuple[float, float, float]
+
+
 @inner
-def _arcs_miss(edge_normal, edge_kind, R_back, R, edge_a, edge_b, d, e, normal):
+def _arcs_miss(geometry, view, edges, normal):
     """Return (miss, end) of the edge whose arc a normal from a to b misses by more (see `arc_miss`).
 
-    d, e: vectors of the edges; they, the normal and the end, which points from a to b too, are in the frame of a.
+    The normal, and the end, which points from a to b too, are in the frame of a.
     """
+    edge_normal, edge_kind, R_back = geometry.edge_normal, geometry.edge_kind, view.R_back
+    edge_a, edge_b, d, e = edges.a, edges.b, edges.d, edges.e
     length = sqrt(dot(d, d))
     direction = (d[0] / length, d[1] / length, d[2] / length)
     normal_0, normal_1 = edge_normals(edge_normal, edge_a)
@@ -45,7 +69,7 @@ def _arcs_miss(edge_normal, edge_kind, R_back, R, edge_a, edge_b, d, e, normal):
     outward = turned(R_back, (-normal[0], -normal[1], -normal[2]))
     normal_0, normal_1 = edge_normals(edge_normal, edge_b)
     miss_b, end_b = arc_miss(outward, direction, normal_0, normal_1, edge_kind[edge_b])
-    end_b = turned(R, end_b)
+    end_b = turned(view.R, end_b)
     return (miss_a, end_a) if miss_a > miss_b else (miss_b, (-end_b[0], -end_b[1], -end_b[2]))
 
 
@@ -53,7 +77,7 @@ def _arcs_miss(edge_normal, edge_kind, R_back, R, edge_a, edge_b, d, e, normal):
 def _crossing(p, d, q, e, skeleton):
     """Return (near, point_a, point_b, c, distance) for the common normal c of two edges p + s d, q + t e.
 
-    `near`: both closest points lie on the edges and are at most `core` apart; c points from a to b.
+    `near`: both closest points lie on the edges and are at most `skeleton` apart; c points from a to b.
     """
     c = cross(d, e)
     c_squared = dot(c, c)
@@ -71,8 +95,9 @@ def _crossing(p, d, q, e, skeleton):
 
 
 @inner
-def _crossing_contact(edge_normal, edge_kind, view, rows, count, edge_a, edge_b, p, d, q, e):
-    """Append the contact of two edges p + s d and q + t e if they cross (frame of the first body)."""
+def _crossing_contact(geometry, view, found, count, edges):
+    """Append the contact of two edges if they cross (frame of the first body)."""
+    p, d, q, e = edges.p, edges.d, edges.q, edges.e
     near, point_a, point_b, c, distance = _crossing(p, d, q, e, view.skeleton)
     if not near:
         return count
@@ -85,16 +110,15 @@ def _crossing_contact(edge_normal, edge_kind, view, rows, count, edge_a, edge_b,
     for _ in range(2 if distance <= PENETRATION * size else 1):
         scale = sense / c_length
         normal = (c[0] * scale, c[1] * scale, c[2] * scale)
-        miss, end = _arcs_miss(edge_normal, edge_kind, view.R_back, view.R, edge_a, edge_b, d, e, normal)
+        miss, end = _arcs_miss(geometry, view, edges, normal)
         if miss <= tolerance + view.leeway:
             if 0.0 < miss <= tolerance:
                 normal = end
             surface_a = along(point_a, view.radius_t, normal)
             surface_b = along(point_b, -view.radius_v, normal)
             gap = dot(subtract(surface_b, surface_a), normal)
-            return append_contact(
-                rows, count, surface_a, surface_b, normal, gap, EDGE_EDGE, edge_a, edge_b, MERGE * size
-            )
+            contact = Contact(surface_a, surface_b, normal, gap, EDGE_EDGE, edges.a, edges.b)
+            return append_contact(found, count, contact, MERGE * size)
         sense = -sense
     return count
 
@@ -112,8 +136,10 @@ def _overlap(p, d, q, e):
 
 
 @inner
-def _parallel_contacts(edge, edge_normal, edge_kind, view, rows, count, edge_a, edge_b, p, d, q, e):
+def _parallel_contacts(geometry, view, found, count, edges):
     """Append both ends of the overlap of two nearly parallel edges of meshes (frame of the first body)."""
+    edge, edge_a, edge_b = geometry.edge, edges.a, edges.b
+    p, d, q, e = edges.p, edges.d, edges.q, edges.e
     length = sqrt(dot(d, d))
     u = (d[0] / length, d[1] / length, d[2] / length)
     low, high, start, speed = _overlap(p, d, q, e)
@@ -124,7 +150,7 @@ def _parallel_contacts(edge, edge_normal, edge_kind, view, rows, count, edge_a, 
         return count
     normal = (between[0] / distance, between[1] / distance, between[2] / distance)
     tolerance = STRICT + view.leeway + ROUND_OFF * (length + abs(p[0]) + abs(p[1]) + abs(p[2])) / distance
-    if _arcs_miss(edge_normal, edge_kind, view.R_back, view.R, edge_a, edge_b, d, e, normal)[0] > tolerance:
+    if _arcs_miss(geometry, view, edges, normal)[0] > tolerance:
         return count
     for end in range(2):
         place = high if end == 1 else low
@@ -139,15 +165,16 @@ def _parallel_contacts(edge, edge_normal, edge_kind, view, rows, count, edge_a, 
         of_a = place == 0.0 or place == length
         feature_a = 2 * edge[edge_a, end] if of_a else 2 * edge_a + 1
         feature_b = 2 * edge_b + 1 if of_a else 2 * edge[edge_b, end if speed > 0.0 else 1 - end]
-        count = append_contact(rows, count, point_a, point_b, normal, gap, CORNER, feature_a, feature_b, MERGE * length)
+        contact = Contact(point_a, point_b, normal, gap, CORNER, feature_a, feature_b)
+        count = append_contact(found, count, contact, MERGE * length)
     return count
 
 
 @inner
-def edge_contacts(geometry, view, pairs, end, rows, count):
+def edge_contacts(geometry, view, pairs, end, found, count):
     """Append the contacts of the edges in both nodes of each pair; `view` is that of the second body's vertices."""
     vertex, edge, kind = geometry.vertex, geometry.edge, geometry.edge_kind
-    owns, triangle_edge, normal = geometry.triangle_owns, geometry.triangle_edge, geometry.edge_normal
+    owns, triangle_edge = geometry.triangle_owns, geometry.triangle_edge
     meshes = view.radius_v == 0.0 and view.radius_t == 0.0
     for pair in range(STACK_ROWS, end):
         a, b = pairs[pair, 0], pairs[pair, 1]
@@ -175,8 +202,9 @@ def edge_contacts(geometry, view, pairs, end, rows, count):
                 d = subtract(p_end, p)
                 c = cross(d, e)
                 sine_squared = dot(c, c) / (dot(d, d) * dot(e, e))
+                edges = _Edges(edge_a, edge_b, p, d, q, e)
                 if sine_squared > CROSSING * CROSSING:
-                    count = _crossing_contact(normal, kind, view, rows, count, edge_a, edge_b, p, d, q, e)
+                    count = _crossing_contact(geometry, view, found, count, edges)
                 if meshes and sine_squared < NEARLY_PARALLEL * NEARLY_PARALLEL:
-                    count = _parallel_contacts(edge, normal, kind, view, rows, count, edge_a, edge_b, p, d, q, e)
+                    count = _parallel_contacts(geometry, view, found, count, edges)
     return count

@@ -1,6 +1,6 @@
 """Contacts of two ROUND primitives: triangles, a segment or a point, grown by a radius.
 
-The features of two cores at distance d <= margin + r_a + r_b that are locally closest make the contacts; the radii are
+The features of two skeletons at distance d <= margin + r_a + r_b that are locally closest make the contacts; the radii are
 then taken off along the normal: gap = d - r_a - r_b.
 - vertex - face: the vertex projects into the face, and no edge that leaves it dives below by more than the margin
   (else the vertex of a box that stands flush on another one would meet its side). All corners within the margin
@@ -52,6 +52,8 @@ from rigidimpulse.collision.manifold.contact_points import (
     ROUND_OFF,
     STRICT,
     TILT,
+    Contact,
+    Found,
     View,
     append_contact,
     outside_box,
@@ -65,23 +67,28 @@ CREASE = 2.0 * TOLERANCES.flat_angle
 
 
 @inner
-def _append_vertex(view, rows, count, skeleton_v, skeleton_t, normal, distance, kind, feature_v, feature_t, merge):
-    """Append a contact of a vertex (core point `skeleton_v`) with a triangle (`skeleton_t`), given in the triangle's frame."""
-    gap = distance - view.radius_v - view.radius_t
-    point_v = along(skeleton_v, view.radius_v, normal)
-    point_t = along(skeleton_t, -view.radius_t, normal)
+def _append_vertex(view, found, count, nearest, merge):
+    """Append a contact of a vertex with a triangle: `nearest` is that of their skeletons, vertex first, in the triangle's frame."""
+    normal, kind = nearest.normal, nearest.kind
+    gap = nearest.gap - view.radius_v - view.radius_t
+    point_v = along(nearest.point_a, view.radius_v, normal)
+    point_t = along(nearest.point_b, -view.radius_t, normal)
     if view.flipped:
         normal = (-normal[0], -normal[1], -normal[2])
-        return append_contact(rows, count, point_t, point_v, normal, gap, kind, feature_t, feature_v, merge)
+        return append_contact(
+            found, count, Contact(point_t, point_v, normal, gap, kind, nearest.feature_b, nearest.feature_a), merge
+        )
     point_v = moved(view.R_back, view.t_back, point_v)
     point_t = moved(view.R_back, view.t_back, point_t)
     normal = turned(view.R_back, normal)
-    return append_contact(rows, count, point_v, point_t, normal, gap, kind, feature_v, feature_t, merge)
+    return append_contact(found, count, Contact(point_v, point_t, normal, gap, kind, nearest.feature_a, nearest.feature_b), merge)
 
 
 @inner
-def _in_vertex_cone(vertex, edge, vertex_edge_first, vertex_edge, corner, direction, slack, tolerance):
-    """Tell whether no edge that leaves a vertex runs along the direction, but for a length `slack` [m] or an angle."""
+def _in_vertex_cone(geometry, corner, direction, slack, tolerance):
+    """Tell whether no edge that leaves a vertex runs along the direction, with a tolerance of a length `slack` [m] or an angle."""
+    vertex, edge = geometry.vertex, geometry.edge
+    vertex_edge_first, vertex_edge = geometry.vertex_edge_first, geometry.vertex_edge
     origin = row(vertex, corner)
     for i in range(vertex_edge_first[corner], vertex_edge_first[corner + 1]):
         leaving = subtract(row(vertex, edge[vertex_edge[i], 0] + edge[vertex_edge[i], 1] - corner), origin)
@@ -92,9 +99,19 @@ def _in_vertex_cone(vertex, edge, vertex_edge_first, vertex_edge, corner, direct
 
 
 @inner
-def _face_contact(geometry, view, rows, count, vertex, p, triangle, corners, normal, height, hidden):
-    """Append the contact of a vertex at `p` with a face if it lies over it; `hidden`: which sides are hidden edges."""
-    a, b, c = corners
+def _face_contact(geometry, view, found, count, vertex, p, triangle, height):
+    """Append the contact of a vertex at `p`, `height` over the plane of a face, if it lies over the face."""
+    a, b, c = (
+        row(geometry.vertex, geometry.triangle[triangle, 0]),
+        row(geometry.vertex, geometry.triangle[triangle, 1]),
+        row(geometry.vertex, geometry.triangle[triangle, 2]),
+    )
+    normal = row(geometry.triangle_normal, triangle)
+    hidden = (
+        geometry.edge_kind[geometry.triangle_edge[triangle, 0]] == EDGE_HIDDEN,
+        geometry.edge_kind[geometry.triangle_edge[triangle, 1]] == EDGE_HIDDEN,
+        geometry.edge_kind[geometry.triangle_edge[triangle, 2]] == EDGE_HIDDEN,
+    )
     side = subtract(b, a)
     size = sqrt(dot(side, side))
     # Across a hidden edge the faces may meet at up to the flat angle: their prisms overlap, so that no gap is between.
@@ -112,18 +129,15 @@ def _face_contact(geometry, view, rows, count, vertex, p, triangle, corners, nor
         height = -height
     else:
         normal = (-normal[0], -normal[1], -normal[2])
-    if not _in_vertex_cone(
-        geometry.vertex, geometry.edge, geometry.vertex_edge_first, geometry.vertex_edge, vertex,
-        turned(view.R_back, normal), view.skeleton, TILT,
-    ):
+    if not _in_vertex_cone(geometry, vertex, turned(view.R_back, normal), view.skeleton, TILT):
         return count
     kind = FACE_VERTEX if view.flipped else VERTEX_FACE
     merge = MERGE * size + 2.0 * crease
-    return _append_vertex(view, rows, count, p, foot, normal, height, kind, vertex, triangle, merge)
+    return _append_vertex(view, found, count, Contact(p, foot, normal, height, kind, vertex, triangle), merge)
 
 
 @inner
-def _face_contacts(geometry, view, pairs, end, rows, count):
+def _face_contacts(geometry, view, pairs, end, found, count):
     """Append the contacts of the corners in one node of each pair with the faces in the other."""
     vertex, triangle, owns = geometry.vertex, geometry.triangle, geometry.triangle_owns
     for pair in range(STACK_ROWS, end):
@@ -146,21 +160,18 @@ def _face_contacts(geometry, view, pairs, end, rows, count):
                     height = dot(subtract(p, a), normal)
                     if abs(height) > view.skeleton or triangle[face, 1] == triangle[face, 2]:
                         continue
-                    corners = (a, row(vertex, triangle[face, 1]), row(vertex, triangle[face, 2]))
-                    hidden = (
-                        geometry.edge_kind[geometry.triangle_edge[face, 0]] == EDGE_HIDDEN,
-                        geometry.edge_kind[geometry.triangle_edge[face, 1]] == EDGE_HIDDEN,
-                        geometry.edge_kind[geometry.triangle_edge[face, 2]] == EDGE_HIDDEN,
-                    )
-                    count = _face_contact(geometry, view, rows, count, corner, p, face, corners, normal, height, hidden)
+                    count = _face_contact(geometry, view, found, count, corner, p, face, height)
     return count
 
 
 @inner
-def _corner_contact(geometry, view, rows, count, corner, p, foot, feature, size):
-    """Append the contact of a vertex at `p` with the point `foot` of an edge or a vertex if it is locally closest."""
+def _corner_contact(geometry, view, found, count, corner, p, touched):
+    """Append the contact of a vertex at `p` with an edge or a vertex if it is locally closest.
+
+    touched: (point of the edge or vertex, 2 * vertex or 2 * edge + 1, size of the feature in m).
+    """
     vertex, edge = geometry.vertex, geometry.edge
-    first_edge, around = geometry.vertex_edge_first, geometry.vertex_edge
+    foot, feature, size = touched
     between = subtract(foot, p)
     distance = sqrt(dot(between, between))
     if distance <= ROUND_OFF * size:
@@ -176,17 +187,15 @@ def _corner_contact(geometry, view, rows, count, corner, p, foot, feature, size)
         tilt = tolerance + min(TILT, view.slack / size)
         if not in_edge_arc(outward, direction, normal_0, normal_1, geometry.edge_kind[other], tilt):
             return count
-    elif not _in_vertex_cone(vertex, edge, first_edge, around, other, outward, view.slack, tolerance):
+    elif not _in_vertex_cone(geometry, other, outward, view.slack, tolerance):
         return count
-    if not _in_vertex_cone(
-        vertex, edge, first_edge, around, corner, turned(view.R_back, normal), view.slack, tolerance
-    ):
+    if not _in_vertex_cone(geometry, corner, turned(view.R_back, normal), view.slack, tolerance):
         return count
-    return _append_vertex(view, rows, count, p, foot, normal, distance, CORNER, 2 * corner, feature, MERGE * size)
+    return _append_vertex(view, found, count, Contact(p, foot, normal, distance, CORNER, 2 * corner, feature), MERGE * size)
 
 
 @inner
-def _corner_contacts(geometry, view, pairs, end, rows, count):
+def _corner_contacts(geometry, view, pairs, end, found, count):
     """Append the contacts of the corners in one node of each pair with the edges and corners in the other."""
     vertex, triangle, owns, edge = geometry.vertex, geometry.triangle, geometry.triangle_owns, geometry.edge
     skeleton_squared = view.skeleton * view.skeleton
@@ -217,14 +226,14 @@ def _corner_contacts(geometry, view, pairs, end, rows, count):
                         off = subtract(foot, p)
                         if -INSIDE <= s <= 1.0 + INSIDE and dot(off, off) <= skeleton_squared:
                             size = sqrt(length_squared)
-                            count = _corner_contact(geometry, view, rows, count, corner, p, foot, 2 * e + 1, size)
+                            count = _corner_contact(geometry, view, found, count, corner, p, (foot, 2 * e + 1, size))
                     v = triangle[face, m]
                     if not view.flipped and owns[face] >> m & 1 and geometry.vertex_corner[v]:
                         foot = row(vertex, v)
                         off = subtract(foot, p)
                         if dot(off, off) <= skeleton_squared:
                             size = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(foot[0]) + abs(foot[1]) + abs(foot[2])
-                            count = _corner_contact(geometry, view, rows, count, corner, p, foot, 2 * v, size)
+                            count = _corner_contact(geometry, view, found, count, corner, p, (foot, 2 * v, size))
     return count
 
 
@@ -241,27 +250,28 @@ def _pose_back(R, t):
 
 
 @inner
-def _keep_closest(contact_real, contact_int, first_row, end):
-    """Keep the contact of least gap of rows [first_row, end); return the new count."""
-    closest = first_row
-    for other in range(first_row + 1, min(end, contact_real.shape[0])):
-        if contact_real[other, 9] < contact_real[closest, 9]:
+def _keep_closest(found, end):
+    """Keep the contact of least gap of those found up to `end`; return the new count."""
+    real, integer, first = found
+    closest = first
+    for other in range(first + 1, min(end, real.shape[0])):
+        if real[other, 9] < real[closest, 9]:
             closest = other
-    if closest > first_row:
-        for column in range(contact_real.shape[1]):
-            contact_real[first_row, column] = contact_real[closest, column]
-        for column in range(contact_int.shape[1]):
-            contact_int[first_row, column] = contact_int[closest, column]
-    return min(end, first_row + 1)
+    if closest > first:
+        for column in range(real.shape[1]):
+            real[first, column] = real[closest, column]
+        for column in range(integer.shape[1]):
+            integer[first, column] = integer[closest, column]
+    return min(end, first + 1)
 
 
 @jit_making_arrays
-def round_round_contacts(geometry, first, second, R, t, margin, pairs, contact_real, contact_int, count):
+def round_round_contacts(geometry, first, second, pose, margin, contacts, count):
     """Append the contacts of two ROUND primitives with gap <= margin, in the first one's frame; return the new count.
 
-    R, t: pose of the second body in the frame of the first; `pairs`: scratch, more than `STACK_ROWS` rows.
     Where round-off lets no normal pass, the closest pair of features is the one contact.
     """
+    R, t, pairs = pose.R, pose.t, contacts.scratch
     R_back, t_back = _pose_back(R, t)
     radius_a, radius_b = geometry.radius[first], geometry.radius[second]
     skeleton = margin + radius_a + radius_b
@@ -269,8 +279,7 @@ def round_round_contacts(geometry, first, second, R, t, margin, pairs, contact_r
     edges_b = geometry.edge_first[second + 1] - geometry.edge_first[second]
     slack = margin if edges_a > 0 and edges_b > 0 and radius_a + radius_b > 0.0 else 0.0
     open_a, open_b = not geometry.closed[first], not geometry.closed[second]
-    rows = (contact_real, contact_int, count)
-    first_row = count
+    found = Found(contacts.real, contacts.integer, count)
     for leeway in (0.0, ANY):
         of_a = View(False, R_back, t_back, R, t, radius_a, radius_b, margin, skeleton, slack, leeway, open_b)
         of_b = View(True, R, t, R_back, t_back, radius_b, radius_a, margin, skeleton, slack, leeway, open_a)
@@ -281,12 +290,12 @@ def round_round_contacts(geometry, first, second, R, t, margin, pairs, contact_r
             depth, end = gather_leaf_pairs(
                 geometry.node_min, geometry.node_max, geometry.node_child, R, t, skeleton, pairs, depth
             )
-            count = edge_contacts(geometry, of_b, pairs, end, rows, count)
+            count = edge_contacts(geometry, of_b, pairs, end, found, count)
             for view in (of_a, of_b):
-                count = _face_contacts(geometry, view, pairs, end, rows, count)
-                count = _corner_contacts(geometry, view, pairs, end, rows, count)
+                count = _face_contacts(geometry, view, pairs, end, found, count)
+                count = _corner_contacts(geometry, view, pairs, end, found, count)
         if leeway == ANY:
-            return _keep_closest(contact_real, contact_int, first_row, count)
-        if count > first_row:
+            return _keep_closest(found, count)
+        if count > found.first:
             return count
     return count

@@ -1,7 +1,7 @@
-"""Convex bodies of a heap that have sunk into each other farther than the contact kernels bear: polyhedra, and prisms for cylinders.
+"""Contacts of convex bodies deeper inside each other than the shrunk shapes allow: polyhedra, and prisms in place of cylinders.
 
-The gap of two convex bodies along a unit normal n from a to b is  s(n) = min_b n.x - max_a n.x;  they are apart just if some s is
-above 0, and the contacts of bodies apart have one such normal. Where there is none `heap_hulls` tells how to push them apart.
+The gap of two convex bodies along a unit normal n from a to b is  s(n) = min_b n.x - max_a n.x;  they are apart if and only if
+some s is above 0, and the contacts of bodies that are apart have such a normal. If there is none, `convex_convex` gives the contacts.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import numpy as np
 
 from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
 from rigidimpulse.collision.manifold.convex_convex import hull_contacts
-from rigidimpulse.collision.manifold.polyhedra import Polyhedra, make_polyhedra
+from rigidimpulse.collision.manifold.polyhedra import Pair, Polyhedra, Query, make_polyhedra
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.scene.shape import Shape
 
 FLUSH = 0.02
-"""Gap, in inner radii, below which points of a face press, too."""
+"""Gap, in inner radii, below which the points of a face are contacts, too."""
 SIDES = 32
-"""Of the prism in a cylinder: 0.5 % of the radius inside it, less than what cylinders are made smaller by for the contact kernels."""
+"""Sides of the prism in a cylinder. It is 0.5 % of the radius inside, less than the cylinder is shrunk for the search."""
 
 
 def solids(
@@ -28,7 +28,7 @@ def solids(
 ) -> tuple[Polyhedra, np.ndarray, np.ndarray]:
     """Polyhedra in the shapes: `convex` ones (s,) bool, whose tables are there; prisms in cylinders, axes of capsules, centres of balls.
 
-    Returns them, which shapes are cylinders (s,) bool, and how far each is inside its shape at most (s,), m. Others have no corners.
+    Returns them; which shapes are cylinders (s,) bool; and how far each is inside its shape at most (s,), m. Other shapes have no corners.
     """
     first = geometry.shape_first
     single, kind, radius = np.diff(first) == 1, geometry.kind[first[:-1]], geometry.radius[first[:-1]]
@@ -68,25 +68,24 @@ def support(geometry, p, x, r, n, sign):
 
 
 @jit
-def gap_along(geometry, bodies, a, b, p, q, n):
-    """s(n) of bodies a and b with the primitives p and q, m."""
+def gap_along(geometry, bodies, a, b, n):
+    """s(n) of bodies a and b, each of one primitive, m."""
+    p, q = geometry.shape_first[bodies.shape[a]], geometry.shape_first[bodies.shape[b]]
     low = -support(geometry, q, bodies.position[b], bodies.rotation[b], n, -1.0)
     return low - support(geometry, p, bodies.position[a], bodies.rotation[a], n, 1.0)
 
 
 @jit
-def overlap_contacts(polyhedra, bodies, a, b, size, work, real, ids):
-    """Contacts into real (5, 10), in the world, and ids (5, 3) of two bodies that have sunk into each other; their number.
+def overlap_contacts(polyhedra, bodies, a, b, size, scratch, points):
+    """Write the contacts, in the world, of two bodies inside each other; returns their number.
 
-    polyhedra: with prisms for cylinders; size: smaller inner radius, m; work: room for `hull_contacts`.
+    polyhedra: with prisms for cylinders; size: smaller inner radius, m.
     """
-    between, origin, c, simplex, polytope, scratch = work
+    between, real = scratch.between, points.real
     for k in range(3):
         between[k] = bodies.position[b, k] - bodies.position[a, k]
-    count, gap = hull_contacts(
-        polyhedra, bodies.velocity, bodies.rotation, a, b, bodies.shape[a], bodies.shape[b], between, origin, size, FLUSH * size, 0.0, c,
-        simplex, polytope, scratch, real, ids,
-    )  # fmt: skip
+    pair = Pair(bodies.rotation, bodies.velocity, a, b, bodies.shape[a], bodies.shape[b])
+    count, gap = hull_contacts(polyhedra, pair, Query(FLUSH * size, 0.0, size), scratch, points)
     if gap > 0.0:
         return np.int64(0)
     for n in range(count):

@@ -1,15 +1,16 @@
 """Pairs with closed forms: a half space against a ROUND primitive, and two spheres.
 
-Half space: solid where n . x <= o. The gap of a vertex p of a core of radius r is n . p - o - r; all corners within the
+Half space: solid where n . x <= o. The gap of a vertex p of a skeleton with radius r is n . p - o - r; all corners within the
 margin are contacts, so a flat face gives its corners and nothing else. Spheres: gap = |c_b - c_a| - r_a - r_b.
-Kernels work in the frame of their first primitive, as `manifold` describes.
+Kernels work in the frame of their first primitive, as `dispatch` describes.
 """
 
 from __future__ import annotations
 
 from math import sqrt
 
-from rigidimpulse.collision.distance.simplices import CORNER, HALF_SPACE_CONTACT, along, dot, inner, row, subtract, write_contact
+from rigidimpulse.collision.distance.simplices import CORNER, HALF_SPACE_CONTACT, along, dot, inner, moved, row, subtract
+from rigidimpulse.collision.manifold.contact_points import Contact, write_contact
 
 
 @inner
@@ -34,12 +35,13 @@ def _least_height(low, high, normal, offset):
 
 
 @inner
-def round_half_space_contacts(geometry, round_, half_space, R, t, margin, stack, contact_real, contact_int, count):
+def round_half_space_contacts(geometry, round_, half_space, pose, margin, contacts, count):
     """Append the corners of a ROUND primitive within `margin` of a half space, in the frame of the former."""
     node_min, node_max, node_child = geometry.node_min, geometry.node_max, geometry.node_child
     node_start, node_count = geometry.node_start, geometry.node_count
     triangle, owns, corner = geometry.triangle, geometry.triangle_owns, geometry.vertex_corner
-    normal, offset = plane_in_frame(geometry.frame, half_space, R, t)
+    normal, offset = plane_in_frame(geometry.frame, half_space, pose.R, pose.t)
+    stack = contacts.scratch
     inward = (-normal[0], -normal[1], -normal[2])
     radius = geometry.radius[round_]
     stack[0, 0] = geometry.node_first[round_]
@@ -63,19 +65,16 @@ def round_half_space_contacts(geometry, round_, half_space, R, t, margin, stack,
             if height - radius <= margin:
                 surface = along(p, -radius, normal)
                 foot = along(p, -height, normal)
-                gap = height - radius
-                kind = HALF_SPACE_CONTACT
-                count = write_contact(
-                    contact_real, contact_int, count, surface, foot, inward, gap, kind, vertex, half_space
-                )
+                contact = Contact(surface, foot, inward, height - radius, HALF_SPACE_CONTACT, vertex, half_space)
+                count = write_contact(contacts.real, contacts.integer, count, contact)
     return count
 
 
 @inner
-def round_half_space_gap(geometry, round_, half_space, R, t, limit, stack, out):
+def round_half_space_gap(geometry, round_, half_space, pose, limit, stack, out):
     """Return the least gap, or `limit` with `out` untouched if it is not below; out[0:6]: points, ROUND one's frame."""
     node_min, node_max, node_child = geometry.node_min, geometry.node_max, geometry.node_child
-    normal, offset = plane_in_frame(geometry.frame, half_space, R, t)
+    normal, offset = plane_in_frame(geometry.frame, half_space, pose.R, pose.t)
     radius = geometry.radius[round_]
     best = limit + radius
     lowest = -1
@@ -112,10 +111,11 @@ def round_half_space_gap(geometry, round_, half_space, R, t, limit, stack, out):
 
 
 @inner
-def sphere_sphere_contact(
-    centre_a, radius_a, vertex_a, centre_b, radius_b, vertex_b, margin, contact_real, contact_int, count
-):
-    """Append the contact of two spheres with gap <= margin, if their centres differ (all in one frame)."""
+def sphere_sphere_contacts(geometry, first, second, pose, margin, contacts, count):
+    """Append the contact of two spheres with gap <= margin, in the frame of the first, if their centres differ."""
+    vertex_a, vertex_b = geometry.vertex_first[first], geometry.vertex_first[second]
+    radius_a, radius_b = geometry.radius[first], geometry.radius[second]
+    centre_a, centre_b = row(geometry.vertex, vertex_a), moved(pose.R, pose.t, row(geometry.vertex, vertex_b))
     between = subtract(centre_b, centre_a)
     distance = sqrt(dot(between, between))
     gap = distance - radius_a - radius_b
@@ -124,6 +124,5 @@ def sphere_sphere_contact(
     normal = (between[0] / distance, between[1] / distance, between[2] / distance)
     point_a = along(centre_a, radius_a, normal)
     point_b = along(centre_b, -radius_b, normal)
-    return write_contact(
-        contact_real, contact_int, count, point_a, point_b, normal, gap, CORNER, 2 * vertex_a, 2 * vertex_b
-    )
+    contact = Contact(point_a, point_b, normal, gap, CORNER, 2 * vertex_a, 2 * vertex_b)
+    return write_contact(contacts.real, contacts.integer, count, contact)

@@ -5,9 +5,9 @@ of faces and the cross products of edges (the separating axes; Gottschalk, Lin a
 are nearest, at most the gap elsewhere, and minus the depth of bodies inside each other. Where a face has it, the polygon of
 the other body that faces it most squarely is cut by its sides (Sutherland and Hodgman 1974), and of the points within
 the margin four stay: the deepest, the one farthest from it, and the ones farthest from their line on either side. Where two
-edges have it by more than EDGE_WINS of the smaller inner radius, their closest points are the contact, unless their normal is within
-ALIKE of that of a face: then what is cut out there are the contacts, along the normal of the edges, since bodies that lie crosswise on
-each other, and rock, come to touch at the next of these points before they are looked at again.
+edges have it by more than EDGE_WINS of the smaller inner radius, their closest points are the contact. There is one exception: if the
+normal of the edges is within ALIKE of that of a face, the polygon cut out on that face gives the contacts, along the normal of the edges.
+Bodies that lie crosswise on each other and rock touch at the next of these points before their contacts are found again.
 
 Contacts are written as (x, y, z on a, x, y, z on b, normal, gap) in world axes relative to the position of a.
 """
@@ -20,39 +20,87 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.contact_records import turned
+from rigidimpulse.collision.distance.epa import Polytope, make_polytope
+from rigidimpulse.collision.distance.gjk import Simplex, make_simplex
 from rigidimpulse.collision.geometry import HALF_SPACE, Geometry
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 
 EDGE_WINS = 2e-3
 ALIKE = 0.95
-"""Cosine of the angle of the normal of two edges and that of a face above which it is the faces that come to touch."""
+"""Cosine of the angle between the normal of two edges and that of a face above which the face gives the contacts."""
 POINTS = 4
 """Contacts of two convex polyhedra."""
 MOST_CORNERS = 64
-"""Corners of a polygon that is cut."""
+"""Most corners of a polygon that is cut."""
 FROM_EDGE = 1 << 20
 """Added to the numbers of corners that clipping made."""
 
 
-class Scratch(NamedTuple):
-    """What contacts are worked out in."""
+class Polygon(NamedTuple):
+    """Scratch memory for a polygon that is cut."""
 
-    polygon: np.ndarray  # (MOST_CORNERS, 3) m
+    corner: np.ndarray  # (MOST_CORNERS, 3) m
     ids: np.ndarray  # (MOST_CORNERS,)
     spare: np.ndarray  # (MOST_CORNERS, 3)
     spare_ids: np.ndarray  # (MOST_CORNERS,)
-    ways: np.ndarray  # (MOST_CORNERS, 3) m
+    paths: np.ndarray  # (MOST_CORNERS, 3) m, relative motion of corners
     height: np.ndarray  # (MOST_CORNERS,) m
     chosen: np.ndarray  # (4,)
 
 
 @jit_making_arrays
-def make_scratch():
-    """Room for one pair."""
-    return Scratch(
+def make_polygon():
+    """Scratch memory for one pair."""
+    return Polygon(
         np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64), np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS, np.int64),
         np.empty((MOST_CORNERS, 3)), np.empty(MOST_CORNERS), np.empty(4, np.int64),
     )  # fmt: skip
+
+
+class Scratch(NamedTuple):
+    """Scratch memory for the contacts of one pair of convex polyhedra."""
+
+    polygon: Polygon
+    simplex: Simplex
+    polytope: Polytope
+    work: np.ndarray  # (3, 3)
+    axes: np.ndarray  # (3, 3) R_a^T R_b
+    between: np.ndarray  # (3,) m, from a to b, in world axes
+    origin: np.ndarray  # (3,) zeros
+
+
+@jit_making_arrays
+def make_scratch():
+    """Scratch memory for one pair."""
+    return Scratch(
+        make_polygon(), make_simplex(), make_polytope(), np.empty((3, 3)), np.empty((3, 3)), np.zeros(3), np.zeros(3)
+    )
+
+
+class Pair(NamedTuple):
+    """Two bodies that are convex polyhedra, a and b in the arrays of bodies, and their shapes."""
+
+    rotation: np.ndarray  # (n, 3, 3)
+    velocity: np.ndarray  # (8 n,) v and w of body i from 8 i on, m/s and rad/s
+    a: int
+    b: int
+    s: int  # shape of a
+    t: int  # shape of b
+
+
+class Query(NamedTuple):
+    """Which contacts are wanted."""
+
+    margin: float  # m, greatest gap
+    ahead: float  # s, time for whose motion contacts are known in advance
+    size: float  # m, smaller inner radius
+
+
+class Points(NamedTuple):
+    """The contacts of one pair as they are found."""
+
+    real: np.ndarray  # (POINTS + 1, 10) on a, on b, normal, gap
+    ids: np.ndarray  # (POINTS + 1, 3) kind and features
 
 
 class Polyhedra(NamedTuple):
@@ -126,7 +174,7 @@ def _loop(flat: list[int], geometry: Geometry, low: int) -> list[int]:
 
 @inlined
 def four_of(points, height, count, chosen):
-    """Write the places of the points (count, 3) that carry all the others' load to chosen (4,); returns their number."""
+    """Choose up to four points (count, 3) that can carry the load of all: writes their places to chosen (4,), returns their number."""
     deepest = 0
     for k in range(1, count):
         if height[k] < height[deepest]:
@@ -166,31 +214,41 @@ def four_of(points, height, count, chosen):
     return number
 
 
-@jit
-def half_space_contacts(shapes, s, r, j, nx, ny, nz, offset, margin, sign, scratch, real, out_ids):
-    """Contacts of the solid n.x <= offset (relative to the shape's position) with shape s turned by r[j]; their number and the gap.
+class Plane(NamedTuple):
+    """The solid n.x <= offset, relative to the position of the other body."""
 
-    sign: 1 where the half space is a, else -1; points are relative to the shape's position.
+    normal: tuple[float, float, float]
+    offset: float  # m
+    sign: float  # 1 where the half space is a, else -1
+
+
+@jit
+def half_space_contacts(shapes, s, rotation, j, plane, margin, polygon, points):
+    """Contacts of a half space with shape s turned by rotation[j]; their number and the gap.
+
+    Points are relative to the shape's position.
     """
-    polygon, ids, height, chosen = scratch.polygon, scratch.ids, scratch.height, scratch.chosen
+    corner, ids, height, chosen = polygon.corner, polygon.ids, polygon.height, polygon.chosen
+    real, out_ids = points
+    (nx, ny, nz), offset, sign = plane
     count, least = 0, inf
     for v in range(shapes.corner_first[s], shapes.corner_first[s + 1]):
-        x, y, z = turned(r, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
+        x, y, z = turned(rotation, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
         gap = nx * x + ny * y + nz * z - offset
         least = min(least, gap)
         if gap <= margin and count < MOST_CORNERS:
-            polygon[count, 0], polygon[count, 1], polygon[count, 2] = x, y, z
+            corner[count, 0], corner[count, 1], corner[count, 2] = x, y, z
             height[count], ids[count] = gap, v
             count += 1
     if count == 0:
         return np.int64(0), least
-    number = four_of(polygon, height, count, chosen)
+    number = four_of(corner, height, count, chosen)
     on_plane, on_shape = (0, 3) if sign > 0.0 else (3, 0)
     for c in range(number):
         k = chosen[c]
         for i in range(3):
             n = nx if i == 0 else (ny if i == 1 else nz)
-            real[c, on_plane + i], real[c, on_shape + i] = polygon[k, i] - height[k] * n, polygon[k, i]
+            real[c, on_plane + i], real[c, on_shape + i] = corner[k, i] - height[k] * n, corner[k, i]
             real[c, 6 + i] = sign * n
         real[c, 9] = height[k]
         out_ids[c, 0], out_ids[c, 1], out_ids[c, 2] = -1, -1, ids[k]
@@ -198,8 +256,29 @@ def half_space_contacts(shapes, s, r, j, nx, ny, nz, offset, margin, sign, scrat
 
 
 @inlined
-def copy_contact(real, ids, source, target):
+def polyhedron_half_space_contacts(shapes, pair, query, scratch, points):
+    """Contacts of a half space and a convex polyhedron, in either order, relative to a; returns their number and the gap."""
+    rotation, _, a, b, s, t = pair
+    real, between = points.real, scratch.between
+    half_space_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
+    half_space, w, i, sign = shapes.half_space, s if half_space_is_a else t, a if half_space_is_a else b, 1.0 if half_space_is_a else -1.0
+    nx, ny, nz = turned(rotation, i, half_space[w, 0], half_space[w, 1], half_space[w, 2])
+    offset = half_space[w, 3] - sign * (nx * between[0] + ny * between[1] + nz * between[2])
+    solid, j = (t, b) if half_space_is_a else (s, a)
+    plane = Plane((nx, ny, nz), offset, sign)
+    count, least = half_space_contacts(shapes, solid, rotation, j, plane, query.margin, scratch.polygon, points)
+    if half_space_is_a:
+        for k in range(count):
+            for c in range(3):
+                real[k, c] += between[c]
+                real[k, 3 + c] += between[c]
+    return count, least
+
+
+@inlined
+def copy_contact(points, source, target):
     """Copy a contact."""
+    real, ids = points
     for k in range(10):
         real[target, k] = real[source, k]
     for k in range(3):
@@ -216,21 +295,21 @@ def nearest_of(real, count):
 
 
 @inlined
-def add_contact(real, ids, count, source):
-    """Add the contact in row `source` to `count` others, in the place of the farthest where there are POINTS; returns their number."""
-    at = count
+def add_contact(points, count, source):
+    """Add the contact at `source` to `count` others, in the place of the farthest where there are POINTS; returns their number."""
+    real, at = points.real, count
     if count == POINTS:
         at = 0
         for n in range(1, count):
             if real[n, 9] > real[at, 9]:
                 at = n
-    copy_contact(real, ids, source, at)
+    copy_contact(points, source, at)
     return min(count + 1, POINTS)
 
 
 @inlined
 def along_edges(real, count, edges, cosine, of_b, gap, size):
-    """Turn `count` contacts of faces to the normal of the edges in row `edges`; returns whether the nearest is as near as the edges are.
+    """Turn `count` contacts of faces to the normal of the edges at place `edges`; returns whether the nearest is as near as the edges are.
 
     A corner at the height h over a face is h cos over it along the normal of edges that is tilted so, and at least as far as the edges are.
     cosine: of both normals; of_b: whether the face is b's; gap: of the edges, m; size: smaller inner radius, m.

@@ -1,5 +1,5 @@
-"""Stage `sweep`: when two bodies on their courses first touch.
+"""Time of impact: when two bodies on their trajectories first touch.
 
-`impact_time` is the contract, `bisection`, `conservative`, `linear` and `after` are the methods, `guard` and `bound`
-what makes the first two safe, and `features` the same for a single pair of features on any prescribed path.
+`result` is the contract. The methods are `bisection`, `conservative`, `linear` and `end_of_step`. `safe_step` and `motion_bound` are the
+conservative bounds that make the first two safe. `feature_paths` does the same for one pair of features on any prescribed path.
 """

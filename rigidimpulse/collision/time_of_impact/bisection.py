@@ -1,17 +1,16 @@
 """Backing up time by bisection: the first contact of each pair, found to a tolerance and never passed.
 
-The guard gives a safe step and the features that limit it. Where their gap has come below `touch` a little later, its
+The conservative bound gives a safe step and the features that limit it. Where their gap has come below `impact_margin` a little later, its
 root is bracketed and bisected with interpolation, log2(h / tolerance) evaluations at most and mostly far fewer. The
-guard then confirms that nothing touches before the root; if it names other features, their earlier root is taken, and
-so on (`guard_search`).
+bound then confirms that nothing touches before the root; if it names other features, their earlier root is taken, and
+so on (`search`).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.collision.geometry import CYLINDER
-from rigidimpulse.collision.time_of_impact.result import ImpactTimes, SweepDetector, no_impacts
+from rigidimpulse.collision.time_of_impact.result import ImpactTimes, PairsToSweep, SearchEffort, SweepDetector, no_impacts
 from rigidimpulse.collision.time_of_impact.search import first_contacts
 from rigidimpulse.motion.trajectory import Trajectories
 
@@ -33,16 +32,16 @@ def sweep(
 
     Args:
         detector: geometry, shapes of the bodies and scratch arrays.
-        course: paths of all bodies, known up to `end`.
+        trajectory: paths of all bodies, known up to `end`.
         pairs_a: (k,) int64 bodies a; likewise pairs_b.
         start: (k,) s, from when each pair is swept.
         end: s.
-        touch: (k,) m, gap at which contact is declared: 0 or more, above 0 where two surfaces without a radius may
+        impact_margin: (k,) m, gap at which contact is declared: 0 or more, above 0 where two surfaces without a radius may
             meet.
-        tolerance: (k,) m, how far above `touch` the gap may be at the time found; rounding sets a limit to it.
+        tolerance: (k,) m, how far above `impact_margin` the gap may be at the time found; rounding sets a limit to it.
 
     Returns:
-        Times with a gap in [touch - round-off, touch + tolerance] and no contact before.
+        Times with a gap in [impact_margin - round-off, impact_margin + tolerance] and no contact before.
 
     """
     result = no_impacts(len(pairs_a))
@@ -51,15 +50,9 @@ def sweep(
         trajectory,
         detector.sweep_scratch,
         detector.shape_of_body,
-        pairs_a,
-        pairs_b,
-        start,
+        PairsToSweep(pairs_a, pairs_b, start, impact_margin, tolerance),
         float(end),
-        impact_margin,
-        tolerance,
-        LOOK_AHEAD,
-        detector.max_queries,
-        1 if (detector.geometry.kind == CYLINDER).any() else None,
+        SearchEffort(LOOK_AHEAD, detector.max_queries),
         result,
     )
     return result

@@ -6,7 +6,7 @@ safe time found so far are opened. A cylinder counts as one box.
 
 from __future__ import annotations
 
-from rigidimpulse.collision.distance.simplices import along, dot, subtract
+from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.time_of_impact.convex_pieces import pieces_safe_until
 from rigidimpulse.collision.time_of_impact.motion_bound import SEEN_SIZE, length, put, scaled, turned, turned_back, vector
 from rigidimpulse.collision.time_of_impact.scratch_layout import (
@@ -46,12 +46,6 @@ NO_NODE = -1
 
 
 @jit
-def row(array, i):
-    """Return row i of an array (k, 3) as a tuple."""
-    return array[i, 0], array[i, 1], array[i, 2]
-
-
-@jit
 def _load_triangle(vertex, triangle, triangle_normal, i, work, index, side):
     """Put triangle i into the place of the first (0) or second (1) piece, in the frame of the first body."""
     normal = row(triangle_normal, i)
@@ -77,13 +71,14 @@ def _write_axis_views(work, axes):
 
 
 @jit
-def _boxes_safe_until(low, high, centre, half, work, carrier, axes, threshold, horizon):
+def _boxes_safe_until(low, high, box, work, carrier, threshold, horizon):
     """Safe time of a box [low, high] of the first body and a box of the second; 0 where no direction separates them.
 
-    `centre` middle of the second box, `half` its half extents along the columns of the matrix at `axes`; frame of the
-    first body. Directions: the one that limits the safe time so far (`carrier`: its side), and the axes of both
+    box: (centre, half, axes) of the second box, with its half extents along the columns of the matrix at `axes`; frame of the first
+    body. Directions: the one that limits the safe time so far (`carrier`: its side), and the axes of both
     boxes. All have views, from the carrier outward where the direction points from the first box to the second.
     """
+    centre, half, axes = box
     middle, half_first = scaled(along(low, 1.0, high), 0.5), scaled(subtract(high, low), 0.5)
     between, arm = subtract(centre, middle), subtract(centre, vector(work, ORIGIN + 3))
     reach, reach_first = length(half), length(half_first)
@@ -112,9 +107,9 @@ def _boxes_safe_until(low, high, centre, half, work, carrier, axes, threshold, h
             view, sign = LIMIT_VIEW + VIEW_SIZE * trial, 1.0 if distance > 0.0 else -1.0
             seen = SEEN + SEEN_SIZE * side
             if side:
-                s = viewed_safe_until(work, seen, view, sign, middle, far_first, reach_first, gap, horizon)
+                s = viewed_safe_until(work, seen, view, sign, (middle, far_first, reach_first), gap, horizon)
             else:
-                s = viewed_safe_until(work, seen, view, sign, arm, far, reach, gap, horizon)
+                s = viewed_safe_until(work, seen, view, sign, (arm, far, reach), gap, horizon)
             best = max(best, s)
             if best >= horizon:
                 return horizon
@@ -132,9 +127,7 @@ def _pair_safe_until(node_min, node_max, first, second, work, carrier, threshold
         low, high = row(node_min, second), row(node_max, second)
         centre = along(turned(work, ROTATION, scaled(along(low, 1.0, high), 0.5)), 1.0, vector(work, ORIGIN + 3))
         half, axes = scaled(subtract(high, low), 0.5), ROTATION
-    return _boxes_safe_until(
-        row(node_min, first), row(node_max, first), centre, half, work, carrier, axes, threshold, horizon
-    )
+    return _boxes_safe_until(row(node_min, first), row(node_max, first), (centre, half, axes), work, carrier, threshold, horizon)
 
 
 @jit
@@ -161,20 +154,20 @@ def _is_larger(node_min, node_max, a, b):
 
 
 @jit
-def trees_safe_until(nodes, surface, first, second, work, index, threshold, horizon, cylinders):
+def trees_safe_until(geometry, first, second, scratch, threshold, horizon):
     """Safe time of two primitives, given by the roots of their trees; NO_NODE for a cylinder as the second.
 
     What limits it: triangles at ELEMENT_A (of the first) and ELEMENT_B, side at CARRIER, record at LIMIT.
 
     Args:
-        nodes: node_min, node_max, node_child, node_start, node_count of the geometry.
-        surface: vertex, triangle, triangle_normal of the geometry.
+        geometry: the compiled shapes.
         first, second: roots.
-        work, index, threshold, horizon, cylinders: as for `pieces_safe_until`.
+        scratch, threshold, horizon: as for `pieces_safe_until`.
 
     """
-    node_min, node_max, child, start, count = nodes
-    vertex, triangle, triangle_normal = surface
+    work, index, node_min, node_max = scratch.work, scratch.index, geometry.node_min, geometry.node_max
+    child, start, count = geometry.node_child, geometry.node_start, geometry.node_count
+    vertex, triangle, triangle_normal = geometry.vertex, geometry.triangle, geometry.triangle_normal
     put(work, LIMIT + DIRECTION, (0.0, 0.0, 0.0))
     _write_axis_views(work, CYLINDER_AXES if second == NO_NODE else ROTATION)
     index[BASE] = 0
@@ -201,7 +194,7 @@ def trees_safe_until(nodes, surface, first, second, work, index, threshold, hori
                 _load_triangle(vertex, triangle, triangle_normal, j, work, index, SECOND)
             for i in range(start[a], start[a] + count[a]):
                 _load_triangle(vertex, triangle, triangle_normal, i, work, index, FIRST)
-                s, carrier = pieces_safe_until(work, index, threshold, horizon, cylinders)
+                s, carrier = pieces_safe_until(scratch, threshold, horizon)
                 if s < horizon:
                     horizon = s
                     index[ELEMENT_A], index[ELEMENT_B], index[CARRIER] = i, j, carrier
@@ -213,9 +206,11 @@ def trees_safe_until(nodes, surface, first, second, work, index, threshold, hori
 
 
 @jit
-def half_space_safe_until(nodes, triangle, owns, vertex, root, normal, level, work, index, horizon):
+def half_space_safe_until(geometry, root, normal, level, scratch, horizon):
     """Safe time of a ROUND primitive of the second body above a level along a normal; ELEMENT_B tells the vertex."""
-    node_min, node_max, child, start, count = nodes
+    work, index, node_min, node_max = scratch.work, scratch.index, geometry.node_min, geometry.node_max
+    child, start, count = geometry.node_child, geometry.node_start, geometry.node_count
+    vertex, triangle, owns = geometry.vertex, geometry.triangle, geometry.triangle_owns
     back = turned_back(work, ROTATION, normal)
     level -= dot(normal, vector(work, ORIGIN + 3))
     write_view(work, SEEN, normal, OTHER_VIEW)
@@ -228,7 +223,7 @@ def half_space_safe_until(nodes, triangle, owns, vertex, root, normal, level, wo
         half, middle = scaled(subtract(high, low), 0.5), scaled(along(low, 1.0, high), 0.5)
         gap = dot(back, middle) - (abs(back[0]) * half[0] + abs(back[1]) * half[1] + abs(back[2]) * half[2]) - level
         arm = turned(work, ROTATION, middle)
-        if gap > 0.0 and viewed_safe_until(work, SEEN, OTHER_VIEW, 1.0, arm, length(arm), length(half), gap, horizon) >= horizon:
+        if gap > 0.0 and viewed_safe_until(work, SEEN, OTHER_VIEW, 1.0, (arm, length(arm), length(half)), gap, horizon) >= horizon:
             continue
         if child[node] >= 0:
             index[STACK + depth] = child[node]
@@ -240,7 +235,7 @@ def half_space_safe_until(nodes, triangle, owns, vertex, root, normal, level, wo
                 if owns[i] >> k & 1:
                     point = row(vertex, triangle[i, k])
                     arm = turned(work, ROTATION, point)
-                    s = viewed_safe_until(work, SEEN, OTHER_VIEW, 1.0, arm, length(arm), 0.0, dot(back, point) - level, horizon)
+                    s = viewed_safe_until(work, SEEN, OTHER_VIEW, 1.0, (arm, length(arm), 0.0), dot(back, point) - level, horizon)
                     if s < horizon:
                         horizon = s
                         index[ELEMENT_B] = -1 - triangle[i, k]

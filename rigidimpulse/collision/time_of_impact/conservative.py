@@ -1,6 +1,6 @@
-"""Backing up time by safe steps alone: conservative advancement until the gap is at `touch`.
+"""Backing up time by safe steps alone: conservative advancement until the gap is at `impact_margin`.
 
-Every step is one that the guard vouches for, so no contact is passed (Mirtich 1996). Each step leaves a third-order
+Every step is a safe one, so no contact is passed (Mirtich 1996). Each step leaves a third-order
 remainder of the time to contact, so few are needed; where bodies graze, each halves what is left.
 """
 
@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.collision.geometry import CYLINDER
-from rigidimpulse.collision.time_of_impact.result import ImpactTimes, SweepDetector, no_impacts
+from rigidimpulse.collision.time_of_impact.result import ImpactTimes, PairsToSweep, SearchEffort, SweepDetector, no_impacts
 from rigidimpulse.collision.time_of_impact.search import first_contacts
 from rigidimpulse.motion.trajectory import Trajectories
 
@@ -31,15 +30,9 @@ def sweep(
         trajectory,
         detector.sweep_scratch,
         detector.shape_of_body,
-        pairs_a,
-        pairs_b,
-        start,
+        PairsToSweep(pairs_a, pairs_b, start, impact_margin, tolerance),
         float(end),
-        impact_margin,
-        tolerance,
-        0.0,
-        detector.max_queries,
-        1 if (detector.geometry.kind == CYLINDER).any() else None,
+        SearchEffort(0.0, detector.max_queries),
         result,
     )
     return result

@@ -2,7 +2,7 @@
 
 Several directions n are tried and the best counts: the normal of either face, carried by its body; the direction of
 the closest features, carried by either body; and, for crossing edges, n turning with both of them. For a carried n
-every corner has its own offset and speed (`guard_root`): one offset with the largest speed would stall a body that
+every corner has its own offset and speed (`separating_quadratic`): one offset with the largest speed would stall a body that
 rolls or slides.
 
 n turning with both edges e_a (at rest in A) and e_b, seen from A: n stays across both to first order if n' = m,
@@ -13,8 +13,8 @@ and for D the vector from a corner of A to one of B, f_ij = n.D:   f' = m.D + n.
 |f'''| <= J + 3 nu |y''| + 3 nu^2 |y'| + nu^3 |D|, the lengths bounded over [0, h]. A cylinder whose side touches takes part as its axis, an
 edge grown by its radius: no point of it is outside of that.
 
-Records lie in the arrays `work` and `index` (`guard_layout`). The argument `cylinders` is None where no shape is a
-cylinder: then nothing of them is compiled.
+Records lie in the arrays `work` and `index` of a `PairScratch`. Kernels whose first argument is its `cylinders` return at once where that
+is None: numba then removes the rest before it compiles. They are never called there.
 """
 
 from __future__ import annotations
@@ -73,31 +73,47 @@ def _cylinder_record(work, side):
 
 
 @jit
-def _top(work, index, side, normal, cylinders):
-    """Return the greatest normal . p over the first (0) or second (1) piece."""
-    if cylinders is not None:
-        if index[COUNT + side] == 0:
-            centre, axis, half_height, radius = _cylinder_record(work, side)
-            return dot(normal, centre) + cylinder_support(axis, half_height, radius, normal)
-    return farthest(work, CORNER + 9 * side, index[COUNT + side], normal)
+def _cylinder_top(cylinders, work, side, normal):
+    """Return the greatest normal . p over the cylinder of one side."""
+    if cylinders is None:
+        return 0.0
+    centre, axis, half_height, radius = _cylinder_record(work, side)
+    return dot(normal, centre) + cylinder_support(axis, half_height, radius, normal)
 
 
 @jit
-def _carried(work, index, side, normal, view, level, horizon, cylinders):
-    """Safe time of the other piece above a level along a normal, with its view, that the body of one side carries."""
+def _top(scratch, side, normal):
+    """Return the greatest normal . p over the first (0) or second (1) piece."""
+    if scratch.index[COUNT + side] == 0:
+        return _cylinder_top(scratch.cylinders, scratch.work, side, normal)
+    return farthest(scratch.work, CORNER + 9 * side, scratch.index[COUNT + side], normal)
+
+
+@jit
+def _cylinder_carried(cylinders, work, side, normal, level, horizon):
+    """As `_carried`, for a cylinder."""
+    if cylinders is None:
+        return horizon
     other = 1 - side
     seen, origin = SEEN + SEEN_SIZE * side, vector(work, ORIGIN + 3 * other)
-    if cylinders is not None:
-        if index[COUNT + other] == 0:
-            centre, axis, half_height, radius = _cylinder_record(work, other)
-            gap = dot(normal, centre) - cylinder_support(axis, half_height, radius, normal) - level
-            arm = subtract(centre, origin)
-            return cylinder_safe_until(work, seen, normal, arm, axis, half_height, radius, gap, horizon)
+    centre, axis, half_height, radius = _cylinder_record(work, other)
+    gap = dot(normal, centre) - cylinder_support(axis, half_height, radius, normal) - level
+    cylinder = (subtract(centre, origin), axis, half_height, radius)
+    return cylinder_safe_until(work, seen, normal, cylinder, gap, horizon)
+
+
+@jit
+def _carried(scratch, side, normal, view, level, horizon):
+    """Safe time of the other piece above a level along a normal, with its view, that the body of one side carries."""
+    work, index, other = scratch.work, scratch.index, 1 - side
+    seen, origin = SEEN + SEEN_SIZE * side, vector(work, ORIGIN + 3 * other)
+    if index[COUNT + other] == 0:
+        return _cylinder_carried(scratch.cylinders, work, side, normal, level, horizon)
     for k in range(index[COUNT + other]):
         point = vector(work, CORNER + 9 * other + 3 * k)
         gap = dot(normal, point) - level
         arm = subtract(point, origin)
-        horizon = viewed_safe_until(work, seen, view, 1.0, arm, length(arm), 0.0, gap, horizon)
+        horizon = viewed_safe_until(work, seen, view, 1.0, (arm, length(arm), 0.0), gap, horizon)
     return horizon
 
 
@@ -135,8 +151,10 @@ def _with_edges(work, index, edges, normal, threshold, horizon):
 
 
 @jit
-def _with_thinned(work, index, normal, threshold, horizon):
+def _with_thinned(cylinders, work, index, normal, threshold, horizon):
     """Safe time of the two pieces along n turning with crossing edges, the sides of cylinders among them; 0 if none cross."""
+    if cylinders is None:
+        return 0.0
     is_side = True
     for side in range(2):
         if index[COUNT + side] == 0:
@@ -158,27 +176,32 @@ def _with_thinned(work, index, normal, threshold, horizon):
 
 
 @jit_making_arrays
-def _closest(work, index, cylinders):
+def _closest_to_cylinder(cylinders, scratch):
+    """As `_closest`, where the second piece is a cylinder."""
+    if cylinders is None:
+        return 0.0, NO_EDGES
+    work, index = scratch.work, scratch.index
+    centre, axis, half_height, radius = _cylinder_record(work, SECOND)
+    points = work[CLOSEST : CLOSEST + GAP]
+    if index[COUNT] == 0:
+        cylinder_cylinder_distance((centre, axis, half_height, radius), _cylinder_record(work, FIRST), points)
+    else:
+        corners = work[CORNER : CORNER + 9].reshape((3, 3))
+        cylinder_triangle_distance(centre, axis, half_height, radius, corners, points)
+    on_cylinder, normal = vector(work, CLOSEST), scaled(vector(work, CLOSEST + NORMAL), -1.0)
+    put(work, CLOSEST + POINT_FIRST, vector(work, CLOSEST + POINT_SECOND))
+    put(work, CLOSEST + POINT_SECOND, on_cylinder)
+    put(work, CLOSEST + NORMAL, normal)
+    top = _top(scratch, FIRST, normal)
+    return -_top(scratch, SECOND, scaled(normal, -1.0)) - top, NO_EDGES
+
+
+@jit
+def _closest(scratch):
     """Write the closest points and the normal of the two pieces at CLOSEST; return (separation, crossing edges)."""
-    if cylinders is not None:
-        if index[COUNT + 1] == 0:
-            centre, axis, half_height, radius = _cylinder_record(work, SECOND)
-            points = work[CLOSEST : CLOSEST + GAP]
-            if index[COUNT] == 0:
-                other, axis_other, height_other, radius_other = _cylinder_record(work, FIRST)
-                cylinder_cylinder_distance(
-                    centre, axis, half_height, radius, other, axis_other, height_other, radius_other, points
-                )
-            else:
-                corners = work[CORNER : CORNER + 9].reshape((3, 3))
-                cylinder_triangle_distance(centre, axis, half_height, radius, corners, points)
-            on_cylinder, normal = vector(work, CLOSEST), scaled(vector(work, CLOSEST + NORMAL), -1.0)
-            put(work, CLOSEST + POINT_FIRST, vector(work, CLOSEST + POINT_SECOND))
-            put(work, CLOSEST + POINT_SECOND, on_cylinder)
-            put(work, CLOSEST + NORMAL, normal)
-            top = _top(work, index, FIRST, normal, cylinders)
-            return -_top(work, index, SECOND, scaled(normal, -1.0), cylinders) - top, NO_EDGES
-    return closest_simplices(work, index, CLOSEST)
+    if scratch.index[COUNT + 1] == 0:
+        return _closest_to_cylinder(scratch.cylinders, scratch)
+    return closest_simplices(scratch.work, scratch.index, CLOSEST)
 
 
 @jit
@@ -190,22 +213,22 @@ def _face_direction(work, index, side):
 
 
 @jit
-def pieces_safe_until(work, index, threshold, horizon, cylinders):
+def pieces_safe_until(scratch, threshold, horizon):
     """Safe time of the two convex pieces at COUNT and CORNER, FACE or CYLINDER.
 
     Of a simplex and a cylinder the cylinder is the second. If the result is short of the horizon, the record at CLOSEST
     tells what limits it. Of the record at LIMIT the direction is tried first (zeros if there is none).
 
     Args:
-        work, index: see `guard_layout`.
+        scratch: `PairScratch`.
         threshold: m, radii of the pieces included.
         horizon: s.
-        cylinders: None, or an int where there are cylinders.
 
     Returns:
         (s, the side that carries the best direction: 0 first, 1 second).
 
     """
+    work, index = scratch.work, scratch.index
     best, carrier, separation = 0.0, 0, 0.0
     edges = NO_EDGES
     normal = direction = vector(work, LIMIT + DIRECTION)
@@ -219,18 +242,18 @@ def pieces_safe_until(work, index, threshold, horizon, cylinders):
                 continue
             normal = _face_direction(work, index, side)
         elif trial == 3:
-            separation, edges = _closest(work, index, cylinders)
+            separation, edges = _closest(scratch)
             normal = vector(work, CLOSEST + NORMAL)
             if separation <= 0.0:
                 break
         outward = normal if side == 0 else scaled(normal, -1.0)
-        level = _top(work, index, side, outward, cylinders) + threshold
-        if trial < 3 and -_top(work, index, 1 - side, scaled(outward, -1.0), cylinders) <= level:
+        level = _top(scratch, side, outward) + threshold
+        if trial < 3 and -_top(scratch, 1 - side, scaled(outward, -1.0)) <= level:
             continue
         if trial > 0:
             write_view(work, SEEN + SEEN_SIZE * side, outward, OTHER_VIEW)
         view = OTHER_VIEW if trial > 0 else LIMIT_VIEW
-        s = _carried(work, index, side, outward, view, level, horizon, cylinders)
+        s = _carried(scratch, side, outward, view, level, horizon)
         if s >= horizon:
             return horizon, side
         if s > best or (trial == 3 and best == 0.0):
@@ -240,9 +263,8 @@ def pieces_safe_until(work, index, threshold, horizon, cylinders):
         put(work, CLOSEST + NORMAL, (0.0, 0.0, 0.0))
     elif edges >= 0:
         best = max(best, _with_edges(work, index, edges, normal, threshold, horizon))
-    elif cylinders is not None:
-        if index[COUNT + 1] == 0:
-            best = max(best, _with_thinned(work, index, normal, threshold, horizon))
+    elif index[COUNT + 1] == 0:
+        best = max(best, _with_thinned(scratch.cylinders, work, index, normal, threshold, horizon))
     work[CLOSEST + GAP] = separation
     put(work, CLOSEST + DIRECTION, direction)
     return best, carrier

@@ -9,12 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.collision.containment import points_in_shape
-from rigidimpulse.collision.distance.simplices import along, subtract
+from rigidimpulse.collision.distance.simplices import along, row, subtract
 from rigidimpulse.collision.geometry import HALF_SPACE, ROUND
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
 from rigidimpulse.collision.time_of_impact.linear import measure
 from rigidimpulse.collision.time_of_impact.motion_bound import put, turned, turned_back, vector
-from rigidimpulse.collision.time_of_impact.result import IMPACT, ImpactTimes, SweepDetector, no_impacts
+from rigidimpulse.collision.time_of_impact.result import IMPACT, ImpactTimes, PairsToSweep, SweepDetector, no_impacts
 from rigidimpulse.collision.time_of_impact.scratch_layout import GAP, NORMAL
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
@@ -47,9 +46,10 @@ def _is_inside(geometry, trajectory, shape_of_body, a, b, t):
 
 
 @jit
-def _sweep(geometry, trajectory, shape_of_body, pairs_a, pairs_b, start, end, impact_margin, result):
-    for k in range(pairs_a.shape[0]):
-        a, b, witness = pairs_a[k], pairs_b[k], result.witness[k]
+def _sweep(geometry, trajectory, shape_of_body, pairs, end, result):
+    start, impact_margin = pairs.start, pairs.impact_margin
+    for k in range(pairs.a.shape[0]):
+        a, b, witness = pairs.a[k], pairs.b[k], result.witness[k]
         measure(geometry, trajectory, shape_of_body, a, b, end, witness)
         result.queries[k] = 1
         gap = witness[GAP]
@@ -77,9 +77,10 @@ def sweep(
     """Report the pairs that are in contact at `end`; arguments as for `bisection.sweep`, `tolerance` is not read.
 
     Returns:
-        `end` for pairs that overlap there or are closer than `touch`.
+        `end` for pairs that overlap there or are closer than `impact_margin`.
 
     """
     result = no_impacts(len(pairs_a))
-    _sweep(detector.geometry, trajectory, detector.shape_of_body, pairs_a, pairs_b, start, float(end), impact_margin, result)
+    pairs = PairsToSweep(pairs_a, pairs_b, start, impact_margin, tolerance)
+    _sweep(detector.geometry, trajectory, detector.shape_of_body, pairs, float(end), result)
     return result

@@ -13,7 +13,7 @@ pair of corners stays apart for
 
     g - c s - 1/2 (|p_a''| + |p_b''|) s^2 > 0,    g = n.(p_b - p_a),   c = -n.(p_b' - p_a')
 
-The least such time is a step that passes no contact; steps are repeated until the gap is at `touch` (conservative
+The least such time is a step that passes no contact; steps are repeated until the gap is at `impact_margin` (conservative
 advancement).
 """
 
@@ -25,8 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, subtract
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
+from rigidimpulse.collision.distance.simplices import along, cross, dot, row, subtract
 from rigidimpulse.collision.time_of_impact.closest_direction import closest_simplices
 from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled, vector
 from rigidimpulse.collision.time_of_impact.scratch_layout import CLOSEST, CORNER, COUNT, FACE, FIRST, INDEX_SIZE, NORMAL, SECOND, WORK_SIZE
@@ -88,8 +87,9 @@ def _bend(corners, path, k):
 
 
 @jit
-def _first_contact(corners_a, path_a, corners_b, path_b, impact_margin, tolerance, work, index, speeds):
-    """Return (tau, steps); tau is inf without contact, nan if the steps were used up."""
+def _first_contact(first, second, impact_margin, tolerance, work, index, speeds):
+    """Return (tau, steps) of two features, each (corners, path); tau is inf without contact, nan if the steps were used up."""
+    (corners_a, path_a), (corners_b, path_b) = first, second
     index[COUNT], index[COUNT + 1] = corners_a.shape[0], corners_b.shape[0]
     tau = 0.0
     for step in range(1, MAX_STEPS + 1):
@@ -130,8 +130,8 @@ def first_contact(
         path_a: its pose from tau = 0 to 1.
         corners_b: as corners_a, of the other feature.
         path_b: its pose.
-        touch: m, distance that counts as contact.
-        tolerance: m, how far above `touch` the distance may be at the time found; rounding sets a limit to it.
+        impact_margin: m, distance that counts as contact.
+        tolerance: m, how far above `impact_margin` the distance may be at the time found; rounding sets a limit to it.
 
     Returns:
         tau of the first contact in [0, 1], inf if there is none.
@@ -150,7 +150,7 @@ def first_contact(
             raise ValueError("corners and paths must be finite")
         if len(arrays[0]) == 3 and not np.cross(arrays[0][1] - arrays[0][0], arrays[0][2] - arrays[0][0]).any():
             raise ValueError("a triangle without area: give its longest edge")
-        features += [arrays[0], FeaturePath(arrays[1], arrays[2])]
+        features.append((arrays[0], FeaturePath(arrays[1], arrays[2])))
     work, index, speeds = np.zeros(WORK_SIZE), np.zeros(INDEX_SIZE, np.int64), np.zeros(18)
     tau, steps = _first_contact(*features, float(impact_margin), float(tolerance), work, index, speeds)
     if np.isnan(tau):

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from math import inf
 
-from rigidimpulse.collision.distance.simplices import along, dot
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
+from rigidimpulse.collision.distance.simplices import along, dot, row
 from rigidimpulse.collision.time_of_impact.motion_bound import length, scaled
 from rigidimpulse.collision.time_of_impact.separating_quadratic import cubic_safe_until
 from rigidimpulse.core.conventions import TOLERANCES
@@ -80,11 +79,14 @@ def spheres_safe_until(x, v, a, jerk, reach, exact, horizon):
 
 
 @jit
-def plane_safe_until(trajectory, i, normal_x, normal_y, normal_z, level, ball, x, v, a, jerk, horizon):
-    """Safe time of a plane of body i, which does not turn, and a sphere with its centre at `level` at the threshold.
+def plane_safe_until(trajectory, i, plane, ball, flight, horizon):
+    """Safe time of a plane of body i, which does not turn, and a sphere.
 
-    x, v, a, jerk: the sphere's flight from the plane's body.
+    plane: (normal in the axes of the body, height of the sphere's centre at the threshold); ball: whether the sphere is the shape; flight:
+    the sphere's `relative_flight` from the plane's body.
     """
+    (normal_x, normal_y, normal_z), level = plane
+    x, v, a, jerk = flight
     q = trajectory.orientation
     normal = rotated(q[i, 0], q[i, 1], q[i, 2], q[i, 3], normal_x, normal_y, normal_z)
     gap = dot(normal, x) - level

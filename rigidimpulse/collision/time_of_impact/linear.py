@@ -1,6 +1,6 @@
 """Backing up time by a linear approximation: the gap is taken to shrink at the speed it has at the start.
 
-    t = start + (gap - touch) / c,     c = -n.(v_b + w_b x r_b - v_a - w_a x r_a)
+    t = start + (gap - impact_margin) / c,     c = -n.(v_b + w_b x r_b - v_a - w_a x r_a)
 
 with the points that are closest then, and the normal n from a to b.
 
@@ -16,11 +16,10 @@ from math import inf
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, subtract
-from rigidimpulse.collision.manifold.dispatch import pair_gap
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
+from rigidimpulse.collision.distance.simplices import along, cross, dot, row, subtract
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled
-from rigidimpulse.collision.time_of_impact.result import IMPACT, TOUCHING, ImpactTimes, SweepDetector, no_impacts
+from rigidimpulse.collision.time_of_impact.result import IMPACT, TOUCHING, ImpactTimes, PairsToSweep, SweepDetector, no_impacts
 from rigidimpulse.collision.time_of_impact.scratch_layout import FIRST, GAP, NORMAL, POINT_FIRST, POINT_SECOND, SECOND
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
@@ -38,7 +37,8 @@ def measure(geometry, trajectory, shape_of_body, a, b, t, witness):
     for side in range(2):
         motion_at(trajectory, b if side else a, t, x[side], q[side], v[side], w[side])
         quaternion_to_matrix(q[side], axes[side])
-    gap = pair_gap(geometry, shape_of_body[a], x[0], axes[0], shape_of_body[b], x[1], axes[1], inf, points)
+    posed_a, posed_b = Posed(shape_of_body[a], x[0], axes[0]), Posed(shape_of_body[b], x[1], axes[1])
+    gap = pair_gap(geometry, posed_a, posed_b, inf, points)
     point_a, point_b = (points[0], points[1], points[2]), (points[3], points[4], points[5])
     between = scaled(subtract(point_b, point_a), 1.0 if gap >= 0.0 else -1.0)
     if dot(between, between) == 0.0:
@@ -55,9 +55,10 @@ def measure(geometry, trajectory, shape_of_body, a, b, t, witness):
 
 
 @jit
-def _sweep(geometry, trajectory, shape_of_body, pairs_a, pairs_b, start, end, impact_margin, result):
-    for k in range(pairs_a.shape[0]):
-        a, b, witness = pairs_a[k], pairs_b[k], result.witness[k]
+def _sweep(geometry, trajectory, shape_of_body, pairs, end, result):
+    start, impact_margin = pairs.start, pairs.impact_margin
+    for k in range(pairs.a.shape[0]):
+        a, b, witness = pairs.a[k], pairs.b[k], result.witness[k]
         closing = measure(geometry, trajectory, shape_of_body, a, b, start[k], witness)
         result.queries[k] = 1
         if closing <= 0.0:
@@ -88,5 +89,6 @@ def sweep(
 
     """
     result = no_impacts(len(pairs_a))
-    _sweep(detector.geometry, trajectory, detector.shape_of_body, pairs_a, pairs_b, start, float(end), impact_margin, result)
+    pairs = PairsToSweep(pairs_a, pairs_b, start, impact_margin, tolerance)
+    _sweep(detector.geometry, trajectory, detector.shape_of_body, pairs, float(end), result)
     return result

@@ -45,7 +45,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
 from rigidimpulse.motion.trajectory import FIXED, FORCED, JERK, LINEAR, PRESCRIBED, TORQUE_RATE, motion_at, rate_of, row_at
 
-# Offsets are numpy integers because numba would compile a kernel anew for every literal int that it is called with.
+# Offsets are numpy integers because numba would compile a kernel again for every literal int that it is called with.
 
 POSITION, VELOCITY, SPIN, ACCELERATION, SPIN_RATE, AXES, ORIENTATION = np.array([0, 3, 6, 9, 12, 15, 24])
 SPIN_BOUND, SPIN_RATE_BOUND, JERK_BOUND, CENTRE_JERK, MOTION_SIZE = np.array([28, 29, 30, 31, 34])
@@ -131,19 +131,19 @@ def _fastest_spin(moments, energy, momentum):
 
 
 @jit
-def _write_spin_bounds(moments, torque_world, torque_rate, horizon, row):
+def _write_spin_bounds(moments, torque_world, torque_rate, horizon, record):
     """Write alpha, W, A and K of a body that turns freely or under a torque that changes at `torque_rate`."""
-    spin, torque = turned_back(row, AXES, vector(row, SPIN)), turned_back(row, AXES, torque_world)
+    spin, torque = turned_back(record, AXES, vector(record, SPIN)), turned_back(record, AXES, torque_world)
     i, j, k = moments
     momentum = (i * spin[0], j * spin[1], k * spin[2])
     moment_of_force = subtract(torque, cross(spin, momentum))
     rate = (moment_of_force[0] / i, moment_of_force[1] / j, moment_of_force[2] / k)
-    put(row, SPIN_RATE, turned(row, AXES, rate))
+    put(record, SPIN_RATE, turned(record, AXES, rate))
 
     least = min(i, j, k)
     kappa = max(abs(i - j) / k, abs(j - k) / i, abs(k - i) / j)
     torque_size, spin_now, rate_now = length(torque), length(spin), length(rate)
-    torque_size = max(torque_size, length(turned_back(row, AXES, along(torque_world, horizon, torque_rate))))
+    torque_size = max(torque_size, length(turned_back(record, AXES, along(torque_world, horizon, torque_rate))))
     kick, kick_rate = torque_size / least, length(torque_rate) / least
     energy = (sqrt(dot(spin, momentum)) + horizon * torque_size / sqrt(least)) ** 2
     spin_bound = max(_fastest_spin(moments, energy, max(length(momentum) - horizon * torque_size, 0.0) ** 2), spin_now)
@@ -154,51 +154,57 @@ def _write_spin_bounds(moments, torque_world, torque_rate, horizon, row):
         jerk_bound = spin_bound * kick + 2.0 / sqrt(3.0) * kappa * spin_bound * rate_bound + kick_rate
         rate_bound = max(rate_now, min(rate_bound, rate_now + horizon * jerk_bound))
         spin_bound = max(spin_now, min(spin_bound, spin_now + horizon * rate_bound))
-    row[SPIN_BOUND] = spin_bound * _WIDEN
-    row[SPIN_RATE_BOUND] = rate_bound * _WIDEN
-    row[JERK_BOUND] = jerk_bound * _WIDEN
+    record[SPIN_BOUND] = spin_bound * _WIDEN
+    record[SPIN_RATE_BOUND] = rate_bound * _WIDEN
+    record[JERK_BOUND] = jerk_bound * _WIDEN
 
 
 @jit_making_arrays
-def motion_bound(trajectory, i, t, horizon, row):
-    """Write the motion of body i at time t, with bounds that hold until t + horizon, into row (MOTION_SIZE,).
+def motion_bound(trajectory, i, t, horizon, record):
+    """Write the motion of body i at time t, with bounds that hold until t + horizon, into record (MOTION_SIZE,).
 
-    Works for every mode of a course: fixed, prescribed, free, and turning under a world torque.
+    Works for every mode of a trajectory: fixed, prescribed, free, and turning under a world torque.
     """
     motion_at(
-        trajectory, i, t, row[POSITION:VELOCITY], row[ORIENTATION:SPIN_BOUND], row[VELOCITY:SPIN], row[SPIN:ACCELERATION]
+        trajectory, i, t, record[POSITION:VELOCITY], record[ORIENTATION:SPIN_BOUND], record[VELOCITY:SPIN], record[SPIN:ACCELERATION]
     )
-    quaternion_to_matrix(row[ORIENTATION:SPIN_BOUND], row[AXES:ORIENTATION].reshape((3, 3)))
+    quaternion_to_matrix(record[ORIENTATION:SPIN_BOUND], record[AXES:ORIENTATION].reshape((3, 3)))
     mode, s = trajectory.mode[i], t - trajectory.start[i]
     none = (0.0, 0.0, 0.0)
     growth = rate_of(trajectory, i, JERK)
-    put(row, ACCELERATION, none if mode == FIXED else row_at(trajectory.acceleration, i, growth, s))
-    put(row, CENTRE_JERK, none if mode == FIXED else growth)
+    put(record, ACCELERATION, none if mode == FIXED else row_at(trajectory.acceleration, i, growth, s))
+    put(record, CENTRE_JERK, none if mode == FIXED else growth)
     if mode == FIXED or mode == PRESCRIBED or mode == LINEAR:
-        put(row, SPIN_RATE, none)
-        row[SPIN_BOUND] = length(vector(row, SPIN))
-        row[SPIN_RATE_BOUND] = 0.0
-        row[JERK_BOUND] = 0.0
+        put(record, SPIN_RATE, none)
+        record[SPIN_BOUND] = length(vector(record, SPIN))
+        record[SPIN_RATE_BOUND] = 0.0
+        record[JERK_BOUND] = 0.0
         return
     moments = (trajectory.inertia[i, 0], trajectory.inertia[i, 1], trajectory.inertia[i, 2])
     torque_rate = rate_of(trajectory, i, TORQUE_RATE)
     torque = row_at(trajectory.torque, i, torque_rate, s) if mode == FORCED else none
-    _write_spin_bounds(moments, torque, torque_rate, horizon, row)
+    _write_spin_bounds(moments, torque, torque_rate, horizon, record)
 
 
 @jit
-def stop_turning(row):
-    """Take the rotation out of a motion row: for a sphere about its own centre, on which no rotation can be seen."""
+def stop_turning(record):
+    """Take the rotation out of a motion record: for a sphere about its own centre, on which no rotation can be seen."""
     for k in range(SPIN_RATE, ORIENTATION):
-        row[k] = 0.0
-    put(row, SPIN, (0.0, 0.0, 0.0))
-    row[AXES] = row[AXES + 4] = row[AXES + 8] = 1.0
-    row[SPIN_BOUND] = row[SPIN_RATE_BOUND] = row[JERK_BOUND] = 0.0
+        record[k] = 0.0
+    put(record, SPIN, (0.0, 0.0, 0.0))
+    record[AXES] = record[AXES + 4] = record[AXES + 8] = 1.0
+    record[SPIN_BOUND] = record[SPIN_RATE_BOUND] = record[JERK_BOUND] = 0.0
 
 
 @jit
-def _centre_jerk(spin, rate, jerk, distance, speed, velocity, acceleration, pull, pull_rate, horizon):
-    """J_c from W, A, K of the carrier, |d|, the largest |v_b - v_a|, |u|, |c|, the largest |acc_b - acc_a| and |jerk_b - jerk_a|."""
+def _centre_jerk(turning, seen, pulls, horizon):
+    """J_c from turning = (W, A, K) of the carrier, seen = (|d|, largest |v_b - v_a|, |u|, |c|) and pulls.
+
+    pulls: (largest |acc_b - acc_a|, |jerk_b - jerk_a|).
+    """
+    spin, rate, jerk = turning
+    distance, speed, velocity, acceleration = seen
+    pull, pull_rate = pulls
     if spin == 0.0 and rate == 0.0:
         return pull_rate * _WIDEN
     far = distance + horizon * speed
@@ -260,9 +266,8 @@ def relative_motion(work, carrier, other, axes, horizon, seen):
     most, growing = max(length(pull), length(along(pull, horizon, growth))), length(growth)
     speed = max(length(dv), length(along(dv, horizon, along(pull, 0.5 * horizon, growth))))
     speed += 0.125 * horizon * horizon * growing  # what the path of a velocity bulges beyond its chord
-    work[seen + SEEN_JERK] = _centre_jerk(
-        spin, rate, jerk, length(d), speed, length(u), length(c), most, growing, horizon
-    )
+    distances = (length(d), speed, length(u), length(c))
+    work[seen + SEEN_JERK] = _centre_jerk((spin, rate, jerk), distances, (most, growing), horizon)
     both_spins, both_rates = spin + work[other + SPIN_BOUND], rate + work[other + SPIN_RATE_BOUND]
     both_jerks, spin_now, turn_now = jerk + work[other + JERK_BOUND], length(w), length(beta)
     work[seen + SEEN_ARM_JERK] = _arm_jerk(spin, both_spins, both_rates, both_jerks, spin_now, turn_now, horizon)

@@ -1,15 +1,15 @@
 """What every sweep answers.
 
-A sweep looks for the first time in [start, end] at which the gap of a pair of bodies comes down to `touch`. Its
+A sweep looks for the first time in [start, end] at which the gap of a pair of bodies comes down to `impact_margin`. Its
 answer is a status and a time:
 
     SEPARATE   the pair stays apart: time inf
-    IMPACT     the gap comes down to `touch` at `time`
-    TOUCHING   the gap is at or below `touch` at the start and shrinks: time = start
+    IMPACT     the gap comes down to `impact_margin` at `time`
+    TOUCHING   the gap is at or below `impact_margin` at the start and shrinks: time = start
     STALLED    the budget of queries is used up; until `time` there is no contact
 
 Methods, one module each with the same function `sweep`: `bisection` (the default) and `conservative` never pass a
-contact and leave a gap in [touch - round-off, touch + tolerance]; `linear` and `after` are cheaper and may miss one.
+contact and leave a gap in [impact_margin - round-off, impact_margin + tolerance]; `linear` and `after` are cheaper and may miss one.
 """
 
 from __future__ import annotations
@@ -34,6 +34,23 @@ class ImpactTimes(NamedTuple):
     witness: (
         np.ndarray
     )  # (k, 10) m, points on a and b, normal from a to b (zeros if unknown) and gap where contact is made
+
+
+class PairsToSweep(NamedTuple):
+    """Pairs (k,) whose first contact is wanted."""
+
+    a: np.ndarray  # (k,) bodies
+    b: np.ndarray  # (k,)
+    start: np.ndarray  # (k,) s, from when on
+    impact_margin: np.ndarray  # (k,) m, gap at which contact is declared
+    tolerance: np.ndarray  # (k,) m, how far above it the gap may be
+
+
+class SearchEffort(NamedTuple):
+    """How contacts are searched for."""
+
+    ahead: float  # how far past a safe step the root is looked for, relative to the step; 0 for safe steps only
+    max_queries: int  # gap evaluations a pair may use
 
 
 class SweepDetector(Protocol):

@@ -1,11 +1,11 @@
 """How long two moving shapes stay apart for certain: one safe step, whatever the shapes.
 
 `safe_time` looks at two bodies at one instant and returns a span over which their gap stays above a threshold. It
-holds for exactly the motion that `bound` describes, turning and accelerating bodies included, so stepping by safe
+holds for exactly the motion that `motion_bound` describes, turning and accelerating bodies included, so stepping by safe
 spans never passes a contact (conservative advancement, Mirtich 1996; Zhang, Lee and Kim 2006, here with exact first
 and second derivatives and bounded third ones).
 
-Primitives are walked through by `guard_tree`, their convex pieces are bounded by `guard_pieces`. The body of the
+Primitives are walked through by `bvh_walk`, their convex pieces are bounded by `convex_pieces`. The body of the
 first primitive carries the frame: a half space before a ROUND primitive before a cylinder. Bodies that start at or
 below the threshold but leave it are let go: until they come back, the gap is not below the present one.
 """
@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.distance.cylinder import basis
-from rigidimpulse.collision.distance.simplices import along, dot, subtract
+from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER as CYLINDER_KIND
-from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, Geometry
-from rigidimpulse.collision.time_of_impact.bvh_walk import NO_NODE, half_space_safe_until, row, trees_safe_until
+from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, Geometry, cylinders_of
+from rigidimpulse.collision.time_of_impact.bvh_walk import NO_NODE, half_space_safe_until, trees_safe_until
 from rigidimpulse.collision.time_of_impact.convex_pieces import pieces_safe_until
 from rigidimpulse.collision.time_of_impact.motion_bound import (
     AXES,
@@ -79,7 +79,8 @@ class SweepScratch(NamedTuple):
     ball: np.ndarray  # (s,) bool: one sphere about the centre of mass, on which no rotation can be seen
     plane: np.ndarray  # (s,) the half space that is all of the shape, or -1
     work: np.ndarray  # (WORK_SIZE,) and
-    index: np.ndarray  # (INDEX_SIZE,) int64, see `guard_layout`
+    index: np.ndarray  # (INDEX_SIZE,) int64, see `scratch_layout`
+    cylinders: np.ndarray | None  # (c,) primitives that are cylinders, None where there is none, see `geometry.Shapes`
 
 
 def make_scratch(geometry: Geometry) -> SweepScratch:
@@ -97,7 +98,7 @@ def make_scratch(geometry: Geometry) -> SweepScratch:
             ball[shape] = len(vertices) == 1 and not vertices.any()
             if ball[shape]:
                 reach[shape] = geometry.radius[first]
-    return SweepScratch(reach, ball, plane, np.zeros(WORK_SIZE), np.zeros(INDEX_SIZE, np.int64))
+    return SweepScratch(reach, ball, plane, np.zeros(WORK_SIZE), np.zeros(INDEX_SIZE, np.int64), cylinders_of(geometry))
 
 
 @jit
@@ -144,37 +145,35 @@ def _bounds_safe_until(bound_centre, bound_radius, first, second, work, threshol
 
 
 @jit
-def _half_space_pair(geometry, first, second, work, index, threshold, horizon, cylinders):
+def _half_space_cylinder(cylinders, geometry, second, work, index, normal, level, horizon):
+    """Safe time of a cylinder of the second body above a level along a normal."""
+    if cylinders is None:
+        return horizon
+    frame, radius = geometry.frame, geometry.radius
+    _place_cylinder(frame, radius, second, work, index, SECOND)
+    point = support_point(geometry, second, FIRST, turned_back(work, ROTATION, scaled(normal, -1.0)))
+    point = along(turned(work, ROTATION, point), 1.0, vector(work, ORIGIN + 3))
+    at = CYLINDER + CYLINDER_SIZE
+    arm, axis = subtract(vector(work, at), vector(work, ORIGIN + 3)), vector(work, at + CYLINDER_AXIS)
+    cylinder = (arm, axis, frame[second, 6], radius[second])
+    return cylinder_safe_until(work, SEEN, normal, cylinder, dot(normal, point) - level, horizon)
+
+
+@jit
+def _half_space_pair(geometry, first, second, scratch, threshold, horizon):
     """Safe time of a half space and another primitive; the record at LIMIT gets direction and closest points."""
-    kind, radius, frame, vertex, triangle = (
-        geometry.kind,
-        geometry.radius,
-        geometry.frame,
-        geometry.vertex,
-        geometry.triangle,
-    )
+    radius, frame, work, index = geometry.radius, geometry.frame, scratch.work, scratch.index
     normal = row(frame, first)
     down = turned_back(work, ROTATION, scaled(normal, -1.0))
     level = frame[first, 3] + threshold
     s = horizon
-    if kind[second] == ROUND:
-        nodes = (geometry.node_min, geometry.node_max, geometry.node_child, geometry.node_start, geometry.node_count)
-        root, level = geometry.node_first[second], level + radius[second]
-        s = half_space_safe_until(
-            nodes, triangle, geometry.triangle_owns, vertex, root, normal, level, work, index, horizon
-        )
-    elif cylinders is not None:
-        _place_cylinder(frame, radius, second, work, index, SECOND)
-        point = support_point(kind, radius, frame, vertex, triangle, second, FIRST, down)
-        point = along(turned(work, ROTATION, point), 1.0, vector(work, ORIGIN + 3))
-        at = CYLINDER + CYLINDER_SIZE
-        arm, axis = subtract(vector(work, at), vector(work, ORIGIN + 3)), vector(work, at + CYLINDER_AXIS)
-        s = cylinder_safe_until(
-            work, SEEN, normal, arm, axis, frame[second, 6], radius[second], dot(normal, point) - level, horizon
-        )
+    if geometry.kind[second] == ROUND:
+        s = half_space_safe_until(geometry, geometry.node_first[second], normal, level + radius[second], scratch, horizon)
+    else:
+        s = _half_space_cylinder(scratch.cylinders, geometry, second, work, index, normal, level, horizon)
     if s < horizon:
         index[CARRIER] = 0
-        point = support_point(kind, radius, frame, vertex, triangle, second, index[ELEMENT_B], down)
+        point = support_point(geometry, second, index[ELEMENT_B], down)
         point = along(turned(work, ROTATION, point), 1.0, vector(work, ORIGIN + 3))
         gap = dot(normal, point) - frame[first, 3]
         put(work, LIMIT + POINT_FIRST, along(point, -gap, normal))
@@ -186,28 +185,25 @@ def _half_space_pair(geometry, first, second, work, index, threshold, horizon, c
 
 
 @jit
-def _solid_pair(geometry, first, second, work, index, threshold, horizon, cylinders):
+def _solid_pair(geometry, first, second, scratch, threshold, horizon):
     """Safe time of two primitives that are no half spaces; the record at LIMIT tells what limits it."""
-    radius, kind = geometry.radius, geometry.kind
+    radius, kind, work, index = geometry.radius, geometry.kind, scratch.work, scratch.index
     grown_first, grown_second = radius[first], radius[second]
     root_first, root_second = geometry.node_first[first], geometry.node_first[second]
-    if cylinders is not None:
-        if kind[second] == CYLINDER_KIND:
-            grown_second, root_second = 0.0, NO_NODE
-            _place_cylinder(geometry.frame, radius, second, work, index, SECOND)
-        if kind[first] == CYLINDER_KIND:
-            _place_cylinder(geometry.frame, radius, first, work, index, FIRST)
-            put(work, LIMIT + DIRECTION, (0.0, 0.0, 0.0))
-            s, carrier = pieces_safe_until(work, index, threshold, horizon, cylinders)
-            if s < horizon:
-                index[CARRIER] = carrier
-                for k in range(LIMIT_SIZE):
-                    work[LIMIT + k] = work[CLOSEST + k]
-            return s
-    nodes = (geometry.node_min, geometry.node_max, geometry.node_child, geometry.node_start, geometry.node_count)
-    surface = (geometry.vertex, geometry.triangle, geometry.triangle_normal)
+    if kind[second] == CYLINDER_KIND:
+        grown_second, root_second = 0.0, NO_NODE
+        _place_cylinder(geometry.frame, radius, second, work, index, SECOND)
+    if kind[first] == CYLINDER_KIND:
+        _place_cylinder(geometry.frame, radius, first, work, index, FIRST)
+        put(work, LIMIT + DIRECTION, (0.0, 0.0, 0.0))
+        s, carrier = pieces_safe_until(scratch, threshold, horizon)
+        if s < horizon:
+            index[CARRIER] = carrier
+            for k in range(LIMIT_SIZE):
+                work[LIMIT + k] = work[CLOSEST + k]
+        return s
     threshold += grown_first + grown_second
-    s = trees_safe_until(nodes, surface, root_first, root_second, work, index, threshold, horizon, cylinders)
+    s = trees_safe_until(geometry, root_first, root_second, scratch, threshold, horizon)
     if s < horizon:
         normal = vector(work, LIMIT + NORMAL)
         work[LIMIT + GAP] -= grown_first + grown_second
@@ -236,7 +232,7 @@ def _name_witness(work, index, p, q, swapped, first):
 
 
 @jit
-def safe_time(geometry, shape_a, shape_b, work, index, threshold, horizon, cylinders):
+def safe_time(geometry, shape_a, shape_b, scratch, threshold, horizon):
     """Find how long two shapes stay farther apart than a threshold.
 
     Two half spaces never limit each other.
@@ -244,11 +240,9 @@ def safe_time(geometry, shape_a, shape_b, work, index, threshold, horizon, cylin
     Args:
         geometry: the compiled shapes.
         shape_a: index of a's shape; likewise shape_b.
-        work: scratch with the motions of a and b (`bound.motion_bound`) at MOTION, their bounds valid over the horizon.
-        index: scratch.
+        scratch: `PairScratch`, with the motions of a and b (`motion_bound`) at MOTION, their bounds valid over the horizon.
         threshold: m.
         horizon: s.
-        cylinders: None where no shape is a cylinder, else any int: without them the kernel compiles faster.
 
     Returns:
         s <= horizon such that the gap is above the threshold on [0, s); where it starts at or below the threshold and
@@ -256,7 +250,7 @@ def safe_time(geometry, shape_a, shape_b, work, index, threshold, horizon, cylin
         tell what limits it: features whose present gap need not be the least one.
 
     """
-    view = -1
+    work, index, view = scratch.work, scratch.index, -1
     for p in range(geometry.shape_first[shape_a], geometry.shape_first[shape_a + 1]):
         for q in range(geometry.shape_first[shape_b], geometry.shape_first[shape_b + 1]):
             swapped = geometry.kind[q] < geometry.kind[p]
@@ -271,9 +265,9 @@ def safe_time(geometry, shape_a, shape_b, work, index, threshold, horizon, cylin
             if s >= horizon or geometry.kind[second] == HALF_SPACE:
                 continue
             if geometry.kind[first] == HALF_SPACE:
-                s = _half_space_pair(geometry, first, second, work, index, threshold, horizon, cylinders)
+                s = _half_space_pair(geometry, first, second, scratch, threshold, horizon)
             else:
-                s = _solid_pair(geometry, first, second, work, index, threshold, horizon, cylinders)
+                s = _solid_pair(geometry, first, second, scratch, threshold, horizon)
             if s < horizon:
                 horizon = s
                 _name_witness(work, index, p, q, swapped, motion)

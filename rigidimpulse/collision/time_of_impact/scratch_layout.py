@@ -1,4 +1,4 @@
-"""The scratch of a guard: one array of floats in which every record has its place, and one of integers.
+"""The scratch memory of a safe step: one array of floats in which every record has its place, and one of integers.
 
 Two bodies are looked at from the *first*: its frame is the one of all points, directions and arms (arms start at the
 centres of mass). Records that come in pairs have that of the first body or piece, then that of the second.
@@ -7,6 +7,8 @@ One array instead of many: numba passes an array as seven numbers from kernel to
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,13 +26,13 @@ POINT_FIRST, POINT_SECOND, NORMAL, GAP, DIRECTION, LIMIT_SIZE = np.array([0, 3, 
 four, from a to b in the world."""
 
 VIEW_SIZE = 8
-"""Of a direction that is carried: how points move along it, see `guard_root`."""
+"""Of a direction that is carried: how points move along it, see `separating_quadratic`."""
 
 STACK_SIZE = 128
 """Depth of a walk through two trees; they are less deep than that together."""
 
 _SIZES = {
-    "motion": 2 * MOTION_SIZE,  # of bodies a and b (see `bound`)
+    "motion": 2 * MOTION_SIZE,  # of bodies a and b (see `motion_bound`)
     "rotation": 9,  # columns: axes of the second body
     "origin": 6,  # centres of mass
     "seen": 2 * SEEN_SIZE,  # second body seen from the first, first seen from the second; all in the first's axes
@@ -60,3 +62,11 @@ INDEX_SIZE = STACK + 2 * STACK_SIZE
 """Places in the integer array. The witness: primitives of a and b, their elements (a triangle, or -1 - vertex), and
 which of them carries the direction (0: a, 1: b). Then the number of corners of both pieces, 0 for a cylinder, and the
 stack of pairs of nodes, with the depth at which the last opened pair lay."""
+
+
+class PairScratch(NamedTuple):
+    """The two arrays, and whether there are cylinders."""
+
+    work: np.ndarray  # (WORK_SIZE,)
+    index: np.ndarray  # (INDEX_SIZE,) int64
+    cylinders: np.ndarray | None  # as in `geometry.Shapes`: where it is None, kernels of cylinders are not compiled

@@ -1,14 +1,14 @@
-"""The search that both guarded sweeps share: safe steps until the gap is at `touch`.
+"""The search that both safe methods share, bisection and conservative advancement: safe steps until the gap is at `impact_margin`.
 
-Each step asks the bounding spheres, then the shapes (`guard`). If the shapes limit the step by features that are at
-`touch` already and approach, the pair is in contact. Features at `touch` that hover (they approach by less than
-rounding until the end), slide or leave are let go: they may come closer by the slack for rounding, so that neither
+Each step asks the bounding spheres, then the shapes (`safe_step`). If the shapes limit the step by features that are at
+`impact_margin` already and approach, the pair is in contact. Features at `impact_margin` that hover (they approach by less than
+rounding until the end), slide or leave do not count: they may come closer by the slack for rounding, so that neither
 lasting contact nor a rebound is taken for an impact. Surfaces that cross are in contact however they move.
 
-Balls, and balls and planes that stand, have their time in closed form (`ball_time`), but where they hover.
+Balls, and balls and planes that stand, have their time in closed form (`ball_time`), unless they hover.
 
-With `ahead`, the time at which the limiting features come down to `touch` is found by bisection
-(`guard_witness`); the steps then only have to confirm that nothing is earlier. Without it, they are repeated until
+With `ahead`, the time at which the limiting features come down to `impact_margin` is found by bisection
+(`witness`); the steps then only have to confirm that nothing is earlier. Without it, they are repeated until
 they are there (conservative advancement).
 """
 
@@ -16,13 +16,13 @@ from __future__ import annotations
 
 from math import inf
 
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
+from rigidimpulse.collision.distance.simplices import row
 from rigidimpulse.collision.time_of_impact.free_flight import plane_safe_until, relative_flight, rounding_slack, spheres_safe_until
 from rigidimpulse.collision.time_of_impact.motion_bound import MOTION_SIZE, length, motion_bound, stop_turning
 from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE, STALLED, TOUCHING
 from rigidimpulse.collision.time_of_impact.safe_step import safe_time
-from rigidimpulse.collision.time_of_impact.scratch_layout import GAP, MOTION, WITNESS
-from rigidimpulse.collision.time_of_impact.spheres import ball_time, is_closed_form, write_ball_witness
+from rigidimpulse.collision.time_of_impact.scratch_layout import GAP, MOTION, WITNESS, PairScratch
+from rigidimpulse.collision.time_of_impact.spheres import Pair, ball_time, is_closed_form, write_ball_witness
 from rigidimpulse.collision.time_of_impact.witness import closing_speed, witness_root
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.motion.trajectory import FIXED
@@ -41,9 +41,11 @@ def _later(t, s):
 
 
 @jit
-def _flight_safe_until(frame, trajectory, scratch, a, b, shape_a, shape_b, t, threshold, horizon):
+def _flight_safe_until(frame, trajectory, scratch, pair, t, threshold, horizon):
     """Return (safe time of the bounding spheres or planes, whether it is exact for the shapes)."""
-    x, v, acceleration, jerk = relative_flight(trajectory, a, b, t)
+    a, b, shape_a, shape_b = pair
+    flight = relative_flight(trajectory, a, b, t)
+    x, v, acceleration, jerk = flight
     plane_a, plane_b = scratch.plane[shape_a], scratch.plane[shape_b]
     if plane_a >= 0 or plane_b >= 0:
         i, plane, other = a if plane_a >= 0 else b, max(plane_a, plane_b), shape_b if plane_a >= 0 else shape_a
@@ -52,7 +54,7 @@ def _flight_safe_until(frame, trajectory, scratch, a, b, shape_a, shape_b, t, th
         sign, ball = 1.0 if plane_a >= 0 else -1.0, scratch.ball[other]
         n0, n1, n2 = sign * frame[plane, 0], sign * frame[plane, 1], sign * frame[plane, 2]
         level = frame[plane, 3] + scratch.reach[other] + threshold
-        return plane_safe_until(trajectory, i, n0, n1, n2, level, ball, x, v, acceleration, jerk, horizon), ball
+        return plane_safe_until(trajectory, i, ((n0, n1, n2), level), ball, flight, horizon), ball
     reach = scratch.reach[shape_a] + scratch.reach[shape_b] + threshold
     if reach == inf:
         return 0.0, False
@@ -61,8 +63,9 @@ def _flight_safe_until(frame, trajectory, scratch, a, b, shape_a, shape_b, t, th
 
 
 @jit
-def _bring_motions(trajectory, scratch, a, b, shape_a, shape_b, t, horizon):
+def _bring_motions(trajectory, scratch, pair, t, horizon):
     """Write the motions of a pair at time t, over a horizon in which neither turns too far; returns that horizon."""
+    a, b, shape_a, shape_b = pair
     for side in range(2):
         i, shape = b if side else a, shape_b if side else shape_a
         if not scratch.ball[shape] and trajectory.mode[i] != FIXED:
@@ -80,7 +83,7 @@ def _bring_motions(trajectory, scratch, a, b, shape_a, shape_b, t, horizon):
 
 @jit
 def _record(result, k, time, status, queries, work):
-    """Write row k of the answer; the witness only where contact is made."""
+    """Write answer k; the witness only where contact is made."""
     result.time[k], result.status[k], result.queries[k] = time, status, queries
     if status == IMPACT or status == TOUCHING:
         for i in range(result.witness.shape[1]):
@@ -88,33 +91,29 @@ def _record(result, k, time, status, queries, work):
 
 
 @jit
-def _record_ball(frame, trajectory, scratch, a, b, shape_a, shape_b, t, start, end, result, k):
-    """Write row k of the answer for a pair that meets at t [s]."""
+def _record_ball(frame, trajectory, scratch, pair, t, interval, result, k):
+    """Write answer k for a pair that meets at t [s]; interval: (start, end), s."""
+    start, end = interval
     result.time[k], result.status[k], result.queries[k] = t if t < end else inf, SEPARATE, 1
     if t < end:
         result.status[k] = IMPACT if t > start else TOUCHING
-        write_ball_witness(frame, trajectory, scratch, a, b, shape_a, shape_b, t, result.witness[k])
+        write_ball_witness(frame, trajectory, scratch, pair, t, result.witness[k])
 
 
 @jit
-def first_contacts(
-    geometry, trajectory, scratch, shape_of_body, pairs_a, pairs_b, start, end, impact_margin, tolerance, ahead, max_queries, cylinders,
-    result,
-):
-    """Fill in `result` (`ImpactTimes`); arguments as for `bisection.sweep`.
-
-    ahead: how far past a safe step the root is looked for, relative to the step; 0 for safe steps only.
-    max_queries: gap evaluations a pair may use.
-    cylinders: None where no shape is a cylinder, else any int.
-    """
-    work, index = scratch.work, scratch.index
-    for k in range(pairs_a.shape[0]):
-        a, b = pairs_a[k], pairs_b[k]
+def first_contacts(geometry, trajectory, scratch, shape_of_body, pairs, end, effort, result):
+    """Fill in `result` (`ImpactTimes`) until `end` [s]; scratch: `SweepScratch`, pairs: `PairsToSweep`, effort: `SearchEffort`."""
+    start, impact_margin, tolerance = pairs.start, pairs.impact_margin, pairs.tolerance
+    ahead, max_queries = effort
+    work, pair_scratch = scratch.work, PairScratch(scratch.work, scratch.index, scratch.cylinders)
+    for k in range(pairs.a.shape[0]):
+        a, b = pairs.a[k], pairs.b[k]
         shape_a, shape_b = shape_of_body[a], shape_of_body[b]
+        pair = Pair(a, b, shape_a, shape_b)
         if is_closed_form(trajectory, scratch, a, b, shape_a, shape_b, impact_margin[k]):
-            t = ball_time(geometry.frame, trajectory, scratch, a, b, shape_a, shape_b, start[k])
+            t = ball_time(geometry.frame, trajectory, scratch, pair, start[k])
             if t == t:
-                _record_ball(geometry.frame, trajectory, scratch, a, b, shape_a, shape_b, t, start[k], end, result, k)
+                _record_ball(geometry.frame, trajectory, scratch, pair, t, (start[k], end), result, k)
                 continue
         slack = rounding_slack(trajectory, scratch.reach, a, b, shape_a, shape_b, end)
         above = max(tolerance[k], slack)
@@ -124,13 +123,13 @@ def first_contacts(
             rest = target - t
             horizon = rest if is_let_go else min(rest, trial)
             queries += 1
-            s, exact = _flight_safe_until(geometry.frame, trajectory, scratch, a, b, shape_a, shape_b, t, floor, horizon)
+            s, exact = _flight_safe_until(geometry.frame, trajectory, scratch, pair, t, floor, horizon)
             is_free = s >= horizon or (not exact and s > _WORTHWHILE * horizon)
             if not is_free:
-                span = _bring_motions(trajectory, scratch, a, b, shape_a, shape_b, t, horizon)
-                guarded = safe_time(geometry, shape_a, shape_b, work, index, floor, span, cylinders)
-                is_free = guarded >= span
-                s = s if exact and not is_free else guarded
+                span = _bring_motions(trajectory, scratch, pair, t, horizon)
+                safe = safe_time(geometry, shape_a, shape_b, pair_scratch, floor, span)
+                is_free = safe >= span
+                s = s if exact and not is_free else safe
             if is_free:
                 if s >= rest and target == end:
                     t, status = inf, SEPARATE
@@ -155,6 +154,6 @@ def first_contacts(
             trial, floor, is_let_go = 2.0 * s, impact_margin[k], False
             probe = min(target, t + ahead * s)
             if probe > t and not exact:
-                root, used = witness_root(geometry, trajectory, work, index, a, b, t, probe, impact_margin[k], above)
+                root, used = witness_root(geometry, trajectory, pair_scratch, a, b, (t, probe), impact_margin[k], above)
                 target, queries = min(target, root), queries + used
         _record(result, k, t, status, queries, work)

@@ -126,8 +126,9 @@ def write_view(work, seen, normal, view):
 
 
 @jit
-def viewed_safe_until(work, seen, view, sign, arm, far, reach, gap, horizon):
-    """As `point_safe_until`, along the normal of a view (sign 1) or against it (-1); `far`: |arm|, m."""
+def viewed_safe_until(work, seen, view, sign, ball, gap, horizon):
+    """As `point_safe_until`, along the normal of a view (sign 1) or against it (-1); ball: (arm, |arm|, reach), m."""
+    arm, far, reach = ball
     speed = work[view] + dot(vector(work, view + 1), arm)
     bend = work[view + 4] + dot(vector(work, view + 5), arm)
     closing = work[seen + SEEN_SPIN_SIZE] * reach - sign * speed
@@ -146,8 +147,9 @@ def _end_growth(q, rate, bend, rest, horizon):
 
 
 @jit
-def cylinder_safe_until(work, seen, normal, arm, axis, half_height, radius, gap, horizon):
-    """Safe time of a cylinder with its centre at `arm`, as `point_safe_until`; `axis` unit, in the axes of `seen`."""
+def cylinder_safe_until(work, seen, normal, cylinder, gap, horizon):
+    """Safe time of a cylinder, as `point_safe_until`; cylinder: (arm of its centre, unit axis, half height, radius), axes of `seen`."""
+    arm, axis, half_height, radius = cylinder
     if horizon <= 0.0:
         return 0.0
     w = vector(work, seen + SEEN_SPIN)

@@ -1,25 +1,25 @@
-"""When two balls, or a ball and a plane, meet: in closed form, from their courses alone.
+"""When two balls, or a ball and a plane, meet: in closed form, from their trajectories alone.
 
 With x, v, a the position, velocity and acceleration of b's centre as seen from a's at t0, the instant since which both
-courses hold, and s = t - t0:
+trajectories hold, and s = t - t0:
 
     ball and plane     g(s) = n.x - r + n.v s + 1/2 n.a s^2 = 0         the root at which g falls
     two balls, a = 0   |x + v s| = r,   s = s_c - sqrt(r^2 - |x + v s_c|^2) / |v|,   s_c = -x.v / v^2
-    two balls          Newton's method from the safe side (`guard_flight.spheres_safe_until`)
+    two balls          Newton's method from the safe side (`free_flight.spheres_safe_until`)
 
 The distance of closest approach x + v s_c is small where it matters, so s has no cancellation. A pair that touches and
 leaves needs no gap of its own: the root at which it came is not the one at which g falls again. So the time depends on
-the courses and on nothing else, in particular not on when it is asked for.
+the trajectories and on nothing else, in particular not on when it is asked for.
 """
 
 from __future__ import annotations
 
 from math import inf, nan, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, dot, subtract
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
+from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.time_of_impact.free_flight import relative_flight, spheres_safe_until
 from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled
 from rigidimpulse.collision.time_of_impact.scratch_layout import FIRST, GAP, NORMAL, POINT_FIRST, POINT_SECOND, SECOND
@@ -37,11 +37,21 @@ _NEWTON_ERROR = 10.0
 """Round-offs that may be left of the gap where Newton's method ends."""
 
 
+class Pair(NamedTuple):
+    """Two bodies and their shapes."""
+
+    a: int
+    b: int
+    shape_a: int
+    shape_b: int
+
+
 @jit
 def is_closed_form(trajectory, scratch, a, b, shape_a, shape_b, impact_margin):
     """Whether the pair is two balls, or a ball and a plane that stands, and is to meet at gap 0.
 
-    Where it has just been in contact `touch` [m] may be lower by round-off; lower still, the pair was in contact without consequence.
+    Where it has just been in contact `impact_margin` [m] may be lower by round-off. Lower still, the pair was in contact without
+    consequence.
     """
     plane_a, plane_b = scratch.plane[shape_a] >= 0, scratch.plane[shape_b] >= 0
     if not ((scratch.ball[shape_a] or plane_a) and (scratch.ball[shape_b] or plane_b)) or (plane_a and plane_b):
@@ -96,11 +106,12 @@ def until_contact(x, v, acceleration, reach, size, speed, normal, level):
 
 
 @jit
-def ball_time(frame, trajectory, scratch, a, b, shape_a, shape_b, start):
-    """Time from `start` on at which a pair of `is_closed_form` meets, inf if it never does; nan where the guard must look.
+def ball_time(frame, trajectory, scratch, pair, start):
+    """Time from `start` on at which a pair of `is_closed_form` meets, inf if it never does; nan where the general search must be used.
 
-    frame (p, 7): that of the geometry; course: paths of all bodies, since before `start` [s]; scratch: `SweepScratch`.
+    frame (p, 7): that of the geometry; trajectory: paths of all bodies, since before `start` [s]; scratch: `SweepScratch`; pair: `Pair`.
     """
+    a, b, shape_a, shape_b = pair
     since = max(trajectory.start[a], trajectory.start[b])
     x, v, acceleration, jerk = relative_flight(trajectory, a, b, since)
     if jerk[0] != 0.0 or jerk[1] != 0.0 or jerk[2] != 0.0:
@@ -121,8 +132,9 @@ def ball_time(frame, trajectory, scratch, a, b, shape_a, shape_b, start):
 
 
 @jit_making_arrays
-def write_ball_witness(frame, trajectory, scratch, a, b, shape_a, shape_b, t, witness):
+def write_ball_witness(frame, trajectory, scratch, pair, t, witness):
     """Write points on a and b, the normal from a to b and the gap at t [s] into witness (10,); pairs of `is_closed_form`."""
+    a, b, shape_a, shape_b = pair
     centre = np.empty((2, 3))
     place_at(trajectory, a, t, centre[0])
     place_at(trajectory, b, t, centre[1])

@@ -2,16 +2,15 @@
 
 The direction is carried by one of the bodies, so the gap along it at any other pose costs two support functions and
 no search. It is a lower bound of the distance of the features, and equals it for a vertex over a face. The time at
-which it reaches a value is found cheaply; the guard then says whether anything was earlier.
+which it reaches a value is found cheaply; the conservative bound then tells whether anything was earlier.
 """
 
 from __future__ import annotations
 
 from math import inf, log2
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, subtract
+from rigidimpulse.collision.distance.simplices import along, cross, dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
 from rigidimpulse.collision.time_of_impact.motion_bound import (
     MOTION_SIZE,
     POSITION,
@@ -46,11 +45,12 @@ _TRUNCATION = 0.2  # kappa_1 of the ITP method times the first bracket; kappa_2 
 
 
 @jit
-def support_point(kind, radius, frame, vertex, triangle, primitive, element, normal):
+def support_point(geometry, primitive, element, normal):
     """Return the point of a primitive that is farthest along a unit normal; of a ROUND one, of its element.
 
-    The first five are arrays of the geometry; the element is a triangle, or -1 - vertex.
+    The element is a triangle, or -1 - vertex.
     """
+    kind, radius, frame, vertex, triangle = geometry.kind, geometry.radius, geometry.frame, geometry.vertex, geometry.triangle
     if kind[primitive] == HALF_SPACE:
         return scaled(row(frame, primitive), frame[primitive, 3])
     if kind[primitive] == CYLINDER:
@@ -73,17 +73,10 @@ def support_point(kind, radius, frame, vertex, triangle, primitive, element, nor
 @jit
 def _gap_along(geometry, work, index, direction):
     """Gap of the witness along its direction at the poses at PLACE and FRAME."""
-    kind, radius, frame, vertex, triangle = (
-        geometry.kind,
-        geometry.radius,
-        geometry.frame,
-        geometry.vertex,
-        geometry.triangle,
-    )
     normal = turned(work, FRAME + 9 * index[CARRIER], direction)
     own_a, own_b = turned_back(work, FRAME, normal), turned_back(work, FRAME + 9, scaled(normal, -1.0))
-    point_a = support_point(kind, radius, frame, vertex, triangle, index[PRIMITIVE_A], index[ELEMENT_A], own_a)
-    point_b = support_point(kind, radius, frame, vertex, triangle, index[PRIMITIVE_B], index[ELEMENT_B], own_b)
+    point_a = support_point(geometry, index[PRIMITIVE_A], index[ELEMENT_A], own_a)
+    point_b = support_point(geometry, index[PRIMITIVE_B], index[ELEMENT_B], own_b)
     between = subtract(vector(work, PLACE + 3), vector(work, PLACE))
     return dot(normal, between) - dot(own_b, point_b) - dot(own_a, point_a)
 
@@ -103,17 +96,18 @@ def _next_trial(low, above, high, below, truncation, least, left):
 
 
 @jit_making_arrays
-def witness_root(geometry, trajectory, work, index, a, b, low, high, impact_margin, tolerance):
-    """Find where the witness of bodies a and b comes down to `touch` between two times.
+def witness_root(geometry, trajectory, scratch, a, b, interval, impact_margin, tolerance):
+    """Find where the witness of bodies a and b comes down to `impact_margin` in an interval of time.
 
     Bisection with interpolation (ITP: Oliveira and Takahashi 2020): at most log2((high - low) / rounding) + 1
     evaluations after those at the ends, mostly far fewer.
 
     Returns:
-        (t, evaluations): the last time known to be above, where its gap is at most touch + tolerance or t is one
+        (t, evaluations): the last time known to be above, where its gap is at most impact_margin + tolerance or t is one
         rounding from the root; inf if it is not above at low and below at high.
 
     """
+    work, index, (low, high) = scratch.work, scratch.index, interval
     least = _EPSILON * max(abs(low), abs(high))
     budget = 1 + int(max(log2((high - low) / least), 0.0))
     truncation = _TRUNCATION / (high - low)

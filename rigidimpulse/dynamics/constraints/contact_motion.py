@@ -24,7 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
-from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND
+from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE
+from rigidimpulse.collision.manifold.rounding import only_primitive
 from rigidimpulse.core.copying import copy_vector
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 
@@ -32,8 +33,6 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 # relative to the radius. Where normal and axis are nearer than this sine there is none.
 NEAR = 0.3
 LEAST_LEAN = 1e-3
-# Cosine of normal and axis below which a cylinder that is not touched at a rim is touched at its side.
-ON_ITS_SIDE = 0.7
 # Sine of the angle of two edges below which they count as parallel: the place of contact would run along them too fast to follow.
 PARALLEL = 0.05
 # Cosine of normal and axis of a cylinder, or one less it, that is none.
@@ -71,25 +70,6 @@ def _owner(first, index):
         else:
             high = middle
     return low
-
-
-@jit
-def only_primitive(geometry, shape):
-    """The only primitive of a shape, or -1."""
-    p = geometry.shape_first[shape]
-    return p if geometry.shape_first[shape + 1] == p + 1 else -1
-
-
-@jit_making_arrays
-def side_radius(geometry, p, rotation, normal):
-    """Radius of a cylinder (the only primitive of its shape) that is touched at its side, or of a ball; else 0."""
-    if p < 0 or geometry.kind[p] == HALF_SPACE:
-        return 0.0
-    if geometry.kind[p] == CYLINDER:
-        k = np.empty(3)
-        _rotated(rotation, geometry.frame[p, 3:6], k)
-        return geometry.radius[p] if abs(_dot(normal, k)) < ON_ITS_SIDE else 0.0
-    return geometry.radius[p] if geometry.kind[p] == ROUND else 0.0
 
 
 @jit_making_arrays

@@ -32,12 +32,12 @@ import math
 import numpy as np
 from scipy.optimize import root_scalar
 
+from rigidimpulse.collision.manifold.penetrating_points import find_points
+from rigidimpulse.collision.manifold.penetrating_surface import inward_axes, solid_geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.dynamics.forces.force import ForceTable, Instant
 from rigidimpulse.dynamics.impact.point import BodyState
-from rigidimpulse.dynamics.penalty.points import find_points
-from rigidimpulse.dynamics.penalty.surface import inward_axes, solid_geometry
 from rigidimpulse.engine.touching import bring_all
 
 REST_DEPTH, IMPACT_DEPTH = 4e-4, 0.02

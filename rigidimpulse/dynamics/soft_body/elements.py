@@ -22,7 +22,7 @@ from math import atan2, pi, sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, row, subtract
+from rigidimpulse.collision.distance.simplices import cross, dot, row, subtract
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 
 
@@ -156,41 +156,3 @@ def add_hinge_hessian(x, hinge, stiffness, slot, block):
                 for p in range(3):
                     for q in range(3):
                         block[at, p, q] += stiffness[h] * slope[m, p] * slope[o, q]
-
-
-@jit
-def closest_on_triangle(p, a, b, c):
-    """Return the barycentric coordinates of the point of triangle abc closest to p (after Ericson 2005, section 5.1.5)."""
-    ab, ac, ap = subtract(b, a), subtract(c, a), subtract(p, a)
-    d1, d2 = dot(ab, ap), dot(ac, ap)
-    if d1 <= 0.0 and d2 <= 0.0:
-        return 1.0, 0.0, 0.0
-    bp = subtract(p, b)
-    d3, d4 = dot(ab, bp), dot(ac, bp)
-    if d3 >= 0.0 and d4 <= d3:
-        return 0.0, 1.0, 0.0
-    vc = d1 * d4 - d3 * d2
-    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-        v = d1 / (d1 - d3)
-        return 1.0 - v, v, 0.0
-    cp = subtract(p, c)
-    d5, d6 = dot(ab, cp), dot(ac, cp)
-    if d6 >= 0.0 and d5 <= d6:
-        return 0.0, 0.0, 1.0
-    vb = d5 * d2 - d1 * d6
-    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-        w = d2 / (d2 - d6)
-        return 1.0 - w, 0.0, w
-    va = d3 * d6 - d5 * d4
-    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
-        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        return 0.0, 1.0 - w, w
-    total = va + vb + vc
-    v, w = vb / total, vc / total
-    return 1.0 - v - w, v, w
-
-
-@jit
-def triangle_point(a, b, c, weights):
-    """Return the point of triangle abc with barycentric coordinates `weights`."""
-    return along(along((weights[0] * a[0], weights[0] * a[1], weights[0] * a[2]), weights[1], b), weights[2], c)

@@ -18,6 +18,9 @@ from functools import cached_property
 
 import numpy as np
 
+from rigidimpulse.collision.contact_buffer import Question
+from rigidimpulse.collision.geometry import Shapes
+from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.dynamics.energy import mechanical_energy
 from rigidimpulse.engine.exact.energy_limit import note_end_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work
@@ -174,7 +177,8 @@ class SubsteppedIslands:
         a, b = a[which], b[which]
         margin = TOUCHES * np.minimum(self.stepper.skin[a], self.stepper.skin[b])
         buffer = run.contact_buffer
-        count = buffer.find(self.stepper.geometry, world, run.state.now, run.state.rotation, a, b, margin)
+        shapes = Shapes(self.stepper.geometry, world.shape_of_body, world.cylinders)
+        count = buffer.find(Question(shapes, run.state.now, run.state.rotation, PairQuery(a, b, margin)))
         touched = np.unique(buffer.integer[:count, :2])
         touched = touched[resting[touched]]
         labels = self.label[touched]
@@ -191,7 +195,7 @@ class SubsteppedIslands:
             return chosen
         self._set_up(run, np.flatnonzero(begins), pair_events.begin, pair_events.end - pair_events.begin, 0.0)
         stepper = self.stepper
-        level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.rows, TALL)
+        level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.points, TALL)
         tall = np.unique(root[stepper.order[level[: len(root)] == TALL + 1]])
         tall = tall[tall >= 0]
         refused.update(dict.fromkeys(tall.tolist(), "tall"))

@@ -7,22 +7,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.collision.contact_buffer import ContactBuffer, find_together
-from rigidimpulse.collision.contact_cache import classify, look, make_workspace, most_motion, share_of
-from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT, SolverBodies, load_bodies
+from rigidimpulse.collision.contact_buffer import ContactBuffer, Question, find_together
+from rigidimpulse.collision.contact_cache import Convex, Limits, Share, classify, find_contacts, make_workspace, most_motion, share_of
+from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
 from rigidimpulse.collision.contact_table import ContactTable
-from rigidimpulse.collision.contact_update import FARTHER, convex_polyhedra, inner_radii, shrunk_geometry, store_contacts
-from rigidimpulse.collision.fat_boxes import FatBoxes
-from rigidimpulse.collision.manifold.dispatch import pair_gap
-from rigidimpulse.collision.manifold.inset_surface import cores
+from rigidimpulse.collision.contact_update import FARTHER, Searched, SmallerShapes, store_contacts
+from rigidimpulse.collision.fat_boxes import BodyBounds, FatBoxes
+from rigidimpulse.collision.geometry import Shapes
+from rigidimpulse.collision.manifold.dispatch import PairQuery, Posed, pair_gap
+from rigidimpulse.collision.manifold.inset_surface import inset_surfaces
 from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
+from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, inner_radii, shrunk_geometry
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import number_of_cores
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.core.simd import ROW, aligned, machine_simd
 from rigidimpulse.core.workers import empty_work_queue
+from rigidimpulse.dynamics.solvers.tgs_soft.bodies import SolverBodies, load_bodies
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import energies, mark_quick, note_pressed, slow_down
 from rigidimpulse.dynamics.solvers.tgs_soft.depenetration import move_apart
 from rigidimpulse.dynamics.solvers.tgs_soft.fill import fill, keep_impulses, place_bodies
@@ -51,11 +54,11 @@ LEAST_SUB_STEPS = 16
 SPAN = 1.0
 """Longest time that is stepped at once, in sqrt(r / g) of the smallest inner radius r."""
 CROSSED = 1e-6
-"""Inner radii below which the surfaces of two cores cross."""
+"""Inner radii below which the surfaces of two inset surfaces cross."""
 LEAST_SUB_STEPS_BETWEEN = 2
 """Sub-steps from look to look."""
 COARSEST = 0.3
-"""Inner radii by which bodies with cores may pass each other from look to look: sub-steps are made shorter for it."""
+"""Inner radii by which bodies with inset surfaces may pass each other from look to look: sub-steps are made shorter for it."""
 SAME, KEPT = 0.02, 0.2
 """Parts of the motion until a look (`Accuracy.substep_motion`) that a pair may make with the contacts it has: at any time, and in the
 middle of a step."""
@@ -68,7 +71,7 @@ WORTHWHILE, WORTHWHILE_GENERAL = 400, 16
 WORTHWHILE_BATCHES, MOST_SOLVERS = 2000, 2
 """Batches, each counted in every sub-step, beyond which two cores solve them."""
 _NO_STEADY = 0, np.zeros(1, np.int64)
-"""Patches, and edges of the colours of batches, that were made before the last look."""
+"""Patches, and edges of the colours of batches, that were made before the last find_contacts."""
 FINER_STEP, FINER_SUB_STEP, FINER_MOTION = 1.0 / 8.0, 1.0 / 32.0, 1.0 / 10.0
 """Parts of the settings `step` and `substep_motion` that scenes of few bodies are stepped with: they can afford finer ones."""
 CLEAR = 0.2
@@ -116,7 +119,7 @@ class ContactStepper:
         self.skin = TOLERANCES.skin * self.inner
         self.reach = np.where(world.ball, 0.0, world.bound_radius)
         convex = convex_polyhedra(world.geometry)
-        cored, depth, self._back = cores(world.shapes, world.geometry, convex, dynamic_shapes)
+        cored, depth, self._back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
         self.geometry, factor = shrunk_geometry(cored, dynamic_shapes)
         self.shapes = make_polyhedra(world.geometry, convex)
         self._solids, drum, self._inset = solids(world.shapes, world.geometry, convex, self.shapes)
@@ -132,7 +135,9 @@ class ContactStepper:
         self._more_buffers: list[ContactBuffer] = []
         self.table = ContactTable(self._shares, n)
         least = CLEAR * np.where(movable, self.inner, 0.0)
-        self.fat_boxes = FatBoxes(world, self.order, self.inner, least)
+        moves = world.dynamic | world.moving
+        bounds = BodyBounds(self.order, moves, world.bound_radius, self.inner, least, world.static_min, world.static_max)
+        self.fat_boxes = FatBoxes(bounds, world.dynamic, world.may_collide if len(world.apart) else None)
         self.simd = machine_simd()
         self._patches, self._count, self._steady = empty_patches(PATCHES_OF_A_BODY * n), 0, _NO_STEADY
         none = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
@@ -217,10 +222,11 @@ class ContactStepper:
         if room > len(self._places):
             self._places, self._margins = reserve((2 * room,), np.int64), reserve((2 * room,), np.float64)
         while True:
-            outcome = look.together([
+            convex, limits = Convex(self.shapes, self._solids, self._inset), Limits(self.ahead, SAME * self.motion, kept)
+            outcome = find_contacts.together([
                 (
-                    self.shapes, self._solids, self._inset, self.bodies, table.pairs, share, shares, self.ahead, SAME * self.motion, kept,
-                    self._places, self._margins, table.rows, table.ids, table.free, self.world.coefficients, self._workspaces[share],
+                    convex, self.bodies, table.arrays, Share(share, shares, self._places, self._margins), limits, self.world.coefficients,
+                    self._workspaces[share],
                 )
                 for share in range(shares)
             ])  # fmt: skip
@@ -253,18 +259,20 @@ class ContactStepper:
             self._more_buffers.append(ContactBuffer())
         buffers = [run.contact_buffer, *self._more_buffers][: len(shares)]
         a, b = self.order[first], self.order[second]
-        found = find_together(buffers, [(self.geometry, world, now, rotation, a[some], b[some], shown[some]) for some in shares])
+        shapes = Shapes(self.geometry, world.shape_of_body, world.cylinders)
+        questions = [Question(shapes, now, rotation, PairQuery(a[some], b[some], shown[some])) for some in shares]
+        found = find_together(buffers, questions)
+        smaller = SmallerShapes(world.geometry, self.geometry, self._factor, self._back, self._depth, self._convex, self._solids)
         for some, buffer, count in zip(shares, buffers, found, strict=True):
             # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
             table.grow(count + POINTS * len(some) + 1)
-            table.free[0, 0] = store_contacts(
-                world.geometry, self.geometry, self._back, self._solids, self.bodies, pairs, places[some], margin[some], far[some],
-                self._convex, self._factor, self._depth, world.coefficients, buffer.real, buffer.integer, count, self.order, table.rows,
-                table.ids, int(table.free[0, 0]),
+            store_contacts(
+                smaller, self.bodies, table.arrays, Searched(places[some], margin[some], far[some]), (buffer.real, buffer.integer), count,
+                self.order, world.coefficients,
             )  # fmt: skip
 
     def report_crossed(self, run: Run, members: np.ndarray, time: float) -> None:
-        """Report pairs of members, brought to the present, whose cores cross: where they press on each other is not known any more."""
+        """Report pairs of members, brought to the present, whose inset surfaces cross: the place of contact is not known any more."""
         if not self._depth.any():
             return
         pairs, world, now = self.table.pairs, self.world, run.state.now
@@ -274,7 +282,8 @@ class ContactStepper:
         for i, j in zip(self.order[pairs.first[asked]].tolist(), self.order[pairs.second[asked]].tolist(), strict=True):
             a, b, limit = int(world.shape_of_body[i]), int(world.shape_of_body[j]), CROSSED * min(self.inner[i], self.inner[j])
             rotation = to_matrix(now.orientation[i]), to_matrix(now.orientation[j])
-            if pair_gap(self.geometry, a, now.position[i], rotation[0], b, now.position[j], rotation[1], limit, np.zeros(7)) < limit:
+            posed = Posed(a, now.position[i], rotation[0]), Posed(b, now.position[j], rotation[1])
+            if pair_gap(self.geometry, *posed, limit, np.zeros(7)) < limit:
                 run.log.report(
                     time, "overlap in a heap", (world.names[min(i, j)], world.names[max(i, j)]),
                     "the bodies are deeper inside each other than their contacts can tell; use a smaller step",
@@ -296,10 +305,10 @@ class ContactStepper:
         """Make patches, colours and records of quick bodies after the steady ones, for sub-steps of h s; returns the number of batches."""
         bodies, table, width, (begin, edges) = self.bodies, self.table, self.simd.width, self._steady
         first = int(edges[-1])
-        count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
+        count = list_patches(bodies, table.pairs, table.points, self._patches, begin)
         if count < 0:
             self._patches = more_patches(self._patches, -2 * count)
-            count = list_patches(bodies, table.pairs, table.rows, self._patches, begin)
+            count = list_patches(bodies, table.pairs, table.points, self._patches, begin)
         self._count = count
         number, colours = colour_patches(width, bodies, table.pairs, self._patches, begin, count, first, self._begins)
         if colours < 0:
@@ -319,7 +328,7 @@ class ContactStepper:
         mine = np.zeros(len(bodies.part), bool)
         mine[at] = True
         before = self._energies()[1]
-        if not move_apart(bodies, self.table.pairs, self.table.rows, mine):
+        if not move_apart(bodies, self.table.pairs, self.table.points, mine):
             return
         self._take_off(before)
         members = self.rank[self.members]
@@ -366,15 +375,15 @@ class ContactStepper:
         if self._special:
             strength = float(self.world.steady_strength[self.members].max())
             balls, rebounds, supports = special_patches(
-                width, bodies, table.pairs, self._patches, self._steady[0], self._count, table.rows, self._batches,
+                width, bodies, table.pairs, self._patches, self._steady[0], self._count, table.points, self._batches,
                 self.world.coefficients, strength, lists, target,
             )
         shares, sleep_timer = min(self._shares, MOST_SOLVERS) if number * sub_steps > WORTHWHILE_BATCHES else 1, len(self._steady[1]) - 1
         self._work_queue[:] = empty_work_queue()
         work, *_ = advance.together([
             (
-                self.simd, bodies, table.pairs, self._patches, self._batches, self._edges, sleep_timer, table.rows, lists, balls, rebounds,
-                supports, target, sub_steps, h, self._work_queue, share, shares,
+                self.simd, bodies, table.pairs, self._patches, self._batches, self._edges, sleep_timer, table.points, lists, balls,
+                rebounds, supports, target, sub_steps, h, self._work_queue, share, shares,
             )
             for share in range(shares)
         ])  # fmt: skip

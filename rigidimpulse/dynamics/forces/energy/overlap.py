@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.collision.distance.separating_plane import best_plane, tangents
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, Geometry
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.dynamics.forces.energy.separating_plane import best_plane, tangents
 from rigidimpulse.dynamics.forces.energy.term import Expansion, Poses, body_indices, eliminated, levers, positive, turning
 from rigidimpulse.model.world import World
 from rigidimpulse.scene.body import number

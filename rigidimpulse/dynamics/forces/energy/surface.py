@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Geometry, Primitive, build_geometry
-from rigidimpulse.collision.manifold.dispatch import pair_gap
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.dynamics.forces.energy.term import Expansion, Poses, body_index, body_point, levers, positive
 from rigidimpulse.model.world import World
@@ -90,7 +90,7 @@ class CompiledSurfacePoint:
 def _distance(geometry: Geometry, p: np.ndarray) -> tuple[float, np.ndarray]:
     """Return the signed distance of a point p (3,) m from shape 0, and the way (3,) m to it from the nearest place of the surface."""
     out = np.zeros(7)
-    pair_gap(geometry, 1, p, np.eye(3), 0, np.zeros(3), np.eye(3), np.inf, out)
+    pair_gap(geometry, Posed(1, p, np.eye(3)), Posed(0, np.zeros(3), np.eye(3)), np.inf, out)
     if not points_inside(geometry, 0, p[None])[0]:
         away = p - out[3:6]
         return float(np.linalg.norm(away)), away

@@ -2,9 +2,10 @@
 
 from math import sqrt
 
-from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, set_inverse_inertia, turned, turned_back
+from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, turned, turned_back
 from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.quaternion import exponential, product, quaternion_to_matrix
+from rigidimpulse.dynamics.solvers.tgs_soft.bodies import set_inverse_inertia
 
 
 @inlined

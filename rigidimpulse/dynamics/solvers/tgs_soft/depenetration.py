@@ -8,8 +8,9 @@ makes s = 0. Contacts take turns (Gauss and Seidel) until all are met to PARTED 
 the heap are moved; what is deeper in than DEEPEST skins is left to the solver, which needs velocities for it.
 """
 
-from rigidimpulse.collision.contact_records import INVERSE_MASS, SEPARATION, SKIN, in_play, set_inverse_inertia
+from rigidimpulse.collision.contact_records import SEPARATION, SKIN, in_play
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.dynamics.solvers.tgs_soft.bodies import INVERSE_MASS, set_inverse_inertia
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import set_orientation
 from rigidimpulse.dynamics.solvers.tgs_soft.records import normal_of, point_of
 

@@ -13,11 +13,10 @@ from __future__ import annotations
 
 from rigidimpulse.collision.contact_records import (
     CARRIER,
+    CONTACT_MARGIN,
     DYNAMIC_FRICTION,
     FRICTION,
-    HELD,
     IMPULSE,
-    INVERSE_MASS,
     ROUND_A,
     ROUND_B,
     SKELETON_A,
@@ -27,6 +26,7 @@ from rigidimpulse.collision.contact_records import (
 )
 from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.simd import ROW, fma, gather, load, root, scatter, spread, store, where_greater, width_of
+from rigidimpulse.dynamics.solvers.tgs_soft.bodies import INVERSE_MASS
 from rigidimpulse.dynamics.solvers.tgs_soft.passes import DEEPEST, TINY, add, along, cross, dot, less, linear, store_three, three, times
 from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     ARM_A,
@@ -136,7 +136,7 @@ def _points(simd, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
         first, second = gather(simd, lines, batches.row, at), gather(simd, lines[ROW:], batches.row, at)
         a = _turned(ra, (first[SKELETON_A], first[SKELETON_A + 1], first[SKELETON_A + 2]))
         b = add(between, _turned(rb, (second[SKELETON_B - ROW], second[SKELETON_B + 1 - ROW], second[SKELETON_B + 2 - ROW])))
-        gap = dot(n, less(b, a)) - (first[ROUND_A] + first[ROUND_B]) - second[HELD - ROW]
+        gap = dot(n, less(b, a)) - (first[ROUND_A] + first[ROUND_B]) - second[CONTACT_MARGIN - ROW]
         a, b = along(a, first[ROUND_A], n), along(b, -first[ROUND_B], n)
         x = (fma(share, a[0], rest * b[0]), fma(share, a[1], rest * b[1]), fma(share, a[2], rest * b[2]))
         # A single point lies at the centre of its patch to the bit: with a lever of round-off it would hold a twist, by whatever force.

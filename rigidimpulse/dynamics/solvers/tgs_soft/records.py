@@ -14,11 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.contact_cache import GENERAL
-from rigidimpulse.collision.contact_records import HELD, INVERSE_MASS, ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, in_play, turned
+from rigidimpulse.collision.contact_records import CONTACT_MARGIN, ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, in_play, turned
+from rigidimpulse.collision.manifold.dispatch import GENERAL
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.simd import ROW, aligned
+from rigidimpulse.dynamics.solvers.tgs_soft.bodies import INVERSE_MASS
 
 ARM_A, ARM_B, ARM_FIELDS = 0, 3, 6
 """Fields of three of the arms: from the centres of the bodies to O, m."""
@@ -238,7 +239,7 @@ def point_of(position, rotation, rows, r, a, b, nx, ny, nz, share):
     by += position[b, 1] - position[a, 1]
     bz += position[b, 2] - position[a, 2]
     s, t = rows[r, ROUND_A], rows[r, ROUND_B]
-    gap = nx * (bx - ax) + ny * (by - ay) + nz * (bz - az) - (s + t) - rows[r, HELD]
+    gap = nx * (bx - ax) + ny * (by - ay) + nz * (bz - az) - (s + t) - rows[r, CONTACT_MARGIN]
     rest = 1.0 - share
     x = share * (ax + s * nx) + rest * (bx - t * nx)
     y = share * (ay + s * ny) + rest * (by - t * ny)

@@ -33,10 +33,11 @@ from math import pi, sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import INVERSE_MASS, SKIN
+from rigidimpulse.collision.contact_records import SKIN
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.simd import width_of
 from rigidimpulse.core.workers import LAST, NONE, PATIENCE, look_at, open_round, pause, report_piece, take_piece, wait_for
+from rigidimpulse.dynamics.solvers.tgs_soft.bodies import INVERSE_MASS
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import finish, kick, move
 from rigidimpulse.dynamics.solvers.tgs_soft.passes import solve, warm_start
 from rigidimpulse.dynamics.solvers.tgs_soft.records import (

@@ -7,7 +7,8 @@ from contact_scenes import IDENTITY, ROUND_OFF, SQUARE, Scene, approached, box, 
 
 from rigidimpulse.collision.bvh import STACK_ROWS
 from rigidimpulse.collision.geometry import CYLINDER, Primitive
-from rigidimpulse.collision.manifold.dispatch import pair_contacts, reduce_contacts
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_contacts
+from rigidimpulse.collision.manifold.reduce import reduce_contacts
 
 
 def test_open_sheet_is_touched_from_both_sides():
@@ -27,14 +28,14 @@ def test_open_sheet_is_touched_from_both_sides():
 
 
 class TestBuffers:
-    def test_tells_how_many_rows_it_needs(self):
+    def test_tells_how_many_contacts_it_needs(self):
         small = Scene(mesh(box()), mesh(box()), capacity=3)
         pose_b = (np.array([0.1, 0.2, 1.0 + 1e-5]), np.eye(3))
-        arguments = (0, *IDENTITY, 1, *pose_b, 2e-5)
-        assert pair_contacts(small.geometry, *arguments, small.scratch, small.real, small.integer, 0) == -4
+        arguments = (Posed(0, *IDENTITY), Posed(1, *pose_b), 2e-5)
+        assert pair_contacts(small.shapes, *arguments, small.buffers, 0) == -4
         enough = Scene(mesh(box()), mesh(box()), capacity=6)
         enough.real[:2] = 5.0
-        assert pair_contacts(enough.geometry, *arguments, enough.scratch, enough.real, enough.integer, 2) == 6
+        assert pair_contacts(enough.shapes, *arguments, enough.buffers, 2) == 6
         assert np.all(enough.real[:2] == 5.0) and np.all(enough.integer[:, :2] == -7)
 
     def test_chunks_of_leaf_pairs_change_nothing(self):
@@ -64,7 +65,7 @@ class TestReduction:
         spread = np.sort(np.delete(angle[kept], list(kept).index(13)))
         assert np.diff([*spread, spread[0] + 2 * np.pi]).max() < 2.1 * np.pi / 4
 
-    def test_walls_are_not_mixed_and_few_contacts_stay(self):
+    def test_patches_are_not_mixed_and_few_contacts_stay(self):
         rng = np.random.default_rng(14)
         rows, integer = np.zeros((60, 10)), np.zeros((60, 5), dtype=np.int64)
         rows[:, :2] = rng.normal(size=(60, 2))
@@ -79,7 +80,7 @@ class TestReduction:
         # The hull's support in the kept directions is that of all.
         assert before[:40, :2].max() == before[kept[kept < 40], :2].max()
 
-    def test_rows_outside_the_range_are_left_alone(self):
+    def test_contacts_outside_the_range_are_left_alone(self):
         rows, integer = np.zeros((30, 10)), np.zeros((30, 5), dtype=np.int64)
         rows[:, 0], rows[:, 8], rows[:5, 3] = np.arange(30), 1.0, 9.0
         count = reduce_contacts(rows, integer, 5, 30)

@@ -25,8 +25,8 @@ from rigidimpulse.collision.distance.simplices import (
     turned,
 )
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
+from rigidimpulse.collision.manifold.penetrating_surface import NUDGE, add_point, turned_back
 from rigidimpulse.core.kernels import jit, jit_making_arrays
-from rigidimpulse.dynamics.penalty.surface import NUDGE, add_point, turned_back
 
 MOST_DEPTH = 2.0
 """How much deeper than the corners of the pair, or than its least deep edges, edges may be."""

@@ -1,0 +1,92 @@
+"""Convex shapes: which shapes are convex, how deep their centre lies inside, and the same shapes shrunk for the search.
+
+The mesh contact routines need a gap above 0, and soft contacts sink in. A convex shape around its centre of mass is therefore shrunk
+about that centre by the factor f = 1 - SHRINK. With h the distance of a face from the centre, the face moves inwards by SHRINK h, and
+normals stay the same. A point p of the shrunk shape belongs to the point p / f of the true one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
+from rigidimpulse.core.conventions import TOLERANCES
+
+SHRINK = 1.5 * TOLERANCES.skin
+"""Part of their lengths by which convex bodies are shrunk for the search."""
+
+
+def inner_radii(geometry: Geometry) -> np.ndarray:
+    """Distance (s,) from the centre of mass of each shape to its nearest face, m; inf for half spaces.
+
+    For shapes that are not one convex piece it is a tenth of the radius that encloses them.
+    """
+    out = np.full(len(geometry.shape_first) - 1, np.inf)
+    for s in range(len(out)):
+        first, last = int(geometry.shape_first[s]), int(geometry.shape_first[s + 1])
+        if np.all(geometry.kind[first:last] == HALF_SPACE):
+            continue
+        depth = _convex_depth(geometry, first) if last == first + 1 else 0.0
+        reach = np.linalg.norm(geometry.bound_centre[first:last], axis=1) + geometry.bound_radius[first:last]
+        out[s] = depth if depth > 0.0 else 0.1 * float(reach[np.isfinite(reach)].max())
+    return out
+
+
+def _convex_depth(geometry: Geometry, p: int) -> float:
+    """Distance from the centre of mass to the nearest face of a convex primitive, m; 0 if it is not convex or the centre is outside."""
+    if geometry.kind[p] == CYLINDER:
+        centre, axis, half = geometry.frame[p, :3], geometry.frame[p, 3:6], geometry.frame[p, 6]
+        along = float(centre @ axis)
+        return float(min(half - abs(along), geometry.radius[p] - np.linalg.norm(centre - along * axis)))
+    vertices = geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]]
+    faces = slice(int(geometry.triangle_first[p]), int(geometry.triangle_first[p + 1]))
+    normals = geometry.triangle_normal[faces]
+    if not np.any(normals):
+        # A ball or a capsule.
+        return float(geometry.radius[p]) if np.abs(vertices.sum(0)).max() <= 1e-9 * geometry.bound_radius[p] else 0.0
+    depth = np.einsum("ij,ij->i", normals, geometry.vertex[geometry.triangle[faces, 0]])
+    size = float(geometry.bound_radius[p])
+    for n, d in zip(normals, depth, strict=True):
+        if d <= 0.0 or float((vertices @ n).max()) > d + 1e-9 * size:
+            return 0.0
+    return float(depth.min() + geometry.radius[p])
+
+
+def convex_polyhedra(geometry: Geometry) -> np.ndarray:
+    """Which shapes (s,) bool are one convex polyhedron around their centre of mass, with sharp edges."""
+    out = np.zeros(len(geometry.shape_first) - 1, bool)
+    for s in range(len(out)):
+        p = int(geometry.shape_first[s])
+        single = geometry.shape_first[s + 1] == p + 1 and geometry.kind[p] == ROUND and geometry.radius[p] == 0.0
+        out[s] = single and _convex_depth(geometry, p) > 0.0
+    return out
+
+
+def shrunk_geometry(geometry: Geometry, dynamic_shapes: np.ndarray) -> tuple[Geometry, np.ndarray]:
+    """The shapes for the search, and the factor (s,) of their lengths; 1 where a shape is unchanged.
+
+    dynamic_shapes (s,) bool: shapes of bodies that move freely.
+    """
+    factor = np.ones(len(geometry.shape_first) - 1)
+    vertex, frame, radius = geometry.vertex.copy(), geometry.frame.copy(), geometry.radius.copy()
+    low, high = geometry.node_min.copy(), geometry.node_max.copy()
+    centre, bound = geometry.bound_centre.copy(), geometry.bound_radius.copy()
+    for s in np.flatnonzero(dynamic_shapes):
+        p = int(geometry.shape_first[s])
+        rounded = geometry.kind[p] == ROUND and geometry.radius[p] > 0.0
+        if geometry.shape_first[s + 1] != p + 1 or geometry.kind[p] == HALF_SPACE or rounded or _convex_depth(geometry, p) <= 0.0:
+            continue
+        factor[s] = 1.0 - SHRINK
+        vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]] *= factor[s]
+        nodes = slice(int(geometry.node_first[p]), int(geometry.node_first[p + 1]))
+        low[nodes] *= factor[s]
+        high[nodes] *= factor[s]
+        centre[p] *= factor[s]
+        bound[p] *= factor[s]
+        if geometry.kind[p] == CYLINDER:
+            frame[p, :3] *= factor[s]
+            frame[p, 6] *= factor[s]
+            radius[p] *= factor[s]
+    return geometry._replace(
+        vertex=vertex, frame=frame, radius=radius, node_min=low, node_max=high, bound_centre=centre, bound_radius=bound
+    ), factor
