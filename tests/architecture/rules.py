@@ -8,9 +8,19 @@ from functools import cache
 from pathlib import Path
 
 from structure import (
-    OldWord, Package, circles, comment_lines, import_graph, layer_violations, old_words_in, parameter_counts, parameters_called, read_package,
-    size, untyped_parameters,
-)  # fmt: skip
+    OldWord,
+    Package,
+    circles,
+    comment_lines,
+    import_graph,
+    layer_violations,
+    old_words_in,
+    parameter_counts,
+    parameters_called,
+    read_package,
+    size,
+    untyped_parameters,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "rigidimpulse"
@@ -43,7 +53,8 @@ OLD_WORDS = (
         "click.group", "main.group", "collision group", "collision_group", "CollisionGroup", "Khronos group", "THREE.Group", "hits.group",
         "match.group", ".group(", ".groups(",
     ), (
-        "rigidimpulse/io/*", "rigidimpulse/view/*", "rigidimpulse/cli/*", "rigidimpulse/studies/charts.py", "rigidimpulse/scene/collision_filter.py",
+        "rigidimpulse/io/*", "rigidimpulse/view/*", "rigidimpulse/cli/*", "rigidimpulse/studies/charts.py",
+        "rigidimpulse/scene/collision_filter.py",
         "tests/io/*", "tests/browser/*", "docs/usd.md", "docs/robots.md", "docs/gltf.md", "docs/cache.md", "docs/recipes/*",
     ), "files have groups of nodes and of data sets, filters have groups of bodies, commands and regular expressions have groups"),
     OldWord("guard", "safe step, conservative bound; energy limiter"),
@@ -55,12 +66,14 @@ OLD_WORDS = (
     OldWord("toil", "solve count"),
     OldWord("lane", "SIMD vector, element of a vector"),
     OldWord("core", "skeleton of a rounded shape; inset surface", (
-        "rigidimpulse.core", "rigidimpulse/core", "numba.core", '"core.', "'core.", "`core`", "`core/", "core <-", "core/", "usd-core", "usd_core",
+        "rigidimpulse.core", "rigidimpulse/core", "numba.core", '"core.', "'core.", "`core`", "`core/", "core <-", "core/", "usd-core",
+        "usd_core",
         "physical core", "processor core", "one core", "two cores", "four cores", "all cores", "many cores", "more cores", "shared cores",
         "number_of_cores", "MOST_CORES", "most_cores", "several cores", "other cores", "number of cores", "each core works", "['cores']",
         '["cores"]', '"cores"', "{cores}", "cores=", "test_cores", "s} cores", "]} cores",
     ), (
-        "rigidimpulse/core/*", "rigidimpulse/cli/*", "rigidimpulse/studies/*", "rigidimpulse/gallery/hard/*", "docs/speed.md", "tests/bench/*",
+        "rigidimpulse/core/*", "rigidimpulse/cli/*", "rigidimpulse/studies/*", "rigidimpulse/gallery/hard/*", "docs/speed.md",
+        "tests/bench/*",
         "tests/determinism/test_cores.py", "docs/make_what_accuracy_costs.py", "docs/what_accuracy_costs.md",
     ), "the package's lowest folder, the cores of a processor, and the solid core of a body with spikes"),
     OldWord("course", "trajectory", ("of course", "Of course"), FOLDERS_OF_REAL_THINGS, "courses of bricks"),
@@ -70,7 +83,8 @@ OLD_WORDS = (
     OldWord("calmer", "slower"),
     OldWord("stirred", "awake"),
     OldWord("stir", "wake"),
-    OldWord("room", "capacity, workspace", ("room.glb", "a room of yours", '"room"'), (*FOLDERS_OF_REAL_THINGS, *PICTURES), "rooms of scenes, room on a page"),
+    OldWord("room", "capacity, workspace", ("room.glb", "a room of yours", '"room"'), (*FOLDERS_OF_REAL_THINGS, *PICTURES),
+            "rooms of scenes, room on a page"),
     OldWord("wish", "accuracy target"),
     OldWord("desk", "report", (), FOLDERS_OF_REAL_THINGS, "furniture"),
     OldWord("deck", "work queue", (), FOLDERS_OF_REAL_THINGS, "a deck of cards"),
@@ -81,10 +95,12 @@ OLD_WORDS = (
     OldWord("rattles", "inelastic collapse", ("RATTLE",), (), "the velocity projection method RATTLE"),
     OldWord("rattle together", "inelastic collapse"),
     OldWord("wall", "half space, plane", ("wall clock", "wall time", "wall-clock", "wall_s", '"wall"', '"walls"'), (
-        *FOLDERS_OF_REAL_THINGS, "rigidimpulse/studies/*", "docs/hard_cases.md", "docs/gallery.md", "docs/speed.md", "docs/penalty.md", "docs/heaps.md",
+        *FOLDERS_OF_REAL_THINGS, "rigidimpulse/studies/*", "docs/hard_cases.md", "docs/gallery.md", "docs/speed.md", "docs/penalty.md",
+        "docs/heaps.md",
         "docs/what_accuracy_costs.md", "docs/make_what_accuracy_costs.py", "README.md",
     ), "walls of bricks, thin walls, pits with walls; time on the wall's clock"),
-    OldWord("net", "soft body, cloth", ("net force", "net impulse", "net torque", "net momentum", "https://", ".net/"), FOLDERS_OF_REAL_THINGS,
+    OldWord("net", "soft body, cloth", ("net force", "net impulse", "net torque", "net momentum", "https://", ".net/"),
+            FOLDERS_OF_REAL_THINGS,
             "sums, and safety nets of scenes"),
     OldWord("arrival", "velocity projection"),
     OldWord("anew", "again"),
@@ -150,8 +166,9 @@ def measures() -> dict[str, Measure]:
     def named(found: list) -> tuple[str, ...]:
         return tuple(f"{entry.place}: {entry.number}" for entry in found)
 
+    largest = tuple(rings[0]) if rings else ()
     table = [
-        Measure("largest_circle", "files in the largest circle of imports", len(rings[0]) if rings else 1, 2, tuple(rings[0]) if rings else ()),
+        Measure("largest_circle", "files in the largest circle of imports", max(len(largest), 1), 2, largest),
         Measure("circles_over_two", "circles of more than two files", sum(len(ring) > 2 for ring in rings), 0, tuple(map(" ".join, rings))),
         Measure("layer_violations", "imports from a higher layer", len(upwards), 0, tuple(f"{a} imports {b}" for a, b in upwards)),
         Measure("files", "files of the package", files, 370),
