@@ -11,9 +11,10 @@ from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTE
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.dynamics.constraints.energy_limit import limit_energy, note_end_energy
 from rigidimpulse.dynamics.constraints.rattle import project_velocities
-from rigidimpulse.dynamics.impact.point import Contacts
 from rigidimpulse.engine.pair_table import live_contacts
-from rigidimpulse.engine.touching import bring_all, fill_contacts, near_pairs, pressing
+from rigidimpulse.engine.touching import fill_contacts, near_pairs, pressing
+from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.motion.evaluate import bring_all
 
 if TYPE_CHECKING:
     from rigidimpulse.engine.exact.joints import JointState

@@ -123,7 +123,7 @@ def _respond_and_detect(context) -> None:
     from rigidimpulse.engine.exact.impacts import respond_to_impacts
     from rigidimpulse.engine.pair_events import PairEvents
     from rigidimpulse.engine.simulate import start_trajectories
-    from rigidimpulse.engine.touching import bring_gyroscopic, refresh_pose
+    from rigidimpulse.motion.evaluate import bring_gyroscopic, refresh_pose
     from rigidimpulse.recording.contact_log import fill_contacts_and_forces
 
     state, world, now, one, contacts = context.state, context.world, context.state.now, np.ones(1), _contact()
@@ -180,7 +180,7 @@ def _move(context) -> None:
     from rigidimpulse.engine.exact.trajectories import set_impact_margins
     from rigidimpulse.engine.pair_events import PairEvents
     from rigidimpulse.engine.simulate import start_trajectories
-    from rigidimpulse.engine.touching import bring_all
+    from rigidimpulse.motion.evaluate import bring_all
     from rigidimpulse.motion.trajectory import FREE, take
 
     state, now, world = context.state, context.state.now, context.world

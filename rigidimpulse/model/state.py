@@ -13,15 +13,15 @@ from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch, make_s
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.dynamics.constraints.energy_limit import Ground, note_end_energy
 from rigidimpulse.dynamics.constraints.rattle import PairForce
-from rigidimpulse.dynamics.impact.point import BodyState
 from rigidimpulse.dynamics.solvers.qp import row_solver
 from rigidimpulse.engine.exact.joints import JointState
 from rigidimpulse.engine.exact.step_size import ErrorEstimate
 from rigidimpulse.engine.islands import NO_FORCE
 from rigidimpulse.engine.regime import why_not_substepped
 from rigidimpulse.engine.substepped.advance import SubsteppedIslands
-from rigidimpulse.engine.touching import bring_all
 from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
+from rigidimpulse.motion.evaluate import bring_all
 from rigidimpulse.motion.trajectory import Trajectories, make_trajectories, pose_at
 from rigidimpulse.recording.contact_log import ContactLog
 from rigidimpulse.recording.events import EventLog

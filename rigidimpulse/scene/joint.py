@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.dynamics.constraints.joint import ABOUT, ACROSS, ALONG, DISTANCE, SWING, TWIST, Joints
-from rigidimpulse.engine.plan import Skip
+from rigidimpulse.model.effect import Skip
 from rigidimpulse.scene.body import vector
 
 HARD = math.inf

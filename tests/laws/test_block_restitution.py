@@ -13,9 +13,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidimpulse.dynamics.impact.point import BodyState, Contacts
 from rigidimpulse.dynamics.impact.restitution import LAWS
 from rigidimpulse.dynamics.impact.sequence import respond_simultaneous
+from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.motion.body_state import BodyState
 
 
 def state(masses, inertias, velocity, spin) -> BodyState:

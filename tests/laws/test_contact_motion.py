@@ -17,11 +17,12 @@ import pytest
 import rigidimpulse as ri
 from rigidimpulse.core.quaternion import multiply, quaternion_from_axis_angle
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
-from rigidimpulse.dynamics.impact.point import Contacts
 from rigidimpulse.engine.simulate import start_trajectories
-from rigidimpulse.engine.touching import bring_all, fill_contacts
+from rigidimpulse.engine.touching import fill_contacts
+from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.model.state import StepContext
 from rigidimpulse.model.world import compile_scene
+from rigidimpulse.motion.evaluate import bring_all
 from rigidimpulse.motion.trajectory import begin
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder

@@ -21,7 +21,7 @@ import trimesh
 
 import rigidimpulse as ri
 from rigidimpulse.dynamics.constraints import energy_limit
-from rigidimpulse.dynamics.impact.point import BodyState
+from rigidimpulse.motion.body_state import BodyState
 
 G = 9.81
 BODIES = 6

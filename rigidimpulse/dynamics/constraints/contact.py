@@ -43,7 +43,7 @@ from rigidimpulse.dynamics.constraints.rows import (
     solve_with_slip,
     take_rows,
 )
-from rigidimpulse.dynamics.impact.point import Contacts
+from rigidimpulse.model.contacts import Contacts
 
 STICK_PASSES = 4
 # Residual asked of the solver and slip that counts, relative to the speed gained in the sub-step.

@@ -18,8 +18,8 @@ import numpy as np
 from rigidimpulse.core.quaternion import cross
 from rigidimpulse.dynamics.constraints.contact import SLIP, SOLVE_TOLERANCE
 from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows, row_velocities, solve_with_slip
-from rigidimpulse.dynamics.impact.point import Contacts, select
 from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.model.contacts import Contacts, select
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError, unknown_name
-from rigidimpulse.engine.plan import Bound, Skip
+from rigidimpulse.model.effect import Bound, Skip
 from rigidimpulse.scene.body import vector
 
 if TYPE_CHECKING:

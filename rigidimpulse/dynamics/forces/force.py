@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.quaternion import cross, rotate, rotate_inverse
-from rigidimpulse.engine.plan import Skip
+from rigidimpulse.model.effect import Skip
 from rigidimpulse.motion.trajectory import Trajectories, pose_at, state_at
 from rigidimpulse.scene.body import number, vector
 from rigidimpulse.scene.shape import normalized_quaternion
 
 if TYPE_CHECKING:
-    from rigidimpulse.dynamics.impact.point import BodyState
     from rigidimpulse.model.world import World
+    from rigidimpulse.motion.body_state import BodyState
 
 
 class Instant(NamedTuple):

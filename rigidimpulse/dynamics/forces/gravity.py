@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.engine.plan import Bound, Skip
-from rigidimpulse.engine.touching import bring_gyroscopic
+from rigidimpulse.model.effect import Bound, Skip
+from rigidimpulse.motion.evaluate import bring_gyroscopic
 
 
 @dataclass(frozen=True)

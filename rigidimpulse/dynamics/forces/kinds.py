@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from rigidimpulse.dynamics.forces import KINDS
-from rigidimpulse.engine.plan import Bound, Skip
+from rigidimpulse.model.effect import Bound, Skip
 
 
 @dataclass(frozen=True)

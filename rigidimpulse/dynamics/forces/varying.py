@@ -22,7 +22,7 @@ import numpy as np
 from rigidimpulse.dynamics.forces.force import ForceTable, Instant
 from rigidimpulse.dynamics.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.dynamics.forces.mass_flow import BurningForces, MassFlow
-from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.motion.evaluate import refresh_pose
 from rigidimpulse.motion.force_step import Lines, Workspace, nystroem, semi_implicit
 
 IN_FLIGHT, IN_CONTACT = 0.03, 3.0

@@ -40,9 +40,10 @@ from rigidimpulse.dynamics.constraints.rows import (
     row_velocities,
     solve_with_slip,
 )
-from rigidimpulse.dynamics.impact.point import Contacts, log_impact, select
+from rigidimpulse.dynamics.impact.point import log_impact
 from rigidimpulse.dynamics.impact.restitution import AUTO, NEWTON, POISSON
 from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.model.contacts import Contacts, select
 
 # Residual asked of the solver, relative to the speed of the group.
 SOLVE_TOLERANCE = 1e-14

@@ -12,43 +12,11 @@ touches only those its contacts name.
 """
 
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.impact.friction import contact_impulse
-
-
-class BodyState(NamedTuple):
-    """What respond and constrain need of every body at one instant, world frame."""
-
-    position: np.ndarray  # (n, 3) m, centre of mass
-    orientation: np.ndarray  # (n, 4) wxyz, principal frame
-    velocity: np.ndarray  # (n, 3) m/s
-    angular_velocity: np.ndarray  # (n, 3) rad/s
-    inv_mass: np.ndarray  # (n,) 1/kg, 0 for immovable
-    inv_inertia: np.ndarray  # (n, 3, 3) 1/(kg m2), world axes
-
-
-class Contacts(NamedTuple):
-    """The contacts of one group."""
-
-    body_a: np.ndarray  # (m,)
-    body_b: np.ndarray  # (m,)
-    arm_a: np.ndarray  # (m, 3) m
-    arm_b: np.ndarray  # (m, 3) m
-    normal: np.ndarray  # (m, 3)
-    gap: np.ndarray  # (m,) m
-    restitution: np.ndarray  # (m,)
-    tangential_restitution: np.ndarray  # (m,)
-    static_friction: np.ndarray  # (m,)
-    dynamic_friction: np.ndarray  # (m,)
-
-
-def select(contacts: Contacts, which: np.ndarray) -> Contacts:
-    """The contacts at the given places."""
-    return Contacts(*(np.ascontiguousarray(column[which]) for column in contacts))
 
 
 @jit

@@ -14,7 +14,8 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.dynamics.impact.block import rebound_of, solve_block
-from rigidimpulse.dynamics.impact.point import Contacts, relative_velocity, resolve_contact
+from rigidimpulse.dynamics.impact.point import relative_velocity, resolve_contact
+from rigidimpulse.model.contacts import Contacts
 
 # Impulses per contact before a group is finished without rebound.
 IMPULSES_PER_CONTACT = 200

@@ -35,10 +35,10 @@ from scipy.optimize import root_scalar
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.dynamics.forces.force import ForceTable, Instant
-from rigidimpulse.dynamics.impact.point import BodyState
 from rigidimpulse.dynamics.penalty.points import find_points
 from rigidimpulse.dynamics.penalty.surface import inward_axes, solid_geometry
-from rigidimpulse.engine.touching import bring_all
+from rigidimpulse.motion.body_state import BodyState
+from rigidimpulse.motion.evaluate import bring_all
 
 REST_DEPTH, IMPACT_DEPTH = 4e-4, 0.02
 MOST_DAMPING = 3.0

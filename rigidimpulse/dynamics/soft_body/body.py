@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rigidimpulse.collision.geometry import unique_edges
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.dynamics.soft_body.mass_spring import SpringMesh, sheet
-from rigidimpulse.engine.plan import Skip
+from rigidimpulse.model.effect import Skip
 from rigidimpulse.scene.body import DEFAULT_MATERIAL, number, vector
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.shape import Shape, check_orientation, rotation_matrix

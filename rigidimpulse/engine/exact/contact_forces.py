@@ -16,11 +16,11 @@ from rigidimpulse.dynamics.constraints.position_correction import correct_positi
 from rigidimpulse.dynamics.constraints.rattle import forget_forces, remember_forces
 from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.dynamics.impact.point import select
 from rigidimpulse.engine.exact.step_size import ALLOWED
 from rigidimpulse.engine.islands import Island, collect, make_island, near_contacts
 from rigidimpulse.engine.plan import Bound, Skip
-from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.model.contacts import select
+from rigidimpulse.motion.evaluate import refresh_pose
 
 PLAY = 1e-3
 """Energy that forces which are no solution may make, relative."""

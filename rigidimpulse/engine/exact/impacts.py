@@ -9,11 +9,12 @@ import numpy as np
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.dynamics.energy import kinetic_energy
 from rigidimpulse.dynamics.impact.kinematic import respond_kinematic
-from rigidimpulse.dynamics.impact.point import Contacts, select, speed_scale
+from rigidimpulse.dynamics.impact.point import speed_scale
 from rigidimpulse.dynamics.impact.restitution import LAWS
 from rigidimpulse.dynamics.impact.sequence import respond_sequential, respond_simultaneous
 from rigidimpulse.engine.islands import Island, classify
 from rigidimpulse.engine.plan import Bound, Skip
+from rigidimpulse.model.contacts import Contacts, select
 
 KERNELS = {
     "sequential": respond_sequential,

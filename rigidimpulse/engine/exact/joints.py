@@ -12,7 +12,7 @@ from rigidimpulse.dynamics.constraints.joint_impact import impact_rows, stop_at_
 from rigidimpulse.dynamics.constraints.joint_limits import next_switch
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_jointed, make_memory, stop_joints
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.motion.evaluate import refresh_pose
 from rigidimpulse.motion.trajectory import FIXED
 from rigidimpulse.scene.joint import Joint
 

@@ -42,8 +42,8 @@ from rigidimpulse.engine.substepped.trajectories import (
     most_stray,
     wake_by_contact,
 )
-from rigidimpulse.engine.touching import bring_all
 from rigidimpulse.engine.warm_up import prepare_kernels
+from rigidimpulse.motion.evaluate import bring_all
 from rigidimpulse.motion.trajectory import FIXED, LINEAR
 
 REST = 3.0

@@ -39,7 +39,7 @@ from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     place_patches,
 )
 from rigidimpulse.dynamics.solvers.tgs_soft.solver import FREQUENCY, advance, softness, special_patches
-from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.motion.evaluate import refresh_pose
 
 COLUMN = 20.0
 """Bodies whose weight may press the skin in by PRESSED."""
