@@ -113,11 +113,11 @@ def _contact():
 
 def _respond_and_detect(context) -> None:
     """Impulses first: by then the other process has rows and what moves bodies in the cache, which these need too."""
-    from rigidimpulse.dynamics.constraints.contact import hold_contacts
+    from rigidimpulse.dynamics.constraints.contact import ContactProblem, hold_contacts
     from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
     from rigidimpulse.dynamics.constraints.position_correction import needs_correction
     from rigidimpulse.dynamics.constraints.rows import make_rows
-    from rigidimpulse.dynamics.impact.restitution import LAWS
+    from rigidimpulse.dynamics.impact.restitution import LAWS, ImpactRule
     from rigidimpulse.dynamics.impact.sequence import respond_sequential
     from rigidimpulse.dynamics.solvers.newton import solve_newton
     from rigidimpulse.engine.exact.impacts import respond_to_impacts
@@ -129,7 +129,7 @@ def _respond_and_detect(context) -> None:
     state, world, now, one, contacts = context.state, context.world, context.state.now, np.ones(1), _contact()
     members = np.array([1])
     now.inv_inertia[1] = np.eye(3)
-    respond_sequential(now, contacts, LAWS["auto"], False, one, 1.0, 1.0, context.column, None, context.impact_log)
+    respond_sequential(now, contacts, ImpactRule(LAWS["auto"], one, 1.0, 1.0), False, context.column, None, context.impact_log)
     needs_correction(contacts, np.ones(1, bool), one)
     refresh_pose(members, now, state.rotation, state.trajectory.inertia)
     bring_gyroscopic(members, now, state.rotation, state.trajectory.inertia, context.angular_acceleration)
@@ -138,10 +138,10 @@ def _respond_and_detect(context) -> None:
         world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
     )
     solve_newton(make_rows.py_func(0), 1, 1.0)
-    hold_contacts(
-        _leave_unsolved, now, contacts, members, motion.turning, np.zeros(1), context.acceleration, context.angular_acceleration,
-        1.0, 1.0, context.column, np.zeros((1, 3)), context.wrench,
+    problem = ContactProblem(
+        now, contacts, members, context.column, motion.turning, context.acceleration, context.angular_acceleration
     )
+    hold_contacts(_leave_unsolved, problem, np.zeros(1), 1.0, 1.0, np.zeros((1, 3)), context.wrench)
     start_trajectories(context)
     pair_events = PairEvents(context, 1.0 / 60.0)
     pair_events.find_pairs()
@@ -237,33 +237,42 @@ def _step_substepped(context) -> None:
     )  # fmt: skip
 
 
+def _jointed_box(context):
+    """The joint of the box, and the box."""
+    from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
+
+    state, joints = context.state, context.joints
+    return JointedIsland(
+        joints.table, np.array([0]), state.now, state.rotation, np.array([1]), context.column, joints.memory, 1.0
+    )
+
+
 def _start_joints(context) -> None:
     """Rows of joints at the start of a sub-step and at impacts, and those that close them."""
     from rigidimpulse.dynamics.constraints.joint_impact import fill_rates, impact_rows
-    from rigidimpulse.dynamics.constraints.joint_sub_step import count_joint_rows, fill_closing_rows, start_joint_rows
+    from rigidimpulse.dynamics.constraints.joint_sub_step import fill_closing_rows, start_joint_rows
+    from rigidimpulse.dynamics.constraints.jointed_island import count_joint_rows
     from rigidimpulse.dynamics.constraints.rows import make_rows
 
-    state, joints, which, members = context.state, context.joints, np.array([0]), np.array([1])
-    now, table, memory = state.now, joints.table, joints.memory
-    rows = make_rows.py_func(int(count_joint_rows(table, which)))
-    fill_closing_rows(table, which, now, state.rotation, context.column, memory.angle, rows, 0)
-    start_joint_rows(table, which, now, state.rotation, context.column, memory, STEP, 1.0, rows, 0)
-    impact_rows(table, which, now, state.rotation, members, context.column, memory, 1.0, joints.moment)
-    fill_rates(table, which, now, state.rotation, context.column, memory, 1.0, rows)
+    island = _jointed_box(context)
+    rows = make_rows.py_func(int(count_joint_rows(island.joints, island.which)))
+    fill_closing_rows(island, rows, 0)
+    start_joint_rows(island, STEP, rows, 0)
+    impact_rows(island, context.joints.moment)
+    fill_rates(island, rows)
 
 
 def _close_and_stop_joints(context) -> None:
     """Rows of joints at the end of a sub-step."""
-    from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, count_joint_rows, stop_rows
+    from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, stop_rows
+    from rigidimpulse.dynamics.constraints.jointed_island import count_joint_rows
     from rigidimpulse.dynamics.constraints.rows import make_rows
 
-    state, joints, which, members = context.state, context.joints, np.array([0]), np.array([1])
-    count = int(count_joint_rows.py_func(joints.table, which))
+    island = _jointed_box(context)
+    count = int(count_joint_rows.py_func(island.joints, island.which))
     rows = make_rows.py_func(count)
-    close_at_end(
-        joints.table, which, state.now, context.acceleration, members, STEP, joints.memory, rows, 0, np.zeros(count), context.wrench
-    )
-    stop_rows(joints.table, which, state.now, state.rotation, members, context.column, joints.memory, np.zeros(1))
+    close_at_end(island, context.acceleration, STEP, rows, 0, np.zeros(count), context.wrench)
+    stop_rows(island, np.zeros(1))
 
 
 def _fly(_context) -> None:

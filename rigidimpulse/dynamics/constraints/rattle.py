@@ -91,11 +91,12 @@ def project_velocities(context, island) -> bool:
 def _stop(context, island, contacts: Contacts, entries) -> None:
     """The impulses nu of contacts; entries: for each the forces of its pair and its key."""
     now, members = context.state.now, island.members
-    rows, first_row, frames = contact_rows(now, contacts, members, context.column, 0)
+    of_contacts = contact_rows(now, contacts, members, context.column, 0)
+    rows, first_row, frames = of_contacts
     row_velocities(now, contacts, first_row, frames, rows.bias)
     slides = np.array([key in entry.slides or (key not in entry.force and bool(entry.slides)) for entry, key in entries])
     scale = float(np.abs(rows.bias).max(initial=np.finfo(float).tiny))
     solve_with_slip(
-        solve_newton, rows, len(members), first_row, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale
+        solve_newton, of_contacts, len(members), contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale
     )
     change_velocities(now, members, rows)

@@ -50,8 +50,13 @@ def count_rolling_rows(rolling: Rolling | None) -> int:
 
 
 @jit
-def fill_rolling_rows(bodies, contacts, rolling, number, angular_acceleration, frames, first_row, h, rows, start):
-    """Rows from `start` on, with the velocities L t.w that they would have after h without moments."""
+def fill_rolling_rows(problem, rolling, h, of_contacts, start):
+    """Fill the rows from `start` on, with the velocities L t.w that they would have after h without moments.
+
+    problem: a `ContactProblem`; of_contacts: `ContactRows`.
+    """
+    bodies, contacts, number = problem.bodies, problem.contacts, problem.number
+    rows, first_row, frames = of_contacts.rows, of_contacts.first_row, of_contacts.frames
     i = start
     for c in range(first_row.shape[0]):
         lever = rolling.lever[c]
@@ -63,13 +68,13 @@ def fill_rolling_rows(bodies, contacts, rolling, number, angular_acceleration, f
             x, y, z = lever * frames[c, k, 0], lever * frames[c, k, 1], lever * frames[c, k, 2]
             if bodies.inv_mass[a] > 0.0:
                 rows.first[i] = number[a]
-                write_body(bodies, a, rows.jacobian[i, :6], 0.0, 0.0, 0.0, -x, -y, -z)
+                write_body(bodies, a, rows.jacobian[i, :6], (0.0, 0.0, 0.0), (-x, -y, -z))
             if bodies.inv_mass[b] > 0.0:
                 rows.second[i] = number[b]
-                write_body(bodies, b, rows.jacobian[i, 6:], 0.0, 0.0, 0.0, x, y, z)
+                write_body(bodies, b, rows.jacobian[i, 6:], (0.0, 0.0, 0.0), (x, y, z))
             rows.kind[i] = SEGMENT if k == 0 else (DISC if k == 1 else DISC_SECOND)
             rows.master[i], rows.coefficient[i] = first_row[c], bound / lever
-            w, alpha = bodies.angular_velocity, angular_acceleration
+            w, alpha = bodies.angular_velocity, problem.angular_acceleration
             rows.bias[i] = (
                 x * (w[b, 0] - w[a, 0] + h * (alpha[b, 0] - alpha[a, 0]))
                 + y * (w[b, 1] - w[a, 1] + h * (alpha[b, 1] - alpha[a, 1]))

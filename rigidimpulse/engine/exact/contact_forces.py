@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.core.conventions import TOLERANCES
-from rigidimpulse.dynamics.constraints.contact import Held, hold_contacts
+from rigidimpulse.dynamics.constraints.contact import ContactProblem, Held, hold_contacts
 from rigidimpulse.dynamics.constraints.contact_motion import Motion, contact_motion
 from rigidimpulse.dynamics.constraints.energy_limit import limit_correction_energy, note_hold
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
@@ -142,10 +142,10 @@ def _hold_turning(
     def hold_over(h: float, excess: np.ndarray) -> Held:
         h = island.load(context, h)
         context.wrench[island.members] = 0.0
-        return hold_contacts(
-            context.solve_rows, state.now, contacts, island.members, motion.turning, excess, context.acceleration,
-            context.angular_acceleration, h, SHORTEST_STOP * step, context.column, force, context.wrench, rolling,
+        problem = ContactProblem(
+            state.now, contacts, island.members, context.column, motion.turning, context.acceleration, context.angular_acceleration
         )
+        return hold_contacts(context.solve_rows, problem, excess, h, SHORTEST_STOP * step, force, context.wrench, rolling)
 
     if motion.fastest * step <= STEADY:
         held = hold_over(sub_step(motion.fastest, step, rest), np.zeros(len(subset)))

@@ -10,7 +10,7 @@ from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.dynamics.energy import kinetic_energy
 from rigidimpulse.dynamics.impact.kinematic import respond_kinematic
 from rigidimpulse.dynamics.impact.point import speed_scale
-from rigidimpulse.dynamics.impact.restitution import LAWS
+from rigidimpulse.dynamics.impact.restitution import LAWS, ImpactRule
 from rigidimpulse.dynamics.impact.sequence import respond_sequential, respond_simultaneous
 from rigidimpulse.engine.islands import Island, classify
 from rigidimpulse.engine.plan import Bound, Skip
@@ -74,9 +74,10 @@ def respond_to_impacts(context, island: Island, kernel, law: int) -> None:
     before = kinetic_energy(now, context.world, island.members)
     joints = context.joints.impact_block(context, island) if len(island.joints) else None
     together = len(live) > 1 and (bool(collapses.any()) or _bear_each_other(context, island))
+    rule = ImpactRule(law, rest_speed, tolerance, scale)
     for _ in range(MAX_CALLS):
         count, _, capped = kernel(
-            now, contacts, law, together, rest_speed, tolerance, scale, context.column, joints, context.impact_log
+            now, contacts, rule, together, context.column, joints, context.impact_log
         )
         context.log.impacts.add(island.time, contacts, now.position, context.impact_log, count)
         _remember_rebounds(context, island, contacts, context.impact_log[:count])

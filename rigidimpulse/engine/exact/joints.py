@@ -7,10 +7,12 @@ import math
 import numpy as np
 
 from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.joint import RADIUS
 from rigidimpulse.dynamics.constraints.joint_impact import impact_rows, stop_at_limits
 from rigidimpulse.dynamics.constraints.joint_limits import next_switch
-from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_jointed, make_memory, stop_joints
+from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_jointed, stop_joints
+from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, make_memory
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.motion.evaluate import refresh_pose
 from rigidimpulse.motion.trajectory import FIXED
@@ -126,22 +128,16 @@ class JointState:
             held = memory.wrench[i] * max(elapsed[j] for j in self.at([i])) if int(i) in self._of_body else np.zeros(6)
             now.velocity[i] -= now.inv_mass[i] * held[:3]
             now.angular_velocity[i] -= now.inv_inertia[i] @ held[3:]
-        moved = close_joints(
-            self.table, which, now, island.contacts, state.rotation, members, context.column, memory.angle, self._allowed
-        )
-        if moved:
+        jointed = self._jointed(context, island)
+        if close_joints(jointed, island.contacts):
             refresh_pose(members, now, state.rotation, state.trajectory.inertia)
             island.moved = True
-        stop_joints(
-            self.table, which, now, state.rotation, members, context.column, memory, elapsed, self.moment
-        )
+        stop_joints(jointed, elapsed, self.moment)
         self._book(context, which, island.time)
         state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
         if self._limited:
             # An impact at this instant: what came before goes on unchanged.
-            stop_at_limits(
-                self.table, which, now, state.rotation, members, context.column, memory, self._allowed, self.shock
-            )
+            stop_at_limits(jointed, self.shock)
         memory.wrench[members] = 0.0
         self.length[which] = elapsed[which]
         after = mechanical_energy(now, context.world, members)
@@ -167,10 +163,13 @@ class JointState:
 
     def impact_block(self, context, island):
         """The joints' part in the impulses of an impact (`JointBlock`)."""
+        return impact_rows(self._jointed(context, island), self.shock)
+
+    def _jointed(self, context, island) -> JointedIsland:
+        """The joints of an island and its bodies, as the kernels take them."""
         state = context.state
-        return impact_rows(
-            self.table, island.joints, state.now, state.rotation, island.members, context.column, self.memory, self._allowed,
-            self.shock,
+        return JointedIsland(
+            self.table, island.joints, state.now, state.rotation, island.members, context.column, self.memory, self._allowed
         )
 
     def sub_step(self, context, island, h: float) -> float:
@@ -237,11 +236,11 @@ class JointState:
             for i in others:
                 memory.end_position[i], memory.end_rotation[i] = context.pose_matrix(i, island.time + h)
             moment = self.moment.copy()
-            residual, worst = hold_jointed(
-                context.solve_rows, state.now, contacts, turning, context.acceleration, context.angular_acceleration, h,
-                island.members, context.column, force, self.table, island.joints, state.rotation, memory, self._allowed,
-                context.wrench, moment, rolling,
+            problem = ContactProblem(
+                state.now, contacts, island.members, context.column, turning, context.acceleration, context.angular_acceleration
             )
+            jointed = self._jointed(context, island)
+            residual, worst = hold_jointed(context.solve_rows, problem, jointed, h, force, context.wrench, moment, rolling)
             self.pull[island.joints] = 2.0 * (moment[island.joints] - self.moment[island.joints]) / h
             shorter = self.sub_step(context, island, h)
             if shorter < 0.5 * h:
