@@ -8,61 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from time import perf_counter
-from typing import Protocol
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.model.effect import Bound, Effect, Line, Skip
 
 STAGES = ("detect", "respond", "forces", "constrain", "sweep", "integrate", "observe")
 NEEDED = ("steady load", "varying load", "contact forces", "impact time", "exact flight", "forced flight")
 """Effects that the loop cannot do without where they are in: bodies would not move, or hit each other without end."""
-
-
-@dataclass(frozen=True)
-class Skip:
-    """Why an effect is out, and the function of its stage if it could be in all the same."""
-
-    reason: str
-    function: Callable | None = None
-
-
-@dataclass(frozen=True)
-class Bound:
-    """An effect that is in: the function of its stage (None: others call it, by its clock), and why it is in."""
-
-    function: Callable | None
-    reason: str
-
-
-class Effect(Protocol):
-    """One effect of one stage."""
-
-    @property
-    def stage(self) -> str:
-        """One of STAGES."""
-        ...
-
-    @property
-    def name(self) -> str:
-        """What `explain` calls it."""
-        ...
-
-    def bind(self, world) -> Bound | Skip:
-        """Look at the compiled world once; return the function for the stage, or why there is none."""
-        ...
-
-
-@dataclass
-class Line:
-    """One line of `explain`."""
-
-    stage: str
-    name: str
-    included: bool
-    reason: str
-    seconds: float = 0.0
-    calls: int = 0
 
 
 def _as_chosen(bound: Bound | Skip, name: str, wanted: bool | None) -> Bound | Skip:

@@ -1,4 +1,4 @@
-"""Contacts that last: forces that hold touching bodies apart over a sub-step.
+"""Contacts that last: forces that keep bodies apart over a sub-step.
 
 Over a sub-step of length h the contact forces f are constant. Row i of a contact has the velocity u_i + h a_i + W p_i at
 the end, p = h f, with u the velocity now and a the acceleration that the row would have without contact forces, as the
@@ -7,16 +7,16 @@ place of contact moves (see `contact_motion`):
     a = a_b + alpha_b x r_b + w_b x r_b' - (a_a + alpha_a x r_a + w_a x r_a') + n (u.n')
 
 The solver finds p >= 0 in Coulomb's cone so that no contact approaches at the end. Positions follow x0 + v0 h + a h^2 / 2,
-so sliding and standing are exact. Where arms or normals turn, velocities are put right at the end (see `arrival`), and
-the gap g, which is to be delta, is kept by position: with u_n = 0, g + h^2/2 (a_n + W f) = delta puts 2 (g - delta) / h to
-the bias, never more than a part of what presses.
+so sliding and standing are exact. Where arms or normals turn, velocities are put right at the end (velocity projection, see `rattle`), and
+the gap g is brought to the contact margin d by position: with u_n = 0, g + h^2/2 (a_n + W f) = d adds 2 (g - d) / h to
+the bias, limited to a part of the pressing acceleration.
 
-A contact that carries load but leaves slowly (it would rise less than the gap it is held at) is captured first: its
-normal velocity is set to zero in the metric of mass, which only dissipates; otherwise the force would do work on it
-and it would hover for ever.
+A contact that carries load but leaves slowly (it would rise less than the contact margin) sticks first: its normal
+velocity is set to zero in the metric of mass, which only dissipates. Otherwise the force would do work on it and it
+would hover for ever.
 
 A contact that slips stops at t = |u_t| / |a_t + W_t f|, and its friction changes there, also where it slips back: the sub-step ends at the
-first such time (stop split). The same holds for rolling and spinning friction (see `rolling`).
+first such time (stop split). The same holds for rolling and spinning friction (see `rolling_friction`).
 """
 
 from typing import NamedTuple

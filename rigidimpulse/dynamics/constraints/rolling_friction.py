@@ -21,6 +21,9 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.dynamics.constraints.rows import DISC, DISC_SECOND, SEGMENT, write_body
+from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
 
 
 class Rolling(NamedTuple):
@@ -31,7 +34,7 @@ class Rolling(NamedTuple):
     lever: np.ndarray  # (m,) L, m
 
 
-def rolling_of(world, bodies, contacts) -> Rolling | None:
+def rolling_of(world: World, bodies: BodyState, contacts: Contacts) -> Rolling | None:
     """Of the given contacts; None where no material asks for any."""
     if world.rolling is None or not len(contacts.gap):
         return None
@@ -99,7 +102,7 @@ def add_rolling_wrench(contacts, rolling, rows, frames, h, start, wrench):
 
 
 def rolling_slip(
-    bodies, contacts, rolling: Rolling, frames: np.ndarray, start: int, slow: float
+    bodies: BodyState, contacts: Contacts, rolling: Rolling, frames: np.ndarray, start: int, slow: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What rolls and spins faster than `slow` [m/s]: first and second row (s,), the same for a spin, and L w along them (s, 2)."""
     w = rolling.lever[:, None] * (bodies.angular_velocity[contacts.body_b] - bodies.angular_velocity[contacts.body_a])

@@ -1,4 +1,4 @@
-"""Flexible bodies: nets of springs and dampers, implicit steps, contact with rigid bodies. See docs/flexible.md."""
+"""Flexible bodies: soft bodies of springs and dampers, implicit steps, contact with rigid bodies. See docs/flexible.md."""
 
 from rigidimpulse.dynamics.soft_body.body import FlexibleBody
 from rigidimpulse.dynamics.soft_body.contact_planes import RigidMotion
