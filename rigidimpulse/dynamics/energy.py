@@ -3,6 +3,8 @@
 import numpy as np
 
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
 
 
 @jit
@@ -23,14 +25,14 @@ def kinetic_of(velocity, angular_velocity, orientation, mass, inertia, members):
     return total
 
 
-def kinetic_energy(bodies, world, members: np.ndarray) -> float:
+def kinetic_energy(bodies: BodyState, world: World, members: np.ndarray) -> float:
     """Kinetic energy of the members [J]."""
     return kinetic_of(
         bodies.velocity, bodies.angular_velocity, bodies.orientation, world.mass, world.inertia, members
     )
 
 
-def mechanical_energy(bodies, world, members: np.ndarray) -> float:
+def mechanical_energy(bodies: BodyState, world: World, members: np.ndarray) -> float:
     """Kinetic energy and potential energy of gravity and constant forces [J]."""
     potential = -(world.mass[members, None] * world.steady_acceleration[members] * bodies.position[members]).sum()
     return kinetic_energy(bodies, world, members) + float(potential)

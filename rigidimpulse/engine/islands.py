@@ -16,12 +16,13 @@ from rigidimpulse.collision.contact_buffer import Question
 from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.dispatch import PairQuery
-from rigidimpulse.dynamics.impact.point import Contacts
 from rigidimpulse.engine.pair_table import MARGIN, live_contacts
 from rigidimpulse.engine.regime import island_roots as roots
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.touching import bring_all, fill_contacts, near_pairs, pressing
+from rigidimpulse.engine.touching import fill_contacts, near_pairs, pressing
+from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.model.island import Island, empty_contacts, island_without_contacts
+from rigidimpulse.motion.evaluate import bring_all
 
 if TYPE_CHECKING:
     from rigidimpulse.engine.pair_events import PairEvents

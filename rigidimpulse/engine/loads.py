@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.touching import bring_gyroscopic
 from rigidimpulse.model.island import Island
+from rigidimpulse.motion.evaluate import bring_gyroscopic
 
 
 def set_steady_load(run: Run, _pair_events: PairEvents, island: Island) -> None:

@@ -22,9 +22,9 @@ import numpy as np
 
 from rigidimpulse.collision.contact_records import SEPARATION, SKIN, SUPPORT, in_play
 from rigidimpulse.core.kernels import jit_making_arrays
-from rigidimpulse.dynamics.impact.point import BodyState
 from rigidimpulse.engine.sleeping import SLEEP_SPEED
 from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
 
 MANY, SOME, FEW, KEPT = 60, 12, 8, 2
 EXPENSIVE_SOLVES = 6.0

@@ -26,9 +26,9 @@ from rigidimpulse.dynamics.forces.force import ForceTable, Instant
 from rigidimpulse.dynamics.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.dynamics.forces.mass_flow import BurningForces, MassFlow
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.touching import refresh_pose
 from rigidimpulse.model.island import Island
 from rigidimpulse.model.world import World
+from rigidimpulse.motion.evaluate import refresh_pose
 from rigidimpulse.motion.force_step import Lines, Workspace, nystroem, semi_implicit
 from rigidimpulse.motion.trajectory import Trajectories
 

@@ -10,14 +10,15 @@ import sys
 import numpy as np
 
 from rigidimpulse.collision.time_of_impact import bisection
-from rigidimpulse.dynamics.constraints.contact import hold_contacts
+from rigidimpulse.dynamics.constraints.contact import ContactProblem, hold_contacts
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_impact import fill_rates, impact_rows
-from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, count_joint_rows, fill_closing_rows, start_joint_rows, stop_rows
+from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, fill_closing_rows, start_joint_rows, stop_rows
+from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
 from rigidimpulse.dynamics.constraints.position_correction import needs_correction
 from rigidimpulse.dynamics.constraints.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
 from rigidimpulse.dynamics.impact.block import log_block
-from rigidimpulse.dynamics.impact.restitution import LAWS
+from rigidimpulse.dynamics.impact.restitution import LAWS, ImpactRule
 from rigidimpulse.dynamics.impact.sequence import respond_sequential
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
@@ -33,9 +34,9 @@ from rigidimpulse.engine.sleeping import advance_sleep_timers
 from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
-from rigidimpulse.engine.touching import bring_all, bring_gyroscopic, refresh_pose
 from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, SUBSTEPPED
 from rigidimpulse.model.island import empty_contacts
+from rigidimpulse.motion.evaluate import bring_all, bring_gyroscopic, refresh_pose
 from rigidimpulse.motion.trajectory import FREE, take
 from rigidimpulse.recording.contact_log import fill_contacts_and_forces
 from rigidimpulse.recording.events import EventLog
@@ -79,7 +80,7 @@ def _respond_and_detect(run) -> None:
     state, world, now, one, contacts = run.state, run.world, run.state.now, np.ones(1), _contact()
     members = np.array([1])
     now.inv_inertia[1] = np.eye(3)
-    respond_sequential(now, contacts, LAWS["auto"], False, one, 1.0, 1.0, run.column, None, run.impact_log)
+    respond_sequential(now, contacts, ImpactRule(LAWS["auto"], one, 1.0, 1.0), False, run.column, None, run.impact_log)
     needs_correction(contacts, np.ones(1, bool), one)
     refresh_pose(members, now, state.rotation, state.trajectory.inertia)
     bring_gyroscopic(members, now, state.rotation, state.trajectory.inertia, run.angular_acceleration)
@@ -88,10 +89,8 @@ def _respond_and_detect(run) -> None:
         world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
     )
     solve_newton(make_rows.py_func(0), 1, 1.0)
-    hold_contacts(
-        _leave_unsolved, now, contacts, members, motion.turning, np.zeros(1), run.acceleration, run.angular_acceleration,
-        1.0, 1.0, run.column, np.zeros((1, 3)), run.wrench,
-    )
+    problem = ContactProblem(now, contacts, members, run.column, motion.turning, run.acceleration, run.angular_acceleration)
+    hold_contacts(_leave_unsolved, problem, np.zeros(1), 1.0, 1.0, np.zeros((1, 3)), run.wrench)
     start_trajectories(run)
     pair_events = PairEvents(run, 1.0 / 60.0)
     pair_events.find_pairs()
@@ -170,26 +169,31 @@ def _step_substepped(run) -> None:
     )  # fmt: skip
 
 
-def _start_joints(run) -> None:
-    """Rows of joints at the start of a sub-step and at impacts, and those that close them."""
-    state, joints, which, members = run.state, run.joints, np.array([0]), np.array([1])
-    now, table, memory = state.now, joints.table, joints.memory
-    rows = make_rows.py_func(int(count_joint_rows(table, which)))
-    fill_closing_rows(table, which, now, state.rotation, run.column, memory.angle, rows, 0)
-    start_joint_rows(table, which, now, state.rotation, run.column, memory, STEP, 1.0, rows, 0)
-    impact_rows(table, which, now, state.rotation, members, run.column, memory, 1.0, joints.moment)
-    fill_rates(table, which, now, state.rotation, run.column, memory, 1.0, rows)
-
-
-def _close_and_stop_joints(run) -> None:
-    """Rows of joints at the end of a sub-step."""
-    state, joints, which, members = run.state, run.joints, np.array([0]), np.array([1])
-    count = int(count_joint_rows.py_func(joints.table, which))
-    rows = make_rows.py_func(count)
-    close_at_end(
-        joints.table, which, state.now, run.acceleration, members, STEP, joints.memory, rows, 0, np.zeros(count), run.wrench
+def _jointed_box(run: Run) -> JointedIsland:
+    """The joint of the box, and the box."""
+    state, joints = run.state, run.joints
+    return JointedIsland(
+        joints.table, np.array([0]), state.now, state.rotation, np.array([1]), run.column, joints.memory, 1.0
     )
-    stop_rows(joints.table, which, state.now, state.rotation, members, run.column, joints.memory, np.zeros(1))
+
+
+def _start_joints(run: Run) -> None:
+    """Rows of joints at the start of a sub-step and at impacts, and those that close them."""
+    island = _jointed_box(run)
+    rows = make_rows.py_func(int(count_joint_rows(island.joints, island.which)))
+    fill_closing_rows(island, rows, 0)
+    start_joint_rows(island, STEP, rows, 0)
+    impact_rows(island, run.joints.moment)
+    fill_rates(island, rows)
+
+
+def _close_and_stop_joints(run: Run) -> None:
+    """Rows of joints at the end of a sub-step."""
+    island = _jointed_box(run)
+    count = int(count_joint_rows.py_func(island.joints, island.which))
+    rows = make_rows.py_func(count)
+    close_at_end(island, run.acceleration, STEP, rows, 0, np.zeros(count), run.wrench)
+    stop_rows(island, np.zeros(1))
 
 
 def _fly(_run) -> None:

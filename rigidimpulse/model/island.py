@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigidimpulse.core.conventions import TOLERANCES
-from rigidimpulse.dynamics.impact.point import Contacts
+from rigidimpulse.model.contacts import Contacts
 
 NO_FORCE = np.zeros(3)
 CORRECTED = 10.0

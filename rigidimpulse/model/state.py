@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.dynamics.impact.point import BodyState
 from rigidimpulse.model.island import NO_FORCE
 from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.trajectory import Trajectories, make_trajectories
 
 

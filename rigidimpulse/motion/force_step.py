@@ -33,8 +33,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import jit_making_arrays
-from rigidimpulse.dynamics.impact.point import BodyState
-from rigidimpulse.engine.touching import bring, bring_all
+from rigidimpulse.motion.body_state import BodyState
+from rigidimpulse.motion.evaluate import bring, bring_all
 from rigidimpulse.motion.trajectory import FORCED, FREE, make_trajectories, take
 
 Stage = tuple[np.ndarray, np.ndarray]

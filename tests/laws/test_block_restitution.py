@@ -13,9 +13,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidimpulse.dynamics.impact.point import BodyState, Contacts
-from rigidimpulse.dynamics.impact.restitution import LAWS
+from rigidimpulse.dynamics.impact.restitution import LAWS, ImpactRule
 from rigidimpulse.dynamics.impact.sequence import respond_simultaneous
+from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.motion.body_state import BodyState
 
 
 def state(masses, inertias, velocity, spin) -> BodyState:
@@ -37,7 +38,7 @@ def respond(bodies: BodyState, contacts: Contacts, law: str) -> np.ndarray:
     log, m = np.zeros((100, 7)), len(contacts.gap)
     scale = float(np.abs(bodies.velocity).max() + np.abs(bodies.angular_velocity).max())
     column = np.zeros(len(bodies.inv_mass), np.int64)
-    count, _, _ = respond_simultaneous(bodies, contacts, LAWS[law], True, np.zeros(m), 1e-12 * scale, scale, column, None, log)
+    count, _, _ = respond_simultaneous(bodies, contacts, ImpactRule(LAWS[law], np.zeros(m), 1e-12 * scale, scale), True, column, None, log)
     return log[:count]
 
 

@@ -20,12 +20,13 @@ from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.core.quaternion import multiply, quaternion_from_axis_angle
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
-from rigidimpulse.dynamics.impact.point import Contacts
 from rigidimpulse.engine.begin import start_trajectories
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.touching import bring_all, fill_contacts
+from rigidimpulse.engine.touching import fill_contacts
+from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.model.plan import Plan
+from rigidimpulse.motion.evaluate import bring_all
 from rigidimpulse.motion.trajectory import begin
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder

@@ -20,8 +20,8 @@ import pytest
 import trimesh
 
 import rigidimpulse as ri
-from rigidimpulse.dynamics.impact.point import BodyState
 from rigidimpulse.engine.exact import energy_limit
+from rigidimpulse.motion.body_state import BodyState
 
 G = 9.81
 BODIES = 6

@@ -20,6 +20,7 @@ import rigidimpulse as ri
 from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.dynamics.impact.friction import contact_impulse
 from rigidimpulse.dynamics.impact.restitution import LAWS as LAW_NUMBERS
+from rigidimpulse.dynamics.impact.restitution import PairLaw
 
 NORMAL = np.array([0.48, 0.6, 0.64])
 FRAME = np.array([NORMAL, [0.8, 0.0, -0.6], np.cross(NORMAL, [0.8, 0.0, -0.6])])
@@ -29,8 +30,9 @@ def impulse(k, u, e, mu, law, e_t=0.0, static=None) -> np.ndarray:
     """Impulse of one impact in the frame (normal, tangent, tangent), like k and u; the impact takes place in a slanted frame."""
     answer = np.empty(3)
     contact_impulse(
-        FRAME.T @ k @ FRAME, NORMAL, FRAME.T @ np.asarray(u, float), float(e), float(e_t),
-        float(mu if static is None else static), float(mu), LAW_NUMBERS[law], np.empty(3), np.empty(3), answer,
+        FRAME.T @ k @ FRAME, NORMAL, FRAME.T @ np.asarray(u, float),
+        PairLaw(LAW_NUMBERS[law], float(e), float(e_t), float(mu if static is None else static), float(mu)),
+        np.empty(3), np.empty(3), answer,
     )
     return FRAME @ answer
 
@@ -178,7 +180,7 @@ def test_turning_slip_against_a_runge_kutta_method(law: str) -> None:
 def _impulses(k, n, u, e, e_t, static, dynamic, law, out):
     t1, t2 = np.empty(3), np.empty(3)
     for i in range(n.shape[0]):
-        contact_impulse(k[i], n[i], u[i], e[i], e_t[i], static[i], dynamic[i], law[i], t1, t2, out[i])
+        contact_impulse(k[i], n[i], u[i], PairLaw(law[i], e[i], e_t[i], static[i], dynamic[i]), t1, t2, out[i])
 
 
 @pytest.mark.parametrize(("spread", "count", "bound"), [(0.5, 100_000, 1e-11), (2.0, 100_000, 1e-10), (6.0, 20_000, 1e-3)])

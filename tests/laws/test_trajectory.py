@@ -11,8 +11,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rigidimpulse.core.quaternion import angle_between, multiply, quaternion_from_rotation_vector, rotate, rotate_inverse
-from rigidimpulse.dynamics.impact.point import BodyState
-from rigidimpulse.engine.touching import bring
+from rigidimpulse.motion.body_state import BodyState
+from rigidimpulse.motion.evaluate import bring
 from rigidimpulse.motion.trajectory import (
     FIXED,
     FORCED,

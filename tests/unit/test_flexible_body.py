@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.collision.distance.point import STACK, first_touch, first_touch_of_triangle, signed_distance
+from rigidimpulse.collision.distance.point import STACK, first_contact, first_contact_with_triangle, signed_distance
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import rotate_inverse
 from rigidimpulse.dynamics.soft_body import FlexibleBody, Flexibles, FlexibleTrack
@@ -88,18 +88,18 @@ def test_fast_points_touch() -> None:
     axis = int(np.argmin(np.ptp(geometry.vertex, axis=0)))
     start, end, gap = np.full(3, 0.1), np.full(3, 0.3), 1e-4
     start[axis], end[axis] = 1.0, -999.0
-    time, distance, normal, _ = first_touch(geometry, np.int64(0), tuple(start), tuple(end), gap, np.empty(STACK, np.int64))
+    time, distance, normal, _ = first_contact(geometry, np.int64(0), tuple(start), tuple(end), gap, np.empty(STACK, np.int64))
     assert gap <= distance <= 1.02 * gap
     assert time == pytest.approx((1.0 - 5e-4 - gap) / 1000.0, rel=1e-6)
     assert normal[axis] == 1.0
     start[(axis + 1) % 3] = end[(axis + 1) % 3] = 1.2
-    assert first_touch(geometry, np.int64(0), tuple(start), tuple(end), gap, np.empty(STACK, np.int64))[0] == np.inf
+    assert first_contact(geometry, np.int64(0), tuple(start), tuple(end), gap, np.empty(STACK, np.int64))[0] == np.inf
 
 
 def test_fast_ball_touches_a_moving_triangle() -> None:
     corners = ((-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (0.0, 2.0, 0.0))
     ways = ((0.0, 0.0, 4.0),) * 3
-    time, weights, normal, distance = first_touch_of_triangle((0.0, 0.0, 1.0), (0.0, 0.0, -96.0), corners, ways, 0.1, 1e-3)
+    time, weights, normal, distance = first_contact_with_triangle((0.0, 0.0, 1.0), (0.0, 0.0, -96.0), corners, ways, 0.1, 1e-3)
     assert time == pytest.approx((1.0 - 0.1 - 1e-3) / 100.0, rel=1e-4)
     assert 1e-3 * (1.0 - 1e-12) <= distance <= 1.02e-3
     np.testing.assert_allclose(weights, 1.0 / 3.0, rtol=0, atol=1e-12)

@@ -1,7 +1,7 @@
 """Signed distance of points from rigid shapes, and the first time at which a moving point comes near one.
 
 A shape is the union of its primitives; of those that overlap the least distance counts. Half spaces, spheres, capsules and cylinders
-are in closed form; of a mesh it is the nearest triangle's, by its box tree, negative where the ray test of `detect.inside` finds the
+are in closed form; of a mesh it is the nearest triangle's, by its box tree, negative where `collision.containment` finds the
 point inside; an open mesh has no inside. A moving point advances by its distance, which no surface can be nearer than
 (conservative advancement, Mirtich 1996, for a point).
 """
@@ -177,7 +177,7 @@ def signed_distance(geometry, shape, p, limit, stack):
 
 
 @jit
-def first_touch(geometry, shape, start, end, gap, stack):
+def first_contact(geometry, shape, start, end, gap, stack):
     """Return (time, distance, normal, place) where a point moving from start to end comes within `gap` of a shape, in its frame.
 
     time is in [0, 1], or inf where it does not come so near; distance and unit normal are those at that place. A point that starts
@@ -199,7 +199,7 @@ def first_touch(geometry, shape, start, end, gap, stack):
 
 
 @jit
-def first_touch_of_triangle(p, way_p, corners, ways, radius, gap):
+def first_contact_with_triangle(p, way_p, corners, ways, radius, gap):
     """Return (time, weights, normal, distance) at which a moving ball comes within `gap` of a moving triangle.
 
     p, way_p: centre and its way over the step; corners, ways: three of each; weights: barycentric, of the place touched; normal: unit,

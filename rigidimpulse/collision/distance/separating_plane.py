@@ -43,8 +43,9 @@ def tangents(n, u, v):
 
 
 @jit
-def _side(points, radius, sign, n, u, v, d, g, H):
-    """Add the points of one body, sign 1 for a and -1 for b; returns their E."""
+def _side(points, radius, sign, plane, g, H):
+    """Add the points of one body, sign 1 for a and -1 for b; plane: n, u, v, d. Returns their E."""
+    n, u, v, d = plane
     energy = 0.0
     for k in range(points.shape[0]):
         x, y, z = points[k, 0], points[k, 1], points[k, 2]
@@ -68,12 +69,13 @@ def _side(points, radius, sign, n, u, v, d, g, H):
 
 
 @jit_making_arrays
-def _expand(a, radius_a, b, radius_b, n, u, v, d, g, H):
-    """E with its derivatives by the two angles and d, written to g (3,) and the lower half of H (3, 3)."""
+def _expand(a, radius_a, b, radius_b, plane, g, H):
+    """E with its derivatives by the two angles and d, written to g (3,) and the lower half of H (3, 3); plane: n, u, v, d."""
+    n, u, v, _ = plane
     g[:] = 0.0
     H[:] = 0.0
     tangents(n, u, v)
-    return _side(a, radius_a, 1.0, n, u, v, d, g, H) + _side(b, radius_b, -1.0, n, u, v, d, g, H)
+    return _side(a, radius_a, 1.0, plane, g, H) + _side(b, radius_b, -1.0, plane, g, H)
 
 
 @jit
@@ -107,7 +109,7 @@ def best_plane(a, radius_a, b, radius_b, n, d):
     u, v, g, s, trial = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     H, other = np.empty((3, 3)), np.empty((3, 3))
     trial_g = np.empty(3)
-    energy = _expand(a, radius_a, b, radius_b, n, u, v, d, g, H)
+    energy = _expand(a, radius_a, b, radius_b, (n, u, v, d), g, H)
     shift = 1e-3 * (H[0, 0] + H[1, 1] + H[2, 2])
     for _ in range(ROUNDS):
         least = LEAST_SHIFT * (abs(H[0, 0]) + abs(H[1, 1]) + H[2, 2])
@@ -122,7 +124,7 @@ def best_plane(a, radius_a, b, radius_b, n, d):
         for k in range(3):
             trial[k] = n[k] + s[0] * u[k] + s[1] * v[k]
         trial /= sqrt(trial[0] * trial[0] + trial[1] * trial[1] + trial[2] * trial[2])
-        trial_energy = _expand(a, radius_a, b, radius_b, trial, u, v, d + s[2], trial_g, other)
+        trial_energy = _expand(a, radius_a, b, radius_b, (trial, u, v, d + s[2]), trial_g, other)
         lower = trial_energy < energy
         if lower or (size <= 1e-9 and np.abs(trial_g).sum() < np.abs(g).sum()):
             energy = trial_energy

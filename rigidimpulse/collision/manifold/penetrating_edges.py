@@ -1,4 +1,4 @@
-"""Edges of two surfaces that cross, as points of the penalty method: see `penalty_points`.
+"""Edges of two surfaces that cross, as points of the penalty method: see `points`.
 
     edges of a and b with ways e_a, e_b, p and q where their lines are nearest,  n = +- e_a x e_b / |e_a x e_b|,  d = (p - q).n > 0
 
@@ -75,9 +75,9 @@ def _holds(geometry, surface, e, body, way, middle, position, rotation):
 
 
 @jit
-def crossing_edges(geometry, first, second, bodies, position, rotation, real, integer, count):
+def crossing_edges(geometry, first, second, bodies, poses, points, count):
     """Edges of two surfaces that cross where the solids overlap."""
-    a, b = bodies
+    (position, rotation), (a, b) = poses, bodies
     if not (geometry.closed[first] and geometry.closed[second]):
         return count
     for e in range(geometry.edge_first[first], geometry.edge_first[first + 1]):
@@ -106,13 +106,14 @@ def crossing_edges(geometry, first, second, bodies, position, rotation, real, in
                 and _holds(geometry, first, e, a, p_way, along(p, -0.5 * depth, n), position, rotation)
                 and _holds(geometry, second, f, b, q_way, along(p, -0.5 * depth, n), position, rotation)
             ):
-                count = add_point(real, integer, count, bodies, (EDGE + e, EDGE + f), p, n, depth)
+                count = add_point(points, count, bodies, (EDGE + e, EDGE + f), p, n, depth)
     return count
 
 
 @jit_making_arrays
-def drop_deep_edges(real, integer, first, edges, end):
-    """Keep of rows [edges, end) those not much deeper than the corners [first, edges), or than the least deep of them: the way out."""
+def drop_deep_edges(points, first, edges, end):
+    """Drop points from `edges` to `end` that are much deeper than the corners from `first` on, or than the least deep edge: no way out."""
+    real, integer = points
     if end > real.shape[0] or end == edges:
         return end
     limit = 0.0

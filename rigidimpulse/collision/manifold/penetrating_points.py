@@ -33,9 +33,9 @@ from rigidimpulse.core.kernels import jit
 
 
 @jit
-def _points_in_half_space(geometry, plane, other, bodies, position, rotation, real, integer, count):
+def _points_in_half_space(solids, plane, other, bodies, poses, points, count):
     """Corners of a ROUND primitive of bodies[1] in a half space of bodies[0]."""
-    a, b = bodies
+    geometry, (position, rotation), (a, b) = solids.geometry, poses, bodies
     normal = turned(rotation[a], row(geometry.frame, plane))
     offset = geometry.frame[plane, 3] + dot(normal, row(position, a))
     for v in range(geometry.vertex_first[other], geometry.vertex_first[other + 1]):
@@ -43,14 +43,14 @@ def _points_in_half_space(geometry, plane, other, bodies, position, rotation, re
             p = moved(rotation[b], row(position, b), row(geometry.vertex, v))
             depth = offset + geometry.radius[other] - dot(normal, p)
             if depth > 0.0:
-                count = add_point(real, integer, count, bodies, (-1 - plane, v), p, normal, depth)
+                count = add_point(points, count, bodies, (-1 - plane, v), p, normal, depth)
     return count
 
 
 @jit
-def _points_of_axes(geometry, first, second, bodies, position, rotation, real, integer, count):
+def _points_of_axes(solids, first, second, bodies, poses, points, count):
     """The closest points of two spheres or capsules."""
-    a, b = bodies
+    geometry, (position, rotation), (a, b) = solids.geometry, poses, bodies
     p_first, q_first = geometry.vertex_first[first], geometry.vertex_first[second]
     p = moved(rotation[a], row(position, a), row(geometry.vertex, p_first))
     q = moved(rotation[b], row(position, b), row(geometry.vertex, q_first))
@@ -64,14 +64,14 @@ def _points_of_axes(geometry, first, second, bodies, position, rotation, real, i
     if depth > 0.0 and distance > 0.0:
         normal = (between[0] / distance, between[1] / distance, between[2] / distance)
         point = along(p, geometry.radius[first] - 0.5 * depth, normal)
-        count = add_point(real, integer, count, bodies, (p_first, q_first), point, normal, depth)
+        count = add_point(points, count, bodies, (p_first, q_first), point, normal, depth)
     return count
 
 
 @jit
-def _points_in_surface(geometry, axes, sizes, surface, other, bodies, position, rotation, real, integer, count):
+def _points_in_surface(solids, surface, other, bodies, poses, points, count):
     """Corners of a ROUND primitive of bodies[1] in the solid of triangles of bodies[0]."""
-    a, b = bodies
+    (geometry, axes, sizes), (position, rotation), (a, b) = solids, poses, bodies
     radius, root = geometry.radius[other], geometry.node_first[surface]
     for v in range(geometry.vertex_first[other], geometry.vertex_first[other + 1]):
         if not geometry.vertex_corner[v]:
@@ -97,14 +97,14 @@ def _points_in_surface(geometry, axes, sizes, surface, other, bodies, position, 
             normal = (out[0] / distance, out[1] / distance, out[2] / distance)
         depth = radius + (dot(out, normal) if inside else -distance)
         if depth > 0.0:
-            count = add_point(real, integer, count, bodies, (-1 - surface, v), world, turned(rotation[a], normal), depth)
+            count = add_point(points, count, bodies, (-1 - surface, v), world, turned(rotation[a], normal), depth)
     return count
 
 
 @jit
-def _corners_at_axis(geometry, surface, capsule, bodies, position, rotation, real, integer, count):
+def _corners_at_axis(solids, surface, capsule, bodies, poses, points, count):
     """Corners of a surface of bodies[0] beside the axis of a capsule of bodies[1]; its ends are points of their own."""
-    a, b = bodies
+    geometry, (position, rotation), (a, b) = solids.geometry, poses, bodies
     v = geometry.vertex_first[capsule]
     start = moved(rotation[b], row(position, b), row(geometry.vertex, v))
     axis = subtract(moved(rotation[b], row(position, b), row(geometry.vertex, v + 1)), start)
@@ -119,45 +119,45 @@ def _corners_at_axis(geometry, surface, capsule, bodies, position, rotation, rea
         distance = sqrt(dot(out, out))
         if 0.0 < distance < geometry.radius[capsule]:
             normal = (out[0] / distance, out[1] / distance, out[2] / distance)
-            count = add_point(real, integer, count, bodies, (corner, v), p, normal, geometry.radius[capsule] - distance)
+            count = add_point(points, count, bodies, (corner, v), p, normal, geometry.radius[capsule] - distance)
     return count
 
 
 @jit
-def _points_of_primitives(geometry, axes, sizes, i, j, bodies, position, rotation, real, integer, count):
+def _points_of_primitives(solids, i, j, bodies, poses, points, count):
     """Points of two primitives of bodies a and b, that of a first."""
+    geometry = solids.geometry
     back = (bodies[1], bodies[0])
     if geometry.kind[i] == HALF_SPACE or geometry.kind[j] == HALF_SPACE:
         if geometry.kind[j] == ROUND:
-            return _points_in_half_space(geometry, i, j, bodies, position, rotation, real, integer, count)
+            return _points_in_half_space(solids, i, j, bodies, poses, points, count)
         if geometry.kind[i] == ROUND:
-            return _points_in_half_space(geometry, j, i, back, position, rotation, real, integer, count)
+            return _points_in_half_space(solids, j, i, back, poses, points, count)
         return count
     first, thick_i, thick_j = count, geometry.radius[i] > 0.0, geometry.radius[j] > 0.0
     if thick_i and thick_j:
-        return _points_of_axes(geometry, i, j, bodies, position, rotation, real, integer, count)
+        return _points_of_axes(solids, i, j, bodies, poses, points, count)
     if not thick_i:
-        count = _points_in_surface(geometry, axes, sizes, i, j, bodies, position, rotation, real, integer, count)
+        count = _points_in_surface(solids, i, j, bodies, poses, points, count)
         if thick_j and geometry.vertex_first[j + 1] == geometry.vertex_first[j] + 2:
-            count = _corners_at_axis(geometry, i, j, bodies, position, rotation, real, integer, count)
+            count = _corners_at_axis(solids, i, j, bodies, poses, points, count)
     if not thick_j:
-        count = _points_in_surface(geometry, axes, sizes, j, i, back, position, rotation, real, integer, count)
+        count = _points_in_surface(solids, j, i, back, poses, points, count)
         if thick_i and geometry.vertex_first[i + 1] == geometry.vertex_first[i] + 2:
-            count = _corners_at_axis(geometry, j, i, back, position, rotation, real, integer, count)
+            count = _corners_at_axis(solids, j, i, back, poses, points, count)
     if not thick_i and not thick_j:
-        end = crossing_edges(geometry, i, j, bodies, position, rotation, real, integer, count)
-        count = drop_deep_edges(real, integer, first, count, end)
+        end = crossing_edges(geometry, i, j, bodies, poses, points, count)
+        count = drop_deep_edges(points, first, count, end)
     return count
 
 
 @jit
-def find_points(geometry, axes, sizes, shape_of_body, reach, pairs, position, rotation, real, integer):
-    """Points inside, of all pairs (p, 2) a < b; returns how many there are, also where there is no room for all.
+def find_points(solids, shape_of_body, reach, pairs, poses, points):
+    """Points inside, of all pairs (p, 2) a < b; returns how many there are, also where that is more than the buffer holds.
 
-    axes, sizes: see `inward_axes`. reach (n,) m about the centres of mass; position (n, 3), rotation (n, 3, 3) of the principal frames.
-    real (cap, 7): a point of the line of action and the normal from a to b, world, and the depth, m.
-    integer (cap, 4): a, b, and what touches: a vertex of one and of the other a vertex, or a primitive p as -1 - p.
+    solids, poses, points: see `surface`. reach (n,) m about the centres of mass.
     """
+    geometry, position = solids.geometry, poses.position
     # Not a literal: that would compile everything above twice.
     count = np.int64(0)
     for k in range(pairs.shape[0]):
@@ -168,5 +168,5 @@ def find_points(geometry, axes, sizes, shape_of_body, reach, pairs, position, ro
         shape_a, shape_b = shape_of_body[a], shape_of_body[b]
         for i in range(geometry.shape_first[shape_a], geometry.shape_first[shape_a + 1]):
             for j in range(geometry.shape_first[shape_b], geometry.shape_first[shape_b + 1]):
-                count = _points_of_primitives(geometry, axes, sizes, i, j, (a, b), position, rotation, real, integer, count)
+                count = _points_of_primitives(solids, i, j, (a, b), poses, points, count)
     return count

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,6 +44,28 @@ def _prism(cylinder: Primitive) -> Primitive:
     bottom, top = np.stack([zero, k[2:], k[1:-1]], 1), np.stack([zero, k[1:-1], k[2:]], 1) + SIDES
     vertices = np.concatenate([centre - half * axis + rim, centre + half * axis + rim])
     return Primitive(ROUND, vertices=vertices, faces=np.concatenate([*side, bottom, top]))
+
+
+class Solids(NamedTuple):
+    """The shapes of a scene as the penalty method asks them."""
+
+    geometry: Geometry
+    axes: np.ndarray  # (V, 3) and
+    sizes: np.ndarray  # (V,) m, see `inward_axes`
+
+
+class BodyPoses(NamedTuple):
+    """Where n bodies are: centres of mass and principal frames."""
+
+    position: np.ndarray  # (n, 3) m
+    rotation: np.ndarray  # (n, 3, 3)
+
+
+class PointBuffer(NamedTuple):
+    """Points inside other bodies, as they are found."""
+
+    real: np.ndarray  # (c, 7) a point of the line of action and the normal from a to b, world, and the depth, m
+    integer: np.ndarray  # (c, 4) a, b, and what is in contact: a vertex of one; of the other a vertex, or a primitive p as -1 - p
 
 
 def inward_axes(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
@@ -148,8 +171,9 @@ def turned_back(R, v):
 
 
 @jit
-def add_point(real, integer, count, bodies, features, point, normal, depth):
-    """Write a point if there is room; bodies (a, b), normal from a to b; where a is the larger they are swapped. Returns count + 1."""
+def add_point(points, count, bodies, features, point, normal, depth):
+    """Write a point if the buffer has space; bodies (a, b), normal from a to b; swapped where a is the larger. Returns count + 1."""
+    real, integer = points
     if count < real.shape[0]:
         swap = bodies[0] > bodies[1]
         sign = -1.0 if swap else 1.0

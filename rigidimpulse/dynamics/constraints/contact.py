@@ -1,4 +1,4 @@
-"""Contacts that last: forces that hold touching bodies apart over a sub-step.
+"""Contacts that last: forces that keep bodies apart over a sub-step.
 
 Over a sub-step of length h the contact forces f are constant. Row i of a contact has the velocity u_i + h a_i + W p_i at
 the end, p = h f, with u the velocity now and a the acceleration that the row would have without contact forces, as the
@@ -7,16 +7,16 @@ place of contact moves (see `contact_motion`):
     a = a_b + alpha_b x r_b + w_b x r_b' - (a_a + alpha_a x r_a + w_a x r_a') + n (u.n')
 
 The solver finds p >= 0 in Coulomb's cone so that no contact approaches at the end. Positions follow x0 + v0 h + a h^2 / 2,
-so sliding and standing are exact. Where arms or normals turn, velocities are put right at the end (see `arrival`), and
-the gap g, which is to be delta, is kept by position: with u_n = 0, g + h^2/2 (a_n + W f) = delta puts 2 (g - delta) / h to
-the bias, never more than a part of what presses.
+so sliding and standing are exact. Where arms or normals turn, velocities are put right at the end (velocity projection, see `rattle`), and
+the gap g is brought to the contact margin d by position: with u_n = 0, g + h^2/2 (a_n + W f) = d adds 2 (g - d) / h to
+the bias, limited to a part of the pressing acceleration.
 
-A contact that carries load but leaves slowly (it would rise less than the gap it is held at) is captured first: its
-normal velocity is set to zero in the metric of mass, which only dissipates; otherwise the force would do work on it
-and it would hover for ever.
+A contact that carries load but leaves slowly (it would rise less than the contact margin) sticks first: its normal
+velocity is set to zero in the metric of mass, which only dissipates. Otherwise the force would do work on it and it
+would hover for ever.
 
 A contact that slips stops at t = |u_t| / |a_t + W_t f|, and its friction changes there, also where it slips back: the sub-step ends at the
-first such time (stop split). The same holds for rolling and spinning friction (see `rolling`).
+first such time (stop split). The same holds for rolling and spinning friction (see `rolling_friction`).
 """
 
 from typing import NamedTuple
@@ -34,6 +34,7 @@ from rigidimpulse.dynamics.constraints.rolling_friction import (
 from rigidimpulse.dynamics.constraints.rows import (
     FREE,
     Rows,
+    RowSolver,
     change_velocities,
     contact_rows,
     contact_velocity,
@@ -43,7 +44,8 @@ from rigidimpulse.dynamics.constraints.rows import (
     solve_with_slip,
     take_rows,
 )
-from rigidimpulse.dynamics.impact.point import Contacts
+from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.motion.body_state import BodyState
 
 STICK_PASSES = 4
 # Residual asked of the solver and slip that counts, relative to the speed gained in the sub-step.
@@ -66,6 +68,18 @@ class Held(NamedTuple):
     force: np.ndarray  # (m, 3) N on b, in the world
 
 
+class ContactProblem(NamedTuple):
+    """The m lasting contacts of an island, and how its bodies accelerate without them."""
+
+    bodies: BodyState
+    contacts: Contacts
+    members: np.ndarray  # movable bodies of the island
+    number: np.ndarray  # (n,) working memory: the number of each member among the members
+    turning: np.ndarray  # (m, 3) m/s2, from `contact_motion`
+    acceleration: np.ndarray  # (n, 3) m/s2
+    angular_acceleration: np.ndarray  # (n, 3) rad/s2
+
+
 @jit
 def start_contact_impulses(rows, first_row, force, h):
     """Impulses of the contact rows to start from, by the forces (m, 3) of last time."""
@@ -75,15 +89,17 @@ def start_contact_impulses(rows, first_row, force, h):
 
 
 @jit_making_arrays
-def fill_contact_bias(bodies, contacts, frames, turning, excess, acceleration, angular_acceleration, h, rows, first_row):
-    """b = u + h a of the contact rows; turning (m, 3) from `contact_motion`, excess (m,): g - delta to be closed, m.
+def fill_contact_bias(problem, excess, h, of_contacts):
+    """Write b = u + h a of the contact rows; excess (m,): g - d to be closed, m.
 
     Returns the largest speed h a gained [m/s] and the velocities u (m, 3) along the frames.
     """
+    bodies, contacts, turning = problem.bodies, problem.contacts, problem.turning
+    rows, first_row, frames = of_contacts.rows, of_contacts.first_row, of_contacts.frames
     m = first_row.shape[0]
     u, a, scale = np.empty((m, 3)), np.empty((m, 3)), TINY
     for c in range(m):
-        contact_velocity(contacts, c, frames[c], acceleration, angular_acceleration, a[c])
+        contact_velocity(contacts, c, frames[c], problem.acceleration, problem.angular_acceleration, a[c])
         for k in range(3):
             for j in range(3):
                 a[c, k] += turning[c, j] * frames[c, k, j]
@@ -98,32 +114,29 @@ def fill_contact_bias(bodies, contacts, frames, turning, excess, acceleration, a
 
 
 def hold_contacts(
-    solve, bodies, contacts: Contacts, members, turning, excess, acceleration, angular_acceleration, h: float, shortest: float,
-    number, force, wrench, rolling: Rolling | None = None,
+    solve: RowSolver, problem: ContactProblem, excess: np.ndarray, h: float, shortest: float, force: np.ndarray, wrench: np.ndarray,
+    rolling: Rolling | None = None,
 ) -> Held:
     """Contact forces of the sub-step for m contacts.
 
-    solve: a solver of rows; members: movable bodies of the group; turning (m, 3) from `contact_motion`; excess (m,): gaps to be
-    closed, m; acceleration, angular_acceleration (n, 3) of the bodies without contacts; h: length of the sub-step, s, that is
-    not split in parts below `shortest`; force (m, 3) in (n, t1, t2) [N], start and answer; wrench (n, 6): force and torque on the
-    members are added; rolling: their rolling friction, if any. May change velocities (capture).
+    excess (m,): gaps to be closed, m; h: length of the sub-step, s, that is not split in parts below `shortest`; force (m, 3) in
+    (n, t1, t2) [N], start and answer; wrench (n, 6): force and torque on the members are added; rolling: their rolling friction, if any.
+    May change velocities: contacts that leave slowly stick.
     """
+    bodies, contacts, members = problem.bodies, problem.contacts, problem.members
     extra = count_rolling_rows(rolling)
-    rows, first_row, frames = contact_rows(bodies, contacts, members, number, extra)
+    of_contacts = contact_rows(bodies, contacts, members, problem.number, extra)
+    rows, first_row, frames = of_contacts
     start = len(rows.bias) - extra
     start_contact_impulses(rows, first_row, force, h)
     n, rough = len(members), contacts.static_friction > 0.0
 
     def attempt(h: float) -> tuple[float, float, np.ndarray, np.ndarray]:
-        scale, u = fill_contact_bias(
-            bodies, contacts, frames, turning, excess, acceleration, angular_acceleration, h, rows, first_row
-        )
+        scale, u = fill_contact_bias(problem, excess, h, of_contacts)
         if rolling is not None:
-            fill_rolling_rows(
-                bodies, contacts, rolling, number, angular_acceleration, frames, first_row, h, rows, start
-            )
+            fill_rolling_rows(problem, rolling, h, of_contacts, start)
         slides = rough & (np.abs(u[:, 1]) + np.abs(u[:, 2]) > SLIP * scale)
-        residual = solve_with_slip(solve, rows, n, first_row, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale)
+        residual = solve_with_slip(solve, of_contacts, n, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale)
         return residual / scale, scale, u, slides
 
     residual, scale, u, slides = attempt(h)
@@ -175,7 +188,9 @@ def _first_stop(slip: np.ndarray, end: np.ndarray, brief: float) -> float:
     return float(time.min(initial=np.inf))
 
 
-def stick(solve, bodies, members, rows: Rows, normals: np.ndarray, leaving: np.ndarray, target: float) -> None:
+def stick(
+    solve: RowSolver, bodies: BodyState, members: np.ndarray, rows: Rows, normals: np.ndarray, leaving: np.ndarray, target: float
+) -> None:
     """Stop load-bearing contacts that leave slowly; normals: their rows, leaving: their u.n [m/s]."""
     stops = take_rows(rows, normals)
     stops.kind[:], stops.bias[:], stops.impulse[:] = FREE, leaving, 0.0

@@ -1,4 +1,4 @@
-"""How contacts move: the point where bodies touch wanders over them, and the normal turns.
+"""How contacts move: the point of contact moves over the bodies, and the normal turns.
 
 With r_a, r_b the arms of a contact, n its normal from a to b and u = v_b + w_b x r_b - v_a - w_a x r_a, the relative
 velocity at the place of contact changes, at constant v and w, by
@@ -104,7 +104,7 @@ def _cylinder_skeleton(geometry, p, rotation, normal, direction):
 
 
 @jit
-def _core(geometry, p, kind, feature, is_a, rotation, normal, direction):
+def _skeleton_of(geometry, p, kind, feature, is_a, rotation, normal, direction):
     """What a body (of the single primitive p, or -1) is at a contact: its radius, and POINT, LINE (unit direction (3,)) or FACE.
 
     UNKNOWN where a pair was stopped by its sweep alone, and for cylinders that are parts of a body.
@@ -175,24 +175,37 @@ def _centre_velocity(bodies, i, arm, n, radius, out):
     out[2] = v[2] + w[0] * y - w[1] * x
 
 
-@jit
-def _on_face(geometry, p, rotation, bodies, i, arm, skeleton_velocity, radius, outward, outward_rate, place):
-    """p' of the place where body i (of the single primitive p, or -1) touches a face that carries the normal.
+class Side(NamedTuple):
+    """What a body is at a contact: its rounded shape's skeleton there."""
 
-    outward (3,): from the face to the body, outward_rate (3,) its rate; skeleton_velocity (3,): of the centre of the rounding.
+    skeleton: np.int64  # POINT, LINE, FACE or UNKNOWN
+    radius: float  # m, of the rounding
+    velocity: np.ndarray  # (3,) m/s, of the place of the skeleton
+    spin: np.ndarray  # (3,) rad/s
+    direction: np.ndarray  # (3,) unit, of a LINE
+
+
+@jit
+def _on_face(geometry, p, rotation, body_velocity, side, arm, out, place):
+    """p' of the place where a body (of the single primitive p, or -1) is in contact with a face that carries the normal.
+
+    side: the body's `Side`; out: direction (3,) from the face to the body, and its rate (3,).
     """
+    outward, outward_rate = out
     if p >= 0 and geometry.kind[p] == CYLINDER:
-        if _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, bodies.angular_velocity[i], place):
+        if _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, side.spin, place):
             for k in range(3):
-                place[k] += bodies.velocity[i, k]
+                place[k] += body_velocity[k]
             return
     for k in range(3):
-        place[k] = skeleton_velocity[k] - radius * outward_rate[k]
+        place[k] = side.velocity[k] - side.radius * outward_rate[k]
 
 
 @jit_making_arrays
-def _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
+def _between_lines(first, second, n, distance, place, normal_rate):
     """Two crossing lines: n' turns with both, and their crossing runs along both. False if they are parallel."""
+    va, wa, ea, ra = first.velocity, first.spin, first.direction, first.radius
+    vb, wb, eb = second.velocity, second.spin, second.direction
     x = np.empty(3)
     cosine = _dot(ea, eb)
     determinant = 1.0 - cosine * cosine
@@ -215,10 +228,12 @@ def _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
 
 
 @jit_making_arrays
-def _between_skeletons(bodies, a, b, skeleton_a, skeleton_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate):
+def _between_skeletons(first, second, n, distance, place, normal_rate):
     """Points and lines with a rounding."""
-    wa, wb, x = bodies.angular_velocity[a], bodies.angular_velocity[b], np.empty(3)
-    if skeleton_a == LINE and skeleton_b == LINE and _between_lines(va, vb, wa, wb, ea, eb, n, distance, ra, place, normal_rate):
+    va, wa, ea, ra, skeleton_a = first.velocity, first.spin, first.direction, first.radius, first.skeleton
+    vb, wb, eb, rb, skeleton_b = second.velocity, second.spin, second.direction, second.radius, second.skeleton
+    x = np.empty(3)
+    if skeleton_a == LINE and skeleton_b == LINE and _between_lines(first, second, n, distance, place, normal_rate):
         return
     across = _dot(vb, n) - _dot(va, n)
     for k in range(3):
@@ -234,32 +249,31 @@ def _between_skeletons(bodies, a, b, skeleton_a, skeleton_b, va, vb, ea, eb, n, 
 
 
 @jit_making_arrays
-def _place_velocity(geometry, shape_of_body, rotation, bodies, contacts, c, kind, feature_a, feature_b, place, normal_rate):
-    """p' and n' of contact c, into place and normal_rate."""
+def _place_velocity(geometry, primitives, rotation, bodies, contacts, c, features, rates):
+    """p' and n' of contact c, into rates; features: kind, and the features of both bodies."""
+    (pa, pb), (kind, feature_a, feature_b), (place, normal_rate) = primitives, features, rates
     a, b, n = contacts.body_a[c], contacts.body_b[c], contacts.normal[c]
-    pa, pb = only_primitive(geometry, shape_of_body[a]), only_primitive(geometry, shape_of_body[b])
     ea, eb, va, vb, outward_rate = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     flat_a = pa >= 0 and geometry.kind[pa] == HALF_SPACE
     flat_b = pb >= 0 and geometry.kind[pb] == HALF_SPACE
-    ra, skeleton_a = (0.0, FACE) if flat_a else _core(geometry, pa, kind, feature_a, True, rotation[a], n, ea)
-    rb, skeleton_b = (0.0, FACE) if flat_b else _core(geometry, pb, kind, feature_b, False, rotation[b], n, eb)
+    ra, skeleton_a = (0.0, FACE) if flat_a else _skeleton_of(geometry, pa, kind, feature_a, True, rotation[a], n, ea)
+    rb, skeleton_b = (0.0, FACE) if flat_b else _skeleton_of(geometry, pb, kind, feature_b, False, rotation[b], n, eb)
     _centre_velocity(bodies, a, contacts.arm_a[c], n, -ra, va)
     _centre_velocity(bodies, b, contacts.arm_b[c], n, rb, vb)
     distance = ra + rb + contacts.gap[c]
+    first = Side(skeleton_a, ra, va, bodies.angular_velocity[a], ea)
+    second = Side(skeleton_b, rb, vb, bodies.angular_velocity[b], eb)
     if skeleton_a == FACE:
         _cross(bodies.angular_velocity[a], n, normal_rate)
-        _on_face(geometry, pb, rotation[b], bodies, b, contacts.arm_b[c], vb, rb, n, normal_rate, place)
+        _on_face(geometry, pb, rotation[b], bodies.velocity[b], second, contacts.arm_b[c], (n, normal_rate), place)
     elif skeleton_b == FACE:
         _cross(bodies.angular_velocity[b], n, normal_rate)
         for k in range(3):
             outward_rate[k] = -normal_rate[k]
-        _on_face(geometry, pa, rotation[a], bodies, a, contacts.arm_a[c], va, ra, -n, outward_rate, place)
+        _on_face(geometry, pa, rotation[a], bodies.velocity[a], first, contacts.arm_a[c], (-n, outward_rate), place)
     elif ra + rb > 0.0 and skeleton_a != UNKNOWN and skeleton_b != UNKNOWN:
-        _between_skeletons(bodies, a, b, skeleton_a, skeleton_b, va, vb, ea, eb, n, distance, ra, rb, place, normal_rate)
-    elif not (
-        skeleton_a == LINE and skeleton_b == LINE
-        and _between_lines(va, vb, bodies.angular_velocity[a], bodies.angular_velocity[b], ea, eb, n, distance, ra, place, normal_rate)
-    ):
+        _between_skeletons(first, second, n, distance, place, normal_rate)
+    elif not (skeleton_a == LINE and skeleton_b == LINE and _between_lines(first, second, n, distance, place, normal_rate)):
         # Sharp corners: half of both.
         _cross(0.5 * (bodies.angular_velocity[a] + bodies.angular_velocity[b]), n, normal_rate)
         for k in range(3):
@@ -280,17 +294,17 @@ class Motion(NamedTuple):
 
 @jit_making_arrays
 def contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, features):
-    """The `Motion` of m contacts; kinds (m,) and features (m, 2) as `detect.features` has them."""
+    """The `Motion` of m contacts; kinds (m,) and features (m, 2) name what is in contact, as in `collision.distance.simplices`."""
     m = contacts.gap.shape[0]
     turning, fastest = np.zeros((m, 3)), 0.0
     rate_a, rate_b, normal_rate = np.empty((m, 3)), np.empty((m, 3)), np.empty((m, 3))
     place, u, x = np.empty(3), np.empty(3), np.empty(3)
     for c in range(m):
         n = contacts.normal[c]
-        _place_velocity(
-            geometry, shape_of_body, rotation, bodies, contacts, c, kinds[c], features[c, 0], features[c, 1], place,
-            normal_rate[c],
-        )
+        a, b = contacts.body_a[c], contacts.body_b[c]
+        primitives = only_primitive(geometry, shape_of_body[a]), only_primitive(geometry, shape_of_body[b])
+        at_contact = kinds[c], features[c, 0], features[c, 1]
+        _place_velocity(geometry, primitives, rotation, bodies, contacts, c, at_contact, (place, normal_rate[c]))
         u[:] = 0.0
         for side in range(2):
             i = contacts.body_b[c] if side else contacts.body_a[c]

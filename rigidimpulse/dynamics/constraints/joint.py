@@ -220,23 +220,24 @@ def _write_angular(bodies, number, a, b, direction, rows, i):
     x, y, z = direction[0], direction[1], direction[2]
     if a >= 0 and bodies.inv_mass[a] > 0.0:
         rows.first[i] = number[a]
-        write_body(bodies, a, rows.jacobian[i, :6], 0.0, 0.0, 0.0, -x, -y, -z)
+        write_body(bodies, a, rows.jacobian[i, :6], (0.0, 0.0, 0.0), (-x, -y, -z))
     if b >= 0 and bodies.inv_mass[b] > 0.0:
         rows.second[i] = number[b]
-        write_body(bodies, b, rows.jacobian[i, 6:], 0.0, 0.0, 0.0, x, y, z)
+        write_body(bodies, b, rows.jacobian[i, 6:], (0.0, 0.0, 0.0), (x, y, z))
 
 
 @jit_making_arrays
-def joint_rows(joints, which, bodies, rotation, number, angle, rows, start, value, direction):
-    """Fill rows from `start` on with those of the joints listed in `which`, in the present pose.
+def joint_rows(island, rows, start, value, direction):
+    """Fill rows from `start` on with those of the joints of a `JointedIsland`, in the present pose.
 
-    angle (k,) last coordinates, updated; value (s,) coordinate - target and direction (s, 3) of the s rows are written.
+    value (s,) gets coordinate - target of the s rows, and direction (s, 3) their directions. The remembered coordinates are updated.
     Bounds of impulses are left as they are. Returns the number of rows filled.
     """
+    joints, bodies, rotation, number, angle = island.joints, island.bodies, island.rotation, island.number, island.memory.angle
     pa, pb, d, ra, rb = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     e, f = np.empty((3, 3)), np.empty((3, 3))
     i = np.int64(0)
-    for j in which:
+    for j in island.which:
         _carry(joints, j, 0, bodies.position, rotation, pa, e)
         _carry(joints, j, 1, bodies.position, rotation, pb, f)
         for c in range(3):
@@ -251,7 +252,7 @@ def joint_rows(joints, which, bodies, rotation, number, angle, rows, start, valu
                     # e_k turns with a: its lever arm ends at the anchor of b.
                     ra[r] = (pa[r] if code == DISTANCE else pb[r]) - (bodies.position[a, r] if a >= 0 else 0.0)
                     rb[r] = pb[r] - (bodies.position[b, r] if b >= 0 else 0.0)
-                write_row(bodies, number, a, b, ra, rb, way[0], way[1], way[2], rows, start + i)
+                write_row(bodies, number, (a, b), (ra, rb), (way[0], way[1], way[2]), rows, start + i)
             else:
                 _write_angular(bodies, number, a, b, way, rows, start + i)
             one_sided = joints.lower[k] > -np.inf or joints.upper[k] < np.inf
@@ -261,12 +262,13 @@ def joint_rows(joints, which, bodies, rotation, number, angle, rows, start, valu
 
 
 @jit_making_arrays
-def relative_point_velocity(joints, which, bodies, rotation, direction, u):
-    """Rates u (s,) of the coordinates at the present velocities."""
+def relative_point_velocity(island, direction, u):
+    """Write the rates u (s,) of the coordinates of a `JointedIsland` at the present velocities."""
+    joints, bodies, rotation = island.joints, island.bodies, island.rotation
     pa, pb = np.empty(3), np.empty(3)
     e, f, v = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     i = 0
-    for j in which:
+    for j in island.which:
         _carry(joints, j, 0, bodies.position, rotation, pa, e)
         _carry(joints, j, 1, bodies.position, rotation, pb, f)
         for k in range(joints.first[j], joints.first[j + 1]):

@@ -1,4 +1,8 @@
-"""Joints at an impact: they hold while impulses act, so their rows take part in every block of impulses."""
+"""Joints at an impact: they hold while impulses act, so their rows take part in every block of impulses.
+
+The rows are those of `joint` in the present pose, with velocities u = J v in place of coordinates: u = 0 for hard rows, u >= 0 for lower
+limits that are reached and u <= 0 for upper ones. Soft rows have no impulse: an impact takes no time.
+"""
 
 from typing import NamedTuple
 
@@ -7,6 +11,7 @@ import numpy as np
 from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.dynamics.constraints.joint import is_linear, joint_rows, relative_point_velocity
 from rigidimpulse.dynamics.constraints.joint_limits import is_reached, limit_side
+from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, Rows, change_velocities, make_rows
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 
@@ -15,9 +20,9 @@ SOLVE_TOLERANCE = 1e-12
 
 
 class JointBlock(NamedTuple):
-    """Rows of the joints of a group at an impact."""
+    """Rows of the joints of an island at an impact."""
 
-    members: np.ndarray  # (n,) movable bodies of the group
+    members: np.ndarray  # (n,) movable bodies of the island
     rows: Rows
     joint: np.ndarray  # (s,) joint of each row
     direction: np.ndarray  # (s, 3) of the force on b; zeros for rows that turn
@@ -25,18 +30,16 @@ class JointBlock(NamedTuple):
 
 
 @jit_making_arrays
-def impact_rows(joints, which, bodies, rotation, members, number, memory, allowed, moment):
-    """The `JointBlock` of the joints listed in `which`: hard rows hold, limits that are reached stop, soft rows are too slow.
-
-    allowed: closing error, m or rad.
-    """
+def impact_rows(island, moment):
+    """The `JointBlock` of a `JointedIsland`: hard rows hold, limits that are reached stop, soft rows are too slow to act."""
+    joints, which, members, number, memory = island.joints, island.which, island.members, island.number, island.memory
     for k in range(members.shape[0]):
         number[members[k]] = k
     count = np.int64(0)
     for j in which:
         count += joints.first[j + 1] - joints.first[j]
     rows, value, direction, joint = make_rows(count), np.empty(count), np.empty((count, 3)), np.empty(count, np.int64)
-    joint_rows(joints, which, bodies, rotation, number, memory.angle, rows, np.int64(0), value, direction)
+    joint_rows(island, rows, np.int64(0), value, direction)
     i = 0
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
@@ -45,7 +48,7 @@ def impact_rows(joints, which, bodies, rotation, members, number, memory, allowe
                 direction[i] = 0.0
             if rows.kind[i] == BOUNDED or joints.stiffness[k] < np.inf:
                 rows.kind[i] = BOUNDED
-                holds = joints.stiffness[k] == np.inf and (memory.active[k] or is_reached(joints, k, value[i], allowed))
+                holds = joints.stiffness[k] == np.inf and (memory.active[k] or is_reached(joints, k, value[i], island.allowed))
                 rows.lower[i] = -np.inf if holds and joints.lower[k] < 0.0 else 0.0
                 rows.upper[i] = np.inf if holds and joints.upper[k] > 0.0 else 0.0
             i += 1
@@ -53,28 +56,28 @@ def impact_rows(joints, which, bodies, rotation, members, number, memory, allowe
 
 
 @jit_making_arrays
-def fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows):
-    """Rates of all rows, to their bias; returns the fastest approach to a hard limit that is reached, m/s or rad/s."""
-    count = rows.bias.shape[0]
+def fill_rates(island, rows):
+    """Write the rates of all rows to their bias. Returns the fastest approach to a hard limit that is reached, m/s or rad/s."""
+    joints, count = island.joints, rows.bias.shape[0]
     again, value, direction = make_rows(count), np.empty(count), np.empty((count, 3))
-    joint_rows(joints, which, bodies, rotation, number, memory.angle, again, np.int64(0), value, direction)
-    relative_point_velocity(joints, which, bodies, rotation, direction, rows.bias)
+    joint_rows(island, again, np.int64(0), value, direction)
+    relative_point_velocity(island, direction, rows.bias)
     fastest, i = 0.0, 0
-    for j in which:
+    for j in island.which:
         for k in range(joints.first[j], joints.first[j + 1]):
-            if joints.stiffness[k] == np.inf and is_reached(joints, k, value[i], allowed):
+            if joints.stiffness[k] == np.inf and is_reached(joints, k, value[i], island.allowed):
                 fastest = max(fastest, -limit_side(joints, k) * rows.bias[i])
             i += 1
     return fastest
 
 
-def stop_at_limits(joints, which, bodies, rotation, members, number, memory, allowed: float, moment) -> None:
-    """Impacts without rebound on the hard limits that are reached; arguments as of `impact_rows`."""
-    block = impact_rows(joints, which, bodies, rotation, members, number, memory, allowed, moment)
+def stop_at_limits(island: JointedIsland, moment: np.ndarray) -> None:
+    """Impacts without rebound on the hard limits that are reached; moment (j, 3) N s on b by joint, added to."""
+    block = impact_rows(island, moment)
     rows = block.rows
-    if fill_rates(joints, which, bodies, rotation, number, memory, allowed, rows) > 0.0:
-        solve_newton(rows, len(members), SOLVE_TOLERANCE * float(np.abs(rows.bias).max()))
-        change_velocities(bodies, members, rows)
+    if fill_rates(island, rows) > 0.0:
+        solve_newton(rows, len(island.members), SOLVE_TOLERANCE * float(np.abs(rows.bias).max()))
+        change_velocities(island.bodies, island.members, rows)
         add_moments(block, rows.impulse)
 
 

@@ -1,6 +1,6 @@
-"""Joints and lasting contacts of a group over a sub-step: forces at its start, velocities at its end.
+"""Joints and lasting contacts of an island over a sub-step: forces at its start, velocities at its end.
 
-Velocity Verlet with constraints (RATTLE: Andersen 1983; second order, symmetric and symplectic), in the courses that
+Velocity Verlet with constraints (RATTLE: Andersen 1983; second order, symmetric and symplectic), along the trajectories that
 all bodies take here. J_0, J_1 are the Jacobians at the start and at the end of a sub-step of length h.
 
     start   forces f = p / h along J_0, constant over the sub-step, such that the joints close at its end: x_1 = target
@@ -12,19 +12,19 @@ solver, together with the rows of the contacts, as  u = b + W p  with  b = 2 x_1
 round, until x_1 is closed; each round gains a factor of about (h w)^2.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix, to_matrix
-from rigidimpulse.dynamics.constraints.contact import SLIP, fill_contact_bias, start_contact_impulses
+from rigidimpulse.dynamics.constraints.contact import SLIP, ContactProblem, fill_contact_bias, start_contact_impulses
 from rigidimpulse.dynamics.constraints.joint import is_linear, joint_rows, joint_values, relative_point_velocity
 from rigidimpulse.dynamics.constraints.joint_limits import is_reached, joint_weights, limit_side, spring_of
+from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling, count_rolling_rows, fill_rolling_rows
 from rigidimpulse.dynamics.constraints.rows import (
     BOUNDED,
     FREE,
+    RowSolver,
     change_velocities,
     contact_rows,
     make_rows,
@@ -38,7 +38,8 @@ from rigidimpulse.dynamics.constraints.rows import (
 )
 from rigidimpulse.dynamics.constraints.softness import end_rate, is_slow, soft_row
 from rigidimpulse.dynamics.solvers.newton import solve_newton
-from rigidimpulse.motion.trajectory import FORCED, Trajectories, begin, make_trajectories, pose_at
+from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.motion.trajectory import FORCED, begin, pose_at
 
 MAX_ROUNDS = 20
 MOST_FAILURES = 3
@@ -50,76 +51,27 @@ SOLVE_TOLERANCE = 1e-12
 TINY = 1e-300
 
 
-class JointMemory(NamedTuple):
-    """What joints keep from one sub-step to the next, and room to work in; n bodies, k rows."""
-
-    angle: np.ndarray  # (k,) last coordinates
-    force: np.ndarray  # (k,) N or N m
-    active: np.ndarray  # (k,) bool, rows at work: not at a bound of theirs
-    start_value: np.ndarray  # (k,) coordinate less target at the start of the sub-step
-    start_rate: np.ndarray  # (k,)
-    end_value: np.ndarray  # (k,) the same at its end
-    slack: np.ndarray  # (k,) bool, limits that are not reached
-    weight: np.ndarray  # (k,) W of soft rows, see `joint_limits`
-    steepness: np.ndarray  # (k,) length of the direction: 1, but for a twist near where it is not defined
-    wrench: np.ndarray  # (n, 6) half of the joints' part of the wrench, taken back at the end
-    trial: Trajectories
-    end_position: np.ndarray  # (n, 3) at the end of the sub-step; right for what is no member of a group
-    end_rotation: np.ndarray  # (n, 3, 3)
-
-
-def make_memory(joints, inertia: np.ndarray) -> JointMemory:
-    """Memory of joints that have not acted yet; inertia (n, 3), principal moments."""
-    k, n = len(joints.coordinate), len(inertia)
-    trial = make_trajectories(n)
-    trial.inertia[:] = inertia
-    hard = (joints.stiffness == np.inf) & (joints.lower == -np.inf) & (joints.upper == np.inf)
-    return JointMemory(
-        angle=np.zeros(k),
-        force=np.zeros(k),
-        active=hard,
-        start_value=np.zeros(k),
-        start_rate=np.zeros(k),
-        end_value=np.zeros(k),
-        slack=np.zeros(k, bool),
-        weight=np.zeros(k),
-        steepness=np.ones(k),
-        wrench=np.zeros((n, 6)),
-        trial=trial,
-        end_position=np.zeros((n, 3)),
-        end_rotation=np.zeros((n, 3, 3)),
-    )
-
-
-@jit
-def count_joint_rows(joints, which):
-    """Rows of the joints listed in `which`."""
-    count = np.int64(0)
-    for j in which:
-        count += joints.first[j + 1] - joints.first[j]
-    return count
-
-
-def stop_joints(joints, which, bodies, rotation, members, number, memory: JointMemory, elapsed, moment) -> None:
+def stop_joints(island: JointedIsland, elapsed: np.ndarray, moment: np.ndarray) -> None:
     """End of a sub-step: the impulses nu.
 
     elapsed (j,): length of the sub-step that ends, s; moment (j, 3): the impulse on b of each joint is added, N s.
     """
-    rows, direction, scale = stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed)
-    solve_newton(rows, len(members), SOLVE_TOLERANCE * scale)
-    change_velocities(bodies, members, rows)
-    _add_moments(joints, which, rows, 0, direction, moment)
+    rows, direction, scale = stop_rows(island, elapsed)
+    solve_newton(rows, len(island.members), SOLVE_TOLERANCE * scale)
+    change_velocities(island.bodies, island.members, rows)
+    _add_moments(island.joints, island.which, rows, 0, direction, moment)
 
 
 @jit_making_arrays
-def stop_rows(joints, which, bodies, rotation, members, number, memory, elapsed):
+def stop_rows(island, elapsed):
     """Rows of the impulses nu, their directions (s, 3) and the largest speed to stop."""
+    joints, which, members, number, memory = island.joints, island.which, island.members, island.number, island.memory
     count = count_joint_rows(joints, which)
     for k in range(members.shape[0]):
         number[members[k]] = k
     rows, value, direction, u = make_rows(count), np.empty(count), np.empty((count, 3)), np.empty(count)
-    joint_rows(joints, which, bodies, rotation, number, memory.angle, rows, np.int64(0), value, direction)
-    relative_point_velocity(joints, which, bodies, rotation, direction, u)
+    joint_rows(island, rows, np.int64(0), value, direction)
+    relative_point_velocity(island, direction, u)
     weight = np.empty(count)
     joint_weights(joints, which, rows, np.int64(0), weight)
     scale, i = TINY, 0
@@ -165,41 +117,43 @@ def _add_moments(joints, which, rows, start, direction, moment):
             i += 1
 
 
-def close_joints(joints, which, bodies, contacts, rotation, members, number, angle, allowed: float) -> bool:
+def close_joints(island: JointedIsland, contacts: Contacts) -> bool:
     """Bring the joints' coordinates back to their targets by the least displacement in the metric of mass.
 
-    Done only where one is off by more than `allowed` [m or rad]; contacts keep half of their gaps, if they have any. Returns whether bodies
+    Done only where one is off by more than the island allows. Contacts keep half of their gaps, if they have any. Returns whether bodies
     were moved.
     """
+    joints, which, bodies, rotation, members = island.joints, island.which, island.bodies, island.rotation, island.members
     moved, last, m = False, np.inf, len(contacts.gap)
-    smooth, room = contacts._replace(static_friction=np.zeros(m)), 0.5 * np.maximum(contacts.gap, 0.0)
+    smooth, slack = contacts._replace(static_friction=np.zeros(m)), 0.5 * np.maximum(contacts.gap, 0.0)
     before = bodies.position[members].copy(), bodies.orientation[members].copy()
     for _ in range(MAX_ROUNDS):
-        rows, _, _ = contact_rows(bodies, smooth, members, number, count_joint_rows(joints, which))
-        worst = fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, m)
+        rows, _, _ = contact_rows(bodies, smooth, members, island.number, count_joint_rows(joints, which))
+        worst = fill_closing_rows(island, rows, m)
         if not worst < last:
             # No pose closes them; the one before was the best.
             bodies.position[members], bodies.orientation[members] = before
             rotation[members] = to_matrix(bodies.orientation[members])
             break
-        if worst <= allowed:
+        if worst <= island.allowed:
             break
         moved, last = True, worst
         before = bodies.position[members].copy(), bodies.orientation[members].copy()
-        rows.bias[:m] = room
-        solve_newton(rows, len(members), 1e-3 * allowed)
-        room += response_to(rows, len(members), rows.impulse)[:m]
+        rows.bias[:m] = slack
+        solve_newton(rows, len(members), 1e-3 * island.allowed)
+        slack += response_to(rows, len(members), rows.impulse)[:m]
         move_bodies(bodies, members, rows)
         rotation[members] = to_matrix(bodies.orientation[members])
     return moved
 
 
 @jit_making_arrays
-def fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, start):
-    """Rows, from `start` on, of the displacement that closes the joints; returns the worst error of a coordinate."""
+def fill_closing_rows(island, rows, start):
+    """Fill the rows, from `start` on, of the displacement that closes the joints. Returns the worst error of a coordinate."""
+    joints, which = island.joints, island.which
     count = rows.bias.shape[0] - start
     value, direction = np.empty(count), np.empty((count, 3))
-    joint_rows(joints, which, bodies, rotation, number, angle, rows, start, value, direction)
+    joint_rows(island, rows, start, value, direction)
     worst, i = 0.0, 0
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
@@ -217,8 +171,9 @@ def fill_closing_rows(joints, which, bodies, rotation, number, angle, rows, star
 
 
 @jit_making_arrays
-def _end_values(joints, which, bodies, acceleration, members, wrench, h, memory, value):
-    """Coordinates - targets (s,) after h under the wrenches (n_world, 6)."""
+def _end_values(island, acceleration, wrench, h, value):
+    """Write coordinates - targets (s,) after h under the wrenches (n_world, 6)."""
+    bodies, members, memory = island.bodies, island.members, island.memory
     trajectory, q = memory.trial, np.empty(4)
     for i in members:
         trajectory.position[i], trajectory.orientation[i] = bodies.position[i], bodies.orientation[i]
@@ -229,38 +184,34 @@ def _end_values(joints, which, bodies, acceleration, members, wrench, h, memory,
         begin(trajectory, i)
         pose_at(trajectory, i, h, memory.end_position[i], q)
         quaternion_to_matrix(q, memory.end_rotation[i])
-    joint_values(joints, which, memory.end_position, memory.end_rotation, memory.angle, value)
+    joint_values(island.joints, island.which, memory.end_position, memory.end_rotation, memory.angle, value)
 
 
 def hold_jointed(
-    solve, bodies, contacts, turning, acceleration, angular_acceleration, h: float, members, number, force, joints, which,
-    rotation, memory: JointMemory, allowed: float, wrench, moment, rolling: Rolling | None,
+    solve: RowSolver, problem: ContactProblem, island: JointedIsland, h: float, force: np.ndarray, wrench: np.ndarray, moment: np.ndarray,
+    rolling: Rolling | None,
 ) -> tuple[float, float]:
     """Forces of joints and lasting contacts over a sub-step of length h.
 
-    As `resting.hold_contacts`, with joints listed in `which`; allowed: closing error, m or rad; moment (j, 3): half of the
-    joints' impulses on b is added. Returns (residual relative to the speed gained, worst closing error).
+    force, wrench and rolling as of `contact.hold_contacts`, with the joints of the island; moment (j, 3): half of the joints' impulses on b
+    is added. Returns (residual relative to the speed gained, worst closing error).
     """
-    n, count, extra = len(members), count_joint_rows(joints, which), count_rolling_rows(rolling)
-    rows, first_row, frames = contact_rows(bodies, contacts, members, number, extra + count)
+    contacts, acceleration, allowed = problem.contacts, problem.acceleration, island.allowed
+    n, count, extra = len(island.members), count_joint_rows(island.joints, island.which), count_rolling_rows(rolling)
+    of_contacts = contact_rows(island.bodies, contacts, island.members, island.number, extra + count)
+    rows, first_row, _ = of_contacts
     start = len(rows.bias) - count
     if rolling is not None:
-        fill_rolling_rows(
-            bodies, contacts, rolling, number, angular_acceleration, frames, first_row, h, rows, start - extra
-        )
+        fill_rolling_rows(problem, rolling, h, of_contacts, start - extra)
     start_contact_impulses(rows, first_row, force, h)
-    direction, beta = start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed, rows, start)
-    level = np.zeros(len(first_row))
-    scale, u = fill_contact_bias(
-        bodies, contacts, frames, turning, level, acceleration, angular_acceleration, h, rows, first_row
-    )
+    direction, beta = start_joint_rows(island, h, rows, start)
+    scale, u = fill_contact_bias(problem, np.zeros(len(first_row)), h, of_contacts)
     slides = np.abs(u[:, 1]) + np.abs(u[:, 2]) > SLIP * scale
-    scale = max(scale, h * float(np.sqrt(np.max(np.sum(acceleration[members] ** 2, axis=1)))))
+    scale = max(scale, h * float(np.sqrt(np.max(np.sum(acceleration[island.members] ** 2, axis=1)))))
     residual, best, kept, failures = 0.0, np.inf, rows.impulse, 0
     for round_ in range(MAX_ROUNDS):
-        worst, largest = close_at_end(
-            joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench
-        )
+        worst, largest = close_at_end(island, acceleration, h, rows, start, beta, wrench)
+        # Rounds may diverge where no impulses close the joints: the best ones so far are kept.
         closer = worst <= max(best, allowed) and residual <= UNSOLVED * scale
         failures = 0 if closer else failures + 1
         if worst <= max(best, allowed):
@@ -268,27 +219,26 @@ def hold_jointed(
         if (round_ > 1 and worst <= allowed) or failures == MOST_FAILURES or not np.isfinite(worst):
             break
         scale = max(scale, largest)
-        residual = solve_with_slip(
-            solve, rows, n, first_row, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale
-        )
+        residual = solve_with_slip(solve, of_contacts, n, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale)
     rows.impulse[:] = kept
-    worst, _ = close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench)
-    _finish(joints, which, bodies, members, rows, first_row, start, h, memory, direction, force, moment)
+    worst, _ = close_at_end(island, acceleration, h, rows, start, beta, wrench)
+    _finish(island, rows, first_row, start, h, direction, force, moment)
     return residual / scale, worst
 
 
 @jit_making_arrays
-def close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, start, beta, wrench):
-    """Bias of the joints' rows for the next round; wrench: that of the present impulses.
+def close_at_end(island, acceleration, h, rows, start, beta, wrench):
+    """Write the bias of the joints' rows for the next round; wrench: that of the present impulses.
 
     Returns the violation at the end under that wrench, inf if there is no end, and the largest bias.
     """
+    joints, which, members, memory = island.joints, island.which, island.members, island.memory
     n, count = members.shape[0], beta.shape[0]
     y, u, value, largest = np.empty((n, 6)), np.empty(rows.bias.shape[0]), np.empty(count), 0.0
     multiply_transposed(rows, rows.impulse, y)
     multiply(rows, y, u)
-    _write_wrenches(bodies, members, y, h, wrench)
-    _end_values(joints, which, bodies, acceleration, members, wrench, h, memory, value)
+    _write_wrenches(island.bodies, members, y, h, wrench)
+    _end_values(island, acceleration, wrench, h, value)
     for i in range(count):
         rows.bias[start + i] = 2.0 / h * value[i] - u[start + i] - beta[i]
         largest = max(largest, abs(rows.bias[start + i]))
@@ -296,8 +246,9 @@ def close_at_end(joints, which, bodies, acceleration, members, h, memory, rows, 
 
 
 @jit_making_arrays
-def _finish(joints, which, bodies, members, rows, first_row, start, h, memory, direction, force, moment):
-    """Forces of the contacts (m, 3); what is remembered of the joints; half of the joints' impulses to their moments."""
+def _finish(island, rows, first_row, start, h, direction, force, moment):
+    """Write the forces of the contacts (m, 3), remember the joints, and add half of the joints' impulses to their moments."""
+    joints, which, members, memory = island.joints, island.which, island.members, island.memory
     for s in range(first_row.shape[0]):
         force[s] = 0.0
         for k in range(rows_of(rows, first_row[s])):
@@ -305,21 +256,22 @@ def _finish(joints, which, bodies, members, rows, first_row, start, h, memory, d
     _remember(joints, which, rows, start, h, memory)
     y = np.empty((members.shape[0], 6))
     multiply_transposed(rows, rows.impulse, y)
-    _write_wrenches(bodies, members, y, h, memory.wrench)
+    _write_wrenches(island.bodies, members, y, h, memory.wrench)
     _add_moments(joints, which, rows, start, direction, moment)
 
 
 @jit_making_arrays
-def start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed, rows, start):
-    """Joints' rows from `start` on, with bounds, softness and first impulses; their coordinates and rates are remembered.
+def start_joint_rows(island, h, rows, start):
+    """Fill the joints' rows from `start` on, with bounds, softness and first impulses; their coordinates and rates are remembered.
 
     Limits that are not reached carry nothing. Returns their directions (s, 3) and the terms beta (s,) of soft ones.
     """
+    joints, which, memory = island.joints, island.which, island.memory
     count = rows.bias.shape[0] - start
     value, direction, u, beta = np.empty(count), np.empty((count, 3)), np.empty(count), np.zeros(count)
     weight = np.empty(count)
-    joint_rows(joints, which, bodies, rotation, number, memory.angle, rows, start, value, direction)
-    relative_point_velocity(joints, which, bodies, rotation, direction, u)
+    joint_rows(island, rows, start, value, direction)
+    relative_point_velocity(island, direction, u)
     joint_weights(joints, which, rows, start, weight)
     i = 0
     for j in which:
@@ -328,7 +280,7 @@ def start_joint_rows(joints, which, bodies, rotation, number, memory, h, allowed
             rows.lower[r], rows.upper[r], rows.impulse[r] = joints.lower[k] * h, joints.upper[k] * h, memory.force[k] * h
             memory.start_value[k], memory.start_rate[k], memory.weight[k] = value[i], u[i], weight[i]
             memory.steepness[k] = np.sqrt(np.sum(direction[i] ** 2))
-            memory.slack[k] = limit_side(joints, k) != 0.0 and not is_reached(joints, k, value[i], allowed)
+            memory.slack[k] = limit_side(joints, k) != 0.0 and not is_reached(joints, k, value[i], island.allowed)
             if memory.slack[k]:
                 rows.lower[r] = rows.upper[r] = rows.impulse[r] = 0.0
             elif joints.stiffness[k] < np.inf:

@@ -21,6 +21,9 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.dynamics.constraints.rows import DISC, DISC_SECOND, SEGMENT, write_body
+from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
 
 
 class Rolling(NamedTuple):
@@ -31,7 +34,7 @@ class Rolling(NamedTuple):
     lever: np.ndarray  # (m,) L, m
 
 
-def rolling_of(world, bodies, contacts) -> Rolling | None:
+def rolling_of(world: World, bodies: BodyState, contacts: Contacts) -> Rolling | None:
     """Of the given contacts; None where no material asks for any."""
     if world.rolling is None or not len(contacts.gap):
         return None
@@ -50,8 +53,13 @@ def count_rolling_rows(rolling: Rolling | None) -> int:
 
 
 @jit
-def fill_rolling_rows(bodies, contacts, rolling, number, angular_acceleration, frames, first_row, h, rows, start):
-    """Rows from `start` on, with the velocities L t.w that they would have after h without moments."""
+def fill_rolling_rows(problem, rolling, h, of_contacts, start):
+    """Fill the rows from `start` on, with the velocities L t.w that they would have after h without moments.
+
+    problem: a `ContactProblem`; of_contacts: `ContactRows`.
+    """
+    bodies, contacts, number = problem.bodies, problem.contacts, problem.number
+    rows, first_row, frames = of_contacts.rows, of_contacts.first_row, of_contacts.frames
     i = start
     for c in range(first_row.shape[0]):
         lever = rolling.lever[c]
@@ -63,13 +71,13 @@ def fill_rolling_rows(bodies, contacts, rolling, number, angular_acceleration, f
             x, y, z = lever * frames[c, k, 0], lever * frames[c, k, 1], lever * frames[c, k, 2]
             if bodies.inv_mass[a] > 0.0:
                 rows.first[i] = number[a]
-                write_body(bodies, a, rows.jacobian[i, :6], 0.0, 0.0, 0.0, -x, -y, -z)
+                write_body(bodies, a, rows.jacobian[i, :6], (0.0, 0.0, 0.0), (-x, -y, -z))
             if bodies.inv_mass[b] > 0.0:
                 rows.second[i] = number[b]
-                write_body(bodies, b, rows.jacobian[i, 6:], 0.0, 0.0, 0.0, x, y, z)
+                write_body(bodies, b, rows.jacobian[i, 6:], (0.0, 0.0, 0.0), (x, y, z))
             rows.kind[i] = SEGMENT if k == 0 else (DISC if k == 1 else DISC_SECOND)
             rows.master[i], rows.coefficient[i] = first_row[c], bound / lever
-            w, alpha = bodies.angular_velocity, angular_acceleration
+            w, alpha = bodies.angular_velocity, problem.angular_acceleration
             rows.bias[i] = (
                 x * (w[b, 0] - w[a, 0] + h * (alpha[b, 0] - alpha[a, 0]))
                 + y * (w[b, 1] - w[a, 1] + h * (alpha[b, 1] - alpha[a, 1]))
@@ -94,7 +102,7 @@ def add_rolling_wrench(contacts, rolling, rows, frames, h, start, wrench):
 
 
 def rolling_slip(
-    bodies, contacts, rolling: Rolling, frames: np.ndarray, start: int, slow: float
+    bodies: BodyState, contacts: Contacts, rolling: Rolling, frames: np.ndarray, start: int, slow: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What rolls and spins faster than `slow` [m/s]: first and second row (s,), the same for a spin, and L w along them (s, 2)."""
     w = rolling.lever[:, None] * (bodies.angular_velocity[contacts.body_b] - bodies.angular_velocity[contacts.body_a])

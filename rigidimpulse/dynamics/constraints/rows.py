@@ -15,6 +15,7 @@ The normal of a contact is BOUNDED with lower = 0; it is the master of its two r
 are numbered from 0 on in order of their index; immovable ones have the number -1.
 """
 
+from collections.abc import Callable
 from math import inf, sqrt
 from typing import NamedTuple
 
@@ -24,6 +25,8 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import multiply as quaternion_product
 from rigidimpulse.core.quaternion import quaternion_from_rotation_vector
 from rigidimpulse.dynamics.impact.friction import tangents
+from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.motion.body_state import BodyState
 
 FREE, BOUNDED, DISC, DISC_SECOND, SEGMENT = np.arange(5)
 """Kinds of rows."""
@@ -48,9 +51,21 @@ class Rows(NamedTuple):
     impulse: np.ndarray  # (r,) start and answer
 
 
+class ContactRows(NamedTuple):
+    """The rows of m contacts, which come first; rows of rolling friction and of joints follow them."""
+
+    rows: Rows
+    first_row: np.ndarray  # (m,) the normal row of each contact
+    frames: np.ndarray  # (m, 3, 3) n, t1, t2
+
+
+RowSolver = Callable[[Rows, int, float], float]
+"""A solver of rows: (rows, number of movable bodies, residual asked for) -> residual."""
+
+
 @jit_making_arrays
 def make_rows(r):
-    """Room for r rows, all of them FREE and hard, with no impulse."""
+    """Return r rows, all of them FREE and hard, with no impulse."""
     return Rows(
         np.full(r, -1, np.int64),
         np.full(r, -1, np.int64),
@@ -79,8 +94,9 @@ def cholesky_3(a, c):
 
 
 @jit_making_arrays
-def write_body(bodies, i, line, x, y, z, tx, ty, tz):
-    """Half a row, line (6,): linear direction (x, y, z), angular (tx, ty, tz), scaled by the mass of body i."""
+def write_body(bodies, i, line, direction, torque):
+    """Write half a row, line (6,): a linear and an angular direction (tuples), scaled by the mass of body i."""
+    (x, y, z), (tx, ty, tz) = direction, torque
     factor = np.empty((3, 3))
     cholesky_3(bodies.inv_inertia[i], factor)
     root = sqrt(bodies.inv_mass[i])
@@ -90,24 +106,28 @@ def write_body(bodies, i, line, x, y, z, tx, ty, tz):
 
 
 @jit
-def write_row(bodies, number, a, b, ra, rb, x, y, z, rows, i):
-    """Row i for the relative velocity of two points along (x, y, z); ra, rb (3,) their arms on bodies a and b (-1: the world)."""
+def write_row(bodies, number, ends, arms, direction, rows, i):
+    """Write row i for the relative velocity of two points along a direction (tuple).
+
+    arms: the two points, (3,) m each, from the centres of mass of the bodies `ends` (-1: the world).
+    """
+    (a, b), (ra, rb), (x, y, z) = ends, arms, direction
     if a >= 0 and bodies.inv_mass[a] > 0.0:
         tx, ty, tz = ra[1] * z - ra[2] * y, ra[2] * x - ra[0] * z, ra[0] * y - ra[1] * x
         rows.first[i] = number[a]
-        write_body(bodies, a, rows.jacobian[i, :6], -x, -y, -z, -tx, -ty, -tz)
+        write_body(bodies, a, rows.jacobian[i, :6], (-x, -y, -z), (-tx, -ty, -tz))
     if b >= 0 and bodies.inv_mass[b] > 0.0:
         tx, ty, tz = rb[1] * z - rb[2] * y, rb[2] * x - rb[0] * z, rb[0] * y - rb[1] * x
         rows.second[i] = number[b]
-        write_body(bodies, b, rows.jacobian[i, 6:], x, y, z, tx, ty, tz)
+        write_body(bodies, b, rows.jacobian[i, 6:], (x, y, z), (tx, ty, tz))
 
 
 @jit_making_arrays
 def contact_rows(bodies, contacts, members, number, extra):
-    """Rows n, t1, t2 of m contacts, and room for `extra` (int) rows after them.
+    """The `ContactRows` of m contacts: rows n, t1, t2 of each, and `extra` (int) empty rows after them.
 
     Contacts without friction have the normal row only; friction coefficients are the static ones. members: movable bodies, in
-    order; number (n_world,) gets the place of each. Returns rows, first_row (m,) and frames (m, 3, 3).
+    order; number (n_world,) gets the place of each.
     """
     for k in range(members.shape[0]):
         number[members[k]] = k
@@ -127,13 +147,13 @@ def contact_rows(bodies, contacts, members, number, extra):
         for k in range(last):
             d = frames[c, k]
             a, b = contacts.body_a[c], contacts.body_b[c]
-            write_row(bodies, number, a, b, contacts.arm_a[c], contacts.arm_b[c], d[0], d[1], d[2], rows, r + k)
+            write_row(bodies, number, (a, b), (contacts.arm_a[c], contacts.arm_b[c]), (d[0], d[1], d[2]), rows, r + k)
         rows.kind[r], rows.lower[r] = BOUNDED, 0.0
         if last == 3:
             rows.kind[r + 1], rows.kind[r + 2] = DISC, DISC_SECOND
             rows.master[r + 1] = rows.master[r + 2] = r
             rows.coefficient[r + 1] = rows.coefficient[r + 2] = contacts.static_friction[c]
-    return rows, first_row, frames
+    return ContactRows(rows, first_row, frames)
 
 
 def take_rows(rows: Rows, which: np.ndarray) -> Rows:
@@ -262,7 +282,7 @@ def change_velocities(bodies, members, rows):
             bodies.angular_velocity[members[k], j] += change[k, 3 + j]
 
 
-def move_bodies(bodies, members: np.ndarray, rows: Rows) -> None:
+def move_bodies(bodies: BodyState, members: np.ndarray, rows: Rows) -> None:
     """Move bodies by what the rows' impulses make of a displacement (the metric of mass)."""
     change = changes_of(bodies, members, rows)
     bodies.position[members] += change[:, :3]
@@ -296,12 +316,15 @@ def let_slip(rows, n, first_row, dynamic_friction, slow):
     return changed
 
 
-def solve_with_slip(solve, rows: Rows, n: int, first_row: np.ndarray, contacts, slides, target: float, slow: float) -> float:
+def solve_with_slip(
+    solve: RowSolver, of_contacts: ContactRows, n: int, contacts: Contacts, slides: np.ndarray, target: float, slow: float
+) -> float:
     """Solve rows that begin with those of contacts; contacts that slip, or come to slip, have dynamic friction.
 
     solve: a solver of rows, as `newton.solve_newton`; slides (m,) bool: contacts that slip from the start; target: residual
     asked for, m/s; slow: slip that is none, m/s. Returns the residual, m/s: inf where there is no finite answer, and then no impulse.
     """
+    rows, first_row, _ = of_contacts
     rough = contacts.static_friction > 0.0
     disc = first_row[rough] + 1
     rows.coefficient[disc] = np.where(slides, contacts.dynamic_friction, contacts.static_friction)[rough]

@@ -7,7 +7,7 @@ A row of stiffness k, damping c and target rate r acts on the coordinate x (less
     R'' = 1 - 2 s R' - w^2 R,  R(0) = R'(0) = 0,     B = R',   A = 1 - w^2 R,   A' = -w^2 B,   B' = R''
 
 Over a sub-step the force p / h is constant and x(h) = x_0 + h u_0 + h^2 / 2 (a + W p / h). Both agree for every a if p
-obeys, with z = 2 x(h) / h (the velocity of the row in `joint_forces`) and q = 1 - 2 R / h^2,
+obeys, with z = 2 x(h) / h (the velocity of the row in `joint_sub_step`) and q = 1 - 2 R / h^2,
 
     z + softness p = beta,     softness = W (1 - q) / q,
     beta = 2 / (h q) [(A - 1) x_0 + (B - h) u_0 + R c W r] + 2 x_0 / h + 2 u_0

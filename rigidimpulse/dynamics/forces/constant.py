@@ -23,6 +23,7 @@ from rigidimpulse.scene.body import vector
 
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force import ForceTable
+    from rigidimpulse.model.world import World
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +47,12 @@ class ConstantForce:
     stage: ClassVar[str] = "forces"
     kind: ClassVar[str] = "forces at points"
 
-    def bind(self, _world) -> Skip:
+    def bind(self, _world: World) -> Skip:
         """Constant forces are one line of the plan, not one each."""
         return Skip("a constant force; see constant forces")
 
     @classmethod
-    def compile(cls, forces: Sequence[Self], world) -> ForceTable:
+    def compile(cls, forces: Sequence[Self], world: World) -> ForceTable:
         """Check and bind forces whose torque or effect varies: those at points, and those on bodies that lose mass."""
         from rigidimpulse.dynamics.forces.force import body_point, checked_vector, dynamic_body, named
         from rigidimpulse.dynamics.forces.timed import TimedForces

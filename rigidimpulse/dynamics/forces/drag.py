@@ -61,7 +61,7 @@ class Drag(Force):
 class DragForces(ForceTable):
     """Drags, one row for each body of each."""
 
-    def __init__(self, names, body: np.ndarray, cause: np.ndarray, linear: np.ndarray, quadratic: np.ndarray) -> None:
+    def __init__(self, names: list[str], body: np.ndarray, cause: np.ndarray, linear: np.ndarray, quadratic: np.ndarray) -> None:
         """All (k,)."""
         self.kind, self.names, self.body, self.cause = Drag.kind, names, body, cause
         self.links, self.is_steady = no_links(), True

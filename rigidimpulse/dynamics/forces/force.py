@@ -21,8 +21,8 @@ from rigidimpulse.scene.body import number, vector
 from rigidimpulse.scene.shape import normalized_quaternion
 
 if TYPE_CHECKING:
-    from rigidimpulse.dynamics.impact.point import BodyState
     from rigidimpulse.model.world import World
+    from rigidimpulse.motion.body_state import BodyState
 
 
 class Instant(NamedTuple):

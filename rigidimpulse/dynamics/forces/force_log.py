@@ -2,7 +2,7 @@
 
     J = integral of F ds,   H = integral of (tau + x x F) ds,   W = integral of (F.v + tau.w) ds
 
-along the course of the body, where the force and its torque tau about the centre of mass follow a line over the time s since its start.
+along the trajectory of the body, where the force and its torque tau about the centre of mass follow a line over the time s since its start.
 J is the closed form of the line. H and W are Gauss's quadrature of three points: exact for H and for the work of F, as x is a cubic.
 """
 
@@ -14,18 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.core.kernels import jit_making_arrays
-from rigidimpulse.motion.trajectory import state_at
+from rigidimpulse.motion.trajectory import Trajectories, state_at
 
 NODES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
 WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 
 @jit_making_arrays
-def add_line_integrals(trajectory, i, begin, start, end, rows, value, rate, total):
-    """Add J, H, W from `start` to `end` [s] of lines that began at `begin`, to rows of total (k, 7).
+def add_line_integrals(trajectory, i, times, rows, value, rate, total):
+    """Add J, H, W of lines to rows of total (k, 7).
 
-    value (k, 6) N and N m at `begin`, rate (k, 6) a second.
+    times: when the lines began, and from when to when they are integrated, s; value (k, 6) N and N m when they began, rate (k, 6) a second.
     """
+    begin, start, end = times
     h = end - start
     x, q, v, w = np.empty(3), np.empty(4), np.empty(3), np.empty(3)
     for node in range(3):
@@ -99,7 +100,7 @@ class ForceLog:
 
     """
 
-    def __init__(self, times: np.ndarray, body: np.ndarray, trajectory) -> None:
+    def __init__(self, times: np.ndarray, body: np.ndarray, trajectory: Trajectories) -> None:
         """times (f,) s of the frames; body (k,) of each row."""
         n = len(trajectory.start)
         self.at_frames = np.zeros((len(times), len(body), 7))
@@ -113,7 +114,7 @@ class ForceLog:
     def begin(self, members: np.ndarray, time: float, value: np.ndarray, change: np.ndarray, length: np.ndarray) -> None:
         """New lines act on members from `time` on: value (k, 6), that change by (k, 6) over length (n,) s.
 
-        Their courses must still be those that led here.
+        Their trajectories must still be those that led here.
         """
         for i in members.tolist():
             self.end(i, time)
@@ -133,10 +134,10 @@ class ForceLog:
         first, last = int(self._written[i]), int(np.searchsorted(self._times, time, side="left"))
         for f in range(first, last):
             self.at_frames[f, rows] = self._total[rows]
-            add_line_integrals(self._trajectory, i, start, start, self._times[f], rows, self._value, self._rate, self.at_frames[f])
+            add_line_integrals(self._trajectory, i, (start, start, self._times[f]), rows, self._value, self._rate, self.at_frames[f])
         self._written[i] = last
         before = self._total[rows, 6].sum()
-        add_line_integrals(self._trajectory, i, start, start, time, rows, self._value, self._rate, self._total)
+        add_line_integrals(self._trajectory, i, (start, start, time), rows, self._value, self._rate, self._total)
         self.work[i] += self._total[rows, 6].sum() - before
         self._begun[i] = time
 
@@ -146,4 +147,4 @@ class ForceLog:
             for f in range(int(self._written[i]), len(self._times)):
                 self.at_frames[f, rows] = self._total[rows]
                 start = self._begun[i]
-                add_line_integrals(self._trajectory, i, start, start, self._times[f], rows, self._value, self._rate, self.at_frames[f])
+                add_line_integrals(self._trajectory, i, (start, start, self._times[f]), rows, self._value, self._rate, self.at_frames[f])

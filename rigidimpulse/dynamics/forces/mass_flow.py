@@ -14,6 +14,8 @@ from abc import abstractmethod
 import numpy as np
 
 from rigidimpulse.dynamics.forces.force import ForceTable
+from rigidimpulse.model.world import World
+from rigidimpulse.motion.trajectory import Trajectories
 
 
 class BurningForces(ForceTable):
@@ -27,7 +29,7 @@ class BurningForces(ForceTable):
 class MassFlow:
     """Masses of the bodies of a run, brought up to date when a body is looked at."""
 
-    def __init__(self, tables: list[BurningForces], world, trajectory) -> None:
+    def __init__(self, tables: list[BurningForces], world: World, trajectory: Trajectories) -> None:
         """Of forces that take mass."""
         self._tables, self._world, self._trajectory = tables, world, trajectory
         self.bodies = np.unique(np.concatenate([table.body for table in tables]))

@@ -92,9 +92,20 @@ class Line(NamedTuple):
     break_force: float
 
 
+class SpringTable(NamedTuple):
+    """s springs as the kernel reads them, and the spring of each of k rows."""
+
+    ends: np.ndarray  # (s, 2) bodies, -1 the world
+    arms: np.ndarray  # (s, 2, 3) m
+    values: np.ndarray  # (s, 3) stiffness, damping, length
+    is_carried: np.ndarray  # (s, 2) bool, ends on bodies with a given path
+    spring_of: np.ndarray  # (k,)
+
+
 @jit_making_arrays
-def _pull(rows, spring_of, end_of_row, ends, arms, table, is_carried, carried, bodies, rotation, out):
+def _pull(rows, end_of_row, springs, carried, bodies, rotation, out):
     """Force and torque of rows, into out (r, 6); carried (r, 6): place and velocity of an other end on a given path."""
+    ends, arms, table, is_carried, spring_of = springs
     p, v, arm = np.empty((2, 3)), np.zeros((2, 3)), np.empty((2, 3))
     for row in range(rows.shape[0]):
         s, mine = spring_of[rows[row]], end_of_row[rows[row]]
@@ -153,7 +164,8 @@ class SpringForces(ForceTable):
             spring, end = self.cause[rows[r]], 1 - self._end[rows[r]]
             p, v = at.carried_point(int(self._ends[spring, end]), float(at.time[self.body[rows[r]]]), self._arms[spring, end])
             carried[r, :3], carried[r, 3:] = p, v
-        _pull(rows, self.cause, self._end, self._ends, self._arms, self._table, self._carried, carried, at.bodies, at.rotation, out)
+        springs = SpringTable(self._ends, self._arms, self._table, self._carried, self.cause)
+        _pull(rows, self._end, springs, carried, at.bodies, at.rotation, out)
         return out
 
     def give_way(self, value: np.ndarray, time: float) -> list[int]:

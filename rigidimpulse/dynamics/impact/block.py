@@ -2,7 +2,7 @@
 
 With W = Jh Jh^T the inverse effective mass of all contacts together (dynamics/constraints/rows.py), u the velocities before,
 find impulses p with u+ = u + W p, u_n+ >= target, complementary to p_n >= 0, and Coulomb's cone
-(dynamics/solvers/newton.py). Approaching contacts have e_c and the slip they reverse e_t c. Joints of the group hold: their
+(dynamics/solvers/newton.py). Approaching contacts have e_c and the slip they reverse e_t c. Joints of the island hold: their
 rows are part of every problem, with u = 0.
 
 Newton's law is one such problem, with targets -e_c u_n and -e_t u_t. If that made energy (Newton's law with friction
@@ -32,6 +32,7 @@ import numpy as np
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.constraints.joint_impact import JointBlock, add_moments, copy_rows
 from rigidimpulse.dynamics.constraints.rows import (
+    ContactRows,
     Rows,
     change_velocities,
     contact_rows,
@@ -40,13 +41,15 @@ from rigidimpulse.dynamics.constraints.rows import (
     row_velocities,
     solve_with_slip,
 )
-from rigidimpulse.dynamics.impact.point import Contacts, log_impact, select
-from rigidimpulse.dynamics.impact.restitution import AUTO, NEWTON, POISSON
+from rigidimpulse.dynamics.impact.point import log_impact
+from rigidimpulse.dynamics.impact.restitution import AUTO, NEWTON, POISSON, ImpactRule
 from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.model.contacts import Contacts, select
+from rigidimpulse.motion.body_state import BodyState
 
-# Residual asked of the solver, relative to the speed of the group.
+# Residual asked of the solver, relative to the speed of the island.
 SOLVE_TOLERANCE = 1e-14
-# Slip that counts as none, relative to the speed of the group, and energy that counts as none, relative to the energy moved.
+# Slip that counts as none, relative to the speed of the island, and energy that counts as none, relative to the energy moved.
 SLIPLESS = 1e-9
 ENERGY_ROUND_OFF = 1e-13
 # The size of the rebound: solutions tried and their relative accuracy.
@@ -58,14 +61,23 @@ SIZE_ACCURACY = 1e-10
 class Block:
     """The problem of one block: its rows (r), those of m contacts first."""
 
-    rows: Rows
+    of_contacts: ContactRows
     n: int
-    first_row: np.ndarray  # (m,)
     contacts: Contacts
     u: np.ndarray  # (r,) velocities before, m/s
     target: np.ndarray  # (r,) velocities after that the rebound asks for
     e: np.ndarray  # (m,) restitution of the contacts that approached, else 0
-    scale: float  # speed of the group, m/s
+    scale: float  # speed of the island, m/s
+
+    @property
+    def rows(self) -> Rows:
+        """All rows."""
+        return self.of_contacts.rows
+
+    @property
+    def first_row(self) -> np.ndarray:
+        """Normal rows (m,) of the contacts."""
+        return self.of_contacts.first_row
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Impulses (r,) of the cone problem for b (r,) [m/s]; static friction first, contacts that still slip again with dynamic."""
@@ -74,7 +86,7 @@ class Block:
         rows.impulse[:] = 0.0
         sticks = np.zeros(m, bool)
         solve_with_slip(
-            solve_newton, rows, self.n, self.first_row, self.contacts, sticks, SOLVE_TOLERANCE * self.scale, SLIPLESS * self.scale
+            solve_newton, self.of_contacts, self.n, self.contacts, sticks, SOLVE_TOLERANCE * self.scale, SLIPLESS * self.scale
         )
         return rows.impulse.copy()
 
@@ -90,7 +102,7 @@ class Block:
 
 @jit
 def rebound_of(contacts, c, approach, rest_speed):
-    """e, or 0 where the rebound would rise less than the gap the contact is held at (LOOP rule: no speed threshold)."""
+    """e, or 0 where the rebound would rise less than the contact margin. So no speed threshold is needed."""
     e = contacts.restitution[c]
     return e if e * abs(approach) > rest_speed[c] else 0.0
 
@@ -122,7 +134,7 @@ def _two_phases(law: int, block: Block) -> np.ndarray:
     if asked == 0.0:
         return compression
     p, whole = compression, np.ones(len(e))
-    # Secants of the share made of what is asked; the size lies between low, which is allowed, and high, which is not.
+    # Secant method for the share of what the law asks. `low` is a size that makes no energy, `high` one that does or is too large.
     size, low, high = 1.0, 0.0, np.inf
     last_size = last_share = 0.0
     for _ in range(SIZES):
@@ -146,21 +158,23 @@ def _two_phases(law: int, block: Block) -> np.ndarray:
 
 
 def solve_block(
-    bodies, contacts: Contacts, subset: np.ndarray, rebound: float, law: int, rest_speed: np.ndarray, scale: float,
-    number: np.ndarray, joints: JointBlock | None, log: np.ndarray, count: int,
+    bodies: BodyState, contacts: Contacts, subset: np.ndarray, rebound: float, rule: ImpactRule, number: np.ndarray,
+    joints: JointBlock | None, log: np.ndarray,
 ) -> int:
-    """Resolve the contacts of subset together and apply the impulses; `rebound` 1, or 0 for an inelastic one. New log count.
+    """Resolve the contacts of subset together and apply the impulses; `rebound` 1, or 0 for an inelastic one.
 
-    joints: None, or the `JointBlock` of the group.
+    joints: None, or the `JointBlock` of the island; log (k, 7): rows not yet written. Returns how many rows of the log were written.
     """
+    law, rest_speed = rule.law, rule.rest_speed
     if len(subset) < len(contacts.gap):
         contacts, rest_speed = select(contacts, subset), rest_speed[subset]
     if joints is None:
-        touched = np.unique(np.concatenate([contacts.body_a, contacts.body_b]))
-        members, extra = touched[bodies.inv_mass[touched] > 0.0], 0
+        ends = np.unique(np.concatenate([contacts.body_a, contacts.body_b]))
+        members, extra = ends[bodies.inv_mass[ends] > 0.0], 0
     else:
         members, extra = joints.members, len(joints.rows.bias)
-    rows, first_row, frames = contact_rows(bodies, contacts, members, number, extra)
+    of_contacts = contact_rows(bodies, contacts, members, number, extra)
+    rows, first_row, frames = of_contacts
     if joints is not None:
         copy_rows(joints.rows, rows, len(rows.bias) - extra)
     u = np.zeros(len(rows.bias))
@@ -173,15 +187,15 @@ def solve_block(
     e_t = np.where(e > 0.0, contacts.tangential_restitution, 0.0)[rough]
     for k in (1, 2):
         target[first_row[rough] + k] = -e_t * u[first_row[rough] + k]
-    block = Block(rows, len(members), first_row, contacts, u, target, e, scale)
+    block = Block(of_contacts, len(members), contacts, u, target, e, rule.scale)
     smooth = not rough.any()
     rows.impulse[:] = _newton(block) if law == NEWTON or (law == AUTO and smooth) else _two_phases(law, block)
     change_velocities(bodies, members, rows)
     if joints is not None:
         add_moments(joints, rows.impulse)
-    last = log_block(bodies, contacts, rows, first_row, frames, u, log, count)
-    log[count:last, 0] = subset[log[count:last, 0].astype(np.int64)]
-    return last
+    count = log_block(bodies, contacts, rows, first_row, frames, u, log, 0)
+    log[:count, 0] = subset[log[:count, 0].astype(np.int64)]
+    return count
 
 
 @jit_making_arrays

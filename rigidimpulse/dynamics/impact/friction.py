@@ -184,11 +184,12 @@ def _makes_energy(k, start, q):
 
 
 @jit_making_arrays
-def contact_impulse(k, n, u, e, e_t, mu_s, mu_k, law, t1, t2, impulse):
+def contact_impulse(k, n, u, pair, t1, t2, impulse):
     """The impulse [N s] on body b of one impact, into `impulse` (3,).
 
-    k (3, 3) 1/kg; n (3,); u (3,) m/s with u.n < 0; law one of `restitution.LAWS`; t1, t2 (3,) are scratch.
+    k (3, 3) 1/kg; n (3,); u (3,) m/s with u.n < 0; pair: `PairLaw`; t1, t2 (3,) are working memory.
     """
+    law, e, e_t, mu_s, mu_k = pair.law, pair.e, pair.e_t, pair.mu_s, pair.mu_k
     un = _dot(u, n)
     k_nn = 0.0
     for a in range(3):

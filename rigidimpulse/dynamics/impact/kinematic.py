@@ -14,14 +14,14 @@ from rigidimpulse.dynamics.impact.point import log_impact, relative_velocity
 
 
 @jit_making_arrays
-def respond_kinematic(bodies, contacts, law, together, rest_speed, tolerance, scale, number, joints, log):
-    """Each contact once, fastest approach first; arguments (neither law nor together matter) and answer as `respond_sequential`."""
+def respond_kinematic(bodies, contacts, rule, together, number, joints, log):
+    """Each contact once, fastest approach first; arguments and answer as `respond_sequential`. The law and `together` do not matter."""
     m = contacts.gap.shape[0]
     done = np.zeros(m, np.bool_)
     u, impulse = np.empty(3), np.empty(3)
     count = 0
     while count < m and count < log.shape[0]:
-        best, fastest = -1, -tolerance
+        best, fastest = -1, -rule.tolerance
         for c in range(m):
             approach = relative_velocity(bodies, contacts, c, u)
             if not done[c] and approach < fastest:
@@ -32,7 +32,7 @@ def respond_kinematic(bodies, contacts, law, together, rest_speed, tolerance, sc
         a, b = contacts.body_a[best], contacts.body_b[best]
         n = contacts.normal[best]
         e = contacts.restitution[best]
-        if e * -fastest <= rest_speed[best]:
+        if e * -fastest <= rule.rest_speed[best]:
             e = 0.0
         change = -(1.0 + e) * fastest
         share_a = 0.0 if bodies.inv_mass[a] == 0.0 else (1.0 if bodies.inv_mass[b] == 0.0 else 0.5)

@@ -1,4 +1,4 @@
-"""Impulses at contacts: the kinematics of a contact, the single impact, and the sequence of impacts of a group.
+"""Impulses at contacts: the kinematics of a contact, the single impact, and the speed of an island.
 
 A contact has arms r_a, r_b from the centres of mass to its points and the unit normal n from a to b. With
 
@@ -7,48 +7,17 @@ A contact has arms r_a, r_b from the centres of mass to its points and the unit 
     j = -(1 + e) u.n / (n.K n)                                             frictionless impulse, A9 (Hahn 1988; Baraff 1989)
 
 the impulse J acts + on b and - on a at the contact: v_b += J / m_b, w_b += I_b^-1 (r_b x J), and the mirror for a.
-Immovable bodies have zero inverse mass and inertia. All bodies' rows stand in arrays of the whole scene; a kernel
-touches only those its contacts name.
+Immovable bodies have zero inverse mass and inertia. The arrays hold all bodies of the scene; a
+kernel reads and writes only the bodies of its contacts.
 """
 
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.impact.friction import contact_impulse
-
-
-class BodyState(NamedTuple):
-    """What respond and constrain need of every body at one instant, world frame."""
-
-    position: np.ndarray  # (n, 3) m, centre of mass
-    orientation: np.ndarray  # (n, 4) wxyz, principal frame
-    velocity: np.ndarray  # (n, 3) m/s
-    angular_velocity: np.ndarray  # (n, 3) rad/s
-    inv_mass: np.ndarray  # (n,) 1/kg, 0 for immovable
-    inv_inertia: np.ndarray  # (n, 3, 3) 1/(kg m2), world axes
-
-
-class Contacts(NamedTuple):
-    """The contacts of one group."""
-
-    body_a: np.ndarray  # (m,)
-    body_b: np.ndarray  # (m,)
-    arm_a: np.ndarray  # (m, 3) m
-    arm_b: np.ndarray  # (m, 3) m
-    normal: np.ndarray  # (m, 3)
-    gap: np.ndarray  # (m,) m
-    restitution: np.ndarray  # (m,)
-    tangential_restitution: np.ndarray  # (m,)
-    static_friction: np.ndarray  # (m,)
-    dynamic_friction: np.ndarray  # (m,)
-
-
-def select(contacts: Contacts, which: np.ndarray) -> Contacts:
-    """The contacts at the given places."""
-    return Contacts(*(np.ascontiguousarray(column[which]) for column in contacts))
+from rigidimpulse.dynamics.impact.restitution import PairLaw
 
 
 @jit
@@ -122,7 +91,7 @@ def resolve_contact(bodies, contacts, c, restitution, law, log, count):
     inverse_effective_mass(bodies, contacts, c, k)
     e_t = contacts.tangential_restitution[c] if restitution > 0.0 else 0.0
     mu_s, mu_k = contacts.static_friction[c], contacts.dynamic_friction[c]
-    contact_impulse(k, contacts.normal[c], u, restitution, e_t, mu_s, mu_k, law, t1, t2, impulse)
+    contact_impulse(k, contacts.normal[c], u, PairLaw(law, restitution, e_t, mu_s, mu_k), t1, t2, impulse)
     apply_impulse(bodies, contacts, c, impulse[0], impulse[1], impulse[2])
     return log_impact(bodies, contacts, c, impulse, approach, log, count)
 
@@ -146,7 +115,7 @@ def log_impact(bodies, contacts, c, impulse, approach, log, count):
 
 @jit
 def speed_scale(bodies, contacts):
-    """Largest speed of a contact point of the group's bodies [m/s]; what 'approaching' is measured against."""
+    """Largest speed of a contact point of the island's bodies [m/s]; what 'approaching' is measured against."""
     scale = 0.0
     for c in range(contacts.gap.shape[0]):
         for i, r in ((contacts.body_a[c], contacts.arm_a[c]), (contacts.body_b[c], contacts.arm_b[c])):

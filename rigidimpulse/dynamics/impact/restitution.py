@@ -28,6 +28,8 @@ p, all ends in closed form.
 from math import inf, sqrt
 from typing import NamedTuple
 
+import numpy as np
+
 from rigidimpulse.core.kernels import jit
 
 NEWTON, POISSON, ENERGETIC, AUTO = 0, 1, 2, 3
@@ -37,6 +39,25 @@ LAWS = {"newton": NEWTON, "poisson": POISSON, "energetic": ENERGETIC, "auto": AU
 # Places in the array of a process: u_n, s, J; p_c, W_c, p_r, W_r; 1 while compressed, else 0.
 UN, S1, S2, JN, J1, J2, PC, WC, PR, WR, COMPRESSED = range(11)
 PLACES = 11
+
+
+class ImpactRule(NamedTuple):
+    """How the m contacts of an island rebound, and which speeds count."""
+
+    law: int  # one of LAWS
+    rest_speed: np.ndarray  # (m,) m/s, a slower rebound is none
+    tolerance: float  # m/s, a slower approach is none
+    scale: float  # m/s, speed of the island
+
+
+class PairLaw(NamedTuple):
+    """The law of one contact and its coefficients."""
+
+    law: int  # one of LAWS
+    e: float  # restitution
+    e_t: float  # tangential restitution
+    mu_s: float  # static friction
+    mu_k: float  # dynamic friction
 
 
 class PointMass(NamedTuple):
@@ -71,8 +92,9 @@ def _positive_root(constant, slope, bend):
 
 
 @jit
-def _left_of_restitution(law, e, k, start, f1, f2, g_n, g_1, g_2, q):
-    """Normal impulse until the law ends the impact, if it goes on along (1, f1, f2); inf if it never does."""
+def _left_of_restitution(law, e, k, start, f, g, q):
+    """Normal impulse until the law ends the impact, if it goes on along (1, f); inf if it never does. g = K (1, f)."""
+    (f1, f2), (g_n, g_1, g_2) = f, g
     if law == POISSON:
         return max(e * q[PC] - q[PR], 0.0)
     if law == NEWTON:
@@ -108,7 +130,7 @@ def go_straight(law, e, k, start, f1, f2, limit, q):
             end = inf
         else:
             turn = max(q[UN], 0.0) / -g_n if g_n < 0.0 else inf
-            end = _left_of_restitution(law, e, k, start, f1, f2, g_n, g_1, g_2, q)
+            end = _left_of_restitution(law, e, k, start, (f1, f2), (g_n, g_1, g_2), q)
         step = min(min(turn, end), limit)
         if step == inf:
             return False

@@ -1,11 +1,11 @@
 """Impacts of many contacts at one instant.
 
-`respond_sequential` goes contact pair by contact pair, fastest approach first: one contact point as in impulse.py,
-several as one block (a box landing on a face is one impact with four points; block.py); what no longer rebounds is
+`respond_sequential` goes contact pair by contact pair, fastest approach first: one contact point as in `point`,
+several as one block (a box landing on a face is one impact with four points; see `block`); what no longer rebounds is
 finished by one inelastic block. It passes k balls for k in Newton's cradle. Where bodies already bear each other (a ball
 that falls on a stack) all contacts are one block, with rebound where they approach: pair after pair, hundreds of
 impulses would run to and fro in the stack and eat all energy (compliant references: a ball at 5 m/s on five boxes, e =
-0.5, leaves with 1.8 to 2.7 m/s; one block 2.5, pairs 0.8). `respond_simultaneous` takes the whole group as one block.
+0.5, leaves with 1.8 to 2.7 m/s; one block 2.5, pairs 0.8). `respond_simultaneous` takes the whole island as one block.
 Both follow the rules of Smith et al. 2012 (momentum kept, one-sided impulses, energy bounded);
 they differ in which of the physically possible answers a chain of bodies gives.
 """
@@ -13,10 +13,14 @@ they differ in which of the physically possible answers a chain of bodies gives.
 import numpy as np
 
 from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.dynamics.constraints.joint_impact import JointBlock
 from rigidimpulse.dynamics.impact.block import rebound_of, solve_block
-from rigidimpulse.dynamics.impact.point import Contacts, relative_velocity, resolve_contact
+from rigidimpulse.dynamics.impact.point import relative_velocity, resolve_contact
+from rigidimpulse.dynamics.impact.restitution import ImpactRule
+from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.motion.body_state import BodyState
 
-# Impulses per contact before a group is finished without rebound.
+# Impulses per contact before an island is finished without rebound.
 IMPULSES_PER_CONTACT = 200
 # Impulses per contact after which it is asked whether contacts have collapsed, and the part of its approach speed that a collapsed one
 # could still have.
@@ -37,11 +41,12 @@ def _approaching(bodies, contacts, tolerance, rebounding, rest_speed):
 
 
 @jit_making_arrays
-def resolve_singles(bodies, contacts, law, rebound, rest_speed, tolerance, cap, log, count):
+def resolve_singles(bodies, contacts, rule, rebound, cap, log, count):
     """Impacts of pairs with one contact, fastest first, until the fastest is of another pair; `rebound` 1, or 0 for inelastic ones.
 
     Returns (new count of log, impulses made, the fastest contact left or -1).
     """
+    law, rest_speed, tolerance = rule.law, rule.rest_speed, rule.tolerance
     u = np.empty(3)
     made, best = 0, -1
     while made < cap and count + contacts.gap.shape[0] < log.shape[0]:
@@ -58,15 +63,14 @@ def resolve_singles(bodies, contacts, law, rebound, rest_speed, tolerance, cap, 
 
 
 def respond_sequential(
-    bodies, contacts: Contacts, law: int, together: bool, rest_speed, tolerance: float, scale: float, number, joints, log
+    bodies: BodyState, contacts: Contacts, rule: ImpactRule, together: bool, number: np.ndarray, joints: JointBlock | None, log: np.ndarray
 ) -> tuple[int, int, bool]:
     """Pair after pair, fastest approach first. Returns (rows written to log, impulses made, whether the cap was reached).
 
     A full log ends the call early, without the inelastic finish: read it and call again.
 
-    law: one of `restitution.LAWS`; together: whether bodies press on each other, so that all contacts are one block; rest_speed
-    (m,): a rebound slower than this is none [m/s]; tolerance: slower approach is none [m/s]; scale: speed of the group; joints:
-    None, or the `JointBlock` of the group, whose rows take part in every impulse.
+    together: whether bodies press on each other, so that all contacts are one block; number (n,): working memory; joints: None, or the
+    `JointBlock` of the island, whose rows take part in every impulse; log (k, 7): see `point.log_impact`.
     """
     m = len(contacts.gap)
     everything = np.arange(m)
@@ -75,11 +79,11 @@ def respond_sequential(
     blocks_only = joints is not None or (together and m > 1)
     while impulses < cap and count + m < len(log):
         if impulses >= round_cap:
-            rest_speed = np.where(_collapsed(contacts, log[:count]), np.inf, rest_speed)
+            rule = rule._replace(rest_speed=np.where(_collapsed(contacts, log[:count]), np.inf, rule.rest_speed))
         if blocks_only:
-            c = _approaching(bodies, contacts, tolerance, 1.0, rest_speed)
+            c = _approaching(bodies, contacts, rule.tolerance, 1.0, rule.rest_speed)
         else:
-            count, made, c = resolve_singles(bodies, contacts, law, 1.0, rest_speed, tolerance, round_cap, log, count)
+            count, made, c = resolve_singles(bodies, contacts, rule, 1.0, round_cap, log, count)
             impulses += made
             if made == round_cap:
                 continue
@@ -87,10 +91,10 @@ def respond_sequential(
             break
         same_pair = (contacts.body_a == contacts.body_a[c]) & (contacts.body_b == contacts.body_b[c])
         subset = everything if together else np.flatnonzero(same_pair)
-        count = solve_block(bodies, contacts, subset, 1.0, law, rest_speed, scale, number, joints, log, count)
+        count += solve_block(bodies, contacts, subset, 1.0, rule, number, joints, log[count:])
         impulses += 1
-    if count + m < len(log) and _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
-        count = _finish(bodies, contacts, law, rest_speed, tolerance, scale, number, joints, log, count)
+    if count + m < len(log) and _approaching(bodies, contacts, rule.tolerance, 0.0, rule.rest_speed) >= 0:
+        count = _finish(bodies, contacts, rule, number, joints, log, count)
         impulses += 1
     return count, impulses, impulses >= cap
 
@@ -107,28 +111,28 @@ def _collapsed(contacts: Contacts, log: np.ndarray) -> np.ndarray:
 
 
 def _finish(
-    bodies, contacts: Contacts, law: int, rest_speed, tolerance: float, scale: float, number, joints, log, count: int
+    bodies: BodyState, contacts: Contacts, rule: ImpactRule, number: np.ndarray, joints: JointBlock | None, log: np.ndarray, count: int
 ) -> int:
     """One inelastic impulse of all contacts."""
     if len(contacts.gap) == 1 and joints is None:
-        return resolve_singles(bodies, contacts, law, 0.0, rest_speed, tolerance, 1, log, count)[0]
+        return resolve_singles(bodies, contacts, rule, 0.0, 1, log, count)[0]
     subset = np.arange(len(contacts.gap))
-    return solve_block(bodies, contacts, subset, 0.0, law, rest_speed, scale, number, joints, log, count)
+    return count + solve_block(bodies, contacts, subset, 0.0, rule, number, joints, log[count:])
 
 
 def respond_simultaneous(
-    bodies, contacts: Contacts, law: int, _together: bool, rest_speed, tolerance: float, scale: float, number, joints, log
+    bodies: BodyState, contacts: Contacts, rule: ImpactRule, _together: bool, number: np.ndarray, joints: JointBlock | None, log: np.ndarray
 ) -> tuple[int, int, bool]:
-    """The whole group as one block; same arguments and answer as `respond_sequential`."""
-    if _approaching(bodies, contacts, tolerance, 0.0, rest_speed) < 0:
+    """The whole island as one block; same arguments and answer as `respond_sequential`."""
+    if _approaching(bodies, contacts, rule.tolerance, 0.0, rule.rest_speed) < 0:
         return 0, 0, False
     if len(contacts.gap) == 1 and joints is None:
         # The only contact, by the law of a single one; inelastic where it is too slow to rebound.
-        return respond_sequential(bodies, contacts, law, False, rest_speed, tolerance, scale, number, joints, log)
+        return respond_sequential(bodies, contacts, rule, False, number, joints, log)
     subset = np.arange(len(contacts.gap))
-    count = solve_block(bodies, contacts, subset, 1.0, law, rest_speed, scale, number, joints, log, 0)
+    count = solve_block(bodies, contacts, subset, 1.0, rule, number, joints, log)
     impulses = 1
-    if _approaching(bodies, contacts, tolerance, 0.0, rest_speed) >= 0:
-        count = _finish(bodies, contacts, law, rest_speed, tolerance, scale, number, joints, log, count)
+    if _approaching(bodies, contacts, rule.tolerance, 0.0, rule.rest_speed) >= 0:
+        count = _finish(bodies, contacts, rule, number, joints, log, count)
         impulses += 1
     return count, impulses, False

@@ -1,6 +1,6 @@
 """The penalty method: bodies go into each other, and springs push them out.
 
-At every point that is inside (`penalty_points`), of depth d, with u the velocity of b less that of a there and n the normal from a to b,
+At every point that is inside (see `points`), of depth d, with u the velocity of b less that of a there and n the normal from a to b,
 
     N = k d - c u.n,  none where that would pull,        force on b:  N n + F_t,  on a the opposite, on the same line
     F_t = -mu N c_t u_t / sqrt((c_t |u_t|)^2 + (mu N)^2),    u_t = u - (u.n) n,    c_t = 2 sqrt(k m),    1 / m = n.K n
@@ -28,17 +28,19 @@ T. Poeschel, Coefficient of restitution and linear-dashpot model revisited, Gran
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import root_scalar
 
 from rigidimpulse.collision.manifold.penetrating_points import find_points
-from rigidimpulse.collision.manifold.penetrating_surface import inward_axes, solid_geometry
+from rigidimpulse.collision.manifold.penetrating_surface import BodyPoses, PointBuffer, Solids, inward_axes, solid_geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.dynamics.forces.force import ForceTable, Instant
-from rigidimpulse.dynamics.impact.point import BodyState
-from rigidimpulse.engine.touching import bring_all
+from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
+from rigidimpulse.motion.evaluate import bring_all
 
 REST_DEPTH, IMPACT_DEPTH = 4e-4, 0.02
 MOST_DAMPING = 3.0
@@ -76,12 +78,20 @@ def _inverse_mass(inv_mass, inv_inertia, i, r, n):
     return total
 
 
-@jit_making_arrays
-def push(real, integer, count, asked, bodies, stiffness, damping, ratio, friction, material_of_body, out, pushes):
-    """Add the forces and torques of points (count,) to out (n, 6), where asked (count,); mark those that push in pushes (count,).
+class PenaltySprings(NamedTuple):
+    """The springs and dampers of all pairs of n bodies of k materials."""
 
-    stiffness (n, n) N/m; damping N s/m, or negative: from ratio (k, k), z of two materials; friction (k, k).
-    """
+    stiffness: np.ndarray  # (n, n) N/m
+    damping: float  # N s/m, or negative: from ratio
+    ratio: np.ndarray  # (k, k) damping ratio z of two materials
+    friction: np.ndarray  # (k, k)
+
+
+@jit_making_arrays
+def push(points, count, asked, bodies, springs, material_of_body, out, pushes):
+    """Add the forces and torques of points (count,) to out (n, 6), where asked (count,); mark those that push in pushes (count,)."""
+    real, integer = points
+    stiffness, damping, ratio, friction = springs
     u, f, n, r = np.empty(3), np.empty(3), np.empty(3), np.empty((2, 3))
     for c in range(count):
         a, b, depth = integer[c, 0], integer[c, 1], real[c, 6]
@@ -120,11 +130,11 @@ def push(real, integer, count, asked, bodies, stiffness, damping, ratio, frictio
             out[b, 3 + k] += r[1, m] * f[p] - r[1, p] * f[m]
 
 
-def penalty_tables(world) -> list[PenaltyForces]:
+def penalty_tables(world: World) -> list[PenaltyForces]:
     """The springs of a compiled scene: none where no two bodies can touch."""
     a, b = np.triu_indices(world.num_bodies, 1)
-    touch = (world.dynamic[a] | world.dynamic[b]) & ~world.is_apart(a, b)
-    return [PenaltyForces(world, np.stack([a[touch], b[touch]], axis=1))] if touch.any() else []
+    may_meet = (world.dynamic[a] | world.dynamic[b]) & ~world.is_apart(a, b)
+    return [PenaltyForces(world, np.stack([a[may_meet], b[may_meet]], axis=1))] if may_meet.any() else []
 
 
 class PenaltyForces(ForceTable):
@@ -138,28 +148,29 @@ class PenaltyForces(ForceTable):
     kind = "penalty forces"
     switches = True
 
-    def __init__(self, world, pairs: np.ndarray) -> None:
+    def __init__(self, world: World, pairs: np.ndarray) -> None:
         """Springs between pairs (p, 2), one at least, of bodies of a compiled scene whose response is "penalty"."""
         dynamic = np.flatnonzero(world.dynamic)
         self.names, self.body, self.cause = ["penalty"], dynamic, np.zeros(len(dynamic), np.int64)
         self.links = np.array([(dynamic[0], i) for i in dynamic[1:]], np.int64).reshape(-1, 2)
         self.is_steady = not world.moving.any()
         self._world, self._carried = world, np.flatnonzero(~world.dynamic)
-        self._geometry = solid_geometry(world.shapes) if world.cylinders is not None else world.geometry
-        self._axes = inward_axes(self._geometry)
+        geometry = solid_geometry(world.shapes) if world.cylinders is not None else world.geometry
+        self._solids = Solids(geometry, *inward_axes(geometry))
         self._pairs = pairs
         self.stiffness = _stiffness(world, self._pairs)
         given = world.accuracy.penalty_damping
         self._damping = -1.0 if given is None else float(given)
-        e, self._friction = world.coefficients[:, :, 0], np.ascontiguousarray(world.coefficients[:, :, 2])
-        self._ratio = np.array([[damping_ratio(float(value)) for value in line] for line in e])
+        e, friction = world.coefficients[:, :, 0], np.ascontiguousarray(world.coefficients[:, :, 2])
+        ratio = np.array([[damping_ratio(float(value)) for value in line] for line in e])
+        self._springs = PenaltySprings(self.stiffness, self._damping, ratio, friction)
         self._bodies = BodyState(
             world.position.copy(), world.orientation.copy(), np.zeros((world.num_bodies, 3)), np.zeros((world.num_bodies, 3)),
             world.inv_mass, np.zeros((world.num_bodies, 3, 3)),
         )
         self._rotation = np.array([to_matrix(q) for q in world.orientation])
         self._unused = np.empty((2, world.num_bodies, 3))
-        self._real, self._integer = np.empty((CAPACITY, 7)), np.empty((CAPACITY, 4), np.int64)
+        self._points_found = PointBuffer(np.empty((CAPACITY, 7)), np.empty((CAPACITY, 4), np.int64))
         self._frozen: np.ndarray | None = None
         self.reason = self._told()
 
@@ -173,12 +184,12 @@ class PenaltyForces(ForceTable):
         world = self._world
         while True:
             count = find_points(
-                self._geometry, *self._axes, world.shape_of_body, world.bound_radius, self._pairs, self._bodies.position, self._rotation,
-                self._real, self._integer,
-            )
-            if count <= len(self._real):
+                self._solids, world.shape_of_body, world.bound_radius, self._pairs,
+                BodyPoses(self._bodies.position, self._rotation), self._points_found,
+            )  # fmt: skip
+            if count <= len(self._points_found.real):
                 return int(count)
-            self._real, self._integer = np.empty((2 * count, 7)), np.empty((2 * count, 4), np.int64)
+            self._points_found = PointBuffer(np.empty((2 * count, 7)), np.empty((2 * count, 4), np.int64))
 
     def _points(self, at: Instant) -> int:
         """Take over the states of an instant and find the points."""
@@ -192,18 +203,15 @@ class PenaltyForces(ForceTable):
     def _push(self, count: int, asked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Forces and torques (n, 6) of the points asked for (count,), and what pushes: rows of a, b and what touches."""
         out, pushes = np.zeros((self._world.num_bodies, 6)), np.zeros(count, np.bool_)
-        push(
-            self._real, self._integer, count, asked, self._bodies, self.stiffness, self._damping, self._ratio, self._friction,
-            self._world.material_of_body, out, pushes,
-        )
-        return out, self._integer[:count][pushes]
+        push(self._points_found, count, asked, self._bodies, self._springs, self._world.material_of_body, out, pushes)
+        return out, self._points_found.integer[:count][pushes]
 
     def wrench(self, at: Instant, rows: np.ndarray) -> np.ndarray:
         """Force and torque of rows."""
         count = self._points(at)
         asked = np.ones(count, np.bool_)
         if self._frozen is not None:
-            asked = (self._integer[:count, None] == self._frozen[None]).all(axis=2).any(axis=1)
+            asked = (self._points_found.integer[:count, None] == self._frozen[None]).all(axis=2).any(axis=1)
         return self._push(count, asked)[0][self.body[rows]]
 
     def freeze(self, at: Instant | None) -> None:
@@ -225,12 +233,12 @@ class PenaltyForces(ForceTable):
             self._bodies.position[:] = position[f]
             self._rotation[:] = [to_matrix(q) for q in orientation[f]]
             count = self._find()
-            k = self.stiffness[self._integer[:count, 0], self._integer[:count, 1]]
-            values[f, 0] = 0.5 * float(k @ self._real[:count, 6] ** 2)
+            k = self.stiffness[self._points_found.integer[:count, 0], self._points_found.integer[:count, 1]]
+            values[f, 0] = 0.5 * float(k @ self._points_found.real[:count, 6] ** 2)
         return values
 
 
-def _stiffness(world, pairs: np.ndarray) -> np.ndarray:
+def _stiffness(world: World, pairs: np.ndarray) -> np.ndarray:
     """Stiffness (n, n) N/m of all pairs (p, 2): as given, or as the head of the module says."""
     accuracy, (a, b) = world.accuracy, pairs.T
     stiffness = np.zeros((world.num_bodies, world.num_bodies))

@@ -1,12 +1,12 @@
-"""What a step of nets must keep: momentum, angular momentum, and no energy out of nothing.
+"""What a step of soft bodies must keep: momentum, angular momentum, and no energy out of nothing.
 
-Momentum and angular momentum of every piece of a net that is not pinned to the world follow from what acted on it,
+Momentum and angular momentum of every piece of a soft body that is not pinned to the world follow from what acted on it,
 
     P1 = P0 + h (M g + sum of f),    L1 = L0 + X0 x h M g + sum of (c + r) x h f
 
 with c the place at which an impulse h f acts on the centre of the rigid body it comes from (see `lever_place`) and r the arm there. The
-implicit Euler step keeps P but for the solver's tolerance, and lets L of what turns decay by (h w)^2 a step; a rigid velocity added to
-the piece sets both right. Energy: with grad Phi = 0 the step changes K + E, but for the work of what acts from outside, by
+implicit Euler step keeps P to the solver's tolerance, and lets L of what turns decay by (h w)^2 a step; a rigid velocity added to
+the piece sets both right. Energy: with grad Phi = 0 the step changes K + E by the work of outer forces and by
 
     G = E(x1) - E(x0) - grad E~(x1) . dx - sum of m |v1 - v0|^2 / 2 + ...    (implicit Euler; E~ with dampers)
 
@@ -40,7 +40,9 @@ def rigid_motion(mass: np.ndarray, x: np.ndarray, momentum: np.ndarray, angular_
     return momentum / total + cross(spin, arm)
 
 
-def set_momenta(mass, x, velocity, momentum, angular_momentum) -> None:
+def set_momenta(
+    mass: np.ndarray, x: np.ndarray, velocity: np.ndarray, momentum: np.ndarray, angular_momentum: np.ndarray
+) -> None:
     """Bring the momenta of points to the given ones, about the origin, by a rigid velocity, in place; twice, against round-off."""
     for _ in range(2):
         lacking = momentum - mass @ velocity
@@ -49,7 +51,7 @@ def set_momenta(mass, x, velocity, momentum, angular_momentum) -> None:
             velocity += rigid_motion(mass, x, lacking, lacking_angular)
 
 
-def take_energy(mass, x, velocity, pieces: list[np.ndarray], excess: float) -> float:
+def take_energy(mass: np.ndarray, x: np.ndarray, velocity: np.ndarray, pieces: list[np.ndarray], excess: float) -> float:
     """Take kinetic energy (J) from the motion of each piece relative to its rigid motion, in place; returns what could not be taken."""
     inner = []
     for piece in pieces:
@@ -58,6 +60,7 @@ def take_energy(mass, x, velocity, pieces: list[np.ndarray], excess: float) -> f
         arm = place - centre
         rigid = rigid_motion(m, arm, m @ v, (m[:, None] * cross(arm, v)).sum(0))
         inner.append((piece, rigid, v - rigid, 0.5 * float(m @ np.einsum("ij,ij->i", v - rigid, v - rigid))))
+    # The motion relative to the rigid one carries neither momentum nor angular momentum.
     there = sum(part[3] for part in inner)
     kept = np.sqrt(max(0.0, 1.0 - excess / there)) if there > 0.0 else 1.0
     for piece, rigid, relative, _ in inner:

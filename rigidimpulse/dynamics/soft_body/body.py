@@ -20,6 +20,7 @@ from rigidimpulse.scene.surface import check_triangles
 
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force import ForceTable
+    from rigidimpulse.model.world import World
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class FlexibleBody:
         area_density: kg/m^2.
         pinned: vertices that stay where they are in the world.
         attached: vertices by the name of the body that they are fastened to.
-        material: density and friction. Restitution is 0: nets do not rebound by themselves.
+        material: density and friction. Restitution is 0: a soft body rebounds by its own elasticity only.
         position: (3,) m, orientation: (w, x, y, z): pose of the mesh's own frame at the start.
         velocity: (3,) m/s, angular_velocity: (3,) rad/s about the origin of that frame, world axes.
         gravity_factor: scales the scene's gravity for this body.
@@ -68,13 +69,13 @@ class FlexibleBody:
     stage: ClassVar[str] = "forces"
     kind: ClassVar[str] = "flexible bodies"
 
-    def bind(self, _world) -> Skip:
-        """Nets are moved by `Flexibles`, all together, not by a stage of their own."""
+    def bind(self, _world: World) -> Skip:
+        """Soft bodies are moved by `Flexibles`, all together, not by a stage of their own."""
         return Skip("a flexible body; see flexible bodies")
 
     @classmethod
-    def compile(cls, _bodies: Sequence[Self], world) -> ForceTable:
-        """Return what all nets of a compiled scene do to its rigid bodies.
+    def compile(cls, _bodies: Sequence[Self], world: World) -> ForceTable:
+        """Return what all soft bodies of a compiled scene do to its rigid bodies.
 
         Raises:
             SceneError: naming the body, the value and the remedy.
@@ -105,7 +106,7 @@ class FlexibleBody:
         return vertices, faces
 
     def build(self) -> SpringMesh:
-        """Return its net, in its rest shape, placed where it starts.
+        """Return its mass-spring mesh, in its rest shape, placed where it starts.
 
         Raises:
             SceneError: naming the body, the value and the remedy.

@@ -1,23 +1,39 @@
 """Conjugate gradients for the linear systems of an implicit step.
 
-The matrix is that of the net (3 x 3 blocks in compressed rows) plus that of the rigid bodies (6 x 6 blocks) plus J^T D J of the
+The matrix is that of the soft bodies (3 x 3 blocks in compressed rows) plus that of the rigid bodies (6 x 6 blocks) plus J^T D J of the
 contacts, which join both and are applied one by one. The preconditioner inverts the blocks on the diagonal, contacts included.
 Source: Hestenes, Stiefel 1952; on cloth: Baraff, Witkin 1998.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rigidimpulse.collision.distance.simplices import cross, row
 from rigidimpulse.core.copying import copy_matrix
 from rigidimpulse.core.kernels import jit, jit_making_arrays
-from rigidimpulse.dynamics.soft_body.contact_terms import add_to_ends, miss
+from rigidimpulse.dynamics.soft_body.contact_terms import SoftContacts, add_to_ends, miss
+
+
+class LinearSystem(NamedTuple):
+    """The matrix of n vertices, r rigid bodies and m contacts."""
+
+    first: np.ndarray  # (n + 1,) first block of each vertex
+    column: np.ndarray  # (b,) vertex of each block's column
+    block: np.ndarray  # (b, 3, 3)
+    free: np.ndarray  # (n,) bool, vertices that nothing holds
+    rigid: np.ndarray  # (r, 6, 6)
+    contacts: SoftContacts
+    no_aim: SoftContacts  # the same with aims of zero: u is then linear in z
+    D: np.ndarray  # (m, 3, 3) second derivatives of psi by u
 
 
 @jit
-def apply_matrix(first, column, block, free, rigid, contacts, no_aim, D, z, out):
+def apply_matrix(system, z, out):
     """Write the matrix times z (n + 2 r, 3); rows of vertices that are not free are zero."""
+    first, column, block, free, rigid, contacts, no_aim, D = system
     n = free.shape[0]
     for i in range(n):
         s0, s1, s2 = 0.0, 0.0, 0.0
@@ -112,11 +128,12 @@ def _inner(a, b):
 
 
 @jit_making_arrays
-def conjugate_gradients(first, column, block, free, rigid, contacts, no_aim, D, node_inverse, rigid_inverse, r, accuracy, most, z):
+def conjugate_gradients(system, node_inverse, rigid_inverse, r, accuracy, most, z):
     """Write the solution z (n + 2 b, 3) of matrix z = r; r is destroyed. Returns the number of iterations.
 
     It ends where r has fallen to `accuracy` times its start in the preconditioner's norm, or after `most` iterations.
     """
+    free = system.free
     z[:] = 0.0
     s, p, image = np.empty_like(r), np.empty_like(r), np.empty_like(r)
     _precondition(node_inverse, rigid_inverse, free, r, s)
@@ -126,9 +143,9 @@ def conjugate_gradients(first, column, block, free, rigid, contacts, no_aim, D, 
     for count in range(most):
         if size <= goal or size <= 0.0:
             return count
-        apply_matrix(first, column, block, free, rigid, contacts, no_aim, D, p, image)
+        apply_matrix(system, p, image)
         bend = _inner(p, image)
-        if bend <= 0.0:  # a direction of negative curvature: what is there so far goes downhill (Steihaug 1983)
+        if bend <= 0.0:  # a direction of negative curvature: the sum so far goes downhill (Steihaug 1983)
             if count == 0:
                 copy_matrix(p, z)
             return count

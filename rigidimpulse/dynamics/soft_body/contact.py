@@ -1,23 +1,62 @@
-"""Where nets touch rigid bodies: vertices of nets on the surfaces of bodies, and sample points of bodies on faces of nets.
+"""Contacts of soft bodies with rigid bodies: vertices on the surfaces of bodies, and sample points of bodies on faces of soft bodies.
 
 Both are followed over the whole step, along straight ways: vertices as seen from the body, sample points against the moving faces. The
 first place that comes within the gap gives the plane of the contact, so that nothing passes through, whatever its speed. Sample points
-are vertices of meshes and boxes, the core of spheres and capsules with their radius, and points on the rims of cylinders.
+are vertices of meshes and boxes, the centres of spheres and axes of capsules with their radius, and points on the rims of cylinders.
 """
 
 from __future__ import annotations
 
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.distance.point import STACK, first_touch, first_touch_of_triangle, signed_distance
+from rigidimpulse.collision.distance.point import STACK, first_contact, first_contact_with_triangle, signed_distance
 from rigidimpulse.collision.distance.simplices import dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, Geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 
 RIM_POINTS = 16
-CORE_POINTS = 9
+AXIS_POINTS = 9
+
+
+class BodyShapes(NamedTuple):
+    """The shapes of n rigid bodies."""
+
+    geometry: Geometry
+    shape_of_body: np.ndarray  # (n,)
+    radius: np.ndarray  # (n,) m, bound about the centre of mass
+
+
+class PosesOverStep(NamedTuple):
+    """Poses of n rigid bodies at both ends of a step."""
+
+    position: np.ndarray  # (n, 3) m
+    rotation: np.ndarray  # (n, 3, 3)
+    end_position: np.ndarray  # (n, 3) m
+    end_rotation: np.ndarray  # (n, 3, 3)
+
+
+class MovingFaces(NamedTuple):
+    """The faces of all soft bodies over a step."""
+
+    geometry: Geometry  # one mesh
+    low: np.ndarray  # (N, 3) m, boxes of its tree, see `fit_boxes`
+    high: np.ndarray  # (N, 3) m
+    start: np.ndarray  # (v, 3) m, vertices
+    end: np.ndarray  # (v, 3) m
+    skip: np.ndarray  # (v, n) bool, vertices and bodies that do not collide
+
+
+class MovingSamples(NamedTuple):
+    """Sample points of rigid bodies over a step."""
+
+    start: np.ndarray  # (s, 3) m
+    end: np.ndarray  # (s, 3) m
+    radius: np.ndarray  # (s,) m
+    body: np.ndarray  # (s,)
+    every: np.ndarray  # (s,) bool, whether to find all faces that a sample meets, or its first one only
 
 
 @jit
@@ -32,16 +71,16 @@ def _into_frame(R, x, p):
 
 
 @jit_making_arrays
-def vertices_on_bodies(geometry, shape_of_body, radius, x0, R0, x1, R1, start, end, gap, skip, out_int, out_real):
-    """Find vertices that come within the gap of bodies; returns their number, which may exceed the room in the output.
+def vertices_on_bodies(bodies, poses, start, end, gap, skip, out_int, out_real):
+    """Find vertices that come within the gap of bodies; returns their number, which may exceed the size of the output.
 
     Args:
-        geometry, shape_of_body: compiled shapes. radius: (b,) m, bound of each body about its centre of mass.
-        x0, R0, x1, R1: poses (b, 3), (b, 3, 3) of bodies at both ends of the step. start, end: (n, 3) m vertices there.
-        gap: m. skip: (n, b) bool, pairs that do not touch each other.
+        bodies: `BodyShapes`. poses: `PosesOverStep` of b bodies. start, end: (n, 3) m, vertices at both ends of the step.
+        gap: m. skip: (n, b) bool, pairs that do not collide.
         out_int: (k, 2) vertex, body. out_real: (k, 8) m, in the body's frame: normal, place of the surface, distance, time.
 
     """
+    (geometry, shape_of_body, radius), (x0, R0, x1, R1) = bodies, poses
     stack = np.empty(STACK, np.int64)
     count = 0
     for b in range(x0.shape[0]):
@@ -52,7 +91,7 @@ def vertices_on_bodies(geometry, shape_of_body, radius, x0, R0, x1, R1, start, e
             reach = radius[b] + gap + np.sqrt(dot(way, way))
             if dot(y0, y0) > reach * reach or skip[i, b]:
                 continue
-            time, distance, normal, place = first_touch(geometry, shape_of_body[b], y0, y1, gap, stack)
+            time, distance, normal, place = first_contact(geometry, shape_of_body[b], y0, y1, gap, stack)
             if time == inf:
                 continue
             if count < out_int.shape[0]:
@@ -85,17 +124,16 @@ def fit_boxes(geometry, start, end, low, high):
 
 
 @jit_making_arrays
-def samples_on_faces(geometry, low, high, p0, p1, radius, body, start, end, gap, skip, every, out_int, out_real):
-    """Find sample points that come within the gap of faces of nets; returns their number, which may exceed the room in the output.
+def samples_on_faces(faces, samples, gap, out_int, out_real):
+    """Find sample points that come within the gap of faces of soft bodies; returns their number, which may exceed the size of the output.
 
     Args:
-        geometry: faces of all nets as one mesh. low, high: boxes of its tree, see `fit_boxes`.
-        p0, p1: (s, 3) m, samples at both ends of the step. radius: (s,) m. body: (s,).
-        start, end: (n, 3) m, vertices. gap: m. skip: (n, b) bool, see `vertices_on_bodies`.
-        every: (s,) bool, whether to find all faces that a sample meets, or its first one only.
+        faces: `MovingFaces`. samples: `MovingSamples`. gap: m.
         out_int: (k, 2) sample, face. out_real: (k, 8) weights, normal from the sample to the face, distance at the start, time.
 
     """
+    geometry, low, high, start, end, skip = faces
+    p0, p1, radius, body, every = samples
     stack = np.empty(STACK, np.int64)
     count = 0
     for s in range(p0.shape[0]):
@@ -129,23 +167,24 @@ def samples_on_faces(geometry, low, high, p0, p1, radius, body, start, end, gap,
                 ways = (
                     subtract(row(end, i), corners[0]), subtract(row(end, j), corners[1]), subtract(row(end, m), corners[2])
                 )  # fmt: skip
-                time, w, n, away = first_touch_of_triangle(a, way, corners, ways, radius[s], gap)
+                time, w, n, away = first_contact_with_triangle(a, way, corners, ways, radius[s], gap)
                 if time == inf:
                     continue
                 if every[s]:
-                    _write_sample(count, s, t, w, n, away, time, out_int, out_real)
+                    _write_sample(count, s, t, (w, n, away, time), out_int, out_real)
                     count += 1
                 elif time < first or (time == first and away < nearest):
                     first, hit, weights, normal, nearest = time, t, w, n, away
         if hit >= 0:
-            _write_sample(count, s, hit, weights, normal, nearest, first, out_int, out_real)
+            _write_sample(count, s, hit, (weights, normal, nearest, first), out_int, out_real)
             count += 1
     return count
 
 
 @jit
-def _write_sample(c, s, face, weights, normal, distance, time, out_int, out_real):
-    """Row c of what `samples_on_faces` finds, if there is room."""
+def _write_sample(c, s, face, found, out_int, out_real):
+    """Write row c of the output of `samples_on_faces`, if the output has it."""
+    weights, normal, distance, time = found
     if c < out_int.shape[0]:
         out_int[c, 0], out_int[c, 1] = s, face
         for k in range(3):
@@ -154,8 +193,12 @@ def _write_sample(c, s, face, weights, normal, distance, time, out_int, out_real
 
 
 @jit
-def distances_at(geometry, shape_of_body, x1, R1, body, place, limit, stack, distance, normal):
-    """Write signed distances (k,) of places (k, 3) from one body each, and the outward normals (k, 3) there, in the world."""
+def distances_at(bodies, poses, body, place, limit, stack, distance, normal):
+    """Write signed distances (k,) of places (k, 3) from one body each, and the outward normals (k, 3) there, in the world.
+
+    bodies: `BodyShapes`; poses: positions (n, 3) and rotations (n, 3, 3).
+    """
+    geometry, shape_of_body, (x1, R1) = bodies.geometry, bodies.shape_of_body, poses
     for c in range(body.shape[0]):
         b = body[c]
         p = _into_frame(R1[b], x1[b], row(place, c))
@@ -176,7 +219,7 @@ def sample_points(geometry: Geometry, shape: int) -> tuple[np.ndarray, np.ndarra
         else:
             found, radius = geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]], float(geometry.radius[p])
             if len(found) == 2:
-                found = np.linspace(found[0], found[1], CORE_POINTS)
+                found = np.linspace(found[0], found[1], AXIS_POINTS)
         points.append(found)
         radii.append(np.full(len(found), radius))
     return np.concatenate(points), np.concatenate(radii)

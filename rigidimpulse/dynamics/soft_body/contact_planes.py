@@ -1,4 +1,4 @@
-"""From touches to contacts: planes, aims and friction of everything that nets may touch in a step.
+"""From touches to contacts: planes, aims and friction of everything that soft bodies may touch in a step.
 
 A vertex that touches at the place s of a body, with the normal n there, shall end above the plane through s: u.n >= 0 with the gap g kept
 (the distance it starts with, where that is less). The slip is its way in that plane over the step relative to the material point at s.
@@ -14,17 +14,26 @@ import numpy as np
 
 from rigidimpulse.collision.geometry import ROUND, CompiledShape, Geometry, Primitive, build_geometry
 from rigidimpulse.core.quaternion import cross
-from rigidimpulse.dynamics.soft_body.contact import fit_boxes, sample_points, samples_on_faces, vertices_on_bodies
+from rigidimpulse.dynamics.soft_body.contact import (
+    BodyShapes,
+    MovingFaces,
+    MovingSamples,
+    PosesOverStep,
+    fit_boxes,
+    sample_points,
+    samples_on_faces,
+    vertices_on_bodies,
+)
 from rigidimpulse.dynamics.soft_body.contact_terms import SoftContacts
 
-LIFT = 0.2
+CORRECTION = 0.2
 """Share of a missing gap that a vertex is moved by, per step, without any velocity."""
 SLIPS = 1e-3
 """Slip speed above which dynamic friction counts, relative to what gravity gives in the step."""
 
 
 class RigidMotion(NamedTuple):
-    """All n rigid bodies over a step of h s, as they would move without the nets. Principal frames, world axes."""
+    """All n rigid bodies over a step of h s, as they would move without the soft bodies. Principal frames, world axes."""
 
     position: np.ndarray  # (n, 3) m, at its start
     rotation: np.ndarray  # (n, 3, 3) body to world
@@ -37,7 +46,7 @@ class RigidMotion(NamedTuple):
     movable: np.ndarray  # (n,) bool, False: static or kinematic
 
 
-class Touches(NamedTuple):
+class FoundContacts(NamedTuple):
     """Places found by `Surfaces.find`: what `SoftContacts` needs but for the solver's own numbers."""
 
     key: np.ndarray  # (m,)
@@ -45,24 +54,24 @@ class Touches(NamedTuple):
     weight: np.ndarray  # (m, 3)
     body: np.ndarray  # (m,)
     place: np.ndarray  # (m, 3) m, of the surface, in the body's frame
-    normal: np.ndarray  # (m, 3) from the body to the net, in the body's frame
+    normal: np.ndarray  # (m, 3) from the body to the soft body, in the body's frame
     target: np.ndarray  # (m,) m, gap to end with
     distance: np.ndarray  # (m,) m, where it touches
     time: np.ndarray  # (m,) share of the step before it touches
 
 
-def joined(touches: list[Touches]) -> Touches:
+def joined(touches: list[FoundContacts]) -> FoundContacts:
     """Return several as one."""
-    return Touches(*(np.concatenate(column) for column in zip(*touches, strict=True)))
+    return FoundContacts(*(np.concatenate(column) for column in zip(*touches, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """What can touch: vertices and faces of nets, surfaces and sample points of bodies.
+    """What can touch: vertices and faces of soft bodies, surfaces and sample points of bodies.
 
     Attributes:
         geometry: of the bodies. shape_of_body: (n,). radius: (n,) m about the centre of mass.
-        faces: all faces of nets, one mesh; None without any.
+        faces: all faces of soft bodies, one mesh; None without any.
         sample, sample_radius, sample_body: (s, 3) m in the body's frame, (s,) m, (s,).
         skip: (v, n) bool, vertices that do not touch a body.
         ball: (n,) bool, bodies that are one sphere about their centre of mass.
@@ -85,7 +94,7 @@ class Surfaces:
 
     def find(
         self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, sides: dict[int, float], gap: float, frame: np.ndarray, every: bool
-    ) -> Touches:
+    ) -> FoundContacts:
         """Find all places that come within a gap (m) while vertices move from start to end (v, 3) m. `sides`: see `_samples`.
 
         every: whether to find all faces that a sample point meets, where it could slip through one, or its first one only.
@@ -99,14 +108,15 @@ class Surfaces:
         normal, place = (np.einsum("mij,mj->mi", back[vertices.body], v) for v in (vertices.normal, vertices.place))
         return joined([vertices._replace(normal=normal, place=place), self._samples(start, end, seen, sides, gap, every, frame)])
 
-    def _vertices(self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, gap: float) -> Touches:
-        """Touches of vertices on bodies."""
+    def _vertices(self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, gap: float) -> FoundContacts:
+        """FoundContacts of vertices on bodies."""
         capacity = 256
         while True:
             which, real = np.empty((capacity, 2), np.int64), np.empty((capacity, 8))
             count = vertices_on_bodies(
-                self.geometry, self.shape_of_body, self.radius, rigid.position, rigid.rotation, rigid.end_position,
-                rigid.end_rotation, start, end, gap, self.skip, which, real,
+                BodyShapes(self.geometry, self.shape_of_body, self.radius),
+                PosesOverStep(rigid.position, rigid.rotation, rigid.end_position, rigid.end_rotation),
+                start, end, gap, self.skip, which, real,
             )  # fmt: skip
             if count <= capacity:
                 break
@@ -117,19 +127,19 @@ class Surfaces:
         distance, time = real[:, 6], real[:, 7]
         target = np.where(time == 0.0, np.minimum(distance, gap), gap)
         key = vertex * len(self.radius) + body
-        return Touches(key, np.tile(vertex[:, None], 3), weight, body, real[:, 3:6], real[:, :3], target, distance, time)
+        return FoundContacts(key, np.tile(vertex[:, None], 3), weight, body, real[:, 3:6], real[:, :3], target, distance, time)
 
     def _samples(
         self, start: np.ndarray, end: np.ndarray, rigid: RigidMotion, sides: dict[int, float], gap: float, every: bool, frame: np.ndarray
-    ) -> Touches:
-        """Touches of sample points on faces; every, frame: see `find`.
+    ) -> FoundContacts:
+        """FoundContacts of sample points on faces; every, frame: see `find`.
 
         `sides` says, by key, on which side of the faces a sample was when it was last in contact: one that is found on the other side,
         by less than the gap, has not passed but was moved there by round-off, and is sent back.
         """
         body = self.sample_body
         if self.faces is None or len(body) == 0:
-            return _no_touches()
+            return _nothing_found()
         p0 = rigid.position[body] + np.einsum("sij,sj->si", rigid.rotation[body], self.sample)
         p1 = rigid.end_position[body] + np.einsum("sij,sj->si", rigid.end_rotation[body], self.sample)
         low, high = np.empty_like(self.faces.node_min), np.empty_like(self.faces.node_max)
@@ -138,8 +148,9 @@ class Surfaces:
         while True:
             which, real = np.empty((capacity, 2), np.int64), np.empty((capacity, 8))
             count = samples_on_faces(
-                self.faces, low, high, p0, p1, self.sample_radius, body, start, end, gap, self.skip, every & self.is_slim, which, real
-            )
+                MovingFaces(self.faces, low, high, start, end, self.skip),
+                MovingSamples(p0, p1, self.sample_radius, body, every & self.is_slim), gap, which, real,
+            )  # fmt: skip
             if count <= capacity:
                 break
             capacity = 2 * count
@@ -154,10 +165,10 @@ class Surfaces:
         b = body[sample]
         turned = np.einsum("sji,sj->si", frame[b], normal)
         place = self.sample[sample] + self.sample_radius[sample, None] * turned
-        return Touches(key, node, weight, b, place, turned, target, distance, time)
+        return FoundContacts(key, node, weight, b, place, turned, target, distance, time)
 
 
-def sides_of(touches: Touches, x: np.ndarray, rotation: np.ndarray, first_key: int) -> dict[int, float]:
+def sides_of(touches: FoundContacts, x: np.ndarray, rotation: np.ndarray, first_key: int) -> dict[int, float]:
     """On which side of the faces, at vertices x (v, 3), samples are: by key, see `Surfaces._samples`."""
     chosen = np.flatnonzero(touches.key >= first_key)
     normal = np.einsum("sij,sj->si", rotation[touches.body[chosen]], touches.normal[chosen])
@@ -169,13 +180,16 @@ def _face_normals(corners: np.ndarray) -> np.ndarray:
     return cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def _no_touches() -> Touches:
+def _nothing_found() -> FoundContacts:
     flat, index = np.zeros((0, 3)), np.zeros(0, np.int64)
-    return Touches(index, np.zeros((0, 3), np.int64), flat, index, flat, flat, np.zeros(0), np.zeros(0), np.zeros(0))
+    return FoundContacts(index, np.zeros((0, 3), np.int64), flat, index, flat, flat, np.zeros(0), np.zeros(0), np.zeros(0))
 
 
-def make_surfaces(geometry: Geometry, shape_of_body, radius, ball, position, face, skip: np.ndarray, edge: float, gap: float) -> Surfaces:
-    """Prepare the surfaces of a scene: bodies as in `World`, vertices (v, 3) m and faces (f, 3) of all nets; see `Surfaces`."""
+def make_surfaces(
+    bodies: BodyShapes, ball: np.ndarray, position: np.ndarray, face: np.ndarray, skip: np.ndarray, edge: float, gap: float
+) -> Surfaces:
+    """Prepare the surfaces of a scene: rigid bodies, vertices (v, 3) m and faces (f, 3) of all soft bodies; see `Surfaces`."""
+    geometry, shape_of_body, radius = bodies
     samples, radii, owner = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0, np.int64)]
     for b, shape in enumerate(shape_of_body):
         points, r = sample_points(geometry, int(shape))
@@ -191,12 +205,13 @@ def make_surfaces(geometry: Geometry, shape_of_body, radius, ball, position, fac
 
 
 def make_contacts(
-    touches: Touches, start: np.ndarray, velocity: np.ndarray, rigid: RigidMotion, unknown: np.ndarray, friction: np.ndarray, slow: float
+    touches: FoundContacts, start: np.ndarray, velocity: np.ndarray, rigid: RigidMotion, unknown: np.ndarray, friction: np.ndarray,
+    slow: float,
 ) -> SoftContacts:
     """Make contacts of touches.
 
     Args:
-        touches: places. start: (v, 3) m. velocity: (v, 3) m/s. rigid: bodies without the nets.
+        touches: places. start: (v, 3) m. velocity: (v, 3) m/s. rigid: bodies without the soft bodies.
         unknown: (n,) place of each body among the unknowns, -1 for none.
         friction: (v, n, 2) static and dynamic. slow: m/s, slip below which the static one counts.
 

@@ -1,12 +1,12 @@
-"""Contacts of nets as terms of the incremental potential: the method of multipliers.
+"""Contacts of soft bodies as terms of the incremental potential: the method of multipliers.
 
-A contact joins a point of a net, y = sum of w_k x_k over up to three vertices, with a point of a rigid body. With q = (X, Theta) the
-displacement of the body by the net over the step and r the arm of the contact,
+A contact joins a point of a soft body, y = sum of w_k x_k over up to three vertices, with a point of a rigid body. With q = (X, Theta) the
+displacement of the body by the soft body over the step and r the arm of the contact,
 
     u = y - a - (X + Theta x r)
 
 is what is left to its aim a: u.n is the gap above the one wanted, u_t the slip over the step. With the force lambda of the last round,
-the penalty rho and the radius of Coulomb's disk R = mu lambda_n of the last round, the force on the net is
+the penalty rho and the radius of Coulomb's disk R = mu lambda_n of the last round, the force on the soft body is
 
     f_n = max(0, lambda_n - rho u.n),    f_t = lambda_t - rho u_t, cut to the length R
 
@@ -27,14 +27,14 @@ from rigidimpulse.core.kernels import jit
 
 
 class SoftContacts(NamedTuple):
-    """m contacts of nets with rigid bodies."""
+    """m contacts of soft bodies with rigid bodies."""
 
     node: np.ndarray  # (m, 3) vertices; the first again where there are fewer
     weight: np.ndarray  # (m, 3)
     body: np.ndarray  # (m,) index of the rigid body
     unknown: np.ndarray  # (m,) place of the body among the unknowns, -1 where it is immovable
     arm: np.ndarray  # (m, 3) m, from its centre of mass at the end of the step
-    normal: np.ndarray  # (m, 3) from the body to the net
+    normal: np.ndarray  # (m, 3) from the body to the soft body
     aim: np.ndarray  # (m, 3) m
     friction: np.ndarray  # (m,) mu
     penalty: np.ndarray  # (m,) N/m

@@ -1,4 +1,4 @@
-"""Elastic elements of a net: springs along edges and struts, hinges between neighbouring faces.
+"""Elastic elements of a soft body: springs along edges and struts, hinges between neighbouring faces.
 
 Spring between vertices i and j, d = x_j - x_i, l = |d|, n = d / l, of rest length L:
 

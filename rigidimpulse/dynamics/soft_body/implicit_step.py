@@ -1,7 +1,7 @@
-"""One implicit step of nets and the rigid bodies they touch, as a minimisation.
+"""One implicit step of soft bodies and the rigid bodies they touch, as a minimisation.
 
 With x the vertices at the end of the step, x^ = x0 + h v0 + h^2 g their free flight, E the energy of springs, hinges and dampers (see
-`net`), q = (X, Theta) the displacement of each rigid body by the net, M_b its inertia, and psi the contacts (see `contact_terms`):
+`mass_spring`), q = (X, Theta) the displacement of each rigid body by the soft body, M_b its inertia, and psi the contacts, `contact_terms`:
 
     Phi(x, q) = (x - x^)^T M (x - x^) / 2 h^2 + E(x) + sum of q^T M_b q / 2 h^2 + sum of psi     ->  least
 
@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.quaternion import cross
-from rigidimpulse.dynamics.soft_body.conjugate_gradients import conjugate_gradients, diagonal_inverses
+from rigidimpulse.dynamics.soft_body.conjugate_gradients import LinearSystem, conjugate_gradients, diagonal_inverses
 from rigidimpulse.dynamics.soft_body.contact_terms import (
     SoftContacts,
     add_contact_gradient,
@@ -86,7 +86,7 @@ def _blocks(p: Problem, x: np.ndarray, exact: bool = False) -> np.ndarray:
 
 
 def set_penalties(p: Problem, contacts: SoftContacts, x: np.ndarray) -> None:
-    """Set the penalties of contacts: well above the stiffness that the net and the body oppose to them.
+    """Set the penalties of contacts: well above the stiffness that the soft body and the body oppose to them.
 
     A vertex on an immovable body has its penalty in a block of its own, which the preconditioner inverts, so that it may be larger.
     """
@@ -173,14 +173,14 @@ def _newton_step(
     linear_part, D = coupling._replace(aim=np.zeros_like(coupling.aim)), D[~apart]
     node_inverse, rigid_inverse, step = np.empty((n, 3, 3)), np.empty_like(p.rigid), np.empty_like(z)
     diagonal_inverses(pattern.diagonal, block, p.rigid, coupling, D, node_inverse, rigid_inverse)
-    count = conjugate_gradients(
-        pattern.first, pattern.column, block, p.free, p.rigid, coupling, linear_part, D, node_inverse, rigid_inverse,
-        residual.copy(), accuracy, np.int64(MOST_LINEAR), step,
-    )  # fmt: skip
+    system = LinearSystem(pattern.first, pattern.column, block, p.free, p.rigid, coupling, linear_part, D)
+    count = conjugate_gradients(system, node_inverse, rigid_inverse, residual.copy(), accuracy, np.int64(MOST_LINEAR), step)
     return step, count
 
 
-def _search(p: Problem, contacts: SoftContacts, z, step, value: float, slope: float) -> tuple[np.ndarray | None, float]:
+def _search(
+    p: Problem, contacts: SoftContacts, z: np.ndarray, step: np.ndarray, value: float, slope: float
+) -> tuple[np.ndarray | None, float]:
     """First of the steps 1, 1/2, 1/4, ... that lowers Phi by its share of the slope, and Phi there; None where round-off hides it.
 
     There the gradient tells whether Newton's step is any good: it is that of a convex function nearby.

@@ -1,4 +1,4 @@
-"""Nets: the point masses, springs and hinges that flexible bodies are compiled to.
+"""Soft bodies: the point masses, springs and hinges that flexible bodies are compiled to.
 
     E(x) = sum over springs of k (l - L)^2 / 2  +  sum over hinges of kappa (phi - phi_0)^2 / 2
 
@@ -175,7 +175,7 @@ def sheet(
 
 
 def join(soft_bodies: list[SpringMesh]) -> SpringMesh:
-    """Return several nets as one; of none an empty one."""
+    """Return several soft bodies as one; of none an empty one."""
     first = np.concatenate([[0], np.cumsum([len(soft_body.mass) for soft_body in soft_bodies])]).astype(np.int64)
 
     def all_of(name: str, *shape: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The fixed pattern of a net's matrices: 3 x 3 blocks in compressed rows, one row a vertex, both halves stored."""
+"""The fixed pattern of a soft body's matrices: 3 x 3 blocks in compressed rows, one row a vertex, both halves stored."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
 """All flexible bodies of a scene, stepped together and together with the rigid bodies they touch.
 
-A step takes the rigid bodies as they would move without the nets, solves nets, contacts and the reaction of every touched body at once
+A step takes the rigid bodies as they would move alone, solves soft bodies, contacts and the reaction of every body in contact at once
 (see `minimise`), and returns the impulses that the bodies got. Over the step of h s an impulse J moves its body by h J / m, as implicit
 Euler does, but that part of it which bears a steady load L, as in the step before and no more than gravity's, by half of that:
 
     d = h J / m - h^2 L / 2 m    exactly by the force    F(s) = 4 J / h - 3 L + (6 L - 6 J / h) s / h
 
 It is constant where J = h L: a body at rest stays there. A constant force J / h would move the body by h J / 2 m and leave it inside
-the net by up to h^2 F / 2 m, or let it go on through it.
+the soft body by up to h^2 F / 2 m, or let it go on through it.
 """
 
 from __future__ import annotations
@@ -15,14 +15,23 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import cross, quaternion_from_rotation_vector, to_matrix
+from rigidimpulse.core.union_find import roots
 from rigidimpulse.dynamics.soft_body.balance import lever_place, set_momenta, take_energy
 from rigidimpulse.dynamics.soft_body.body import FlexibleBody
-from rigidimpulse.dynamics.soft_body.contact_planes import LIFT, SLIPS, RigidMotion, Touches, joined, make_contacts, make_surfaces, sides_of
+from rigidimpulse.dynamics.soft_body.contact import BodyShapes
+from rigidimpulse.dynamics.soft_body.contact_planes import (
+    CORRECTION,
+    SLIPS,
+    FoundContacts,
+    RigidMotion,
+    joined,
+    make_contacts,
+    make_surfaces,
+    sides_of,
+)
 from rigidimpulse.dynamics.soft_body.contact_terms import SoftContacts
 from rigidimpulse.dynamics.soft_body.implicit_step import Problem, Solution, minimise, set_penalties, value_of
 from rigidimpulse.dynamics.soft_body.mass_spring import join
@@ -30,7 +39,7 @@ from rigidimpulse.model.world import World
 from rigidimpulse.scene.material import combine
 
 GAP = 0.01
-"""Gap at which nets are kept from bodies, relative to the mean length of their edges."""
+"""Gap at which soft bodies are kept from bodies, relative to the mean length of their edges."""
 ROUNDS = 10
 """Most times that contacts are looked for again on the way that was solved for."""
 MIDPOINT_EXCESS = 1e-3
@@ -45,9 +54,9 @@ SCHEMES = ("euler", "midpoint")
 
 
 class FlexibleStep(NamedTuple):
-    """What a step of nets did to n rigid bodies, and how it went."""
+    """What a step of soft bodies did to n rigid bodies, and how it went."""
 
-    impulse: np.ndarray  # (n, 6) N s, N m s about the centre of mass: what the nets gave each body over the step
+    impulse: np.ndarray  # (n, 6) N s, N m s about the centre of mass: what the soft bodies gave each body over the step
     ramp: np.ndarray  # (2, n, 6) N, N m: force and torque at the start, and their rates per s (see the module)
     energy_taken: float  # J, motion taken off against energy out of nothing
     energy_made: float  # J, of it what no motion was left to be taken from
@@ -56,8 +65,18 @@ class FlexibleStep(NamedTuple):
     unresolved: int  # contacts still found after the last round
 
 
+class Solved(NamedTuple):
+    """A step that has been solved for a set of contacts."""
+
+    solution: Solution
+    contacts: SoftContacts
+    problem: Problem
+    slots: np.ndarray  # movable bodies among the unknowns
+    midpoint: bool  # whether the midpoint rule was used, or implicit Euler
+
+
 class Flexibles:
-    """The nets of a scene and their state.
+    """The soft bodies of a scene and their state.
 
     Attributes:
         bodies: the flexible bodies, in the order they were added. first: (k + 1,) vertices of each.
@@ -71,7 +90,7 @@ class Flexibles:
         """Compile the flexible bodies of a scene.
 
         Args:
-            world: the compiled scene; its gravity counts for the nets.
+            world: the compiled scene; its gravity counts for the soft bodies.
             scheme: "euler" (first order, damps what steps do not resolve) or "midpoint" (second order; steps in which anything
                 is touched are Euler's).
             tolerance: error of the solver's velocities, relative to the speeds in a step.
@@ -122,9 +141,8 @@ class Flexibles:
     def _find_pieces(self, free: np.ndarray) -> list[np.ndarray]:
         """Vertices of each connected piece without held vertices."""
         n, ends = len(free), np.concatenate([self.soft_body.spring, self.soft_body.hinge[:, [0, 2]], self.soft_body.hinge[:, [0, 3]]])
-        links = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(n, n))
-        count, label = connected_components(links, directed=False)
-        pieces = [np.flatnonzero(label == k) for k in range(count)]
+        root = roots(n, ends[:, 0].copy(), ends[:, 1].copy())
+        pieces = [np.flatnonzero(root == k) for k in np.unique(root)]
         self._free = free
         return [piece for piece in pieces if free[piece].all()]
 
@@ -139,7 +157,8 @@ class Flexibles:
         self._edge = float(edges.mean())
         gap = GAP * self._edge
         self._surfaces = make_surfaces(
-            world.geometry, world.shape_of_body, world.bound_radius, world.ball, self.position, self.soft_body.face, skip, self._edge, gap
+            BodyShapes(world.geometry, world.shape_of_body, world.bound_radius), world.ball, self.position, self.soft_body.face, skip,
+            self._edge, gap,
         )
 
     @property
@@ -157,13 +176,13 @@ class Flexibles:
         return self.position[self.first[k] : self.first[k + 1]]
 
     def step_limit(self, rigid: RigidMotion, within: float) -> float:
-        """Longest step (s) in which what may touch moves by no more than an edge of the nets relative to them.
+        """Longest step (s) in which what may touch moves by no more than an edge of the soft bodies relative to them.
 
-        Longer steps let nothing pass either, but a net that is struck harder than that is taken by surprise: its faces turn far within
+        Longer steps let nothing pass either, but after a harder blow it does not follow well: its faces turn far within
         the step, and friction on them is that of the place where they were.
 
         Args:
-            rigid: the bodies now. within: s, only bodies that may reach a net by then count.
+            rigid: the bodies now. within: s, only bodies that may reach a soft body by then count.
 
         """
         low, high = self.position.min(axis=0), self.position.max(axis=0)
@@ -178,11 +197,11 @@ class Flexibles:
         return limit
 
     def step(self, time: float, h: float, rigid: RigidMotion) -> FlexibleStep:
-        """Step all nets from `time` to time + h s, together with the rigid bodies that they touch.
+        """Step all soft bodies from `time` to time + h s, together with the rigid bodies that they touch.
 
         Args:
             time: s; nothing depends on it.
-            h: s. rigid: the rigid bodies over the step, as they would move without the nets.
+            h: s. rigid: the rigid bodies over the step, as they would move without the soft bodies.
 
         """
         del time
@@ -193,25 +212,24 @@ class Flexibles:
         self._place_held(rigid, target)
         way = np.where(self._free[:, None], flight, target)
         touches = self._surfaces.find(start, way, rigid, self._sides, self._surfaces.gap, rigid.end_rotation, False)
-        lift = self._move_out(touches, rigid, start)
+        correction = self._move_out(touches, rigid, start)
         midpoint = self.scheme == "midpoint" and len(touches.key) == 0 and len(self._joined[0]) == 0
         rounds, unresolved = 0, 0
         while True:
-            solution, contacts, problem, slots = self._solve(touches, rigid, h, flight + lift, target, start + lift, midpoint)
-            n = len(start)
+            solved = self._solve(touches, rigid, h, flight + correction, target, start + correction, midpoint)
+            solution, n = solved.solution, len(start)
             end = solution.z[:n] if not midpoint else 2.0 * solution.z[:n] - start
-            new = self._missing(touches, end, start + lift, rigid, self._moved(rigid, solution, slots))
+            new = self._missing(touches, end, start + correction, rigid, self._moved(rigid, solution, solved.slots))
             rounds += 1
             unresolved = len(new.key)
             if unresolved == 0 or rounds == ROUNDS:
                 break
             touches, midpoint = joined([touches, new]), False
-        done = self._finish(start + lift, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h)
+        done = self._finish(start + correction, end, solved, rigid, touches, unresolved, h)
         if done is None:  # the midpoint rule would make energy here
-            midpoint = False
-            solution, contacts, problem, slots = self._solve(touches, rigid, h, flight, target, start, midpoint)
-            end = solution.z[: len(start)]
-            done = self._finish(start, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h)
+            solved = self._solve(touches, rigid, h, flight, target, start, False)
+            end = solved.solution.z[: len(start)]
+            done = self._finish(start, end, solved, rigid, touches, unresolved, h)
             assert done is not None
         return done
 
@@ -223,19 +241,22 @@ class Flexibles:
         b = bodies[on]
         target[vertices[on]] = rigid.end_position[b] + np.einsum("kij,kj->ki", rigid.end_rotation[b], places[on])
 
-    def _move_out(self, touches: Touches, rigid: RigidMotion, start: np.ndarray) -> np.ndarray:
+    def _move_out(self, touches: FoundContacts, rigid: RigidMotion, start: np.ndarray) -> np.ndarray:
         """Ways (v, 3) m by which vertices that have less than their gap are moved, position only; their targets follow."""
-        lift = np.zeros_like(start)
+        correction = np.zeros_like(start)
         lacks = (touches.key < self._surfaces.skip.size) & (touches.time == 0.0) & (touches.distance < 0.999 * self._surfaces.gap)
         lacks &= self._free[touches.node[:, 0]]
         for c in np.flatnonzero(lacks):
-            way = LIFT * (self._surfaces.gap - touches.distance[c])
-            lift[touches.node[c, 0]] += way * (rigid.rotation[touches.body[c]] @ touches.normal[c])
+            way = CORRECTION * (self._surfaces.gap - touches.distance[c])
+            correction[touches.node[c, 0]] += way * (rigid.rotation[touches.body[c]] @ touches.normal[c])
             touches.target[c] = min(self._surfaces.gap, touches.distance[c] + way)
-        return lift
+        return correction
 
-    def _solve(self, touches, rigid: RigidMotion, h: float, flight, target, start, midpoint: bool):
-        """Solve the step for a set of touches."""
+    def _solve(
+        self, touches: FoundContacts, rigid: RigidMotion, h: float, flight: np.ndarray, target: np.ndarray, start: np.ndarray,
+        midpoint: bool,
+    ) -> Solved:
+        """Solve the step for a set of contacts."""
         span = 0.5 * h if midpoint else h
         goal = start + span * self.velocity + span * span * self._gravity if midpoint else flight
         unknown = np.full(len(rigid.inv_mass), -1)
@@ -269,7 +290,7 @@ class Flexibles:
             set_penalties(problem, contacts, z[: len(start)])
             solution = minimise(problem, contacts, z, self.tolerance)._replace(converged=False)
         self._force_of = dict(zip(contacts.key.tolist(), solution.force, strict=True))
-        return solution, contacts, problem, slots
+        return Solved(solution, contacts, problem, slots, midpoint)
 
     def _recall(self, contacts: SoftContacts) -> None:
         """Start from the forces of the last step."""
@@ -280,39 +301,42 @@ class Flexibles:
                 contacts.radius[c] = contacts.friction[c] * max(0.0, float(known @ contacts.normal[c]))
 
     def _moved(self, rigid: RigidMotion, solution: Solution, slots: np.ndarray) -> RigidMotion:
-        """The rigid bodies with what the nets add to their way."""
+        """The rigid bodies with what the soft bodies add to their way."""
         position, rotation = rigid.end_position.copy(), rigid.end_rotation.copy()
         for b, (way, turn) in zip(slots, solution.z[len(self.position) :].reshape(-1, 2, 3), strict=True):
             position[b] += way
             rotation[b] = to_matrix(quaternion_from_rotation_vector(turn)) @ rotation[b]
         return rigid._replace(end_position=position, end_rotation=rotation)
 
-    def _missing(self, known: Touches, end: np.ndarray, start: np.ndarray, rigid: RigidMotion, moved: RigidMotion) -> Touches:
-        """Touches on the way solved for, on which bodies are `moved`, that no plane guards yet; of a sample point the earliest ones.
+    def _missing(self, known: FoundContacts, end: np.ndarray, start: np.ndarray, rigid: RigidMotion, moved: RigidMotion) -> FoundContacts:
+        """Contacts on the way solved for, on which bodies are `moved`, that no plane covers yet; of a sample point the earliest ones.
 
         They are looked for at half the gap: nearer than planes let anything come, but for what had less than that from the start.
         """
         found = self._surfaces.find(start, end, moved, self._sides, 0.5 * self._surfaces.gap, rigid.end_rotation, True)
-        guarded: dict[tuple[int, ...], list[np.ndarray]] = {}
+        covered: dict[tuple[int, ...], list[np.ndarray]] = {}
         for key, nodes, normal in zip(known.key.tolist(), known.node.tolist(), known.normal, strict=True):
-            guarded.setdefault((key, *nodes), []).append(normal)
+            covered.setdefault((key, *nodes), []).append(normal)
         fresh, first = [], {}
         keys, nodes_of = found.key.tolist(), found.node.tolist()
         for c in np.argsort(found.time, kind="stable").tolist():
-            if all(float(found.normal[c] @ normal) < ALIKE for normal in guarded.get((keys[c], *nodes_of[c]), [])):
+            if all(float(found.normal[c] @ normal) < ALIKE for normal in covered.get((keys[c], *nodes_of[c]), [])):
                 if found.time[c] <= first.setdefault(keys[c], float(found.time[c])) + AT_ONCE:
                     fresh.append(c)
-        return Touches(*(column[np.array(sorted(fresh), np.int64)] for column in found))
+        return FoundContacts(*(column[np.array(sorted(fresh), np.int64)] for column in found))
 
-    def _finish(self, start, end, solution, contacts, problem, rigid, touches, midpoint, unresolved, h) -> FlexibleStep | None:
+    def _finish(
+        self, start: np.ndarray, end: np.ndarray, solved: Solved, rigid: RigidMotion, touches: FoundContacts, unresolved: int, h: float
+    ) -> FlexibleStep | None:
         """Take over the new state; see `balance` for what is set right. None if the midpoint rule shall not be taken."""
+        solution, contacts, problem, _, midpoint = solved
         n, soft_body, free = len(start), self.soft_body, self._free
         before, x0 = self.velocity.copy(), self.position
         way = end - start
         velocity = 2.0 * way / h - before if midpoint else way / h
         velocity[~free] = way[~free] / h
         impulse = h * solution.force
-        self._keep_momenta(start, end, velocity, before, impulse, contacts, rigid, h, midpoint)
+        self._keep_momenta(start, end, velocity, before, solved, rigid, h)
         elastic = problem.soft_body.gradient(solution.z[:n])
         acting = np.zeros_like(elastic)
         np.add.at(acting, contacts.node.ravel(), (contacts.weight[:, :, None] * solution.force[:, None, :]).reshape(-1, 3))
@@ -321,7 +345,7 @@ class Flexibles:
         work = float(np.sum((acting + hold) * way))
         kinetic = 0.5 * float(soft_body.mass @ (np.einsum("ij,ij->i", velocity, velocity) - np.einsum("ij,ij->i", before, before)))
         excess = kinetic + soft_body.energy(end) - soft_body.energy(x0) - work
-        if np.any(start != x0):  # what lifting costs is no motion's to give
+        if np.any(start != x0):  # the energy of the position correction is no motion's to give
             excess -= soft_body.energy(start) - soft_body.energy(x0)
         if midpoint and excess > MIDPOINT_EXCESS * float(soft_body.mass @ np.einsum("ij,ij->i", velocity, velocity)):
             return None
@@ -340,11 +364,13 @@ class Flexibles:
         self._bear(given[:, :3] / h, rigid, h)
         return FlexibleStep(given, ramp, taken, made, len(contacts.key), solution.converged, unresolved)
 
-    def _keep_momenta(self, start, end, velocity, before, impulse, contacts: SoftContacts, rigid, h, midpoint) -> None:
+    def _keep_momenta(
+        self, start: np.ndarray, end: np.ndarray, velocity: np.ndarray, before: np.ndarray, solved: Solved, rigid: RigidMotion, h: float
+    ) -> None:
         """Set momentum, angular momentum and the way of the centre of free pieces to what acted on them."""
         if not self._pieces:
             return
-        mass = self.soft_body.mass
+        mass, contacts, impulse, midpoint = self.soft_body.mass, solved.contacts, h * solved.solution.force, solved.midpoint
         place = np.einsum("mk,mkj->mj", contacts.weight, start[contacts.node])
         on = contacts.unknown >= 0
         shift = 0.5 * h * h * rigid.inv_mass[:, None] * self._load
@@ -367,15 +393,17 @@ class Flexibles:
             velocity[piece] = v
 
     def _bear(self, force: np.ndarray, rigid: RigidMotion, h: float) -> None:
-        """Keep what the nets bear of each body, (n, 3) N: their force, as far as it is no more than what the body flies with."""
+        """Keep what the soft bodies bear of each body, (n, 3) N: their force, as far as it is no more than what the body flies with."""
         end = rigid.end_position + 0.5 * h * h * rigid.inv_mass[:, None] * self._load
         weight = 2.0 / h**2 * (end - rigid.position - h * rigid.velocity)
         size = np.linalg.norm(weight, axis=1) / np.where(rigid.movable, rigid.inv_mass, np.inf)
         strength = np.linalg.norm(force, axis=1)
         self._load = force * np.divide(np.minimum(size, strength), strength, out=np.zeros_like(size), where=strength > 0.0)[:, None]
 
-    def _given(self, contacts: SoftContacts, impulse, rigid: RigidMotion, hold, end) -> np.ndarray:
-        """Impulses (n, 6) that the nets gave the bodies."""
+    def _given(
+        self, contacts: SoftContacts, impulse: np.ndarray, rigid: RigidMotion, hold: np.ndarray, end: np.ndarray
+    ) -> np.ndarray:
+        """Impulses (n, 6) that the soft bodies gave the bodies."""
         given = np.zeros((len(rigid.inv_mass), 6))
         np.subtract.at(given, contacts.body, np.concatenate([impulse, cross(contacts.arm, impulse)], axis=1))
         vertices, bodies, _ = self._held
@@ -385,7 +413,9 @@ class Flexibles:
         return given
 
 
-def _with_fastened(contacts: SoftContacts, vertices, bodies, places, rigid: RigidMotion, unknown) -> SoftContacts:
+def _with_fastened(
+    contacts: SoftContacts, vertices: np.ndarray, bodies: np.ndarray, places: np.ndarray, rigid: RigidMotion, unknown: np.ndarray
+) -> SoftContacts:
     """Add the vertices that are fastened to dynamic bodies."""
     k = len(vertices)
     if k == 0:

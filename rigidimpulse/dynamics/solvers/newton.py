@@ -18,6 +18,7 @@ smaller in proportion. Rows that contradict each other have no answer: their imp
 """
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -156,6 +157,15 @@ def _assemble(rows, slope, slot, blocks, n):
             _add_outer(blocks, slot[b, b], jacobian, i, 6, right, 6)
 
 
+class RegularisedLaw(NamedTuple):
+    """The regularised laws of the rows about impulses q."""
+
+    base: np.ndarray  # (r,) m/s, u at q
+    q: np.ndarray  # (r,) N s
+    r: np.ndarray  # (r,) 1/kg, regularisation
+    frozen: np.ndarray  # (r,) radii of discs that are frozen, or -1
+
+
 @jit
 def _norm(v):
     total = 0.0
@@ -166,8 +176,9 @@ def _norm(v):
 
 
 @jit
-def _evaluate(rows, base, change, q, r, frozen, u, p, slope, residual):
-    """p and slope at y + change, and the residual F (n, 6); returns |F|. u (r,) is room for the velocities."""
+def _evaluate(rows, law, change, u, p, slope, residual):
+    """p and slope at y + change, and the residual F (n, 6); returns |F|. u (r,) is working memory for the velocities."""
+    base, q, r, frozen = law.base, law.q, law.r, law.frozen
     multiply(rows, change, u)
     for i in range(u.shape[0]):
         u[i] += base[i]
@@ -200,14 +211,14 @@ def _speed(rows, y, line):
 
 
 @jit_making_arrays
-def _newton(rows, elimination, base, q, r, frozen, p, target):
-    """Find p with F = 0; base (r,): u at the impulses q. Returns whether it converged (or cannot be improved further)."""
+def _newton(rows, elimination, law, p, target):
+    """Find p with F = 0. Returns whether it converged (or cannot be improved further)."""
     n, count = elimination.order.shape[0], p.shape[0]
     change, trial = np.zeros((n, 6)), np.empty((n, 6))
     residual, step = np.empty((n, 6)), np.empty((n, 6))
     u, line, slope = np.empty(count), np.empty(count), np.empty((count, 3))
     blocks, pivots = np.empty((elimination.num_blocks, 6, 6)), np.empty((n, 6), np.int64)
-    size = _evaluate(rows, base, change, q, r, frozen, u, p, slope, residual)
+    size = _evaluate(rows, law, change, u, p, slope, residual)
     for _ in range(MAX_INNER):
         if _speed(rows, residual, line) <= target:
             return True
@@ -222,7 +233,7 @@ def _newton(rows, elimination, base, q, r, frozen, p, target):
             for i in range(n):
                 for k in range(6):
                     trial[i, k] = change[i, k] - scale * step[i, k]
-            trial_size = _evaluate(rows, base, trial, q, r, frozen, u, p, slope, residual)
+            trial_size = _evaluate(rows, law, trial, u, p, slope, residual)
             if is_last or trial_size < size * (1.0 - 0.1 * scale):
                 improved = True
                 break
@@ -275,7 +286,7 @@ def solve_newton(rows, n, target):
         for i in range(count):
             frozen[i] = rows.coefficient[i] * max(q[rows.master[i]], 0.0) if convex else -1.0
             r[i] = weight[i] * (min(k, free_k) if rows.kind[i] == FREE else k)
-        solved = _newton(rows, elimination, u, q, r, frozen, trial, 0.05 * target)
+        solved = _newton(rows, elimination, RegularisedLaw(u, q, r, frozen), trial, 0.05 * target)
         if not solved and not convex:
             failures += 1
             convex = k >= 0.5

@@ -4,7 +4,7 @@ With W = Jh Jh^T, u = b + W p and s the softness of the rows, the impulses of
 
     min  1/2 p^T (W + diag s) p + (b + c)^T p     under the bounds of p and |p_t| <= k p_master for every disc and segment
 
-satisfy the laws of all rows (see `rows`) but one: slip would lift the contact. With c_master = k |u_t|, found by the fixed
+satisfy the laws of all rows (see `rows`) but one: slip would open the contact. With c_master = k |u_t|, found by the fixed
 point  c <- k |u_t(p(c))|,  that is taken back, and the true Coulomb cone is met (De Saxce and Feng 1998; Acary, Cadoux, Lemarechal
 and Malick, A formulation of the linear discrete Coulomb friction problem via convex optimization, ZAMM 91, 2011). Each convex
 problem is solved by the interior-point method of Clarabel (Goulart and Chen 2024).
@@ -18,7 +18,7 @@ import numpy as np
 from scipy import sparse
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, SEGMENT, Rows
+from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, SEGMENT, Rows, RowSolver
 from rigidimpulse.dynamics.solvers.newton import natural_residual, row_weights, solve_newton
 
 MOST_ROUNDS = 100
@@ -31,7 +31,7 @@ REGULAR = 1e-9
 """Added to the scaled W, which redundant contacts make singular."""
 
 
-def row_solver(name: str):
+def row_solver(name: str) -> RowSolver:
     """The solver of rows (rows, n, target) -> residual for a value of `Accuracy.contact_solver`.
 
     Raises:
@@ -60,9 +60,9 @@ def solve_qp(rows: Rows, n: int, target: float) -> float:
     weight = np.empty(count)
     row_weights(rows, weight)
     discs = np.flatnonzero((rows.kind == DISC) | (rows.kind == SEGMENT))
-    lift, best, stagnant = np.zeros(count), np.inf, 0
+    opening, best, stagnant = np.zeros(count), np.inf, 0
     for _ in range(MOST_ROUNDS):
-        p = _convex_step(rows, effective, rows.bias + lift, discs)
+        p = _convex_step(rows, effective, rows.bias + opening, discs)
         u = rows.bias + jacobian @ (jacobian.T @ p)
         residual = float(natural_residual(rows, u, p, weight))
         stagnant = 0 if residual < 0.9 * best else stagnant + 1
@@ -72,8 +72,8 @@ def solve_qp(rows: Rows, n: int, target: float) -> float:
         if best <= target or not len(discs) or stagnant == MOST_STAGNANT:
             break
         slip = np.where(rows.kind[discs] == DISC, np.hypot(u[discs], u[np.minimum(discs + 1, count - 1)]), np.abs(u[discs]))
-        lift[:] = 0.0
-        lift[rows.master[discs]] = rows.coefficient[discs] * slip
+        opening[:] = 0.0
+        opening[rows.master[discs]] = rows.coefficient[discs] * slip
     return best
 
 

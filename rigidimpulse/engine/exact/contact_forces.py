@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 
-from rigidimpulse.dynamics.constraints.contact import Held, hold_contacts
+from rigidimpulse.dynamics.constraints.contact import ContactProblem, Held, hold_contacts
 from rigidimpulse.dynamics.constraints.contact_motion import Motion, contact_motion
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
 from rigidimpulse.dynamics.constraints.position_correction import correct_positions, needs_correction
 from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.dynamics.impact.point import Contacts, select
 from rigidimpulse.engine.exact.energy_limit import limit_correction_energy, note_hold
 from rigidimpulse.engine.exact.step_size import ALLOWED
 from rigidimpulse.engine.exact.velocity_projection import forget_forces, remember_forces
@@ -21,8 +20,9 @@ from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import may_sleep
-from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.model.contacts import Contacts, select
 from rigidimpulse.model.island import Island
+from rigidimpulse.motion.evaluate import refresh_pose
 
 PLAY = 1e-3
 """Energy that forces which are no solution may make, relative."""
@@ -123,10 +123,10 @@ def _hold_turning(
     def hold_over(h: float, excess: np.ndarray) -> Held:
         h = load_over(run, island, h)
         run.wrench[island.members] = 0.0
-        return hold_contacts(
-            run.solve_rows, state.now, contacts, island.members, motion.turning, excess, run.acceleration,
-            run.angular_acceleration, h, SHORTEST_STOP * step, run.column, force, run.wrench, rolling,
+        problem = ContactProblem(
+            state.now, contacts, island.members, run.column, motion.turning, run.acceleration, run.angular_acceleration
         )
+        return hold_contacts(run.solve_rows, problem, excess, h, SHORTEST_STOP * step, force, run.wrench, rolling)
 
     if motion.fastest * step <= STEADY:
         held = hold_over(sub_step(motion.fastest, step, rest), np.zeros(len(subset)))

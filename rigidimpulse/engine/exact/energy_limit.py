@@ -17,11 +17,12 @@ import numpy as np
 
 from rigidimpulse.core.quaternion import cross
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.dynamics.impact.point import BodyState, Contacts
 from rigidimpulse.engine.run import Run
+from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.model.island import Island
 from rigidimpulse.model.state import Ground
 from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
 
 GAIN = 1e-11
 """Part of their kinetic energy that bodies may gain by rounding."""

@@ -9,12 +9,13 @@ import numpy as np
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.dynamics.energy import kinetic_energy
 from rigidimpulse.dynamics.impact.kinematic import respond_kinematic
-from rigidimpulse.dynamics.impact.point import Contacts, select, speed_scale
-from rigidimpulse.dynamics.impact.restitution import LAWS
+from rigidimpulse.dynamics.impact.point import speed_scale
+from rigidimpulse.dynamics.impact.restitution import LAWS, ImpactRule
 from rigidimpulse.dynamics.impact.sequence import respond_sequential, respond_simultaneous
 from rigidimpulse.engine.islands import classify
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
+from rigidimpulse.model.contacts import Contacts, select
 from rigidimpulse.model.island import Island
 
 KERNELS = {
@@ -59,9 +60,10 @@ def respond_to_impacts(run: Run, island: Island, kernel: Callable[..., tuple[int
     before = kinetic_energy(now, run.world, island.members)
     joints = run.joints.impact_block(run, island) if len(island.joints) else None
     together = len(live) > 1 and (bool(collapses.any()) or _bear_each_other(run, island))
+    rule = ImpactRule(law, rest_speed, tolerance, scale)
     for _ in range(MAX_CALLS):
         count, _, capped = kernel(
-            now, contacts, law, together, rest_speed, tolerance, scale, run.column, joints, run.impact_log
+            now, contacts, rule, together, run.column, joints, run.impact_log
         )
         run.log.impacts.add(island.time, contacts, now.position, run.impact_log, count)
         _remember_rebounds(run, island, contacts, run.impact_log[:count])

@@ -9,19 +9,22 @@ from collections.abc import Iterable
 import numpy as np
 
 from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.joint import RADIUS
 from rigidimpulse.dynamics.constraints.joint_impact import JointBlock, impact_rows, stop_at_limits
 from rigidimpulse.dynamics.constraints.joint_limits import next_switch
-from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_jointed, make_memory, stop_joints
+from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_jointed, stop_joints
+from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, make_memory
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.dynamics.impact.point import BodyState, Contacts
 from rigidimpulse.engine.absent import NoJoints
 from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.touching import refresh_pose
+from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.model.island import Island
 from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
+from rigidimpulse.motion.evaluate import refresh_pose
 from rigidimpulse.motion.trajectory import FIXED
 from rigidimpulse.scene.joint import Joint
 
@@ -135,22 +138,16 @@ class JointState:
             held = memory.wrench[i] * max(elapsed[j] for j in self.at([i])) if int(i) in self._of_body else np.zeros(6)
             now.velocity[i] -= now.inv_mass[i] * held[:3]
             now.angular_velocity[i] -= now.inv_inertia[i] @ held[3:]
-        moved = close_joints(
-            self.table, which, now, island.contacts, state.rotation, members, run.column, memory.angle, self._allowed
-        )
-        if moved:
+        jointed = self._jointed(run, island)
+        if close_joints(jointed, island.contacts):
             refresh_pose(members, now, state.rotation, state.trajectory.inertia)
             island.moved = True
-        stop_joints(
-            self.table, which, now, state.rotation, members, run.column, memory, elapsed, self.moment
-        )
+        stop_joints(jointed, elapsed, self.moment)
         self._book(run, which, island.time)
         state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
         if self._limited:
             # An impact at this instant: what came before goes on unchanged.
-            stop_at_limits(
-                self.table, which, now, state.rotation, members, run.column, memory, self._allowed, self.shock
-            )
+            stop_at_limits(jointed, self.shock)
         memory.wrench[members] = 0.0
         self.length[which] = elapsed[which]
         after = mechanical_energy(now, run.world, members)
@@ -176,10 +173,13 @@ class JointState:
 
     def impact_block(self, run: Run, island: Island) -> JointBlock:
         """The joints' part in the impulses of an impact (`JointBlock`)."""
+        return impact_rows(self._jointed(run, island), self.shock)
+
+    def _jointed(self, run: Run, island: Island) -> JointedIsland:
+        """The joints of an island and its bodies, as the kernels take them."""
         state = run.state
-        return impact_rows(
-            self.table, island.joints, state.now, state.rotation, island.members, run.column, self.memory, self._allowed,
-            self.shock,
+        return JointedIsland(
+            self.table, island.joints, state.now, state.rotation, island.members, run.column, self.memory, self._allowed
         )
 
     def sub_step(self, run: Run, island: Island, h: float) -> float:
@@ -248,11 +248,11 @@ class JointState:
             for i in others:
                 memory.end_position[i], memory.end_rotation[i] = run.pose_matrix(i, island.time + h)
             moment = self.moment.copy()
-            residual, worst = hold_jointed(
-                run.solve_rows, state.now, contacts, turning, run.acceleration, run.angular_acceleration, h,
-                island.members, run.column, force, self.table, island.joints, state.rotation, memory, self._allowed,
-                run.wrench, moment, rolling,
+            problem = ContactProblem(
+                state.now, contacts, island.members, run.column, turning, run.acceleration, run.angular_acceleration
             )
+            jointed = self._jointed(run, island)
+            residual, worst = hold_jointed(run.solve_rows, problem, jointed, h, force, run.wrench, moment, rolling)
             self.pull[island.joints] = 2.0 * (moment[island.joints] - self.moment[island.joints]) / h
             shorter = self.sub_step(run, island, h)
             if shorter < 0.5 * h:

@@ -16,11 +16,12 @@ import numpy as np
 
 from rigidimpulse.core.quaternion import cross
 from rigidimpulse.dynamics.constraints.contact_motion import Motion, contact_motion
-from rigidimpulse.dynamics.impact.point import BodyState, Contacts
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.touching import bring_all
+from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.model.island import Island
 from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
+from rigidimpulse.motion.evaluate import bring_all
 from rigidimpulse.motion.trajectory import FORCED, begin, make_trajectories
 
 ALLOWED = 0.1

@@ -16,16 +16,16 @@ import numpy as np
 from rigidimpulse.core.quaternion import cross
 from rigidimpulse.dynamics.constraints.contact import SLIP, SOLVE_TOLERANCE
 from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows, row_velocities, solve_with_slip
-from rigidimpulse.dynamics.impact.point import Contacts, select
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.engine.run import Run
+from rigidimpulse.model.contacts import Contacts, select
 from rigidimpulse.model.island import Island
 from rigidimpulse.model.state import PairForce, State
 
 
 def remember_forces(
-    state: State, time: float, keys: list[tuple[int, ...]], contacts: Contacts, force: np.ndarray, world_force: np.ndarray, slides:
-    np.ndarray
+    state: State, time: float, keys: list[tuple[int, ...]], contacts: Contacts, force: np.ndarray, world_force: np.ndarray,
+    slides: np.ndarray,
 ) -> None:
     """Keep the forces of m contacts from `time` on: force (m, 3) in their frames, world_force (m, 3) N on b, slides (m,) bool."""
     torque_a = cross(contacts.arm_a, world_force)
@@ -76,11 +76,12 @@ def project_velocities(run: Run, island: Island) -> bool:
 def _stop(run: Run, island: Island, contacts: Contacts, entries: list[tuple[PairForce, tuple[int, ...]]]) -> None:
     """The impulses nu of contacts; entries: for each the forces of its pair and its key."""
     now, members = run.state.now, island.members
-    rows, first_row, frames = contact_rows(now, contacts, members, run.column, 0)
+    of_contacts = contact_rows(now, contacts, members, run.column, 0)
+    rows, first_row, frames = of_contacts
     row_velocities(now, contacts, first_row, frames, rows.bias)
     slides = np.array([key in entry.slides or (key not in entry.force and bool(entry.slides)) for entry, key in entries])
     scale = float(np.abs(rows.bias).max(initial=np.finfo(float).tiny))
     solve_with_slip(
-        solve_newton, rows, len(members), first_row, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale
+        solve_newton, of_contacts, len(members), contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale
     )
     change_velocities(now, members, rows)

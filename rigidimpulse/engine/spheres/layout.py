@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.dynamics.impact.point import BodyState, Contacts
 from rigidimpulse.engine.spheres.queue import Queue
 from rigidimpulse.engine.spheres.tree import BoxTree
+from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.trajectory import Trajectories
 
 BALL, PLANE, OTHER = (np.int64(kind) for kind in range(3))

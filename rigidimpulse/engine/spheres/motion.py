@@ -10,7 +10,7 @@ import numpy as np
 
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.quaternion import exponential, product, quaternion_to_matrix
-from rigidimpulse.engine.touching import world_inverse_inertia
+from rigidimpulse.motion.evaluate import world_inverse_inertia
 from rigidimpulse.motion.free_rotation import BASE, FIXED_AXIS, KIND, RATE, REST, keep_axis
 from rigidimpulse.motion.trajectory import FIXED, FREE, JERK
 

@@ -42,10 +42,10 @@ from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import advance_sleep_timers, wake_by_contact
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Outcome
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
-from rigidimpulse.engine.touching import bring_all
 from rigidimpulse.engine.warm_up import prepare_kernels
 from rigidimpulse.model.island import Island, island_without_contacts
 from rigidimpulse.model.world import World
+from rigidimpulse.motion.evaluate import bring_all
 from rigidimpulse.motion.trajectory import FIXED, LINEAR
 
 NAME = "sub-stepped islands"

@@ -41,10 +41,10 @@ from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     more_patches,
     place_patches,
 )
-from rigidimpulse.dynamics.solvers.tgs_soft.solver import FREQUENCY, advance, softness, special_patches
+from rigidimpulse.dynamics.solvers.tgs_soft.solver import FREQUENCY, Solve, SpecialPatches, advance, softness, special_patches
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.touching import refresh_pose
 from rigidimpulse.model.world import World
+from rigidimpulse.motion.evaluate import refresh_pose
 
 COLUMN = 20.0
 """Bodies whose weight may press the skin in by PRESSED."""
@@ -317,7 +317,7 @@ class ContactStepper:
         if number > len(self._batches.points):
             self._batches = more_batches(self._batches, 2 * number, width)
         self._edges = np.concatenate([edges[:-1], self._begins[: colours + 1]])
-        place_patches(width, bodies, table.pairs, self._patches, begin, count, self._batches, first, number)
+        place_patches(width, bodies, table.pairs, self._patches, (begin, count), self._batches, (first, number))
         place_bodies(bodies, self._places_of_bodies)
         fill(self.simd, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
         return number
@@ -369,26 +369,23 @@ class ContactStepper:
     def _advance(self, sub_steps: int, h: float) -> float:
         """Sub-steps of h s with the contacts as they are known; returns the work of moving supports, J."""
         bodies, table, width = self.bodies, self.table, self.simd.width
-        number = self._fill(h)
+        number, steady = self._fill(h), len(self._steady[1]) - 1
+        solve = Solve(bodies, table.pairs, self._patches, self._batches, table.points, self._edges, steady)
         lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
         balls = rebounds = supports = 0
         if self._special:
             strength = float(self.world.steady_strength[self.members].max())
             balls, rebounds, supports = special_patches(
-                width, bodies, table.pairs, self._patches, self._steady[0], self._count, table.points, self._batches,
-                self.world.coefficients, strength, lists, target,
+                width, solve, self._steady[0], self._count, self.world.coefficients, strength, lists, target
             )
-        shares, sleep_timer = min(self._shares, MOST_SOLVERS) if number * sub_steps > WORTHWHILE_BATCHES else 1, len(self._steady[1]) - 1
+        special = SpecialPatches(lists[0, :balls], lists[1, :rebounds], lists[2, :supports], target)
+        shares = min(self._shares, MOST_SOLVERS) if number * sub_steps > WORTHWHILE_BATCHES else 1
         self._work_queue[:] = empty_work_queue()
         work, *_ = advance.together([
-            (
-                self.simd, bodies, table.pairs, self._patches, self._batches, self._edges, sleep_timer, table.points, lists, balls,
-                rebounds, supports, target, sub_steps, h, self._work_queue, share, shares,
-            )
-            for share in range(shares)
+            (self.simd, solve, special, sub_steps, h, self._work_queue, share, shares) for share in range(shares)
         ])  # fmt: skip
         keep_impulses(self.simd, self._batches, number, table.lines)
-        if not sleep_timer:
+        if not steady:
             bodies.quick[:] = False
             self._steady = self._count, self._edges
         return work

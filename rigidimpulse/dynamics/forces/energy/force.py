@@ -83,7 +83,7 @@ class EnergyForces(ForceTable):
         return wrench
 
     def _poses(self, at: Instant, time: float) -> Poses:
-        """Poses of all bodies: those that forces move are at theirs, the others on their courses."""
+        """Poses of all bodies: those that forces move are at theirs, the others on their trajectories."""
         position, orientation, rotation = (values.copy() for values in self._start)
         i = self.body
         position[i], orientation[i], rotation[i] = at.bodies.position[i], at.bodies.orientation[i], at.rotation[i]

@@ -146,7 +146,10 @@ class CompiledNoOverlap:
         if energy > 0.0:
             self._add(arms, y, radii, bodies, n, d * size, total)
 
-    def _add(self, arms, y, radii, bodies, n, d, total: Expansion) -> None:
+    def _add(
+        self, arms: list[np.ndarray], y: list[np.ndarray], radii: list[float], bodies: tuple[int, int], n: np.ndarray, d: float,
+        total: Expansion,
+    ) -> None:
         """Add two pieces with the best plane n (3,), d between them."""
         u, v = np.empty(3), np.empty(3)
         tangents(n, u, v)

@@ -1,4 +1,4 @@
-"""A group of bodies that keeps its layout up to a common rigid motion: shape matching.
+"""A set of bodies that keeps its layout up to a common rigid motion: shape matching.
 
     V = min over T = (R, t) of  k/2 sum_i <|p - T p0|^2>_i,    <|p - T p0|^2>_i = |x_i - R x0_i - t|^2 + s_i |R_i - R R0_i|^2
 
@@ -28,7 +28,7 @@ from rigidimpulse.model.world import World
 
 @dataclass(frozen=True, eq=False)
 class RestoreShape:
-    """Lets a group of bodies keep its layout, up to a rigid motion of all: V = k/2 sum of mean squares of their points' displacements.
+    """Lets a set of bodies keep its layout, up to a rigid motion of all: V = k/2 sum of mean squares of their points' displacements.
 
     Checked when it is used: a `SceneError` names unknown bodies, fewer than two, half spaces, bad numbers.
 
@@ -46,7 +46,7 @@ class RestoreShape:
     orientations: ArrayLike | None = None
 
     def compile(self, world: World) -> CompiledShapeMatch:
-        """Bind the group to a compiled scene."""
+        """Bind the set to a compiled scene."""
         where = f"RestoreShape({list(self.bodies)!r})"
         bodies = body_indices(world, self.bodies, where)
         weight = positive(self.weight, "weight", "N/m", where)
@@ -84,7 +84,7 @@ def _layout(term: RestoreShape, world: World, bodies: np.ndarray, where: str) ->
 
 @dataclass(frozen=True, eq=False)
 class CompiledShapeMatch:
-    """A group: bodies (b,), k, s (b,) m^2, x0 - mean x0 (b, 3) m, R0 (b, 3, 3)."""
+    """A set: bodies (b,), k, s (b,) m^2, x0 - mean x0 (b, 3) m, R0 (b, 3, 3)."""
 
     bodies: np.ndarray
     weight: float
@@ -101,7 +101,7 @@ class CompiledShapeMatch:
         return u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
 
     def expand(self, at: Poses, total: Expansion) -> None:
-        """Add the group to a sum."""
+        """Add the set to a sum."""
         number, k = len(self.bodies), self.weight
         R, x, turned = self.motion(at), at.position[self.bodies], at.rotation[self.bodies]
         wanted = R @ self.axes

@@ -1,4 +1,11 @@
-"""How bodies of heaps move in a sub-step, see `heap_solver`: gravity, free rotation, positions (kernels)."""
+"""How bodies of sub-stepped islands move in a sub-step, see `solver`: gravity, free rotation, positions (kernels).
+
+With h the length of the sub-step, v the velocity, w the spin, g gravity, x the position, q the orientation and I the inertia:
+
+    kick    v <- v + h g
+    move    x <- x + h v,   q <- exp(h w) q;   where no contact pushed also x <- x - h^2 g / 2, which makes it the parabola
+    bodies whose moments differ keep their angular momentum: w <- I(q')^-1 I(q) w, see `_turn_freely`
+"""
 
 from math import sqrt
 

@@ -1,11 +1,11 @@
-"""How bodies that come to a heap closer than contacts are held are moved apart, without speed (kernels).
+"""Depenetration: bodies that join a sub-stepped island closer than the contact margin are moved apart, without speed (kernels).
 
-For a contact with normal n, arms r_a, r_b and a separation s < 0 from the gap it is held at, the least displacement in the metric of mass
+For a contact with normal n, arms r_a, r_b and a separation s < 0 from the contact margin, the smallest displacement in the metric of mass
 
     p = -s / (n.(M_a^-1 + M_b^-1) n),    dx = M^-1 p n,    with (r x n) for rotations
 
-makes s = 0. Contacts take turns (Gauss and Seidel) until all are met to PARTED skins, or MOST_PASSES times. Only bodies that are new to
-the heap are moved; what is deeper in than DEEPEST skins is left to the solver, which needs velocities for it.
+makes s = 0. Contacts take turns (Gauss and Seidel) until all are met to CLEARED skins, or MOST_PASSES times. Only bodies that are new to
+the island are moved. Contacts deeper than DEEPEST skins are left to the solver, which pushes them apart with velocities.
 """
 
 from rigidimpulse.collision.contact_records import SEPARATION, SKIN, in_play
@@ -14,7 +14,7 @@ from rigidimpulse.dynamics.solvers.tgs_soft.bodies import INVERSE_MASS, set_inve
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import set_orientation
 from rigidimpulse.dynamics.solvers.tgs_soft.records import normal_of, point_of
 
-PARTED, DEEPEST, MOST_PASSES = 0.01, 1.0, 200
+CLEARED, DEEPEST, MOST_PASSES = 0.01, 1.0, 200
 
 
 @jit
@@ -29,8 +29,9 @@ def _turn_for(bodies, i, x, y, z, nx, ny, nz):
 
 
 @jit
-def _shift(bodies, i, p, nx, ny, nz, wx, wy, wz):
-    """Move body i by an impulse p n over a unit of time."""
+def _shift(bodies, i, p, n, w):
+    """Move body i by an impulse p n over a unit of time; w: its rotation for a unit impulse."""
+    (nx, ny, nz), (wx, wy, wz) = n, w
     move = bodies.mass[8 * i + INVERSE_MASS] * p
     bodies.position[i, 0] += move * nx
     bodies.position[i, 1] += move * ny
@@ -54,8 +55,8 @@ def move_apart(bodies, pairs, rows, fresh):
                 if rows[r, SEPARATION] < -DEEPEST * rows[r, SKIN]:
                     continue
                 nx, ny, nz = normal_of(bodies.position, bodies.rotation, rows, r, a, b, pairs.carrier[p])
-                x, y, z, s = point_of(bodies.position, bodies.rotation, rows, r, a, b, nx, ny, nz, 0.5)
-                if s > -PARTED * rows[r, SKIN]:
+                x, y, z, s = point_of(bodies.position, bodies.rotation, rows, r, (a, b), (nx, ny, nz), 0.5)
+                if s > -CLEARED * rows[r, SKIN]:
                     continue
                 worst, moved = max(worst, -s), True
                 dx, dy, dz = (
@@ -67,9 +68,9 @@ def move_apart(bodies, pairs, rows, fresh):
                 give_a, give_b = give_a if fresh[a] else 0.0, give_b if fresh[b] else 0.0
                 push = -s / (give_a + give_b)
                 if fresh[a]:
-                    _shift(bodies, a, -push, nx, ny, nz, ax, ay, az)
+                    _shift(bodies, a, -push, (nx, ny, nz), (ax, ay, az))
                 if fresh[b]:
-                    _shift(bodies, b, push, nx, ny, nz, bx, by, bz)
+                    _shift(bodies, b, push, (nx, ny, nz), (bx, by, bz))
         if worst == 0.0:
             break
     return moved

@@ -1,4 +1,4 @@
-"""Records of patches for the solver of heaps, a batch of W at once, and impulses back from them; see `heap_records` for the fields.
+"""Records of patches for the sub-stepped solver, a batch of W at once, and impulses back from them; see `records` for the fields.
 
 With unit normal n, from a to b, tangents t_1, t_2 (t_1 x t_2 = n), points c_a on a and c_b on b, and their gap n.(c_b - c_a), impulses
 act at one point s c_a + (1 - s) c_b, so that no torque is left over: mid-way (s = 1/2), or on the surface of what can move, so that it
@@ -124,8 +124,9 @@ def _tangents(simd, n):
 
 
 @inlined
-def _points(simd, batches, k, lines, pa, pb, ra, rb, share, n, t, u):
+def _points(simd, batches, k, lines, places, rotations, share, axes):
     """Places, from the first of them, and gaps of the points of batch k into its record; returns the first and their mean from it."""
+    (pa, pb), (ra, rb), (n, t, u) = places, rotations, axes
     w = width_of(simd)
     record, zero, one = batches.record, spread(simd, 0.0), spread(simd, 1.0)
     rest, number, base, mean = one - share, zero, (zero, zero, zero), (zero, zero, zero)
@@ -180,7 +181,7 @@ def _impulses(simd, batches, k, lines, middle, t, u):
 def fill(simd, batches, begin, number, places, mass, lines, soft):
     """Records of the batches from `begin` to `number`.
 
-    places: lines (8 (n+1),) of `place_bodies`; lines (8 m,) of the pool; soft (2, 3) from `heap_solver.softness`: movable, immovable.
+    places: lines (8 (n+1),) of `place_bodies`; lines (8 m,) of the pool; soft (2, 3) from `solver.softness`: movable, immovable.
     """
     w = width_of(simd)
     record, zero, one, half = batches.record, spread(simd, 0.0), spread(simd, 1.0), spread(simd, 0.5)
@@ -197,7 +198,7 @@ def fill(simd, batches, begin, number, places, mass, lines, soft):
         skeleton_b = add(between, _turned(rb, (second[SKELETON_B - ROW], second[SKELETON_B + 1 - ROW], second[SKELETON_B + 2 - ROW])))
         n = _normal(simd, first, second, ra, rb, skeleton_a, skeleton_b)
         t, u = _tangents(simd, n)
-        base, middle = _points(simd, batches, k, lines, pa, pb, ra, rb, share, n, t, u)
+        base, middle = _points(simd, batches, k, lines, (pa, pb), (ra, rb), share, (n, t, u))
         arm_a = add(base, middle)
         arm_b = less(arm_a, between)
         _impulses(simd, batches, k, lines, middle, t, u)
@@ -210,18 +211,19 @@ def fill(simd, batches, begin, number, places, mass, lines, soft):
         store_three(record, o + SHARE * w, w, share, first[ROUND_A], first[ROUND_B])
         store(record, o + MU_STATIC * w, second[STATIC_FRICTION - ROW])
         store(record, o + MU_DYNAMIC * w, second[DYNAMIC_FRICTION - ROW])
-        # In the place of a spring between movable bodies one twice as stiff against what is not.
+        # Against a body that cannot be moved the spring has twice the frequency.
         both = ma[INVERSE_MASS] * mb[INVERSE_MASS]
         stiff = where_greater(both, zero, spread(simd, soft[0, 0]), spread(simd, soft[1, 0]))
         hard = where_greater(both, zero, spread(simd, soft[0, 1]), spread(simd, soft[1, 1]))
         store_three(record, o + STIFF * w, w, stiff, hard, where_greater(both, zero, spread(simd, soft[0, 2]), spread(simd, soft[1, 2])))
         store(record, o + DEPTH * w, second[SKIN - ROW] * stiff * spread(simd, DEEPEST))
-        _couple(simd, record, o, batches.points[k], ma, mb, arm_a, arm_b, n, t, u)
+        _couple(simd, record, o, batches.points[k], (ma, mb), (arm_a, arm_b), (n, t, u))
 
 
 @inlined
-def _couple(simd, record, o, points, ma, mb, arm_a, arm_b, n, t, u):
+def _couple(simd, record, o, points, masses, arms, axes):
     """Effective masses and couplings: entries of K and M along (t_1, t_2, n), turns about them numbered 4 to 6."""
+    (ma, mb), (arm_a, arm_b), (n, t, u) = masses, arms, axes
     w = width_of(simd)
     one, tiny, half = spread(simd, 1.0), spread(simd, TINY), spread(simd, 0.5)
     im = ma[INVERSE_MASS] + mb[INVERSE_MASS]
@@ -253,12 +255,13 @@ def _couple(simd, record, o, points, ma, mb, arm_a, arm_b, n, t, u):
     store_three(record, o + TO_TURN_2 * w, w, k15, k25, k56)
     store(record, o + TWIST_TO_1 * w, k16)
     store(record, o + TWIST_TO_2 * w, k26)
-    _couple_points(simd, record, o, points, k33, k34, k35, k44, k45, k55)
+    _couple_points(simd, record, o, points, (k33, k34, k35, k44, k45, k55))
 
 
 @inlined
-def _couple_points(simd, record, o, points, k33, k34, k35, k44, k45, k55):
-    """Effective masses of the points along n, and how they push each other."""
+def _couple_points(simd, record, o, points, entries):
+    """Effective masses of the points along n, and how they push each other; entries: of K and M, numbered as in `_couple`."""
+    k33, k34, k35, k44, k45, k55 = entries
     w = width_of(simd)
     tiny = spread(simd, TINY)
     for c in range(points):

@@ -1,4 +1,4 @@
-"""The passes of the solver of heaps over batches of patches, see `heap_solver` for the method and `heap_records` for the record.
+"""The passes of the sub-stepped solver over batches of patches; see `solver` for the method and `records` for the record.
 
 With d = (x_b - x_a) moved since the step began, the arms of a patch are those to one point O that goes along with both bodies:
 r_a = ARM_A + (1 - s) d, r_b = ARM_B - s d, s = SHARE, so that impulses leave no torque over. The gap at a point c of a body that has turned
@@ -132,8 +132,9 @@ def _moved_arms(simd, arm_a, arm_b, share, xa, xb):
 
 
 @inlined
-def _push(velocity, batches, first, va, vb, ma, mb, arm_a, arm_b, f, torque):
-    """Give the impulse f at O and the torque to b and their opposites to a."""
+def _push(velocity, batches, first, velocities, masses, arms, impulse):
+    """Give the impulse f at O and the torque to b and their opposites to a; each argument holds those of a and of b."""
+    (va, vb), (ma, mb), (arm_a, arm_b), (f, torque) = velocities, masses, arms, impulse
     ta, tb = times(ma, add(cross(arm_a, f), torque)), times(mb, add(cross(arm_b, f), torque))
     a, b = -ma[6], mb[6]
     scatter(
@@ -181,7 +182,7 @@ def warm_start(simd, batches, begin, number, velocity, moved, mass):
         n = three(simd, record, o + NORMAL * w)
         t, u = three(simd, record, o + TANGENT_1 * w), three(simd, record, o + TANGENT_2 * w)
         f, torque = sum_up(t, u, n, f1, f2, press), sum_up(t, u, n, turn_1, turn_2, twist)
-        _push(velocity, batches, k * w, va, vb, ma, mb, arm_a, arm_b, f, torque)
+        _push(velocity, batches, k * w, (va, vb), (ma, mb), (arm_a, arm_b), (f, torque))
 
 
 @inlined
@@ -221,8 +222,9 @@ def _rub(simd, record, o, points, u1, u2, w3):
 
 
 @inlined
-def _press(simd, record, g, speed, gap, relaxing, per_h, stiff, hard, soft, deepest):
-    """Normal impulse of the points at g that approach at -speed, in m/s; returns its change."""
+def _press(simd, record, g, speed, gap, relaxing, per_h, spring_of):
+    """Normal impulse of the points at g that approach at -speed, in m/s; returns its change. spring_of: STIFF, HARD, SOFT, DEPTH."""
+    stiff, hard, soft, deepest = spring_of
     w = width_of(simd)
     zero = spread(simd, 0.0)
     mass, old = load(simd, record, g + MASS * w), load(simd, record, g + PRESS * w)
@@ -248,11 +250,12 @@ def _turned_normal(theta, n, half):
 
 
 @jit
-def solve(simd, batches, begin, number, velocity, moved, mass, h, relaxing):
-    """One pass over the batches from `begin` to `number`; moved: since these were made.
+def solve_batches(simd, batches, begin, number, bodies, moved, h, relaxing):
+    """One pass over the batches from `begin` to `number`; moved: how far bodies have come since these were made.
 
-    relaxing: the one with friction and without springs, after the bodies have moved.
+    relaxing: the pass with friction and without springs, after the bodies have moved.
     """
+    velocity, mass = bodies.velocity, bodies.mass
     w = width_of(simd)
     record, zero, per_h, half = batches.record, spread(simd, 0.0), spread(simd, 1.0 / h), spread(simd, 0.5)
     for k in range(begin, number):
@@ -280,10 +283,10 @@ def solve(simd, batches, begin, number, velocity, moved, mass, h, relaxing):
             un = _coupled(simd, record, o + TO_NORMAL * w, f1, f2, f3, un)
             w1 = _coupled(simd, record, o + TO_TURN_1 * w, f1, f2, f3, w1)
             w2 = _coupled(simd, record, o + TO_TURN_2 * w, f1, f2, f3, w2)
-        press, turn_1, turn_2 = _press_points(simd, record, o, points, un, w1, w2, at_o, slope_1, slope_2, relaxing, per_h)
+        press, turn_1, turn_2 = _press_points(simd, record, o, points, (un, w1, w2), (at_o, slope_1, slope_2), relaxing, per_h)
         ma, mb = gather(simd, mass, batches.first, k * w), gather(simd, mass, batches.second, k * w)
         f, torque = sum_up(t, u, n, f1, f2, press), sum_up(t, u, n, turn_1, turn_2, f3)
-        _push(velocity, batches, k * w, va, vb, ma, mb, arm_a, arm_b, f, torque)
+        _push(velocity, batches, k * w, (va, vb), (ma, mb), (arm_a, arm_b), (f, torque))
 
 
 @inlined
@@ -293,8 +296,12 @@ def _coupled(simd, record, at, f1, f2, f3, speed):
 
 
 @inlined
-def _press_points(simd, record, o, points, un, w1, w2, at_o, slope_1, slope_2, relaxing, per_h):
-    """Normal impulses of the points of a patch; returns the sum of their changes along n and its torque about t_1 and t_2."""
+def _press_points(simd, record, o, points, speeds, gaps, relaxing, per_h):
+    """Normal impulses of the points of a patch; returns the sum of their changes along n and its torque about t_1 and t_2.
+
+    speeds: at O along n, and of the spin about t_1 and t_2; gaps: how the gap has changed at O, and from there along t_1 and t_2.
+    """
+    (un, w1, w2), (at_o, slope_1, slope_2) = speeds, gaps
     w = width_of(simd)
     zero = spread(simd, 0.0)
     stiff, hard = load(simd, record, o + STIFF * w), load(simd, record, o + HARD * w)
@@ -315,7 +322,7 @@ def _press_points(simd, record, o, points, un, w1, w2, at_o, slope_1, slope_2, r
             speed = fma(load(simd, record, o + (BETWEEN + 2) * w), p0, speed)
             speed = fma(load(simd, record, o + (BETWEEN + 4) * w), p1, speed)
             speed = fma(load(simd, record, o + (BETWEEN + 5) * w), p2, speed)
-        change = _press(simd, record, g, speed, gap, relaxing, per_h, stiff, hard, soft, deepest)
+        change = _press(simd, record, g, speed, gap, relaxing, per_h, (stiff, hard, soft, deepest))
         if c == 0:
             p0 = change
         elif c == 1:

@@ -1,4 +1,4 @@
-"""Contacts of heaps as the solver reads them: patches, coloured, one to a lane.
+"""Contacts of sub-stepped islands as the solver reads them: patches, coloured, one to a SIMD lane.
 
 A patch is up to four contact points of one pair with one normal. Patches that share no movable body have one colour (greedy, in
 the order of the pairs, with a word of bits for each body) and may be solved at once; a batch is W patches of one colour, those of
@@ -39,14 +39,14 @@ BETWEEN = 34
 """How points push each other along n: 01, 02, 03, 12, 13, 23."""
 POINT, POINT_SIZE = 40, 6
 X, Y, GAP, MASS, PRESS, LEVER = 0, 1, 2, 3, 4, 5
-"""First field of the points, and fields of each: place, m; gap less the held one, m; effective mass, 0: none; impulse; distance from O."""
+"""First field of the points, and their fields: place, m; gap less contact margin, m; effective mass, 0: none; impulse; distance from O."""
 FIELDS = POINT + 4 * POINT_SIZE
 POINTS, LINES = 4, 3
 """Points of a patch at most; lines of 8 of a row of the pool."""
 REGIONS = 2
-"""Parts of the heap, by the places of bodies at the start: each core works in one of them as long as it can."""
+"""Parts of the island, by the ranks of bodies: each processor works in one of them as long as it can."""
 PATCHES_OF_A_BODY = 8
-"""For so many there is room at first: what is reserved takes no memory before it is touched."""
+"""Patches of a body for which memory is reserved at first: it takes no real memory before it is written."""
 COLOURS = 62
 """Patches that find no colour among these have a batch each."""
 ONE_PATCH = 1.0 - 1e-8
@@ -75,7 +75,7 @@ class Batches(NamedTuple):
 
 
 def empty_patches(m: int) -> Patches:
-    """Room for m patches."""
+    """Arrays for m patches."""
 
     def numbers(*shape: int) -> np.ndarray:
         return reserve(shape, np.int32)
@@ -84,7 +84,7 @@ def empty_patches(m: int) -> Patches:
 
 
 def more_patches(patches: Patches, m: int) -> Patches:
-    """The same with room for m."""
+    """A copy with a capacity of m patches."""
     out = empty_patches(m)
     for new, old in zip(out, patches, strict=True):
         new[: len(old)] = old
@@ -92,7 +92,7 @@ def more_patches(patches: Patches, m: int) -> Patches:
 
 
 def more_batches(batches: Batches, b: int, width: int) -> Batches:
-    """The same with room for b batches."""
+    """A copy with a capacity of b batches."""
     slots = b * width
     record, arm = aligned(-(-FIELDS * slots // (2 * ROW))).view(np.float32), aligned(-(-ARM_FIELDS * slots // ROW))
     first, second, row = reserve((slots,), np.int32), reserve((slots,), np.int32), reserve((POINTS * slots,), np.int32)
@@ -104,7 +104,7 @@ def more_batches(batches: Batches, b: int, width: int) -> Batches:
 
 @jit_making_arrays
 def list_patches(bodies, pairs, rows, patches, begin):
-    """Write the patches of pairs in play of quick bodies from place `begin` on; returns where they end, negative without room."""
+    """Write the patches of pairs in play of quick bodies from place `begin` on; returns their end, negative if above the capacity."""
     m = begin
     capacity, part, quick = patches.pair.shape[0], bodies.part, bodies.quick
     taken = np.zeros(64, np.bool_)
@@ -121,6 +121,7 @@ def list_patches(bodies, pairs, rows, patches, begin):
                     patches.row[m, c] = start + c
             m += 1
             continue
+        # Meshes give points with several normals: a patch has one.
         taken[:count] = False
         for c in range(count):
             if taken[c]:
@@ -169,7 +170,7 @@ def _class_of(bodies, pairs, patches, m):
 
 @jit_making_arrays
 def colour_patches(width, bodies, pairs, patches, begin, count, batches, begins):
-    """Colour the patches from `begin` to `count` and give them slots, after so many batches; begins (c+1,): where colours begin.
+    """Colour the patches from `begin` to `count` and give them slots, after `batches` batches; begins (c+1,): where colours begin.
 
     Returns where their batches end, and the number of colours, minus that where `begins` is too small.
     """
@@ -231,8 +232,9 @@ def tangents(nx, ny, nz):
 
 
 @jit
-def point_of(position, rotation, rows, r, a, b, nx, ny, nz, share):
-    """Where the impulses of row r act, from the centre of a, and the gap less the held one, m."""
+def point_of(position, rotation, rows, r, ends, n, share):
+    """Where the impulses of row r act, from the centre of a, and the gap less the contact margin, m; ends: bodies a and b."""
+    (a, b), (nx, ny, nz) = ends, n
     ax, ay, az = turned(rotation, a, rows[r, SKELETON_A], rows[r, SKELETON_A + 1], rows[r, SKELETON_A + 2])
     bx, by, bz = turned(rotation, b, rows[r, SKELETON_B], rows[r, SKELETON_B + 1], rows[r, SKELETON_B + 2])
     bx += position[b, 0] - position[a, 0]
@@ -262,8 +264,9 @@ def normal_of(position, rotation, rows, r, a, b, carrier):
 
 
 @jit_making_arrays
-def place_patches(width, bodies, pairs, patches, begin, count, batches, first, number):
-    """Put the patches from `begin` to `count` into their lanes of the batches from `first` to `number`."""
+def place_patches(width, bodies, pairs, patches, of_patches, batches, of_batches):
+    """Put patches into their slots of batches; of_patches, of_batches: first and last + 1 of either."""
+    (begin, count), (first, number) = of_patches, of_batches
     idle = bodies.part.shape[0] - 1
     batches.first[first * width : number * width] = batches.second[first * width : number * width] = idle
     batches.row[POINTS * first * width : POINTS * number * width] = 0

@@ -1,6 +1,6 @@
-"""The sub-stepped solver of heaps: soft contacts with a skin, a relaxing pass, friction in a cone (kernels).
+"""The sub-stepped solver: soft contacts with a skin, a relaxing pass, friction in a cone (kernels).
 
-A step is cut into sub-steps of length h. In each of them, for every body and every patch of contact points (`heap_records`) with normal
+A step is cut into sub-steps of length h. In each of them, for every body and every patch of contact points (see `records`) with normal
 n, gaps less the skin s, effective masses m = 1 / (n.K n), normal impulses p, and friction f and twist t at its centre carried
 over from the sub-step before (a warm start):
 
@@ -20,8 +20,8 @@ block slides where it should hold.
 
 w = 2 pi F / h is the frequency of the spring, z its damping ratio, a_1 = 2 z + h w, a_2 = h w a_1, a_3 = 1 / (1 + a_2); twice
 w against what cannot be moved. Patches are visited colour by colour (Gauss-Seidel), many at once. K is that of the start of the
-step; gaps and arms are those of points fixed in the bodies, anew in every sub-step (gaps to second order in the turn); radii are taken
-along the normal, so that balls roll, and the normal of two balls is made anew. At the end of a sub-step contacts that were seen
+step; gaps and arms are those of points fixed in the bodies, updated in every sub-step (gaps to second order in the turn); radii are
+taken along the normal, so that balls roll, and the normal of two balls is updated too. At the end of a sub-step contacts that were seen
 at u_n < -sqrt(2 g skin) / e and are closed by now leave at -e u_n. The torque-free part of rotation keeps the angular
 momentum: w <- I(q')^-1 I(q) w, with q' from the spin at mid-way.
 
@@ -30,16 +30,17 @@ Method: Macklin et al., Small steps in physics simulation, 2019; the relaxing pa
 """
 
 from math import pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import SKIN
+from rigidimpulse.collision.contact_records import SKIN, ContactPairs
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.simd import width_of
 from rigidimpulse.core.workers import LAST, NONE, PATIENCE, look_at, open_round, pause, report_piece, take_piece, wait_for
-from rigidimpulse.dynamics.solvers.tgs_soft.bodies import INVERSE_MASS
+from rigidimpulse.dynamics.solvers.tgs_soft.bodies import INVERSE_MASS, SolverBodies
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import finish, kick, move
-from rigidimpulse.dynamics.solvers.tgs_soft.passes import solve, warm_start
+from rigidimpulse.dynamics.solvers.tgs_soft.passes import solve_batches, warm_start
 from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     ARM_A,
     ARM_B,
@@ -60,6 +61,8 @@ from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     TANGENT_1,
     TANGENT_2,
     TWIST,
+    Batches,
+    Patches,
     X,
     Y,
     normal_of,
@@ -75,6 +78,28 @@ KICK, WARM, SOLVE, MOVE, RELAX = range(5)
 """Phases of a sub-step: gravity, warm start, normal rows, motion, relaxing. WARM, SOLVE and RELAX have a round for each colour."""
 BODIES_EACH, BATCHES_EACH = 128, 8
 """Bodies and batches of a piece of a round: a microsecond or two of work."""
+
+
+class Solve(NamedTuple):
+    """What sub-steps work on."""
+
+    bodies: SolverBodies
+    pairs: ContactPairs
+    patches: Patches
+    batches: Batches
+    rows: np.ndarray  # the pool of contact rows
+    edges: np.ndarray  # (c+1,) where the batches of colours begin
+    steady: int
+    """Colours that were made before contacts were last looked for; how far bodies have come since they were made is in `drift`."""
+
+
+class SpecialPatches(NamedTuple):
+    """Patches that need more than the passes give, see `special_patches`."""
+
+    balls: np.ndarray  # patches of two balls
+    rebounds: np.ndarray  # patches with points that rebound
+    supports: np.ndarray  # patches on moving supports
+    target: np.ndarray  # (m, 4) m/s
 
 
 def softness(h: float) -> np.ndarray:
@@ -113,7 +138,7 @@ def _first_arm(s, width):
 
 @jit_making_arrays
 def _arms_to(bodies, batches, s, o, width, c):
-    """Bodies of lane s, and the arms from them to its point c (to its centre for c < 0) as they are now."""
+    """Bodies of slot s, and the arms from them to its point c (to its centre for c < 0) as they are now."""
     record, arm, moved = batches.record, batches.arm, bodies.moved
     a, b = batches.first[s], batches.second[s]
     x, y = 0.0, 0.0
@@ -163,12 +188,13 @@ def _slip_at(bodies, a, b, arm_a, arm_b):
 
 
 @jit_making_arrays
-def special_patches(width, bodies, pairs, patches, begin, count, rows, batches, coefficients, gravity, lists, target):
+def special_patches(width, solve, begin, count, coefficients, gravity, lists, target):
     """Patches from `begin` to `count` that need more than the passes give: of two balls, of rebounds, of moving supports.
 
     Writes them to lists (3, m), and returns their numbers. coefficients (k, k, 4) of two materials; gravity: its strength, m/s2. target
     (m, 4): speeds at which points leave after they have closed, m/s, 0 for none.
     """
+    bodies, pairs, patches, rows, batches = solve.bodies, solve.pairs, solve.patches, solve.rows, solve.batches
     balls, rebounds, supports = 0, 0, 0
     for m in range(begin, count):
         p, s = patches.pair[m], patches.slot[m]
@@ -212,7 +238,7 @@ def _turn_balls(width, bodies, pairs, patches, chosen, rows, batches):
         f = (f1 * t[0] + f2 * u[0], f1 * t[1] + f2 * u[1], f1 * t[2] + f2 * u[2])
         n = normal_of(bodies.position, bodies.rotation, rows, r, a, b, pairs.carrier[p])
         ux, uy, uz, vx, vy, vz = tangents(n[0], n[1], n[2])
-        x, y, z, gap = point_of(bodies.position, bodies.rotation, rows, r, a, b, n[0], n[1], n[2], share)
+        x, y, z, gap = point_of(bodies.position, bodies.rotation, rows, r, (a, b), n, share)
         record[o + PUSH_1 * width] = ux * f[0] + uy * f[1] + uz * f[2]
         record[o + PUSH_2 * width] = vx * f[0] + vy * f[1] + vz * f[2]
         arm, t, u = (x, y, z), (ux, uy, uz), (vx, vy, vz)
@@ -305,9 +331,10 @@ def _extent(bodies, edges, phase, colour):
 
 
 @jit
-def _work_on(simd, bodies, batches, calm, h, phase, colour, begin, end):
-    """A piece of a round; calm: colours of batches that were made before the last look."""
-    moved = bodies.drift if colour < calm else bodies.moved
+def _work_on(simd, solve, h, phase, colour, begin, end):
+    """Work on a piece of a round."""
+    bodies, batches = solve.bodies, solve.batches
+    moved = bodies.drift if colour < solve.steady else bodies.moved
     if phase == KICK:
         kick(bodies, begin, end, h)
     elif phase == WARM:
@@ -315,16 +342,16 @@ def _work_on(simd, bodies, batches, calm, h, phase, colour, begin, end):
     elif phase == MOVE:
         move(bodies, begin, end, h)
     else:
-        solve(simd, batches, begin, end, bodies.velocity, moved, bodies.mass, h, phase == RELAX)
+        solve_batches(simd, batches, begin, end, bodies, moved, h, phase == RELAX)
 
 
 @jit
-def _lead(simd, bodies, batches, edges, calm, h, work_queue, is_shared, number):
+def _lead(simd, solve, h, work_queue, is_shared, number):
     """Work on a round until it is done."""
-    phase, colour = _round(number, edges.shape[0] - 1)
-    begin, end, each, pieces = _extent(bodies, edges, phase, colour)
+    phase, colour = _round(number, solve.edges.shape[0] - 1)
+    begin, end, each, pieces = _extent(solve.bodies, solve.edges, phase, colour)
     if not is_shared or pieces < 2:
-        _work_on(simd, bodies, batches, calm, h, phase, colour, begin, end)
+        _work_on(simd, solve, h, phase, colour, begin, end)
         return
     open_round(work_queue, number)
     mine = 0
@@ -333,14 +360,15 @@ def _lead(simd, bodies, batches, edges, calm, h, work_queue, is_shared, number):
         if taken >= pieces:
             break
         first = begin + mine * each
-        _work_on(simd, bodies, batches, calm, h, phase, colour, first, min(first + each, end))
+        _work_on(simd, solve, h, phase, colour, first, min(first + each, end))
         mine += 1
     wait_for(work_queue, pieces - mine)
 
 
 @jit
-def _help(simd, bodies, batches, edges, calm, h, work_queue):
-    """Work on whatever round is open, to the last."""
+def _help(simd, solve, h, work_queue):
+    """Work on every round that is open, to the last."""
+    bodies, edges = solve.bodies, solve.edges
     waited, colours, mine, last = 0, edges.shape[0] - 1, 0, NONE
     while waited < PATIENCE:
         number, taken = look_at(work_queue)
@@ -357,35 +385,32 @@ def _help(simd, bodies, batches, edges, calm, h, work_queue):
                 mine = mine + 1 if number == last else 1
                 last, waited = number, 0
                 first = begin + (pieces - mine) * each
-                _work_on(simd, bodies, batches, calm, h, phase, colour, first, min(first + each, end))
+                _work_on(simd, solve, h, phase, colour, first, min(first + each, end))
                 report_piece(work_queue)
         pause()
 
 
 @jit
-def advance(
-    simd, bodies, pairs, patches, batches, edges, calm, rows, lists, balls, rebounds, supports, target, sub_steps, h, work_queue, share,
-    shares,
-):
-    """So many sub-steps of length h; returns the work of moving supports, J.
+def advance(simd, solve, special, sub_steps, h, work_queue, share, shares):
+    """Make `sub_steps` sub-steps of length h; returns the work of moving supports, J.
 
-    edges (c+1,): where the batches of colours begin; calm: how many colours were made before the last look; what bodies have come since
-    then is in `drift`. share: 0 for who leads, 1 for who helps, if `shares` is 2, see `heap_team`.
+    share: 0 for the thread that leads, 1 for the one that helps, if `shares` is 2; see `workers`.
     """
-    width, colours, work = width_of(simd), edges.shape[0] - 1, 0.0
+    width, colours, work = width_of(simd), solve.edges.shape[0] - 1, 0.0
+    bodies, patches, batches = solve.bodies, solve.patches, solve.batches
     if share > 0:
-        _help(simd, bodies, batches, edges, calm, h, work_queue)
+        _help(simd, solve, h, work_queue)
         return 0.0
     for s in range(sub_steps):
         first = s * (3 * colours + 2)
         for k in range(2 * colours + 2):
-            _lead(simd, bodies, batches, edges, calm, h, work_queue, shares > 1, first + k)
-        _turn_balls(width, bodies, pairs, patches, lists[0, :balls], rows, batches)
+            _lead(simd, solve, h, work_queue, shares > 1, first + k)
+        _turn_balls(width, bodies, solve.pairs, patches, special.balls, solve.rows, batches)
         for k in range(2 * colours + 2, 3 * colours + 2):
-            _lead(simd, bodies, batches, edges, calm, h, work_queue, shares > 1, first + k)
-        # Whatever a rebound takes from the impulses has acted already.
-        work += _work_of(width, bodies, patches, lists[2, :supports], batches)
-        work += _rebound(width, bodies, patches, lists[1, :rebounds], batches, target)
+            _lead(simd, solve, h, work_queue, shares > 1, first + k)
+        # The work is counted first: a rebound sets impulses to zero that have acted already.
+        work += _work_of(width, bodies, patches, special.supports, batches)
+        work += _rebound(width, bodies, patches, special.rebounds, batches, special.target)
     open_round(work_queue, LAST)
     finish(bodies)
     return work
