@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.providers import provider
 from rigidimpulse.dynamics.forces.constant import ConstantForces
 from rigidimpulse.dynamics.forces.gravity import FreeRotation, Gravity, SteadyLoad
 from rigidimpulse.dynamics.forces.kinds import bind_forces, force_kinds
@@ -48,8 +49,8 @@ from rigidimpulse.scene.scene import Scene
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force_log import ForceWork
     from rigidimpulse.engine.spheres.run import EventRun
-    from rigidimpulse.io.cache.checkpointer import Cache
-    from rigidimpulse.studies.accuracy_targets import AccuracyTarget
+    from rigidimpulse.recording.cache import Cache
+    from rigidimpulse.scene.accuracy_targets import AccuracyTarget
 
 # Frames whose product with the number of bodies is refused as a slip of the keyboard (about 1e9 poses, 100 GB).
 MOST_POSES = 1_000_000_000
@@ -73,7 +74,7 @@ def simulate(
         scene: what to simulate; it is not changed.
         duration: s, >= 0.
         fps: frames per second; changes what is recorded, never what happens.
-        accuracy: "preview", "standard", "exact" or an `Accuracy`; or a wish, `Within` or `InTime`, that chooses one by measuring the scene.
+        accuracy: "preview", "standard", "exact" or an `Accuracy`; or an accuracy target, `Within` or `InTime`: it chooses one by measuring.
         effects: effects, by their names in `run.plan.explain()`, that are to be in (True) or out (False) whatever the scene calls for. The
             status says where one is out that the scene calls for.
         progress: called with the simulated time in s after every step, or after many in which nothing but impacts of balls happened.
@@ -92,9 +93,7 @@ def simulate(
         return _simulate(scene, duration, fps, accuracy, effects, progress, cache)
     if cache is not None:
         raise SceneError("a cache for an accuracy that is still to be chosen", "choose it first, and give run.choice.accuracy")
-    from rigidimpulse.studies.accuracy_targets import simulate_to_target
-
-    return simulate_to_target(scene, duration, fps, accuracy, effects, progress)
+    return provider("simulate to target")(scene, duration, fps, accuracy, effects, progress)
 
 
 def _simulate(
@@ -132,9 +131,7 @@ def _simulate(
         run_to_end(running, plan, duration, progress)
         run = finish_run(running, plan, duration)
     else:
-        from rigidimpulse.io.cache.checkpointer import Checkpointer
-
-        with closing(Checkpointer(cache, settings, running, plan)) as checkpointer:
+        with closing(provider("checkpoints")(cache, settings, running, plan)) as checkpointer:
             run_to_end(checkpointer.running, plan, duration, lambda time: checkpointer.look(time, progress))
             checkpointer.write(float(duration))
             run = finish_run(checkpointer.running, plan, duration)

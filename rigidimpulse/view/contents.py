@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.recording.exporters import ExportOptions, ExportTarget
 from rigidimpulse.scene.shape import rotation_matrix
 from rigidimpulse.view.arrows import arrow_rows, fade_time, longest_arrow
 from rigidimpulse.view.camera import Framing, Path, frame_action, up_axis
@@ -172,14 +173,13 @@ def glb_file(recording: Any) -> bytes:
     from pathlib import Path as FilePath
     from tempfile import TemporaryDirectory
 
-    from rigidimpulse.io.gltf.animate import write_motion
-    from rigidimpulse.io.motion import MotionOptions
+    from rigidimpulse.io.gltf.animate import write_gltf
     from rigidimpulse.scene.scene import Scene
 
     plain = replace(recording, scene=Scene(recording.scene.gravity, recording.scene.bodies), soft_bodies=[])
     with TemporaryDirectory() as folder:
         path = FilePath(folder) / "motion.glb"
-        write_motion(plain, path, MotionOptions())
+        write_gltf(plain, ExportTarget(path, path.stem, ExportOptions()))
         return path.read_bytes()
 
 

@@ -24,9 +24,8 @@ from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
 from rigidimpulse.engine.simulate import frame_times
 from rigidimpulse.recording.events import IMPACT_DTYPE
 from rigidimpulse.studies.compare import frames_of, labels_of
-from rigidimpulse.view import render_page
 from rigidimpulse.view.comparison import COMPARISON_SCRIPTS, render_comparison
-from rigidimpulse.view.page import SCRIPTS
+from rigidimpulse.view.page import SCRIPTS, render_page
 
 FPS = 24.0
 DRIFT = np.array([3e-3, 0.0, 4e-3])  # m/s by which the ball of the second run runs away: 5e-3 m/s

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -21,6 +20,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.engine.fingerprint import fingerprint
 from rigidimpulse.io.cache.file import FRAMES, SUFFIXES, CacheFile, Content, Header, read
 from rigidimpulse.io.cache.freeze import Constants, freeze, thaw
+from rigidimpulse.recording.cache import Cache
 from rigidimpulse.recording.recorder import sample_paths
 from rigidimpulse.recording.recording import Recording, RunSettings
 
@@ -30,20 +30,6 @@ if TYPE_CHECKING:
 
 EXPENSIVE = 20.0
 """How many times longer than the last checkpoint took the run goes on before the next."""
-
-
-@dataclass(frozen=True)
-class Cache:
-    """Where a run is kept on disk while it goes on, see `simulate`.
-
-    Attributes:
-        path: a file that ends in .h5 or .hdf5.
-        every: s of computing between checkpoints, at least; 20 times what one takes if that is longer.
-
-    """
-
-    path: str | os.PathLike[str]
-    every: float = 5.0
 
 
 class Checkpointer:

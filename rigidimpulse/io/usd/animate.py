@@ -11,14 +11,13 @@ USD's own; bodies that turn fast have keys in between, see `rigidimpulse.io.keys
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import from_matrix
-from rigidimpulse.io.motion import Motion, MotionOptions
+from rigidimpulse.io.motion import Motion
 from rigidimpulse.io.usd.draw import Drawing, draw_soft_body
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place, quaternions, sample, valid_name, vectors
 from rigidimpulse.io.usd.library import Gf, Sdf, UsdUtils
@@ -27,6 +26,7 @@ from rigidimpulse.view.camera import stage_rotation, up_axis
 from rigidimpulse.view.materials import color
 
 if TYPE_CHECKING:
+    from rigidimpulse.recording.exporters import ExportTarget
     from rigidimpulse.recording.recording import Recording
 
 NEAR = 1e-9
@@ -37,26 +37,27 @@ IS_AXIS = 1e-9
 AXES = {"y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
 
 
-def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
+def write_usd(run: Recording, target: ExportTarget) -> None:
     """Write a .usda, .usdc, .usd or .usdz file of a run.
 
     Args:
-        run: with its scene. target: where; the suffix says which. options: see there.
+        run: with its scene. target: where, and the options; the suffix of its path chooses the kind.
 
     Raises:
-        SceneError: usd-core is missing, a figure makes no sense, or a pose is not finite.
+        SceneError: usd-core is missing, an option makes no sense, or a pose is not finite.
 
     """
-    motion = Motion(run, options)
-    if target.suffix != ".usdz":
-        layer = Sdf.Layer.CreateNew(str(target))
+    motion = Motion(run, target.options)
+    path = target.path
+    if path.suffix != ".usdz":
+        layer = Sdf.Layer.CreateNew(str(path))
         _Writer(run, motion, layer).write()
         layer.Save()
         return
-    inner = target.with_suffix(".usdc")
+    inner = path.with_suffix(".usdc")
     try:
-        write_motion(run, inner, options)
-        UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(inner)), str(target))
+        write_usd(run, target._replace(path=inner))
+        UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(inner)), str(path))
     finally:
         inner.unlink(missing_ok=True)
 

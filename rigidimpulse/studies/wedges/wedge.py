@@ -15,6 +15,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import write_renamed
 from rigidimpulse.recording.recording import Recording, load_recording
 from rigidimpulse.scene.scene import Scene
+from rigidimpulse.studies.job import DEFAULT_DURATION, DEFAULT_FPS, find_job
 from rigidimpulse.studies.wedges.take import FAILED, Take, TakeJob, make_scene
 from rigidimpulse.studies.wedges.vary import UnknownParameter, combinations
 from rigidimpulse.studies.wedges.workers import run_dask, run_here, run_pool
@@ -103,8 +104,6 @@ def wedge(
         SceneError: no such scene, nothing to vary, or the folder has another wedge in it.
 
     """
-    from rigidimpulse.cli.jobs import DEFAULT_DURATION, DEFAULT_FPS, find_job
-
     named = os.fspath(scene) if isinstance(scene, str | os.PathLike) else None
     job = find_job(named) if named is not None else None
     own = (job.duration, job.fps, job.accuracy) if job is not None else (DEFAULT_DURATION, DEFAULT_FPS, "standard")
