@@ -54,6 +54,7 @@ _HOMES = {
     "Trigger": "engine.triggers",
     "Velocity": "dynamics.forces.energy.path",
     "Within": "scene.accuracy_targets",
+    "Workers": "studies.wedges.workers",
     "compare": "studies.compare",
     "compile_scene": "model.world",
     "contains": "collision.containment",

@@ -74,7 +74,7 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str |
     seconds = perf_counter() - start
     num_impacts = len(run.impacts)
     impacts = f"{num_impacts} {'impact' if num_impacts == 1 else 'impacts'}"
-    rest = f"; {cache} had what came before, or all" if begun else ""
+    rest = f"; {cache} already had the beginning, or all of it" if begun else ""
     click.echo(f"{job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s{rest}")
     click.echo(f"status: {run.status.message}")
     if profile and run.profile is not None:

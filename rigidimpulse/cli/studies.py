@@ -76,7 +76,6 @@ def _study_scene(scene: str, output: str | None, budget: float | None, full: boo
     from rigidimpulse.studies.work_precision import study as run_study
 
     job = find_job(scene)
-    given = job.name if job.entry is not None else job.make()
     folder = Path(output or f"study_{job.name}")
     with tqdm(total=100, disable=None, leave=False, bar_format="{desc} {percentage:3.0f} % of the budget |{bar}|") as bar:
 
@@ -85,8 +84,8 @@ def _study_scene(scene: str, output: str | None, budget: float | None, full: boo
             bar.update(round(100.0 * share) - bar.n)
 
         result = run_study(
-            given, duration or job.duration, job.fps, name=job.name, full=full, budget=budget or (FULL_BUDGET if full else BUDGET),
-            peers=peers, output=folder, progress=progress,
+            job, duration or job.duration, job.fps, settings="full" if full else "small",
+            budget=budget or (FULL_BUDGET if full else BUDGET), peers=peers, output=folder, progress=progress,
         )  # fmt: skip
     click.echo(f"{result.name}, {result.duration:g} s; reference: {result.reference.describe()}")
     click.echo(result.table())

@@ -21,7 +21,7 @@ from rigidimpulse.view.contents import is_large, page_contents
 from rigidimpulse.view.protocol import RecordingLike
 
 SCRIPTS = (
-    "look.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "nets.js", "shapes.js", "transport.js", "plot.js", "timeline.js",
+    "look.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "soft_bodies.js", "shapes.js", "transport.js", "plot.js", "timeline.js",
     "panel.js", "ledger.js", "hud.js", "messages.js", "main.js",
 )  # fmt: skip
 LARGE_SCRIPTS = tuple("glb.js" if name == "messages.js" else name for name in SCRIPTS)
