@@ -15,7 +15,7 @@ _HOMES = {
     "Accuracy": "scene.accuracy",
     "BallJoint": "scene.joint",
     "Body": "scene.body",
-    "Cache": "io.cache.checkpointer",
+    "Cache": "recording.cache",
     "CollisionFilter": "scene.collision_filter",
     "ConstantForce": "dynamics.forces.constant",
     "Curvature": "dynamics.forces.energy.path",
@@ -29,7 +29,7 @@ _HOMES = {
     "GravityPotential": "dynamics.forces.energy.potential",
     "HarmonicForce": "dynamics.forces.harmonic",
     "HingeJoint": "scene.joint",
-    "InTime": "studies.accuracy_targets",
+    "InTime": "scene.accuracy_targets",
     "Keyframes": "scene.keyframes",
     "Limit": "scene.joint_six_axis",
     "Material": "scene.material",
@@ -53,7 +53,8 @@ _HOMES = {
     "Thruster": "dynamics.forces.thruster",
     "Trigger": "engine.triggers",
     "Velocity": "dynamics.forces.energy.path",
-    "Within": "studies.accuracy_targets",
+    "Within": "scene.accuracy_targets",
+    "Workers": "studies.wedges.workers",
     "compare": "studies.compare",
     "compile_scene": "engine.compile_scene",
     "contains": "collision.containment",
@@ -67,6 +68,9 @@ _HOMES = {
 }
 
 __all__ = sorted(_HOMES)
+
+for _package in ("io", "view", "studies"):
+    importlib.import_module(f"rigidimpulse.{_package}.registration")
 
 
 def __getattr__(name: str) -> Any:

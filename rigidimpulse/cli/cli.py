@@ -12,10 +12,7 @@ import rigidimpulse
 from rigidimpulse.cli.jobs import (
     BAD_SCENE,
     CHECK_FAILED,
-    RECORDING_SUFFIXES,
-    find_job,
     given_options,
-    job_of,
     print_table,
     recording_with_shapes,
     run_job,
@@ -25,13 +22,16 @@ from rigidimpulse.cli.jobs import (
 from rigidimpulse.cli.site import gallery as gallery_pages
 from rigidimpulse.cli.studies import compare, hardcases, study
 from rigidimpulse.cli.wedge import wedge
-from rigidimpulse.core.files import ANIMATED_SUFFIXES
+from rigidimpulse.recording.exporters import export_suffixes, reader_suffixes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rigidimpulse.gallery.record import Check
     from rigidimpulse.recording.recording import Recording
+
+
+OUTPUT_SUFFIXES = " or ".join(", ".join(export_suffixes()).rsplit(", ", 1))
 
 
 class Failure(click.ClickException):
@@ -98,12 +98,13 @@ def export_options(command: Callable) -> Callable:
 
 @main.command()
 @click.argument("name", required=False)
-@click.option("-o", "--output", multiple=True, help="Write the recording: a name that ends in .html, .npz, .csv, .glb, .gltf or .usd.")
+@click.option("-o", "--output", multiple=True, help=f"Write the recording: a name that ends in {OUTPUT_SUFFIXES}.")
 @export_options
 @run_options
 def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, cache: str | None, **settings: Any) -> None:
     """Run a gallery scene and its checks; without NAME, list the scenes."""
     from rigidimpulse import gallery
+    from rigidimpulse.studies.job import job_of
 
     if name is None:
         width = max(map(len, gallery.names() + gallery.hard_names()))
@@ -128,11 +129,13 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, c
 
 @main.command()
 @click.argument("scene")
-@click.option("-o", "--output", multiple=True, required=True, help="Where to write: a name in .html, .npz, .csv, .glb, .gltf or .usd.")
+@click.option("-o", "--output", multiple=True, required=True, help=f"Where to write: a name that ends in {OUTPUT_SUFFIXES}.")
 @export_options
 @run_options
 def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, cache: str | None, **settings: Any) -> None:
     """Simulate SCENE and write the recording."""
+    from rigidimpulse.studies.job import find_job
+
     keys = _export_settings(settings)
     job = find_job(scene)._replace(**given_options(settings))
     _hand_over(run_job(job, output, profile, cache), output, view, keys)
@@ -150,10 +153,10 @@ def view(file: str, scene: str | None) -> None:
         raise SceneError(f"there is no file {file!r}", "check the path")
     if path.suffix == ".html":
         click.launch(path.resolve().as_uri())
-    elif path.suffix in RECORDING_SUFFIXES:
+    elif path.suffix in reader_suffixes():
         show(recording_with_shapes(path, scene))
     else:
-        raise SceneError(f"cannot view {path.name!r}", f"give a recording, a file that ends in .html or {' or '.join(RECORDING_SUFFIXES)}")
+        raise SceneError(f"cannot view {path.name!r}", f"give a recording, a file that ends in .html or {' or '.join(reader_suffixes())}")
 
 
 @main.command()
@@ -164,6 +167,7 @@ def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
     """Say which effects SCENE calls for, which not, and why."""
     from rigidimpulse.engine.begin import make_plan
     from rigidimpulse.engine.compile_scene import compile_scene
+    from rigidimpulse.studies.job import find_job
 
     job = find_job(scene)._replace(**given_options({"accuracy": accuracy, "duration": duration}))
     if duration is None:
@@ -191,8 +195,9 @@ def _print_checks(checks: Sequence[Check]) -> bool:
 def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str, Any]) -> None:
     """Write the recording where it was asked for, and open it; keys: options of animated nodes, and the pre-roll."""
     run = run.part(keys.pop("pre_roll"))
+    takes_options = export_suffixes(with_options=True)
     for target in output:
-        path = run.export(target, **(keys if Path(target).suffix in ANIMATED_SUFFIXES else {}))
+        path = run.export(target, **(keys if Path(target).suffix in takes_options else {}))
         click.echo(f"wrote {path} ({size_of(path)})")
     if view:
         show(run)

@@ -1,50 +1,29 @@
-"""What commands share: scenes found by name or file, run with a progress bar; tables. Whatever is dear is imported where it is used."""
+"""Shared by the commands: runs with a progress bar, and tables. Expensive modules are imported where they are used."""
 
 from __future__ import annotations
 
-from functools import partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from rigidimpulse.core.files import ANIMATED_SUFFIXES
+from rigidimpulse.recording.exporters import export_suffixes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    from rigidimpulse.gallery.record import GalleryScene
     from rigidimpulse.recording.recording import Recording
-    from rigidimpulse.scene.accuracy import Accuracy
-    from rigidimpulse.scene.scene import Scene
-    from rigidimpulse.studies.accuracy_targets import AccuracyTarget
     from rigidimpulse.studies.compare import Comparison
+    from rigidimpulse.studies.job import Job
 
-SCENE_SUFFIXES = (*ANIMATED_SUFFIXES, ".urdf", ".xml", ".mjcf")
-OUTPUT_SUFFIXES = (".html", ".npz", *ANIMATED_SUFFIXES, ".csv")
-RECORDING_SUFFIXES = (".npz", ".h5", ".hdf5")
-DEFAULT_DURATION = 4.0
-"""s, of scenes from files."""
-DEFAULT_FPS = 60.0
 PATIENCE = 0.5
 """s of work before a progress bar appears."""
 CHECK_FAILED, BAD_SCENE = 1, 2
 """Exit codes, besides 0 for success."""
 
 
-class Job(NamedTuple):
-    """A scene to run: name, how to make it, how long [s], frames per second, accuracy, gallery record."""
-
-    name: str
-    make: Callable[..., Scene]
-    duration: float
-    fps: float
-    accuracy: str | Accuracy | AccuracyTarget
-    entry: GalleryScene | None
-
-
 def given_options(settings: dict[str, Any]) -> dict[str, Any]:
-    """Return the options that were given; a wish takes the place of the accuracy.
+    """Return the options that were given; an accuracy target takes the place of the accuracy.
 
     Raises:
         SceneError: more than one accuracy was given.
@@ -56,85 +35,14 @@ def given_options(settings: dict[str, Any]) -> dict[str, Any]:
     if len({"accuracy", "within", "per_frame"} & set(given)) > 1:
         raise SceneError("more than one of --accuracy, --within and --per-frame", "give one of them")
     if "within" in given:
-        from rigidimpulse.studies.accuracy_targets import Within
+        from rigidimpulse.scene.accuracy_targets import Within
 
         given["accuracy"] = Within(position=given.pop("within"))
     if "per_frame" in given:
-        from rigidimpulse.studies.accuracy_targets import InTime
+        from rigidimpulse.scene.accuracy_targets import InTime
 
         given["accuracy"] = InTime(given.pop("per_frame"))
     return given
-
-
-def job_of(entry: GalleryScene) -> Job:
-    return Job(entry.name, entry.scene, entry.duration, entry.fps, entry.accuracy, entry)
-
-
-def find_job(scene: str) -> Job:
-    """Return the job for a gallery name or a file.
-
-    Raises:
-        SceneError: it is neither, with the ways to name a scene.
-
-    """
-    from rigidimpulse import gallery
-    from rigidimpulse.core.errors import SceneError
-
-    path = Path(scene)
-    if path.suffix == ".py":
-        return Job(path.stem, _scene_function(path), DEFAULT_DURATION, DEFAULT_FPS, "standard", None)
-    if path.suffix in SCENE_SUFFIXES:
-        return Job(path.stem, partial(_load_scene, path), DEFAULT_DURATION, DEFAULT_FPS, "standard", None)
-    if path.suffix or len(path.parts) > 1:
-        known = "a gallery scene (`rigidimpulse demo` lists them), a .glb, .gltf, .usd, .urdf or .xml file, a file.py that defines scene()"
-        raise SceneError(f"cannot read a scene from {scene!r}", f"supported: {known}")
-    return job_of(gallery.load(scene))
-
-
-def _load_scene(path: Path) -> Scene:
-    """Return the scene of a file; what of the file is not in it is printed."""
-    from rigidimpulse.io.scene_file import load_scene
-
-    scene = load_scene(path)
-    for line in scene.report:
-        click.echo(f"{path.name}: {line}", err=True)
-    return scene
-
-
-def _scene_function(path: Path) -> Callable[[], Scene]:
-    """Return the function `scene` of a Python file, so wrapped that its errors name the file and the line."""
-    import runpy
-    import traceback
-
-    from rigidimpulse.core.errors import RigidImpulseError, SceneError
-    from rigidimpulse.scene.scene import Scene
-
-    where = f"scene file {str(path)!r}"
-    if not path.is_file():
-        raise SceneError("there is no such file", "check the path", where)
-
-    def guarded(function: Callable[[], Any]) -> Any:
-        try:
-            return function()
-        except RigidImpulseError:
-            raise
-        except Exception as error:
-            lines = [entry.lineno for entry in traceback.extract_tb(error.__traceback__) if entry.filename == str(path)]
-            line = getattr(error, "lineno", None) or (lines[-1] if lines else "?")
-            raise SceneError(f"line {line}: {type(error).__name__}: {error}", "correct the file", where) from error
-
-    function = guarded(lambda: runpy.run_path(str(path))).get("scene")
-    if not callable(function):
-        raise SceneError("it defines no function scene()", "write: def scene(): ... return a Scene", where)
-
-    @wraps(function)
-    def make(**arguments: Any) -> Scene:
-        made = guarded(partial(function, **arguments))
-        if not isinstance(made, Scene):
-            raise SceneError(f"scene() returned a {type(made).__name__}", "return a Scene", where)
-        return made
-
-    return make
 
 
 def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str | None = None) -> Recording:
@@ -142,8 +50,8 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str |
     from rigidimpulse.core.errors import SceneError
 
     for target in output:
-        if Path(target).suffix not in OUTPUT_SUFFIXES:
-            raise SceneError(f"cannot write {target!r}", f"use a name that ends in {', '.join(OUTPUT_SUFFIXES)}")
+        if Path(target).suffix not in export_suffixes():
+            raise SceneError(f"cannot write {target!r}", f"use a name that ends in {', '.join(export_suffixes())}")
     from time import perf_counter
 
     from tqdm import tqdm
@@ -166,7 +74,7 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str |
     seconds = perf_counter() - start
     num_impacts = len(run.impacts)
     impacts = f"{num_impacts} {'impact' if num_impacts == 1 else 'impacts'}"
-    rest = f"; {cache} had what came before, or all" if begun else ""
+    rest = f"; {cache} already had the beginning, or all of it" if begun else ""
     click.echo(f"{job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s{rest}")
     click.echo(f"status: {run.status.message}")
     if profile and run.profile is not None:
@@ -196,6 +104,7 @@ def recording_with_shapes(path: Path, scene: str | None) -> Recording:
 
     from rigidimpulse.core.errors import SceneError
     from rigidimpulse.recording.recording import load_recording
+    from rigidimpulse.studies.job import find_job
 
     if scene is None:
         remedy = "name its scene, --scene SCENE, or export the run as .html"

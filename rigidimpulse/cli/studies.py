@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rigidimpulse.cli.jobs import CHECK_FAILED, find_job, given_options, print_table, recording_with_shapes, run_job, show, size_of
+from rigidimpulse.cli.jobs import CHECK_FAILED, given_options, print_table, recording_with_shapes, run_job, show, size_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -71,11 +71,11 @@ def _study_scene(scene: str, output: str | None, budget: float | None, full: boo
     """Print the table of a study and write its files."""
     from tqdm import tqdm
 
+    from rigidimpulse.studies.job import find_job
     from rigidimpulse.studies.work_precision import BUDGET, FULL_BUDGET, charts_are_installed
     from rigidimpulse.studies.work_precision import study as run_study
 
     job = find_job(scene)
-    given = job.name if job.entry is not None else job.make()
     folder = Path(output or f"study_{job.name}")
     with tqdm(total=100, disable=None, leave=False, bar_format="{desc} {percentage:3.0f} % of the budget |{bar}|") as bar:
 
@@ -84,8 +84,8 @@ def _study_scene(scene: str, output: str | None, budget: float | None, full: boo
             bar.update(round(100.0 * share) - bar.n)
 
         result = run_study(
-            given, duration or job.duration, job.fps, name=job.name, full=full, budget=budget or (FULL_BUDGET if full else BUDGET),
-            peers=peers, output=folder, progress=progress,
+            job, duration or job.duration, job.fps, settings="full" if full else "small",
+            budget=budget or (FULL_BUDGET if full else BUDGET), peers=peers, output=folder, progress=progress,
         )  # fmt: skip
     click.echo(f"{result.name}, {result.duration:g} s; reference: {result.reference.describe()}")
     click.echo(result.table())
@@ -125,6 +125,7 @@ def _study_scaling(most: int) -> None:
 def compare(first: str, second: str, scene: str, output: str | None, view: bool, **settings: Any) -> None:
     """Say how far A and B are apart: recordings (.npz) of SCENE, or accuracies (preview, standard, exact) that it is run with."""
     from rigidimpulse.studies import compare as comparison
+    from rigidimpulse.studies.job import find_job
 
     words, job = (first, second), find_job(scene)
     comparison.check_words(words, output)

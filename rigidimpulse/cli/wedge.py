@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 @click.option("--fps", type=float, help="Frames per second.")
 @click.option("--accuracy", help="preview, standard or exact.")
 @click.option("--view", is_flag=True, help="Open the sheet of all takes in the browser.")
-def wedge(scene: str, vary: tuple[str, ...], output: str | None, view: bool, **settings: Any) -> None:
+def wedge(
+    scene: str, vary: tuple[str, ...], output: str | None, view: bool, processes: int | None, scheduler: str | None, retries: int,
+    **settings: Any,
+) -> None:  # fmt: skip
     """Run SCENE with all combinations of varied parameters; the exit code is 1 if a take fails."""
     from pathlib import Path
 
@@ -33,6 +36,7 @@ def wedge(scene: str, vary: tuple[str, ...], output: str | None, view: bool, **s
     from rigidimpulse.core.errors import SceneError
     from rigidimpulse.studies.wedges.vary import combinations, parse_vary
     from rigidimpulse.studies.wedges.wedge import wedge as run_wedge
+    from rigidimpulse.studies.wedges.workers import Workers
 
     pairs = [parse_vary(text) for text in vary]
     varied = dict(pairs)
@@ -44,7 +48,7 @@ def wedge(scene: str, vary: tuple[str, ...], output: str | None, view: bool, **s
         def progress(_take: Take) -> None:
             bar.update()
 
-        result = run_wedge(scene, varied, folder, progress=progress, **settings)
+        result = run_wedge(scene, varied, folder, workers=Workers(processes, scheduler, retries), progress=progress, **settings)
     rows = result.rows()
     print_table([(*row[:-1], row[-1].splitlines()[0]) for row in rows], right=(0, *range(1, len(rows[0]) - 1)))
     click.echo(f"{len(result.takes) - len(result.failed)} of {len(result.takes)} takes done")

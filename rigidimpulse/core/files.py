@@ -1,4 +1,4 @@
-"""Files by suffix, files that are there as a whole or not at all, and files of meshes."""
+"""Files that are there as a whole or not at all, and files of meshes."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ from rigidimpulse.core.errors import SceneError
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
-
-ANIMATED_SUFFIXES = (".glb", ".gltf", ".usda", ".usdc", ".usd", ".usdz")
-"""Of files with animated bodies."""
 
 
 def write_renamed(path: Path, write: Callable[[Path], object]) -> Path:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.providers import provider
 from rigidimpulse.engine.begin import begin_run, make_plan
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.effects import EventKernel
@@ -23,8 +24,8 @@ from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from rigidimpulse.io.cache.checkpointer import Cache
-    from rigidimpulse.studies.accuracy_targets import AccuracyTarget
+    from rigidimpulse.recording.cache import Cache
+    from rigidimpulse.scene.accuracy_targets import AccuracyTarget
 
 MOST_POSES = 1_000_000_000
 """Frames times bodies that are refused as a slip of the keyboard (about 100 GB)."""
@@ -46,7 +47,7 @@ def simulate(
         scene: what to simulate; it is not changed.
         duration: s, >= 0.
         fps: frames per second; changes what is recorded, never what happens.
-        accuracy: "preview", "standard", "exact" or an `Accuracy`; or a wish, `Within` or `InTime`, that chooses one by measuring the scene.
+        accuracy: "preview", "standard", "exact" or an `Accuracy`; or an accuracy target, `Within` or `InTime`: it chooses one by measuring.
         effects: effects, by their names in `run.plan.explain()`, that are to be in (True) or out (False) whatever the scene calls for. The
             status says where one is out that the scene calls for.
         progress: called with the simulated time in s after every step, or after many in which nothing but impacts of balls happened.
@@ -65,9 +66,7 @@ def simulate(
         return _simulate(scene, duration, fps, accuracy, effects, progress, cache)
     if cache is not None:
         raise SceneError("a cache for an accuracy that is still to be chosen", "choose it first, and give run.choice.accuracy")
-    from rigidimpulse.studies.accuracy_targets import simulate_to_target
-
-    return simulate_to_target(scene, duration, fps, accuracy, effects, progress)
+    return provider("simulate to target")(scene, duration, fps, accuracy, effects, progress)
 
 
 def _simulate(
@@ -92,9 +91,7 @@ def _simulate(
         run_to_end(run, duration, progress)
         recording = finish_run(run, duration)
     else:
-        from rigidimpulse.io.cache.checkpointer import Checkpointer
-
-        with closing(Checkpointer(cache, settings, run)) as checkpointer:
+        with closing(provider("checkpoints")(cache, settings, run)) as checkpointer:
             run_to_end(checkpointer.run, duration, lambda time: checkpointer.look(time, progress))
             checkpointer.write(float(duration))
             recording = finish_run(checkpointer.run, duration)

@@ -15,7 +15,7 @@ at the share s of the way. Impacts between frames, which straight lines cut off,
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,9 @@ from rigidimpulse.core.quaternion import (
     rotate_inverse,
     rotation_vector,
 )
+
+if TYPE_CHECKING:
+    from rigidimpulse.recording.recording import Recording
 
 ALIASING = 2.0
 """rad, turn from key to key from which on there are keys in between."""
@@ -58,7 +61,7 @@ class Path:
     Between two of these it turns evenly, by the vector phi, and its centre of mass flies or moves evenly.
     """
 
-    def __init__(self, run, name: str, impacts: np.ndarray | None = None, gravity: np.ndarray | None = None) -> None:
+    def __init__(self, run: Recording, name: str, impacts: np.ndarray | None = None, gravity: np.ndarray | None = None) -> None:
         """Take over the frames of a recording.
 
         Args:
@@ -181,12 +184,11 @@ def reduced(keys: Keys, reach: float, tolerance: float) -> np.ndarray:
     The key that is off most is kept, as long as one is (Ramer 1972; Douglas & Peucker 1973). A pose is off by the distance of
     the origins and `reach` times the angle, a bound for all points within `reach` [m] of the origin. tolerance: m.
     """
-    times, x, q = keys
-    kept = np.array([0, len(times) - 1])
-    inside = np.arange(len(times))  # frames between keys where some are still off
+    kept = np.array([0, len(keys.times) - 1])
+    inside = np.arange(len(keys.times))  # frames between keys where some are still off
     while len(inside):
         part = np.minimum(np.searchsorted(kept, inside, side="right") - 1, len(kept) - 2)
-        off = _off(times, x, q, inside, kept[part], kept[part + 1], reach)
+        off = _off(keys, inside, kept[part], kept[part + 1], reach)
         first = np.flatnonzero(np.diff(part, prepend=-1))
         worst = np.maximum.reduceat(off, first)
         which = np.cumsum(np.diff(part, prepend=-1) > 0) - 1
@@ -199,8 +201,9 @@ def reduced(keys: Keys, reach: float, tolerance: float) -> np.ndarray:
     return kept
 
 
-def _off(times, x, q, i, first, last, reach: float) -> np.ndarray:
+def _off(keys: Keys, i: np.ndarray, first: np.ndarray, last: np.ndarray, reach: float) -> np.ndarray:
     """How far the poses i (m,) are off [m] those in between the keys first and last (m,)."""
+    times, x, q = keys
     h = times[last] - times[first]
     s = np.divide(times[i] - times[first], h, out=np.zeros(len(i)), where=h > 0.0)[:, None]
     turn = rotation_vector(multiply(q[last], conjugate(q[first])))

@@ -1,9 +1,9 @@
-"""What all files of motion share: their options, and the keys of every body of a run."""
+"""Shared by all animated files: their options, and the keys of every body of a run."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.io.keys import Keys, Path, reduced
 
 if TYPE_CHECKING:
+    from rigidimpulse.recording.exporters import ExportOptions
     from rigidimpulse.recording.recording import Recording
     from rigidimpulse.scene.body import Body
     from rigidimpulse.scene.scene import Scene
@@ -19,29 +20,19 @@ MOST_SAMPLES = 1000
 """Keys a frame that make sense."""
 
 
-class MotionOptions(NamedTuple):
-    """Options of animated files, see `Recording.export`."""
-
-    start_frame: float = 0.0
-    tolerance: float | None = None
-    impact_keys: bool = False
-    only_moved: bool = True
-    samples: int = 1
-    up_axis: str | None = None
-    unit: float = 1.0
-
-    def check(self) -> None:
-        """Raise a `SceneError` for a figure that makes no sense."""
-        if not (math.isfinite(self.start_frame) and self.start_frame >= 0.0):
-            raise SceneError(f"start_frame = {self.start_frame!r}", "give the number of a frame, >= 0")
-        if self.tolerance is not None and not (math.isfinite(self.tolerance) and self.tolerance > 0.0):
-            raise SceneError(f"tolerance = {self.tolerance!r}", "give a length in m, > 0, or None for a key a frame")
-        if isinstance(self.samples, bool) or not isinstance(self.samples, int) or not 1 <= self.samples <= MOST_SAMPLES:
-            raise SceneError(f"samples = {self.samples!r}", f"give a whole number of keys a frame, 1 to {MOST_SAMPLES}")
-        if self.up_axis not in (None, "y", "z"):
-            raise SceneError(f"up_axis = {self.up_axis!r}", "give 'y', 'z', or None for that of the scene")
-        if not (math.isfinite(self.unit) and self.unit > 0.0):
-            raise SceneError(f"unit = {self.unit!r}", "give the metres in a unit of the file, 0.01 for centimetres")
+def check_options(options: ExportOptions) -> None:
+    """Raise a `SceneError` for an option that makes no sense."""
+    start, tolerance, samples, unit = options.start_frame, options.tolerance, options.samples, options.unit
+    if not (math.isfinite(start) and start >= 0.0):
+        raise SceneError(f"start_frame = {start!r}", "give the number of a frame, >= 0")
+    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise SceneError(f"tolerance = {tolerance!r}", "give a length in m, > 0, or None for a key a frame")
+    if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+        raise SceneError(f"samples = {samples!r}", f"give a whole number of keys a frame, 1 to {MOST_SAMPLES}")
+    if options.up_axis not in (None, "y", "z"):
+        raise SceneError(f"up_axis = {options.up_axis!r}", "give 'y', 'z', or None for that of the scene")
+    if not (math.isfinite(unit) and unit > 0.0):
+        raise SceneError(f"unit = {unit!r}", "give the metres in a unit of the file, 0.01 for centimetres")
 
 
 class Motion:
@@ -52,10 +43,10 @@ class Motion:
 
     """
 
-    def __init__(self, run: Recording, options: MotionOptions) -> None:
+    def __init__(self, run: Recording, options: ExportOptions) -> None:
         """Raise a `SceneError` for a bad option, or a pose that is not finite."""
         assert run.scene is not None
-        options.check()
+        check_options(options)
         if not (np.isfinite(run.positions).all() and np.isfinite(run.orientations).all()):
             raise SceneError("a pose of the run is not finite", "look at run.status")
         self.scene: Scene = run.scene

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import csv
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from rigidimpulse.recording.exporters import ExportTarget
     from rigidimpulse.recording.recording import Recording
 
 COLUMNS = (
@@ -21,10 +21,10 @@ COLUMNS = (
 """Position and orientation (body to world) are of the body's origin, velocity is of its centre of mass; all in world axes."""
 
 
-def write_csv(run: Recording, target: Path) -> None:
+def write_csv(run: Recording, target: ExportTarget) -> None:
     """Write a .csv file of a run: UTF-8, with the head `COLUMNS`, frames in order, within a frame bodies in the order of `run.names`."""
     figures = np.concatenate([run.positions, run.orientations, run.velocities, run.angular_velocities], axis=2).tolist()
-    with target.open("w", newline="", encoding="utf-8") as file:
+    with target.path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow(COLUMNS)
         for frame, (time, bodies) in enumerate(zip(run.times.tolist(), figures, strict=True)):

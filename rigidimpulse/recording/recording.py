@@ -12,19 +12,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError, unknown_name
-from rigidimpulse.core.files import ANIMATED_SUFFIXES, write_renamed
+from rigidimpulse.core.files import write_renamed
+from rigidimpulse.core.providers import provider
 from rigidimpulse.recording.contacts import CONTACT_DTYPE, forces_on
+from rigidimpulse.recording.exporters import ExportOptions, ExportTarget, export_suffixes, find_exporter, find_reader
 
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
     from rigidimpulse.model.plan import Plan
+    from rigidimpulse.recording.choice import Choice
     from rigidimpulse.recording.events import Event
     from rigidimpulse.recording.impulses import Impulses
     from rigidimpulse.recording.ledger import Ledger
     from rigidimpulse.recording.profile import Profile
     from rigidimpulse.scene.accuracy import Accuracy
     from rigidimpulse.scene.scene import Scene
-    from rigidimpulse.studies.accuracy_targets import Choice
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class Recording:
         contacts: structured array, one row a stretch of time over which a lasting contact carries the same force (see
             observe.contacts.CONTACT_DTYPE); stretches that no frame sees are left out. `contacts_at`, `contact_force` by frame.
         by_cause: impulses by body and cause, see `impulses`; None in a loaded recording.
-        nets: frames of flexible bodies, see `net`.
+        soft_bodies: frames of flexible bodies, see `soft_body`.
         profile: where the time of the run went, by stage and by kernel; `profile.table()` for people.
         settings: duration, fps, accuracy and chosen effects of the run; None in a loaded recording.
         choice: how the accuracy was chosen, if it was asked for by `Within` or `InTime`.
@@ -109,7 +111,7 @@ class Recording:
         """Time by body until which the run can be trusted, s: it is one of many plausible ones beyond.
 
         Until then two runs whose settings bracket those of this run (steps larger and smaller by sqrt(2), tolerances by 10), started off by
-        rounding, agree with each other: to the wished tolerance, where accuracy was asked for by `Within`, else to a thousandth of the
+        rounding, agree with each other: to the bound of the accuracy target, where there is a `Within`, else to a thousandth of the
         body's size. Dynamic bodies only; the last frame's time where they always agree. The two runs are made when this is first asked for.
 
         Raises:
@@ -118,9 +120,7 @@ class Recording:
         """
         if self.scene is None or self.settings is None:
             raise SceneError("a loaded recording cannot be run again", "ask the run that simulate() returned")
-        from rigidimpulse.studies.horizon import find_horizon
-
-        return find_horizon(self)
+        return provider("horizon")(self)
 
     def index(self, name: str) -> int:
         """Index of a body.
@@ -182,7 +182,8 @@ class Recording:
         """Impulse on a body by cause until each frame, (f, 3) N s; together they are its change of momentum.
 
         Causes: "gravity", "constant forces", each other force by its name, "joint NAME", "contact with NAME" (lasting contact), "impacts
-        with NAME", and "corrections", what ends sub-steps: small, but for heaps, whose contacts are all in it.
+        with NAME", and "corrections", the changes of velocity at the end of sub-steps. Corrections are small,
+        except in sub-stepped islands: there they include all contacts.
 
         Raises:
             SceneError: for an unknown name, listing the known ones; for a recording that was loaded from a file.
@@ -246,7 +247,7 @@ class Recording:
         )  # fmt: skip
 
     def state_hash(self) -> str:
-        """SHA-256 of all frames, nets and impacts: equal if and only if two runs agree in every bit."""
+        """SHA-256 of all frames, flexible bodies and impacts: equal if and only if two runs agree in every bit."""
         import hashlib
 
         digest = hashlib.sha256()
@@ -261,12 +262,12 @@ class Recording:
         self, path: str | os.PathLike, *, start_frame: float = 0.0, tolerance: float | None = None, impact_keys: bool = False,
         only_moved: bool = True, samples: int = 1, up_axis: str | None = None, unit: float = 1.0,
     ) -> Path:  # fmt: skip
-        """Write the recording; the suffix says how.
+        """Write the recording; the suffix of the path chooses the format.
 
-        .npz: arrays. .csv: a table, one row a frame and body. .html: a page that plays it. .glb, .gltf: animated nodes of glTF.
-        .usda, .usdc, .usd, .usdz: animated prims of USD (extra `usd`). A scene from a glTF or USD file is written as that file
-        with its nodes or prims animated, into its own kind of file; any other as a node or prim a body. See docs/guide/gltf.md and
-        docs/guide/usd.md.
+        The formats are those that are registered with `rigidimpulse.recording.exporters`: arrays, tables, pages that play the run, and
+        animated files of glTF and of USD (extra `usd`). A scene from a glTF or USD file is written as that file with its nodes or prims
+        animated, into a file of the same format. Any other scene is written with one node or prim for each body. See
+        docs/guide/gltf.md and docs/guide/usd.md.
 
         Args:
             path: where to.
@@ -279,32 +280,20 @@ class Recording:
             unit: of USD: metres in a unit of the file, 0.01 for centimetres. (glTF is in metres.)
 
         Raises:
-            SceneError: for another suffix, an option that the format has not, or without a scene, which .npz and .csv do not need.
+            SceneError: for another suffix, for an option that the format does not have, or without a scene where the format needs shapes.
 
         """
         path = Path(path)
-        options = (start_frame, tolerance, impact_keys, only_moved, samples, up_axis, unit)
-        if path.suffix in ANIMATED_SUFFIXES:
-            self._need_scene("an animated file")
-            from rigidimpulse.io.motion import MotionOptions
-            from rigidimpulse.io.motion_file import write_motion
-
-            return write_motion(self, path, MotionOptions(*options))
-        if options != (0.0, None, False, True, 1, None, 1.0):
+        exporter = find_exporter(path)
+        options = ExportOptions(start_frame, tolerance, impact_keys, only_moved, samples, up_axis, unit)
+        if options != ExportOptions() and not exporter.takes_options:
             names = "start_frame, tolerance, impact_keys, only_moved, samples, up_axis or unit"
-            raise SceneError(f"{names} for {path.name!r}", f"give them for {', '.join(ANIMATED_SUFFIXES)} only")
-        if path.suffix == ".npz":
-            return write_renamed(path, self._write_npz)
-        if path.suffix == ".csv":
-            from rigidimpulse.io.table import write_csv
-
-            return write_renamed(path, lambda target: write_csv(self, target))
-        if path.suffix == ".html":
-            self._need_scene("an HTML page")
-            from rigidimpulse.view import write_html
-
-            return write_renamed(path, lambda target: write_html(self, target, title=path.stem))
-        raise SceneError(f"cannot export to {path.name!r}", f"use a name that ends in .npz, .csv, .html, {', '.join(ANIMATED_SUFFIXES)}")
+            raise SceneError(f"{names} for {path.name!r}", f"give them for {', '.join(export_suffixes(with_options=True))} only")
+        if exporter.needs_shapes is not None:
+            self._need_scene(exporter.needs_shapes)
+        if self.scene is not None and self.scene.origin is not None:
+            self.scene.origin.check_target(path)
+        return write_renamed(path, lambda target: exporter.write(self, ExportTarget(target, path.stem, options)))
 
     def show(self) -> Any:
         """Open the recording in the browser (meshcat); returns the viewer, which ends with the program.
@@ -314,31 +303,11 @@ class Recording:
 
         """
         self._need_scene("the viewer")
-        from rigidimpulse.view import show
-
-        return show(self)
+        return provider("show")(self)
 
     def _need_scene(self, what: str) -> None:
         if self.scene is None:
             raise SceneError(f"{what} needs the shapes of the scene", "simulate the scene, then export or show that run")
-
-    def _write_npz(self, path: Path) -> None:
-        soft_bodies: dict[str, Any] = {}
-        for number, track in enumerate(self.soft_bodies):
-            soft_bodies.update(track.arrays(number))
-        np.savez_compressed(
-            path,
-            times=self.times,
-            names=np.array(self.names),
-            position=self.positions,
-            orientation=self.orientations,
-            velocity=self.velocities,
-            angular_velocity=self.angular_velocities,
-            center_of_mass=self.centers,
-            impacts=self.impacts,
-            contacts=self.contacts,
-            **soft_bodies,
-        )
 
 
 def load_recording(path: str | os.PathLike) -> Recording:
@@ -348,34 +317,4 @@ def load_recording(path: str | os.PathLike) -> Recording:
         SceneError: the file is missing or no recording.
 
     """
-    if Path(path).suffix in (".h5", ".hdf5"):
-        from rigidimpulse.io.cache.load import load_cache
-
-        return load_cache(Path(path))
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            return Recording(
-                times=data["times"],
-                names=[str(name) for name in data["names"]],
-                positions=data["position"],
-                orientations=data["orientation"],
-                velocities=data["velocity"],
-                angular_velocities=data["angular_velocity"],
-                centers=data["center_of_mass"],
-                impacts=data["impacts"],
-                contacts=data["contacts"],
-                soft_bodies=_soft_bodies_in(data),
-            )
-    except (OSError, KeyError, ValueError) as error:
-        raise SceneError(
-            f"{os.fspath(path)} is no recording: {error}", "give an .npz file written by Recording.export"
-        ) from None
-
-
-def _soft_bodies_in(data: Any) -> list[FlexibleTrack]:
-    """Flexible bodies in the arrays of a file."""
-    if "net0_name" not in data:
-        return []
-    from rigidimpulse.dynamics.soft_body.track import tracks_in
-
-    return tracks_in(data)
+    return find_reader(path)(Path(path))

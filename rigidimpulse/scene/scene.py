@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.core.conventions import STANDARD_GRAVITY
 from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.providers import provider
 from rigidimpulse.scene.body import Body, vector
 from rigidimpulse.scene.mass import masses_of
 
@@ -94,9 +95,7 @@ class Scene:
             SceneError: for another suffix, or a scene that is not valid.
 
         """
-        from rigidimpulse.io.scene_file import write_scene
-
-        return write_scene(self, Path(path))
+        return provider("write scene")(self, Path(path))
 
     def __getitem__(self, name: str) -> Body:
         """Return the body of a name; a `SceneError` lists the names there are."""

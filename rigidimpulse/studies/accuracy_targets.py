@@ -1,22 +1,20 @@
-"""Accuracy by wish: the scene is measured on a ladder of settings, coarse ones first, and the cheapest that will do is taken.
+"""Accuracy targets: the scene is run on a ladder of settings, coarse ones first, and the cheapest one that meets the target is taken.
 
 Let u_k be the run on rung k (`settings.rung`) and d_k the largest distance between u_k and u_(k+1). For an error c h^p with p >= 1,
 halving the step leaves at most half of it, so e_k <= 2 d_k. That is for errors that have begun to shrink as they should; so
 
     e_k  ~  SAFETY max(d_k, d_(k-1) / 8) + r_k + floor
 
-where r_k is how far u_k moves when it is started off by rounding (`reference.perturbed`) and its impact times may be off by LOOSER times
-their tolerance, and d_(k-1) / 8 guards against a d_k that is
-small by chance. The floor is what all rungs have in common: the rounding of the places themselves, and, where contacts last, the gap at
-which they are held (`conventions.TOLERANCES.contact_margin` of a body's size; in heaps the skin, relative to half a size).
+where r_k is how far u_k moves when it starts with an error of rounding (`reference.perturbed`) and its impact times may be off by LOOSER
+times their tolerance. The term d_(k-1) / 8 counts where d_k is small by chance. The floor is an error that all rungs share: the rounding
+of the positions themselves and, where contacts last, the gap at which bodies rest (`conventions.TOLERANCES.contact_margin` of a body's
+size; in sub-stepped islands the skin, relative to half a size).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,9 +23,10 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.model.world import World
+from rigidimpulse.recording.choice import UNKNOWN, Choice, Estimate, Try
 from rigidimpulse.recording.events import Event
 from rigidimpulse.recording.recording import Recording, Status
-from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.accuracy_targets import InTime, Within
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.deviation import deviation
 from rigidimpulse.studies.reference import perturbed
@@ -41,108 +40,13 @@ FLOOR = 8.0 * float(np.finfo(float).eps)
 """Of the largest coordinate, and of the largest angle turned."""
 
 
-@dataclass(frozen=True)
-class Within:
-    """A wish: errors within bounds.
-
-    Attributes:
-        position: m, of any dynamic body's origin. angle: rad, of its orientation. At least one is given.
-        until: s, how long the bounds are to hold; all of the run if None.
-
-    """
-
-    position: float | None = None
-    angle: float | None = None
-    until: float | None = None
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        if self.position is None and self.angle is None:
-            raise SceneError("Within() wishes for nothing", "give position=... in m, or angle=... in rad")
-        for name, unit in (("position", "m"), ("angle", "rad"), ("until", "s")):
-            _check_positive(f"Within({name}=...)", getattr(self, name), unit)
-
-
-@dataclass(frozen=True)
-class InTime:
-    """A wish: as accurate as the time allows.
-
-    Attributes:
-        per_frame: s that a frame may take to compute, on this machine and under its load now, in the mean over the run.
-
-    """
-
-    per_frame: float
-
-    def __post_init__(self) -> None:
-        """Check the number."""
-        _check_positive("InTime(per_frame=...)", self.per_frame, "s")
-
-
-AccuracyTarget = Within | InTime
-
-
-class Estimate(NamedTuple):
-    """Estimated largest errors of a run, m and rad."""
-
-    position: float
-    angle: float
-
-    def within(self, target: Within) -> bool:
-        """Whether a wish is met."""
-        return (target.position is None or self.position <= target.position) and (target.angle is None or self.angle <= target.angle)
-
-
-UNKNOWN = Estimate(math.nan, math.nan)
-
-
-class Try(NamedTuple):
-    """One run that was made to choose: its setting, s it took, and what its error is about (NaN where it was not estimated)."""
-
-    setting: Setting
-    seconds: float
-    error: Estimate
-
-
-@dataclass(frozen=True)
-class Choice:
-    """How a setting was chosen.
-
-    Attributes:
-        wish: what was asked for. accuracy: what was chosen. met: whether the wish is met.
-        error: estimated largest errors until `until` [s]. how: how they were estimated.
-        tries: all runs that were made, coarse ones first.
-
-    """
-
-    target: AccuracyTarget
-    accuracy: Accuracy
-    met: bool
-    error: Estimate
-    until: float
-    how: str
-    tries: tuple[Try, ...]
-
-    @property
-    def message(self) -> str:
-        """One line for people."""
-        chosen = f"chose step {self.accuracy.step:.4g} s, tolerance {self.accuracy.tolerance:.0e}, of {len(self.tries)} measured settings"
-        error = f"estimated error until {self.until:.4g} s: {self.error.position:.1e} m, {self.error.angle:.1e} rad ({self.how})"
-        return f"{chosen}; {error}"
-
-
-def _check_positive(what: str, value: object, unit: str) -> None:
-    if value is not None and not (isinstance(value, int | float) and math.isfinite(value) and value > 0.0):
-        raise SceneError(f"{what}: {value!r}", f"give a positive finite number, {unit}")
-
-
 def simulate_to_target(
     scene: Scene, duration: float, fps: float, target: object, effects: Mapping[str, bool] | None, progress: Callable[[float], None] | None
 ) -> Recording:
     """Choose a setting and return its run; see `simulate`.
 
     Raises:
-        SceneError: as `simulate`; or the accuracy is neither a name, an Accuracy nor a wish.
+        SceneError: as `simulate`; or the accuracy is neither a name, an Accuracy nor an accuracy target.
 
     """
     if not isinstance(target, Within | InTime):
@@ -160,14 +64,14 @@ def simulate_to_target(
     return replace(chosen, status=replace(status, message=f"{status.message}\n{choice.message}"), choice=choice)
 
 
-def _complaint(target: AccuracyTarget) -> str:
+def _complaint(target: Within | InTime) -> str:
     if isinstance(target, InTime):
-        return f"no setting computes a frame in {target.per_frame:g} s; wish for more time, or for fewer bodies"
-    return "no setting is as accurate as wished for so long; wish for less, or until an earlier time (chaos has no remedy: see run.horizon)"
+        return f"no setting computes a frame in {target.per_frame:g} s; allow more time, or have fewer bodies"
+    return "no setting meets the target; give larger bounds, or an earlier `until` (chaos has no remedy: see run.horizon)"
 
 
 def _within(run: Callable[..., Recording], scene: Scene, duration: float, target: Within) -> tuple[Recording, Choice]:
-    """The cheapest rung whose estimated error is within the wish, and its run."""
+    """Return the cheapest rung whose estimated error is within the bounds, and its run."""
     until = duration if target.until is None else min(target.until, duration)
     settings = [rung(0)]
     runs, steps, errors = [run(settings[0], until)], [], []
@@ -191,14 +95,14 @@ def _within(run: Callable[..., Recording], scene: Scene, duration: float, target
     if not errors[best].within(target):
         best = int(np.argmin([error.position for error in errors]))
         errors[best] = _estimate(steps[: best + 1], drift(best), runs[best])
-    tries = [Try(setting, _seconds(made), error) for setting, made, error in zip(settings, runs, [*errors, UNKNOWN], strict=True)]
+    tries = [Try(setting.accuracy, _seconds(made), error) for setting, made, error in zip(settings, runs, [*errors, UNKNOWN], strict=True)]
     how = "from a run with half the step, and one started off by rounding"
     choice = Choice(target, settings[best].accuracy, errors[best].within(target), errors[best], until, how, tuple(tries))
     return (runs[best] if until == duration else run(settings[best], duration)), choice
 
 
 def _in_time(run: Callable[..., Recording], scene: Scene, duration: float, target: InTime) -> tuple[Recording, Choice]:
-    """The finest rung whose frames take no longer than wished, and its run."""
+    """Return the finest rung whose frames take no longer than the target allows, and its run."""
     settings, runs, steps = [], [], []
     for level in range(LAST_RUNG + 1):
         settings.append(rung(level))
@@ -212,7 +116,7 @@ def _in_time(run: Callable[..., Recording], scene: Scene, duration: float, targe
     drift = _apart(runs[best], run(_looser(settings[best]), duration, perturbed(scene)))
     # The finest that was run has nothing finer to compare with: what the one before is off by bounds its error.
     error = _estimate(steps[: best + 1], drift, runs[best]) if steps else UNKNOWN
-    tries = tuple(Try(setting, _seconds(made), UNKNOWN) for setting, made in zip(settings, runs, strict=True))
+    tries = tuple(Try(setting.accuracy, _seconds(made), UNKNOWN) for setting, made in zip(settings, runs, strict=True))
     how = f"from a run with {'half' if best < len(steps) else 'twice'} the step, and one started off by rounding"
     return runs[best], Choice(target, settings[best].accuracy, bool(fast), error, duration, how, tries)
 
@@ -223,7 +127,7 @@ def _looser(setting: Setting) -> Setting:
 
 
 def _seconds(run: Recording) -> float:
-    """Time that a run took but for loading kernels, s."""
+    """Time that a run took without the loading of kernels, s."""
     assert run.profile is not None
     return run.profile.seconds - run.profile.preparing
 
@@ -240,13 +144,13 @@ def _floor(run: Recording) -> np.ndarray:
     world = compile_scene(run.scene)
     spin = float(np.linalg.norm(run.angular_velocities, axis=2).max(initial=0.0))
     rounding = FLOOR * np.array([np.abs(run.positions).max(initial=0.0), 1.0 + spin * run.times[-1]])
-    touching = [group for group in _groups(run, world) if len(group) > 0]
+    touching = [island for island in _islands(run, world) if len(island) > 0]
     share = 0.5 * TOLERANCES.skin if "sub-stepping" in run.ledger.dissipated else 2.0 * TOLERANCES.contact_margin
-    return rounding + share * np.array([max((world.size[group].sum() for group in touching), default=0.0), float(bool(touching))])
+    return rounding + share * np.array([max((world.size[island].sum() for island in touching), default=0.0), float(bool(touching))])
 
 
-def _groups(run: Recording, world: World) -> list[np.ndarray]:
-    """Indices of the dynamic bodies of each group that lasting contacts joined at some time; gaps add up in it."""
+def _islands(run: Recording, world: World) -> list[np.ndarray]:
+    """Return the dynamic bodies (indices) of each island that lasting contacts joined at some time; the gaps of an island add up."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

@@ -22,7 +22,7 @@ from rigidimpulse.studies.settings import Setting
 SHORT, REPEATS = 0.3, 3
 """Runs shorter than this, in s, are repeated; the median counts."""
 RUN_SHARE, PATIENCE = 0.1, 4.0
-"""Of the budget, and of the time of the dearest preset, that one run may take."""
+"""Share of the budget, and multiple of the time of the slowest preset, that one run may take."""
 
 
 def peer_setting(peer: str, steps: int, fps: float) -> Setting:
@@ -39,7 +39,7 @@ class TimeUp(Exception):
 class MeasuredRuns:
     """Runs settings of one scene and measures them; a run that takes too long is given up.
 
-    Too long is a share of the budget, or some times what the dearest preset took, if that is more; and never beyond the budget.
+    Too long is a share of the budget, or a multiple of the time of the slowest preset, if that is more; and never beyond the budget.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class MeasuredRuns:
         return (process_time() - cpu) * loop / profile.seconds, run
 
     def run_peer(self, name: str, steps: int) -> Row:
-        """Run another engine with so many steps a frame."""
+        """Run another engine with `steps` steps a frame."""
         setting = peer_setting(name, steps, self.fps)
         try:
             begin = perf_counter()

@@ -29,6 +29,9 @@ MOST_FRAMES = 120
 HALVINGS = 12
 """Of the least way out of an overlap: three digits."""
 
+Pose = tuple[np.ndarray, np.ndarray]
+"""Position (3,) m and orientation (4,) wxyz."""
+
 
 class Errors(NamedTuple):
     """Error measures of one run until one time; see the head of the module."""
@@ -140,7 +143,7 @@ def penetration(world: World, run: Recording) -> np.ndarray:
     return depth
 
 
-def _depth(world: World, narrowphase: Narrowphase, i: int, pose_i, j: int, pose_j) -> float:
+def _depth(world: World, narrowphase: Narrowphase, i: int, pose_i: Pose, j: int, pose_j: Pose) -> float:
     """Depth of a pair, 0 if it is apart, m."""
     shapes = int(world.shape_of_body[i]), int(world.shape_of_body[j])
     found = narrowphase.separation(shapes[0], pose_i, shapes[1], pose_j)
@@ -153,15 +156,17 @@ def _depth(world: World, narrowphase: Narrowphase, i: int, pose_i, j: int, pose_
     for direction in directions:
         length = float(np.linalg.norm(direction))
         if length > 0.0:
-            least = min(least, _way_out(narrowphase, shapes, pose_i, pose_j, direction / length, least))
+            least = min(least, _way_out(narrowphase, shapes, (pose_i, pose_j), direction / length, least))
     return least
 
 
-def _way_out(narrowphase: Narrowphase, shapes: tuple[int, int], pose_i, pose_j, direction: np.ndarray, most: float) -> float:
+def _way_out(narrowphase: Narrowphase, shapes: tuple[int, int], poses: tuple[Pose, Pose], direction: np.ndarray, most: float) -> float:
     """Least way along a direction after which a pair is apart, m; inf if it is longer than `most`."""
 
+    pose_i, (position_j, orientation_j) = poses
+
     def inside(way: float) -> bool:
-        return narrowphase.overlap(shapes[0], pose_i, shapes[1], (pose_j[0] + way * direction, pose_j[1]))
+        return narrowphase.overlap(shapes[0], pose_i, shapes[1], (position_j + way * direction, orientation_j))
 
     low, high = 0.0, most
     if inside(high):

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.engine.simulate import frame_times, simulate
@@ -76,7 +77,7 @@ def perturbed(scene: Scene, sign: float = 1.0) -> Scene:
     """
     random = np.random.default_rng(0)
 
-    def off(value) -> np.ndarray:
+    def off(value: ArrayLike) -> np.ndarray:
         return sign * ROUNDING * random.choice([-1.0, 1.0], 3) * np.asarray(value, float)
 
     out = Scene(gravity=np.asarray(scene.gravity, float) * (1.0 + sign * ROUNDING))

@@ -1,7 +1,7 @@
-"""How cost grows with the number of bodies: an elastic gas, impact by impact, and a heap of boxes, step by step.
+"""How cost grows with the number of bodies: an elastic gas, impact by impact, and a pile of boxes, step by step.
 
 An impact of a gas concerns two bodies, so its cost should not depend on how many others fly elsewhere: exponent 0 of the cost per impact. A
-step of a heap looks after all bodies: exponent 1 of the cost per step. Exponents are slopes of log(cost) over log(n) by least squares from
+step of a pile handles all bodies: exponent 1 of the cost per step. Exponents are slopes of log(cost) over log(n) by least squares from
 FEWEST bodies on. Costs are times of the stages of the loop (`Recording.profile`); what a run costs before it starts is not in them.
 """
 
@@ -30,7 +30,7 @@ FILLED = 0.05
 BALL_SECONDS = 6_000.0
 """Duration of a run of gas times the number of balls, s, and of 4 s at least."""
 PILED, LAYERS = 2.0, 10
-"""s in which boxes fall and heap up, and layers they fall in."""
+"""s in which boxes fall and pile up, and layers they fall in."""
 
 
 class Point(NamedTuple):
@@ -58,8 +58,8 @@ def gas(number: int) -> Scene:
     scene = Scene(gravity=(0.0, 0.0, 0.0))
     for axis in range(3):
         for sign in (-1.0, 1.0):
-            wall = Shape.half_space(tuple(-sign * np.eye(3)[axis]), -0.5 * side)
-            scene.add(Body(f"wall {'xyz'[axis]}{sign:+.0f}", wall, motion="static", material=smooth))
+            side_plane = Shape.half_space(tuple(-sign * np.eye(3)[axis]), -0.5 * side)
+            scene.add(Body(f"side {'xyz'[axis]}{sign:+.0f}", side_plane, motion="static", material=smooth))
     rows = math.ceil(number ** (1.0 / 3.0) - 1e-9)
     ticks = (np.arange(rows) + 0.5) * (side - 2.0 * radius) / rows - 0.5 * side + radius
     places = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -89,12 +89,12 @@ def _pile_point(number: int) -> Point:
 
 SCENES = {
     "gas": Scaling("elastic balls in a box", "impact", _gas_point),
-    "pile": Scaling("boxes that fall into a pit and heap up", "step", _pile_point),
+    "pile": Scaling("boxes that fall into a pit and pile up", "step", _pile_point),
 }
 
 
 def sizes(kind: str, most: int) -> list[int]:
-    """Numbers of bodies of up to `most`: heaps begin at 100, for fewer bodies are none.
+    """Numbers of bodies of up to `most`: piles begin at 100, since fewer bodies make no pile.
 
     Raises:
         SceneError: fewer than two sizes are left to compare.

@@ -100,7 +100,7 @@ def _run_apart(folder: Path, name: str, limit: float) -> CaseResult:
 def run_scene(name: str, folder: Path) -> CaseResult:
     """Run a scene in this process and write its page, its still and, last, its result."""
     from rigidimpulse.engine.simulate import simulate
-    from rigidimpulse.view import write_html
+    from rigidimpulse.view.page import write_html
     from rigidimpulse.view.picture import draw_picture, png
 
     entry = gallery.load(name)

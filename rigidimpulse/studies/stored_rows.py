@@ -1,13 +1,13 @@
 """Rows of a study on disk, written as they come, and its reference: a study that was stopped goes on where it was.
 
-The first line names the fingerprint of what was studied; a file with another one is not gone on with but put aside. The reference is kept
-since another one, made in another time, would be another scale for the rows to come.
+The first line names the fingerprint of what was studied; a file with another one is not gone on with but put aside. The reference is
+stored, too: a new one, made in another time, would be another scale for the rows to come.
 """
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ MARK = "# study "
 
 
 class StoredRows:
-    """The rows in a file; none are kept without one."""
+    """The rows in a file; without a file they are only held in memory."""
 
     def __init__(self, path: Path | None, fingerprint: str) -> None:
         """Read the rows that the file has of this study, or begin the file."""
@@ -35,8 +35,8 @@ class StoredRows:
             lines = path.read_text(encoding="utf-8").splitlines()
             if lines and lines[0] == first:
                 # A line that was cut off while it was written is left out.
-                whole = [cells for cells in csv.DictReader(lines[1:]) if None not in cells.values() and None not in cells]
-                self._rows = {cells["name"]: Row.of(cells) for cells in whole}
+                complete = [cells for cells in csv.DictReader(lines[1:]) if None not in cells.values() and None not in cells]
+                self._rows = {cells["name"]: Row.of(cells) for cells in complete}
             else:
                 path.replace(path.with_suffix(".old.csv"))
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -51,14 +51,14 @@ class StoredRows:
         return self._rows.get(name)
 
     def add(self, row: Row) -> None:
-        """Keep a row."""
+        """Add a row, and write it to the file."""
         self._rows[row.name] = row
         if self._path is not None:
             with self._path.open("a", encoding="utf-8", newline="") as file:
                 csv.writer(file).writerow(row.cells())
 
 
-def kept_reference(path: Path | None, fingerprint: str, make: Callable[[], Reference]) -> Reference:
+def stored_reference(path: Path | None, fingerprint: str, make: Callable[[], Reference]) -> Reference:
     """The reference in a file of this study, or a new one, which is written there; None: it is only made."""
     if path is not None and path.is_file():
         try:
@@ -86,7 +86,8 @@ def _arrays(reference: Reference, fingerprint: str) -> dict[str, Any]:
     return arrays
 
 
-def _read(data) -> Reference:
+def _read(data: Mapping[str, Any]) -> Reference:
+    """Return the reference in the arrays of a file."""
     truth = None
     if "times" in data:
         energy, impacts = (data[name] if name in data else None for name in ("energy", "impacts"))

@@ -4,8 +4,8 @@
              and making the recording are not in it, as building the model is not in that of other engines
     error    `measures.Errors`, of the whole run (until the reference's horizon) and of the beginning, until just before impact k + 1
 
-A row is on the front if no other row is both cheaper and more accurate. Rows are kept in a CSV file as they come, with a fingerprint of the
-scene; the same study asked for again goes on where it was.
+A row is on the front if no other row is both cheaper and more accurate. Rows are written to a CSV file as they come, with a fingerprint of
+the scene; the same study asked for again goes on where it was.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.files import write_renamed
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.fingerprint import fingerprint
@@ -31,11 +31,12 @@ from rigidimpulse.engine.simulate import frame_times
 from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.model.world import World
 from rigidimpulse.scene.scene import Scene
+from rigidimpulse.studies.job import Job
 from rigidimpulse.studies.measured_runs import MeasuredRuns, TimeUp, peer_setting
 from rigidimpulse.studies.reference import Reference, converged_reference, exact_reference
 from rigidimpulse.studies.row import ERRORS, Row
 from rigidimpulse.studies.settings import Setting, grid
-from rigidimpulse.studies.stored_rows import StoredRows, kept_reference
+from rigidimpulse.studies.stored_rows import StoredRows, stored_reference
 
 BUDGET, FULL_BUDGET = 60.0, 3600.0
 """s, of a study and of one of all settings."""
@@ -43,7 +44,8 @@ REFERENCE_SHARE = 0.3
 """Of the budget, for the reference."""
 DURATION, FPS = 4.0, 60.0
 FIRST = 5
-"""Impacts of the beginning."""
+"""Impacts of the beginning, whose errors are measured as well."""
+GRIDS = ("small", "full")
 PEER_STEPS = (1, 2, 4, 8, 16, 64, 256)
 """Steps a frame of other engines."""
 
@@ -79,7 +81,10 @@ class Study:
         return out
 
     def advantage(self, error: str = "position") -> list[tuple[Row, Row, float]]:
-        """Rows of other engines, the best own row that took no longer, and the ratio of their errors; but for those faster than all own."""
+        """Rows of other engines, the best own row that took no longer, and the ratio of their errors.
+
+        Rows that are faster than all own rows are left out.
+        """
         out, front = [], self.front(error)
         floor = max(self.reference.uncertainty if error == "position" else 0.0, float(np.finfo(float).tiny))
         for row in self.rows:
@@ -106,28 +111,24 @@ def _figure(value: float) -> str:
 
 
 def study(
-    scene: Scene | str,
+    scene: Scene | str | Job,
     duration: float | None = None,
     fps: float | None = None,
     *,
-    name: str | None = None,
-    settings: Sequence[Setting] | None = None,
-    full: bool = False,
+    settings: Sequence[Setting] | str = "small",
     budget: float = BUDGET,
     peers: Sequence[str] = (),
-    first: int = FIRST,
     output: str | os.PathLike | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Study:
     """Run a scene over a grid of settings against a reference.
 
     Args:
-        scene: a scene, or the name of one in the gallery, whose closed form is the reference if it has one.
+        scene: a scene, a job that makes one, or the name of one in the gallery, whose closed form is the reference if it has one.
         duration: s; fps: frames per second, at which errors are measured; by default those of the gallery scene, else 4 s at 60.
-        name: what titles call the scene. settings: those to run; by default a grid of all strategies, small, or large with `full`.
+        settings: those to run, or the name of a grid of all strategies: "small", or "full", which has more members a family.
         budget: s that the study may take, the reference included; settings that do not fit any more are named in `Study.left`.
         peers: other engines to run beside it, of `peers.PEERS`; they need `pip install 'rigidimpulse[peers]'`.
-        first: number of impacts of the beginning that errors are told for as well.
         output: folder for `study.csv` and, where the extra `study` is installed, the charts `study.png` and `study.html`; a study found
             there is gone on with.
         progress: called with what is being run, and the share of the budget that is spent.
@@ -137,23 +138,24 @@ def study(
 
     """
     start = perf_counter()
-    topic = _topic(scene, duration, fps, name)
+    topic = _topic(scene, duration, fps)
+    chosen = _settings(settings)
     tell = progress or (lambda what, share: None)
     world = compile_scene(topic.scene)
     tell("reference", 0.0)
-    mark = fingerprint(topic.scene, topic.duration, topic.fps, first)
+    mark = fingerprint(topic.scene, topic.duration, topic.fps, FIRST)
     folder = None if output is None else Path(output)
-    reference = kept_reference(
+    reference = stored_reference(
         None if folder is None else folder / "reference.npz", mark,
         lambda: make_reference(topic, world, REFERENCE_SHARE * budget, lambda what: tell(what, 0.0)),
     )  # fmt: skip
     out = Study(topic.name, topic.duration, reference)
-    measured_runs = MeasuredRuns(world, topic.scene, reference, topic.duration, topic.fps, first, start, budget)
-    jobs: list[tuple[Setting, Callable[[], Row]]] = [(each, lambda each=each: measured_runs.run(each)) for each in settings or grid(full)]
+    measured_runs = MeasuredRuns(world, topic.scene, reference, topic.duration, topic.fps, FIRST, start, budget)
+    jobs: list[tuple[Setting, Callable[[], Row]]] = [(each, lambda each=each: measured_runs.run(each)) for each in chosen]
     for peer in peers:
         jobs += [(peer_setting(peer, k, topic.fps), lambda peer=peer, k=k: measured_runs.run_peer(peer, k)) for k in PEER_STEPS]
-    kept = StoredRows(None if folder is None else folder / "study.csv", mark)
-    _run_jobs(out, _in_turn(jobs), kept, lambda: perf_counter() - start, budget, tell)
+    stored = StoredRows(None if folder is None else folder / "study.csv", mark)
+    _run_jobs(out, _in_turn(jobs), stored, lambda: perf_counter() - start, budget, tell)
     if folder is not None and charts_are_installed():
         from rigidimpulse.studies.charts import write_html, write_png
 
@@ -172,31 +174,42 @@ class _Topic(NamedTuple):
     fps: float
 
 
-def _topic(scene: Scene | str, duration: float | None, fps: float | None, name: str | None) -> _Topic:
-    """Find a scene, and what is not said of it."""
-    entry = None
+def _settings(settings: Sequence[Setting] | str) -> Sequence[Setting]:
+    """Return the given settings, or those of the named grid."""
+    if not isinstance(settings, str):
+        return settings
+    if settings not in GRIDS:
+        raise unknown_name("grid of settings", settings, GRIDS)
+    return grid(full=settings == "full")
+
+
+def _topic(scene: Scene | str | Job, duration: float | None, fps: float | None) -> _Topic:
+    """Find the scene; its duration and fps are those of the gallery scene where they are not given."""
+    entry, name = None, "scene"
     if isinstance(scene, str):
         from rigidimpulse import gallery
 
         entry = gallery.load(scene)
-        scene = entry.scene()
+        name, scene = entry.name, entry.scene()
+    elif isinstance(scene, Job):
+        entry, name, scene = scene.entry, scene.name, scene.make()
     elif not isinstance(scene, Scene):
         raise SceneError(f"scene is a {type(scene).__name__}", "give a Scene, or the name of one in the gallery")
     length = duration if duration is not None else entry.duration if entry is not None else DURATION
     rate = fps if fps is not None else entry.fps if entry is not None else FPS
     if len(frame_times(length, rate)) < 2:
         raise SceneError(f"duration = {length!r}", "a study needs at least two frames")
-    return _Topic(name or (entry.name if entry is not None else "scene"), scene, entry, length, rate)
+    return _Topic(name, scene, entry, length, rate)
 
 
 def _run_jobs(
-    out: Study, jobs: list[tuple[Setting, Callable[[], Row]]], kept: StoredRows, spent: Callable[[], float], budget: float,
+    out: Study, jobs: list[tuple[Setting, Callable[[], Row]]], stored: StoredRows, spent: Callable[[], float], budget: float,
     tell: Callable[[str, float], None],
 ) -> None:
-    """Add the rows that are kept, or that the budget has time for; spent: s until now."""
+    """Add the rows that are stored, and those that the budget has time for; spent: s until now."""
     costs: dict[str, list[tuple[float, float]]] = {}
     for setting, job in jobs:
-        row = kept.get(setting.name)
+        row = stored.get(setting.name)
         if row is None:
             begin = spent()
             if begin + _expected(costs.get(setting.family, []), setting) > budget:
@@ -209,7 +222,7 @@ def _run_jobs(
                 out.left.append(setting.name)
                 continue
             costs.setdefault(setting.family, []).append((setting.knob, spent() - begin))
-            kept.add(row)
+            stored.add(row)
         out.rows.append(row)
 
 

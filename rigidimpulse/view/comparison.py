@@ -2,9 +2,9 @@
 
 To the manifest and the messages of `contents` are added
     comparison   in the manifest: labels of the runs; ghosts: name, key in meshcat's tree, shape, paint and pose of the first frame of each
-                 body that is not static; nets: name and key of each flexible body; horizon (s) by name
+                 body that is not static; softBodies: name and key of each flexible body; horizon (s) by name
     motion       also animates /ghosts/key
-    apart        distance (m) and angle (rad) by body, ghosts first, then nets, and frame, as properties of /ghosts
+    apart        distance (m) and angle (rad) by body, ghosts first, then flexible bodies, and frame, as properties of /ghosts
     frames       vertices of a flexible body in all frames of the second run, as a property of /ghosts/key
 """
 
@@ -46,7 +46,7 @@ def comparison_contents(comparison: Comparison) -> tuple[dict[str, Any], list[tu
     run = comparison.run_b
     times = np.asarray(run.times, dtype=np.float64)
     manifest, messages = page_contents(comparison.run_a, run)
-    drawn = {entry["name"]: entry for entry in manifest["bodies"] + manifest["nets"]}
+    drawn = {entry["name"]: entry for entry in manifest["bodies"] + manifest["softBodies"]}
     soft_body_names = [track.name for track in run.soft_bodies]
     ghosts, tracks = [], {}
     for name in comparison.names:
@@ -57,7 +57,7 @@ def comparison_contents(comparison: Comparison) -> tuple[dict[str, Any], list[tu
     manifest["comparison"] = {
         "labels": list(comparison.labels),
         "ghosts": ghosts,
-        "nets": [{"name": name, "key": drawn[name]["key"]} for name in soft_body_names],
+        "softBodies": [{"name": name, "key": drawn[name]["key"]} for name in soft_body_names],
         "horizon": {name: max(time, float(times[0]) - 1.0) for name, time in comparison.horizon.items() if time < np.inf},
     }
     manifest["summary"] = _summary(comparison)

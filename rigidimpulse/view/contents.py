@@ -5,7 +5,7 @@ Manifest (JSON)
     bodies    name, folder (group) and key in meshcat's tree, half spaces, number of the geometry that collides (-1: none) and of the
               one that is drawn, where it is another (rendered, else -1), faceted (collides by its faces), surface, pose of the first
               frame, centre of mass in the body's frame
-    nets      name, key in meshcat's tree, surface, and whether it is thin (cloth), of each flexible body
+    softBodies  name, key in meshcat's tree, surface, and whether it is thin (cloth), of each flexible body
     numShapes, fade (s an arrow is seen), summary (a line of text), contacts (whether
               there are any), ledger (least range of its plot, J; null: none)
 Messages, each with its kind
@@ -16,7 +16,7 @@ Messages, each with its kind
     ledger    energies and momentum, see `history`, as a property of /ledger
     motion    the animation of all bodies that move; in large recordings instead
     glb       the glTF file that `Recording.export` writes, as a property of /motion
-    net, frames   faces of a flexible body, and its vertices in all frames, at /nets/k
+    soft body, frames  faces of a flexible body, and its vertices in all frames, at /softBodies/k
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.recording.exporters import ExportOptions, ExportTarget
 from rigidimpulse.scene.shape import rotation_matrix
 from rigidimpulse.view.arrows import arrow_rows, fade_time, longest_arrow
 from rigidimpulse.view.camera import Framing, Path, frame_action, up_axis
@@ -47,13 +48,13 @@ MOST_TRIANGLES = 250_000
 MOST_KEYS = 200_000
 """Bodies that move times frames, beyond which the motion is a glTF file: a page of 1,000 bodies then opens a second sooner."""
 LEVEL = 0.99
-"""Least cosine of the slope of a half space that is drawn as the ground and not as a wall or a ramp."""
+"""Least cosine of the slope of a half space that is drawn as the ground and not as an upright plane or a ramp."""
 ROUND_OFF = 1e-9
 """m and relative, of a centre of mass."""
 SOFT_BODY_COLOUR = 2
-"""Colours of the palette that are left out between bodies and nets: amber blanches on level cloth."""
+"""Colours of the palette that are left out between rigid and flexible bodies: amber blanches on level cloth."""
 SOFT_BODY_MARGIN = 0.03
-"""Margin about the vertices of a net in the picture, relative to its extent."""
+"""Margin about the vertices of a flexible body in the picture, relative to its extent."""
 
 
 def page_contents(
@@ -95,7 +96,9 @@ def page_contents(
     manifest = {
         "framing": asdict(framing),
         "bodies": entries,
-        "nets": [_soft_body_entry(track, len(bodies) + k, num_coloured + SOFT_BODY_COLOUR + k) for k, track in enumerate(soft_bodies)],
+        "softBodies": [
+            _soft_body_entry(track, len(bodies) + k, num_coloured + SOFT_BODY_COLOUR + k) for k, track in enumerate(soft_bodies)
+        ],
         "numShapes": len(meshes),
         "fade": fade_time(float(times[-1] - times[0])),
         "summary": _summary(sum(dynamic) + len(soft_bodies), len(recording.impacts), float(times[-1] - times[0])),
@@ -172,14 +175,13 @@ def glb_file(recording: Any) -> bytes:
     from pathlib import Path as FilePath
     from tempfile import TemporaryDirectory
 
-    from rigidimpulse.io.gltf.animate import write_motion
-    from rigidimpulse.io.motion import MotionOptions
+    from rigidimpulse.io.gltf.animate import write_gltf
     from rigidimpulse.scene.scene import Scene
 
     plain = replace(recording, scene=Scene(recording.scene.gravity, recording.scene.bodies), soft_bodies=[])
     with TemporaryDirectory() as folder:
         path = FilePath(folder) / "motion.glb"
-        write_motion(plain, path, MotionOptions())
+        write_gltf(plain, ExportTarget(path, path.stem, ExportOptions()))
         return path.read_bytes()
 
 
@@ -249,7 +251,7 @@ def _with_rendered(scene: Any, bodies: list[Any], numbers: list[int], meshes: li
 
 
 def _center(position: np.ndarray, orientation: np.ndarray, center: np.ndarray) -> list[float]:
-    """Return the centre of mass (3,) m in the frame of a body; exactly zero where it is the body's origin but for round-off."""
+    """Return the centre of mass (3,) m in the frame of a body; exactly zero where it is the body's origin up to round-off."""
     offset = rotation_matrix(orientation).T @ (center - position)
     return np.where(np.abs(offset) > ROUND_OFF * (1.0 + np.abs(center).max()), offset, 0.0).tolist()
 
@@ -271,14 +273,14 @@ def _paths(
 
 
 def _soft_body_path(*tracks: SoftBodyLike) -> Path:
-    """Return the places of all vertices of a net in all frames of its tracks, as a path."""
+    """Return the places of all vertices of a flexible body in all frames of its tracks, as a path."""
     vertices = np.concatenate([np.asarray(track.vertices, dtype=np.float64) for track in tracks])
     margin = SOFT_BODY_MARGIN * float(np.linalg.norm(np.ptp(vertices[0], axis=0)))
     return Path(tracks[0].name, vertices.reshape(-1, 3), margin, moves=True)
 
 
 def _soft_body_entry(track: SoftBodyLike, index: int, colour: int) -> dict[str, Any]:
-    """Return what the manifest says of a net."""
+    """Return what the manifest says of a flexible body."""
     closed = is_closed(track.faces)
     surface = soft_body_surface(colour, closed)
     return {"name": track.name, "key": _path_key(index, track.name), "surface": surface, "thin": not closed}

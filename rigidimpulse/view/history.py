@@ -4,7 +4,7 @@ Marks: the run is cut into `MARK_BINS` equal parts; each has the number n of its
 sqrt(j / j_max), the share of the longest arrow that its impulse j has (`arrows`).
 
 Contact rows: the force F of a contact acts on body b, -F on a. The arrow is that on the dynamic body; where both are, that on the
-one that it lifts, so that the arrows of a heap point up. Its length grows with the square root of |F|, as those of impulses do.
+one that it carries, so that the arrows in a pile point up. Its length grows with the square root of |F|, as those of impulses do.
 """
 
 from __future__ import annotations

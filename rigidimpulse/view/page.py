@@ -16,11 +16,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from rigidimpulse.recording.exporters import ExportTarget
 from rigidimpulse.view.contents import is_large, page_contents
 from rigidimpulse.view.protocol import RecordingLike
 
 SCRIPTS = (
-    "look.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "nets.js", "shapes.js", "transport.js", "plot.js", "timeline.js",
+    "look.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "soft_bodies.js", "shapes.js", "transport.js", "plot.js", "timeline.js",
     "panel.js", "ledger.js", "hud.js", "messages.js", "main.js",
 )  # fmt: skip
 LARGE_SCRIPTS = tuple("glb.js" if name == "messages.js" else name for name in SCRIPTS)
@@ -42,6 +43,11 @@ def write_html(recording: RecordingLike, path: str | os.PathLike[str], title: st
 
     """
     Path(path).write_text(render_page(recording, title), encoding="utf-8")
+
+
+def export_html(recording: RecordingLike, target: ExportTarget) -> None:
+    """Write a recording as `write_html` does; its title is the name of the file."""
+    write_html(recording, target.path, title=target.title)
 
 
 def render_page(recording: RecordingLike, title: str = DEFAULT_TITLE) -> str:

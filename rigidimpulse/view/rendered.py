@@ -57,7 +57,7 @@ def rendered_meshes(scene: Any, collision: dict[str, DisplayMesh]) -> dict[str, 
 
 
 def _pieces(meshes: Meshes, body: int, bodies: set[int]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Vertices (v, 3) in the frame of a body and faces of all meshes at and below its node, but for those of other bodies."""
+    """Vertices (v, 3) in the frame of a body and faces of all meshes at and below its node, without those of other bodies."""
     hierarchy, pieces, stack = meshes.hierarchy, [], [body]
     while stack:
         node = stack.pop()

@@ -1,8 +1,8 @@
 """Flexible bodies on a page.
 
-A page shows a net as one mesh whose vertices are written anew for each frame: the manifest's entry names it, a `set_object` message
-brings its faces, and a `set_property` message hangs the vertices of all frames on the same node, as float32, frame by frame. Normals are
-left to the page: smooth ones follow from the faces.
+A page shows a flexible body as one mesh whose vertices are written again for each frame: the manifest's entry names it, a `set_object`
+message brings its faces, and a `set_property` message hangs the vertices of all frames on the same node, as float32, frame by frame.
+Normals are left to the page: smooth ones follow from the faces.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def is_closed(faces: np.ndarray) -> bool:
 
 
 def soft_body_messages(track: SoftBodyLike, number: int) -> list[tuple[str, dict[str, Any]]]:
-    """Return the messages of a net for `view.contents`, each with its kind: "net" (mesh) and "frames" (vertices of all frames).
+    """Return the messages of a flexible body for `view.contents`, each with its kind: "soft body" (mesh) and "frames" (vertices).
 
     Raises:
         ValueError: a vertex is not finite.
@@ -32,7 +32,7 @@ def soft_body_messages(track: SoftBodyLike, number: int) -> list[tuple[str, dict
 
     if not np.isfinite(track.vertices).all():
         raise ValueError(f"flexible body {track.name!r}: a vertex is not finite; look at the status of the run")
-    geometry, material, path = f"net geometry {number}", f"net material {number}", f"/nets/{number}"
+    geometry, material, path = f"soft body geometry {number}", f"soft body material {number}", f"/softBodies/{number}"
     attributes = {"position": pack_numpy_array(track.vertices[0].T.astype(np.float32))}
     mesh = {
         "type": "set_object",
@@ -45,8 +45,8 @@ def soft_body_messages(track: SoftBodyLike, number: int) -> list[tuple[str, dict
                 "data": {"attributes": attributes, "index": pack_numpy_array(track.faces.T.astype(np.uint32))},
             }],
             "materials": [{"uuid": material, "type": "MeshBasicMaterial", "side": 2}],
-            "object": {"uuid": f"net {number}", "type": "Mesh", "geometry": geometry, "material": material},
+            "object": {"uuid": f"soft body {number}", "type": "Mesh", "geometry": geometry, "material": material},
         },
     }  # fmt: skip
     frames = {"type": "set_property", "path": path, "property": "frames", "value": pack_float32(track.vertices)}
-    return [("net", mesh), ("frames", frames)]
+    return [("soft body", mesh), ("frames", frames)]

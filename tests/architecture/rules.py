@@ -55,7 +55,8 @@ OLD_WORDS = (
     ), (
         "rigidimpulse/io/*", "rigidimpulse/view/*", "rigidimpulse/cli/*", "rigidimpulse/studies/charts.py",
         "rigidimpulse/scene/collision_filter.py",
-        "tests/io/*", "tests/browser/*", "docs/usd.md", "docs/robots.md", "docs/gltf.md", "docs/cache.md", "docs/recipes/*",
+        "tests/io/*", "tests/browser/*", "docs/guide/usd.md", "docs/guide/robots.md", "docs/guide/gltf.md",
+        "docs/guide/cache.md", "docs/guide/recipes/*",
     ), "files have groups of nodes and of data sets, filters have groups of bodies, commands and regular expressions have groups"),
     OldWord("guard", "safe step, conservative bound; energy limiter"),
     OldWord("lift", "position correction, depenetration", (), FOLDERS_OF_REAL_THINGS, "bodies do lift off"),

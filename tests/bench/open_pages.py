@@ -16,7 +16,8 @@ import numpy as np
 
 import rigidimpulse as ri
 from rigidimpulse.recording.events import IMPACT_DTYPE
-from rigidimpulse.view import contents, write_html
+from rigidimpulse.view import contents
+from rigidimpulse.view.page import write_html
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "browser"))
 from chromium import FLAGS, find_chromium

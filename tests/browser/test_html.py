@@ -18,7 +18,8 @@ from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
-from rigidimpulse.view import show, write_html
+from rigidimpulse.view.page import write_html
+from rigidimpulse.view.server import show
 
 pytestmark = pytest.mark.browser
 

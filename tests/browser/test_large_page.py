@@ -14,8 +14,9 @@ from chromium import Opened, open_page
 from test_html import STRANGE_NAME, recording
 from test_recording_page import full_run
 
-from rigidimpulse.view import contents, render_page, write_html
+from rigidimpulse.view import contents
 from rigidimpulse.view.contents import is_large
+from rigidimpulse.view.page import render_page, write_html
 
 pytestmark = pytest.mark.browser
 

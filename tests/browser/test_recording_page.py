@@ -18,8 +18,9 @@ import rigidimpulse as ri
 from rigidimpulse.core.quaternion import rotate
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.ledger import Ledger
-from rigidimpulse.view import contents, write_html
+from rigidimpulse.view import contents
 from rigidimpulse.view.display import display_mesh
+from rigidimpulse.view.page import write_html
 
 pytestmark = pytest.mark.browser
 

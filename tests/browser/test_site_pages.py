@@ -12,7 +12,7 @@ from rigidimpulse import gallery
 from rigidimpulse.gallery.record import at_most
 from rigidimpulse.studies.hard_cases import FAILED, PASSED, CaseResult, as_plain
 from rigidimpulse.studies.site_pages import index_page, scene_page
-from rigidimpulse.view import write_html
+from rigidimpulse.view.page import write_html
 from rigidimpulse.view.picture import draw_picture, png
 
 pytestmark = pytest.mark.browser

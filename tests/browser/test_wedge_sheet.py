@@ -33,7 +33,7 @@ def tumble(height: float = 1.0) -> ri.Scene:
 @pytest.fixture(scope="module")
 def wedge(tmp_path_factory: pytest.TempPathFactory) -> Wedge:
     folder = tmp_path_factory.mktemp("wedge")
-    return ri.wedge(tumble, {"height": [1.0, 1.5, -1.0], "seed": [0, 1]}, folder, duration=0.8, fps=30, processes=1)
+    return ri.wedge(tumble, {"height": [1.0, 1.5, -1.0], "seed": [0, 1]}, folder, duration=0.8, fps=30, workers=ri.Workers(processes=1))
 
 
 @pytest.fixture(scope="module")

@@ -215,7 +215,7 @@ class RunsAFile:
     """Pickled, it would have the library run a scene file."""
 
     def __reduce__(self):
-        from rigidimpulse.cli.jobs import find_job
+        from rigidimpulse.studies.job import find_job
 
         return find_job, ("harmful.py",)
 

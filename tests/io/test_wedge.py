@@ -96,7 +96,8 @@ def test_seeds_nudge_by_two_percent_of_the_scale_of_speeds():
 def test_takes_are_the_scene_with_its_parameters(tmp_path):
     # A ball that falls h without loss has v^2 = 2 g h at the floor, whatever the worker.
     heights = [0.5, 1.0, 2.0]
-    result = ri.wedge(drop, {"height": heights, "accuracy": ["standard", "preview"]}, tmp_path, duration=0.8, processes=1)
+    vary = {"height": heights, "accuracy": ["standard", "preview"]}
+    result = ri.wedge(drop, vary, tmp_path, duration=0.8, workers=ri.Workers(processes=1))
     assert [take.parameters["height"] for take in result.takes] == [0.5, 0.5, 1.0, 1.0, 2.0, 2.0]
     assert not result.failed
     for take, height in zip(result.takes[::2], heights, strict=True):
@@ -113,7 +114,8 @@ def test_takes_are_the_scene_with_its_parameters(tmp_path):
 def test_failing_takes_stop_no_others(tmp_path, monkeypatch):
     monkeypatch.setenv("WEDGE_TEST_FOLDER", str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(wedge_scenes.__file__).parent), os.environ.get("PYTHONPATH", "")]))
-    result = ri.wedge(fragile, {"height": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]}, tmp_path / "takes", duration=0.2, processes=2, retries=2)
+    vary = {"height": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]}
+    result = ri.wedge(fragile, vary, tmp_path / "takes", duration=0.2, workers=ri.Workers(processes=2, retries=2))
     outcomes = [take.outcome for take in result.takes]
     assert outcomes == ["ok", "failed", "ok", "failed", "failed", "ok"]
     assert "radius" in result.takes[1].message
@@ -122,7 +124,7 @@ def test_failing_takes_stop_no_others(tmp_path, monkeypatch):
 
 
 def test_a_first_take_that_fails_stops_no_others(tmp_path):
-    result = ri.wedge(fragile, {"height": [5.0, 2.0, 1.0]}, tmp_path, duration=0.1, processes=1)
+    result = ri.wedge(fragile, {"height": [5.0, 2.0, 1.0]}, tmp_path, duration=0.1, workers=ri.Workers(processes=1))
     assert [take.outcome for take in result.takes] == ["failed", "failed", "ok"]
 
 
@@ -131,7 +133,7 @@ def test_a_killed_wedge_goes_on(tmp_path):
     assert subprocess.run(program).returncode == -signal.SIGKILL
     done = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("take_*.h5")}
     assert len(done) == 2
-    result = ri.wedge(drop, {"height": [1.0, 2.0, 3.0]}, tmp_path, duration=0.3, processes=1)
+    result = ri.wedge(drop, {"height": [1.0, 2.0, 3.0]}, tmp_path, duration=0.3, workers=ri.Workers(processes=1))
     assert [take.outcome for take in result.takes] == ["ok"] * 3
     assert all((tmp_path / name).stat().st_mtime_ns == time for name, time in done.items())
 
@@ -149,7 +151,7 @@ def test_a_folder_of_another_wedge_is_refused(tmp_path):
 def test_dask_gives_the_same_bits_though_a_worker_is_killed(tmp_path):
     pytest.importorskip("distributed")
     vary = {"material.restitution": [0.3, 0.6, 0.9], "height": [0.5, 1.0], "seed": range(2)}
-    serial = ri.wedge(drop, vary, tmp_path / "serial", duration=0.5, processes=1)
+    serial = ri.wedge(drop, vary, tmp_path / "serial", duration=0.5, workers=ri.Workers(processes=1))
     where = tmp_path / "scheduler.json"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(wedge_scenes.__file__).parent), *sys.path])}
     begin = [sys.executable, "-m"]
@@ -172,7 +174,7 @@ def test_dask_gives_the_same_bits_though_a_worker_is_killed(tmp_path):
             if len(done) == len(serial.takes) // 2:
                 processes[1].kill()
 
-        result = ri.wedge(drop, vary, tmp_path / "dask", duration=0.5, scheduler=address, progress=progress)
+        result = ri.wedge(drop, vary, tmp_path / "dask", duration=0.5, workers=ri.Workers(scheduler=address), progress=progress)
     finally:
         for process in processes:
             process.kill()

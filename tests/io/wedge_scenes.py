@@ -41,7 +41,7 @@ def killed_after(number: int, folder: str) -> None:
         if number == 0:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    ri.wedge(drop, {"height": [1.0, 2.0, 3.0]}, folder, duration=0.3, processes=1, progress=progress)
+    ri.wedge(drop, {"height": [1.0, 2.0, 3.0]}, folder, duration=0.3, workers=ri.Workers(processes=1), progress=progress)
 
 
 if __name__ == "__main__":

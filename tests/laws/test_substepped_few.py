@@ -49,7 +49,7 @@ def test_a_fall_of_some_dozen_bodies_is_stepped_finely(kind: str, seed: int, num
 
 
 @pytest.mark.parametrize("number", [11, 20])
-def test_what_is_csubstepped_island_stays_exact(number: int) -> None:
+def test_what_is_cheap_stays_exact(number: int) -> None:
     """A column of boxes with a ball that rolls beside it takes a few exact steps a frame: to the bit what "newton" gives."""
     stone = ri.Material(density=900, static_friction=0.4, dynamic_friction=0.4)
     scene = ri.Scene(gravity=(0.0, 0.0, -9.81))

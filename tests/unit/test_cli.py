@@ -137,7 +137,7 @@ def test_view_of_arrays_needs_the_scene(scene_file, tmp_path, monkeypatch):
     ("arguments", "words"),
     [
         (("demo", "sppt"), "did you mean 'spot'"),
-        (("demo", "two_spheres", "-o", "run.obj"), ".html, .npz, .glb, .gltf"),
+        (("demo", "two_spheres", "-o", "run.obj"), ".npz, .csv, .glb, .gltf"),
         (("demo", "two_spheres", "--fps", "0"), "fps"),
         (("demo", "two_spheres", "--duration", "-1"), "duration"),
         (("demo", "two_spheres", "--accuracy", "perfect"), "'preview', 'standard', 'exact'"),

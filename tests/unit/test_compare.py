@@ -24,9 +24,8 @@ from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
 from rigidimpulse.engine.simulate import frame_times
 from rigidimpulse.recording.events import IMPACT_DTYPE
 from rigidimpulse.studies.compare import frames_of, labels_of
-from rigidimpulse.view import render_page
 from rigidimpulse.view.comparison import COMPARISON_SCRIPTS, render_comparison
-from rigidimpulse.view.page import SCRIPTS
+from rigidimpulse.view.page import SCRIPTS, render_page
 
 FPS = 24.0
 DRIFT = np.array([3e-3, 0.0, 4e-3])  # m/s by which the ball of the second run runs away: 5e-3 m/s
@@ -176,7 +175,7 @@ class TestPage:
         assert np.allclose(values, [5e-3 * a.times, 0 * a.times, 0.125 * a.times], rtol=1e-7, atol=ROUND_OFF)
         assert np.frombuffer(angle["value"].data, "<f4").reshape(3, -1)[1, -1] == pytest.approx(TURN * a.times[-1], rel=1e-7)
         *_, frames = messages_of(page, "frames")
-        assert frames["path"] == f"/ghosts/{contents['nets'][0]['key']}"
+        assert frames["path"] == f"/ghosts/{contents['softBodies'][0]['key']}"
         assert np.array_equal(np.frombuffer(frames["value"].data, "<f4"), b.soft_bodies[0].vertices.astype(np.float32).ravel())
 
     def test_camera_sees_both_runs(self) -> None:

@@ -109,7 +109,7 @@ def test_fast_ball_touches_a_moving_triangle() -> None:
 def test_track_of_a_page_and_a_file() -> None:
     track = FlexibleTrack("cloth", np.arange(36.0).reshape(3, 4, 3), np.array([[0, 1, 2], [0, 2, 3]]))
     (kind, mesh), (_, frames) = soft_body_messages(track, 2)
-    assert kind == "net" and mesh["path"] == frames["path"] == "/nets/2"
+    assert kind == "soft body" and mesh["path"] == frames["path"] == "/softBodies/2"
     assert np.frombuffer(frames["value"].data, "<f4").tolist() == list(range(36))
     (back,) = tracks_in(track.arrays(0))
     np.testing.assert_array_equal(back.vertices, track.vertices)

@@ -27,10 +27,11 @@ from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 from rigidimpulse.view import camera as framing
-from rigidimpulse.view import render_page, show, write_html
 from rigidimpulse.view.arrows import LEAST_LENGTH, MOST_ROWS, arrow_rows, fade_time
 from rigidimpulse.view.display import display_mesh, display_planes, shade
 from rigidimpulse.view.materials import PALETTE, color, surface
+from rigidimpulse.view.page import render_page, write_html
+from rigidimpulse.view.server import show
 from rigidimpulse.view.tracks import body_tracks, quaternion_keys, thin_keys
 
 QUARTER_TURN = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)  # about x

@@ -14,9 +14,9 @@ from rigidimpulse.recording.ledger import Ledger
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
-from rigidimpulse.view import render_page
 from rigidimpulse.view.display import display_mesh
 from rigidimpulse.view.history import MARK_BINS, contact_rows, energy_span, impact_marks, ledger_curves
+from rigidimpulse.view.page import render_page
 from rigidimpulse.view.rendered import rendered_meshes
 
 

@@ -23,13 +23,14 @@ class FlexibleTrack:
 
     def arrays(self, number: int) -> dict[str, np.ndarray]:
         """What an .npz file keeps of the track with this number."""
-        return {f"net{number}_name": np.array(self.name), f"net{number}_vertices": self.vertices, f"net{number}_faces": self.faces}
+        name = f"soft_body{number}"
+        return {f"{name}_name": np.array(self.name), f"{name}_vertices": self.vertices, f"{name}_faces": self.faces}
 
 
 def tracks_in(arrays: Any) -> list[FlexibleTrack]:
     """Tracks kept in the arrays of an .npz file (a mapping), in order of their numbers."""
     tracks = []
-    while f"net{len(tracks)}_name" in arrays:
-        key = f"net{len(tracks)}"
+    while f"soft_body{len(tracks)}_name" in arrays:
+        key = f"soft_body{len(tracks)}"
         tracks.append(FlexibleTrack(str(arrays[f"{key}_name"]), arrays[f"{key}_vertices"], arrays[f"{key}_faces"]))
     return tracks

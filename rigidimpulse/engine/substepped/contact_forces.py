@@ -285,7 +285,7 @@ class ContactStepper:
             posed = Posed(a, now.position[i], rotation[0]), Posed(b, now.position[j], rotation[1])
             if pair_gap(self.geometry, *posed, limit, np.zeros(7)) < limit:
                 run.log.report(
-                    time, "overlap in a heap", (world.names[min(i, j)], world.names[max(i, j)]),
+                    time, "overlap in a sub-stepped island", (world.names[min(i, j)], world.names[max(i, j)]),
                     "the bodies are deeper inside each other than their contacts can tell; use a smaller step",
                 )  # fmt: skip
 

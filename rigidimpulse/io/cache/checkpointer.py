@@ -1,15 +1,14 @@
-"""Keeps a run in its cache while it goes on, and finds where to go on with one that was stopped.
+"""Checkpoints: they store a run in its cache while it goes on, and let a stopped run go on from there.
 
-What is written at a checkpoint, between two steps: frames until then, those of bodies whose courses go on beyond it included (they lie on
-them; whatever changes a course on the way writes them once more); impacts; and everything that the run changes (`freeze`). A run that goes
-on is made ready anew like any other, then takes the state of the checkpoint in the place of its own.
+A checkpoint is written between two steps. It holds the frames until then; the impacts; and everything that the run changes (`freeze`). A
+body's trajectory may go on beyond the checkpoint. Its frames until then are sampled from that trajectory; if it changes later, they are
+written again. A run that goes on is prepared like any other, and then takes the state of the checkpoint in place of its own.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -21,6 +20,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.engine.fingerprint import fingerprint
 from rigidimpulse.io.cache.file import FRAMES, SUFFIXES, CacheFile, Content, Header, read
 from rigidimpulse.io.cache.freeze import Constants, freeze, thaw
+from rigidimpulse.recording.cache import Cache
 from rigidimpulse.recording.recorder import sample_paths
 from rigidimpulse.recording.recording import Recording, RunSettings
 
@@ -29,20 +29,6 @@ if TYPE_CHECKING:
 
 EXPENSIVE = 20.0
 """How many times longer than the last checkpoint took the run goes on before the next."""
-
-
-@dataclass(frozen=True)
-class Cache:
-    """Where a run is kept on disk while it goes on, see `simulate`.
-
-    Attributes:
-        path: a file that ends in .h5 or .hdf5.
-        every: s of computing between checkpoints, at least; 20 times what one takes if that is longer.
-
-    """
-
-    path: str | os.PathLike[str]
-    every: float = 5.0
 
 
 class Checkpointer:
@@ -71,19 +57,19 @@ class Checkpointer:
         duration, fps, accuracy, effects = settings
         mark = fingerprint(world.scene, duration, fps, accuracy, effects)
         header = Header(mark, rigidimpulse.__version__, duration, fps, list(world.names), recorder.times, world.offset, world.turn)
-        kept = self._look_up(header)
+        stored = self._look_up(header)
         self._frames = self._impacts = 0
         self._state = b""
-        self.run = run if kept is None or kept.state is None else self._recall(run, kept)
+        self.run = run if stored is None or stored.state is None else self._recall(run, stored)
         self._written = self.run.recorder.written.copy()
-        complete = kept is not None and kept.complete
-        self._file = None if complete else CacheFile(self._path, header, kept)
+        complete = stored is not None and stored.complete
+        self._file = None if complete else CacheFile(self._path, header, stored)
         self._last, self._cost = perf_counter(), 0.0
-        if kept is None or kept.state is None:
+        if stored is None or stored.state is None:
             self.write(0.0)  # a state that cannot be written is better known at once
 
     def _look_up(self, header: Header) -> Content | None:
-        """What there is of this run."""
+        """Return what the file has of this run, None without a file."""
         if not self._path.exists():
             return None
         known, content = read(self._path, alone=True)
@@ -91,14 +77,14 @@ class Checkpointer:
             raise SceneError(_difference(known, header), "delete it, or give another name", f"cache {str(self._path)!r}")
         return content
 
-    def _recall(self, run: Run, kept: Content) -> Run:
+    def _recall(self, run: Run, stored: Content) -> Run:
         """The run as its checkpoint left it."""
-        recorder, rows = run.recorder, run.log.impacts
-        for name, frames in kept.frames.items():
+        recorder, impacts = run.recorder, run.log.impacts
+        for name, frames in stored.frames.items():
             getattr(recorder, name)[: len(frames)] = frames
-        rows.rows = np.concatenate([kept.impacts, rows.rows])
-        self._frames, self._impacts = len(kept.frames["position"]), len(kept.impacts)
-        return thaw(kept.state or b"", _constants(run))
+        impacts.rows = np.concatenate([stored.impacts, impacts.rows])
+        self._frames, self._impacts = len(stored.frames["position"]), len(stored.impacts)
+        return thaw(stored.state or b"", _constants(run))
 
     def look(self, time: float, more: Callable[[float], None] | None = None) -> None:
         """Write a checkpoint if it is time to; call `more` with the time of the run [s]."""
@@ -126,16 +112,16 @@ class Checkpointer:
         self._cost = self._last - start
 
     def _fill_in(self, first: int, last: int) -> None:
-        """Write frames until the last one that are not written yet, from the present courses; what writes them comes again."""
+        """Write the frames before `last` that are not written yet, from the present trajectories; the recorder writes them again later."""
         recorder, trajectory = self.run.recorder, self.run.state.trajectory
         behind, frames = np.flatnonzero(recorder.written < last), (getattr(recorder, name) for name in FRAMES)
         sample_paths(trajectory, behind, recorder.times, last, np.maximum(recorder.written, first), *frames)
 
     def _content(self, frames: int, time: float, state: bytes, tables: dict[str, Any] | None = None) -> Content:
         run = self.run
-        rows = run.log.impacts
+        impacts = run.log.impacts
         recorded = {name: getattr(run.recorder, name)[:frames] for name in FRAMES}
-        return Content(recorded, rows.rows[: rows.count], time, state, tables is not None, tables or {})
+        return Content(recorded, impacts.rows[: impacts.count], time, state, tables is not None, tables or {})
 
     def finish(self, recording: Recording) -> None:
         """Add what only a finished run has, and say that it is complete."""
@@ -153,19 +139,19 @@ class Checkpointer:
 
 
 def _constants(run: Run) -> Constants:
-    """What of a run its checkpoints do not hold."""
+    """Return the parts of a run that its checkpoints do not hold."""
     world, recorder = run.world, run.recorder
     own = [run.plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), run.log.impacts.rows]
     return Constants([world.scene, world.scene.bodies, world.scene.effects, world.shapes, world.geometry, *own])
 
 
 def _difference(known: Header, header: Header) -> str:
-    """What a cache is of that the run is not: as much as both say."""
+    """Say how a cache differs from the run."""
     if known.version != header.version:
         return f"it is of version {known.version} of the library, this is {header.version}"
     if known.names != header.names:
         return "it is of another scene: its bodies have other names"
-    for what, unit, kept, asked in (("duration", " s", known.duration, header.duration), ("fps", "", known.fps, header.fps)):
-        if kept != asked:
-            return f"it is of other settings: {what} {kept:g}{unit}, asked for is {asked:g}{unit}"
+    for what, unit, stored, asked in (("duration", " s", known.duration, header.duration), ("fps", "", known.fps, header.fps)):
+        if stored != asked:
+            return f"it is of other settings: {what} {stored:g}{unit}, asked for is {asked:g}{unit}"
     return "it is of another scene, of another accuracy or of other effects"

@@ -9,10 +9,10 @@
     checkpoint      two slots of bytes, and commits (2,): number, time, frames, impacts, size and digest of each
     tables          of a finished run: contacts, and vertices and faces of flexible bodies
 
-All tables lie in the file from its beginning, with room to spare (holes, on most disks), so that nothing that says where they are is
+All tables lie in the file from its beginning, with spare capacity (holes, on most disks), so that nothing that says where they are is
 ever written again: a process may be killed at any moment. A checkpoint is written into the slot of the older one, then its commit; each is
 on disk before the next thing is written. Whatever is cut off, one slot agrees with its digest, and frames and impacts that it counts are as
-it left them: they are only ever written again with the same numbers. Where room does not do, a file with twice as much takes the place of
+it left them: they are only ever written again with the same numbers. Where the capacity is too small, a file with twice as much replaces
 this one.
 """
 
@@ -38,7 +38,7 @@ COMMIT = np.dtype(
     [("number", "<u8"), ("time", "<f8"), ("frames", "<u8"), ("impacts", "<u8"), ("size", "<u8"), ("digest", "S64")]
 )
 SPARE = 2
-"""How many times what there is there is room for, in impacts and in bytes of a state."""
+"""Capacity over what is stored, for impacts and for bytes of a state."""
 LEAST_IMPACTS = 256
 
 
@@ -157,7 +157,7 @@ class CacheFile:
         self._file = self._make(content or empty(len(header.names)))
 
     def _make(self, content: Content) -> Any:
-        """Make the file with this content and room for more; return it open."""
+        """Make the file with this content and capacity for more; return it open."""
         data = b"" if content.state is None else zlib.compress(content.state, 1)
 
         def create(target: Path) -> None:
@@ -213,12 +213,12 @@ class CacheFile:
 
 
 def empty(n: int) -> Content:
-    """What there is of a run of n bodies before its first checkpoint."""
+    """Return the content of a run of n bodies before its first checkpoint."""
     return Content({name: np.zeros((0, n, width)) for name, width in FRAMES.items()}, np.zeros((0, ROW_LENGTH)), 0.0, None, False, {})
 
 
 def _lay_out(file: Any, header: Header, impacts: int, size: int) -> None:
-    """Give a new file its tables, with room for so many impacts and states of so many bytes."""
+    """Give a new file its tables, with the capacity for `impacts` impacts and for states of `size` bytes."""
     h5py = library()
     told = {"format": FORMAT, "fingerprint": header.fingerprint, "version": header.version, "complete": False}
     file.attrs.update(told | {"duration": header.duration, "fps": header.fps, "names": np.array(header.names, dtype=object)})

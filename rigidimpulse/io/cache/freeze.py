@@ -1,9 +1,9 @@
 """The state of a run as bytes, and back, bit for bit.
 
 What is written is the graph of objects that a run changes. Constants are written as numbers in the order in which a walk meets them: the
-scene with all that people put into it (functions among it, which have no bytes), compiled shapes and their geometry; a run that goes on has
-compiled them anew, and walks them in the same order. Arrays that share memory share it again when they are read: a view is written as its
-base, and where and how it lies in it.
+scene with all that people put into it (functions among it, which have no bytes), compiled shapes and their geometry; a run that goes on
+has compiled them again, and walks them in the same order. Arrays that share memory share it again when they are read: a view is written
+as its base, and where and how it lies in it.
 
 Only what a run is made of (`HOMES`), plain containers and arrays are ever made from bytes.
 """
@@ -114,8 +114,8 @@ def _address(array: np.ndarray) -> int:
 def _owner(data: Any, dtype: np.dtype, shape: tuple[int, ...], order: Any, residue: int, writeable: bool) -> np.ndarray:
     """An array with these bytes that lies as the one that was written does to the lines of the processor's cache: kernels count on it."""
     plain = np.frombuffer(data, dtype).reshape(shape, order=order)
-    room = np.empty(plain.nbytes + LINE, np.uint8)
-    array = np.ndarray(shape, dtype, buffer=room, offset=(residue - _address(room)) % LINE, order=order)
+    memory = np.empty(plain.nbytes + LINE, np.uint8)
+    array = np.ndarray(shape, dtype, buffer=memory, offset=(residue - _address(memory)) % LINE, order=order)
     array[...] = plain
     array.flags.writeable = writeable
     return array

@@ -36,7 +36,7 @@ def load_cache(path: Path) -> Recording:
         impacts=impacts[impacts["time"] <= header.duration],
         contacts=content.tables.get("contacts", np.zeros(0, CONTACT_DTYPE)),
         status=Status(True, "loaded") if content.complete else _unfinished(header, content),
-        soft_bodies=tracks_in(content.tables) if "net0_name" in content.tables else [],
+        soft_bodies=tracks_in(content.tables),
     )
 
 

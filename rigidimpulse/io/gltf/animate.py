@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import json
 import logging
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,9 +30,10 @@ from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.origin import Origin
 from rigidimpulse.io.keys import Keys
 from rigidimpulse.io.keys import Path as BodyPath
-from rigidimpulse.io.motion import Motion, MotionOptions
+from rigidimpulse.io.motion import Motion
 
 if TYPE_CHECKING:
+    from rigidimpulse.recording.exporters import ExportTarget
     from rigidimpulse.recording.recording import Recording
 
 logger = logging.getLogger("rigidimpulse")
@@ -48,16 +48,20 @@ ANIMATION = "rigidimpulse"
 """Name of the animation."""
 
 
-def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
+def write_gltf(run: Recording, target: ExportTarget) -> None:
     """Write a .glb or .gltf file of a run.
 
     Args:
-        run: with its scene. target: where; the suffix says which. options: see there.
+        run: with its scene. target: where, and the options; the suffix of its path chooses the kind.
 
     Raises:
-        SceneError: a figure makes no sense, a pose is not finite, or a file beside the scene is gone.
+        SceneError: an option makes no sense, a pose is not finite, or a file beside the scene is gone.
 
     """
+    options = target.options
+    if (options.up_axis, options.unit) != (None, 1.0):
+        name = f"{target.title}{target.path.suffix}"
+        raise SceneError(f"up_axis or unit for {name!r}", "glTF is Y up and in metres: leave them out, or write USD")
     motion = Motion(run, options)
     paths, scene = motion.paths, motion.scene
     origin = scene.origin if isinstance(scene.origin, Origin) else None
@@ -85,7 +89,7 @@ def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
         _drop_channels(builder.tree, set(writer.nodes))
         writer.take_over(origin)
     writer.close()
-    builder.write(target)
+    builder.write(target.path)
 
 
 class _Locals:

@@ -84,7 +84,7 @@ class BodyMaker:
                 self.joints.append(FixedJoint(name, title, name=f"weld of {title}"))
 
     def _common(self, node: int, name: str, motion: Motion | None, shape: Shape) -> dict[str, Any]:
-        """Arguments of the body but for shape, material and filter."""
+        """Return the arguments of the body, without shape, material and filter."""
         turn = self.hierarchy.turn[node]
         values: dict[str, Any] = {"position": self.hierarchy.position(node).copy(), "orientation": turn, "motion": "static"}
         release = release_of(self.hierarchy, node)

@@ -7,7 +7,7 @@
     plane               half space; with sizes: two triangles, which stop bodies from both sides
     mesh                its triangles, K applied exactly, turned inside out where K mirrors; or their hull
 
-A negative scale counts as its magnitude, but for meshes. Hulls have their points on the surface and lie inside it: by
+A negative scale counts as its magnitude, except for meshes. Hulls have their points on the surface and lie inside it: by
 1.8 % of the radius for spheres, 0.2 % for rims. glTF's capsules and cylinders stand along Y, those of `Shape` along z.
 """
 

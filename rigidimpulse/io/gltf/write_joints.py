@@ -14,13 +14,16 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.model.world import World
 from rigidimpulse.scene.joint import BallJoint, DistanceJoint, FixedJoint, HingeJoint, Joint, Motor, SliderJoint
-from rigidimpulse.scene.joint_six_axis import AXES, SixAxisJoint
+from rigidimpulse.scene.joint_six_axis import AXES, Limit, SixAxisJoint
 
 ALL = [0, 1, 2]
 
 
-def joint_entry(joint: Joint, world) -> tuple[dict[str, Any], tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray], list[str]]:
+def joint_entry(
+    joint: Joint, world: World
+) -> tuple[dict[str, Any], tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray], list[str]]:
     """Return the limits and drives of a joint, its anchors (3,) and frames (3, 3) in the world at the start, and what is left out.
 
     world: the compiled scene, for anchors that follow from it.
@@ -79,7 +82,7 @@ def _soft(stiffness: float, damping: float) -> dict[str, float]:
     return {"stiffness": float(stiffness), "damping": float(damping)}
 
 
-def _limit_of(limit) -> dict[str, Any]:
+def _limit_of(limit: Limit) -> dict[str, Any]:
     linear, axes, _ = limit.parts()
     entry: dict[str, Any] = {"linearAxes" if linear else "angularAxes": list(axes)}
     entry |= {key: float(value) for key, value in (("min", limit.lower), ("max", limit.upper)) if value is not None}

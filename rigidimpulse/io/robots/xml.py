@@ -1,4 +1,4 @@
-"""XML files of robots, guarded against entities that expand without end, and the files they name."""
+"""XML files of robots, read without expanding entities (an entity can expand without end), and the files they name."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Motion into a USD file: a layer over the file that the scene came from, or one prim a body.
 
-The world pose of a body is (x, Q) at each key. Over a file with L metres a unit its prim keeps its stretch K at rest, what its
-world matrix is but for the rotation. Below a parent that stands still and has the matrix s R (an even scale and a rotation)
+The world pose of a body is (x, Q) at each key. Over a file with L metres a unit its prim keeps its stretch K at rest, which is what its
+world matrix is without the rotation. Below a parent that stands still and has the matrix s R (an even scale and a rotation)
 
     translate = (s R)^-1 (x / L - x_p),    orient = R^T Q,    then K / s
 
@@ -11,22 +11,24 @@ USD's own; bodies that turn fast have keys in between, see `rigidimpulse.io.keys
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import from_matrix
-from rigidimpulse.io.motion import Motion, MotionOptions
+from rigidimpulse.io.keys import Keys
+from rigidimpulse.io.motion import Motion
 from rigidimpulse.io.usd.draw import Drawing, draw_soft_body
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place, quaternions, sample, valid_name, vectors
-from rigidimpulse.io.usd.library import Gf, Sdf, UsdUtils
+from rigidimpulse.io.usd.library import Gf, Layer, PrimSpec, Sdf, SdfPath, UsdUtils
 from rigidimpulse.io.usd.origin import UsdOrigin
 from rigidimpulse.view.camera import stage_rotation, up_axis
 from rigidimpulse.view.materials import color
 
 if TYPE_CHECKING:
+    from rigidimpulse.recording.exporters import ExportTarget
     from rigidimpulse.recording.recording import Recording
 
 NEAR = 1e-9
@@ -37,26 +39,27 @@ IS_AXIS = 1e-9
 AXES = {"y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
 
 
-def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
+def write_usd(run: Recording, target: ExportTarget) -> None:
     """Write a .usda, .usdc, .usd or .usdz file of a run.
 
     Args:
-        run: with its scene. target: where; the suffix says which. options: see there.
+        run: with its scene. target: where, and the options; the suffix of its path chooses the kind.
 
     Raises:
-        SceneError: usd-core is missing, a figure makes no sense, or a pose is not finite.
+        SceneError: usd-core is missing, an option makes no sense, or a pose is not finite.
 
     """
-    motion = Motion(run, options)
-    if target.suffix != ".usdz":
-        layer = Sdf.Layer.CreateNew(str(target))
+    motion = Motion(run, target.options)
+    path = target.path
+    if path.suffix != ".usdz":
+        layer = Sdf.Layer.CreateNew(str(path))
         _Writer(run, motion, layer).write()
         layer.Save()
         return
-    inner = target.with_suffix(".usdc")
+    inner = path.with_suffix(".usdc")
     try:
-        write_motion(run, inner, options)
-        UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(inner)), str(target))
+        write_usd(run, target._replace(path=inner))
+        UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(inner)), str(path))
     finally:
         inner.unlink(missing_ok=True)
 
@@ -64,7 +67,7 @@ def write_motion(run: Recording, target: Path, options: MotionOptions) -> None:
 class _Writer:
     """A layer that is being made of a run."""
 
-    def __init__(self, run: Recording, motion: Motion, layer) -> None:
+    def __init__(self, run: Recording, motion: Motion, layer: Layer) -> None:
         self.run, self.motion, self.layer = run, motion, layer
         step = float(run.times[-1]) / (len(run.times) - 1) if len(run.times) > 1 else 1.0 / LONE_FPS
         self.fps = round(1.0 / step, 9)
@@ -93,7 +96,7 @@ class _Writer:
         with Sdf.ChangeBlock():
             self._bodies(Sdf.Path("/World"), {}, 1.0)
 
-    def _over(self, origin) -> None:
+    def _over(self, origin: UsdOrigin) -> None:
         """Give the prims of bodies their motion."""
         for name, path in origin.prim_of.items():
             if name not in self.motion.paths:
@@ -106,14 +109,14 @@ class _Writer:
             keys, names = origin.local(path, self.motion.keys(name), self.motion, prim)
             self._sample(prim, keys, names)
 
-    def _sample(self, prim, keys, names: tuple[str, str]) -> None:
+    def _sample(self, prim: PrimSpec, keys: Keys, names: tuple[str, str]) -> None:
         """Write the keys of a prim by the names of its operations, or those of them that change."""
         codes = self.codes(keys.times)
         for name, given, made in ((names[0], keys.positions, vectors), (names[1], keys.orientations, quaternions)):
             if not self.motion.options.only_moved or np.any(given != given[0]):
                 sample(prim, name, codes, made(given))
 
-    def _bodies(self, root, drawn: dict, scale: float) -> None:
+    def _bodies(self, root: SdfPath, drawn: Mapping[str, Any], scale: float) -> None:
         """Write bodies that have no prim, below a root in metres."""
         scene, paths = self.motion.scene, self.motion.paths
         fresh = [body for body in scene.bodies if body.name not in drawn]
@@ -133,7 +136,7 @@ class _Writer:
         for number, track in enumerate(self.run.soft_bodies):
             draw_soft_body(self.layer, root.AppendChild(valid_name(track.name, self.used)), track, codes, color(moving + number))
 
-    def _root(self, path, scale: float, inside: bool) -> None:
+    def _root(self, path: SdfPath, scale: float, inside: bool) -> None:
         """Write the prim above the bodies; a stage of its own has kilograms, metres and the up axis of the scene, or what is asked for."""
         root = define(self.layer, path)
         if inside:

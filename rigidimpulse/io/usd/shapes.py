@@ -9,7 +9,7 @@
     Mesh                by `physics:approximation`: none, convexDecomposition and meshSimplification: its triangles, exactly;
                         convexHull; boundingCube and boundingSphere, about its points in its own axes
 
-A negative scale counts as its magnitude, but for meshes. Capsules and cylinders stand along z in `Shape`.
+A negative scale counts as its magnitude, except for meshes. Capsules and cylinders stand along z in `Shape`.
 """
 
 from __future__ import annotations

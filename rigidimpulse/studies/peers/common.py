@@ -40,7 +40,7 @@ class Peer(Protocol):
     """A scene in another engine."""
 
     def advance(self, count: int) -> None:
-        """Take so many steps."""
+        """Take `count` steps."""
         ...
 
     def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -103,7 +103,7 @@ def _contact(restitution: float, step: float) -> list[float]:
     return [-w * w, -2.0 * z * w]
 
 
-def _add_body(spec, body: PeerBody, step: float) -> None:
+def _add_body(spec: Any, body: PeerBody, step: float) -> None:
     added = spec.worldbody.add_body(name=body.body.name, pos=np.asarray(body.body.position, float), quat=body.body.unit_orientation())
     if body.body.motion == "dynamic":
         added.add_freejoint()
@@ -121,7 +121,7 @@ def _add_body(spec, body: PeerBody, step: float) -> None:
             geom.contype, geom.conaffinity = 2, 1
 
 
-def _geometry(spec, name: str, part: Part) -> dict:
+def _geometry(spec: Any, name: str, part: Part) -> dict:
     """Arguments of a geometry."""
     shape, kinds = part.shape, mujoco.mjtGeom
     if shape.kind == "half_space":
@@ -147,7 +147,7 @@ def _geometry(spec, name: str, part: Part) -> dict:
     return {"type": kinds.mjGEOM_MESH, "meshname": name}
 
 
-def _add_joint(spec, joint: PeerJoint) -> None:
+def _add_joint(spec: Any, joint: PeerJoint) -> None:
     """A constraint that holds a point of both bodies together, for each point."""
     name = joint.b if joint.a is None else joint.a
     body = spec.body(name)

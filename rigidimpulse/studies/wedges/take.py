@@ -15,6 +15,7 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import write_renamed
 from rigidimpulse.scene.scene import Scene
+from rigidimpulse.studies.job import find_job
 from rigidimpulse.studies.wedges.vary import is_of_run, run_settings, with_parameter
 
 DONE, REPORTED, FAILED = "ok", "reported", "failed"
@@ -71,8 +72,6 @@ def make_scene(scene: str | Scene | Callable[..., Scene], parameters: dict[str, 
         SceneError: no such scene, or nothing of it has a parameter's name.
 
     """
-    from rigidimpulse.cli.jobs import find_job
-
     made = scene
     left = {name: value for name, value in parameters.items() if not is_of_run(name)}
     if not isinstance(made, Scene):

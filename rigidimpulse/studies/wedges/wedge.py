@@ -6,7 +6,7 @@ import csv
 import json
 import logging
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,10 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import write_renamed
 from rigidimpulse.recording.recording import Recording, load_recording
 from rigidimpulse.scene.scene import Scene
+from rigidimpulse.studies.job import DEFAULT_DURATION, DEFAULT_FPS, find_job
 from rigidimpulse.studies.wedges.take import FAILED, Take, TakeJob, make_scene
 from rigidimpulse.studies.wedges.vary import UnknownParameter, combinations
-from rigidimpulse.studies.wedges.workers import run_dask, run_here, run_pool
+from rigidimpulse.studies.wedges.workers import ONE_A_CORE, Workers, run_dask, run_here, run_pool
 
 logger = logging.getLogger("rigidimpulse")
 
@@ -78,15 +79,13 @@ def wedge(
     duration: float | None = None,
     fps: float | None = None,
     accuracy: str | None = None,
-    processes: int | None = None,
-    scheduler: str | None = None,
-    retries: int = 2,
+    workers: Workers = ONE_A_CORE,
     progress: Callable[[Take], None] | None = None,
 ) -> Wedge:
     """Run a scene with all combinations of parameters; each take has its cache, its page and its figures in the folder.
 
     A wedge that was stopped goes on where it was when it is called again. Takes that fail are in the result and stop no others. Programs
-    that call this with more than one process need the usual guard, `if __name__ == "__main__":`.
+    that call this with more than one process need the line `if __name__ == "__main__":`.
 
     Args:
         scene: a gallery name, a scene file, a Scene, or a function that returns one, whose arguments may be varied.
@@ -94,17 +93,13 @@ def wedge(
             See docs/guide/wedges.md.
         folder: for the files; also of workers on other machines.
         duration, fps, accuracy: as `simulate` has them; by default those of a gallery scene, else 4 s, 60 and "standard".
-        processes: how many at a time; by default one a core. 1: in this process.
-        scheduler: address of a Dask scheduler, "tcp://host:port", or "local" for a cluster on this machine.
-        retries: how often a take is run again after an error that is not the scene's, or after its process died.
+        workers: which processes run the takes; by default one process for each core of this machine.
         progress: called with each take that is done.
 
     Raises:
         SceneError: no such scene, nothing to vary, or the folder has another wedge in it.
 
     """
-    from rigidimpulse.cli.jobs import DEFAULT_DURATION, DEFAULT_FPS, find_job
-
     named = os.fspath(scene) if isinstance(scene, str | os.PathLike) else None
     job = find_job(named) if named is not None else None
     own = (job.duration, job.fps, job.accuracy) if job is not None else (DEFAULT_DURATION, DEFAULT_FPS, "standard")
@@ -116,12 +111,7 @@ def wedge(
     _check_names(jobs[0])
     _claim(Path(folder), {"scene": named or getattr(scene, "__name__", "scene"), "vary": vary, "settings": settings})
     takes = []
-    number = min(processes or os.cpu_count() or 1, len(jobs))
-    if scheduler is not None:
-        source = run_dask(jobs, scheduler, number, retries)
-    else:
-        source = run_here(jobs, retries) if number == 1 else run_pool(jobs, number, retries)
-    for take in source:
+    for take in _runs(jobs, workers):
         takes.append(take)
         if progress is not None:
             progress(take)
@@ -129,6 +119,14 @@ def wedge(
     _write_table(result)
     _write_sheet(result, Path(named).stem if named is not None else getattr(scene, "__name__", "scene"))
     return result
+
+
+def _runs(jobs: list[TakeJob], workers: Workers) -> Iterator[Take]:
+    """Run the takes; they come in the order in which they end."""
+    number = min(workers.processes or os.cpu_count() or 1, len(jobs))
+    if workers.scheduler is not None:
+        return run_dask(jobs, workers.scheduler, number, workers.retries)
+    return run_here(jobs, workers.retries) if number == 1 else run_pool(jobs, number, workers.retries)
 
 
 def _check_names(job: TakeJob) -> None:

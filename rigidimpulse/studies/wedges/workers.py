@@ -9,13 +9,31 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.studies.wedges.take import FAILED, Take, TakeJob, run_take
 
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 """Workers share the cores among themselves."""
+
+
+class Workers(NamedTuple):
+    """Which processes run the takes of a wedge.
+
+    Attributes:
+        processes: how many takes at a time; None: one for each core. 1: in the calling process.
+        scheduler: address of a Dask scheduler, "tcp://host:port", or "local" for a cluster on this machine; None: no Dask.
+        retries: how often a take is run again after an error that is not the scene's, or after its process died.
+
+    """
+
+    processes: int | None = None
+    scheduler: str | None = None
+    retries: int = 2
+
+
+ONE_A_CORE = Workers()
 
 
 def run_here(jobs: Sequence[TakeJob], retries: int) -> Iterator[Take]:

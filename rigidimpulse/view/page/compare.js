@@ -10,8 +10,8 @@ class Bodies {
   constructor(viewer, manifest, ghosts) {
     this.entries = new Map();
     this.meshes = [];
-    const compared = new Set([...manifest.comparison.ghosts, ...manifest.comparison.nets].map(({name}) => name));
-    for (const {name, key, group = "bodies", surface} of [...manifest.bodies, ...manifest.nets]) {
+    const compared = new Set([...manifest.comparison.ghosts, ...manifest.comparison.softBodies].map(({name}) => name));
+    for (const {name, key, group = "bodies", surface} of [...manifest.bodies, ...manifest.softBodies]) {
       if (compared.has(name)) {
         const node = viewer.scene_tree.find([group, key]).object, meshes = [];
         node.traverse((part) => { if (part.isMesh) { meshes.push(part); } });
@@ -54,11 +54,11 @@ class ComparisonPanel extends Panel {
     super(viewer, stage, transport, "comparison", `<canvas id="apart" title="click to go there"></canvas>
       <div id="legend"><div id="runs"></div><p id="who"></p><p id="distance"></p><p id="angle"></p><p id="trust"></p></div>`);
     Object.assign(this, {hovered: null, chosen: null});
-    const {labels, ghosts, nets, horizon} = manifest.comparison, {distance, angle} = viewer.scene_tree.find(["ghosts"]).object;
+    const {labels, ghosts, softBodies, horizon} = manifest.comparison, {distance, angle} = viewer.scene_tree.find(["ghosts"]).object;
     this.ghosts = new Ghosts(viewer, manifest.comparison, transport.times);
     this.bodies = new Bodies(viewer, manifest, this.ghosts);
     this.build(labels);
-    this.plot = new DistancePlot(element("apart"), transport.times, [...ghosts, ...nets].map(({name}) => name), distance, angle, horizon);
+    this.plot = new DistancePlot(element("apart"), transport.times, [...ghosts, ...softBodies].map(({name}) => name), distance, angle, horizon);
     this.bindScene();
     this.open([this.plot]);
   }
@@ -130,7 +130,7 @@ class ComparisonPanel extends Panel {
     element("who").textContent = focus ?? (this.bodies.entries.size === 1 ? [...this.bodies.entries.keys()][0] : "largest of all bodies");
     element("distance").textContent = withUnit(distance, "m");
     element("angle").textContent = withUnit(angle, "rad");
-    element("angle").hidden = this.ghosts.turns.size === 0 || (focus !== null && !this.ghosts.turns.has(focus)); // nets have none
+    element("angle").hidden = this.ghosts.turns.size === 0 || (focus !== null && !this.ghosts.turns.has(focus)); // flexible bodies have none
     element("legend").style.setProperty("--line", colour);
     element("trust").textContent = until === Infinity ? "" :
       `${time > until ? "beyond" : "within"} the horizon, ${Number(Math.max(until, this.transport.start).toPrecision(4))} s`;
@@ -182,7 +182,7 @@ expose = (viewer, stage, transport, parts) => {
   stage.frameAction();
   window.rigidimpulse.comparison = {
     pose: (name) => [...panel.ghosts.nodes.get(name).position.toArray(), ...panel.ghosts.nodes.get(name).quaternion.toArray()],
-    vertices: (number) => [...panel.ghosts.nets[number].geometry.attributes.position.array],
+    vertices: (number) => [...panel.ghosts.softBodies[number].geometry.attributes.position.array],
     apart: (name) => panel.plot.at(name, transport.frame, transport.time),
     beyond: () => [...panel.bodies.beyond],
     get focus() { return panel.focus; },

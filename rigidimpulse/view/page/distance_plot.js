@@ -3,7 +3,7 @@
    rad. What is not played yet is faint. A horizon is a dashed line, beyond which the plot is hatched. */
 
 const BEYOND = "#a8590a";
-const LEAST_ROOM = 13; // pixels a decade, with less only each third has a figure
+const LEAST_STEP = 13; // pixels a decade, with less only each third has a figure
 const LEAST_DECADES = 3, MOST_DECADES = 16;
 
 /* Largest value over all bodies, frame by frame; `values` holds body after body. */
@@ -69,7 +69,7 @@ class DistancePlot extends TimePlot {
   }
 
   drawScale(pen) {
-    const room = (this.height - PLOT_HEAD - PLOT_FOOT) / (this.top - this.bottom), every = room < LEAST_ROOM ? 3 : 1;
+    const step = (this.height - PLOT_HEAD - PLOT_FOOT) / (this.top - this.bottom), every = step < LEAST_STEP ? 3 : 1;
     for (let power = this.bottom; power <= this.top; power++) {
       const labelled = power % every === 0, y = this.y(Math.pow(10, power));
       pen.fillStyle = `rgba(29, 39, 48, ${labelled ? 0.13 : 0.05})`;

@@ -1,6 +1,6 @@
 /* Run B: its moving bodies as ghosts, which shine at their edges and let the scene through. Meshes are those of run A. */
 
-const GHOST_CORE = "#f3f9ff", GHOST_EDGE = "#1f4468"; // pale against dark bodies, deep against the pale ground
+const GHOST_MIDDLE = "#f3f9ff", GHOST_EDGE = "#1f4468"; // pale against dark bodies, deep against the pale ground
 const SURFACE_BACK = 200; // steps of depth, of 2^-24, by which a ghost lies further back than it is
 const EDGE_BACK = 1.2e-5; // the same for its edges, of a depth from -1 to 1: less, or the ghost would hide them
 const CREASE = 35; // degrees, from which an edge is drawn, as in the display geometry
@@ -14,7 +14,7 @@ function ghostSurface(octants, rims) {
   return new THREE.ShaderMaterial({
     ...BEHIND, depthWrite: false, toneMapped: false, extensions: {derivatives: true},
     uniforms: {
-      core: {value: new THREE.Color(GHOST_CORE)}, edge: {value: new THREE.Color(GHOST_EDGE)},
+      middle: {value: new THREE.Color(GHOST_MIDDLE)}, edge: {value: new THREE.Color(GHOST_EDGE)},
       octants: {value: octants}, rims: {value: new THREE.Vector2(...rims)},
     },
     vertexShader: `
@@ -27,7 +27,7 @@ function ghostSurface(octants, rims) {
         gl_Position = projectionMatrix * place;
       }`,
     fragmentShader: `
-      uniform vec3 core, edge;
+      uniform vec3 middle, edge;
       uniform vec2 rims;
       uniform bool octants;
       varying vec3 outward, seen, local;
@@ -37,7 +37,7 @@ function ghostSurface(octants, rims) {
         float rim = pow(1.0 - abs(dot(normal, normalize(seen))), 1.8) * mix(rims.x, rims.y, curved);
         vec3 sides = clamp(local / max(fwidth(local), 1e-12), -1.0, 1.0);
         float dark = octants ? 0.5 - 0.5 * sides.x * sides.y * sides.z : 0.0; // as the bodies of run A are painted
-        vec3 colour = mix(core, edge, max(smoothstep(0.05, 0.7, rim), 0.35 * dark));
+        vec3 colour = mix(middle, edge, max(smoothstep(0.05, 0.7, rim), 0.35 * dark));
         gl_FragColor = vec4(colour, mix(0.3, 0.95, rim));
       }`,
   });
@@ -57,7 +57,7 @@ function edgeSurface() {
   return material;
 }
 
-/* The border of a net, which moves with it; what is closed has none. */
+/* The border of a flexible body, which moves with it; a closed surface has none. */
 function borderOf(geometry) {
   const faces = geometry.index.array, border = new Map(), lines = new THREE.BufferGeometry();
   for (let i = 0; i < faces.length; i++) {
@@ -75,13 +75,13 @@ class Ghosts {
     this.folder = viewer.scene_tree.find(["ghosts"]).object;
     this.round = ghostSurface(true, [1, 1]);
     this.faced = ghostSurface(false, [0.3, 1]);
-    this.soft = ghostSurface(false, [0.55, 0.55]); // of the facets of a net no two are bent alike
+    this.soft = ghostSurface(false, [0.55, 0.55]); // no two facets of a flexible body have the same curvature
     this.nodes = new Map();
-    this.nets = [];
+    this.softBodies = [];
     this.turns = new Set(comparison.ghosts.map(({name}) => name)); // bodies that have an attitude
     this.edgesOf = new Map(); // by geometry: equal shapes share them
     comparison.ghosts.forEach((entry) => this.addBody(entry));
-    comparison.nets.forEach((entry) => this.addNet(entry));
+    comparison.softBodies.forEach((entry) => this.addSoftBody(entry));
   }
 
   /* What run A draws of a body. */
@@ -99,12 +99,12 @@ class Ghosts {
     this.nodes.set(name, node);
   }
 
-  addNet({name, key}) {
+  addSoftBody({name, key}) {
     const node = this.viewer.scene_tree.find(["ghosts", key]).object, own = this.drawn(key).geometry;
     const geometry = new THREE.BufferGeometry();
     geometry.setIndex(own.index);
     geometry.setAttribute("position", own.attributes.position.clone());
-    this.nets.push({geometry, frames: node.frames, times: this.times});
+    this.softBodies.push({geometry, frames: node.frames, times: this.times});
     this.put(key, geometry, this.soft, borderOf(geometry));
     this.nodes.set(name, node);
   }
@@ -124,5 +124,5 @@ class Ghosts {
     this.folder.traverse((part) => { if (part.isMesh) { part.castShadow = on; } });
   }
 
-  show(frame, time) { this.nets.forEach((net) => Net.prototype.show.call(net, frame, time)); }
+  show(frame, time) { this.softBodies.forEach((each) => SoftBody.prototype.show.call(each, frame, time)); }
 }

@@ -1,4 +1,4 @@
-/* Puts the page together: meshcat's viewer, what the page holds, and the manifest that names it. */
+/* Puts the page together: meshcat's viewer, the contents of the page, and the manifest that names them. */
 
 function decode(base64) {
   const text = atob(base64.trim()), bytes = new Uint8Array(text.length);
@@ -16,7 +16,7 @@ async function readMessages(viewer) {
   const scripts = [...document.querySelectorAll("script.command")];
   const messages = await Promise.all(scripts.map(async (script) => {
     const message = await unpack(script.textContent);
-    script.textContent = ""; // it would be kept twice
+    script.textContent = ""; // it would be in memory twice
     return [script.dataset.kind, message];
   }));
   return (wanted) => messages.forEach((entry) => {
@@ -56,15 +56,15 @@ async function main() {
     impacts: new ImpactArrows(rows, manifest.fade),
     contacts: manifest.contacts ? new ContactArrows(contactRows) : null,
     shapes: new SimulatedShapes(stage, manifest, geometries),
-    nets: makeNets(viewer, manifest.nets, times),
+    softBodies: makeSoftBodies(viewer, manifest.softBodies, times),
   };
   viewer.set_object(["impacts"], parts.impacts.object);
   if (parts.contacts) { viewer.set_object(["contacts"], parts.contacts.object); }
-  parts.nets.forEach((net) => stage.surfaces.push(net.surface));
+  parts.softBodies.forEach((each) => stage.surfaces.push(each.surface));
   const transport = new Transport(viewer.animator, times, () => {
     parts.impacts.show(transport.time);
     parts.contacts?.show(transport.frame);
-    parts.nets.forEach((net) => net.show(transport.frame, transport.time));
+    parts.softBodies.forEach((each) => each.show(transport.frame, transport.time));
     parts.trails.show(transport.time);
     bar.update();
     parts.ledger?.show();
@@ -117,7 +117,7 @@ function startViewing(viewer, stage, transport, bar, parts) {
 }
 
 /* For scripts and tests. */
-function expose(viewer, stage, transport, {impacts, contacts, shapes, trails, nets, ledger}) {
+function expose(viewer, stage, transport, {impacts, contacts, shapes, trails, softBodies, ledger}) {
   window.rigidimpulse = {
     get time() { return transport.time; },
     get frame() { return transport.frame; },
@@ -131,7 +131,7 @@ function expose(viewer, stage, transport, {impacts, contacts, shapes, trails, ne
       const node = stage.nodes.get(name);
       return [...node.position.toArray(), ...node.quaternion.toArray()];
     },
-    vertices: (number) => [...nets[number].geometry.attributes.position.array],
+    vertices: (number) => [...softBodies[number].geometry.attributes.position.array],
     visibleArrows: () => (impacts.object.parent.visible ? impacts.visible : []),
     contacts: () => (contacts?.shown ? contacts.visible : []),
     trail: (name) => trails.path(name),

@@ -1,4 +1,4 @@
-/* A panel of plots above the bar: a click goes to a time, dragging scrubs, and the picture makes room for it. */
+/* A panel of plots above the bar: a click goes to a time, dragging scrubs, and the picture becomes smaller for it. */
 
 const ROOM_ABOVE = 0.07, ROOM_BELOW = 0.015; // of the window: left free at its top, and above the panel
 
@@ -62,7 +62,7 @@ class Panel {
     this.show();
   }
 
-  /* Fits the panel anew where the clock beside the bar has grown. */
+  /* Fits the panel again where the clock beside the bar has grown. */
   keepFitted() {
     if (element("marks").clientWidth !== this.fitted) { this.fit(); }
   }

@@ -94,7 +94,7 @@ class TimePlot {
     pen.stroke();
   }
 
-  /* Writes a figure at a height of the scale: beside the plot, or where there is no room just above its line, in the plot. */
+  /* Writes a figure at a height of the scale: beside the plot, or where it does not fit just above its line, in the plot. */
   drawFigure(pen, text, y) {
     const inside = this.left < ROOM_FOR_FIGURES;
     pen.font = "10.5px system-ui, sans-serif";

@@ -3,7 +3,7 @@
    A point is (x, y, z, time); each segment between neighbours is an instance of one flat strip, as wide as some pixels. */
 
 const TRAIL_POINTS = 400000; // in all; longer runs have fewer points a body
-const TRAIL_WINDOW = [0.25, 1]; // how long a trail is strong: a share of the run, and at least so many seconds
+const TRAIL_TIME = [0.25, 1]; // how long a trail is strong: a share of the run, and at least this many seconds
 const TRAIL_WIDTH = 4; // pixels where it is strongest
 const TRAIL_FAINT = 0.22; // what is left of its strength
 
@@ -77,7 +77,7 @@ class Trails {
     geometry.setAttribute("to", new THREE.InterleavedBufferAttribute(ahead, 4, 0));
     geometry.setAttribute("tint", new THREE.InterleavedBufferAttribute(new THREE.InstancedInterleavedBuffer(tints, 4, 1), 3, 0, true));
     geometry.instanceCount = Math.max(total - 1, 0);
-    const span = this.times[this.times.length - 1] - this.times[0], [share, least] = TRAIL_WINDOW;
+    const span = this.times[this.times.length - 1] - this.times[0], [share, least] = TRAIL_TIME;
     this.uniforms = {
       now: {value: 0}, span: {value: Math.max(share * span, Math.min(least, span), 1e-9)}, width: {value: TRAIL_WIDTH},
       screen: {value: new THREE.Vector2()}};

@@ -1,10 +1,10 @@
-/* Flexible bodies: one mesh each, whose vertices are written anew for each picture, on straight lines between frames. */
+/* Flexible bodies: one mesh each, whose vertices are written again for each picture, on straight lines between frames. */
 
 const DRAPE = 400; // steps of depth by which cloth is drawn nearer: its faces cut into round bodies between its vertices
 
-class Net {
+class SoftBody {
   constructor(viewer, entry, number, times) {
-    const path = ["nets", String(number)];
+    const path = ["softBodies", String(number)];
     const {frames} = viewer.scene_tree.find(path).object;
     this.geometry = viewer.scene_tree.find([...path, "<object>"]).object.geometry;
     this.frames = frames;
@@ -32,9 +32,9 @@ class Net {
   }
 }
 
-/* The nets of a page; meshcat's own meshes of them are taken away. */
-function makeNets(viewer, entries, times) {
-  const nets = entries.map((entry, number) => new Net(viewer, entry, number, times));
-  if (nets.length > 0) { viewer.delete_path(["nets"]); }
-  return nets;
+/* The flexible bodies of a page; meshcat's own meshes of them are taken away. */
+function makeSoftBodies(viewer, entries, times) {
+  const softBodies = entries.map((entry, number) => new SoftBody(viewer, entry, number, times));
+  if (softBodies.length > 0) { viewer.delete_path(["softBodies"]); }
+  return softBodies;
 }

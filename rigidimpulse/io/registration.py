@@ -1,0 +1,19 @@
+"""What this package provides to lower layers: file formats of recordings, scene files and checkpoints."""
+
+from __future__ import annotations
+
+from rigidimpulse.core.providers import provide
+from rigidimpulse.recording.exporters import register_exporter, register_reader
+
+ANIMATED = "an animated file"
+
+register_exporter((".npz",), "rigidimpulse.io.npz:write_npz")
+register_exporter((".csv",), "rigidimpulse.io.table:write_csv")
+register_exporter((".glb", ".gltf"), "rigidimpulse.io.gltf.animate:write_gltf", needs_shapes=ANIMATED, takes_options=True)
+register_exporter(
+    (".usda", ".usdc", ".usd", ".usdz"), "rigidimpulse.io.usd.animate:write_usd", needs_shapes=ANIMATED, takes_options=True
+)  # fmt: skip
+register_reader((".npz",), "rigidimpulse.io.npz:read_npz")
+register_reader((".h5", ".hdf5"), "rigidimpulse.io.cache.load:load_cache")
+provide("write scene", "rigidimpulse.io.scene_file:write_scene")
+provide("checkpoints", "rigidimpulse.io.cache.checkpointer:Checkpointer")
