@@ -1,8 +1,8 @@
 """Functions that higher layers provide to lower ones.
 
 A module imports nothing from a layer above its own. Some functions of a lower layer still need a function of a higher one: a recording
-opens the viewer. The higher layer registers that function here, as "module:function". The module is imported when the function is first
-asked for, so registering costs nothing. The `registration` modules of the packages register their functions; `import rigidimpulse` runs them.
+opens the viewer. The higher layer registers that function here, as "module:function". The module is imported when the function is
+first asked for, so registering costs nothing. The `registration` modules of the packages register their functions; `import rigidimpulse` runs them.
 """
 
 from __future__ import annotations

@@ -96,7 +96,9 @@ def page_contents(
     manifest = {
         "framing": asdict(framing),
         "bodies": entries,
-        "softBodies": [_soft_body_entry(track, len(bodies) + k, num_coloured + SOFT_BODY_COLOUR + k) for k, track in enumerate(soft_bodies)],
+        "softBodies": [
+            _soft_body_entry(track, len(bodies) + k, num_coloured + SOFT_BODY_COLOUR + k) for k, track in enumerate(soft_bodies)
+        ],
         "numShapes": len(meshes),
         "fade": fade_time(float(times[-1] - times[0])),
         "summary": _summary(sum(dynamic) + len(soft_bodies), len(recording.impacts), float(times[-1] - times[0])),

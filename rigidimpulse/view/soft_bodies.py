@@ -1,8 +1,8 @@
 """Flexible bodies on a page.
 
-A page shows a flexible body as one mesh whose vertices are written again for each frame: the manifest's entry names it, a `set_object` message
-brings its faces, and a `set_property` message hangs the vertices of all frames on the same node, as float32, frame by frame. Normals are
-left to the page: smooth ones follow from the faces.
+A page shows a flexible body as one mesh whose vertices are written again for each frame. The manifest's entry names it, a `set_object`
+message brings its faces, and a `set_property` message hangs the vertices of all frames on the same node, as float32, frame by frame.
+Normals are left to the page: smooth ones follow from the faces.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def is_closed(faces: np.ndarray) -> bool:
 
 
 def soft_body_messages(track: SoftBodyLike, number: int) -> list[tuple[str, dict[str, Any]]]:
-    """Return the messages of a flexible body for `view.contents`, each with its kind: "soft body" (mesh) and "frames" (vertices of all frames).
+    """Return the messages of a flexible body for `view.contents`, with their kinds: "soft body" (mesh), "frames" (vertices by frame).
 
     Raises:
         ValueError: a vertex is not finite.

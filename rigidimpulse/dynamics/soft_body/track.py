@@ -23,7 +23,8 @@ class FlexibleTrack:
 
     def arrays(self, number: int) -> dict[str, np.ndarray]:
         """What an .npz file keeps of the track with this number."""
-        return {f"soft_body{number}_name": np.array(self.name), f"soft_body{number}_vertices": self.vertices, f"soft_body{number}_faces": self.faces}
+        key = f"soft_body{number}"
+        return {f"{key}_name": np.array(self.name), f"{key}_vertices": self.vertices, f"{key}_faces": self.faces}
 
 
 def tracks_in(arrays: Any) -> list[FlexibleTrack]:

@@ -2,8 +2,8 @@
 
 What is written is the graph of objects that a run changes. Constants are written as numbers in the order in which a walk meets them: the
 scene with all that people put into it (functions among it, which have no bytes), compiled shapes and their geometry; a run that goes on
-has compiled them again, and walks them in the same order. Arrays that share memory share it again when they are read: a view is written as its
-base, and where and how it lies in it.
+has compiled them again, and walks them in the same order. Arrays that share memory share it again when they are read: a view is written
+as its base, and its place and layout in that base.
 
 Only what a run is made of (`HOMES`), plain containers and arrays are ever made from bytes.
 """
