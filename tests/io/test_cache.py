@@ -243,8 +243,8 @@ def test_the_command_line_goes_on(tmp_path):
     command = ["simulate", "bounce", "--duration", "0.5", "--cache", str(cache), "-o", str(output)]
     told = [CliRunner().invoke(main, command) for _ in range(2)]
     assert [result.exit_code for result in told] == [0, 0], told[0].output
-    assert "had what came before" not in told[0].output
-    assert "had what came before" in told[1].output
+    assert "already had the beginning" not in told[0].output
+    assert "already had the beginning" in told[1].output
     refused = CliRunner().invoke(main, ["simulate", "spot", "--duration", "0.5", "--cache", str(cache), "-o", str(output)])
     assert refused.exit_code == BAD_SCENE
     assert "another scene" in refused.output
