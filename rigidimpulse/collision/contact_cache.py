@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.contact_matching import NEAR, hand_over, take_up, write_row
-from rigidimpulse.collision.contact_records import IMPULSE, ROW_SIZE, UNKNOWN, closing_speed, in_play, turned, turned_back
+from rigidimpulse.collision.contact_records import IMPULSE, ROW_SIZE, UNKNOWN, closing_speed, in_play
 from rigidimpulse.collision.distance.epa import Polytope, make_polytope
 from rigidimpulse.collision.distance.gjk import Simplex, closest, make_simplex
 from rigidimpulse.collision.manifold.box_box import box_axis, edge_contact, face_along, face_contacts
@@ -24,6 +24,7 @@ from rigidimpulse.collision.manifold.convex_convex import hull_contacts, seen_fr
 from rigidimpulse.collision.manifold.polyhedra import ALIKE, POINTS, Scratch, along_edges, copy_contact, half_space_contacts, make_scratch
 from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.quaternion import product
+from rigidimpulse.core.vector import turned_back_by, turned_by
 
 BOXES, PLANE, GENERAL, HULLS = 0, 1, 2, 3
 """Kinds of pairs: two boxes, a half space and a convex polyhedron, all others, two convex polyhedra."""
@@ -105,7 +106,7 @@ def _relative_pose(position, orientation, rotation, carrier, other):
     turn = product(
         q[carrier, 0], -q[carrier, 1], -q[carrier, 2], -q[carrier, 3], q[other, 0], q[other, 1], q[other, 2], q[other, 3]
     )
-    return turned_back(rotation, carrier, dx, dy, dz), turn
+    return turned_back_by(rotation, carrier, dx, dy, dz), turn
 
 
 @inlined
@@ -196,7 +197,7 @@ def _at_wall(shapes, rotation, a, b, s, t, between, margin, scratch, real, ids):
     """Contacts of a half space and a convex polyhedron relative to the first body; returns their number and the gap."""
     half_space_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
     half_space, w, i, sign = shapes.half_space, s if half_space_is_a else t, a if half_space_is_a else b, 1.0 if half_space_is_a else -1.0
-    nx, ny, nz = turned(rotation, i, half_space[w, 0], half_space[w, 1], half_space[w, 2])
+    nx, ny, nz = turned_by(rotation, i, half_space[w, 0], half_space[w, 1], half_space[w, 2])
     offset = half_space[w, 3] - sign * (nx * between[0] + ny * between[1] + nz * between[2])
     solid, j = (t, b) if half_space_is_a else (s, a)
     count, least = half_space_contacts(shapes, solid, rotation, j, nx, ny, nz, offset, margin, sign, scratch, real, ids)

@@ -21,9 +21,9 @@ from rigidimpulse.collision.contact_records import (
     SKELETON_B,
     SKIN,
     STATIC_FRICTION,
-    turned_back,
 )
 from rigidimpulse.core.kernels import inlined, jit
+from rigidimpulse.core.vector import turned_back_by
 
 NEAR = 0.2
 """Inner radii within which an old contact hands its impulse to a new one of other features."""
@@ -48,9 +48,9 @@ def write_row(
     m, t = material[a], material[b]
     for k in range(IMPULSE, ROW_SIZE):
         rows[r, k] = 0.0
-    rows[r, 0], rows[r, 1], rows[r, 2] = turned_back(rotation, b if carrier else a, nx, ny, nz)
-    rows[r, SKELETON_A], rows[r, SKELETON_A + 1], rows[r, SKELETON_A + 2] = turned_back(rotation, a, ax, ay, az)
-    rows[r, SKELETON_B], rows[r, SKELETON_B + 1], rows[r, SKELETON_B + 2] = turned_back(rotation, b, bx, by, bz)
+    rows[r, 0], rows[r, 1], rows[r, 2] = turned_back_by(rotation, b if carrier else a, nx, ny, nz)
+    rows[r, SKELETON_A], rows[r, SKELETON_A + 1], rows[r, SKELETON_A + 2] = turned_back_by(rotation, a, ax, ay, az)
+    rows[r, SKELETON_B], rows[r, SKELETON_B + 1], rows[r, SKELETON_B + 2] = turned_back_by(rotation, b, bx, by, bz)
     rows[r, ROUND_A], rows[r, ROUND_B], rows[r, CARRIER] = round_a, round_b, 1.0 if carrier else 0.0
     rows[r, STATIC_FRICTION], rows[r, DYNAMIC_FRICTION] = coefficients[m, t, 1], coefficients[m, t, 2]
     rows[r, SKIN], rows[r, HELD] = min(skin[a], skin[b]), held

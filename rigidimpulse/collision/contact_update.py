@@ -11,7 +11,7 @@ import numpy as np
 
 from rigidimpulse.collision.contact_cache import note_seen
 from rigidimpulse.collision.contact_matching import NEAR, hand_over, take_up, write_row
-from rigidimpulse.collision.contact_records import ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SKIN, turned
+from rigidimpulse.collision.contact_records import ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SKIN
 from rigidimpulse.collision.distance.epa import make_polytope
 from rigidimpulse.collision.distance.gjk import make_simplex
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
@@ -21,6 +21,7 @@ from rigidimpulse.collision.manifold.penetrating import gap_along, overlap_conta
 from rigidimpulse.collision.manifold.polyhedra import POINTS, make_scratch
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import turned_by
 from rigidimpulse.dynamics.constraints.contact_motion import only_primitive, side_radius
 
 SHRINK = 1.5 * TOLERANCES.skin
@@ -114,9 +115,9 @@ def _contradicts(bodies, pairs, p, rows, new, new_end):
     carrier = b if pairs.carrier[p] else a
     for o in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
         row = rows[o]
-        nx, ny, nz = turned(bodies.rotation, carrier, row[0], row[1], row[2])
-        ax, ay, az = turned(bodies.rotation, a, row[SKELETON_A], row[SKELETON_A + 1], row[SKELETON_A + 2])
-        bx, by, bz = turned(bodies.rotation, b, row[SKELETON_B], row[SKELETON_B + 1], row[SKELETON_B + 2])
+        nx, ny, nz = turned_by(bodies.rotation, carrier, row[0], row[1], row[2])
+        ax, ay, az = turned_by(bodies.rotation, a, row[SKELETON_A], row[SKELETON_A + 1], row[SKELETON_A + 2])
+        bx, by, bz = turned_by(bodies.rotation, b, row[SKELETON_B], row[SKELETON_B + 1], row[SKELETON_B + 2])
         gap = (
             (bodies.position[b, 0] - bodies.position[a, 0] + bx - ax) * nx
             + (bodies.position[b, 1] - bodies.position[a, 1] + by - ay) * ny

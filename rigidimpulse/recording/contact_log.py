@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.core.kernels import jit_making_arrays
-from rigidimpulse.dynamics.impact.friction import tangents
+from rigidimpulse.core.vector import tangents
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.impulses import ImpulseAccounts
 

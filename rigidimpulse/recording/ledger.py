@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import cross, rotate, rotate_inverse
+from rigidimpulse.core.quaternion import rotate, rotate_inverse
+from rigidimpulse.core.vector import cross_arrays
 
 BLOCK = 4096
 """Frames times bodies that are summed up at once."""
@@ -108,7 +109,7 @@ def _mechanics(position, orientation, velocity, angular_velocity, mass, inertia,
     momenta = mass[:, :, None] * velocity
     kinetic = 0.5 * (_dot(velocity, momenta) + _dot(angular_velocity, spin))
     potential = -mass * np.einsum("fnk,nk->fn", position, steady_acceleration)
-    return kinetic, potential, momenta.sum(1), (spin + cross(position, momenta)).sum(1)
+    return kinetic, potential, momenta.sum(1), (spin + cross_arrays(position, momenta)).sum(1)
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -27,8 +27,9 @@ from __future__ import annotations
 
 from math import copysign, cos, hypot, inf, pi, sin, sqrt
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, inner, over_triangle, subtract
+from rigidimpulse.collision.distance.simplices import inner, over_triangle
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import along, cross, dot, subtract
 
 _EPSILON = 2.0**-52
 _ROUND_OFF = 1e-13  # excess of a distance over its lower bound, relative to the sizes involved, that passes as rounding

@@ -18,9 +18,9 @@ from math import inf, sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import turned, turned_back
 from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS, FROM_EDGE, MOST_CORNERS, four_of
 from rigidimpulse.core.kernels import inlined
+from rigidimpulse.core.vector import turned_back_by, turned_by
 
 PARALLEL = 1e-6
 """Square of the sine of the angle of two edges below which they have no normal."""
@@ -36,7 +36,7 @@ def box_axis(half, s, t, r, a, b, dx, dy, dz, far, c):
 
     half[s], half[t] (3,) m: half sides; r[a], r[b]: rotations; d: from centre to centre, world; c (3, 3) is set to C.
     """
-    d = turned_back(r, a, dx, dy, dz)
+    d = turned_back_by(r, a, dx, dy, dz)
     h, k = (half[s, 0], half[s, 1], half[s, 2]), (half[t, 0], half[t, 1], half[t, 2])
     for i in range(3):
         for j in range(3):
@@ -204,7 +204,7 @@ def edge_contact(half, s, t, r, a, dx, dy, dz, axis, gap, c, work, real, ids):
     """The contact of two edges of boxes, with the gap found for their axis; returns 1. work: room (3, 3)."""
     i, j = (axis - 6) // 3, (axis - 6) % 3
     i1, i2 = (i + 1) % 3, (i + 2) % 3
-    d = turned_back(r, a, dx, dy, dz)
+    d = turned_back_by(r, a, dx, dy, dz)
     n, p, o = work[0], work[1], work[2]
     length = sqrt(1.0 - c[i, j] * c[i, j])
     # e_i x f_j in the axes of a.
@@ -231,9 +231,9 @@ def edge_contact(half, s, t, r, a, dx, dy, dz, axis, gap, c, work, real, ids):
     p[i] += (along * v - u) / (length * length)
     for m in range(3):
         o[m] += (v - along * u) / (length * length) * c[m, j]
-    nx, ny, nz = turned(r, a, n[0], n[1], n[2])
-    ax, ay, az = turned(r, a, p[0], p[1], p[2])
-    bx, by, bz = turned(r, a, o[0], o[1], o[2])
+    nx, ny, nz = turned_by(r, a, n[0], n[1], n[2])
+    ax, ay, az = turned_by(r, a, p[0], p[1], p[2])
+    bx, by, bz = turned_by(r, a, o[0], o[1], o[2])
     real[0, 0], real[0, 1], real[0, 2] = ax, ay, az
     real[0, 3], real[0, 4], real[0, 5] = bx, by, bz
     real[0, 6], real[0, 7], real[0, 8], real[0, 9] = nx, ny, nz, gap

@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.distance.cylinder import ZERO, basis, from_axes, on_circle
-from rigidimpulse.collision.distance.simplices import along, cross, dot, inner, moved, over_triangle, row, subtract, turned
+from rigidimpulse.collision.distance.simplices import inner, over_triangle
 from rigidimpulse.collision.manifold.contact_points import PENETRATION, STRICT, TILT, append_contact
+from rigidimpulse.core.vector import along, cross, dot, moved, row, subtract, turned
 
 CYLINDER_CONTACT = np.int64(5)
 """Kind of all contacts of cylinders."""

@@ -29,19 +29,7 @@ import numpy as np
 
 from rigidimpulse.collision.bvh import STACK_ROWS
 from rigidimpulse.collision.distance.meshes import round_round_gap
-from rigidimpulse.collision.distance.simplices import (
-    FACE_VERTEX,
-    VERTEX_FACE,
-    along,
-    cross,
-    dot,
-    inner,
-    moved,
-    relative_pose,
-    row,
-    turned,
-    write_contact,
-)
+from rigidimpulse.collision.distance.simplices import FACE_VERTEX, VERTEX_FACE, inner, write_contact
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND
 from rigidimpulse.collision.manifold.cylinder import (
     cylinder_cylinder_contacts,
@@ -54,6 +42,7 @@ from rigidimpulse.collision.manifold.cylinder import (
 from rigidimpulse.collision.manifold.mesh_mesh import round_round_contacts
 from rigidimpulse.collision.manifold.plane import round_half_space_contacts, round_half_space_gap, sphere_sphere_contact
 from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.core.vector import along, cross, dot, moved, relative_pose, row, turned
 
 SCRATCH_ROWS = 8 * STACK_ROWS
 """Rows of `scratch_pairs` that serve well; it needs more than `STACK_ROWS`."""

@@ -5,22 +5,10 @@ from __future__ import annotations
 from math import sqrt
 
 from rigidimpulse.collision.bvh import STACK_ROWS
-from rigidimpulse.collision.distance.simplices import (
-    CORNER,
-    EDGE_EDGE,
-    along,
-    arc_miss,
-    cross,
-    dot,
-    edge_normals,
-    inner,
-    moved,
-    row,
-    subtract,
-    turned,
-)
+from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, arc_miss, edge_normals, inner
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
 from rigidimpulse.collision.manifold.contact_points import INSIDE, MERGE, PENETRATION, ROUND_OFF, STRICT, TILT, append_contact, outside_box
+from rigidimpulse.core.vector import along, cross, dot, moved, row, subtract, turned
 
 CROSSING = 1e-7
 """Least sine of the angle of two edges that are taken to cross at one point."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from rigidimpulse.collision.distance.simplices import CORNER, HALF_SPACE_CONTACT, along, dot, inner, row, subtract, write_contact
+from rigidimpulse.collision.distance.simplices import CORNER, HALF_SPACE_CONTACT, inner, write_contact
+from rigidimpulse.core.vector import along, dot, row, subtract
 
 
 @inner

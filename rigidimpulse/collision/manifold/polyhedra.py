@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import turned
 from rigidimpulse.collision.geometry import HALF_SPACE, Geometry
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
+from rigidimpulse.core.vector import turned_by
 
 EDGE_WINS = 2e-3
 ALIKE = 0.95
@@ -175,7 +175,7 @@ def half_space_contacts(shapes, s, r, j, nx, ny, nz, offset, margin, sign, scrat
     polygon, ids, height, chosen = scratch.polygon, scratch.ids, scratch.height, scratch.chosen
     count, least = 0, inf
     for v in range(shapes.corner_first[s], shapes.corner_first[s + 1]):
-        x, y, z = turned(r, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
+        x, y, z = turned_by(r, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
         gap = nx * x + ny * y + nz * z - offset
         least = min(least, gap)
         if gap <= margin and count < MOST_CORNERS:

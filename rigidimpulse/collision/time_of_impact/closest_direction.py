@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from rigidimpulse.collision.distance.simplices import along, closest_on_segments, cross, dot, over_triangle, subtract
-from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled, vector
+from rigidimpulse.collision.distance.simplices import closest_on_segments, over_triangle
+from rigidimpulse.collision.time_of_impact.motion_bound import put, vector
 from rigidimpulse.collision.time_of_impact.scratch_layout import CORNER, COUNT, FACE, NORMAL, POINT_FIRST, POINT_SECOND
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import along, cross, dot, length, scaled, subtract
 
 NO_EDGES = -1
 """In place of a pair of edges where the closest features are not two crossing edges."""

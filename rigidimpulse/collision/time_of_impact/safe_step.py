@@ -17,20 +17,17 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.distance.cylinder import basis
-from rigidimpulse.collision.distance.simplices import along, dot, subtract
 from rigidimpulse.collision.geometry import CYLINDER as CYLINDER_KIND
 from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, Geometry
-from rigidimpulse.collision.time_of_impact.bvh_walk import NO_NODE, half_space_safe_until, row, trees_safe_until
+from rigidimpulse.collision.time_of_impact.bvh_walk import NO_NODE, half_space_safe_until, trees_safe_until
 from rigidimpulse.collision.time_of_impact.convex_pieces import pieces_safe_until
 from rigidimpulse.collision.time_of_impact.motion_bound import (
     AXES,
     MOTION_SIZE,
     POSITION,
     SEEN_SIZE,
-    length,
     put,
     relative_motion,
-    scaled,
     turned,
     turned_back,
     vector,
@@ -70,6 +67,7 @@ from rigidimpulse.collision.time_of_impact.scratch_layout import (
 from rigidimpulse.collision.time_of_impact.separating_quadratic import cylinder_safe_until, point_safe_until
 from rigidimpulse.collision.time_of_impact.witness import support_point
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import along, dot, length, row, scaled, subtract
 
 
 class SweepScratch(NamedTuple):

@@ -18,15 +18,14 @@ from math import inf, nan, sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, dot, subtract
-from rigidimpulse.collision.time_of_impact.bvh_walk import row
 from rigidimpulse.collision.time_of_impact.free_flight import relative_flight, spheres_safe_until
-from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled
+from rigidimpulse.collision.time_of_impact.motion_bound import put
 from rigidimpulse.collision.time_of_impact.scratch_layout import FIRST, GAP, NORMAL, POINT_FIRST, POINT_SECOND, SECOND
 from rigidimpulse.collision.time_of_impact.separating_quadratic import safe_until
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import rotated
+from rigidimpulse.core.vector import along, dot, length, row, scaled, subtract
 from rigidimpulse.motion.trajectory import FIXED, place_at
 
 _ROUND_OFF = TOLERANCES.round_off

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import cross
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 
 GAIN = 1e-11
@@ -131,13 +131,13 @@ def take_off(now, world, members: np.ndarray, energy: float, ground: np.ndarray)
     v, w = now.velocity[members], now.angular_velocity[members]
     inertia = np.linalg.inv(now.inv_inertia[members])
     r = x - (mass * x).sum(axis=0) / mass.sum()
-    momentum = np.concatenate([(mass * v).sum(axis=0), (cross(r, mass * v) + np.einsum("ijk,ik->ij", inertia, w)).sum(axis=0)])
+    momentum = np.concatenate([(mass * v).sum(axis=0), (cross_arrays(r, mass * v) + np.einsum("ijk,ik->ij", inertia, w)).sum(axis=0)])
     steiner = np.einsum("i,ij,ij->", mass[:, 0], r, r) * np.eye(3) - np.einsum("i,ij,ik->jk", mass[:, 0], r, r)
     common = np.zeros((6, 6))
     common[:3, :3], common[3:, 3:] = mass.sum() * np.eye(3), inertia.sum(axis=0) + steiner
     free = _free_motions(ground)
     rigid = free @ np.linalg.solve(free.T @ common @ free, free.T @ momentum)
-    rigid_v = rigid[:3] + cross(rigid[3:], r)
+    rigid_v = rigid[:3] + cross_arrays(rigid[3:], r)
     dv, dw = v - rigid_v, w - rigid[3:]
     available = 0.5 * float((mass * dv**2).sum() + np.einsum("ij,ijk,ik->", dw, inertia, dw))
     if available > 0.0:

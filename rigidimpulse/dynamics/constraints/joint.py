@@ -33,9 +33,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.copying import copy_vector
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import from_columns
+from rigidimpulse.core.vector import copy_vector
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, FREE, write_body, write_row
 
 ALONG, RADIUS, DISTANCE, ABOUT, TWIST, SWING, ANGLE, ACROSS = 0, 3, 6, 7, 10, 13, 16, 17

@@ -17,8 +17,8 @@ from math import ceil, sqrt
 
 import numpy as np
 
-from rigidimpulse.core.copying import copy_vector
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import copy_vector
 from rigidimpulse.dynamics.constraints.softness import response
 
 # Gaps that count as closed, and those that a slack limit may overrun, relative to the error at which joints are closed.

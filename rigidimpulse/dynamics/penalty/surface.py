@@ -11,9 +11,9 @@ from math import inf
 import numpy as np
 
 from rigidimpulse.collision.bvh import STACK_ROWS
-from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER, EDGE_CAPSULE, EDGE_HIDDEN, ROUND, CompiledShape, Geometry, Primitive, build_geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import along, dot, row, subtract
 
 SIDES = 24
 """Sides of the prism that stands for a cylinder."""
@@ -135,16 +135,6 @@ def nearest_on_surface(geometry, primitive, p, axis):
             if dot(off, off) < best:
                 best, nearest, place = dot(off, off), q, t
     return best, nearest, place
-
-
-@jit
-def turned_back(R, v):
-    """R^T v."""
-    return (
-        R[0, 0] * v[0] + R[1, 0] * v[1] + R[2, 0] * v[2],
-        R[0, 1] * v[0] + R[1, 1] * v[1] + R[2, 1] * v[2],
-        R[0, 2] * v[0] + R[1, 2] * v[1] + R[2, 2] * v[2],
-    )
 
 
 @jit

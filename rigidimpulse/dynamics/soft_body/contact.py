@@ -11,9 +11,9 @@ from math import inf
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, Geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import dot, row, subtract
 from rigidimpulse.dynamics.soft_body.distance import STACK, first_touch, first_touch_of_triangle, signed_distance
 
 RIM_POINTS = 16

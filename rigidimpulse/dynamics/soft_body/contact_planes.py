@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.geometry import ROUND, CompiledShape, Geometry, Primitive, build_geometry
-from rigidimpulse.core.quaternion import cross
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.soft_body.contact import fit_boxes, sample_points, samples_on_faces, vertices_on_bodies
 from rigidimpulse.dynamics.soft_body.contact_terms import SoftContacts
 
@@ -166,7 +166,7 @@ def sides_of(touches: Touches, x: np.ndarray, rotation: np.ndarray, first_key: i
 
 
 def _face_normals(corners: np.ndarray) -> np.ndarray:
-    return cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return cross_arrays(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def _no_touches() -> Touches:
@@ -210,7 +210,7 @@ def make_contacts(
     before -= normal * np.einsum("ij,ij->i", before, normal)[:, None]
     aim = rigid.end_position[b] + arm + before + touches.target[:, None] * normal
     slip = np.einsum("mk,mkj->mj", touches.weight, velocity[touches.node]) - rigid.velocity[b]
-    slip -= cross(rigid.angular_velocity[b], place - rigid.position[b])
+    slip -= cross_arrays(rigid.angular_velocity[b], place - rigid.position[b])
     slip -= normal * np.einsum("ij,ij->i", slip, normal)[:, None]
     pair = friction[touches.node[:, 0], b]
     grip = np.where(np.linalg.norm(slip, axis=1) > slow, pair[:, 1], pair[:, 0])

@@ -19,7 +19,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.quaternion import cross, quaternion_from_rotation_vector, to_matrix
+from rigidimpulse.core.quaternion import quaternion_from_rotation_vector, to_matrix
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.soft_body.balance import lever_place, set_momenta, take_energy
 from rigidimpulse.dynamics.soft_body.body import FlexibleBody
 from rigidimpulse.dynamics.soft_body.contact_planes import LIFT, SLIPS, RigidMotion, Touches, joined, make_contacts, make_surfaces, sides_of
@@ -356,10 +357,10 @@ class Flexibles:
             mine = np.isin(contacts.node[:, 0], piece)
             fall = h * (m[:, None] * self._gravity[piece]).sum(0)
             momentum = m @ before[piece] + fall + impulse[mine].sum(0)
-            angular = (m[:, None] * cross(self.position[piece] - origin, before[piece])).sum(0)
-            angular += cross(place[mine] - origin, impulse[mine]).sum(0)
+            angular = (m[:, None] * cross_arrays(self.position[piece] - origin, before[piece])).sum(0)
+            angular += cross_arrays(place[mine] - origin, impulse[mine]).sum(0)
             if midpoint:  # its centre follows the parabola: gravity acts at the mean of its places, not at the first
-                angular += 0.5 * h * cross(m @ before[piece], fall) / m.sum()
+                angular += 0.5 * h * cross_arrays(m @ before[piece], fall) / m.sum()
             went = 0.5 * h * (momentum + m @ before[piece]) if midpoint else h * momentum
             end[piece] += origin + went / m.sum() - m @ end[piece] / m.sum()
             v = velocity[piece]
@@ -377,11 +378,11 @@ class Flexibles:
     def _given(self, contacts: SoftContacts, impulse, rigid: RigidMotion, hold, end) -> np.ndarray:
         """Impulses (n, 6) that the nets gave the bodies."""
         given = np.zeros((len(rigid.inv_mass), 6))
-        np.subtract.at(given, contacts.body, np.concatenate([impulse, cross(contacts.arm, impulse)], axis=1))
+        np.subtract.at(given, contacts.body, np.concatenate([impulse, cross_arrays(contacts.arm, impulse)], axis=1))
         vertices, bodies, _ = self._held
         on = bodies >= 0
         arm = end[vertices[on]] - rigid.end_position[bodies[on]]
-        np.subtract.at(given, bodies[on], np.concatenate([hold[vertices[on]], cross(arm, hold[vertices[on]])], axis=1))
+        np.subtract.at(given, bodies[on], np.concatenate([hold[vertices[on]], cross_arrays(arm, hold[vertices[on]])], axis=1))
         return given
 
 

@@ -13,8 +13,8 @@ from math import inf
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import cross, dot, row, subtract
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import cross, dot, row, subtract
 
 SHARE_ALONG, SHARE_TILTED = 0.4, 0.15
 """Shares of the ray along the normal and of each of the four others."""

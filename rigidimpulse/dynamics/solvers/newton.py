@@ -21,8 +21,8 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse.core.copying import copy_matrix, copy_vector
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import copy_matrix, copy_vector
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMENT, multiply, multiply_transposed
 from rigidimpulse.dynamics.solvers.sparse_lu import factor, plan_elimination, solve_factored
 

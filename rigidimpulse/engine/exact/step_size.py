@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import cross
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.impact.point import BodyState, Contacts
 from rigidimpulse.engine.touching import bring_all
@@ -62,8 +62,8 @@ class ErrorEstimate:
         turning = contact_motion(
             world.geometry, world.shape_of_body[touched], self.rotation, self.bodies, ahead, island.kinds[subset], island.features[subset]
         ).turning
-        point_a = self.acceleration[a] + cross(self.angular_acceleration[a], ahead.arm_a)
-        point_b = self.acceleration[b] + cross(self.angular_acceleration[b], ahead.arm_b)
+        point_a = self.acceleration[a] + cross_arrays(self.angular_acceleration[a], ahead.arm_a)
+        point_b = self.acceleration[b] + cross_arrays(self.angular_acceleration[b], ahead.arm_b)
         return np.einsum("ij,ij->i", point_b - point_a + turning, normal) * (h * h / 6.0)
 
     def _take_over(self, context, touched: np.ndarray) -> None:

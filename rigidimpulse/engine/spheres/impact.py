@@ -16,12 +16,11 @@ from math import isfinite, sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, dot, moved, relative_pose, turned
 from rigidimpulse.collision.manifold.plane import plane_in_frame
-from rigidimpulse.collision.time_of_impact.motion_bound import scaled
 from rigidimpulse.collision.time_of_impact.spheres import DEEPEST
 from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import along, dot, moved, relative_pose, scaled, turned
 from rigidimpulse.dynamics.energy import kinetic_of
 from rigidimpulse.dynamics.impact.point import relative_velocity, resolve_contact, speed_scale
 from rigidimpulse.engine.exact.impacts import SLOW

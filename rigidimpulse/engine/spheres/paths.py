@@ -10,11 +10,10 @@ from math import inf, sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, dot, subtract
-from rigidimpulse.collision.time_of_impact.motion_bound import length, scaled
 from rigidimpulse.collision.time_of_impact.spheres import until_contact
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.quaternion import rotated
+from rigidimpulse.core.vector import along, dot, length, scaled, subtract
 from rigidimpulse.engine.islands import MARGIN
 from rigidimpulse.engine.spheres.layout import OTHER
 from rigidimpulse.motion.trajectory import FIXED

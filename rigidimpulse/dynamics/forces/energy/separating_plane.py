@@ -18,8 +18,8 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse.core.copying import copy_matrix, copy_vector
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import copy_matrix, copy_vector
 
 ROUNDS = 80
 CONVERGED = 1e-15
