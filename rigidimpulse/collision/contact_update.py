@@ -19,12 +19,12 @@ from rigidimpulse.collision.manifold.dispatch import reduce_contacts
 from rigidimpulse.collision.manifold.inset_surface import put_back
 from rigidimpulse.collision.manifold.penetrating import gap_along, overlap_contacts, support
 from rigidimpulse.collision.manifold.polyhedra import POINTS, make_scratch
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import turned_by
 from rigidimpulse.dynamics.constraints.contact_motion import only_primitive, side_radius
 
-SHRINK = 1.5 * TOLERANCES.skin
+SHRINK = 1.5 * TOLERANCES.sub_stepping.skin
 """Part of their lengths by which convex bodies are shrunk for the contact kernels."""
 PER_NORMAL = np.int64(4)
 """Contacts kept of one normal, beside the deepest."""

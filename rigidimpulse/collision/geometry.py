@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 
 if TYPE_CHECKING:
     from rigidimpulse.scene.shape import Shape
@@ -288,8 +288,8 @@ def _edges(
     sine = np.sum(np.cross(edge_normal[:, 0], edge_normal[:, 1]) * along, axis=1)
     cosine = np.sum(edge_normal[:, 0] * edge_normal[:, 1], axis=1)
     # Two faces folded back to back (cosine near -1) are the rim of a sheet: it can touch, so it counts as convex.
-    folded = (np.abs(sine) <= TOLERANCES.flat_angle) & (cosine < 0.0)
-    kind = np.where((sine > TOLERANCES.flat_angle) | folded, EDGE_CONVEX, EDGE_HIDDEN)
+    folded = (np.abs(sine) <= TOLERANCES.surface.flat_angle) & (cosine < 0.0)
+    kind = np.where((sine > TOLERANCES.surface.flat_angle) | folded, EDGE_CONVEX, EDGE_HIDDEN)
     kind[(edges.count != 2) | (edges.balance != 0)] = EDGE_BOUNDARY
     return edge, edge_normal, kind, edges.triangle_edge, first, bool(np.all(edges.balance == 0))
 
@@ -315,7 +315,7 @@ def _corners(vertex: np.ndarray, edge: np.ndarray, edge_kind: np.ndarray) -> np.
     directions = np.concatenate([along, -along])
     degree = np.bincount(ends, minlength=len(vertex))
     total = np.column_stack([np.bincount(ends, weights=directions[:, k], minlength=len(vertex)) for k in range(3)])
-    straight = (degree == 2) & (np.linalg.norm(total, axis=1) <= TOLERANCES.flat_angle)
+    straight = (degree == 2) & (np.linalg.norm(total, axis=1) <= TOLERANCES.surface.flat_angle)
     return (degree > 0) & ~straight
 
 
@@ -357,12 +357,12 @@ def _bounding_sphere(primitive: Primitive) -> tuple[np.ndarray, float]:
         return np.zeros(3), np.inf
     if primitive.kind == CYLINDER:
         radius = float(np.hypot(primitive.radius, primitive.frame[6]))
-        return primitive.frame[:3], radius * (1.0 + TOLERANCES.round_off)
+        return primitive.frame[:3], radius * (1.0 + TOLERANCES.arithmetic.round_off)
     low, high = primitive.vertices.min(axis=0), primitive.vertices.max(axis=0)
     centres = (0.5 * (low + high), primitive.vertices.mean(axis=0))
     radii = [float(np.linalg.norm(primitive.vertices - centre, axis=1).max()) for centre in centres]
     best = int(np.argmin(radii))
-    return centres[best], (radii[best] + primitive.radius) * (1.0 + TOLERANCES.round_off)
+    return centres[best], (radii[best] + primitive.radius) * (1.0 + TOLERANCES.arithmetic.round_off)
 
 
 def _edges_around_vertices(edge: np.ndarray, num_vertices: int) -> tuple[np.ndarray, np.ndarray]:

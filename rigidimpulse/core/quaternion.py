@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import cross_arrays
 
-_SMALL_ANGLE = 1e-5
-"""rad; below it sin(a/2)/a is taken from two terms of its series, which is then exact to round-off"""
+_SMALL_ANGLE = TOLERANCES.rotation.small_angle
 
 
 # -- compiled: scalars in, tuples out ---------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTEX_FACE
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.energy_limit import limit_energy, note_end_energy
 from rigidimpulse.dynamics.constraints.rattle import project_velocities
 from rigidimpulse.dynamics.impact.point import Contacts
@@ -84,7 +84,7 @@ class Island:
         """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the held gap."""
         zero_speed = self.zero_speed
         if self.moved:
-            zero_speed += CORRECTED * self.scale * TOLERANCES.contact_margin
+            zero_speed += CORRECTED * self.scale * TOLERANCES.contact.margin
         return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + zero_speed
 
 

@@ -17,7 +17,7 @@ import itertools
 import numpy as np
 
 from rigidimpulse.collision.containment import contains
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.accuracy import Accuracy
@@ -31,7 +31,7 @@ PITCH, RADIUS = 0.25, 0.1
 REACH, SIDE = 2.5 * PITCH, 2.0 * PITCH
 """m: c of the octahedron, s of the cross."""
 PLACES = {"octahedron": (-0.9, 0.0, 1.4), "cross": (0.9, 0.0, 1.6)}
-SKIN = TOLERANCES.skin * RADIUS
+SKIN = TOLERANCES.sub_stepping.skin * RADIUS
 NUDGE = 0.15
 """m/s, sideways: columns of marbles that fall straight stay columns."""
 DURATION = 1.5

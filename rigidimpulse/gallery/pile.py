@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.regime import TALL
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
 from rigidimpulse.recording.recording import Recording
@@ -25,7 +25,7 @@ SIDE, PITCH, LAYERS = 0.5, 0.9, 8
 GRAVITY = 9.81
 NUM_BOXES = 128
 MATERIAL = Material(density=8.0, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
-SKIN = TOLERANCES.skin * 0.5 * SIDE
+SKIN = TOLERANCES.sub_stepping.skin * 0.5 * SIDE
 DURATION = 5.0
 
 

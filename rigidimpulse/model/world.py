@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import from_matrix, multiply, rotate
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint import Joints
 from rigidimpulse.dynamics.forces.constant import ConstantForce, push_of_forces
 from rigidimpulse.scene.accuracy import Accuracy, resolve_accuracy
@@ -229,8 +229,8 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         flat=_has_faces(geometry, shape_of_body),
         half_space=np.array([_all_half_spaces(geometry, k) for k in shape_of_body], bool),
         ball=np.array([_is_ball(geometry, k) for k in shape_of_body], bool),
-        contact_margin=TOLERANCES.contact_margin,
-        impact_margin=TOLERANCES.impact_margin,
+        contact_margin=TOLERANCES.contact.margin,
+        impact_margin=TOLERANCES.contact.impact_margin,
         apart=_pairs_apart(joints, bodies, dynamic),
         joints_of_scene=joints,
         left_out=left_out,

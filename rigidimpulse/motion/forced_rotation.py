@@ -20,6 +20,7 @@ import math
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import exponential, from_columns, product, rotated
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.motion import free_rotation as free_rotation
 
 ORDER = 18
@@ -45,14 +46,11 @@ _STRIDE = 9
 SERIES_SIZE = _STRIDE * (ORDER + 1)
 """coefficients in all; few bodies have a series, so that they lie apart from the other constants"""
 
-_PARALLEL = 1e-15
-"""sine of the angle between vectors that are taken for parallel: what round-off of their turn to the body leaves"""
-_NO_TORQUE = 1e-280
-"""rad/s^2, and rad/s^3: angular acceleration and its rate taken for none: squares would underflow"""
+_PARALLEL = TOLERANCES.rotation.parallel_torque
+_NO_TORQUE = TOLERANCES.rotation.no_torque
 _MOST_SEGMENTS = 100_000
 """segments after which the rotation is given up: some 30,000 rad, a tenth of a second of work"""
-_LAST_TERM = 1e-15
-"""size of the last terms of the series at the end of a segment; the terms left out are an eighth of it or less"""
+_LAST_TERM = TOLERANCES.rotation.last_term
 
 
 @jit

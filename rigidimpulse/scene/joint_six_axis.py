@@ -25,13 +25,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint import ABOUT, ALONG, ANGLE, DISTANCE, RADIUS, SWING, TWIST
 from rigidimpulse.scene.body import vector
 from rigidimpulse.scene.joint import HARD, Joint, Motor, Row, across, bounds
 
 AXES = "xyz"
-ORTHONORMAL = 1e-9
-"""Largest error of the products of given axes; they are made orthonormal to round-off."""
+ORTHONORMAL = TOLERANCES.joint.orthonormal_axes
 
 
 def _axes(translation: str, rotation: str, owner: str) -> tuple[bool, tuple[int, ...]]:

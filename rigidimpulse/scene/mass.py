@@ -24,14 +24,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.shape import Shape
 from rigidimpulse.scene.surface import Surface
 
 _JACOBI_SWEEPS = 30  # convergence is quadratic: 4 to 6 sweeps are enough for any 3 x 3 matrix
-_JACOBI_CONVERGED = 1e-30  # off-diagonal entries, relative to the largest moment, that no longer change anything
+_JACOBI_CONVERGED = TOLERANCES.inertia.jacobi_converged
 
 
 class Solid(NamedTuple):
@@ -111,7 +111,7 @@ def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     tensor = 0.5 * (inertia + inertia.T)
     axes = np.eye(3)
     largest = float(np.max(np.abs(np.diag(tensor))))
-    if _off_diagonal(tensor) > TOLERANCES.diagonal_inertia * largest:
+    if _off_diagonal(tensor) > TOLERANCES.inertia.diagonal * largest:
         for _ in range(_JACOBI_SWEEPS):
             if _off_diagonal(tensor) <= _JACOBI_CONVERGED * largest:
                 break
@@ -251,7 +251,7 @@ def _polyhedron(surface: Surface) -> Solid:
     area = 0.5 * math.fsum(np.linalg.norm(area_vectors, axis=1).tolist())
     signed = np.sum(corners[:, 0] * np.cross(corners[:, 1], corners[:, 2]), axis=1) / 6.0
     volume = math.fsum(signed.tolist())
-    if abs(volume) <= TOLERANCES.enclosed_volume * area * float(np.max(high - low)):
+    if abs(volume) <= TOLERANCES.inertia.enclosed_volume * area * float(np.max(high - low)):
         raise SceneError("it encloses no volume", "give it a thickness, or make the body motion='static'")
     if volume < 0.0:
         raise SceneError(
@@ -276,7 +276,7 @@ def _given_inertia(inertia: np.ndarray) -> np.ndarray:
     """Return a given inertia, (3,) or (3, 3), as a symmetric tensor."""
     if inertia.shape == (3,):
         return np.diag(inertia)
-    if np.max(np.abs(inertia - inertia.T)) > TOLERANCES.symmetric_inertia * np.max(np.abs(inertia)):
+    if np.max(np.abs(inertia - inertia.T)) > TOLERANCES.inertia.symmetric * np.max(np.abs(inertia)):
         raise SceneError(f"inertia {inertia.tolist()} is not symmetric", "give a symmetric tensor in kg m^2")
     return 0.5 * (inertia + inertia.T)
 
@@ -284,9 +284,9 @@ def _given_inertia(inertia: np.ndarray) -> np.ndarray:
 def _check_moments(moments: np.ndarray) -> None:
     """Raise a `SceneError` for moments that no body has."""
     small, middle, large = sorted(float(moment) for moment in moments)
-    if small <= TOLERANCES.least_moment * large:
+    if small <= TOLERANCES.inertia.least_moment * large:
         raise SceneError(f"principal moments of inertia are {moments.tolist()} kg m^2", "all must be > 0")
-    if small + middle < large * (1.0 - TOLERANCES.realizable_inertia):
+    if small + middle < large * (1.0 - TOLERANCES.inertia.realizable):
         raise SceneError(
             f"principal moments of inertia are {moments.tolist()} kg m^2",
             "no body has one above the sum of the other two: check inertia=, which is about the centre of mass",
@@ -318,7 +318,7 @@ def _jacobi_rotate(tensor: np.ndarray, axes: np.ndarray, p: int, q: int, r: int)
 
 def _equalized(moments: np.ndarray) -> np.ndarray:
     """Make moments equal that differ by no more than rounding: all three, or the closest two."""
-    allowed = TOLERANCES.equal_moments * float(np.max(np.abs(moments)))
+    allowed = TOLERANCES.inertia.equal_moments * float(np.max(np.abs(moments)))
     if np.ptp(moments) <= allowed:
         return np.full(3, moments.mean())
     gap, p, q = min((abs(moments[p] - moments[q]), p, q) for p, q in ((0, 1), (0, 2), (1, 2)))

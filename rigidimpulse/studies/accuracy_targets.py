@@ -8,7 +8,7 @@ halving the step leaves at most half of it, so e_k <= 2 d_k. That is for errors 
 where r_k is how far u_k moves when it is started off by rounding (`reference.perturbed`) and its impact times may be off by LOOSER times
 their tolerance, and d_(k-1) / 8 guards against a d_k that is
 small by chance. The floor is what all rungs have in common: the rounding of the places themselves, and, where contacts last, the gap at
-which they are held (`conventions.TOLERANCES.contact_margin` of a body's size; in heaps the skin, relative to half a size).
+which they are held (`tolerances.TOLERANCES.contact.margin` of a body's size; in heaps the skin, relative to half a size).
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.model.world import World, compile_scene
 from rigidimpulse.recording.events import Event
@@ -240,7 +240,7 @@ def _floor(run: Recording) -> np.ndarray:
     spin = float(np.linalg.norm(run.angular_velocities, axis=2).max(initial=0.0))
     rounding = FLOOR * np.array([np.abs(run.positions).max(initial=0.0), 1.0 + spin * run.times[-1]])
     touching = [group for group in _groups(run, world) if len(group) > 0]
-    share = 0.5 * TOLERANCES.skin if "sub-stepping" in run.ledger.dissipated else 2.0 * TOLERANCES.contact_margin
+    share = 0.5 * TOLERANCES.sub_stepping.skin if "sub-stepping" in run.ledger.dissipated else 2.0 * TOLERANCES.contact.margin
     return rounding + share * np.array([max((world.size[group].sum() for group in touching), default=0.0), float(bool(touching))])
 
 

@@ -43,11 +43,11 @@ from rigidimpulse.collision.manifold.contact_points import (
     outside_box,
 )
 from rigidimpulse.collision.manifold.mesh_edges import edge_contacts
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import along, dot, moved, row, subtract, turned
 
-CREASE = 2.0 * TOLERANCES.flat_angle
+CREASE = 2.0 * TOLERANCES.surface.flat_angle
 """How far outside a face beyond a hidden edge a point still counts as inside, relative to its height."""
 
 

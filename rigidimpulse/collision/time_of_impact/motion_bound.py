@@ -39,9 +39,9 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import along, cross, dot, length, subtract
 from rigidimpulse.motion.trajectory import FIXED, FORCED, JERK, LINEAR, PRESCRIBED, TORQUE_RATE, motion_at, rate_of, row_at
 
@@ -58,8 +58,8 @@ the part of y'' that grows with r."""
 
 _TIGHTENINGS = 4
 _WIDEN = 1.0 + 1e-12  # covers the rounding of the bounds themselves
-_ROUND_OFF = TOLERANCES.round_off
-_EQUAL_MOMENTS = TOLERANCES.equal_moments
+_ROUND_OFF = TOLERANCES.arithmetic.round_off
+_EQUAL_MOMENTS = TOLERANCES.inertia.equal_moments
 
 
 @jit

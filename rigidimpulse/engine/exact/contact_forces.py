@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import Held, hold_contacts
 from rigidimpulse.dynamics.constraints.contact_motion import Motion, contact_motion
 from rigidimpulse.dynamics.constraints.energy_limit import limit_correction_energy, note_hold
@@ -234,7 +234,7 @@ def _rests(context, island: Island, h: float) -> bool:
         moves = moves or world.moving[context.joints.bodies_of(island.joints)].any()
     if moves or (island.loaded and not context.forces.may_rest(i)):
         return False
-    limit = TOLERANCES.rest * world.steady_strength[i] * h
+    limit = TOLERANCES.contact.rest * world.steady_strength[i] * h
     force, torque = context.wrench[i, :3], context.wrench[i, 3:]
     spin = context.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], torque)
     gained = h * (context.acceleration[i] + world.inv_mass[i, None] * force)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.energy import kinetic_energy
 from rigidimpulse.dynamics.impact.kinematic import respond_kinematic
 from rigidimpulse.dynamics.impact.point import Contacts, select, speed_scale
@@ -65,7 +65,7 @@ def respond_to_impacts(context, island: Island, kernel, law: int) -> None:
     contacts = island.contacts if len(live) == len(island.live) else select(island.contacts, live)
     rest_speed = np.where(collapses, np.inf, island.rest_speed)[live]
     scale = speed_scale(context.state.now, contacts)
-    tolerance = TOLERANCES.approach * scale + SLOW * float(island.rest_speed[live].max())
+    tolerance = TOLERANCES.contact.approach * scale + SLOW * float(island.rest_speed[live].max())
     island.zero_speed, island.scale = tolerance, scale
     if island.approach[live].min() >= -tolerance:
         return

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint import RADIUS
 from rigidimpulse.dynamics.constraints.joint_impact import impact_rows, stop_at_limits
 from rigidimpulse.dynamics.constraints.joint_limits import next_switch
@@ -69,7 +69,7 @@ class JointState:
         self.began = np.zeros(len(joints))
         self.length = np.zeros(len(joints))
         self.reactions: list[tuple[float, int, np.ndarray]] = []
-        self._allowed = TOLERANCES.joint * world.joint_size
+        self._allowed = TOLERANCES.joint.closed * world.joint_size
         self._joint_of_row = np.repeat(np.arange(len(joints)), np.diff(self.table.first))
         held = (self.table.coordinate < RADIUS) & np.isinf(self.table.stiffness) & np.isinf(self.table.lower) & np.isinf(self.table.upper)
         movable = [(i >= 0) & world.dynamic[i] for i in (self.table.body_a, self.table.body_b)]

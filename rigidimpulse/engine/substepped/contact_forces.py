@@ -17,11 +17,11 @@ from rigidimpulse.collision.manifold.dispatch import pair_gap
 from rigidimpulse.collision.manifold.inset_surface import cores
 from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import number_of_cores
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.core.simd import ROW, aligned, machine_simd
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.workers import empty_work_queue
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import energies, mark_quick, note_pressed, slow_down
 from rigidimpulse.dynamics.solvers.tgs_soft.depenetration import move_apart
@@ -111,7 +111,7 @@ class ContactStepper:
         dynamic_shapes = np.zeros(len(world.geometry.shape_first) - 1, bool)
         dynamic_shapes[world.shape_of_body[movable]] = True
         self.inner = np.where(movable, inner_radii(world.geometry)[world.shape_of_body], np.inf)
-        self.skin = TOLERANCES.skin * self.inner
+        self.skin = TOLERANCES.sub_stepping.skin * self.inner
         self.reach = np.where(world.ball, 0.0, world.bound_radius)
         convex = convex_polyhedra(world.geometry)
         cored, depth, self._back = cores(world.shapes, world.geometry, convex, dynamic_shapes)

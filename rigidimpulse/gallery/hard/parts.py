@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.quaternion import quaternion_from_axis_angle, rotate
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.gallery.record import Check, at_most, equal
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.body import Body
@@ -24,7 +24,7 @@ from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
 GRAVITY = 9.81
-DELTA = TOLERANCES.contact_margin
+DELTA = TOLERANCES.contact.margin
 """Gap of lasting contacts, of a body's size."""
 ROUNDING = 1e-12
 """Of the energy at stake: some thousand operations of sixteen digits."""
