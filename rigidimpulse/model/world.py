@@ -12,13 +12,13 @@ from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, Compile
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import from_matrix, multiply, rotate
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.joint import Joints
 from rigidimpulse.dynamics.forces.constant import ConstantForce, push_of_forces
+from rigidimpulse.model.joint_table import Joints, compile_joints
 from rigidimpulse.scene.accuracy import Accuracy, resolve_accuracy
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.collision_filter import pairs_filtered
 from rigidimpulse.scene.frames import own_pose
-from rigidimpulse.scene.joint import Joint, compile_joints
+from rigidimpulse.scene.joint import Joint
 from rigidimpulse.scene.mass import BodyMass, masses_of
 from rigidimpulse.scene.material import combine, combine_rolling
 from rigidimpulse.scene.scene import Scene, validate

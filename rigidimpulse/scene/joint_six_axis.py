@@ -26,9 +26,9 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.joint import ABOUT, ALONG, ANGLE, DISTANCE, RADIUS, SWING, TWIST
 from rigidimpulse.scene.body import vector
 from rigidimpulse.scene.joint import HARD, Joint, Motor, Row, across, bounds
+from rigidimpulse.scene.joint_coordinates import ABOUT, ALONG, ANGLE, DISTANCE, RADIUS, SWING, TWIST
 
 AXES = "xyz"
 ORTHONORMAL = TOLERANCES.joint.orthonormal_axes

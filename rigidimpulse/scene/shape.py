@@ -18,12 +18,11 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import load_mesh
+from rigidimpulse.scene.solid import Solid, compute_solid
 from rigidimpulse.scene.surface import Surface, clean_surface
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
-
-    from rigidimpulse.scene.mass import Solid
 
 _BOX_CORNERS = 0.5 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
 _BOX_FACES = np.array(
@@ -238,7 +237,7 @@ class Shape:
         """Return volume, centroid and inertia of the shape filled with density 1.
 
         Raises:
-            SceneError: it encloses no volume (see `rigidimpulse.scene.mass.compute_solid`).
+            SceneError: it encloses no volume (see `rigidimpulse.scene.solid.compute_solid`).
 
         """
         return self._solid
@@ -274,8 +273,6 @@ class Shape:
 
     @cached_property
     def _solid(self) -> Solid:
-        from rigidimpulse.scene.mass import compute_solid
-
         return compute_solid(self)
 
     def _check_lengths(self) -> None:

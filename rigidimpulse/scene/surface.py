@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.geometry import unique_edges
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.triangles import unique_edges
 
 
 class Surface(NamedTuple):

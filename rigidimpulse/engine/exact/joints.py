@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.joint import RADIUS
 from rigidimpulse.dynamics.constraints.joint_impact import impact_rows, stop_at_limits
 from rigidimpulse.dynamics.constraints.joint_limits import next_switch
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_jointed, make_memory, stop_joints
@@ -15,6 +14,7 @@ from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.engine.touching import refresh_pose
 from rigidimpulse.motion.trajectory import FIXED
 from rigidimpulse.scene.joint import Joint
+from rigidimpulse.scene.joint_coordinates import RADIUS
 
 TURN = 0.02
 """rad, how far the bodies of a joint may turn against each other in a sub-step."""
