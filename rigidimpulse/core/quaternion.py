@@ -56,8 +56,11 @@ def exponential(x, y, z):
 
 
 @jit
-def from_columns(r00, r10, r20, r01, r11, r21, r02, r12, r22):
-    """The unit quaternion, first component >= 0, of the rotation matrix given column by column."""
+def from_columns(x, y, z):
+    """The unit quaternion, first component >= 0, of the rotation matrix with the columns x, y and z, each of three numbers."""
+    r00, r10, r20 = x
+    r01, r11, r21 = y
+    r02, r12, r22 = z
     trace = r00 + r11 + r22
     if trace >= max(r00, r11, r22):
         q0, q1, q2, q3 = 1.0 + trace, r21 - r12, r02 - r20, r10 - r01
@@ -96,7 +99,7 @@ def matrix_to_quaternion(R):
     """The unit quaternion (4,), first component >= 0, of a rotation matrix (3, 3)."""
     q = np.empty(4)
     q[0], q[1], q[2], q[3] = from_columns(
-        R[0, 0], R[1, 0], R[2, 0], R[0, 1], R[1, 1], R[2, 1], R[0, 2], R[1, 2], R[2, 2]
+        (R[0, 0], R[1, 0], R[2, 0]), (R[0, 1], R[1, 1], R[2, 1]), (R[0, 2], R[1, 2], R[2, 2])
     )
     return q
 

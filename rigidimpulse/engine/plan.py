@@ -13,8 +13,8 @@ from time import perf_counter
 from typing import Protocol
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.scene.stages import STAGES
 
-STAGES = ("detect", "respond", "forces", "constrain", "sweep", "integrate", "observe")
 NEEDED = ("steady load", "varying load", "contact forces", "impact time", "exact flight", "forced flight")
 """Effects that the loop cannot do without where they are in: bodies would not move, or hit each other without end."""
 

@@ -37,7 +37,7 @@ from rigidimpulse.motion.kinematic import KeyframePaths
 from rigidimpulse.motion.trajectory import FIXED, FREE, PRESCRIBED, begin
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.impulses import Impulses
-from rigidimpulse.recording.ledger import make_ledger
+from rigidimpulse.recording.ledger import Masses, make_ledger
 from rigidimpulse.recording.profile import Stopwatch
 from rigidimpulse.recording.recorder import Recorder
 from rigidimpulse.recording.recording import Recording, RunSettings, Status
@@ -345,8 +345,7 @@ def make_recording(context: StepContext, plan: Plan, times: np.ndarray, duration
     work = None if context.forces is None else context.forces.finish(world, times, recorder)
     mass = np.where(world.dynamic & (times[:, None] >= release_times(world)), world.mass, 0.0)
     ledger = make_ledger(
-        times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
-        mass, world.inertia, world.steady_acceleration, context.log, work,
+        recorder.frames._replace(times=times), Masses(mass, world.inertia, world.steady_acceleration), context.log, work
     )
     if context.soft_bodies is not None:
         context.soft_bodies.add_to(ledger)

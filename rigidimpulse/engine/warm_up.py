@@ -181,14 +181,14 @@ def _move(context) -> None:
     from rigidimpulse.engine.pair_events import PairEvents
     from rigidimpulse.engine.simulate import start_trajectories
     from rigidimpulse.engine.touching import bring_all
-    from rigidimpulse.motion.trajectory import FREE, take
+    from rigidimpulse.motion.trajectory import FREE, Load, take
 
     state, now, world = context.state, context.state.now, context.world
     zero = np.zeros(1)
     start_trajectories(context)
     context.recorder.start(state.trajectory)
     bring_all(state.trajectory, np.array([1]), 0.0, now, state.rotation, context.acceleration, context.angular_acceleration)
-    take(state.trajectory, 1, 0.0, now, *np.zeros((4, 3)), FREE)
+    take(state.trajectory, 1, 0.0, now, Load(*np.zeros((4, 3))), FREE)
     pair_events = PairEvents(context, 1.0 / 60.0)
     pair_events.find_pairs()
     pair_events.trajectory_changed(1, 0.0)

@@ -128,11 +128,14 @@ def _across(ex, ey, ez, ux, uy, uz):
 
 
 @jit
-def _start_series(c, series, wx, wy, wz, ex, ey, ez, ux, uy, uz):
+def _start_series(c, series, w, e, u):
     """Begin a series at body angular velocity w and unit directions e of tau0 and u of tau1; set scale and segment.
 
     |tau0| and |tau1| are read; e is u where tau0 is none, and u is not read where tau1 is none.
     """
+    wx, wy, wz = w
+    ex, ey, ez = e
+    ux, uy, uz = u
     i1, i2, i3 = c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2]
     coupling = max(1.0, abs(i2 - i3) / i1, abs(i3 - i1) / i2, abs(i1 - i2) / i3)
     rate = coupling * max(abs(wx), abs(wy), abs(wz)) + math.sqrt(c[_TORQUE] / min(i1, i2, i3))
@@ -176,15 +179,9 @@ def _advance(c, series, t):
     r1, r2, r3 = p2 * q3 - p3 * q2, p3 * q1 - p1 * q3, p1 * q2 - p2 * q1
     n1, n2, n3 = a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1
     g0, g1, g2, g3 = from_columns(
-        p1 * a1 + q1 * b1 + r1 * n1,
-        p2 * a1 + q2 * b1 + r2 * n1,
-        p3 * a1 + q3 * b1 + r3 * n1,
-        p1 * a2 + q1 * b2 + r1 * n2,
-        p2 * a2 + q2 * b2 + r2 * n2,
-        p3 * a2 + q3 * b2 + r3 * n2,
-        p1 * a3 + q1 * b3 + r1 * n3,
-        p2 * a3 + q2 * b3 + r2 * n3,
-        p3 * a3 + q3 * b3 + r3 * n3,
+        (p1 * a1 + q1 * b1 + r1 * n1, p2 * a1 + q2 * b1 + r2 * n1, p3 * a1 + q3 * b1 + r3 * n1),
+        (p1 * a2 + q1 * b2 + r1 * n2, p2 * a2 + q2 * b2 + r2 * n2, p3 * a2 + q3 * b2 + r3 * n2),
+        (p1 * a3 + q1 * b3 + r1 * n3, p2 * a3 + q2 * b3 + r2 * n3, p3 * a3 + q3 * b3 + r3 * n3),
     )
     scale = c[_TIME_SCALE]
     return g0, g1, g2, g3, scale * w1, scale * w2, scale * w3, a1, a2, a3, b1, b2, b3
@@ -238,7 +235,7 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out, series_out)
         c[KIND] = FORCED
         c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2] = i1, i2, i3
         c[_TORQUE], c[_TORQUE_RATE] = magnitude, growth
-        _start_series(c, series_out, wx, wy, wz, ex, ey, ez, ux, uy, uz)
+        _start_series(c, series_out, (wx, wy, wz), (ex, ey, ez), (ux, uy, uz))
     return True
 
 
@@ -263,7 +260,7 @@ def _last_segment(constants, coefficients, t):
             ex, ey, ez, c[_TORQUE] = _direction(now * ex + grown * ux, now * ey + grown * uy, now * ez + grown * uz)
             if c[_TORQUE] == 0.0:
                 ex, ey, ez = ux, uy, uz
-        _start_series(c, series, wx, wy, wz, ex, ey, ez, ux, uy, uz)
+        _start_series(c, series, (wx, wy, wz), (ex, ey, ez), (ux, uy, uz))
     return c, series, math.nan
 
 

@@ -215,8 +215,11 @@ def _store_phase(c, start_rate, speed, sigma, y, t_ratio):
 
 
 @jit
-def _store_motion(c, i1, i2, i3, d13, d12, w1, w2, w3):
-    """Constants of the asymmetric motion, given moments and spin of order one, d13 = |I3 - I1|, d12 = |I1 - I2|."""
+def _store_motion(c, moments, differences, w):
+    """Constants of the asymmetric motion: moments (I1, I2, I3), differences (|I3 - I1|, |I1 - I2|) and spin w, all of order one."""
+    i1, i2, i3 = moments
+    d13, d12 = differences
+    w1, w2, w3 = w
     d23 = d13 + d12
     r2 = i1 * d13 * w1 * w1 + i2 * d23 * w2 * w2
     d2 = i3 * d23 * w3 * w3 + i1 * d12 * w1 * w1
@@ -269,9 +272,9 @@ def _prepare_asymmetric(inertia, low, middle, high, c):
     sign_3 = math.copysign(1.0, c[_SPIN + third])
     sign_2 = sign_3 if step == 2 or step == -1 else -sign_3
     if circles_high:
-        _store_motion(c, i_middle, i_low, i_high, d_high, d_low, w_middle, sign_2 * w_low, abs(w_high))
+        _store_motion(c, (i_middle, i_low, i_high), (d_high, d_low), (w_middle, sign_2 * w_low, abs(w_high)))
     else:
-        _store_motion(c, i_middle, i_high, i_low, d_low, d_high, w_middle, sign_2 * w_high, abs(w_low))
+        _store_motion(c, (i_middle, i_high, i_low), (d_low, d_high), (w_middle, sign_2 * w_high, abs(w_low)))
     for k in range(3):
         c[_AMPLITUDE + k] /= scale_w
     c[_PHASE_RATE] /= scale_w

@@ -131,22 +131,28 @@ def begin_straight(trajectory, i):
     free_rotation.keep_axis(trajectory.orientation[i], trajectory.angular_velocity[i], trajectory.top[i])
 
 
-@jit
-def take(trajectory, i, time, bodies, acceleration, torque, jerk, torque_rate, mode):
-    """Let body i go on from where it is now, at `time`, in a mode.
+class Load(NamedTuple):
+    """What acts on one body from an instant on: it grows in proportion to time."""
 
-    acceleration (3,) m/s^2 and torque (3,) N m at `time`, jerk (3,) m/s^3 and torque_rate (3,) N m/s from then on.
-    """
+    acceleration: np.ndarray  # (3,) m/s^2 at the instant
+    torque: np.ndarray  # (3,) N m at the instant
+    jerk: np.ndarray  # (3,) m/s^3
+    torque_rate: np.ndarray  # (3,) N m/s
+
+
+@jit
+def take(trajectory, i, time, bodies, load, mode):
+    """Let body i go on from its present state, at `time`, in a mode and under a `Load`."""
     trajectory.start[i] = time
     trajectory.mode[i] = mode
     for k in range(3):
         trajectory.position[i, k] = bodies.position[i, k]
         trajectory.velocity[i, k] = bodies.velocity[i, k]
         trajectory.angular_velocity[i, k] = bodies.angular_velocity[i, k]
-        trajectory.acceleration[i, k] = acceleration[k]
-        trajectory.torque[i, k] = torque[k]
-        trajectory.top[i, JERK + k] = jerk[k]
-        trajectory.top[i, TORQUE_RATE + k] = torque_rate[k]
+        trajectory.acceleration[i, k] = load.acceleration[k]
+        trajectory.torque[i, k] = load.torque[k]
+        trajectory.top[i, JERK + k] = load.jerk[k]
+        trajectory.top[i, TORQUE_RATE + k] = load.torque_rate[k]
     for k in range(4):
         trajectory.orientation[i, k] = bodies.orientation[i, k]
     begin(trajectory, i)

@@ -2,15 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from rigidimpulse.core.kernels import KERNELS
-from rigidimpulse.engine.plan import STAGES, Plan
+from rigidimpulse.scene.stages import STAGES
 
 MOST_ROWS = 20
 """Kernels in a table."""
+
+
+class Line(Protocol):
+    """An effect of a run: its stage and name, whether it is in, why, and what it took."""
+
+    stage: str
+    name: str
+    included: bool
+    reason: str
+    seconds: float
+    calls: int
+
+
+class Plan(Protocol):
+    """The effects of a run, as a recording keeps them (see `engine.plan`)."""
+
+    @property
+    def lines(self) -> Sequence[Line]:
+        """The effects, in the order in which they were bound."""
+        ...
+
+    def explain(self) -> str:
+        """Return a table: stage, effect, in or out, share of the time so far, why."""
+        ...
 
 
 class KernelTime(NamedTuple):

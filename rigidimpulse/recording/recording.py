@@ -17,11 +17,10 @@ from rigidimpulse.recording.contacts import CONTACT_DTYPE, forces_on
 
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
-    from rigidimpulse.engine.plan import Plan
     from rigidimpulse.recording.events import Event
     from rigidimpulse.recording.impulses import Impulses
     from rigidimpulse.recording.ledger import Ledger
-    from rigidimpulse.recording.profile import Profile
+    from rigidimpulse.recording.profile import Plan, Profile
     from rigidimpulse.scene.accuracy import Accuracy
     from rigidimpulse.scene.scene import Scene
     from rigidimpulse.studies.accuracy_targets import Choice

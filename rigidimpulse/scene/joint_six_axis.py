@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.scene.body import vector
-from rigidimpulse.scene.joint import HARD, Joint, Motor, Row, across, bounds
+from rigidimpulse.scene.joint import HARD, Anchors, Joint, Motor, PlacedBodies, Row, across, bounds
 from rigidimpulse.scene.joint_coordinates import ABOUT, ALONG, ANGLE, DISTANCE, RADIUS, SWING, TWIST
 
 AXES = "xyz"
@@ -159,7 +159,7 @@ class SixAxisJoint(Joint):
     anchor_b: ArrayLike | None = None
     axes_b: ArrayLike | None = None
 
-    def points(self, _world):
+    def points(self, _world: PlacedBodies) -> Anchors:
         """See `Joint`."""
         anchor = vector(self.anchor, "anchor", "m")
         anchor_b = anchor if self.anchor_b is None else vector(self.anchor_b, "anchor_b", "m")

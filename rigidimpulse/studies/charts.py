@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.engine.plan import STAGES
+from rigidimpulse.scene.stages import STAGES
 from rigidimpulse.studies.row import ERRORS, Row
 
 TITLES = {

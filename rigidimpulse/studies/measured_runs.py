@@ -8,11 +8,11 @@ from time import perf_counter, process_time
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.engine.plan import STAGES
 from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.stages import STAGES
 from rigidimpulse.studies.measures import Errors, Truth, measure, penetration
 from rigidimpulse.studies.peers import run_peer
 from rigidimpulse.studies.reference import Reference

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from rigidimpulse.engine.plan import STAGES
+from rigidimpulse.scene.stages import STAGES
 from rigidimpulse.studies.measures import Errors
 from rigidimpulse.studies.peers import PEERS
 

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.engine.plan import STAGES
 from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.gallery.pile import pile
 from rigidimpulse.recording.recording import Recording
@@ -22,6 +21,7 @@ from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
+from rigidimpulse.scene.stages import STAGES
 
 SIZES = (10, 30, 100, 300, 1_000, 3_000, 10_000, 20_000)
 FEWEST = 100

@@ -28,7 +28,7 @@ from impacts import bounce, gas
 from piles import FPS, PILES, STEPS, depths, pile
 
 import rigidimpulse as ri
-from rigidimpulse.engine.plan import STAGES
+from rigidimpulse.scene.stages import STAGES
 
 OURS = "rigidimpulse"
 SETTINGS = {

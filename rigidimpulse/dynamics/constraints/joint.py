@@ -105,7 +105,7 @@ def _along_axes(e, x, y, z, direction):
 def _about(turn, e, k, direction):
     """Part k of the rotation vector of `turn`, with its gradient (3,) in the world."""
     q0, q1, q2, q3 = from_columns(
-        turn[0, 0], turn[1, 0], turn[2, 0], turn[0, 1], turn[1, 1], turn[2, 1], turn[0, 2], turn[1, 2], turn[2, 2]
+        (turn[0, 0], turn[1, 0], turn[2, 0]), (turn[0, 1], turn[1, 1], turn[2, 1]), (turn[0, 2], turn[1, 2], turn[2, 2])
     )
     half = sqrt(q1 * q1 + q2 * q2 + q3 * q3)
     angle = 2.0 * atan2(half, q0)

@@ -12,13 +12,14 @@ from rigidimpulse.dynamics.energy import mechanical_energy
 from rigidimpulse.engine.islands import Island
 from rigidimpulse.engine.pair_table import sweep_pair_again
 from rigidimpulse.engine.plan import Bound, Skip
-from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, take
+from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, Load, take
 
 HALF_KEPT = 0.55
 """Held contacts nearer than this part of delta are guarded at half of their gap."""
 LEAVING = 1e-6
 """Part of its gap by which a leaving pair may come nearer before it counts as contact again."""
 NOTHING = np.zeros(3)
+NO_LOAD = Load(NOTHING, NOTHING, NOTHING, NOTHING)
 
 
 @dataclass(frozen=True)
@@ -72,18 +73,18 @@ def begin_trajectory(context, pair_events, i: int, time: float, wrench: np.ndarr
     pressed = not rests and bool(wrench.any())
     if rests:
         now.velocity[i] = now.angular_velocity[i] = 0.0
-        take(trajectory, i, time, now, NOTHING, NOTHING, NOTHING, NOTHING, FIXED)
+        take(trajectory, i, time, now, NO_LOAD, FIXED)
     elif context.forces is not None and context.forces.acts[i]:
         total, rate = wrench + context.forces.value[i], context.forces.rate[i]
         acceleration, jerk = world.steady_acceleration[i] + world.inv_mass[i] * total[:3], world.inv_mass[i] * rate[:3]
         turned = total[3:].any() or rate[3:].any()
-        take(trajectory, i, time, now, acceleration, total[3:], jerk, rate[3:], FORCED if turned else FREE)
+        take(trajectory, i, time, now, Load(acceleration, total[3:], jerk, rate[3:]), FORCED if turned else FREE)
     else:
         acceleration = world.steady_acceleration[i]
         if pressed:
             acceleration = acceleration + world.inv_mass[i] * wrench[:3]
         turned = pressed and wrench[3:].any()
-        take(trajectory, i, time, now, acceleration, wrench[3:], NOTHING, NOTHING, FORCED if turned else FREE)
+        take(trajectory, i, time, now, Load(acceleration, wrench[3:], NOTHING, NOTHING), FORCED if turned else FREE)
     state.under_contact[i] = pressed
     if pressed:
         state.energy_at_start[i] = mechanical_energy(now, world, np.array([i])) - work_of_forces(context, i)

@@ -129,8 +129,8 @@ class Checkpointer:
     def _fill_in(self, first: int, last: int) -> None:
         """Write frames until the last one that are not written yet, from the present courses; what writes them comes again."""
         recorder, trajectory = self.running.context.recorder, self.running.context.state.trajectory
-        behind, frames = np.flatnonzero(recorder.written < last), (getattr(recorder, name) for name in FRAMES)
-        sample_paths(trajectory, behind, recorder.times, last, np.maximum(recorder.written, first), *frames)
+        behind = np.flatnonzero(recorder.written < last)
+        sample_paths(trajectory, behind, last, np.maximum(recorder.written, first), recorder.frames)
 
     def _content(self, frames: int, time: float, state: bytes, tables: dict[str, Any] | None = None) -> Content:
         context = self.running.context
