@@ -60,7 +60,7 @@ def assert_energy_never_grows(run: Recording, tolerance: float = PULLED) -> None
 
 
 def _rises(run: Recording) -> float:
-    """Work against gravity of lifting every dynamic body by its held gap and those of all below it, J."""
+    """Work against gravity of lifting every dynamic body by its contact margin and those of all below it, J."""
     if run.scene is None:
         return 0.0
     from rigidimpulse.model.world import compile_scene

@@ -7,7 +7,7 @@
 
 A point is in a convex polyhedron if it is behind all face planes, in a concave one if a ray from it crosses the surface an odd number of
 times. Many points are in line with vertices and edges of the octahedron; a parity that counts those twice is wrong for half of them.
-There is a marble where a point is inside, and only there. How they fall has no law here: the soft solver of heaps does it, quickly.
+There is a marble where a point is inside, and only there. How they fall has no law here: the soft sub-stepped solver computes it, quickly.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def check(run: Recording) -> list[Check]:
         checks.append(equal(f"{name}: marbles", len(found), len(expected), "number of lattice points inside"))
         checks.append(equal(f"{name}: points taken for the other side", len(found ^ expected), 0, "closed form of the solid"))
     lowest = RADIUS - run.positions[:, 1:, 2].min()
-    return [*checks, at_most("deepest marble in the floor, m", lowest, SKIN, "soft contacts eat the skin of a heap")]
+    return [*checks, at_most("deepest marble in the floor, m", lowest, SKIN, "soft contacts use up the skin of a pile")]
 
 
 def _lattice(name: str) -> np.ndarray:

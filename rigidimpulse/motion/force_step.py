@@ -6,7 +6,7 @@ Stages of Nystroem's method of order 4 (E. J. Nystroem 1925; Hairer, Norsett, Wa
     stage 2  flies h/2 under F_1,  stage 3 has the pose of stage 2 and the velocities of h/2 under F_2,  stage 4 flies h under F_3
 
 "flies" is the exact motion of a rigid body under a constant force and torque, so that gravity and the gyroscopic term cost nothing and a
-body without forces keeps its exact path. The forces of the step enter the course by their two moments (see `course`),
+body without forces keeps its exact path. The forces of the step enter the trajectory by their two moments (see `trajectory`),
 
     M0 = h (F_1 + 2 F_2 + 2 F_3 + F_4) / 6,    M1 = h^2 (F_1 + F_2 + F_3) / 6,
 
@@ -79,10 +79,10 @@ def follow(trajectory, members, bodies, steady, value, rate):
 
 
 class Workspace:
-    """Room for the states of a step's stages."""
+    """Arrays for the states of a step's stages."""
 
     def __init__(self, trajectory: Trajectories, inv_mass: np.ndarray) -> None:
-        """Of the bodies of a course."""
+        """For as many bodies as there are trajectories."""
         n = len(inv_mass)
         self.trajectory = make_trajectories(n)._replace(inertia=trajectory.inertia)
         self.bodies = BodyState(

@@ -5,7 +5,7 @@ Body frame, principal moments I, angular velocity w, tau(t) = tau0 + tau1 t; e =
     d_1 = tau0 / |tau0|,   d_2 normal to d_1,   tau1 = p d_1 + r d_2,
 so that the angular momentum in the world is L0 + tau0 t + tau1 t^2 / 2. These equations are quadratic: the coefficients of the
 power series of w, e_1, e_2 follow one from another by Cauchy products. The series up to ORDER is computed once; it serves for
-any time up to `segment`, where its last terms reach round-off, and is begun anew from there on. Segments depend on the
+any time up to `segment`, where its last terms reach round-off. From there on it is started again. Segments depend on the
 start alone, never on the time asked for, so the path is one smooth function of time. The attitude follows from e_1, e_2
 and e_1 x e_2.
 
@@ -199,7 +199,7 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out, series_out)
     """Write constants (FORCED_ROTATION_SIZE,) and series (SERIES_SIZE,) of the motion from orientation q (4,) and spin (3,), rad/s.
 
     `w_world`, `torque` (3,), N m, and `torque_rate` (3,), N m/s, are in the world; `inertia` (3,): principal moments,
-    kg m^2, all > 0. Returns False and writes nothing if torque and rate are none: then the body is a free top.
+    kg m^2, all > 0. Returns False and writes nothing if torque and rate are none: then the body rotates freely.
     """
     c = constants_out
     i1, i2, i3 = inertia[0], inertia[1], inertia[2]

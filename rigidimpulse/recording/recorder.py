@@ -1,6 +1,6 @@
 """The recorder: samples every body's exact path at the frame times, whatever the frame rate, without touching the motion.
 
-A body's path is fixed from one change of course to the next. Before a body's course changes at time t its frames
+A body's path is fixed from one change of its trajectory to the next. Before a trajectory changes at time t, the body's frames
 before t are written; a frame at the very time of an impact shows the state after it, but frame 0 is the state as
 given.
 """
@@ -94,10 +94,10 @@ class Recorder:
         self._write(trajectory, self._everyone, 1)
 
     def flush(self, trajectory: Trajectories, i: int, time: float, correction: np.ndarray) -> None:
-        """Write the frames of body i before `time`; its course must still be the one that led there.
+        """Write the frames of body i before `time`; its trajectory must still be the one that led there.
 
-        correction (6,): change of velocity [m/s] and spin [rad/s] that it got at the end of its course, for what the
-        course was off by: that grew with the square of the time.
+        correction (6,): change of velocity [m/s] and spin [rad/s] that it got at the end of its trajectory, for the
+        error of the trajectory, which grew with the square of the time.
         """
         first, last = int(self.written[i]), int(np.searchsorted(self.times, time, side="left"))
         if last > first:

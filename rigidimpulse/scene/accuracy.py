@@ -11,11 +11,11 @@ Slots
     integrator      how bodies move between impacts (stage integrate): "exact" (forces that vary: steps of order 4, as long as their error
                     allows), or in steps of one length, where forces vary and nothing collides by impulses: "runge_kutta" (of order 4),
                     "semi_implicit" (Euler's, of order 1)
-    contact_solver  how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for heaps of many bodies: see
-                    docs/heaps.md), "qp" (the exact laws by a convex solver library: a reference), or "auto": per island of bodies
-                    that may touch in a step, newton unless it is a large heap
-    substep_motion     how far touching bodies of a heap may come past each other until their contacts are looked for anew, as a fraction of
-                    the distance from the centre of mass to the nearest face
+    contact_solver  how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for islands of many bodies),
+                    "qp" (the exact laws by a convex solver library: a reference), or "auto": newton, or
+                    substepped for large islands of bodies that may touch in a step
+    substep_motion  how far touching bodies of a sub-stepped island may move past each other until their contacts are searched again, as a
+                    fraction of the distance from the centre of mass to the nearest face
     step            s; contact forces are constant over it, impacts are found inside it at any time
     tolerance       gap error at an impact, as a fraction of the size of the smaller body
     iterations      limit of gap queries for one pair and one interval

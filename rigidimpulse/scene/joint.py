@@ -191,8 +191,8 @@ class HingeJoint(_AnchoredJoint):
 
     def rows(self, _distance: float) -> list[Row]:
         """See `Joint`."""
-        held = [Row(ALONG), Row(ALONG + 1), Row(ALONG + 2), *(Row(code) for code in across(0))]
-        return held + bounds(TWIST, self.lower, self.upper) + (self.motor.rows(TWIST) if self.motor else [])
+        fixed = [Row(ALONG), Row(ALONG + 1), Row(ALONG + 2), *(Row(code) for code in across(0))]
+        return fixed + bounds(TWIST, self.lower, self.upper) + (self.motor.rows(TWIST) if self.motor else [])
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,8 +203,8 @@ class SliderJoint(_AnchoredJoint):
 
     def rows(self, _distance: float) -> list[Row]:
         """See `Joint`."""
-        held = [Row(ALONG + 1), Row(ALONG + 2), Row(ABOUT), Row(ABOUT + 1), Row(ABOUT + 2)]
-        return held + bounds(ALONG, self.lower, self.upper) + (self.motor.rows(ALONG) if self.motor else [])
+        fixed = [Row(ALONG + 1), Row(ALONG + 2), Row(ABOUT), Row(ABOUT + 1), Row(ABOUT + 2)]
+        return fixed + bounds(ALONG, self.lower, self.upper) + (self.motor.rows(ALONG) if self.motor else [])
 
 
 @dataclass(frozen=True, eq=False)

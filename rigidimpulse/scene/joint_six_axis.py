@@ -88,7 +88,7 @@ class Limit:
         linear, axes, locks = self.parts()
         stiffness, damping = HARD if self.stiffness is None else float(self.stiffness), float(self.damping)
         if locks:
-            return [Row(code, stiffness=stiffness, damping=damping) for code in _held(linear, axes)]
+            return [Row(code, stiffness=stiffness, damping=damping) for code in _fixed(linear, axes)]
         others = [k for k in range(3) if k not in axes]
         if len(axes) == 1:
             code = (ALONG if linear else TWIST) + axes[0]
@@ -117,7 +117,7 @@ class Drive(Motor):
         return self.rows((ALONG if linear else TWIST) + axes[0])
 
 
-def _held(linear: bool, axes: Sequence[int]) -> list[int]:
+def _fixed(linear: bool, axes: Sequence[int]) -> list[int]:
     """Coordinates that are zero where the axes are locked."""
     if linear:
         return [ALONG + k for k in axes]
@@ -182,5 +182,5 @@ class SixAxisJoint(Joint):
                 locked[linear].update(axes)
             else:
                 rows += limit.rows()
-        held = [Row(code) for linear, axes in locked.items() if axes for code in _held(linear, sorted(axes))]
-        return held + rows + [row for drive in self.drives for row in drive.axis_rows()]
+        fixed = [Row(code) for linear, axes in locked.items() if axes for code in _fixed(linear, sorted(axes))]
+        return fixed + rows + [row for drive in self.drives for row in drive.axis_rows()]

@@ -198,7 +198,7 @@ class Shape:
 
     @cached_property
     def key(self) -> bytes:
-        """A digest of all that makes the shape, but for the file that it is from: the same for shapes that are alike."""
+        """A digest of all data of the shape except the file it is from: the same for shapes that are alike."""
         from hashlib import blake2b
 
         digest = blake2b(f"{self.kind} {self.radius!r} {self.height!r} {self.offset!r}".encode(), digest_size=16)
@@ -315,7 +315,7 @@ def check_orientation(quaternion: np.ndarray, where: str = "") -> None:
 
 
 def normalized_quaternion(quaternion: ArrayLike) -> np.ndarray:
-    """Return the unit quaternion (4,) along a non-zero one; one that is unit but for rounding is only rescaled."""
+    """Return the unit quaternion (4,) along a non-zero one; one that is a unit quaternion up to rounding is only rescaled."""
     q = np.asarray(quaternion, dtype=np.float64)
     q = q / np.max(np.abs(q))  # keeps tiny and huge ones from under- or overflowing
     return q / np.sqrt(np.sum(q * q))
