@@ -62,7 +62,7 @@ def test_cards_show_their_runs(page: Any, wedge: Wedge) -> None:
                 recorded = np.concatenate([run.position(name)[frame], np.roll(run.orientation(name)[frame], -1)])
                 sign = np.sign(pose[3:] @ recorded[3:])
                 assert np.allclose(pose * [1, 1, 1, sign, sign, sign, sign], recorded, rtol=0, atol=POSE)
-    assert page.evaluate("window.rigidimpulse.model.state.drawn") == 4
+    assert page.evaluate("window.rigidimpulse.state.drawn") == 4
 
 
 def test_something_is_seen(page: Any) -> None:

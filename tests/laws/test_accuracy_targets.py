@@ -87,7 +87,7 @@ def test_time_is_kept_and_more_of_it_is_not_less_accurate() -> None:
 @pytest.mark.parametrize(
     ("target", "said"),
     [
-        (lambda: ri.Within(), "nothing"), (lambda: ri.Within(position=0.0), "position"), (lambda: ri.Within(angle=np.nan), "angle"),
+        (lambda: ri.Within(), "sets no bound"), (lambda: ri.Within(position=0.0), "position"), (lambda: ri.Within(angle=np.nan), "angle"),
         (lambda: ri.Within(position=1.0, until=-1.0), "until"), (lambda: ri.InTime(per_frame=-1.0), "per_frame"),
     ],
 )  # fmt: skip
