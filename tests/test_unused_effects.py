@@ -92,7 +92,7 @@ ASKED_FOR = (
     "rigidimpulse.engine.varying_forces", "rigidimpulse.engine.soft_bodies",
 )  # fmt: skip
 """Modules that are imported where a scene asks for them only, but for those of forces that do not vary."""
-ALWAYS = {"rigidimpulse.dynamics.forces.constant"}
+ALWAYS = {"rigidimpulse.dynamics.forces.constant", "rigidimpulse.io", "rigidimpulse.io.registration"}
 OPTIONAL = {"clarabel", "defusedxml", "meshcat", "mujoco", "pybullet", "dask", "h5py", "pxr", "matplotlib", "playwright"}
 
 REPORT = '''
