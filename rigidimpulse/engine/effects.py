@@ -19,13 +19,16 @@ from rigidimpulse.engine.exact.trajectories import begin_trajectories
 from rigidimpulse.engine.impact_time import REASONS as IMPACT_TIMES
 from rigidimpulse.engine.impact_time import sweep_with
 from rigidimpulse.engine.loads import add_gyroscopic_term, keep_steady_load, set_steady_load
+from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.regime import MANY, only_expensive, why_not_substepped
+from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.spheres.effect import BALL, kinds, why_not
 from rigidimpulse.model.effect import Bound, Effect, Skip
+from rigidimpulse.model.island import Island
 from rigidimpulse.model.world import World
 
 
-def find_pairs(run: Any, pair_events: Any) -> None:
+def find_pairs(run: Run, pair_events: PairEvents) -> None:
     """Which islands are sub-stepped in the step, and which pairs may meet in it."""
     run.substepped.choose(run, pair_events)
     pair_events.find_pairs()
@@ -214,12 +217,12 @@ class ContactForces:
         return Bound(f"{how}bodies may come to rest on each other", verbs)
 
 
-def substep_contacts(run: Any, pair_events: Any, island: Any) -> None:
+def substep_contacts(run: Run, pair_events: PairEvents, island: Island) -> None:
     """Contact forces of a sub-stepped island, by sub-steps to the end of the step."""
     run.substepped.contact_forces(run, pair_events, island)
 
 
-def begin_substepped_trajectories(run: Any, pair_events: Any, island: Any) -> None:
+def begin_substepped_trajectories(run: Run, pair_events: PairEvents, island: Island) -> None:
     """Trajectories of its members to where the solver found them, and of those that left it."""
     run.substepped.begin_trajectories(run, pair_events, island)
 
@@ -304,7 +307,7 @@ class ForcedFlight:
         return Bound(f"steps of order 4, as long as their error allows{impacts}", verbs)
 
 
-def look_at_triggers(run: Any, begin: float, end: float) -> None:
+def look_at_triggers(run: Run, begin: float, end: float) -> None:
     """What came into the triggers of a run, and what left them, in a step [s]."""
     run.triggers.look(begin, end)
 

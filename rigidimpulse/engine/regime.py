@@ -1,19 +1,22 @@
-"""Which bodies are a heap: islands of bodies that may touch in a step, and which of them the sub-stepped solver takes.
+"""Which islands are sub-stepped, of the islands of bodies that may touch in a step.
 
-The exact solver is the better one wherever it can be afforded. "auto" takes an island for a heap only where all of this holds:
+The exact regime is the better one wherever it can be afforded. "auto" sub-steps an island only where all of this holds:
 
-    many        at least MANY movable bodies, or FEW that move (faster than what is calm, see `heap_courses`) in a scene of MANY;
-                KEPT for one that is a heap already
-    or dear     at least FEW, each of which the exact solver dealt with more than TOIL times in the last step, in the mean: what rests
-                takes 2 to 4, a fall of boxes 10 to 20, each about as long as a step of a small heap
-    no joints   they want exact rows
-and, where a heap begins (who comes near one later is taken in):
+    many        at least MANY movable bodies, or FEW that move (faster than the sleep speed, see `sleeping.py`) in a scene of MANY;
+                KEPT for an island that is sub-stepped already
+    or costly   at least FEW, each of which the exact regime solved more than EXPENSIVE_SOLVES times in the last step, in the mean.
+                Bodies at rest take 2 to 4 solves, a fall of boxes 10 to 20; each takes about as long as a step of a small
+                sub-stepped island
+    no joints   joints want exact rows
+
+and, where an island begins to be sub-stepped (a body that comes near later is taken in):
+
     alike       no two neighbours of masses beyond RATIO : 1
     dull        no restitution above REBOUND: a rebound is found at the end of the step only
     low         no body more than TALL others above a support: long columns want exact rows
 
-Scenes of fewer than SOME have no heaps. "substepped" takes every island without joints. Bodies that move farther than FAST of their inner
-radius in a sub-step, or turn by more than SPIN rad, are no part of any: they are swept.
+Scenes of fewer than SOME movable bodies have no sub-stepped islands. "substepped" takes every island without joints. A body that moves
+farther than FAST of its inner radius in a sub-step, or turns by more than SPIN rad, is swept instead.
 """
 
 from __future__ import annotations
@@ -33,7 +36,7 @@ FAST, SPIN = 0.5, 2.5 / 16.0
 
 
 def why_not_substepped(world: World) -> str:
-    """Why a scene cannot have heaps; empty where it can."""
+    """Why a scene cannot have sub-stepped islands; empty where it can."""
     solver = world.accuracy.contact_solver
     if "sub-stepped islands" in world.left_out:
         return "left out by the caller"
@@ -54,7 +57,7 @@ def why_not_substepped(world: World) -> str:
 
 
 def only_expensive(world: World) -> bool:
-    """Whether heaps begin only where the exact solver has become dear: the scene has not MANY bodies."""
+    """Whether islands are sub-stepped only where the exact regime has become expensive: the scene has not MANY bodies."""
     return world.accuracy.contact_solver == "auto" and _number(world) < MANY
 
 
@@ -139,12 +142,12 @@ def refusals(
     b: np.ndarray,
     auto: bool,
 ) -> dict[int, str]:  # fmt: skip
-    """Why islands are no heaps, by their root; what holds of contacts (`low`) is not looked at here.
+    """Why islands are not sub-stepped, by their root; what holds of contacts (`low`) is not looked at here.
 
     Args:
         world: the compiled scene.
         root: (n,) of every body; -1 for those in no island.
-        substepped_before: (n,) bool, members of heaps. joined, moves: (n,) bool.
+        substepped_before: (n,) bool, members of sub-stepped islands. joined, moves: (n,) bool.
         toil: (n,) how often the exact solver dealt with each body in the last step.
         a: (k,) bodies of the pairs that may touch in the step; likewise b.
         auto: False where every island without joints is taken.

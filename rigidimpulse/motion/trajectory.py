@@ -1,4 +1,4 @@
-"""The course of every body: its exact path since the last time that something acted on it.
+"""The trajectory of every body: its exact path since the last time that something acted on it.
 
     x(t) = x0 + v0 s + 1/2 a s^2 + 1/6 j s^3,    v(t) = v0 + a s + 1/2 j s^2,    s = t - start
     rotation, by mode:
@@ -6,7 +6,7 @@
       PRESCRIBED   q(t) = exp(w0 s) q0, constant velocity and world angular velocity (its acceleration must be 0)
       FREE         no torque: closed form (free_rotation)
       FORCED       world torque tau0 + tau1 s: power series (forced_rotation)
-      STEPPED      as PRESCRIBED, but for a constant acceleration: the way to a pose that a heap's solver found; the body's own
+      LINEAR       as PRESCRIBED, with a constant acceleration: the way to a pose that the sub-stepped solver found; the body's own
                    velocities run from those at the start to those at the end of the step
 
 The sweep and the integration both read the path here, so the impact time and the motion cannot disagree. A row is set
@@ -35,16 +35,16 @@ from rigidimpulse.motion import free_rotation as free_rotation
 FIXED, PRESCRIBED, FREE, FORCED, LINEAR = 0, 1, 2, 3, 4
 
 SPEEDS, LENGTH = 8, 20
-"""Places in a row of `Course.top` in mode STEPPED, after the constants of a fixed axis: see `Course.stepped`."""
+"""Places in a row of `Trajectories.top` in mode LINEAR, after the constants of a fixed axis: see `Trajectories.stepped`."""
 JERK, TORQUE_RATE, TOP_SIZE = max(free_rotation.FREE_ROTATION_SIZE, forced_rotation.FORCED_ROTATION_SIZE) + np.array([0, 3, 6])
-"""Places in a row of `Course.top`, and its length. The constants of the rotation come first."""
+"""Places in a row of `Trajectories.top`, and its length. The constants of the rotation come first."""
 
 
 class Trajectories(NamedTuple):
     """Paths of n bodies; see the head of the file. Vectors in the world frame, inertia in the principal frame."""
 
     start: np.ndarray
-    """(n,) s, time of the last change of course"""
+    """(n,) s, time of the last change of trajectory"""
     position: np.ndarray
     """(n, 3) m, centre of mass at `start`"""
     orientation: np.ndarray

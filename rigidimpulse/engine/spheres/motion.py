@@ -1,6 +1,6 @@
 """Motion of bodies that turn about a fixed axis, or not at all: balls in free flight, and what stands or is driven evenly.
 
-The operations are those of `integrate.course` and `detect.touching.bring`, so the results are the same bits, without the
+The operations are those of `motion.trajectory` and `motion.evaluate.bring`, so the results are the same bits, without the
 paths of tops and of bodies under torques, which would have to be compiled into the kernel.
 """
 
@@ -50,7 +50,7 @@ def _turn(trajectory, i, s, moves):
 
 @inlined
 def state_of(trajectory, i, t):
-    """As `course.state_at`, for a body that keeps its axis and whose forces do not change; numbers, since views cost more than the rest."""
+    """As `trajectory.state_at`, for a body that keeps its axis and whose forces do not change; numbers, since views are slower."""
     moves = trajectory.mode[i] != FIXED
     s = t - trajectory.start[i] if moves else 0.0
     x0, v0 = _coordinate(trajectory, i, 0, s, moves)
@@ -76,7 +76,7 @@ def bring_ball(motion, i, time):
 
 @jit_making_arrays
 def begin_free_trajectory(motion, i, time, acceleration):
-    """As `course.take` in mode FREE, for a body of equal moments of inertia; acceleration (3,) m/s2."""
+    """As `trajectory.take` in mode FREE, for a body of equal moments of inertia; acceleration (3,) m/s2."""
     now, trajectory = motion.now, motion.trajectory
     trajectory.start[i], trajectory.mode[i] = time, FREE
     for k in range(3):
