@@ -20,7 +20,7 @@ import math
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import exponential, from_columns, product, rotated
-from rigidimpulse.motion import free_rotation as free_rotation
+from rigidimpulse.motion import free_rotation
 
 ORDER = 18
 """order of the series: a higher one costs more at the start and less beyond the first segment, which grows with it"""

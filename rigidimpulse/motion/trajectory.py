@@ -29,8 +29,7 @@ import numpy as np
 from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.quaternion import exponential, product
-from rigidimpulse.motion import forced_rotation as forced_rotation
-from rigidimpulse.motion import free_rotation as free_rotation
+from rigidimpulse.motion import forced_rotation, free_rotation
 
 FIXED, PRESCRIBED, FREE, FORCED, LINEAR = 0, 1, 2, 3, 4
 

@@ -15,7 +15,7 @@ import time
 import numpy as np
 
 import rigidimpulse as ri
-from rigidimpulse.io.cache import checkpointer as checkpointer
+from rigidimpulse.io.cache import checkpointer
 
 
 def pile() -> ri.Scene:

@@ -16,7 +16,7 @@ from kept_runs import SCENES, gas, pile, run
 import rigidimpulse as ri
 from rigidimpulse import gallery
 from rigidimpulse.cli.cli import BAD_SCENE, main
-from rigidimpulse.io.cache import checkpointer as checkpointer
+from rigidimpulse.io.cache import checkpointer
 
 h5py = pytest.importorskip("h5py")
 DURATIONS = {"pile": 0.5, "gas": 40.0, "forces": 0.4}

@@ -22,8 +22,7 @@ from rigidimpulse.core.quaternion import (
     rotate_inverse,
     rotation_vector,
 )
-from rigidimpulse.motion import forced_rotation as forced_rotation
-from rigidimpulse.motion import free_rotation as free_rotation
+from rigidimpulse.motion import forced_rotation, free_rotation
 
 EPS = np.finfo(float).eps
 ROUND_OFF = 64.0
