@@ -17,7 +17,7 @@ from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTE
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.engine.pair_table import MARGIN, live_contacts
-from rigidimpulse.engine.regime import island_roots as roots
+from rigidimpulse.engine.regime import island_roots
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.touching import fill_contacts, near_pairs, pressing
 from rigidimpulse.model.contacts import Contacts
@@ -107,8 +107,8 @@ def _components(
     ends = [run.joints.bodies_of(np.array([j])) for j in joints.tolist()]
     tied = np.flatnonzero(reached & run.forces.acts)
     links = [integer[:, :2], *(end[[[0, -1]]] for end in ends), np.array(run.forces.ties(tied), np.int64).reshape(-1, 2)]
-    first, second = np.ascontiguousarray(np.concatenate(links).T)
-    root = roots(run.world.num_bodies, first, second, dynamic)
+    first, second = np.concatenate(links).T
+    root = island_roots(run.world.num_bodies, first, second, dynamic)
     owner = root[np.where(dynamic[integer[:, 0]], integer[:, 0], integer[:, 1])]
     owner_of_joint = root[np.array([run.joints.movable_end(j) for j in joints.tolist()], np.int64)]
     owner_of_tied = root[tied]

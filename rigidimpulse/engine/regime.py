@@ -25,6 +25,7 @@ import numpy as np
 
 from rigidimpulse.collision.contact_records import SEPARATION, SKIN, SUPPORT, in_play
 from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.core.union_find import roots
 from rigidimpulse.engine.sleeping import SLEEP_SPEED
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
@@ -75,27 +76,10 @@ def _number(world: World) -> int:
     return int(np.count_nonzero(world.dynamic & ~jointed(world)))
 
 
-@jit_making_arrays
-def island_roots(number, first, second, movable):
-    """Root (l,) of each of `number` bodies: the lowest one that pairs of movable bodies join it with."""
-    root = np.arange(number)
-    for p in range(first.shape[0]):
-        if not (movable[first[p]] and movable[second[p]]):
-            continue
-        a, b = first[p], second[p]
-        while root[a] != a:
-            root[a] = root[root[a]]
-            a = root[a]
-        while root[b] != b:
-            root[b] = root[root[b]]
-            b = root[b]
-        root[max(a, b)] = min(a, b)
-    for i in range(number):
-        a = i
-        while root[a] != a:
-            a = root[a]
-        root[i] = a
-    return root
+def island_roots(number: int, first: np.ndarray, second: np.ndarray, movable: np.ndarray) -> np.ndarray:
+    """Root (n,) of each of `number` bodies: the lowest one that links (k,) between movable bodies join it with."""
+    joins = movable[first] & movable[second]
+    return roots(number, first[joins], second[joins])
 
 
 @jit_making_arrays

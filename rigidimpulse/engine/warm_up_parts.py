@@ -145,7 +145,7 @@ def _find_substepped_contacts(run) -> None:
     stepper.near(run, member, ~member, STEP)
     # Columns of one row only would be another type.
     a, b = np.array([[0, 1], [0, 1]]).T
-    root = island_roots(world.num_bodies, np.ascontiguousarray(a), np.ascontiguousarray(b), member)
+    root = island_roots(world.num_bodies, a, b, member)
     refusals(world, root, member, ~member, member, np.zeros(world.num_bodies), a, b, True)
 
 

@@ -61,7 +61,7 @@ class Effect(Protocol):
 
 @dataclass
 class Line:
-    """One line of `explain`: an effect, whether it is in and why, the time it took [s], and how often it was called."""
+    """One line of `explain`: an effect, whether it is in and why, the time it took [s], how often it was called, and what it counted."""
 
     stage: str
     name: str
@@ -69,3 +69,4 @@ class Line:
     reason: str
     seconds: float = 0.0
     calls: int = 0
+    counts: dict[str, int] = field(default_factory=dict)

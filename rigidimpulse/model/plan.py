@@ -92,6 +92,13 @@ class Plan:
         """Whether a step does anything that could change the trajectories of rigid bodies."""
         return bool(self.pairs or self.exact.loads or self.exact.contact_forces or self.observe)
 
+    def line(self, name: str) -> Line:
+        """The line of an effect; a KeyError says that there is no effect of that name."""
+        for line in self.lines:
+            if line.name == name:
+                return line
+        raise KeyError(name)
+
     def includes(self, name: str) -> bool:
         """Whether the effect of a name is in."""
         return any(line.included for line in self.lines if line.name == name)
@@ -110,16 +117,15 @@ class Plan:
         start = perf_counter()
         yield
         spent = perf_counter() - start
-        line = next(line for line in self.lines if line.name == name)
+        line = self.line(name)
         line.seconds += spent
         line.calls += 1
         self._inner += spent
 
-    def tell(self, name: str, reason: str) -> None:
-        """Say of an effect what it did in the run, in the place of why it is in."""
-        for line in self.lines:
-            if line.name == name:
-                line.reason = reason
+    def tell(self, name: str, reason: str, counts: Mapping[str, int]) -> None:
+        """Say of an effect what it did in the run, in the place of why it is in, and what it counted."""
+        line = self.line(name)
+        line.reason, line.counts = reason, dict(counts)
 
     def explain(self) -> str:
         """Return a table: stage, effect, in or out, share of the time so far, why."""

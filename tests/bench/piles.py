@@ -152,7 +152,7 @@ def measure(name: str) -> Line:
     taken = 1e3 * np.diff(ends)
     sunk = np.concatenate([depths(scene, run, f) for f in range(-FRAMES, 0)])
     on_the_way = np.concatenate([depths(scene, run, f) for f in range(20, STEPS, 20)])
-    print(run.status.message, "|", next(line for line in run.plan.explain().splitlines() if "sub-stepped islands" in line))
+    print(run.status.message, "|", run.plan.line("sub-stepped islands").reason)
     return Line(
         name, run.state_hash()[:16], len(ends), float(np.median(taken)), float(np.median(taken[-LAST:])), float(taken.max()),
         1e3 * sunk.max(initial=0.0), 1e3 * float(sunk.mean()) if len(sunk) else 0.0, 1e3 * on_the_way.max(initial=0.0),

@@ -83,7 +83,7 @@ def test_left_to_itself_it_finds_stiffness_and_damping(e: float) -> None:
     run = bounce(0.1, penalty(), e=e)
     assert speed(run) == pytest.approx(e * SPEED, abs=1e-6 * SPEED)
     assert height(bounce(START + 0.5 * math.pi * 0.02 * 2.0 * RADIUS / SPEED, penalty(), e=1.0)) == pytest.approx(-0.004, rel=1e-6)
-    assert "N/m" in run.plan.explain() and len(run.impacts) == 0 and run.status.ok
+    assert "N/m" in run.plan.line("penalty forces").reason and len(run.impacts) == 0 and run.status.ok
     lost = 0.5 * SPEED**2 * (1.0 - e * e)
     assert run.ledger.dissipated["penalty"][-1] == pytest.approx(lost, abs=1e-6)
 

@@ -33,7 +33,8 @@ def test_every_contact_is_in_one_lane_with_the_motion_since_it_was_put_there(mon
     advance, made, steps = contact_forces.advance, {}, {"whole": 0, "steady": 0}
 
     def checked(calls: list[tuple]) -> list[float]:
-        simd, bodies, pairs, _, batches, edges, sleep_timer, *_ = calls[0]
+        simd, solve, *_ = calls[0]
+        bodies, pairs, _, batches, _, edges, steady = solve
         rows = batches.row[: POINTS * edges[-1] * simd.width]
         seen = np.sort(rows[rows > 0] // LINES)
         listed = [
@@ -42,8 +43,8 @@ def test_every_contact_is_in_one_lane_with_the_motion_since_it_was_put_there(mon
             if in_play.py_func(bodies.part, a, b)
         ]
         assert np.array_equal(seen, np.sort(np.concatenate([*listed, []]).astype(np.int64)))
-        steps["steady" if sleep_timer else "whole"] += 1
-        if sleep_timer == 0:
+        steps["steady" if steady else "whole"] += 1
+        if steady == 0:
             made["place"] = bodies.position.copy()
         drift = bodies.drift.reshape(-1, 8)[:, :3]
         moves = bodies.part == contact_forces.MEMBER

@@ -143,7 +143,7 @@ class SubsteppedIslands:
         while len(woken := self._touched(run, member, a, b)):
             member[woken] = True
             a, b, touch = self._near(run, member, ahead)
-        root = island_roots(world.num_bodies, np.ascontiguousarray(a), np.ascontiguousarray(b), member)
+        root = island_roots(world.num_bodies, a, b, member)
         root[~member] = -1
         moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
         refused = refusals(world, root, self.label >= 0, self._jointed, moves, solve_count, a, b, self._auto)
@@ -261,7 +261,8 @@ class SubsteppedIslands:
 
     def finish(self, run: Run) -> None:
         """Account for what the sub-steps under way take until the end of the run, and tell the plan what was done."""
-        run.plan.tell(NAME, self.summary())
+        refused = {f"refused: {reason}": count for reason, count in self._refused.items()}
+        run.plan.tell(NAME, self.summary(), {"steps": self._steps, "largest island": self._most, **refused})
         members, time = np.flatnonzero(run.state.trajectory.mode == LINEAR), run.state.time
         if not len(members):
             return
