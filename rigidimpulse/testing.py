@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.recording.recording import Recording
 
 ROUNDING = 1e-12
@@ -60,14 +60,14 @@ def assert_energy_never_grows(run: Recording, tolerance: float = PULLED) -> None
 
 
 def _rises(run: Recording) -> float:
-    """Work against gravity of lifting every dynamic body by its held gap and those of all below it, J."""
+    """Work against gravity of lifting every dynamic body by its contact margin and those of all below it, J."""
     if run.scene is None:
         return 0.0
     from rigidimpulse.engine.compile_scene import compile_scene
 
     world = compile_scene(run.scene)
     weight = np.where(world.dynamic, world.mass, 0.0) * np.linalg.norm(world.steady_acceleration, axis=1)
-    gaps = TOLERANCES.contact_margin * float(world.size[world.dynamic].sum())
+    gaps = TOLERANCES.contact.margin * float(world.size[world.dynamic].sum())
     return 2.0 * gaps * float(weight.sum())
 
 

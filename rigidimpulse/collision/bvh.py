@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from rigidimpulse.collision.distance.simplices import inner, moved, row, subtract
+from rigidimpulse.collision.distance.simplices import inner
+from rigidimpulse.core.vector import moved, row, subtract
 
 STACK_ROWS = 128
 """Rows of the scratch buffer used as the stack of a walk through two trees; the rest holds pairs of leaves."""

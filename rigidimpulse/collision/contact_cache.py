@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.contact_matching import NEAR, Points, Source, match_contacts, set_contact_margin, write_point
-from rigidimpulse.collision.contact_records import IMPULSE, POINT_FIELDS, UNKNOWN, closing_speed, in_play, turned_back
+from rigidimpulse.collision.contact_records import IMPULSE, POINT_FIELDS, UNKNOWN, closing_speed, in_play
 from rigidimpulse.collision.distance.epa import make_polytope
 from rigidimpulse.collision.distance.gjk import closest, make_simplex
 from rigidimpulse.collision.manifold.convex_convex import seen_from
@@ -29,6 +29,7 @@ from rigidimpulse.collision.manifold.polyhedra import POINTS, Pair, Polyhedra, Q
 from rigidimpulse.collision.manifold.polyhedra import Points as Found
 from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.quaternion import product
+from rigidimpulse.core.vector import turned_back_by
 
 AHEAD, AHEAD_GENERAL, FARTHEST = 0.05, 0.12, 2.0
 """Least margin, least margin of general pairs, and greatest margin of the search for contacts, in inner radii."""
@@ -107,7 +108,7 @@ def _relative_pose(position, orientation, rotation, carrier, other):
     turn = product(
         q[carrier, 0], -q[carrier, 1], -q[carrier, 2], -q[carrier, 3], q[other, 0], q[other, 1], q[other, 2], q[other, 3]
     )
-    return turned_back(rotation, carrier, dx, dy, dz), turn
+    return turned_back_by(rotation, carrier, dx, dy, dz), turn
 
 
 @inlined

@@ -25,9 +25,9 @@ from rigidimpulse.collision.contact_records import (
     SKELETON_B,
     SKIN,
     STATIC_FRICTION,
-    turned_back,
 )
 from rigidimpulse.core.kernels import inlined, jit
+from rigidimpulse.core.vector import turned_back_by
 
 NEAR = 0.2
 """Distance, in inner radii, within which a new point takes over the impulse of an old one of other features."""
@@ -69,9 +69,9 @@ def write_point(bodies, pairs, p, source, coefficients, points, r):
     m, t = material[a], material[b]
     for k in range(IMPULSE, POINT_FIELDS):
         points[r, k] = 0.0
-    points[r, 0], points[r, 1], points[r, 2] = turned_back(rotation, b if carrier else a, nx, ny, nz)
-    points[r, SKELETON_A], points[r, SKELETON_A + 1], points[r, SKELETON_A + 2] = turned_back(rotation, a, ax, ay, az)
-    points[r, SKELETON_B], points[r, SKELETON_B + 1], points[r, SKELETON_B + 2] = turned_back(rotation, b, bx, by, bz)
+    points[r, 0], points[r, 1], points[r, 2] = turned_back_by(rotation, b if carrier else a, nx, ny, nz)
+    points[r, SKELETON_A], points[r, SKELETON_A + 1], points[r, SKELETON_A + 2] = turned_back_by(rotation, a, ax, ay, az)
+    points[r, SKELETON_B], points[r, SKELETON_B + 1], points[r, SKELETON_B + 2] = turned_back_by(rotation, b, bx, by, bz)
     points[r, ROUND_A], points[r, ROUND_B], points[r, CARRIER] = round_a, round_b, 1.0 if carrier else 0.0
     points[r, STATIC_FRICTION], points[r, DYNAMIC_FRICTION] = coefficients[m, t, 1], coefficients[m, t, 2]
     points[r, SKIN], points[r, CONTACT_MARGIN] = min(skin[a], skin[b]), contact_margin

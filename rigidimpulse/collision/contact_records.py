@@ -60,26 +60,6 @@ def in_play(part, a, b):
 
 
 @inlined
-def turned(rotation, i, x, y, z):
-    """The vector (x, y, z) turned by the matrix rotation[i]."""
-    return (
-        rotation[i, 0, 0] * x + rotation[i, 0, 1] * y + rotation[i, 0, 2] * z,
-        rotation[i, 1, 0] * x + rotation[i, 1, 1] * y + rotation[i, 1, 2] * z,
-        rotation[i, 2, 0] * x + rotation[i, 2, 1] * y + rotation[i, 2, 2] * z,
-    )
-
-
-@inlined
-def turned_back(rotation, i, x, y, z):
-    """The vector (x, y, z) turned by the transpose of the matrix rotation[i]."""
-    return (
-        rotation[i, 0, 0] * x + rotation[i, 1, 0] * y + rotation[i, 2, 0] * z,
-        rotation[i, 0, 1] * x + rotation[i, 1, 1] * y + rotation[i, 2, 1] * z,
-        rotation[i, 0, 2] * x + rotation[i, 1, 2] * y + rotation[i, 2, 2] * z,
-    )
-
-
-@inlined
 def closing_speed(position, velocity, reach, a, b, carrier):
     """How fast the points of bodies a and b move past each other at most, m/s, seen from the carrier (b where it is true)."""
     v, i, j = velocity, 8 * a, 8 * b

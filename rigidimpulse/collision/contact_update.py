@@ -13,7 +13,7 @@ import numpy as np
 
 from rigidimpulse.collision.contact_cache import note_seen
 from rigidimpulse.collision.contact_matching import NEAR, Points, Source, match_contacts, set_contact_margin, write_point
-from rigidimpulse.collision.contact_records import ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SKIN, turned
+from rigidimpulse.collision.contact_records import ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SKIN
 from rigidimpulse.collision.geometry import Geometry
 from rigidimpulse.collision.manifold.inset_surface import put_back
 from rigidimpulse.collision.manifold.penetrating import gap_along, overlap_contacts, support
@@ -22,6 +22,7 @@ from rigidimpulse.collision.manifold.polyhedra import Points as Found
 from rigidimpulse.collision.manifold.reduce import reduce_contacts
 from rigidimpulse.collision.manifold.rounding import only_primitive, side_radius
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import turned_by
 
 PER_NORMAL = np.int64(4)
 """Contacts kept of one normal, in addition to the deepest."""
@@ -56,9 +57,9 @@ def _contradicts(bodies, pairs, p, points, new, new_end):
     carrier = b if pairs.carrier[p] else a
     for o in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
         old = points[o]
-        nx, ny, nz = turned(bodies.rotation, carrier, old[0], old[1], old[2])
-        ax, ay, az = turned(bodies.rotation, a, old[SKELETON_A], old[SKELETON_A + 1], old[SKELETON_A + 2])
-        bx, by, bz = turned(bodies.rotation, b, old[SKELETON_B], old[SKELETON_B + 1], old[SKELETON_B + 2])
+        nx, ny, nz = turned_by(bodies.rotation, carrier, old[0], old[1], old[2])
+        ax, ay, az = turned_by(bodies.rotation, a, old[SKELETON_A], old[SKELETON_A + 1], old[SKELETON_A + 2])
+        bx, by, bz = turned_by(bodies.rotation, b, old[SKELETON_B], old[SKELETON_B + 1], old[SKELETON_B + 2])
         gap = (
             (bodies.position[b, 0] - bodies.position[a, 0] + bx - ax) * nx
             + (bodies.position[b, 1] - bodies.position[a, 1] + by - ay) * ny

@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.triangles import unique_edges
 
 if TYPE_CHECKING:
     from rigidimpulse.scene.shape import Shape
@@ -129,16 +130,6 @@ class _Surface(NamedTuple):
     node_child: np.ndarray
     node_start: np.ndarray
     node_count: np.ndarray
-
-
-class UniqueEdges(NamedTuple):
-    """Edges of a set of triangles; half edge 3 t + k runs from vertex k to vertex (k + 1) % 3 of triangle t."""
-
-    first: np.ndarray  # (e,) first half edge of each edge
-    last: np.ndarray  # (e,) last half edge of each edge
-    count: np.ndarray  # (e,) number of half edges
-    balance: np.ndarray  # (e,) half edges that run one way minus those that run the other way
-    triangle_edge: np.ndarray  # (t, 3) edge of each half edge
 
 
 def build_geometry(shapes: Sequence[CompiledShape]) -> Geometry:
@@ -303,23 +294,10 @@ def _edges(
     sine = np.sum(np.cross(edge_normal[:, 0], edge_normal[:, 1]) * along, axis=1)
     cosine = np.sum(edge_normal[:, 0] * edge_normal[:, 1], axis=1)
     # Two faces folded back to back (cosine near -1) are the rim of a sheet: it can touch, so it counts as convex.
-    folded = (np.abs(sine) <= TOLERANCES.flat_angle) & (cosine < 0.0)
-    kind = np.where((sine > TOLERANCES.flat_angle) | folded, EDGE_CONVEX, EDGE_HIDDEN)
+    folded = (np.abs(sine) <= TOLERANCES.surface.flat_angle) & (cosine < 0.0)
+    kind = np.where((sine > TOLERANCES.surface.flat_angle) | folded, EDGE_CONVEX, EDGE_HIDDEN)
     kind[(edges.count != 2) | (edges.balance != 0)] = EDGE_BOUNDARY
     return edge, edge_normal, kind, edges.triangle_edge, first, bool(np.all(edges.balance == 0))
-
-
-def unique_edges(triangle: np.ndarray, num_vertices: int) -> UniqueEdges:
-    """Find the edges of triangles (t, 3) over vertices 0 .. num_vertices - 1."""
-    tail = triangle.ravel()
-    head = np.roll(triangle, -1, axis=1).ravel()
-    key = np.minimum(tail, head) * num_vertices + np.maximum(tail, head)
-    _, first, inverse, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
-    inverse = inverse.ravel()
-    last = np.empty_like(first)
-    last[inverse] = np.arange(len(key))  # later half edges overwrite earlier ones
-    balance = np.bincount(inverse, weights=np.where(tail < head, 1, -1), minlength=len(first))
-    return UniqueEdges(first, last, count, balance, inverse.reshape(-1, 3))
 
 
 def _corners(vertex: np.ndarray, edge: np.ndarray, edge_kind: np.ndarray) -> np.ndarray:
@@ -330,7 +308,7 @@ def _corners(vertex: np.ndarray, edge: np.ndarray, edge_kind: np.ndarray) -> np.
     directions = np.concatenate([along, -along])
     degree = np.bincount(ends, minlength=len(vertex))
     total = np.column_stack([np.bincount(ends, weights=directions[:, k], minlength=len(vertex)) for k in range(3)])
-    straight = (degree == 2) & (np.linalg.norm(total, axis=1) <= TOLERANCES.flat_angle)
+    straight = (degree == 2) & (np.linalg.norm(total, axis=1) <= TOLERANCES.surface.flat_angle)
     return (degree > 0) & ~straight
 
 
@@ -372,12 +350,12 @@ def _bounding_sphere(primitive: Primitive) -> tuple[np.ndarray, float]:
         return np.zeros(3), np.inf
     if primitive.kind == CYLINDER:
         radius = float(np.hypot(primitive.radius, primitive.frame[6]))
-        return primitive.frame[:3], radius * (1.0 + TOLERANCES.round_off)
+        return primitive.frame[:3], radius * (1.0 + TOLERANCES.arithmetic.round_off)
     low, high = primitive.vertices.min(axis=0), primitive.vertices.max(axis=0)
     centres = (0.5 * (low + high), primitive.vertices.mean(axis=0))
     radii = [float(np.linalg.norm(primitive.vertices - centre, axis=1).max()) for centre in centres]
     best = int(np.argmin(radii))
-    return centres[best], (radii[best] + primitive.radius) * (1.0 + TOLERANCES.round_off)
+    return centres[best], (radii[best] + primitive.radius) * (1.0 + TOLERANCES.arithmetic.round_off)
 
 
 def _edges_around_vertices(edge: np.ndarray, num_vertices: int) -> tuple[np.ndarray, np.ndarray]:

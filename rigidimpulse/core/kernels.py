@@ -205,7 +205,7 @@ class Kernel:
 
     Attributes:
         name: module and function. calls: how often Python called it.
-        seconds: how long that took, but for `preparing`, s: the first call for each set of types, in which it is compiled or loaded.
+        seconds: how long that took, s, without `preparing`: the first call for each set of types, in which it is compiled or loaded.
 
     """
 

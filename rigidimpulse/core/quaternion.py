@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import cross_arrays
 
-_SMALL_ANGLE = 1e-5
-"""rad; below it sin(a/2)/a is taken from two terms of its series, which is then exact to round-off"""
+_SMALL_ANGLE = TOLERANCES.rotation.small_angle
 
 
 # -- compiled: scalars in, tuples out ---------------------------------------------------------------------------------
@@ -55,8 +56,11 @@ def exponential(x, y, z):
 
 
 @jit
-def from_columns(r00, r10, r20, r01, r11, r21, r02, r12, r22):
-    """The unit quaternion, first component >= 0, of the rotation matrix given column by column."""
+def from_columns(x, y, z):
+    """The unit quaternion, first component >= 0, of the rotation matrix with the columns x, y and z, each of three numbers."""
+    r00, r10, r20 = x
+    r01, r11, r21 = y
+    r02, r12, r22 = z
     trace = r00 + r11 + r22
     if trace >= max(r00, r11, r22):
         q0, q1, q2, q3 = 1.0 + trace, r21 - r12, r02 - r20, r10 - r01
@@ -95,7 +99,7 @@ def matrix_to_quaternion(R):
     """The unit quaternion (4,), first component >= 0, of a rotation matrix (3, 3)."""
     q = np.empty(4)
     q[0], q[1], q[2], q[3] = from_columns(
-        R[0, 0], R[1, 0], R[2, 0], R[0, 1], R[1, 1], R[2, 1], R[0, 2], R[1, 2], R[2, 2]
+        (R[0, 0], R[1, 0], R[2, 0]), (R[0, 1], R[1, 1], R[2, 1]), (R[0, 2], R[1, 2], R[2, 2])
     )
     return q
 
@@ -127,18 +131,6 @@ def quaternion_rotate_inverse(q, v, out):
 # -- numpy, over leading axes -----------------------------------------------------------------------------------------
 
 
-def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a x b of vectors (..., 3), to the bit that of `np.cross`, which spends ten times as long on looking at its arguments."""
-    x, y, z = a[..., 0], a[..., 1], a[..., 2]
-    u, v, w = b[..., 0], b[..., 1], b[..., 2]
-    first = y * w - z * v
-    out = np.empty((*np.shape(first), 3))
-    out[..., 0] = first
-    out[..., 1] = z * u - x * w
-    out[..., 2] = x * v - y * u
-    return out
-
-
 def conjugate(q: ArrayLike) -> np.ndarray:
     """The inverse rotations of unit quaternions (..., 4)."""
     return np.asarray(q, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
@@ -159,7 +151,7 @@ def multiply(a: ArrayLike, b: ArrayLike) -> np.ndarray:
     """Quaternions a b (..., 4): first b, then a."""
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     scalar = a[..., :1] * b[..., :1] - np.sum(a[..., 1:] * b[..., 1:], axis=-1, keepdims=True)
-    vector = a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + cross(a[..., 1:], b[..., 1:])
+    vector = a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + cross_arrays(a[..., 1:], b[..., 1:])
     return np.concatenate([scalar, vector], axis=-1)
 
 
@@ -167,8 +159,8 @@ def rotate(q: ArrayLike, v: ArrayLike) -> np.ndarray:
     """Vectors v (..., 3) turned by unit quaternions q (..., 4): body to world."""
     q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
     u = q[..., 1:]
-    twice = 2.0 * cross(u, v)
-    return v + q[..., :1] * twice + cross(u, twice)
+    twice = 2.0 * cross_arrays(u, v)
+    return v + q[..., :1] * twice + cross_arrays(u, twice)
 
 
 def rotate_inverse(q: ArrayLike, v: ArrayLike) -> np.ndarray:

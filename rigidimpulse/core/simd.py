@@ -1,7 +1,7 @@
-"""Explicit SIMD in kernels: vectors of W doubles, one lane for each of W things that are worked on at once.
+"""Explicit SIMD in kernels: vectors of W doubles, one element for each of W things that are computed at once.
 
-`Lanes(W)` is handed to a kernel, which makes its vectors by it; the width is part of its type, so that one source serves all
-machines. Vectors have + - * / and negation, and the functions below. No lane ever reads another one, and products are added by
+A kernel gets `Simd(W)` and makes its vectors by it. The width is part of its type, so that one source serves all
+machines. Vectors have + - * / and negation, and the functions below. No element ever depends on another one, and products are added by
 `fma` or not at all, so the same bits come out at every width.
 
 Arrays that are read and written by `load` and `store` may hold single precision; vectors are of doubles always.
@@ -36,7 +36,7 @@ _DOUBLE, _SINGLE, _INDEX, _SHORT = ir.DoubleType(), ir.FloatType(), ir.IntType(6
 
 
 class Simd:
-    """How many lanes a kernel is to work with, 2, 4 or 8."""
+    """The number of elements of the vectors of a kernel: 2, 4 or 8."""
 
     def __init__(self, width: int) -> None:
         """width: 2, 4 or 8."""
@@ -45,7 +45,7 @@ class Simd:
 
 @cache
 def machine_simd() -> Simd:
-    """Return the lanes of this machine's widest vector unit."""
+    """Return the width of this machine's widest vector unit."""
     features = llvmlite.binding.get_host_cpu_features()
     return Simd(8 if features.get("avx512f") else 4 if features.get("avx2") else 2)
 
@@ -58,7 +58,7 @@ def aligned(rows: int) -> np.ndarray:
 class _SimdType(types.Type):
     def __init__(self, width: int) -> None:
         self.width = width
-        super().__init__(name=f"Lanes({width})")
+        super().__init__(name=f"Simd({width})")
 
 
 class _VectorType(types.Type):
@@ -72,32 +72,32 @@ register_model(_SimdType)(models.OpaqueModel)
 
 @register_model(_VectorType)
 class _VectorModel(models.PrimitiveModel):
-    def __init__(self, manager, kind) -> None:
+    def __init__(self, manager: Any, kind: _VectorType) -> None:
         super().__init__(manager, kind, ir.VectorType(_DOUBLE, kind.width))
 
 
 @typeof_impl.register(Simd)
-def _type_of_simd(simd: Simd, _context) -> types.Type:
+def _type_of_simd(simd: Simd, _context: Any) -> types.Type:
     return _SimdType(simd.width)
 
 
 @unbox(_SimdType)
-def _unbox_simd(_type, _object, context):
+def _unbox_simd(_type: types.Type, _object: Any, context: Any) -> NativeValue:
     return NativeValue(context.context.get_dummy_value())
 
 
 @lower_constant(_SimdType)
-def _constant_simd(context, _builder, _type, _value):
+def _constant_simd(context: Any, _builder: Any, _type: types.Type, _value: Simd) -> Any:
     return context.get_dummy_value()
 
 
-def _define_operator(python, instruction: str) -> None:
+def _define_operator(python: Any, instruction: str) -> None:
     @type_callable(python)
-    def type_of(_context):
+    def type_of(_context: Any) -> Any:
         return lambda a, b: a if isinstance(a, _VectorType) and a == b else None
 
     @lower_builtin(python, _VectorType, _VectorType)
-    def lower(_context, builder, _signature, arguments):
+    def lower(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         return getattr(builder, instruction)(*arguments)
 
 
@@ -106,16 +106,16 @@ for _python, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (o
 
 
 @type_callable(operator.neg)
-def _type_of_negated(_context):
+def _type_of_negated(_context: Any) -> Any:
     return lambda a: a if isinstance(a, _VectorType) else None
 
 
 @lower_builtin(operator.neg, _VectorType)
-def _lower_negated(_context, builder, _signature, arguments):
+def _lower_negated(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
     return builder.fneg(arguments[0])
 
 
-def _by_machine(builder, name: str, kind: _VectorType, arguments):
+def _by_machine(builder: Any, name: str, kind: _VectorType, arguments: Any) -> Any:
     vector = ir.VectorType(_DOUBLE, kind.width)
     function = ir.FunctionType(vector, [vector] * len(arguments))
     return builder.call(cgutils.get_or_insert_function(builder.module, function, f"llvm.{name}.v{kind.width}f64"), arguments)
@@ -151,7 +151,7 @@ def where_greater(_typing, a, b, x, y):
 
 @intrinsic
 def spread(_typing, simd, x):
-    """x in all lanes."""
+    """x in all elements."""
     kind = _VectorType(simd.width)
 
     def lower(context, builder, signature, arguments):
@@ -163,12 +163,12 @@ def spread(_typing, simd, x):
     return kind(simd, x), lower
 
 
-def _place(context, builder, kind, array, index, vector):
+def _place(context: Any, builder: Any, kind: types.Type, array: Any, index: Any, vector: ir.Type) -> Any:
     data = context.make_array(kind)(context, builder, array).data
     return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
 
 
-def _stored(array, width: int) -> tuple[ir.Type, int]:
+def _stored(array: Any, width: int) -> tuple[ir.Type, int]:
     """W values of an array as they lie in memory, and the bytes of one."""
     single = array.dtype == types.float32
     return ir.VectorType(_SINGLE if single else _DOUBLE, width), 4 if single else 8
@@ -202,11 +202,11 @@ def store(_typing, array, index, value):
     return types.void(array, types.intp, value), lower
 
 
-def _mix(builder, a, b, order):
+def _mix(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_SHORT, len(order)), order))
 
 
-def _transposed(builder, rows):
+def _transposed(builder: Any, rows: list) -> list:
     """n vectors of n, n a power of two: swap blocks of 1, 2, 4 ... off the diagonal."""
     n, block, rows = len(rows), 1, list(rows)
     while block < n:
@@ -221,14 +221,14 @@ def _transposed(builder, rows):
     return rows
 
 
-def _columns(builder, rows):
+def _columns(builder: Any, rows: list) -> list:
     """8 vectors of the W rows of 8."""
     w = len(rows)
     parts = [[_mix(builder, row, row, list(range(first, first + w))) for row in rows] for first in range(0, ROW, w)]
     return [column for part in parts for column in _transposed(builder, part)]
 
 
-def _rows(builder, columns, w):
+def _rows(builder: Any, columns: list, w: int) -> list:
     """W rows of 8 of the 8 vectors."""
     parts = [_transposed(builder, columns[first : first + w]) for first in range(0, ROW, w)]
     while len(parts) > 1:
@@ -240,11 +240,13 @@ def _rows(builder, columns, w):
     return parts[0]
 
 
-def _row_place(context, builder, array_type, array, index_type, index, first, lane):
-    number = context.make_array(index_type)(context, builder, index).data
-    number = builder.load(builder.gep(number, [builder.add(first, ir.Constant(first.type, lane))]))
+def _row_place(context: Any, builder: Any, array: tuple[types.Type, Any], index: tuple[types.Type, Any], first: Any, element: int) -> Any:
+    array_type, array_value = array
+    index_type, index_value = index
+    number = context.make_array(index_type)(context, builder, index_value).data
+    number = builder.load(builder.gep(number, [builder.add(first, ir.Constant(first.type, element))]))
     start = builder.shl(builder.sext(number, _INDEX), ir.Constant(_INDEX, 3))
-    place = _place(context, builder, array_type, array, start, ir.VectorType(_DOUBLE, ROW))
+    place = _place(context, builder, array_type, array_value, start, ir.VectorType(_DOUBLE, ROW))
     return place
 
 
@@ -256,8 +258,8 @@ def gather(_typing, simd, array, index, first):
     def lower(context, builder, signature, arguments):
         _, array_type, index_type, _ = signature.args
         rows = []
-        for lane in range(simd.width):
-            row = builder.load(_row_place(context, builder, array_type, arguments[1], index_type, arguments[2], arguments[3], lane))
+        for element in range(simd.width):
+            row = builder.load(_row_place(context, builder, (array_type, arguments[1]), (index_type, arguments[2]), arguments[3], element))
             row.align = LINE
             rows.append(row)
         return context.make_tuple(builder, kind, _columns(builder, rows))
@@ -272,8 +274,8 @@ def scatter(_typing, array, index, first, columns):
     def lower(context, builder, signature, arguments):
         array_type, index_type, _, kind = signature.args
         vectors = cgutils.unpack_tuple(builder, arguments[3], ROW)
-        for lane, row in enumerate(_rows(builder, vectors, kind.dtype.width)):
-            place = _row_place(context, builder, array_type, arguments[0], index_type, arguments[1], arguments[2], lane)
+        for element, row in enumerate(_rows(builder, vectors, kind.dtype.width)):
+            place = _row_place(context, builder, (array_type, arguments[0]), (index_type, arguments[1]), arguments[2], element)
             builder.store(row, place).align = LINE
         return context.get_dummy_value()
 

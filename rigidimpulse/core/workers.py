@@ -40,7 +40,7 @@ def empty_work_queue() -> np.ndarray:
     return work_queue
 
 
-def _pointer(context, builder, signature, arguments):
+def _pointer(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
     return builder.gep(data, [arguments[1]])
 
@@ -118,6 +118,6 @@ def report_piece(work_queue):
 
 @jit
 def wait_for(work_queue, number):
-    """Wait until the helper has done so many pieces of a round."""
+    """Wait until the helper has done this number of pieces of a round."""
     while _read(work_queue, DONE) < number:
         pause()

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import from_matrix, multiply, rotate
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.constant import ConstantForce, push_of_forces
+from rigidimpulse.model.joint_table import compile_joints
 from rigidimpulse.model.world import World
 from rigidimpulse.scene.accuracy import Accuracy, resolve_accuracy
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.collision_filter import pairs_filtered
-from rigidimpulse.scene.joint import Joint, compile_joints
+from rigidimpulse.scene.joint import Joint
 from rigidimpulse.scene.mass import BodyMass, masses_of
 from rigidimpulse.scene.material import combine, combine_rolling
 from rigidimpulse.scene.scene import Scene, validate
@@ -74,8 +75,8 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         flat=_has_faces(geometry, shape_of_body),
         half_space=np.array([_all_half_spaces(geometry, k) for k in shape_of_body], bool),
         ball=np.array([_is_ball(geometry, k) for k in shape_of_body], bool),
-        contact_margin=TOLERANCES.contact_margin,
-        impact_margin=TOLERANCES.impact_margin,
+        contact_margin=TOLERANCES.contact.margin,
+        impact_margin=TOLERANCES.contact.impact_margin,
         apart=_pairs_apart(joints, bodies, dynamic),
         joints_of_scene=joints,
         left_out=left_out,

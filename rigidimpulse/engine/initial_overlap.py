@@ -24,6 +24,7 @@ import numpy as np
 
 from rigidimpulse.collision.distance.fcl import Narrowphase, Separation
 from rigidimpulse.core.quaternion import rotate, to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, make_rows
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.engine.pair_events import PairEvents
@@ -31,17 +32,14 @@ from rigidimpulse.engine.run import Run
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import begin
 
-DEPTH = 1e-5
+DEPTH = TOLERANCES.initial_overlap.depth
 DIRECTIONS = np.vstack([np.eye(3), -np.eye(3)])
 MAX_ROUNDS = 40
 MAX_APPROACHES = 40
 MAX_DESCENTS = 4
-EQUAL = 1e-7
-"""Ways that differ by less, relative to the size of the smaller body, are equal."""
-SOFTNESS = 1e-8
-"""Softness of a demand, relative to its inverse mass: demands that contradict each other end in a compromise."""
-SURE = 1.0 + 1e-9
-"""Distance of bounding spheres, relative to their radii, beyond which bodies are apart whatever rounding does."""
+EQUAL = TOLERANCES.initial_overlap.equal_ways
+SOFTNESS = TOLERANCES.initial_overlap.softness
+SURE = 1.0 + TOLERANCES.initial_overlap.surely_apart
 STALLED = 5
 """Rounds without a lesser overlap after which there is no room."""
 

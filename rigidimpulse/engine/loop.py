@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.effects import EventKernel
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.spheres.effect import ARRIVED, GO_ON, STEP
@@ -18,8 +19,7 @@ from rigidimpulse.motion.trajectory import FIXED
 
 WATCHED = 64
 """Steps at most between two looks at a run that somebody watches."""
-GRID = 1e-9
-"""Part of a step by which a time may miss the grid of steps by rounding."""
+GRID = TOLERANCES.events.grid
 
 
 def run_to_end(run: Run, duration: float, progress: Callable[[float], None] | None) -> None:

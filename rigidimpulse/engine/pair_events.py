@@ -10,15 +10,14 @@ import numpy as np
 
 from rigidimpulse.collision.broad_phase import find_overlapping
 from rigidimpulse.collision.time_of_impact.spheres import is_closed_form
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.pair_table import MARGIN, MAX_REPEATS, Pairs, new_pairs, path_boxes, renew_pairs
 from rigidimpulse.engine.run import Run
 from rigidimpulse.motion.trajectory import FIXED
 
-STUCK_STEP = 1e-3
-"""Part of the contact margin by which the gap of contact is lowered after a contact without consequence."""
+STUCK_STEP = TOLERANCES.events.stuck_step
 MAX_TRIES = 30
-INSTANT = 1e-6
-"""Part of a step within which a pair that comes to contact again does so at the same instant."""
+INSTANT = TOLERANCES.events.instant
 
 
 class PairEvents:

@@ -13,13 +13,12 @@ import numpy as np
 
 from rigidimpulse.collision.broad_phase import overlapping_with
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import FIXED, FREE, JERK, place_at, rate_of, row_at, turning_points
 
-NEAR = 1e-6
-"""Contacts that much farther away than the declared gap, relative to it, are in contact too."""
-ROUND_OFF = 1e-6
-"""The same, relative to the contact margin."""
+NEAR = TOLERANCES.events.near
+ROUND_OFF = TOLERANCES.events.contact_margin_round_off
 MARGIN = 2.0
 """Contacts are looked for within this many contact margins."""
 MAX_REPEATS = 100

@@ -12,7 +12,7 @@ from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.step import react
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.impulses import Impulses
-from rigidimpulse.recording.ledger import make_ledger
+from rigidimpulse.recording.ledger import Masses, make_ledger
 from rigidimpulse.recording.recording import Recording, Status
 from rigidimpulse.scene.frames import own_frames
 
@@ -77,8 +77,7 @@ def make_recording(run: Run, duration: float) -> Recording:
     work = run.forces.finish(world, times, recorder)
     mass = np.where(world.dynamic & (times[:, None] >= release_times(world)), world.mass, 0.0)
     ledger = make_ledger(
-        times, recorder.position, recorder.orientation, recorder.velocity, recorder.angular_velocity,
-        mass, world.inertia, world.steady_acceleration, run.log, work,
+        recorder.frames._replace(times=times), Masses(mass, world.inertia, world.steady_acceleration), run.log, work
     )
     run.soft_bodies.add_to(ledger)
     contacts = run.contact_log.table()

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.island import Island
 
@@ -29,7 +29,7 @@ def may_sleep(run: Run, island: Island, h: float) -> bool:
         moves = moves or world.moving[run.joints.bodies_of(island.joints)].any()
     if moves or (island.loaded and not run.forces.may_rest(i)):
         return False
-    limit = TOLERANCES.rest * world.steady_strength[i] * h
+    limit = TOLERANCES.contact.rest * world.steady_strength[i] * h
     force, torque = run.wrench[i, :3], run.wrench[i, 3:]
     spin = run.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], torque)
     gained = h * (run.acceleration[i] + world.inv_mass[i, None] * force)

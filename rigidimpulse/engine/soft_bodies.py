@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.soft_body.contact_planes import RigidMotion
 from rigidimpulse.dynamics.soft_body.forces import SoftBodyForces
 from rigidimpulse.dynamics.soft_body.soft_bodies import FlexibleStep
@@ -29,12 +30,9 @@ from rigidimpulse.recording.ledger import Ledger
 
 MOST_PIECES = 32
 """Parts into which a step of the run is cut at most where something fast comes near a soft body."""
-SHORTEST = 1e-9
-"""Part of the run's step below which soft bodies are not stepped: what rounding leaves at the end of a run."""
-STILL = 1e-3
-"""Speed below which what a soft body presses stands still, relative to what gravity gives in a step."""
-MADE = 1e-6
-"""Energy made of nothing, relative to that of the soft bodies, that is reported."""
+SHORTEST = TOLERANCES.soft_body.shortest_step
+STILL = TOLERANCES.soft_body.still
+MADE = TOLERANCES.soft_body.energy_reported
 
 
 class RunningSoftBodies:

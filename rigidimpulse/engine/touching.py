@@ -16,12 +16,13 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.impact.point import inverse_effective_mass, relative_velocity
 from rigidimpulse.motion.trajectory import place_at
 
 # Part of bounding radii and of held gaps that rounding may take.
-ROUND_OFF = 1e-9
+ROUND_OFF = TOLERANCES.events.reach_round_off
 
 
 @jit_making_arrays

@@ -18,6 +18,7 @@ from rigidimpulse.collision.distance.fcl import Narrowphase
 from rigidimpulse.collision.geometry import compile_shape
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.quaternion import multiply, rotate
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.effect import Skip
 from rigidimpulse.motion.trajectory import FIXED, pose_at
@@ -25,8 +26,7 @@ from rigidimpulse.scene.body import vector
 from rigidimpulse.scene.collision_filter import CollisionFilter, may_meet
 from rigidimpulse.scene.shape import Shape, check_orientation, normalized_quaternion
 
-SHARPNESS = 1e-9
-"""s, to which times are found."""
+SHARPNESS = TOLERANCES.time_of_impact.trigger
 MOST_LOOKS = 1000
 """Looks at most at one pair in one step."""
 BEGINS, ENDS = "overlap begins", "overlap ends"

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.force import ForceTable, Instant
 from rigidimpulse.dynamics.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.dynamics.forces.mass_flow import BurningForces, MassFlow
@@ -41,11 +42,12 @@ FIRST = 2.0**-6
 """Part of the run's step that the first sub-step of bodies takes that have just come to be held."""
 SAFETY, LEAST_CHANGE, MOST_CHANGE = 0.9, 0.2, 5.0
 """How step lengths follow errors."""
-ASIDE = 1e-9
-"""Part of a step by which forces are taken inside of its ends: where they jump the step's own side counts."""
+ASIDE = TOLERANCES.force.aside
 
-SWITCHED, LEAST_PIECE, MOST_SWITCHES = 1e-9, 1e-13, 20
-"""Part of a step by which it may end off a switch of forces; part of the run's step to which switches are found; how many in a step."""
+SWITCHED = TOLERANCES.force.switched
+LEAST_PIECE = TOLERANCES.force.least_piece
+MOST_SWITCHES = 20
+"""Switches of forces in a step."""
 
 
 class VaryingForces:

@@ -37,7 +37,7 @@ from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories
 from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, SUBSTEPPED
 from rigidimpulse.model.island import empty_contacts
 from rigidimpulse.motion.evaluate import bring_all, bring_gyroscopic, refresh_pose
-from rigidimpulse.motion.trajectory import FREE, take
+from rigidimpulse.motion.trajectory import FREE, Load, take
 from rigidimpulse.recording.contact_log import fill_contacts_and_forces
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
@@ -127,7 +127,7 @@ def _move(run) -> None:
     start_trajectories(run)
     run.recorder.start(state.trajectory)
     bring_all(state.trajectory, np.array([1]), 0.0, now, state.rotation, run.acceleration, run.angular_acceleration)
-    take(state.trajectory, 1, 0.0, now, *np.zeros((4, 3)), FREE)
+    take(state.trajectory, 1, 0.0, now, Load(*np.zeros((4, 3))), FREE)
     pair_events = PairEvents(run, 1.0 / 60.0)
     pair_events.find_pairs()
     pair_events.trajectory_changed(1, 0.0)

@@ -2,7 +2,7 @@
 
 Both joints are of six axes (see `constrain.six_axis`). The shoulder is a ball joint, its axis within CONE of that of the
 socket, its twist stopped by a spring and damper; the elbow is a hinge between bounds. Limits are bounds, to the error at
-which joints are closed, and only take energy: kinetic and potential energy together do not rise, but for what the soft
+which joints are closed, and only take energy: kinetic and potential energy together do not rise, except by what the soft
 stop gives back, which is little.
 """
 

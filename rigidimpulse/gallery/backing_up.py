@@ -44,7 +44,7 @@ ROOT, TANGENT = 1e-12, 1e-11
 
 
 def scene() -> Scene:
-    """Return the floor and the batons, each in a lane of its own."""
+    """Return the floor and the batons, each in a track of its own."""
     scene = Scene(gravity=(0.0, 0.0, -GRAVITY))
     scene.add(Body("floor", Shape.half_space(), motion="static"))
     smooth = Material(density=DENSITY, restitution=0.2, static_friction=0.0)
@@ -90,19 +90,19 @@ def _first(run: Recording, name: str) -> float:
     return float(times[0]) if len(times) else math.nan
 
 
-def _gap(name: str, t):
+def _gap(name: str, t: Any) -> Any:
     height, speed, spin, angle = BATONS[name]
     return height + speed * t - 0.5 * GRAVITY * t**2 - 0.5 * LENGTH * np.abs(np.sin(angle + spin * t)) - RADIUS
 
 
-def _rate(name: str, t):
+def _rate(name: str, t: Any) -> Any:
     """Return gap', m/s."""
     _, speed, spin, angle = BATONS[name]
     turn = angle + spin * t
     return speed - GRAVITY * t - 0.5 * LENGTH * spin * np.cos(turn) * np.sign(np.sin(turn))
 
 
-def _bend(name: str, t):
+def _bend(name: str, t: Any) -> Any:
     """Return gap'' where the baton is not level, m/s^2."""
     _, _, spin, angle = BATONS[name]
     return -GRAVITY + 0.5 * LENGTH * spin**2 * np.abs(np.sin(angle + spin * t))

@@ -7,8 +7,8 @@ Sliding friction mu m g is all that slows the car, whichever wheel bears how muc
 With the centre of mass a height h above the road, half way between axles L apart, the friction under it tips the weight onto the front
 axle until moments balance, N_front L = m g (L / 2 + mu h); once the car stands both bear half. V = 29 m/s and mu = 0.8 stop in 3.695 s,
 53.6 m. All forces are constant until the stop, so the ways are polynomials and errors are those of the equations of contact, solved to
-some 1e-12, and of the held gap, 1e-6 of the car: 1e-6 relative is generous, and a step that stops a sixtieth of a second late is off by
-2e-3.
+some 1e-12, and of the contact margin, 1e-6 of the car: 1e-6 relative is generous, and a step that stops a sixtieth of a second late is
+off by 2e-3.
 """
 
 from __future__ import annotations

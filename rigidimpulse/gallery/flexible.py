@@ -50,6 +50,6 @@ def laws_of_energy(run: Recording, rise: float) -> list[Check]:
     scale = float(np.ptp(run.ledger.potential))
     taken = np.sum(list(run.ledger.dissipated.values()), axis=0)
     return [
-        at_most("largest rise of energy from frame to frame, relative", np.diff(total).max() / scale, rise, "nets only take"),
+        at_most("largest rise of energy from frame to frame, relative", np.diff(total).max() / scale, rise, "soft bodies only take"),
         at_most("error of the ledger, relative", np.abs(total + taken - total[0]).max() / scale, 1e-9, "energy balance"),
     ]

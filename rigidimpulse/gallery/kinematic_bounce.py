@@ -7,7 +7,7 @@ impact j (from 0) has the speed k^j s and the time
 
     t_j = s / g + (2 s / g) (k + k^2 + ... + k^j)
 
-Speed along the floor and spin stay. Each lane has a light ball and one eight thousand times as heavy side by side: their paths are the
+Speed along the floor and spin stay. Each track has a light ball and one eight thousand times as heavy side by side: their paths are the
 same bits until they rest. Roots and products of sixteen digits, some twenty impacts: 1e-11. Impulses with friction would slow both down
 and take the spin.
 """
@@ -29,12 +29,12 @@ from rigidimpulse.scene.shape import Shape
 
 GRAVITY, RADIUS, HEIGHT = 9.81, 0.08, 1.2
 TRACKS = {"k = 0.5": 0.5, "k = 0.7": 0.7, "k = 0.85": 0.85, "k = 1": 1.0}
-"""Restitution of each lane."""
+"""Restitution of each track."""
 DENSITIES = {"light": 30.0, "heavy": 240_000.0}
 SPEED, SPIN = 0.9, 6.0
-"""m/s along the lane, rad/s about the vertical."""
+"""m/s along the track, rad/s about the vertical."""
 TRACK, PAIR = 0.7, 0.2
-"""m between lanes, and between the balls of a lane."""
+"""m between tracks, and between the balls of a track."""
 DURATION = 3.5
 BOUND = 1e-11
 TAIL = 0.999
@@ -42,13 +42,13 @@ TAIL = 0.999
 
 
 def scene() -> Scene:
-    """Return the floor and two balls a lane."""
+    """Return the floor and two balls a track."""
     scene = Scene(gravity=(0.0, 0.0, -GRAVITY))
     scene.add(Body("floor", Shape.half_space(), motion="static"))
     ball = Shape.sphere(RADIUS)
-    for lane, (name, k) in enumerate(TRACKS.items()):
+    for track, (name, k) in enumerate(TRACKS.items()):
         for side, (kind, density) in enumerate(DENSITIES.items()):
-            place = (0.0, lane * TRACK + side * PAIR, RADIUS + HEIGHT)
+            place = (0.0, track * TRACK + side * PAIR, RADIUS + HEIGHT)
             motion: dict[str, Any] = {"velocity": (SPEED, 0.0, 0.0), "angular_velocity": (0.0, 0.0, SPIN)}
             material = Material(density=density, restitution=k)
             scene.add(Body(f"{kind}, {name}", ball, position=place, material=material, **motion))
@@ -56,7 +56,7 @@ def scene() -> Scene:
 
 
 def check(run: Recording) -> list[Check]:
-    """Compare times and speeds of all impacts with the closed forms, and the balls of each lane with each other."""
+    """Compare times and speeds of all impacts with the closed forms, and the balls of each track with each other."""
     checks, along, turn = [], 0.0, 0.0
     for name, k in TRACKS.items():
         light, heavy = (f"{kind}, {name}" for kind in DENSITIES)

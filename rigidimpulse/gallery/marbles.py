@@ -7,7 +7,7 @@
 
 A point is in a convex polyhedron if it is behind all face planes, in a concave one if a ray from it crosses the surface an odd number of
 times. Many points are in line with vertices and edges of the octahedron; a parity that counts those twice is wrong for half of them.
-There is a marble where a point is inside, and only there. How they fall has no law here: the soft solver of heaps does it, quickly.
+There is a marble where a point is inside, and only there. How they fall has no law here: the soft sub-stepped solver computes it, quickly.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import itertools
 import numpy as np
 
 from rigidimpulse.collision.containment import contains
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.accuracy import Accuracy
@@ -31,7 +31,7 @@ PITCH, RADIUS = 0.25, 0.1
 REACH, SIDE = 2.5 * PITCH, 2.0 * PITCH
 """m: c of the octahedron, s of the cross."""
 PLACES = {"octahedron": (-0.9, 0.0, 1.4), "cross": (0.9, 0.0, 1.6)}
-SKIN = TOLERANCES.skin * RADIUS
+SKIN = TOLERANCES.sub_stepping.skin * RADIUS
 NUDGE = 0.15
 """m/s, sideways: columns of marbles that fall straight stay columns."""
 DURATION = 1.5
@@ -73,7 +73,7 @@ def check(run: Recording) -> list[Check]:
         checks.append(equal(f"{name}: marbles", len(found), len(expected), "number of lattice points inside"))
         checks.append(equal(f"{name}: points taken for the other side", len(found ^ expected), 0, "closed form of the solid"))
     lowest = RADIUS - run.positions[:, 1:, 2].min()
-    return [*checks, at_most("deepest marble in the floor, m", lowest, SKIN, "soft contacts eat the skin of a heap")]
+    return [*checks, at_most("deepest marble in the floor, m", lowest, SKIN, "soft contacts use up the skin of a pile")]
 
 
 def _lattice(name: str) -> np.ndarray:

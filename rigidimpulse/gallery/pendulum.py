@@ -73,7 +73,7 @@ def check(run: Recording) -> list[Check]:
             at_most(
                 f"{name}: error of the period, relative", abs(_measured(run.times, angle) / period - 1.0), PERIOD, "4 K(k) sqrt(l / g)"
             ),
-            at_most(f"{name}: mean reaction but for the weight, of m g", abs(mean[2] - 1.0), MEAN, "m g T over a swing"),
+            at_most(f"{name}: mean reaction without the weight, of m g", abs(mean[2] - 1.0), MEAN, "m g T over a swing"),
             at_most(f"{name}: mean reaction sideways, of m g", np.abs(mean[:2]).max(), MEAN, "0 over a swing"),
         ]
     return [*checks, at_most("period at 45 degrees from that of the notes, s", abs(_period(0.25 * math.pi) - NOTES_PERIOD), 1e-12, "B3")]

@@ -1,7 +1,7 @@
-"""A pile: boxes fall into a walled pit and heap up; the sub-stepped solver of heaps takes over where they touch.
+"""A pile: boxes fall into a walled pit and pile up; the sub-stepped solver takes over where they touch.
 
 How they lie in the end follows from no formula, but all of them stay in the pit, none is inside another, energy only goes
-down but for what the skins of the contacts give back, and friction and dull impacts bring them to rest: exactly, not a bit
+down, except for what the skins of the contacts give back, and friction and dull impacts bring them to rest: exactly, not a bit
 moves any more. Walls and boxes are those of the pile in the comparison of engines (side 0.5 m, mu = 0.5, e = 0), of a lighter
 material and fewer of them.
 """
@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.regime import TALL
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
 from rigidimpulse.recording.recording import Recording
@@ -25,7 +25,7 @@ SIDE, PITCH, LAYERS = 0.5, 0.9, 8
 GRAVITY = 9.81
 NUM_BOXES = 128
 MATERIAL = Material(density=8.0, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
-SKIN = TOLERANCES.skin * 0.5 * SIDE
+SKIN = TOLERANCES.sub_stepping.skin * 0.5 * SIDE
 DURATION = 5.0
 
 
@@ -64,7 +64,7 @@ def check(run: Recording) -> list[Check]:
         at_most("centre beyond a wall, m", inside, 0.0, "walls hold"),
         above_floor(run, SKIN),
         equal("boxes inside each other at the end", overlaps(run), 0, "contacts are held at a gap, the skin"),
-        at_most("largest rise of energy, J", rise, SKIN * weight(run) * TALL, "E falls, but for what skins give back: a skin a level"),
+        at_most("largest rise of energy, J", rise, SKIN * weight(run) * TALL, "E falls, except by what skins give back: a skin a level"),
         at_most("speed at the end, m/s", float(np.abs(run.velocities[-1]).max()), 0.0, "friction and dull impacts stop them"),
     ]
 
@@ -88,4 +88,4 @@ def overlaps(run: Recording) -> int:
     )
 
 
-SCENES = (GalleryScene("pile", f"{NUM_BOXES} boxes fall into a pit and heap up", pile, check, DURATION),)
+SCENES = (GalleryScene("pile", f"{NUM_BOXES} boxes fall into a pit and pile up", pile, check, DURATION),)

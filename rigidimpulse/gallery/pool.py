@@ -14,8 +14,8 @@ so the object ball leaves along d: it goes to the pocket if the cue ball strikes
 line from the pocket. What the cue ball does then follows from the spin it still has: rolling it follows, with backspin it comes back, and
 with spin about its own way (masse) it swerves already before.
 
-Between events paths are polynomials and errors those of rounding and of the equations of contact, 1e-12; balls lie on a held gap of 1e-6
-of their size, which the lever arms do not feel. An error of the impact's time of 1e-12 s turns the line of centres by v 1e-12 / 2 R =
+Between events paths are polynomials and errors those of rounding and of the equations of contact, 1e-12; balls lie on a contact margin of
+1e-6 of their size, which the lever arms do not feel. An error of the impact's time of 1e-12 s turns the line of centres by v 1e-12 / 2 R =
 4e-11, over a metre 4e-11 m. Errors before the impact grow by some ten in a thin cut, so 1e-9 m and m/s is the bound. A ball that rolls at
 once, or an impact with a friction of 0.01 between the balls, is off by 1e-2 m.
 """

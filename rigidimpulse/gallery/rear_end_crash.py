@@ -7,9 +7,9 @@ struck one brakes:
     V = (1 + m_b / m_a) sqrt(2 mu g d m_b / (m_a + m_b))
 
 with d the length of the skid marks. While they slide the striking car pushes with m_a mu m_b g / (m_a + m_b). The bumpers meet level with
-the centres of mass, so the blow tips nothing and no friction acts in it. Forces are constant until the stop: d and V are exact but for the
-held gap, 1e-6 of a car, and the equations of contact, 1e-12; 1e-6 relative is the bound. A crash with e = 0.01, or friction in the blow, is
-off by 1e-2.
+the centres of mass, so the blow tips nothing and no friction acts in it. Forces are constant until the stop: d and V are exact up to the
+contact margin, 1e-6 of a car, and the equations of contact, 1e-12; 1e-6 relative is the bound. A crash with e = 0.01, or friction in
+the blow, is off by 1e-2.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Balls with rolling friction roll to a stop, each in its own lane.
+"""Balls with rolling friction roll to a stop, each in its own track.
 
 A solid ball of radius r that rolls with v on a plane with rolling friction b is slowed by a = (5/7) b g / r (m v' = -F,
 (2/5) m r^2 w' = F r - b m g, v = w r), so it stops after v / a at v^2 / (2 a), and its spin about the normal, slowed by
@@ -24,20 +24,20 @@ ROLLING = {"steel": 0.002, "rubber": 0.004, "felt": 0.01}
 SPINNING = 0.003
 DURATION = 6.0
 BOUND = 1e-6
-"""Relative: the forces are found to 1e-12, and sub-steps end where something stops; the held gap is 1e-6 of a ball."""
+"""Relative: the forces are found to 1e-12, and sub-steps end where something stops; the contact margin is 1e-6 of a ball."""
 
 
 def scene() -> Scene:
     """Return a floor and the balls, which roll from the start and spin about the vertical besides."""
     scene = Scene(gravity=(0.0, 0.0, -GRAVITY))
     scene.add(Body("floor", Shape.half_space(), motion="static"))
-    for lane, (name, length) in enumerate(ROLLING.items()):
+    for track, (name, length) in enumerate(ROLLING.items()):
         material = Material(static_friction=0.5, rolling_friction=length, spinning_friction=SPINNING)
         scene.add(
             Body(
                 name,
                 Shape.sphere(RADIUS),
-                position=(0.0, 0.4 * lane, RADIUS),
+                position=(0.0, 0.4 * track, RADIUS),
                 velocity=(SPEED, 0.0, 0.0),
                 angular_velocity=(0.0, SPEED / RADIUS, SPIN),
                 material=material,

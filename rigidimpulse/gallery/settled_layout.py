@@ -1,8 +1,8 @@
-"""A heap of parts settles into a table and a stool, which then stand: beside them the same heap falls down as it was.
+"""A pile of parts settles into a table and a stool, which then stand: beside them the same pile falls down as it was.
 
 Legs are pinned to tops by three points each, so each piece is one rigid thing where its energy is 0: `PinPoints` meet exactly.
 `RestoreShape` keeps stool and books at their places by the table, `NoOverlap` with a gap keeps everything apart and above the floor,
-`GravityPotential` lets it down. `settle` minimises their sum from the disorder; what is pinned is then glued to one body. The other heap is
+`GravityPotential` lets it down. `settle` minimises their sum from the disorder; what is pinned is then glued to one body. The other pile is
 only moved out of itself, by `NoOverlap` alone.
 
 What stands at a minimum of its potential stays: the run moves it by no more than the gap. Heights follow from sizes.
@@ -38,7 +38,7 @@ GAP = 5e-4
 WEIGHT = 1e7
 """N/m; the table sinks into its gap by 10 um."""
 MESS = (0.0, 1.9, 0.0)
-"""m, where the same heap lies unsettled."""
+"""m, where the same pile lies unsettled."""
 DURATION = 2.0
 
 
@@ -51,7 +51,7 @@ def parts() -> dict[str, tuple[float, float, float]]:
     return sizes
 
 
-def heap() -> Scene:
+def pile() -> Scene:
     """Return the parts in disorder, many of them inside each other."""
     random = np.random.default_rng(3)
     scene = Scene(gravity=(0.0, 0.0, -GRAVITY))
@@ -63,7 +63,7 @@ def heap() -> Scene:
 
 
 def settled() -> tuple[Scene, float]:
-    """Return the heap settled, and the largest distance of pinned points, m."""
+    """Return the pile settled, and the largest distance of pinned points, m."""
     from rigidimpulse.dynamics.forces.energy.layout import settle
     from rigidimpulse.dynamics.forces.energy.overlap import NoOverlap
     from rigidimpulse.dynamics.forces.energy.potential import GravityPotential
@@ -73,7 +73,7 @@ def settled() -> tuple[Scene, float]:
     layout, upright = [(*PLACES[name], _height(name)) for name in flat], [(1.0, 0.0, 0.0, 0.0)] * len(flat)
     together = RestoreShape(flat, 1e4, layout, upright)
     # First through each other into place, then out of each other and down.
-    built, first = settle(heap(), [*_pins(heap()), together])
+    built, first = settle(pile(), [*_pins(pile()), together])
     apart = [NoOverlap(WEIGHT, GAP, ["floor", *flat]), NoOverlap(WEIGHT, GAP, ["floor", *BOOKS, *legs])]
     scene, last = settle(built, [*_pins(built), together, *apart, GravityPotential()])
     if not (first.ok and last.ok):
@@ -114,7 +114,7 @@ def _there(body: Body, point: np.ndarray) -> np.ndarray:
 
 
 def scene() -> Scene:
-    """Return the settled pieces, each glued to one body, and beside them the heap, moved out of itself."""
+    """Return the settled pieces, each glued to one body, and beside them the pile, moved out of itself."""
     from rigidimpulse.dynamics.forces.energy.layout import settle
     from rigidimpulse.dynamics.forces.energy.overlap import NoOverlap
 
@@ -125,7 +125,7 @@ def scene() -> Scene:
         glued = [parted[name] for name in parts() if name.startswith(piece)]
         shape = Shape.compound([(part.shape, part.position - origin, part.orientation) for part in glued])
         scene.add(Body(piece, shape, position=origin, material=WOOD))
-    for body in settle(heap(), [NoOverlap(1.0, GAP)]).scene.bodies:
+    for body in settle(pile(), [NoOverlap(1.0, GAP)]).scene.bodies:
         if body.name != "floor":
             place = np.asarray(body.position) + MESS
             scene.add(replace(body, name=f"loose {body.name}", position=place))
@@ -146,8 +146,8 @@ def check(run: Recording) -> list[Check]:
         equal("bodies inside each other at the start", overlaps, 0, "no overlap"),
         at_most("way that settled bodies move, m", moved, 4.0 * GAP, "a minimum of the potential is at rest: they fall through the gaps"),
         at_most("their speed at the end, m/s", away, 0.0, "they rest"),
-        at_least("height of the table above the loose top, m", _height("table") - fallen, 0.3, "the heap falls down"),
+        at_least("height of the table above the loose top, m", _height("table") - fallen, 0.3, "the pile falls down"),
     ]
 
 
-SCENES = (GalleryScene("settled_layout", "A heap of parts settles into furniture that stands; another falls", scene, check, DURATION),)
+SCENES = (GalleryScene("settled_layout", "A pile of parts settles into furniture that stands; another falls", scene, check, DURATION),)

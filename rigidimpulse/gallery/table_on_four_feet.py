@@ -37,7 +37,7 @@ PLACE = (0.28, 0.12)
 DURATION = 4.0
 BOUND = 1e-9
 LIFT = 4e-6
-"""m: held gaps, 1e-6 of a body's size, of up to five storeys."""
+"""m: contact margins, 1e-6 of a body's size, of up to five storeys."""
 
 
 def scene() -> Scene:
@@ -79,7 +79,7 @@ def check(run: Recording) -> list[Check]:
         at_most("moment of the feet but for the weights', of m g l", np.abs(moment[:2]).max() / total, BOUND, "statics; l = 1 m"),
         at_least("least force of a foot, N", float(up[:, 2].min()) if len(feet) else -np.inf, 0.0, "feet push, they do not pull"),
         equal("numbers that change after the first frame", stirs, 0, "bodies at rest stay at rest"),
-        at_most("moved from the drawing, m", np.abs(run.positions[-1] - run.positions[0]).max(), LIFT, "held gaps"),
+        at_most("moved from the drawing, m", np.abs(run.positions[-1] - run.positions[0]).max(), LIFT, "contact margins"),
     ]
 
 

@@ -6,15 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.model.contacts import Contacts
 
 NO_FORCE = np.zeros(3)
 CORRECTED = 10.0
 """Approach speed that a position correction may make, in contact margins of turning (margin over size) times the speed: arms and normals
 turn a little."""
-SLACK = 1e-9
-"""Contacts that leave or approach slower than the held ones by this part are held."""
+SLACK = TOLERANCES.contact.as_fast
 
 
 @dataclass
@@ -75,7 +74,7 @@ class Island:
         """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the contact margin."""
         zero_speed = self.zero_speed
         if self.moved:
-            zero_speed += CORRECTED * self.scale * TOLERANCES.contact_margin
+            zero_speed += CORRECTED * self.scale * TOLERANCES.contact.margin
         return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + zero_speed
 
 

@@ -6,7 +6,7 @@ Stages of Nystroem's method of order 4 (E. J. Nystroem 1925; Hairer, Norsett, Wa
     stage 2  flies h/2 under F_1,  stage 3 has the pose of stage 2 and the velocities of h/2 under F_2,  stage 4 flies h under F_3
 
 "flies" is the exact motion of a rigid body under a constant force and torque, so that gravity and the gyroscopic term cost nothing and a
-body without forces keeps its exact path. The forces of the step enter the course by their two moments (see `course`),
+body without forces keeps its exact path. The forces of the step enter the trajectory by their two moments (see `trajectory`),
 
     M0 = h (F_1 + 2 F_2 + 2 F_3 + F_4) / 6,    M1 = h^2 (F_1 + F_2 + F_3) / 6,
 
@@ -35,21 +35,33 @@ import numpy as np
 from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.evaluate import bring, bring_all
-from rigidimpulse.motion.trajectory import FORCED, FREE, make_trajectories, take
+from rigidimpulse.motion.trajectory import FORCED, FREE, Load, Trajectories, make_trajectories, take
 
 Stage = tuple[np.ndarray, np.ndarray]
 
 
+class Moment(NamedTuple):
+    """Bodies at one instant, and their accelerations then."""
+
+    bodies: BodyState
+    rotation: np.ndarray  # (n, 3, 3)
+    acceleration: np.ndarray  # (n, 3) m/s^2
+    angular_acceleration: np.ndarray  # (n, 3) rad/s^2
+
+
 @jit_making_arrays
-def fly(trajectory, members, elapsed, bodies, steady, wrench, out, rotation, acceleration, angular_acceleration):
-    """Where the members (k,) are after elapsed (n,) s under constant wrenches (n, 6) and steady accelerations (n, 3); from `bodies`."""
+def fly(trajectory, members, elapsed, bodies, steady, wrench, out):
+    """Where the members (k,) are after elapsed (n,) s under constant wrenches (n, 6) and steady accelerations (n, 3); from `bodies`.
+
+    out: a `Moment`, written.
+    """
     zero, pull = np.zeros(3), np.empty(3)
     for i in members:
         for k in range(3):
             pull[k] = steady[i, k] + bodies.inv_mass[i] * wrench[i, k]
         turned = wrench[i, 3] != 0.0 or wrench[i, 4] != 0.0 or wrench[i, 5] != 0.0
-        take(trajectory, i, -elapsed[i], bodies, pull, wrench[i, 3:], zero, zero, FORCED if turned else FREE)
-        bring(trajectory, i, 0.0, out, rotation, acceleration, angular_acceleration)
+        take(trajectory, i, -elapsed[i], bodies, Load(pull, wrench[i, 3:], zero, zero), FORCED if turned else FREE)
+        bring(trajectory, i, 0.0, out.bodies, out.rotation, out.acceleration, out.angular_acceleration)
 
 
 @jit_making_arrays
@@ -63,42 +75,42 @@ def follow(trajectory, members, bodies, steady, value, rate):
         turned = False
         for k in range(3, 6):
             turned = turned or value[i, k] != 0.0 or rate[i, k] != 0.0
-        take(trajectory, i, 0.0, bodies, pull, value[i, 3:], jerk, rate[i, 3:], FORCED if turned else FREE)
+        take(trajectory, i, 0.0, bodies, Load(pull, value[i, 3:], jerk, rate[i, 3:]), FORCED if turned else FREE)
 
 
 class Workspace:
-    """Room for the states of a step's stages."""
+    """Arrays for the states of a step's stages."""
 
-    def __init__(self, trajectory, inv_mass: np.ndarray) -> None:
-        """Of the bodies of a course."""
+    def __init__(self, trajectory: Trajectories, inv_mass: np.ndarray) -> None:
+        """For as many bodies as there are trajectories."""
         n = len(inv_mass)
         self.trajectory = make_trajectories(n)._replace(inertia=trajectory.inertia)
         self.bodies = BodyState(
             np.empty((n, 3)), np.empty((n, 4)), np.empty((n, 3)), np.empty((n, 3)), inv_mass, np.zeros((n, 3, 3))
         )
         self.rotation = np.empty((n, 3, 3))
-        self._unused = np.empty((2, n, 3))
+        self._moment = Moment(self.bodies, self.rotation, np.empty((n, 3)), np.empty((n, 3)))
 
-    def fly(self, members, elapsed, bodies: BodyState, steady, wrench) -> None:
+    def fly(self, members: np.ndarray, elapsed: np.ndarray, bodies: BodyState, steady: np.ndarray, wrench: np.ndarray) -> None:
         """Bring the members to where they are after elapsed (n,) s (see `fly`)."""
-        fly(self.trajectory, members, elapsed, bodies, steady, wrench, self.bodies, self.rotation, *self._unused)
+        fly(self.trajectory, members, elapsed, bodies, steady, wrench, self._moment)
 
-    def stay(self, members, bodies: BodyState, rotation) -> None:
+    def stay(self, members: np.ndarray, bodies: BodyState, rotation: np.ndarray) -> None:
         """Leave the members where they are."""
         self.rotation[members] = rotation[members]
         for mine, theirs in zip(self.bodies, bodies, strict=True):
             if mine is not theirs:
                 mine[members] = theirs[members]
 
-    def follow(self, members, bodies: BodyState, steady, value, rate) -> None:
+    def follow(self, members: np.ndarray, bodies: BodyState, steady: np.ndarray, value: np.ndarray, rate: np.ndarray) -> None:
         """Let the members go along lines of force (see `follow`), for `look`."""
         follow(self.trajectory, members, bodies, steady, value, rate)
 
-    def look(self, members, elapsed: float) -> None:
+    def look(self, members: np.ndarray, elapsed: float) -> None:
         """Bring the members to where the lines lead them after a time."""
-        bring_all(self.trajectory, members, elapsed, self.bodies, self.rotation, *self._unused)
+        bring_all(self.trajectory, members, elapsed, *self._moment)
 
-    def fly_speeds(self, members, elapsed, bodies: BodyState, steady, wrench) -> None:
+    def fly_speeds(self, members: np.ndarray, elapsed: np.ndarray, bodies: BodyState, steady: np.ndarray, wrench: np.ndarray) -> None:
         """The same for the velocities alone."""
         kept = [values[members] for values in (self.bodies.position, self.bodies.orientation, self.bodies.inv_inertia, self.rotation)]
         self.fly(members, elapsed, bodies, steady, wrench)
@@ -114,19 +126,21 @@ class Lines(NamedTuple):
     off: np.ndarray
 
 
-def nystroem(evaluate: Callable, room: Workspace, first: Stage, members, h: np.ndarray, bodies: BodyState, steady) -> tuple[Lines, Lines]:
+def nystroem(
+    evaluate: Callable, workspace: Workspace, first: Stage, members: np.ndarray, h: np.ndarray, bodies: BodyState, steady: np.ndarray
+) -> tuple[Lines, Lines]:
     """Lines of the forces over a step, of each row (k, 6) and of their sums (n, 6) on bodies.
 
     evaluate(share, bodies, rotation) -> the same as `first`, after that share of the step; first: forces of rows and their sums at the
     start; members: bodies that fly; h (n,) s; steady (n, 3) m/s^2.
     """
     half = 0.5 * h
-    room.fly(members, half, bodies, steady, first[1])
-    second = evaluate(0.5, room.bodies, room.rotation)
-    room.fly_speeds(members, half, bodies, steady, second[1])
-    third = evaluate(0.5, room.bodies, room.rotation)
-    room.fly(members, h, bodies, steady, third[1])
-    fourth = evaluate(1.0, room.bodies, room.rotation)
+    workspace.fly(members, half, bodies, steady, first[1])
+    second = evaluate(0.5, workspace.bodies, workspace.rotation)
+    workspace.fly_speeds(members, half, bodies, steady, second[1])
+    third = evaluate(0.5, workspace.bodies, workspace.rotation)
+    workspace.fly(members, h, bodies, steady, third[1])
+    fourth = evaluate(1.0, workspace.bodies, workspace.rotation)
     rows, sums = (
         Lines((2.0 * f1 + f2 + f3 - f4) / 3.0, f4 - f1, (f1 - f2 - f3 + f4) / 3.0)
         for f1, f2, f3, f4 in zip(first, second, third, fourth, strict=True)

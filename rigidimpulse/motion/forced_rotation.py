@@ -5,7 +5,7 @@ Body frame, principal moments I, angular velocity w, tau(t) = tau0 + tau1 t; e =
     d_1 = tau0 / |tau0|,   d_2 normal to d_1,   tau1 = p d_1 + r d_2,
 so that the angular momentum in the world is L0 + tau0 t + tau1 t^2 / 2. These equations are quadratic: the coefficients of the
 power series of w, e_1, e_2 follow one from another by Cauchy products. The series up to ORDER is computed once; it serves for
-any time up to `segment`, where its last terms reach round-off, and is begun anew from there on. Segments depend on the
+any time up to `segment`, where its last terms reach round-off. From there on it is started again. Segments depend on the
 start alone, never on the time asked for, so the path is one smooth function of time. The attitude follows from e_1, e_2
 and e_1 x e_2.
 
@@ -20,6 +20,7 @@ import math
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import exponential, from_columns, product, rotated
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.motion import free_rotation
 
 ORDER = 18
@@ -45,14 +46,11 @@ _STRIDE = 9
 SERIES_SIZE = _STRIDE * (ORDER + 1)
 """coefficients in all; few bodies have a series, so that they lie apart from the other constants"""
 
-_PARALLEL = 1e-15
-"""sine of the angle between vectors that are taken for parallel: what round-off of their turn to the body leaves"""
-_NO_TORQUE = 1e-280
-"""rad/s^2, and rad/s^3: angular acceleration and its rate taken for none: squares would underflow"""
+_PARALLEL = TOLERANCES.rotation.parallel_torque
+_NO_TORQUE = TOLERANCES.rotation.no_torque
 _MOST_SEGMENTS = 100_000
 """segments after which the rotation is given up: some 30,000 rad, a tenth of a second of work"""
-_LAST_TERM = 1e-15
-"""size of the last terms of the series at the end of a segment; the terms left out are an eighth of it or less"""
+_LAST_TERM = TOLERANCES.rotation.last_term
 
 
 @jit
@@ -130,11 +128,14 @@ def _across(ex, ey, ez, ux, uy, uz):
 
 
 @jit
-def _start_series(c, series, wx, wy, wz, ex, ey, ez, ux, uy, uz):
+def _start_series(c, series, w, e, u):
     """Begin a series at body angular velocity w and unit directions e of tau0 and u of tau1; set scale and segment.
 
     |tau0| and |tau1| are read; e is u where tau0 is none, and u is not read where tau1 is none.
     """
+    wx, wy, wz = w
+    ex, ey, ez = e
+    ux, uy, uz = u
     i1, i2, i3 = c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2]
     coupling = max(1.0, abs(i2 - i3) / i1, abs(i3 - i1) / i2, abs(i1 - i2) / i3)
     rate = coupling * max(abs(wx), abs(wy), abs(wz)) + math.sqrt(c[_TORQUE] / min(i1, i2, i3))
@@ -178,15 +179,9 @@ def _advance(c, series, t):
     r1, r2, r3 = p2 * q3 - p3 * q2, p3 * q1 - p1 * q3, p1 * q2 - p2 * q1
     n1, n2, n3 = a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1
     g0, g1, g2, g3 = from_columns(
-        p1 * a1 + q1 * b1 + r1 * n1,
-        p2 * a1 + q2 * b1 + r2 * n1,
-        p3 * a1 + q3 * b1 + r3 * n1,
-        p1 * a2 + q1 * b2 + r1 * n2,
-        p2 * a2 + q2 * b2 + r2 * n2,
-        p3 * a2 + q3 * b2 + r3 * n2,
-        p1 * a3 + q1 * b3 + r1 * n3,
-        p2 * a3 + q2 * b3 + r2 * n3,
-        p3 * a3 + q3 * b3 + r3 * n3,
+        (p1 * a1 + q1 * b1 + r1 * n1, p2 * a1 + q2 * b1 + r2 * n1, p3 * a1 + q3 * b1 + r3 * n1),
+        (p1 * a2 + q1 * b2 + r1 * n2, p2 * a2 + q2 * b2 + r2 * n2, p3 * a2 + q3 * b2 + r3 * n2),
+        (p1 * a3 + q1 * b3 + r1 * n3, p2 * a3 + q2 * b3 + r2 * n3, p3 * a3 + q3 * b3 + r3 * n3),
     )
     scale = c[_TIME_SCALE]
     return g0, g1, g2, g3, scale * w1, scale * w2, scale * w3, a1, a2, a3, b1, b2, b3
@@ -204,7 +199,7 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out, series_out)
     """Write constants (FORCED_ROTATION_SIZE,) and series (SERIES_SIZE,) of the motion from orientation q (4,) and spin (3,), rad/s.
 
     `w_world`, `torque` (3,), N m, and `torque_rate` (3,), N m/s, are in the world; `inertia` (3,): principal moments,
-    kg m^2, all > 0. Returns False and writes nothing if torque and rate are none: then the body is a free top.
+    kg m^2, all > 0. Returns False and writes nothing if torque and rate are none: then the body rotates freely.
     """
     c = constants_out
     i1, i2, i3 = inertia[0], inertia[1], inertia[2]
@@ -240,7 +235,7 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out, series_out)
         c[KIND] = FORCED
         c[_INERTIA], c[_INERTIA + 1], c[_INERTIA + 2] = i1, i2, i3
         c[_TORQUE], c[_TORQUE_RATE] = magnitude, growth
-        _start_series(c, series_out, wx, wy, wz, ex, ey, ez, ux, uy, uz)
+        _start_series(c, series_out, (wx, wy, wz), (ex, ey, ez), (ux, uy, uz))
     return True
 
 
@@ -265,7 +260,7 @@ def _last_segment(constants, coefficients, t):
             ex, ey, ez, c[_TORQUE] = _direction(now * ex + grown * ux, now * ey + grown * uy, now * ez + grown * uz)
             if c[_TORQUE] == 0.0:
                 ex, ey, ez = ux, uy, uz
-        _start_series(c, series, wx, wy, wz, ex, ey, ez, ux, uy, uz)
+        _start_series(c, series, (wx, wy, wz), (ex, ey, ez), (ux, uy, uz))
     return c, series, math.nan
 
 

@@ -30,6 +30,7 @@ import numpy as np
 
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.quaternion import exponential, product, rotated
+from rigidimpulse.core.tolerances import TOLERANCES
 
 # Kinds of rotation, and places in the row of constants.
 REST, FIXED_AXIS, SYMMETRIC, ASYMMETRIC = 0.0, 1.0, 2.0, 3.0
@@ -59,22 +60,14 @@ _ARITHMETIC = 32  # (_MAX_LEVELS,) arithmetic means
 _GEOMETRIC = _ARITHMETIC + _MAX_LEVELS  # (_MAX_LEVELS,) geometric means
 FREE_ROTATION_SIZE = _GEOMETRIC + _MAX_LEVELS
 
-_EQUAL = 4e-15
-"""relative difference of two moments below which they are equal: rates then err by half of it, a few eps"""
-_ON_AXIS = 1e-40
-"""part of the spin off a stable principal axis that is taken for none"""
-_ON_UNSTABLE_AXIS = 1e-15
-"""the same for the middle axis: what round-off of the world spin leaves must not make a body flip"""
-_SLOW = 1e-150
-"""rad/s, below which a body keeps its axis: squares would underflow"""
-_LEAST_M1 = 1e-100
-"""floor of 1 - m: the separatrix itself; the body stays by the unstable axis for 2K > 230 / p"""
-_AGM_DONE = 1e-8
-"""relative gap of the two means after which one more step is exact"""
-_RF_DONE = 0.003
-"""relative spread at which the series of RF, whose error is of order 8, ends"""
-_TINY_ANGLE = 1e-60
-"""z below which sn z = z, and cotangents would overflow"""
+_EQUAL = TOLERANCES.rotation.equal_moments
+_ON_AXIS = TOLERANCES.rotation.on_axis
+_ON_UNSTABLE_AXIS = TOLERANCES.rotation.on_unstable_axis
+_SLOW = TOLERANCES.rotation.slow
+_LEAST_M1 = TOLERANCES.rotation.least_complement
+_AGM_DONE = TOLERANCES.rotation.agm_converged
+_RF_DONE = TOLERANCES.rotation.carlson_converged
+_TINY_ANGLE = TOLERANCES.rotation.tiny_argument
 _NOME_SWITCH = 1.0
 """T = 2K'/K below which the imaginary transformation converges faster"""
 
@@ -222,8 +215,11 @@ def _store_phase(c, start_rate, speed, sigma, y, t_ratio):
 
 
 @jit
-def _store_motion(c, i1, i2, i3, d13, d12, w1, w2, w3):
-    """Constants of the asymmetric motion, given moments and spin of order one, d13 = |I3 - I1|, d12 = |I1 - I2|."""
+def _store_motion(c, moments, differences, w):
+    """Constants of the asymmetric motion: moments (I1, I2, I3), differences (|I3 - I1|, |I1 - I2|) and spin w, all of order one."""
+    i1, i2, i3 = moments
+    d13, d12 = differences
+    w1, w2, w3 = w
     d23 = d13 + d12
     r2 = i1 * d13 * w1 * w1 + i2 * d23 * w2 * w2
     d2 = i3 * d23 * w3 * w3 + i1 * d12 * w1 * w1
@@ -276,9 +272,9 @@ def _prepare_asymmetric(inertia, low, middle, high, c):
     sign_3 = math.copysign(1.0, c[_SPIN + third])
     sign_2 = sign_3 if step == 2 or step == -1 else -sign_3
     if circles_high:
-        _store_motion(c, i_middle, i_low, i_high, d_high, d_low, w_middle, sign_2 * w_low, abs(w_high))
+        _store_motion(c, (i_middle, i_low, i_high), (d_high, d_low), (w_middle, sign_2 * w_low, abs(w_high)))
     else:
-        _store_motion(c, i_middle, i_high, i_low, d_low, d_high, w_middle, sign_2 * w_high, abs(w_low))
+        _store_motion(c, (i_middle, i_high, i_low), (d_low, d_high), (w_middle, sign_2 * w_high, abs(w_low)))
     for k in range(3):
         c[_AMPLITUDE + k] /= scale_w
     c[_PHASE_RATE] /= scale_w

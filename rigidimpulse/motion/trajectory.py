@@ -9,7 +9,7 @@
       LINEAR       as PRESCRIBED, with a constant acceleration: the way to a pose that the sub-stepped solver found; the body's own
                    velocities run from those at the start to those at the end of the step
 
-The sweep and the integration both read the path here, so the impact time and the motion cannot disagree. A row is set
+The search for impacts and the motion both read the path here, so the impact time and the motion cannot disagree. A row is set
 by its owner (all columns, and of `top` the rates at its end), then made ready by `begin`. Evaluation only reads; it may be called
 in any order.
 
@@ -34,7 +34,7 @@ from rigidimpulse.motion import forced_rotation, free_rotation
 FIXED, PRESCRIBED, FREE, FORCED, LINEAR = 0, 1, 2, 3, 4
 
 SPEEDS, LENGTH = 8, 20
-"""Places in a row of `Trajectories.top` in mode LINEAR, after the constants of a fixed axis: see `Trajectories.stepped`."""
+"""Places in a row of `Trajectories.top` in mode LINEAR, after the constants of a fixed axis: see `Trajectories.linear`."""
 JERK, TORQUE_RATE, TOP_SIZE = max(free_rotation.FREE_ROTATION_SIZE, forced_rotation.FORCED_ROTATION_SIZE) + np.array([0, 3, 6])
 """Places in a row of `Trajectories.top`, and its length. The constants of the rotation come first."""
 
@@ -43,7 +43,7 @@ class Trajectories(NamedTuple):
     """Paths of n bodies; see the head of the file. Vectors in the world frame, inertia in the principal frame."""
 
     start: np.ndarray
-    """(n,) s, time of the last change of trajectory"""
+    """(n,) s, time of the last change of the trajectory"""
     position: np.ndarray
     """(n, 3) m, centre of mass at `start`"""
     orientation: np.ndarray
@@ -57,33 +57,33 @@ class Trajectories(NamedTuple):
     torque: np.ndarray
     """(n, 3) N m at `start`; read in mode FORCED only"""
     mode: np.ndarray
-    """(n,) int64: FIXED, PRESCRIBED, FREE, FORCED, STEPPED"""
+    """(n,) int64: FIXED, PRESCRIBED, FREE, FORCED, LINEAR"""
     inertia: np.ndarray
     """(n, 3) kg m^2, principal moments; read in modes FREE and FORCED"""
     top: np.ndarray
-    """(n, TOP_SIZE) constants of the rotation, written by `begin`, and from SPEEDS on those of mode STEPPED, then jerk and torque rate
-    (arrays of their own would cost every kernel that gets a course some 3 % of its time)"""
+    """(n, TOP_SIZE) constants of the rotation, written by `begin`, and from SPEEDS on those of mode LINEAR, then jerk and torque rate
+    (arrays of their own would cost every kernel that gets trajectories some 3 % of its time)"""
     series: np.ndarray
     """(n, SERIES_SIZE) the rotation in mode FORCED, written by `begin`; rows of others are never touched, so that they take no memory"""
 
     @property
-    def stepped(self) -> np.ndarray:
-        """(n, 13) velocities at `start` (6), their changes until the step ends (6), and its length, s, a view; read in mode STEPPED"""
+    def linear(self) -> np.ndarray:
+        """(n, 13) velocities at `start` (6), their changes until the step ends (6), and its length, s, a view; read in mode LINEAR"""
         return self.top[:, SPEEDS : LENGTH + 1]
 
     @property
     def jerk(self) -> np.ndarray:
-        """(n, 3) m/s^3, constant, a view; 0 but in modes FREE and FORCED: `begin` sees to it."""
+        """(n, 3) m/s^3, constant, a view; 0 except in modes FREE and FORCED: `begin` sets it."""
         return self.top[:, JERK:TORQUE_RATE]
 
     @property
     def torque_rate(self) -> np.ndarray:
-        """(n, 3) N m/s, constant, a view; 0 but in mode FORCED: `begin` sees to it."""
+        """(n, 3) N m/s, constant, a view; 0 except in mode FORCED: `begin` sets it."""
         return self.top[:, TORQUE_RATE:]
 
 
 def make_trajectories(num_bodies: int) -> Trajectories:
-    """A course of `num_bodies` bodies, all FIXED at the origin at time 0, with unit inertia."""
+    """Trajectories of `num_bodies` bodies, all FIXED at the origin at time 0, with unit inertia."""
     orientation = np.zeros((num_bodies, 4))
     orientation[:, 0] = 1.0
 
@@ -107,7 +107,7 @@ def make_trajectories(num_bodies: int) -> Trajectories:
 
 @jit
 def begin(trajectory, i):
-    """Prepare `course.top[i]`; call it after any other column of row i has changed. Rates that the mode has not are set to 0."""
+    """Prepare `trajectory.top[i]`; call it after any other column of row i has changed. Rates that the mode does not have are set to 0."""
     mode = trajectory.mode[i]
     if mode == PRESCRIBED or mode == LINEAR:
         begin_straight(trajectory, i)
@@ -124,28 +124,34 @@ def begin(trajectory, i):
 
 @inlined
 def begin_straight(trajectory, i):
-    """The same in modes PRESCRIBED and STEPPED: apart, so that it is compiled into loops over thousands of bodies."""
+    """The same in modes PRESCRIBED and LINEAR: apart, so that it is compiled into loops over thousands of bodies."""
     for k in range(JERK, TOP_SIZE):
         trajectory.top[i, k] = 0.0
     free_rotation.keep_axis(trajectory.orientation[i], trajectory.angular_velocity[i], trajectory.top[i])
 
 
-@jit
-def take(trajectory, i, time, bodies, acceleration, torque, jerk, torque_rate, mode):
-    """Let body i go on from where it is now, at `time`, in a mode.
+class Load(NamedTuple):
+    """What acts on one body from an instant on: it grows in proportion to time."""
 
-    acceleration (3,) m/s^2 and torque (3,) N m at `time`, jerk (3,) m/s^3 and torque_rate (3,) N m/s from then on.
-    """
+    acceleration: np.ndarray  # (3,) m/s^2 at the instant
+    torque: np.ndarray  # (3,) N m at the instant
+    jerk: np.ndarray  # (3,) m/s^3
+    torque_rate: np.ndarray  # (3,) N m/s
+
+
+@jit
+def take(trajectory, i, time, bodies, load, mode):
+    """Let body i go on from its present state, at `time`, in a mode and under a `Load`."""
     trajectory.start[i] = time
     trajectory.mode[i] = mode
     for k in range(3):
         trajectory.position[i, k] = bodies.position[i, k]
         trajectory.velocity[i, k] = bodies.velocity[i, k]
         trajectory.angular_velocity[i, k] = bodies.angular_velocity[i, k]
-        trajectory.acceleration[i, k] = acceleration[k]
-        trajectory.torque[i, k] = torque[k]
-        trajectory.top[i, JERK + k] = jerk[k]
-        trajectory.top[i, TORQUE_RATE + k] = torque_rate[k]
+        trajectory.acceleration[i, k] = load.acceleration[k]
+        trajectory.torque[i, k] = load.torque[k]
+        trajectory.top[i, JERK + k] = load.jerk[k]
+        trajectory.top[i, TORQUE_RATE + k] = load.torque_rate[k]
     for k in range(4):
         trajectory.orientation[i, k] = bodies.orientation[i, k]
     begin(trajectory, i)
@@ -226,9 +232,9 @@ def state_at(trajectory, i, t, x_out, q_out, v_out, w_out):
 
 @inlined
 def stepped_at(trajectory, i, t):
-    """Position, quaternion, velocity and angular velocity, three and four numbers each, of body i in mode STEPPED.
+    """Position, quaternion, velocity and angular velocity, three and four numbers each, of body i in mode LINEAR.
 
-    Heaps have thousands of such: numbers, since a view of an array costs more than what is computed.
+    Sub-stepped islands have thousands of such bodies. It returns numbers, because a view of an array costs more than the computation.
     """
     s = t - trajectory.start[i]
     top = trajectory.top
@@ -259,7 +265,7 @@ def stepped_at(trajectory, i, t):
 
 @jit
 def motion_at(trajectory, i, t, x_out, q_out, v_out, w_out):
-    """The same, with the velocities of the path: those by which pose changes. They differ in mode STEPPED only."""
+    """The same, with the velocities of the path: those by which pose changes. They differ in mode LINEAR only."""
     moves = trajectory.mode[i] != FIXED
     s = t - trajectory.start[i] if moves else 0.0
     mean = row_at(trajectory.acceleration, i, rate_of(trajectory, i, JERK), 0.5 * s)

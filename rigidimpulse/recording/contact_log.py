@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidimpulse.core.kernels import jit_making_arrays
-from rigidimpulse.dynamics.impact.friction import tangents
+from rigidimpulse.core.vector import tangents
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.impulses import ImpulseAccounts
+
+if TYPE_CHECKING:
+    from rigidimpulse.model.contacts import Contacts
 
 
 @jit_making_arrays
@@ -37,13 +41,13 @@ class ContactLog:
     """Collects contact forces while a run goes on; those that no frame sees are dropped."""
 
     def __init__(self, times: np.ndarray, accounts: ImpulseAccounts) -> None:
-        """times (f,) s, of the frames; book: where impulses go."""
+        """times (f,) s, of the frames; accounts: where impulses go."""
         self.times, self._accounts = times, accounts
         self._open: dict[int, Stretch] = {}
         self._done: list[np.ndarray] = []
 
     def close(self, bodies: list[int], time: float) -> None:
-        """The contacts of the bodies end at `time`, but for those that begin there, and for the last frame, which is the end."""
+        """The contacts of the bodies end at `time`, except those that begin there. At the last frame, which is the end, none does."""
         if 0.0 < self.times[-1] <= time:
             return
         for stretch in {id(s): s for s in map(self._open.get, bodies) if s is not None and s.start < time}.values():
@@ -52,7 +56,7 @@ class ContactLog:
             if i in self._open and self._open[i].start < time:
                 del self._open[i]
 
-    def replace(self, bodies: list[int], time: float, contacts, position: np.ndarray, force: np.ndarray) -> None:
+    def replace(self, bodies: list[int], time: float, contacts: Contacts, position: np.ndarray, force: np.ndarray) -> None:
         """The contacts of the bodies are these from `time` on; position (n, 3) of all bodies, force (m, 3) in (n, t1, t2)."""
         if 0.0 < self.times[-1] <= time:
             return
@@ -88,7 +92,7 @@ class ContactLog:
         self._count(rows[ends], time)
 
     def _count(self, rows: np.ndarray, end: float) -> None:
-        """Book the impulses of contacts that carried their forces until `end`."""
+        """Account for the impulses of contacts that carried their forces until `end`."""
         total: dict[tuple[int, int], np.ndarray] = {}
         for a, b, force in zip(rows["body_a"].tolist(), rows["body_b"].tolist(), rows["force"], strict=True):
             total[a, b] = total.get((a, b), 0.0) + force

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidimpulse.core.kernels import jit
+
+if TYPE_CHECKING:
+    from rigidimpulse.model.contacts import Contacts
 
 IMPACT_DTYPE = np.dtype(
     [
@@ -28,7 +32,7 @@ FIRST_ROWS = 64
 
 @jit
 def write_impacts(time, contacts, position, log, count, rows, first):
-    """Write `count` rows of a log of impulses (see `respond.impulse.log_impact`) into rows (k, ROW_LENGTH) from `first` on.
+    """Write `count` rows of a log of impulses (see `dynamics.impact.point.log_impact`) into rows (k, ROW_LENGTH) from `first` on.
 
     contacts: those that the log numbers; position (n, 3) m of the centres of mass.
     """
@@ -51,7 +55,7 @@ class ImpactRows:
         self.rows = np.empty((FIRST_ROWS, ROW_LENGTH))
         self.count = 0
 
-    def add(self, time: float, contacts, position: np.ndarray, log: np.ndarray, count: int) -> None:
+    def add(self, time: float, contacts: Contacts, position: np.ndarray, log: np.ndarray, count: int) -> None:
         """Keep the impacts that `write_impacts` describes."""
         while self.count + count > len(self.rows):
             self.rows = np.concatenate([self.rows, np.empty_like(self.rows)])
@@ -96,7 +100,7 @@ class EventLog:
     """Collects impacts, energy changes by cause, and events while a run goes on.
 
     spans: changes of energy that go on for a while: start, end [s], cause, change [J].
-    stretches: courses under contact forces: start, end [s], body, energy at the start [J], work of the forces [J].
+    stretches: trajectories under contact forces: start, end [s], body, energy at the start [J], work of the forces [J].
     """
 
     impacts: ImpactRows = field(default_factory=ImpactRows)
@@ -106,12 +110,12 @@ class EventLog:
     events: list[Event] = field(default_factory=list)
 
     def account(self, time: float, cause: str, change: float) -> None:
-        """Book a change of mechanical energy [J]; negative is dissipated."""
+        """Keep a change of mechanical energy [J]; negative is dissipated."""
         if change != 0.0:
             self.energy.append((time, cause, change))
 
     def account_over(self, start: float, end: float, cause: str, change: float) -> None:
-        """Book a change of mechanical energy [J] that went on from start to end [s]."""
+        """Keep a change of mechanical energy [J] that went on from start to end [s]."""
         if change != 0.0:
             self.spans.append((start, end, cause, change))
 

@@ -3,8 +3,8 @@
     m v(t) - m v(0) = sum over causes of the integral of F ds + sum of impulses
 
 Causes: gravity, constant forces, each force that varies, each joint, each body touched (lasting contact and impacts apart), and what is
-left: "corrections", by which sub-steps end (of second order in their length), captures, what heaps exchange. Of a body that loses mass the
-left side is the integral of m v'.
+left: "corrections". These are the changes of velocity at the end of sub-steps (of second order in their length), the impulses by which
+contacts stick, and what bodies of sub-stepped islands exchange. Of a body that loses mass the left side is the integral of m v'.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Impulses:
         pull: (n, 2, 3) N of gravity and of constant forces on each body, at its mass at the end.
         mass: (n,) kg at the end, 0 of bodies that are never dynamic. release: (n,) s, when bodies that are carried first are let go.
         velocity: (f, n, 3) m/s.
-        book: what pairs exchange. forces: what varying forces did, None where there are none.
+        accounts: what pairs exchange. forces: what varying forces did, None where there are none.
         impacts: the table of impacts.
 
     """
@@ -87,11 +87,11 @@ class Impulses:
         if name not in self.names:
             raise unknown_name("body", name, self.names)
         i = self.names.index(name)
-        held, gained = self._trajectory_of(i)
+        lasted, gained = self._gain_of(i)
         parts: dict[str, np.ndarray] = {}
         for what, pull in zip(("gravity", "constant forces"), self.pull[i], strict=True):
             if np.any(pull):
-                parts[what] = held[:, None] * pull
+                parts[what] = lasted[:, None] * pull
         if self.forces is not None:
             parts.update(self.forces.impulses_on(i))
         for (cause, other), impulse in sorted(self.accounts.of(i).items(), key=lambda item: item[0]):
@@ -102,7 +102,7 @@ class Impulses:
             parts["corrections"] = rest
         return parts
 
-    def _trajectory_of(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+    def _gain_of(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """Time until each frame (f,) s, each instant counted by the body's mass over that at the end, and what it gained (f, 3) N s."""
         share = np.ones(len(self.times))
         if self.forces is not None and self.forces.mass_share is not None:

@@ -3,13 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import cross, rotate, rotate_inverse
+from rigidimpulse.core.quaternion import rotate, rotate_inverse
+from rigidimpulse.core.vector import cross_arrays
+from rigidimpulse.recording.events import EventLog
+from rigidimpulse.recording.recorder import Frames
+
+if TYPE_CHECKING:
+    from rigidimpulse.dynamics.forces.force_log import ForceWork
 
 BLOCK = 4096
 """Frames times bodies that are summed up at once."""
+
+
+class Masses(NamedTuple):
+    """Of n bodies."""
+
+    mass: np.ndarray  # (f, n) or (n,) kg, 0 for bodies that are not dynamic yet
+    inertia: np.ndarray  # (n, 3) kg m2, principal
+    steady_acceleration: np.ndarray  # (n, 3) m/s2 by gravity and constant forces
 
 
 @dataclass(frozen=True)
@@ -23,9 +38,8 @@ class Ledger:
         momentum: (f, 3) kg m/s.
         angular_momentum: (f, 3) kg m2/s about the world's origin.
         dissipated: by cause ("impact", "contact", "stick", "position correction", "joints", "energy correction", "sub-stepping",
-            each force by its
-            name, ...), (f,) J taken
-            from the bodies until each frame; a negative value is energy fed in (a moving support, a lift out of the contact margin).
+            each force by its name, ...), (f,) J taken from the bodies until each frame; a negative value is energy fed in (by a moving
+            support, or by a position correction out of the contact margin).
 
     """
 
@@ -50,31 +64,28 @@ class Ledger:
         )
 
 
-def make_ledger(times, position, orientation, velocity, angular_velocity, mass, inertia, steady_acceleration, log, work=None) -> Ledger:
-    """Ledger of recorded principal-frame states.
-
-    Arrays are (f, n, ...) for all bodies: centre of mass, principal orientation, velocity, world spin; mass (f, n) or (n,) with 0
-    for bodies that are not dynamic yet, principal inertia (n, 3), acceleration by gravity and constant forces (n, 3); log: energy
-    changes by cause and courses under contact forces; work: what varying forces did (`ForceWork`), if there are any.
-    """
+def make_ledger(frames: Frames, masses: Masses, log: EventLog, work: ForceWork | None = None) -> Ledger:
+    """Ledger of recorded states; log: energy changes by cause and trajectories under contact forces; work: of varying forces, if any."""
+    times, position, orientation, velocity, angular_velocity = frames
     share = None if work is None else work.mass_share
     shape = position.shape[:2]
-    mass, kinetic, potential = np.broadcast_to(mass, shape), np.empty(shape), np.empty(shape)
+    mass, kinetic, potential = np.broadcast_to(masses.mass, shape), np.empty(shape), np.empty(shape)
     momentum, angular = np.empty((len(times), 3)), np.empty((len(times), 3))
     # Few frames at a time: arrays of all frames of thousands of bodies leave the caches.
     length = max(BLOCK // max(shape[1], 1), 1)
-    frames = [position, orientation, velocity, angular_velocity, mass] + ([] if share is None else [share])
+    states = [position, orientation, velocity, angular_velocity, mass] + ([] if share is None else [share])
     for first in range(0, len(times), length):
         end = min(first + length, len(times))
         block = slice(first, end)
-        if first and all(np.array_equal(one[block], one[first - 1 : end - 1]) for one in frames):  # all stands still
+        if first and all(np.array_equal(one[block], one[first - 1 : end - 1]) for one in states):  # nothing moves
             for sums in (kinetic, potential, momentum, angular):
                 sums[block] = sums[first - 1]
             continue
         kinetic[block], potential[block], momentum[block], angular[block] = _mechanics(
-            position[block], orientation[block], velocity[block], angular_velocity[block], mass[block],
-            inertia, steady_acceleration, np.ones((1, 1)) if share is None else share[block],
-        )  # fmt: skip
+            Frames(*(one[block] for one in frames)),
+            masses._replace(mass=mass[block]),
+            np.ones((1, 1)) if share is None else share[block],
+        )
     dissipated: dict[str, np.ndarray] = {}
     for cause in sorted({c for _, c, _ in log.energy}):
         stamps = np.array([t for t, c, _ in log.energy if c == cause])
@@ -96,8 +107,10 @@ def make_ledger(times, position, orientation, velocity, angular_velocity, mass, 
     return Ledger(times, kinetic.sum(1), stored, momentum, angular, dissipated)
 
 
-def _mechanics(position, orientation, velocity, angular_velocity, mass, inertia, steady_acceleration, share):
+def _mechanics(frames: Frames, masses: Masses, share: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Energies, kinetic and potential (f, n), momentum and angular momentum (f, 3) of frames; share (f, n): mass and inertia left."""
+    _, position, orientation, velocity, angular_velocity = frames
+    mass, inertia, steady_acceleration = masses
     mass, factor = share * mass, share * np.where(mass > 0.0, 1.0, 0.0)
     spin = (factor * inertia[:, 0])[:, :, None] * angular_velocity
     turned = np.flatnonzero(np.any(inertia != inertia[:, :1], axis=1))
@@ -108,7 +121,7 @@ def _mechanics(position, orientation, velocity, angular_velocity, mass, inertia,
     momenta = mass[:, :, None] * velocity
     kinetic = 0.5 * (_dot(velocity, momenta) + _dot(angular_velocity, spin))
     potential = -mass * np.einsum("fnk,nk->fn", position, steady_acceleration)
-    return kinetic, potential, momenta.sum(1), (spin + cross(position, momenta)).sum(1)
+    return kinetic, potential, momenta.sum(1), (spin + cross_arrays(position, momenta)).sum(1)
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -116,7 +129,7 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.einsum("fnk,fnk->fn", a, b)
 
 
-def _contact_work(times: np.ndarray, energy: np.ndarray, stretches) -> np.ndarray:
+def _contact_work(times: np.ndarray, energy: np.ndarray, stretches: list[tuple[float, float, int, float, float]]) -> np.ndarray:
     """Energy that contact forces took until each frame (f,); inside a stretch what the body, energy (f, n), lost since."""
     taken, steps = np.zeros(len(times)), np.zeros(len(times) + 1)
     for start, end, body, begun, work in stretches:

@@ -1,22 +1,35 @@
 """The recorder: samples every body's exact path at the frame times, whatever the frame rate, without touching the motion.
 
-A body's path is fixed from one change of course to the next. Before a body's course changes at time t its frames
+A body's path is fixed from one change of its trajectory to the next. Before a trajectory changes at time t, the body's frames
 before t are written; a frame at the very time of an impact shows the state after it, but frame 0 is the state as
 given.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rigidimpulse.core.kernels import inlined, jit
-from rigidimpulse.motion.trajectory import FIXED, LINEAR, motion_at, stepped_at
+from rigidimpulse.motion.trajectory import FIXED, LINEAR, Trajectories, motion_at, stepped_at
+
+
+class Frames(NamedTuple):
+    """States of n bodies at f times, world frame."""
+
+    times: np.ndarray  # (f,) s, increasing
+    position: np.ndarray  # (f, n, 3) m, centres of mass
+    orientation: np.ndarray  # (f, n, 4) wxyz, principal frames
+    velocity: np.ndarray  # (f, n, 3) m/s
+    angular_velocity: np.ndarray  # (f, n, 3) rad/s
 
 
 @inlined
-def _write_stepped(trajectory, i, times, f, position, orientation, velocity, angular_velocity):
-    """Write frame f of body i in mode STEPPED."""
-    x, q, v, w = stepped_at(trajectory, i, times[f])
+def _write_linear(trajectory, i, f, frames):
+    """Write frame f of body i in mode LINEAR."""
+    position, orientation, velocity, angular_velocity = frames.position, frames.orientation, frames.velocity, frames.angular_velocity
+    x, q, v, w = stepped_at(trajectory, i, frames.times[f])
     position[f, i, 0], position[f, i, 1], position[f, i, 2] = x
     orientation[f, i, 0], orientation[f, i, 1], orientation[f, i, 2], orientation[f, i, 3] = q
     velocity[f, i, 0], velocity[f, i, 1], velocity[f, i, 2] = v
@@ -24,8 +37,9 @@ def _write_stepped(trajectory, i, times, f, position, orientation, velocity, ang
 
 
 @inlined
-def _write_fixed(trajectory, i, f, position, orientation, velocity, angular_velocity):
+def _write_fixed(trajectory, i, f, frames):
     """Write frame f of body i in mode FIXED."""
+    position, orientation, velocity, angular_velocity = frames.position, frames.orientation, frames.velocity, frames.angular_velocity
     for k in range(3):
         position[f, i, k] = trajectory.position[i, k]
         # Only where it is not 0: zeros that nobody has written take no memory.
@@ -38,17 +52,16 @@ def _write_fixed(trajectory, i, f, position, orientation, velocity, angular_velo
 
 
 @jit
-def sample_paths(trajectory, bodies, times, last, written, position, orientation, velocity, angular_velocity):
-    """Write the frames of these bodies from written[i] to last - 1, on their present courses, and say so in `written`.
-
-    times (f,) s; position, orientation and velocities (f, n, ...).
-    """
+def sample_paths(trajectory, bodies, last, written, frames):
+    """Write the frames of these bodies from written[i] to last - 1, on their present trajectories, and say so in `written` (n,)."""
+    times, position, orientation = frames.times, frames.position, frames.orientation
+    velocity, angular_velocity = frames.velocity, frames.angular_velocity
     for i in bodies:
         for f in range(written[i], last):
             if trajectory.mode[i] == LINEAR:
-                _write_stepped(trajectory, i, times, f, position, orientation, velocity, angular_velocity)
+                _write_linear(trajectory, i, f, frames)
             elif trajectory.mode[i] == FIXED:
-                _write_fixed(trajectory, i, f, position, orientation, velocity, angular_velocity)
+                _write_fixed(trajectory, i, f, frames)
             else:
                 motion_at(trajectory, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
         written[i] = max(written[i], last)
@@ -71,15 +84,20 @@ class Recorder:
         self.written = np.zeros(num_bodies, np.int64)
         self._everyone = np.arange(num_bodies)
 
-    def start(self, trajectory) -> None:
+    @property
+    def frames(self) -> Frames:
+        """All frames, written or not."""
+        return Frames(self.times, self.position, self.orientation, self.velocity, self.angular_velocity)
+
+    def start(self, trajectory: Trajectories) -> None:
         """Write frame 0, the state as given."""
         self._write(trajectory, self._everyone, 1)
 
-    def flush(self, trajectory, i: int, time: float, correction: np.ndarray) -> None:
-        """Write the frames of body i before `time`; its course must still be the one that led there.
+    def flush(self, trajectory: Trajectories, i: int, time: float, correction: np.ndarray) -> None:
+        """Write the frames of body i before `time`; its trajectory must still be the one that led there.
 
-        correction (6,): change of velocity [m/s] and spin [rad/s] that it got at the end of its course, for what the
-        course was off by: that grew with the square of the time.
+        correction (6,): change of velocity [m/s] and spin [rad/s] that it got at the end of its trajectory, for the
+        error of the trajectory, which grew with the square of the time.
         """
         first, last = int(self.written[i]), int(np.searchsorted(self.times, time, side="left"))
         if last > first:
@@ -89,16 +107,15 @@ class Recorder:
             self.velocity[first:last, i] += share[:, None] * correction[:3]
             self.angular_velocity[first:last, i] += share[:, None] * correction[3:]
 
-    def flush_all(self, trajectory, bodies: np.ndarray, time: float) -> None:
+    def flush_all(self, trajectory: Trajectories, bodies: np.ndarray, time: float) -> None:
         """Write the frames of all these bodies before `time`, as `flush` does."""
         self._write(trajectory, bodies, int(np.searchsorted(self.times, time, side="left")))
 
-    def finish(self, trajectory) -> None:
+    def finish(self, trajectory: Trajectories) -> None:
         """Write what is left of all bodies."""
         for last in range(int(self.written.min(initial=0)), len(self.times), AT_ONCE):
             self.flush_all(trajectory, self._everyone, self.times[last])
         self.flush_all(trajectory, self._everyone, np.inf)
 
-    def _write(self, trajectory, bodies: np.ndarray, last: int) -> None:
-        frames = self.position, self.orientation, self.velocity, self.angular_velocity
-        sample_paths(trajectory, bodies, self.times, last, self.written, *frames)
+    def _write(self, trajectory: Trajectories, bodies: np.ndarray, last: int) -> None:
+        sample_paths(trajectory, bodies, last, self.written, self.frames)

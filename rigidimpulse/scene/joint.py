@@ -1,25 +1,39 @@
-"""Joints as people write them, and the table that the kernels read.
+"""Joints as people write them.
 
 Anchors and axes are given in world coordinates at the start. A joint's frame has its first axis along `axis`. What a
-joint does is a list of `Row`s: coordinates (see `joint_rows`) with a target, bounds, and a stiffness.
+joint does is a list of `Row`s: coordinates (see `joint_coordinates`) with a target, bounds, and a stiffness.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import KW_ONLY, dataclass, replace
-from typing import ClassVar
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.core.errors import SceneError, unknown_name
-from rigidimpulse.core.quaternion import to_matrix
-from rigidimpulse.dynamics.constraints.joint import ABOUT, ACROSS, ALONG, DISTANCE, SWING, TWIST, Joints
-from rigidimpulse.model.effect import Skip
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.scene.body import vector
+from rigidimpulse.scene.joint_coordinates import ABOUT, ACROSS, ALONG, DISTANCE, SWING, TWIST
 
 HARD = math.inf
+Anchors = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+class PlacedBodies(Protocol):
+    """Where the bodies of a scene are at the start; a `World` is one."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names in order of index."""
+        ...
+
+    @property
+    def position(self) -> np.ndarray:
+        """(n, 3) m, centres of mass."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -119,11 +133,7 @@ class Joint:
     collide: bool = False
     stage: ClassVar[str] = "constrain"
 
-    def bind(self, _world) -> Skip:
-        """Joints are rows of the stage constrain, not stages of their own."""
-        return Skip("a joint; see joint forces")
-
-    def points(self, _world) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def points(self, _world: PlacedBodies) -> Anchors:
         """Anchor on a, anchor on b and first axis, (3,) each, in the world at the start."""
         raise NotImplementedError
 
@@ -149,7 +159,7 @@ class _AnchoredJoint(Joint):
     anchor: ArrayLike
     axis: ArrayLike
 
-    def points(self, _world):
+    def points(self, _world: PlacedBodies) -> Anchors:
         """See `Joint`."""
         anchor = vector(self.anchor, "anchor", "m")
         return anchor, anchor, vector(self.axis, "axis", "")
@@ -181,8 +191,8 @@ class HingeJoint(_AnchoredJoint):
 
     def rows(self, _distance: float) -> list[Row]:
         """See `Joint`."""
-        held = [Row(ALONG), Row(ALONG + 1), Row(ALONG + 2), *(Row(code) for code in across(0))]
-        return held + bounds(TWIST, self.lower, self.upper) + (self.motor.rows(TWIST) if self.motor else [])
+        fixed = [Row(ALONG), Row(ALONG + 1), Row(ALONG + 2), *(Row(code) for code in across(0))]
+        return fixed + bounds(TWIST, self.lower, self.upper) + (self.motor.rows(TWIST) if self.motor else [])
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,8 +203,8 @@ class SliderJoint(_AnchoredJoint):
 
     def rows(self, _distance: float) -> list[Row]:
         """See `Joint`."""
-        held = [Row(ALONG + 1), Row(ALONG + 2), Row(ABOUT), Row(ABOUT + 1), Row(ABOUT + 2)]
-        return held + bounds(ALONG, self.lower, self.upper) + (self.motor.rows(ALONG) if self.motor else [])
+        fixed = [Row(ALONG + 1), Row(ALONG + 2), Row(ABOUT), Row(ABOUT + 1), Row(ABOUT + 2)]
+        return fixed + bounds(ALONG, self.lower, self.upper) + (self.motor.rows(ALONG) if self.motor else [])
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +213,7 @@ class FixedJoint(Joint):
 
     anchor: ArrayLike | None = None
 
-    def points(self, world):
+    def points(self, world: PlacedBodies) -> Anchors:
         """See `Joint`."""
         if self.anchor is not None:
             anchor = vector(self.anchor, "anchor", "m")
@@ -224,7 +234,7 @@ class DistanceJoint(Joint):
     anchor_b: ArrayLike
     length: float | None = None
 
-    def points(self, _world):
+    def points(self, _world: PlacedBodies) -> Anchors:
         """See `Joint`."""
         return vector(self.anchor_a, "anchor_a", "m"), vector(self.anchor_b, "anchor_b", "m"), np.array([0.0, 0.0, 1.0])
 
@@ -246,70 +256,3 @@ def _frame(axis: np.ndarray) -> np.ndarray:
     second = np.cross(first, np.eye(3)[int(np.argmin(np.abs(first)))])
     second /= np.linalg.norm(second)
     return np.column_stack([first, second, np.cross(first, second)])
-
-
-def _soften(joint: Joint, rows: list[Row]) -> list[Row]:
-    """The rows with the joint's stiffness and damping; drives keep their own."""
-    if joint.stiffness is None:
-        if joint.damping != 0.0:
-            raise SceneError(f"damping = {joint.damping} without stiffness", "give a stiffness too")
-        return rows
-    stiffness = float(joint.stiffness)
-    if not (math.isfinite(stiffness) and stiffness >= 0.0 and math.isfinite(joint.damping) and joint.damping >= 0.0):
-        raise SceneError(f"stiffness {joint.stiffness}, damping {joint.damping}", "give finite values >= 0")
-    return [replace(r, stiffness=stiffness, damping=float(joint.damping)) if r.stiffness == HARD else r for r in rows]
-
-
-def compile_joints(joints: list[Joint], world) -> Joints:
-    """The table of joints of a world whose bodies are compiled.
-
-    Raises:
-        SceneError: unknown bodies, bad values; names the joint.
-
-    """
-    columns: dict[str, list] = {field: [] for field in Joints._fields}
-    columns["first"].append(0)
-    for joint in joints:
-        sides = [_side(joint, world, name) for name in (joint.a, joint.b)]
-        if sides[0][0] == sides[1][0]:
-            raise SceneError(f"it joins {joint.a!r} to itself", "name two different bodies", joint.label)
-        if not joint.break_force > 0.0:
-            raise SceneError(f"break_force = {joint.break_force}", "give a force in N, > 0, or leave it out", joint.label)
-        if not joint.release_time >= 0.0:
-            raise SceneError(f"release_time = {joint.release_time}", "give a time in s, >= 0, or leave it out", joint.label)
-        if joint.name is not None and sum(other.name == joint.name for other in joints) > 1:
-            raise SceneError(f"another joint has the name {joint.name!r}, too", "give each joint a name of its own", joint.label)
-        motor = getattr(joint, "motor", None)
-        if not isinstance(motor, Motor | None):
-            raise SceneError(f"motor = {motor!r}", "give ri.Motor(velocity=..., damping=...) or another Motor", joint.label)
-        if not any(i >= 0 and world.dynamic[i] for i, _, _ in sides):
-            raise SceneError("neither body is dynamic", "join at least one that moves", joint.label)
-        try:
-            anchor_a, anchor_b, axis = joint.points(world)
-            frames = joint.frames(axis)
-            rows = _soften(joint, joint.rows(float(np.linalg.norm(anchor_b - anchor_a))))
-        except SceneError as error:
-            raise error.within(joint.label) from None
-        ends = zip("ab", (anchor_a, anchor_b), frames, sides, strict=True)
-        for side, anchor, frame, (i, turn, origin) in ends:
-            columns[f"body_{side}"].append(i)
-            columns[f"anchor_{side}"].append(turn.T @ (anchor - origin))
-            columns[f"frame_{side}"].append(turn.T @ frame)
-        for row in rows:
-            for field in ("coordinate", "target", "lower", "upper", "stiffness", "damping", "rate", "per_mass"):
-                columns[field].append(getattr(row, field))
-        columns["first"].append(columns["first"][-1] + len(rows))
-    integers = ("body_a", "body_b", "first", "coordinate")
-    types = dict.fromkeys(integers, np.int64) | {"per_mass": np.bool_}
-    arrays = (np.array(columns[f], types.get(f, float)) for f in Joints._fields)
-    return Joints(*(np.ascontiguousarray(array) for array in arrays))
-
-
-def _side(joint: Joint, world, name: str | None) -> tuple[int, np.ndarray, np.ndarray]:
-    """Index, rotation (3, 3) and position (3,) of one side's principal frame at the start."""
-    if name is None:
-        return -1, np.eye(3), np.zeros(3)
-    if name not in world.names:
-        raise unknown_name("body", name, world.names, joint.label)
-    i = world.names.index(name)
-    return i, to_matrix(world.orientation[i]), world.position[i]

@@ -25,13 +25,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.dynamics.constraints.joint import ABOUT, ALONG, ANGLE, DISTANCE, RADIUS, SWING, TWIST
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.scene.body import vector
-from rigidimpulse.scene.joint import HARD, Joint, Motor, Row, across, bounds
+from rigidimpulse.scene.joint import HARD, Anchors, Joint, Motor, PlacedBodies, Row, across, bounds
+from rigidimpulse.scene.joint_coordinates import ABOUT, ALONG, ANGLE, DISTANCE, RADIUS, SWING, TWIST
 
 AXES = "xyz"
-ORTHONORMAL = 1e-9
-"""Largest error of the products of given axes; they are made orthonormal to round-off."""
+ORTHONORMAL = TOLERANCES.joint.orthonormal_axes
 
 
 def _axes(translation: str, rotation: str, owner: str) -> tuple[bool, tuple[int, ...]]:
@@ -88,7 +88,7 @@ class Limit:
         linear, axes, locks = self.parts()
         stiffness, damping = HARD if self.stiffness is None else float(self.stiffness), float(self.damping)
         if locks:
-            return [Row(code, stiffness=stiffness, damping=damping) for code in _held(linear, axes)]
+            return [Row(code, stiffness=stiffness, damping=damping) for code in _fixed(linear, axes)]
         others = [k for k in range(3) if k not in axes]
         if len(axes) == 1:
             code = (ALONG if linear else TWIST) + axes[0]
@@ -117,7 +117,7 @@ class Drive(Motor):
         return self.rows((ALONG if linear else TWIST) + axes[0])
 
 
-def _held(linear: bool, axes: Sequence[int]) -> list[int]:
+def _fixed(linear: bool, axes: Sequence[int]) -> list[int]:
     """Coordinates that are zero where the axes are locked."""
     if linear:
         return [ALONG + k for k in axes]
@@ -159,7 +159,7 @@ class SixAxisJoint(Joint):
     anchor_b: ArrayLike | None = None
     axes_b: ArrayLike | None = None
 
-    def points(self, _world):
+    def points(self, _world: PlacedBodies) -> Anchors:
         """See `Joint`."""
         anchor = vector(self.anchor, "anchor", "m")
         anchor_b = anchor if self.anchor_b is None else vector(self.anchor_b, "anchor_b", "m")
@@ -182,5 +182,5 @@ class SixAxisJoint(Joint):
                 locked[linear].update(axes)
             else:
                 rows += limit.rows()
-        held = [Row(code) for linear, axes in locked.items() if axes for code in _held(linear, sorted(axes))]
-        return held + rows + [row for drive in self.drives for row in drive.axis_rows()]
+        fixed = [Row(code) for linear, axes in locked.items() if axes for code in _fixed(linear, sorted(axes))]
+        return fixed + rows + [row for drive in self.drives for row in drive.axis_rows()]

@@ -1,16 +1,6 @@
-r"""Mass, centre of mass and inertia of bodies.
+"""Mass, centre of mass and inertia of bodies.
 
-A solid of density rho has mass m = rho V, centre of mass c = (1/V) \int x dV, and inertia about c
-I = rho (tr(S) 1 - S), with the second moments S = \int (x - c)(x - c)^T dV.
-
-Triangle meshes: the integrals over the solid are sums over the tetrahedra between a reference point and each face
-(a, b, c), signed by volume v = a . (b x c) / 6:  \int 1 = v,  \int x = v s / 4,  \int x x^T = v (a a^T + b b^T + c c^T
-+ s s^T) / 20, with s = a + b + c (B. Mirtich, Fast and accurate computation of polyhedral mass properties, J. Graphics
-Tools 1 (1996), in the tetrahedral form of J. Blow & A. Binstock, 2004). Exact for polyhedra. They are summed with one
-rounding (`math.fsum`), the second moments about the centre of mass found first, so results depend neither on the order
-of faces nor on where the mesh was drawn.
-
-Compounds: parts add, I = sum R_k I_k R_k^T + m_k (|d_k|^2 1 - d_k d_k^T), d_k from the common centre of mass.
+A solid of density rho has the mass m = rho V, and about its centre of mass the inertia rho I, with V and I of `solid`.
 
 Principal axes: Jacobi rotations, which keep axes close to the body's own and are accurate to the last digits for each
 moment, however unequal they are (J. Demmel & K. Veselic, SIAM J. Matrix Anal. Appl. 13 (1992)).
@@ -24,22 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.scene.body import Body
-from rigidimpulse.scene.shape import Shape
-from rigidimpulse.scene.surface import Surface
+from rigidimpulse.scene.solid import parallel_axes
 
 _JACOBI_SWEEPS = 30  # convergence is quadratic: 4 to 6 sweeps are enough for any 3 x 3 matrix
-_JACOBI_CONVERGED = 1e-30  # off-diagonal entries, relative to the largest moment, that no longer change anything
-
-
-class Solid(NamedTuple):
-    """A shape filled with density 1: volume (m^3), centroid (3,) and inertia (3, 3) about it (m^5), shape's frame."""
-
-    volume: float
-    centroid: np.ndarray
-    inertia: np.ndarray
+_JACOBI_CONVERGED = TOLERANCES.inertia.jacobi_converged
 
 
 class BodyMass(NamedTuple):
@@ -85,33 +66,16 @@ def masses_of(bodies: Iterable[Body]) -> list[BodyMass]:
     return masses
 
 
-def compute_solid(shape: Shape) -> Solid:
-    """Return volume, centroid and inertia of a shape filled with density 1 (`Shape.solid` keeps the answer).
-
-    Raises:
-        SceneError: it does not enclose a volume: a half space, or an open, twisted, flat or inside-out mesh.
-
-    """
-    shape.check()
-    try:
-        solid = _COMPUTE[shape.kind](shape)
-        if not (0.0 < solid.volume < math.inf and np.all(np.isfinite(solid.inertia)) and np.trace(solid.inertia) > 0):
-            raise SceneError(f"its volume comes out as {solid.volume} m^3", "check its size, which is in metres")
-    except SceneError as error:
-        raise error.within(shape.label) from None
-    return solid
-
-
 def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return principal moments (3,) and axes (3, 3, columns, a proper rotation) of a symmetric tensor.
 
-    Moments equal within `Tolerances.equal_moments` are made equal; a tensor that is diagonal within
-    `Tolerances.diagonal_inertia`, or has three equal moments, keeps the axes it is given in.
+    Moments equal within `equal_moments` (see `core.tolerances.Inertia`) are made equal; a tensor that is diagonal within
+    `diagonal`, or has three equal moments, keeps the axes it is given in.
     """
     tensor = 0.5 * (inertia + inertia.T)
     axes = np.eye(3)
     largest = float(np.max(np.abs(np.diag(tensor))))
-    if _off_diagonal(tensor) > TOLERANCES.diagonal_inertia * largest:
+    if _off_diagonal(tensor) > TOLERANCES.inertia.diagonal * largest:
         for _ in range(_JACOBI_SWEEPS):
             if _off_diagonal(tensor) <= _JACOBI_CONVERGED * largest:
                 break
@@ -138,7 +102,7 @@ def _dynamic_mass(body: Body) -> BodyMass:
             raise SceneError(error.problem, remedy, error.where) from None
         mass = solid.volume * float(body.material.density) if body.mass is None else float(body.mass)
         center = solid.centroid if body.center_of_mass is None else np.asarray(body.center_of_mass, dtype=np.float64)
-        tensor = mass / solid.volume * _moved(solid.inertia, solid.volume, center - solid.centroid)
+        tensor = mass / solid.volume * parallel_axes(solid.inertia, solid.volume, center - solid.centroid)
     if body.inertia is not None:
         tensor = _given_inertia(np.asarray(body.inertia, dtype=np.float64))
     assert tensor is not None
@@ -162,121 +126,11 @@ def _frame_origin(body: Body) -> np.ndarray:
         return np.zeros(3)
 
 
-def _sphere(shape: Shape) -> Solid:
-    r = shape.radius
-    volume = 4.0 / 3.0 * math.pi * r * r * r
-    return Solid(volume, np.zeros(3), np.diag(np.full(3, 0.4 * volume * r * r)))
-
-
-def _box(shape: Shape) -> Solid:
-    assert shape.size is not None
-    x, y, z = (float(length) for length in shape.size)
-    volume = x * y * z
-    sums = (y * y + z * z, x * x + z * z, x * x + y * y)
-    return Solid(volume, np.zeros(3), np.diag([volume / 12.0 * total for total in sums]))
-
-
-def _cylinder(shape: Shape) -> Solid:
-    r, h = shape.radius, shape.height
-    volume = math.pi * r * r * h
-    across = volume * (3.0 * r * r + h * h) / 12.0
-    return Solid(volume, np.zeros(3), np.diag([across, across, 0.5 * volume * r * r]))
-
-
-def _capsule(shape: Shape) -> Solid:
-    """A cylinder and two half spheres, whose centroids lie 3 r / 8 beyond its ends."""
-    r, h = shape.radius, shape.height
-    middle, caps = math.pi * r * r * h, 4.0 / 3.0 * math.pi * r * r * r
-    along = 0.5 * middle * r * r + 0.4 * caps * r * r
-    across = middle * (3.0 * r * r + h * h) / 12.0 + caps * (0.4 * r * r + 0.25 * h * h + 0.375 * h * r)
-    return Solid(middle + caps, np.zeros(3), np.diag([across, across, along]))
-
-
-def _mesh(shape: Shape) -> Solid:
-    surface = shape.surface()
-    _check_closed(surface)
-    return _polyhedron(surface)
-
-
-def _compound(shape: Shape) -> Solid:
-    solids = [(part.shape.solid(), part.position, part.rotation) for part in shape.parts_flat()]
-    volume = math.fsum(solid.volume for solid, _, _ in solids)
-    centroids = [position + rotation @ solid.centroid for solid, position, rotation in solids]
-    reference = centroids[0]
-    moment = [solid.volume * (c - reference) for (solid, _, _), c in zip(solids, centroids, strict=True)]
-    centroid = reference + _exact_sum(np.array(moment)) / volume
-    tensors = [
-        _moved(rotation @ solid.inertia @ rotation.T, solid.volume, c - centroid)
-        for (solid, _, rotation), c in zip(solids, centroids, strict=True)
-    ]
-    inertia = _exact_sum(np.array(tensors).reshape(-1, 9)).reshape(3, 3)
-    return Solid(volume, centroid, 0.5 * (inertia + inertia.T))
-
-
-def _half_space(_: Shape) -> Solid:
-    raise SceneError("it is infinite, it has no mass", "make the body motion='static'")
-
-
-_COMPUTE = {
-    "sphere": _sphere,
-    "box": _box,
-    "cylinder": _cylinder,
-    "capsule": _capsule,
-    "mesh": _mesh,
-    "compound": _compound,
-    "half_space": _half_space,
-}
-
-
-def _check_closed(surface: Surface) -> None:
-    """Raise a `SceneError` for a surface that bounds no solid."""
-    if surface.num_open_edges:
-        raise SceneError(
-            f"it is open ({surface.num_open_edges} of its edges lack a second face), so it has no mass of its own",
-            "close it, use Shape.convex_hull, or make the body motion='static'",
-        )
-    if surface.num_twisted_edges:
-        raise SceneError(
-            f"its faces do not all face outwards ({surface.num_twisted_edges} edges join faces of opposite winding)",
-            "turn the faces that are the wrong way round (trimesh.repair.fix_normals(mesh)), or use Shape.convex_hull",
-        )
-
-
-def _polyhedron(surface: Surface) -> Solid:
-    """Return the integrals over a closed surface."""
-    low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
-    middle = 0.5 * (low + high)
-    corners = (surface.vertices - middle)[surface.faces]
-    area_vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = 0.5 * math.fsum(np.linalg.norm(area_vectors, axis=1).tolist())
-    signed = np.sum(corners[:, 0] * np.cross(corners[:, 1], corners[:, 2]), axis=1) / 6.0
-    volume = math.fsum(signed.tolist())
-    if abs(volume) <= TOLERANCES.enclosed_volume * area * float(np.max(high - low)):
-        raise SceneError("it encloses no volume", "give it a thickness, or make the body motion='static'")
-    if volume < 0.0:
-        raise SceneError(
-            f"it is inside out (volume {volume:g} m^3)", "flip its faces: Shape.mesh(vertices, faces[:, ::-1])"
-        )
-    offset = _exact_sum(signed[:, None] * corners.sum(axis=1)) / (4.0 * volume)
-
-    corners = corners - offset
-    signed = np.sum(corners[:, 0] * np.cross(corners[:, 1], corners[:, 2]), axis=1) / 6.0
-    points = np.concatenate([corners, corners.sum(axis=1, keepdims=True)], axis=1)  # (f, 4, 3): a, b, c, s
-    moments = _exact_sum((signed[:, None, None] * np.swapaxes(points, 1, 2) @ points).reshape(-1, 9)) / 20.0
-    second = moments.reshape(3, 3)
-    return Solid(volume, middle + offset, np.trace(second) * np.eye(3) - 0.5 * (second + second.T))
-
-
-def _moved(inertia: np.ndarray, mass: float, offset: np.ndarray) -> np.ndarray:
-    """Return an inertia about the centre of mass moved to a point `offset` away (parallel axes)."""
-    return inertia + mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-
-
 def _given_inertia(inertia: np.ndarray) -> np.ndarray:
     """Return a given inertia, (3,) or (3, 3), as a symmetric tensor."""
     if inertia.shape == (3,):
         return np.diag(inertia)
-    if np.max(np.abs(inertia - inertia.T)) > TOLERANCES.symmetric_inertia * np.max(np.abs(inertia)):
+    if np.max(np.abs(inertia - inertia.T)) > TOLERANCES.inertia.symmetric * np.max(np.abs(inertia)):
         raise SceneError(f"inertia {inertia.tolist()} is not symmetric", "give a symmetric tensor in kg m^2")
     return 0.5 * (inertia + inertia.T)
 
@@ -284,9 +138,9 @@ def _given_inertia(inertia: np.ndarray) -> np.ndarray:
 def _check_moments(moments: np.ndarray) -> None:
     """Raise a `SceneError` for moments that no body has."""
     small, middle, large = sorted(float(moment) for moment in moments)
-    if small <= TOLERANCES.least_moment * large:
+    if small <= TOLERANCES.inertia.least_moment * large:
         raise SceneError(f"principal moments of inertia are {moments.tolist()} kg m^2", "all must be > 0")
-    if small + middle < large * (1.0 - TOLERANCES.realizable_inertia):
+    if small + middle < large * (1.0 - TOLERANCES.inertia.realizable):
         raise SceneError(
             f"principal moments of inertia are {moments.tolist()} kg m^2",
             "no body has one above the sum of the other two: check inertia=, which is about the centre of mass",
@@ -318,15 +172,10 @@ def _jacobi_rotate(tensor: np.ndarray, axes: np.ndarray, p: int, q: int, r: int)
 
 def _equalized(moments: np.ndarray) -> np.ndarray:
     """Make moments equal that differ by no more than rounding: all three, or the closest two."""
-    allowed = TOLERANCES.equal_moments * float(np.max(np.abs(moments)))
+    allowed = TOLERANCES.inertia.equal_moments * float(np.max(np.abs(moments)))
     if np.ptp(moments) <= allowed:
         return np.full(3, moments.mean())
     gap, p, q = min((abs(moments[p] - moments[q]), p, q) for p, q in ((0, 1), (0, 2), (1, 2)))
     if gap <= allowed:
         moments[[p, q]] = 0.5 * (moments[p] + moments[q])
     return moments
-
-
-def _exact_sum(rows: np.ndarray) -> np.ndarray:
-    """Return the sum of rows (n, k), each column rounded once."""
-    return np.array([math.fsum(column.tolist()) for column in rows.T])

@@ -43,7 +43,7 @@ class Scene:
             self.add(body)
 
     def add(self, thing: Any) -> Any:
-        """Add a body, or an effect (anything with a `stage` and a `bind` method: forces, joints), and return it.
+        """Add a body, or an effect (anything with a `stage`: forces, joints, triggers, soft bodies), and return it.
 
         Raises:
             SceneError: the name is taken, or it is neither.
@@ -55,7 +55,7 @@ class Scene:
             if thing.name in self._bodies:
                 raise SceneError("the scene has a body of this name already", "give it another", f"body {thing.name!r}")
             self._bodies[thing.name] = thing
-        elif not isinstance(thing, type) and hasattr(thing, "stage") and callable(getattr(thing, "bind", None)):
+        elif not isinstance(thing, type) and isinstance(getattr(thing, "stage", None), str):
             self._effects.append(thing)
         else:
             what = f"the class {thing.__name__}" if isinstance(thing, type) else f"a {type(thing).__name__}"

@@ -18,12 +18,11 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import load_mesh
+from rigidimpulse.scene.solid import Solid, compute_solid
 from rigidimpulse.scene.surface import Surface, clean_surface
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
-
-    from rigidimpulse.scene.mass import Solid
 
 _BOX_CORNERS = 0.5 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
 _BOX_FACES = np.array(
@@ -199,7 +198,7 @@ class Shape:
 
     @cached_property
     def key(self) -> bytes:
-        """A digest of all that makes the shape, but for the file that it is from: the same for shapes that are alike."""
+        """A digest of all data of the shape except the file it is from: the same for shapes that are alike."""
         from hashlib import blake2b
 
         digest = blake2b(f"{self.kind} {self.radius!r} {self.height!r} {self.offset!r}".encode(), digest_size=16)
@@ -238,7 +237,7 @@ class Shape:
         """Return volume, centroid and inertia of the shape filled with density 1.
 
         Raises:
-            SceneError: it encloses no volume (see `rigidimpulse.scene.mass.compute_solid`).
+            SceneError: it encloses no volume (see `rigidimpulse.scene.solid.compute_solid`).
 
         """
         return self._solid
@@ -274,8 +273,6 @@ class Shape:
 
     @cached_property
     def _solid(self) -> Solid:
-        from rigidimpulse.scene.mass import compute_solid
-
         return compute_solid(self)
 
     def _check_lengths(self) -> None:
@@ -318,7 +315,7 @@ def check_orientation(quaternion: np.ndarray, where: str = "") -> None:
 
 
 def normalized_quaternion(quaternion: ArrayLike) -> np.ndarray:
-    """Return the unit quaternion (4,) along a non-zero one; one that is unit but for rounding is only rescaled."""
+    """Return the unit quaternion (4,) along a non-zero one; one that is a unit quaternion up to rounding is only rescaled."""
     q = np.asarray(quaternion, dtype=np.float64)
     q = q / np.max(np.abs(q))  # keeps tiny and huge ones from under- or overflowing
     return q / np.sqrt(np.sum(q * q))

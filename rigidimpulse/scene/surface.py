@@ -1,7 +1,7 @@
 """Triangle surfaces: cleaning what people bring, and counting what is wrong with it.
 
 Cleaning never moves a vertex. It joins vertices at the same place (texture seams), and where the surface is still open
-also those closer than `Tolerances.weld`; it drops triangles that have lost a corner or come twice; and it flips the
+also those closer than `Surfaces.weld` of `core.tolerances`; it drops triangles that have lost a corner or come twice; and it flips the
 long edge of triangles without area (T-junctions), so that a closed surface stays closed.
 """
 
@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.geometry import unique_edges
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.triangles import unique_edges
 
 
 class Surface(NamedTuple):
@@ -98,7 +98,7 @@ def _welded(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     used = np.unique(faces)
     points = vertices[used]
     size = float(np.max(np.ptp(points, axis=0), initial=0.0))
-    pairs = KDTree(points).query_pairs(TOLERANCES.weld * size, output_type="ndarray")
+    pairs = KDTree(points).query_pairs(TOLERANCES.surface.weld * size, output_type="ndarray")
     links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(used), len(used)))
     _, label = connected_components(links, directed=False)
     _, lowest = np.unique(label, return_index=True)
@@ -140,11 +140,11 @@ def _flip_thin(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Flip the longest edge of thin triangles until none can be helped; drop those without any area."""
     faces = faces.copy()
     for _ in range(len(faces)):
-        thin = np.flatnonzero(_thinness(vertices, faces) < TOLERANCES.thin_triangle)
+        thin = np.flatnonzero(_thinness(vertices, faces) < TOLERANCES.surface.thin_triangle)
         if len(thin) == 0 or not _flip_once(vertices, faces, thin):
             break
         faces = _drop_repeated(faces)
-    return faces[_thinness(vertices, faces) > TOLERANCES.round_off]
+    return faces[_thinness(vertices, faces) > TOLERANCES.arithmetic.round_off]
 
 
 def _flip_once(vertices: np.ndarray, faces: np.ndarray, thin: np.ndarray) -> bool:
@@ -167,7 +167,7 @@ def _flip_once(vertices: np.ndarray, faces: np.ndarray, thin: np.ndarray) -> boo
         if neighbour < 0 or touched & {index, neighbour} or (b, d) in half_edges or (d, b) in half_edges:
             continue
         flipped = np.array([[a, d, b], [d, c, b]])
-        if b != d and _thinness(vertices, flipped).min() < TOLERANCES.thin_triangle:
+        if b != d and _thinness(vertices, flipped).min() < TOLERANCES.surface.thin_triangle:
             continue
         faces[[index, neighbour]] = flipped  # b == d: two faces back to back, which lose a corner and are dropped
         touched |= {index, neighbour}

@@ -7,7 +7,7 @@ halving the step leaves at most half of it, so e_k <= 2 d_k. That is for errors 
 
 where r_k is how far u_k moves when it starts with an error of rounding (`reference.perturbed`) and its impact times may be off by LOOSER
 times their tolerance. The term d_(k-1) / 8 counts where d_k is small by chance. The floor is an error that all rungs share: the rounding
-of the positions themselves and, where contacts last, the gap at which bodies rest (`conventions.TOLERANCES.contact_margin` of a body's
+of the positions themselves and, where contacts last, the gap at which bodies rest (`tolerances.TOLERANCES.contact.margin` of a body's
 size; in sub-stepped islands the skin, relative to half a size).
 """
 
@@ -18,8 +18,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.model.world import World
@@ -145,7 +145,7 @@ def _floor(run: Recording) -> np.ndarray:
     spin = float(np.linalg.norm(run.angular_velocities, axis=2).max(initial=0.0))
     rounding = FLOOR * np.array([np.abs(run.positions).max(initial=0.0), 1.0 + spin * run.times[-1]])
     touching = [island for island in _islands(run, world) if len(island) > 0]
-    share = 0.5 * TOLERANCES.skin if "sub-stepping" in run.ledger.dissipated else 2.0 * TOLERANCES.contact_margin
+    share = 0.5 * TOLERANCES.sub_stepping.skin if "sub-stepping" in run.ledger.dissipated else 2.0 * TOLERANCES.contact.margin
     return rounding + share * np.array([max((world.size[island].sum() for island in touching), default=0.0), float(bool(touching))])
 
 

@@ -21,7 +21,8 @@ from rigidimpulse.collision.distance.fcl import Narrowphase
 from rigidimpulse.core.quaternion import angle_between, multiply, rotate
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.events import EventLog
-from rigidimpulse.recording.ledger import make_ledger
+from rigidimpulse.recording.ledger import Masses, make_ledger
+from rigidimpulse.recording.recorder import Frames
 from rigidimpulse.recording.recording import Recording
 
 MOST_FRAMES = 120
@@ -77,9 +78,10 @@ def mechanical_energy(world: World, run: Recording) -> tuple[np.ndarray, float]:
     ledger = run.ledger
     if ledger is None:
         ledger = make_ledger(
-            run.times, run.centers, multiply(run.orientations, world.turn), run.velocities, run.angular_velocities,
-            np.where(world.dynamic, world.mass, 0.0), world.inertia, world.steady_acceleration, EventLog(),
-        )  # fmt: skip
+            Frames(run.times, run.centers, multiply(run.orientations, world.turn), run.velocities, run.angular_velocities),
+            Masses(np.where(world.dynamic, world.mass, 0.0), world.inertia, world.steady_acceleration),
+            EventLog(),
+        )
     return ledger.total, float(ledger.kinetic.max() + np.ptp(ledger.potential))
 
 

@@ -18,8 +18,8 @@ from scene_plans import ScenePlan, make_scene
 
 import rigidimpulse as ri
 from rigidimpulse.collision.distance.fcl import Narrowphase
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.quaternion import multiply, rotate
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.scene.mass import body_mass
 
 DEPTH = 1e-6
@@ -83,7 +83,7 @@ def _energy(plan: ScenePlan, run: ri.Recording, mass, acceleration) -> list[str]
     moved = float(kinetic.max() + np.ptp(potential))
     size = max(max(body.size) + body.size[2] * (body.shape == "capsule") for body in plan.bodies)
     weight = float(mass @ np.linalg.norm(acceleration, axis=1))
-    gap = 2.0 * TOLERANCES.contact_margin * size
+    gap = 2.0 * TOLERANCES.contact.margin * size
     allowed = (JOINT_ENERGY if plan.joints else ENERGY) * moved + gap * len(mass) * weight + 0.5 * mass.sum() * (gap / STEP) ** 2
     at = run.times[int(np.argmax(total - np.minimum.accumulate(total)))]
     return [f"energy grows by {rise:.1e} J until {at:.4f} s, {rise / moved:.1e} of what moves"] if rise > allowed else []

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 
 RADIUS, HEIGHT, G = 0.5, 2.5, 9.81
 
@@ -38,7 +38,7 @@ def test_inelastic_ball_comes_to_rest_in_time(restitution: float) -> None:
     run = ri.simulate(dropped_ball(e), rest + 0.5, fps=240)
     speeds = np.sqrt(2 * G * HEIGHT) * e ** np.arange(len(run.impacts))
     np.testing.assert_allclose(run.impacts["approach_speed"], speeds, rtol=1e-9)
-    delta = TOLERANCES.contact_margin * 2 * RADIUS
+    delta = TOLERANCES.contact.margin * 2 * RADIUS
     assert rest - 2 * np.sqrt(2 * delta / G) / (1 - e) <= run.impacts["time"][-1] <= rest
     at_rest = run.times > rest
     np.testing.assert_array_equal(run.velocity("ball")[at_rest], 0.0)

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.engine import run as run_module
 
 G, SIZE, SPEED = 9.81, 0.2, 2.0
-GAP = 2.0 * TOLERANCES.contact_margin * SIZE
+GAP = 2.0 * TOLERANCES.contact.margin * SIZE
 
 
 def spoilt(factor: float, start: float, end: float = np.inf):

@@ -10,14 +10,14 @@ import pytest
 from box_pit import pit
 
 import rigidimpulse as ri
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
 
 GRAVITY = 9.81
 SUBSTEPPED = ri.Accuracy(contact_solver="substepped")
 ROUGH = ri.Material(density=1000.0, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
 SIZE = (0.6, 0.5, 0.2)
-SKIN = TOLERANCES.skin * 0.1
+SKIN = TOLERANCES.sub_stepping.skin * 0.1
 """Gap at which a block of SIZE lies on a plane, m."""
 
 
@@ -84,7 +84,7 @@ def test_wall_built_without_gaps_stays_where_it_was_built():
         place = ((c + 0.4 * (k % 2)) * size[0], 0.0, (k + 0.5) * size[2])
         scene.add(ri.Body(f"brick {k} {c}", ri.Shape.box(size), position=place, material=ROUGH))
     run = ri.simulate(scene, 3.0)
-    skin = TOLERANCES.skin * 0.5 * size[1]
+    skin = TOLERANCES.sub_stepping.skin * 0.5 * size[1]
     assert run.status.message == "finished" and run.plan.line("sub-stepped islands").counts["steps"] > 0
     moved = np.abs(run.positions - run.positions[0]).max()
     assert moved < 2.0 * skin
@@ -106,7 +106,7 @@ def test_converges_to_newton_with_shorter_sub_steps():
     exact = ri.simulate(two_boxes(2e-6), 1.0, accuracy=ri.Accuracy(contact_solver="newton"))
     errors = []
     for f in (60, 120, 240):
-        run = ri.simulate(two_boxes(TOLERANCES.skin), 1.0, accuracy=step_accuracy(1.0 / f))
+        run = ri.simulate(two_boxes(TOLERANCES.sub_stepping.skin), 1.0, accuracy=step_accuracy(1.0 / f))
         errors.append(max(abs(run.position(n)[-1, 0] - exact.position(n)[-1, 0]) for n in ("lower", "upper")))
     assert errors[0] < 3e-3
     assert errors[1] / errors[0] < 0.65

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.quaternion import rotate
+from rigidimpulse.core.tolerances import TOLERANCES
 
 G = 9.81
 SMOOTH = ri.Material(restitution=0.0, static_friction=0.0, dynamic_friction=0.0)
@@ -39,7 +39,7 @@ def test_bodies_that_left_their_contacts_carry_no_forces_of_them() -> None:
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=SMOOTH))
     run = ri.simulate(scene, 0.6)
     assert run.status.ok, run.status.message
-    assert rise(run) < 2.0 * TOLERANCES.contact_margin * (height + 2.0 * radius) * (mass + 1.0) * G
+    assert rise(run) < 2.0 * TOLERANCES.contact.margin * (height + 2.0 * radius) * (mass + 1.0) * G
 
 
 def linkage(plate: bool) -> ri.Scene:
@@ -90,7 +90,7 @@ def test_a_cylinder_that_is_drawn_flush_on_a_box_stands_on_it(box, radius: float
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=SMOOTH))
     run = ri.simulate(scene, 0.2)
     assert run.status.ok, run.status.message
-    gaps = 2.0 * TOLERANCES.contact_margin * 2.0 * radius
+    gaps = 2.0 * TOLERANCES.contact.margin * 2.0 * radius
     np.testing.assert_allclose(run.position("drum"), [drum["position"]] * len(run.times), atol=gaps)
 
 

@@ -26,16 +26,18 @@ from __future__ import annotations
 
 from math import copysign, cos, hypot, inf, pi, sin, sqrt
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, inner, over_triangle, subtract
+from rigidimpulse.collision.distance.simplices import inner, over_triangle
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, cross, dot, subtract
 
 _EPSILON = 2.0**-52
-_ROUND_OFF = 1e-13  # excess of a distance over its lower bound, relative to the sizes involved, that passes as rounding
+_ROUND_OFF = TOLERANCES.distance.cylinder_round_off
 _MAX_NEWTON = 60  # steps of Newton's method, most of which halve a bracket
 _MAX_HALVINGS = 60
 _NUM_SAMPLES = 8  # points of a rim from which the closest one is sought
-_THIN = 1e-14  # area of a triangle over the squares of its sides below which it has no face
-_PARALLEL = 1e-12  # sine of the angle of two axes below which their common perpendicular is left to the rims
+_THIN = TOLERANCES.distance.cylinder_thin_triangle
+_PARALLEL = TOLERANCES.distance.cylinder_parallel_axes
 ZERO, AXIS = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 

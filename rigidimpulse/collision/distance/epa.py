@@ -15,12 +15,11 @@ import numpy as np
 
 from rigidimpulse.collision.distance.gjk import farthest_of_both, reduce_simplex
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 
 MOST_CORNERS, MOST_FACES = 64, 192
-EXACT = 1e-3
-"""Part of the inner radius by which the depth may be too small."""
-FLAT = 1e-14
-"""Square of an area, over the fourth power of its sides, that has no normal."""
+EXACT = TOLERANCES.distance.depth_converged
+FLAT = TOLERANCES.distance.flat_polytope_face
 
 
 class Polytope(NamedTuple):

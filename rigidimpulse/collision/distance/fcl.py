@@ -24,14 +24,14 @@ from scipy.sparse.csgraph import connected_components
 from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, Primitive, build_geometry
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import quaternion_to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
 
 Pose = tuple[np.ndarray, np.ndarray]
 """Position (3,) m and orientation (4,), unit quaternion wxyz, of a principal frame."""
 
-_NOT_UNIT = 1e-6  # error of the length of a quaternion that is not round-off
+_NOT_UNIT = TOLERANCES.distance.unit_quaternion
 _UNDEFINED = np.full(3, np.nan)
 
 
@@ -307,7 +307,7 @@ def _scale(shapes: list[CompiledShape]) -> float:
         a, b, c = np.moveaxis(primitive.vertices[_triangles(primitive)], 1, 0)
         size = np.sqrt(np.linalg.norm(np.cross(b - a, c - a), axis=1))
         extent = float(np.ptp(primitive.vertices, axis=0).max())
-        sizes += [float(part.min()) for part in (size[size > TOLERANCES.weld * extent],) if len(part)]
+        sizes += [float(part.min()) for part in (size[size > TOLERANCES.surface.weld * extent],) if len(part)]
         sizes += [extent] if extent > 0.0 else []
     return float(2.0 ** np.ceil(-np.log2(min(sizes))))
 

@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 
 MOST_ROUNDS = 64
-CLOSE, ROUND = 1e-12, 4e-16
-"""Part of |v|^2, and of the greatest |w|^2, that is round-off."""
+CLOSE = TOLERANCES.distance.gjk_converged
+ROUND = TOLERANCES.distance.gjk_round_off
 
 
 class Simplex(NamedTuple):

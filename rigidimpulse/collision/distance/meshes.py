@@ -13,19 +13,9 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse.collision.bvh import STACK_ROWS, box_distance_squared, splits_first
-from rigidimpulse.collision.distance.simplices import (
-    along,
-    closest_on_segments,
-    dot,
-    inner,
-    moved,
-    over_triangle,
-    pierces_triangle,
-    row,
-    subtract,
-    turned,
-)
+from rigidimpulse.collision.distance.simplices import closest_on_segments, inner, over_triangle, pierces_triangle
 from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.core.vector import along, dot, moved, row, subtract, turned
 
 
 @inner

@@ -11,9 +11,9 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from rigidimpulse.collision.containment import point_in_mesh
-from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import along, dot, row, subtract
 
 STACK = 128
 MOST_ADVANCES = 60

@@ -18,13 +18,13 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse.core.copying import copy_matrix, copy_vector
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import copy_matrix, copy_vector
 
 ROUNDS = 80
-CONVERGED = 1e-15
-"""Step relative to the size of the bodies at which the plane has been found."""
-LEAST_SHIFT = 1e-12
+CONVERGED = TOLERANCES.distance.plane_converged
+LEAST_SHIFT = TOLERANCES.distance.least_plane_shift
 
 
 @jit

@@ -18,6 +18,8 @@ import numpy as np
 
 from rigidimpulse.collision.geometry import EDGE_BOUNDARY, EDGE_CAPSULE, EDGE_CONVEX
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, cross, dot, subtract
 
 inner = jit
 """Marks a kernel that is only ever a part of other kernels."""
@@ -28,38 +30,7 @@ VERTEX_FACE, FACE_VERTEX, EDGE_EDGE, CORNER, HALF_SPACE_CONTACT = (np.int64(kind
 (Plain integers would be literals, and kernels would be compiled once for each.)
 """
 
-PARALLEL = 1e-14
-"""Sine of the angle of two segments below which any point of their overlap is as close as any other."""
-
-
-@jit
-def dot(a, b):
-    """Return a . b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@jit
-def cross(a, b):
-    """Return a x b."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-@jit
-def along(a, s, b):
-    """Return a + s b."""
-    return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2])
-
-
-@jit
-def subtract(a, b):
-    """Return a - b."""
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-@jit
-def row(array, i):
-    """Return row `i` of an array (k, 3) as a tuple."""
-    return (array[i, 0], array[i, 1], array[i, 2])
+PARALLEL = TOLERANCES.distance.parallel_segments
 
 
 @inner
@@ -69,37 +40,6 @@ def edge_normals(array, edge):
         (array[edge, 0, 0], array[edge, 0, 1], array[edge, 0, 2]),
         (array[edge, 1, 0], array[edge, 1, 1], array[edge, 1, 2]),
     )
-
-
-@jit
-def turned(R, v):
-    """Return R v."""
-    return (
-        R[0, 0] * v[0] + R[0, 1] * v[1] + R[0, 2] * v[2],
-        R[1, 0] * v[0] + R[1, 1] * v[1] + R[1, 2] * v[2],
-        R[2, 0] * v[0] + R[2, 1] * v[1] + R[2, 2] * v[2],
-    )
-
-
-@jit
-def moved(R, t, v):
-    """Return R v + t."""
-    return (
-        R[0, 0] * v[0] + R[0, 1] * v[1] + R[0, 2] * v[2] + t[0],
-        R[1, 0] * v[0] + R[1, 1] * v[1] + R[1, 2] * v[2] + t[1],
-        R[2, 0] * v[0] + R[2, 1] * v[1] + R[2, 2] * v[2] + t[2],
-    )
-
-
-@jit
-def relative_pose(R_first, x_first, R_second, x_second, R, t):
-    """Write the pose of the second frame in the first: y_first = R y_second + t."""
-    for i in range(3):
-        t[i] = 0.0
-        for k in range(3):
-            t[i] += R_first[k, i] * (x_second[k] - x_first[k])
-        for j in range(3):
-            R[i, j] = R_first[0, i] * R_second[0, j] + R_first[1, i] * R_second[1, j] + R_first[2, i] * R_second[2, j]
 
 
 @jit

@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import turned, turned_back
 from rigidimpulse.collision.manifold.polyhedra import (
     ALIKE,
     EDGE_WINS,
@@ -32,11 +31,11 @@ from rigidimpulse.collision.manifold.polyhedra import (
     four_of,
 )
 from rigidimpulse.core.kernels import inlined
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import turned_back_by, turned_by
 
-PARALLEL = 1e-6
-"""Square of the sine of the angle of two edges below which they have no normal."""
-SECOND_WINS = 1e-6
-"""Part of the sides by which a face of b must have the larger gap."""
+PARALLEL = TOLERANCES.manifold.box_parallel_edges
+SECOND_WINS = TOLERANCES.manifold.box_second_face
 OTHER = MOST_CORNERS // 2
 """A polygon lies in the scratch memory from 0 or from here on."""
 
@@ -48,7 +47,7 @@ def box_axis(half, pair, between, far, c):
     half[s], half[t] (3,) m: half sides; between: from centre to centre, in world axes; c (3, 3) is set to C.
     """
     r, _, a, b, s, t = pair
-    d = turned_back(r, a, between[0], between[1], between[2])
+    d = turned_back_by(r, a, between[0], between[1], between[2])
     h, k = (half[s, 0], half[s, 1], half[s, 2]), (half[t, 0], half[t, 1], half[t, 2])
     for i in range(3):
         for j in range(3):
@@ -239,7 +238,7 @@ def edge_contact(half, pair, axis, gap, scratch, points):
     c, work, (real, ids) = scratch.axes, scratch.work, points
     i, j = (axis - 6) // 3, (axis - 6) % 3
     i1, i2 = (i + 1) % 3, (i + 2) % 3
-    d = turned_back(r, a, scratch.between[0], scratch.between[1], scratch.between[2])
+    d = turned_back_by(r, a, scratch.between[0], scratch.between[1], scratch.between[2])
     n, p, o = work[0], work[1], work[2]
     length = sqrt(1.0 - c[i, j] * c[i, j])
     # e_i x f_j in the axes of a.
@@ -266,9 +265,9 @@ def edge_contact(half, pair, axis, gap, scratch, points):
     p[i] += (along * v - u) / (length * length)
     for m in range(3):
         o[m] += (v - along * u) / (length * length) * c[m, j]
-    nx, ny, nz = turned(r, a, n[0], n[1], n[2])
-    ax, ay, az = turned(r, a, p[0], p[1], p[2])
-    bx, by, bz = turned(r, a, o[0], o[1], o[2])
+    nx, ny, nz = turned_by(r, a, n[0], n[1], n[2])
+    ax, ay, az = turned_by(r, a, p[0], p[1], p[2])
+    bx, by, bz = turned_by(r, a, o[0], o[1], o[2])
     real[0, 0], real[0, 1], real[0, 2] = ax, ay, az
     real[0, 3], real[0, 4], real[0, 5] = bx, by, bz
     real[0, 6], real[0, 7], real[0, 8], real[0, 9] = nx, ny, nz, gap

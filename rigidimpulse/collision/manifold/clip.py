@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import turned, turned_back
 from rigidimpulse.collision.manifold.polyhedra import FROM_EDGE, MOST_CORNERS, four_of
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import turned_back_by, turned_by
 
 
 @jit
 def face_like(shapes, s, r, i, nx, ny, nz):
     """The face of shape s turned by r[i] whose normal is most like n."""
-    a, b, c = turned_back(r, i, nx, ny, nz)
+    a, b, c = turned_back_by(r, i, nx, ny, nz)
     best, face = -inf, shapes.face_first[s]
     for f in range(shapes.face_first[s], shapes.face_first[s + 1]):
         cosine = a * shapes.plane[f, 0] + b * shapes.plane[f, 1] + c * shapes.plane[f, 2]
@@ -82,12 +82,12 @@ def clip_faces(shapes, pair, own, other, query, polygon, points):
     real, out_ids = points
     r, i, j, x, y, face, margin = pair.rotation, own.body, other.body, own.position, other.position, own.face, query.margin
     sign = 1.0 if i == pair.a else -1.0
-    nx, ny, nz = turned(r, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
+    nx, ny, nz = turned_by(r, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
     count = np.int64(0)
     begin = shapes.loop_first[other.face]
     for k in range(begin, min(shapes.loop_first[other.face + 1], begin + MOST_CORNERS)):
         v = shapes.loop[k]
-        vx, vy, vz = turned(r, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
+        vx, vy, vz = turned_by(r, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
         corner[count, 0], corner[count, 1], corner[count, 2] = vx + (y[0] - x[0]), vy + (y[1] - x[1]), vz + (y[2] - x[2])
         ids[count] = v
         count += 1
@@ -95,8 +95,8 @@ def clip_faces(shapes, pair, own, other, query, polygon, points):
     first, last, corners = shapes.loop_first[face], shapes.loop_first[face + 1], count
     for k in range(first, last):
         v, w = shapes.loop[k], shapes.loop[k + 1 if k + 1 < last else first]
-        ax, ay, az = turned(r, i, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
-        bx, by, bz = turned(r, i, shapes.corner[w, 0], shapes.corner[w, 1], shapes.corner[w, 2])
+        ax, ay, az = turned_by(r, i, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
+        bx, by, bz = turned_by(r, i, shapes.corner[w, 0], shapes.corner[w, 1], shapes.corner[w, 2])
         ex, ey, ez = bx - ax, by - ay, bz - az
         px, py, pz = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
         offset, nearer = px * ax + py * ay + pz * az, 0.0

@@ -12,23 +12,18 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.distance.simplices import CORNER, inner
+from rigidimpulse.core.tolerances import TOLERANCES
 
-INSIDE = 1e-11
-"""How far outside a face or an edge a point still counts as inside, relative to the edge."""
-STRICT = 1e-9
-"""Sine of the angle by which a normal may miss an arc or a cone."""
-ROUND_OFF = 1e-15
-"""Error of a point, relative to its coordinates."""
-PENETRATION = 1e-9
-"""Depth down to which a contact of faces or edges is still recognised, relative to the edge."""
+INSIDE = TOLERANCES.manifold.inside
+STRICT = TOLERANCES.manifold.arc
+ROUND_OFF = TOLERANCES.manifold.point_round_off
+PENETRATION = TOLERANCES.manifold.depth
 TILT = 0.02
 """Greatest sine of the angle by which a contact within the margin may miss being locally closest."""
 ANY = 2.0
 """Leeway with which every normal passes."""
-MERGE = 1e-9
-"""Distance below which two contacts are one, relative to the edge."""
-SAME_NORMAL = 1.0 - 1e-9
-"""Cosine of the angle below which normals at one place are one."""
+MERGE = TOLERANCES.manifold.merge
+SAME_NORMAL = 1.0 - TOLERANCES.manifold.same_normal
 ALIKE_NORMAL = 0.99
 """The same for a CORNER, whose normal is the less certain."""
 

@@ -14,17 +14,17 @@ from math import inf
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import turned, turned_back
 from rigidimpulse.collision.distance.epa import EXACT, least_deep
 from rigidimpulse.collision.distance.gjk import closest, farthest
 from rigidimpulse.collision.manifold.clip import Side, clip_faces, face_like
 from rigidimpulse.collision.manifold.polyhedra import ALIKE, EDGE_WINS, POINTS, Query, add_contact, along_edges, copy_contact, nearest_of
 from rigidimpulse.core.kernels import inlined, jit
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import turned_back_by, turned_by
 
 SHRINK = 0.012
 """Part of their lengths by which bodies are shrunk while their closest points are searched for."""
-SECOND_WINS = 1e-6
-"""Part of the inner radius by which a face of b must have the larger gap."""
+SECOND_WINS = TOLERANCES.manifold.hull_second_face
 CLOSEST, CORNER, CODE = -3, -4, 4096
 """First id of the contact of closest points, and of that of a corner and a plane; base of the code of several corners."""
 
@@ -74,7 +74,7 @@ def _one_contact(shapes, pair, d, axis, count, scratch, points):
             middle[1] + share * (p[1] + d[1] + c[1, 0] * q[0] + c[1, 1] * q[1] + c[1, 2] * q[2]),
             middle[2] + share * (p[2] + d[2] + c[2, 0] * q[0] + c[2, 1] * q[1] + c[2, 2] * q[2]),
         )
-    m, n = turned(rotation, a, middle[0], middle[1], middle[2]), turned(rotation, a, n[0], n[1], n[2])
+    m, n = turned_by(rotation, a, middle[0], middle[1], middle[2]), turned_by(rotation, a, n[0], n[1], n[2])
     for k in range(3):
         real[0, k], real[0, 3 + k], real[0, 6 + k] = m[k] - 0.5 * gap * n[k], m[k] + 0.5 * gap * n[k], n[k]
     real[0, 9] = gap
@@ -88,7 +88,7 @@ def seen_from(rotation, a, b, between, c):
     for i in range(3):
         for j in range(3):
             c[i, j] = rotation[a, 0, i] * rotation[b, 0, j] + rotation[a, 1, i] * rotation[b, 1, j] + rotation[a, 2, i] * rotation[b, 2, j]
-    return turned_back(rotation, a, between[0], between[1], between[2])
+    return turned_back_by(rotation, a, between[0], between[1], between[2])
 
 
 @jit
@@ -105,7 +105,7 @@ def hull_contacts(shapes, pair, query, scratch, points):
         nx, ny, nz, gap, count = least_deep(shapes, s, t, (d, c), 1.0 - SHRINK, EXACT * size, simplex, scratch.polytope)
     if count == 0:
         return count, gap
-    x, y, z = turned(rotation, a, nx, ny, nz)
+    x, y, z = turned_by(rotation, a, nx, ny, nz)
     if count < 5:
         face_a, face_b = face_like(shapes, s, rotation, a, x, y, z), face_like(shapes, t, rotation, b, -x, -y, -z)
     else:
@@ -150,7 +150,7 @@ def hull_contacts(shapes, pair, query, scratch, points):
 @inlined
 def _cosine(shapes, face, r, i, n):
     """Cosine of the angle of n and the normal of a face of body i."""
-    x, y, z = turned(r, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
+    x, y, z = turned_by(r, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
     return x * n[0] + y * n[1] + z * n[2]
 
 
@@ -162,8 +162,8 @@ def _corner_contact(shapes, pair, face, corner, of_a, apart, points):
     """
     rotation, i, j = pair.rotation, pair.a if of_a else pair.b, pair.b if of_a else pair.a
     (between, gap), (real, ids) = apart, points
-    n = turned(rotation, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
-    p = turned(rotation, j, shapes.corner[corner, 0], shapes.corner[corner, 1], shapes.corner[corner, 2])
+    n = turned_by(rotation, i, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
+    p = turned_by(rotation, j, shapes.corner[corner, 0], shapes.corner[corner, 1], shapes.corner[corner, 2])
     on_i, on_j, sign = (0, 3, 1.0) if of_a else (3, 0, -1.0)
     for k in range(3):
         place = p[k] + (between[k] if of_a else 0.0)
@@ -176,8 +176,8 @@ def _corner_contact(shapes, pair, face, corner, of_a, apart, points):
 @jit
 def _face_at(shapes, s, corner, r, i, t, j, face):
     """The face of shape s, turned by r[i], at one of its corners that faces most squarely a face of shape t, turned by r[j]."""
-    x, y, z = turned(r, j, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
-    x, y, z = turned_back(r, i, x, y, z)
+    x, y, z = turned_by(r, j, shapes.plane[face, 0], shapes.plane[face, 1], shapes.plane[face, 2])
+    x, y, z = turned_back_by(r, i, x, y, z)
     best, at = inf, shapes.face_first[s]
     for f in range(shapes.face_first[s], shapes.face_first[s + 1]):
         cosine = x * shapes.plane[f, 0] + y * shapes.plane[f, 1] + z * shapes.plane[f, 2]

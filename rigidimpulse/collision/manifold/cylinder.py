@@ -37,7 +37,7 @@ from rigidimpulse.collision.distance.cylinder import (
     cylinder_triangle_distance,
     to_axes,
 )
-from rigidimpulse.collision.distance.simplices import along, dot, inner, subtract
+from rigidimpulse.collision.distance.simplices import inner
 from rigidimpulse.collision.manifold.contact_points import Found
 from rigidimpulse.collision.manifold.cylinder_rims import (
     CAP,
@@ -53,6 +53,7 @@ from rigidimpulse.collision.manifold.cylinder_rims import (
 )
 from rigidimpulse.collision.manifold.cylinder_round import cylinder_round_contacts, cylinder_round_gap
 from rigidimpulse.collision.manifold.plane import plane_in_frame
+from rigidimpulse.core.vector import along, dot, subtract
 
 __all__ = [
     "cylinder_cylinder_contacts",

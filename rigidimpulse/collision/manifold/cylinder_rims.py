@@ -13,8 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.distance.cylinder import ZERO, basis, from_axes, on_circle
-from rigidimpulse.collision.distance.simplices import along, cross, dot, inner, moved, over_triangle, row, subtract, turned
+from rigidimpulse.collision.distance.simplices import inner, over_triangle
 from rigidimpulse.collision.manifold.contact_points import PENETRATION, STRICT, TILT, Contact, append_contact
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, cross, dot, moved, row, subtract, turned
 
 CYLINDER_CONTACT = np.int64(5)
 """Kind of all contacts of cylinders."""
@@ -27,14 +29,14 @@ SIDE, CAP, RIM, LOWEST, FIXED, NUM_FEATURES = (np.int64(number) for number in (0
 WHOLE_PLANE, TRIANGLE = inf, -1.0
 """What bounds a plane, instead of the radius of a disc."""
 
-BORDER = 1e-11  # how far outside a rim, a cap or a face a point still counts as inside, relative to the cylinder
-_LEVEL = 1e-12  # sine of the tilt below which a rim has no lowest point
-_MERGE = 1e-7  # distance below which two contacts are one, relative to the cylinder
+BORDER = TOLERANCES.manifold.rim_border
+_LEVEL = TOLERANCES.manifold.rim_level
+_MERGE = TOLERANCES.manifold.rim_merge
 _MAX_NEWTON = 30
 _STEP = 0.25  # greatest step, rad or part of an edge
-_CONVERGED = 1e-9  # step of Newton's method that is small enough when round-off prevents a smaller one
-_ROUND_OFF = 1e-15
-_LEAST_CURVATURE = 1e-3  # least curvature of the distance of two curves, relative to that of line and circle
+_CONVERGED = TOLERANCES.manifold.rim_converged
+_ROUND_OFF = TOLERANCES.manifold.rim_round_off
+_LEAST_CURVATURE = TOLERANCES.manifold.rim_least_curvature
 _NUM_SAMPLES = 16  # points of a circle between which it has at most one least distance
 
 

@@ -9,7 +9,7 @@ from math import hypot, inf, sqrt
 from typing import NamedTuple
 
 from rigidimpulse.collision.distance.cylinder import ZERO, closest_on_curve, closest_on_triangle, from_axes, to_axes
-from rigidimpulse.collision.distance.simplices import along, dot, edge_normals, in_edge_arc, inner, row, subtract
+from rigidimpulse.collision.distance.simplices import edge_normals, in_edge_arc, inner
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
 from rigidimpulse.collision.manifold.contact_points import PENETRATION, Found
 from rigidimpulse.collision.manifold.cylinder_rims import (
@@ -24,6 +24,7 @@ from rigidimpulse.collision.manifold.cylinder_rims import (
     solid_of,
     write_points,
 )
+from rigidimpulse.core.vector import along, dot, row, subtract
 
 
 class _View(NamedTuple):

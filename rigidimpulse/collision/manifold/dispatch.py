@@ -32,7 +32,7 @@ import numpy as np
 
 from rigidimpulse.collision.bvh import STACK_ROWS
 from rigidimpulse.collision.distance.meshes import round_round_gap
-from rigidimpulse.collision.distance.simplices import FACE_VERTEX, VERTEX_FACE, inner, moved, relative_pose, turned
+from rigidimpulse.collision.distance.simplices import FACE_VERTEX, VERTEX_FACE, inner
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND
 from rigidimpulse.collision.manifold.box_box import box_box_contacts
 from rigidimpulse.collision.manifold.contact_points import Contact, Pose, write_contact
@@ -50,6 +50,7 @@ from rigidimpulse.collision.manifold.plane import round_half_space_contacts, rou
 from rigidimpulse.collision.manifold.polyhedra import polyhedron_half_space_contacts
 from rigidimpulse.collision.manifold.reduce import MAX_PER_NORMAL, reduce_contacts
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
+from rigidimpulse.core.vector import moved, relative_pose, turned
 
 SCRATCH_ROWS = 8 * STACK_ROWS
 """A good size of `Contacts.scratch`; it must be larger than `STACK_ROWS`."""

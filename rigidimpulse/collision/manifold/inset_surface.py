@@ -14,13 +14,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import turned_back
 from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
 from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Geometry, Primitive, build_geometry
 from rigidimpulse.collision.manifold.cylinder_rims import CYLINDER_CONTACT
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import turned_back_by
 
 DEPTH = 0.012
 """d, as a part of the radius that encloses a body."""
@@ -134,8 +134,8 @@ def put_back(smaller, bodies, a, b, real, integer, c):
         if depth[i] == 0.0:
             continue
         x, feature, rise = bodies.position, integer[c, 3 + side], depth[i]
-        n = turned_back(bodies.rotation, i, sign * real[c, 6], sign * real[c, 7], sign * real[c, 8])
-        p = turned_back(bodies.rotation, i, real[c, at] - x[i, 0], real[c, at + 1] - x[i, 1], real[c, at + 2] - x[i, 2])
+        n = turned_back_by(bodies.rotation, i, sign * real[c, 6], sign * real[c, 7], sign * real[c, 8])
+        p = turned_back_by(bodies.rotation, i, real[c, at] - x[i, 0], real[c, at + 1] - x[i, 1], real[c, at + 2] - x[i, 2])
         if kind == VERTEX_FACE or kind == FACE_VERTEX:
             rise = _rise(back, feature, n) if (kind == VERTEX_FACE) == (side == 0) else _rise_of_face(geometry, back, feature, p, n)
         elif kind == EDGE_EDGE:

@@ -6,20 +6,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from rigidimpulse.collision.bvh import STACK_ROWS
-from rigidimpulse.collision.distance.simplices import (
-    CORNER,
-    EDGE_EDGE,
-    along,
-    arc_miss,
-    cross,
-    dot,
-    edge_normals,
-    inner,
-    moved,
-    row,
-    subtract,
-    turned,
-)
+from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, arc_miss, edge_normals, inner
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
 from rigidimpulse.collision.manifold.contact_points import (
     INSIDE,
@@ -32,9 +19,10 @@ from rigidimpulse.collision.manifold.contact_points import (
     append_contact,
     outside_box,
 )
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, cross, dot, moved, row, subtract, turned
 
-CROSSING = 1e-7
-"""Least sine of the angle of two edges that are taken to cross at one point."""
+CROSSING = TOLERANCES.manifold.crossing_edges
 NEARLY_PARALLEL = 0.02
 """Greatest sine of the angle of two edges that may touch along a length."""
 SIDEWAYS = 0.5

@@ -28,21 +28,7 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse.collision.bvh import STACK_ROWS, gather_leaf_pairs
-from rigidimpulse.collision.distance.simplices import (
-    CORNER,
-    FACE_VERTEX,
-    VERTEX_FACE,
-    along,
-    dot,
-    edge_normals,
-    in_edge_arc,
-    inner,
-    moved,
-    over_triangle,
-    row,
-    subtract,
-    turned,
-)
+from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTEX_FACE, edge_normals, in_edge_arc, inner, over_triangle
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
 from rigidimpulse.collision.manifold.contact_points import (
     ANY,
@@ -59,10 +45,11 @@ from rigidimpulse.collision.manifold.contact_points import (
     outside_box,
 )
 from rigidimpulse.collision.manifold.mesh_edges import edge_contacts
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, dot, moved, row, subtract, turned
 
-CREASE = 2.0 * TOLERANCES.flat_angle
+CREASE = 2.0 * TOLERANCES.surface.flat_angle
 """How far outside a face beyond a hidden edge a point still counts as inside, relative to its height."""
 
 

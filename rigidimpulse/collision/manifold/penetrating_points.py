@@ -25,11 +25,12 @@ from math import inf, sqrt
 import numpy as np
 
 from rigidimpulse.collision.containment import point_in_mesh
-from rigidimpulse.collision.distance.simplices import along, closest_on_segments, dot, moved, row, subtract, turned
+from rigidimpulse.collision.distance.simplices import closest_on_segments
 from rigidimpulse.collision.geometry import HALF_SPACE, ROUND
 from rigidimpulse.collision.manifold.penetrating_edges import crossing_edges, drop_deep_edges
 from rigidimpulse.collision.manifold.penetrating_surface import NUDGE, ON_FACE, add_point, box_squared, nearest_on_surface, turned_back
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import along, dot, moved, row, subtract, turned
 
 
 @jit

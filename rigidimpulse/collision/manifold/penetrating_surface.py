@@ -12,16 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.bvh import STACK_ROWS
-from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER, EDGE_CAPSULE, EDGE_HIDDEN, ROUND, CompiledShape, Geometry, Primitive, build_geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, dot, row, subtract
 
 SIDES = 24
 """Sides of the prism that stands for a cylinder."""
-ON_FACE = 1e-6
-"""Part of the distance by which the way to a face may differ from that along its normal; the normal is exact however near the face is."""
-NUDGE = 1e-6
-"""Part of the length of edges by which a point is moved into its own body before it is asked whether another holds it."""
+ON_FACE = TOLERANCES.manifold.on_face
+NUDGE = TOLERANCES.manifold.nudge
 
 
 def solid_geometry(shapes: list[CompiledShape]) -> Geometry:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-from rigidimpulse.collision.distance.simplices import CORNER, HALF_SPACE_CONTACT, along, dot, inner, moved, row, subtract
+from rigidimpulse.collision.distance.simplices import CORNER, HALF_SPACE_CONTACT, inner
 from rigidimpulse.collision.manifold.contact_points import Contact, write_contact
+from rigidimpulse.core.vector import along, dot, moved, row, subtract
 
 
 @inner

@@ -19,13 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import turned
 from rigidimpulse.collision.distance.epa import Polytope, make_polytope
 from rigidimpulse.collision.distance.gjk import Simplex, make_simplex
 from rigidimpulse.collision.geometry import HALF_SPACE, Geometry
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import turned_by
 
-EDGE_WINS = 2e-3
+EDGE_WINS = TOLERANCES.manifold.edge_wins
 ALIKE = 0.95
 """Cosine of the angle between the normal of two edges and that of a face above which the face gives the contacts."""
 POINTS = 4
@@ -233,7 +234,7 @@ def half_space_contacts(shapes, s, rotation, j, plane, margin, polygon, points):
     (nx, ny, nz), offset, sign = plane
     count, least = 0, inf
     for v in range(shapes.corner_first[s], shapes.corner_first[s + 1]):
-        x, y, z = turned(rotation, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
+        x, y, z = turned_by(rotation, j, shapes.corner[v, 0], shapes.corner[v, 1], shapes.corner[v, 2])
         gap = nx * x + ny * y + nz * z - offset
         least = min(least, gap)
         if gap <= margin and count < MOST_CORNERS:
@@ -262,7 +263,7 @@ def polyhedron_half_space_contacts(shapes, pair, query, scratch, points):
     real, between = points.real, scratch.between
     half_space_is_a = shapes.face_first[s] == shapes.face_first[s + 1]
     half_space, w, i, sign = shapes.half_space, s if half_space_is_a else t, a if half_space_is_a else b, 1.0 if half_space_is_a else -1.0
-    nx, ny, nz = turned(rotation, i, half_space[w, 0], half_space[w, 1], half_space[w, 2])
+    nx, ny, nz = turned_by(rotation, i, half_space[w, 0], half_space[w, 1], half_space[w, 2])
     offset = half_space[w, 3] - sign * (nx * between[0] + ny * between[1] + nz * between[2])
     solid, j = (t, b) if half_space_is_a else (s, a)
     plane = Plane((nx, ny, nz), offset, sign)

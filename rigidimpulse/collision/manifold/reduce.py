@@ -10,15 +10,16 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, inner, row
+from rigidimpulse.collision.distance.simplices import inner
 from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, cross, dot, row
 
 MAX_PER_NORMAL = 8
 """Directions in which the extreme contacts of one normal are kept."""
 SAME_PATCH = 0.999
 """Cosine of the angle between normals above which contacts belong to one patch."""
-TIE = 1e-9
-"""Difference of two positions along a direction, relative to the extent, below which they are equally extreme."""
+TIE = TOLERANCES.manifold.tie
 STEEP = 0.77
 """|n_z| from which on the tangents of a normal are built on x instead of z (no common slope has this value)."""
 

@@ -6,9 +6,9 @@ its caps and rims, and for all other shapes, the radius is 0.
 
 from __future__ import annotations
 
-from rigidimpulse.collision.distance.simplices import dot, turned
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import dot, turned
 
 ON_ITS_SIDE = 0.7
 """Cosine of normal and axis below which a cylinder that is not touched at a rim is touched at its side."""

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 
-SHRINK = 1.5 * TOLERANCES.skin
+SHRINK = 1.5 * TOLERANCES.sub_stepping.skin
 """Part of their lengths by which convex bodies are shrunk for the search."""
 
 

@@ -6,9 +6,8 @@ safe time found so far are opened. A cylinder counts as one box.
 
 from __future__ import annotations
 
-from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.time_of_impact.convex_pieces import pieces_safe_until
-from rigidimpulse.collision.time_of_impact.motion_bound import SEEN_SIZE, length, put, scaled, turned, turned_back, vector
+from rigidimpulse.collision.time_of_impact.motion_bound import SEEN_SIZE, put, turned, turned_back, vector
 from rigidimpulse.collision.time_of_impact.scratch_layout import (
     AXIS_VIEWS,
     BASE,
@@ -40,6 +39,7 @@ from rigidimpulse.collision.time_of_impact.scratch_layout import (
 )
 from rigidimpulse.collision.time_of_impact.separating_quadratic import viewed_safe_until, write_view
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import along, dot, length, row, scaled, subtract
 
 NO_NODE = -1
 """In place of a tree node: the cylinder."""

@@ -20,19 +20,8 @@ is None: numba then removes the rest before it compiles. They are never called t
 from __future__ import annotations
 
 from rigidimpulse.collision.distance.cylinder import cylinder_cylinder_distance, cylinder_support, cylinder_triangle_distance
-from rigidimpulse.collision.distance.simplices import along, cross, dot, subtract
 from rigidimpulse.collision.time_of_impact.closest_direction import NO_EDGES, closest_simplices, farthest
-from rigidimpulse.collision.time_of_impact.motion_bound import (
-    SEEN_ARM_JERK,
-    SEEN_JERK,
-    SEEN_SIZE,
-    SEEN_SPIN,
-    length,
-    put,
-    scaled,
-    seen_motion,
-    vector,
-)
+from rigidimpulse.collision.time_of_impact.motion_bound import SEEN_ARM_JERK, SEEN_JERK, SEEN_SIZE, SEEN_SPIN, put, seen_motion, vector
 from rigidimpulse.collision.time_of_impact.scratch_layout import (
     CARRIER,
     CLOSEST,
@@ -60,8 +49,10 @@ from rigidimpulse.collision.time_of_impact.scratch_layout import (
 )
 from rigidimpulse.collision.time_of_impact.separating_quadratic import cylinder_safe_until, safe_until, viewed_safe_until, write_view
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, cross, dot, length, scaled, subtract
 
-_ON_SIDE = 1e-6  # cosine to the axis below which a normal is one of the side of a cylinder
+_ON_SIDE = TOLERANCES.time_of_impact.on_cylinder_side
 _TURN = 0.5  # rad, angle that a direction turns at most: beyond it the third derivatives take over
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.collision.containment import points_in_shape
-from rigidimpulse.collision.distance.simplices import along, row, subtract
 from rigidimpulse.collision.geometry import HALF_SPACE, ROUND
 from rigidimpulse.collision.time_of_impact.linear import measure
 from rigidimpulse.collision.time_of_impact.motion_bound import put, turned, turned_back, vector
@@ -17,6 +16,7 @@ from rigidimpulse.collision.time_of_impact.result import IMPACT, ImpactTimes, Pa
 from rigidimpulse.collision.time_of_impact.scratch_layout import GAP, NORMAL
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
+from rigidimpulse.core.vector import along, row, subtract
 from rigidimpulse.motion.trajectory import Trajectories, pose_at
 
 

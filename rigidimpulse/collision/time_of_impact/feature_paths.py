@@ -25,13 +25,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, row, subtract
 from rigidimpulse.collision.time_of_impact.closest_direction import closest_simplices
-from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled, vector
+from rigidimpulse.collision.time_of_impact.motion_bound import put, vector
 from rigidimpulse.collision.time_of_impact.scratch_layout import CLOSEST, CORNER, COUNT, FACE, FIRST, INDEX_SIZE, NORMAL, SECOND, WORK_SIZE
 from rigidimpulse.collision.time_of_impact.separating_quadratic import safe_until
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.quaternion import exponential, rotated
+from rigidimpulse.core.vector import along, cross, dot, length, row, scaled, subtract
 
 MAX_STEPS = 1_000_000
 """Safe steps before a search is given up."""

@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from math import inf
 
-from rigidimpulse.collision.distance.simplices import along, dot, row
-from rigidimpulse.collision.time_of_impact.motion_bound import length, scaled
 from rigidimpulse.collision.time_of_impact.separating_quadratic import cubic_safe_until
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.quaternion import rotated
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, dot, length, row, scaled
 from rigidimpulse.motion.trajectory import FIXED, JERK, rate_of
 
 _MAX_STEPS = 100  # Newton's method on spheres: 5 to 6 steps, a few dozen where they graze
-_ROUND_OFF = TOLERANCES.round_off
+_ROUND_OFF = TOLERANCES.arithmetic.round_off
 
 
 @jit

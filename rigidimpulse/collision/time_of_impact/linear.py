@@ -16,13 +16,13 @@ from math import inf
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, row, subtract
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
-from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled
+from rigidimpulse.collision.time_of_impact.motion_bound import put
 from rigidimpulse.collision.time_of_impact.result import IMPACT, TOUCHING, ImpactTimes, PairsToSweep, SweepDetector, no_impacts
 from rigidimpulse.collision.time_of_impact.scratch_layout import FIRST, GAP, NORMAL, POINT_FIRST, POINT_SECOND, SECOND
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
+from rigidimpulse.core.vector import along, cross, dot, length, row, scaled, subtract
 from rigidimpulse.motion.trajectory import Trajectories, motion_at
 
 

@@ -39,10 +39,10 @@ from math import sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, subtract
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, cross, dot, length, subtract
 from rigidimpulse.motion.trajectory import FIXED, FORCED, JERK, LINEAR, PRESCRIBED, TORQUE_RATE, motion_at, rate_of, row_at
 
 # Offsets are numpy integers because numba would compile a kernel again for every literal int that it is called with.
@@ -57,9 +57,9 @@ SEEN_SPIN_SIZE, SEEN_TURN_SIZE, SEEN_SIZE = np.array([14, 15, 16])
 the part of y'' that grows with r."""
 
 _TIGHTENINGS = 4
-_WIDEN = 1.0 + 1e-12  # covers the rounding of the bounds themselves
-_ROUND_OFF = TOLERANCES.round_off
-_EQUAL_MOMENTS = TOLERANCES.equal_moments
+_WIDEN = 1.0 + TOLERANCES.time_of_impact.bound_round_off
+_ROUND_OFF = TOLERANCES.arithmetic.round_off
+_EQUAL_MOMENTS = TOLERANCES.inertia.equal_moments
 
 
 @jit
@@ -74,18 +74,6 @@ def put(work, at, v):
     work[at] = v[0]
     work[at + 1] = v[1]
     work[at + 2] = v[2]
-
-
-@jit
-def scaled(a, factor):
-    """Return a times a number."""
-    return a[0] * factor, a[1] * factor, a[2] * factor
-
-
-@jit
-def length(a):
-    """Return |a|."""
-    return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
 @jit

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.distance.cylinder import basis
-from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER as CYLINDER_KIND
 from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, Geometry, cylinders_of
 from rigidimpulse.collision.time_of_impact.bvh_walk import NO_NODE, half_space_safe_until, trees_safe_until
@@ -27,10 +26,8 @@ from rigidimpulse.collision.time_of_impact.motion_bound import (
     MOTION_SIZE,
     POSITION,
     SEEN_SIZE,
-    length,
     put,
     relative_motion,
-    scaled,
     turned,
     turned_back,
     vector,
@@ -70,6 +67,7 @@ from rigidimpulse.collision.time_of_impact.scratch_layout import (
 from rigidimpulse.collision.time_of_impact.separating_quadratic import cylinder_safe_until, point_safe_until
 from rigidimpulse.collision.time_of_impact.witness import support_point
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import along, dot, length, row, scaled, subtract
 
 
 class SweepScratch(NamedTuple):

@@ -16,15 +16,15 @@ from __future__ import annotations
 
 from math import inf
 
-from rigidimpulse.collision.distance.simplices import row
 from rigidimpulse.collision.time_of_impact.free_flight import plane_safe_until, relative_flight, rounding_slack, spheres_safe_until
-from rigidimpulse.collision.time_of_impact.motion_bound import MOTION_SIZE, length, motion_bound, stop_turning
+from rigidimpulse.collision.time_of_impact.motion_bound import MOTION_SIZE, motion_bound, stop_turning
 from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE, STALLED, TOUCHING
 from rigidimpulse.collision.time_of_impact.safe_step import safe_time
 from rigidimpulse.collision.time_of_impact.scratch_layout import GAP, MOTION, WITNESS, PairScratch
 from rigidimpulse.collision.time_of_impact.spheres import Pair, ball_time, is_closed_form, write_ball_witness
 from rigidimpulse.collision.time_of_impact.witness import closing_speed, witness_root
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import length, row
 from rigidimpulse.motion.trajectory import FIXED
 
 _TURN = 0.5  # rad, angle that a body turns at most in one step: beyond it the third derivatives take over

@@ -31,7 +31,6 @@ from __future__ import annotations
 
 from math import sqrt
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot
 from rigidimpulse.collision.time_of_impact.motion_bound import (
     SEEN_ACCELERATION,
     SEEN_ARM_JERK,
@@ -41,12 +40,12 @@ from rigidimpulse.collision.time_of_impact.motion_bound import (
     SEEN_TURN,
     SEEN_TURN_SIZE,
     SEEN_VELOCITY,
-    length,
     put,
     seen_motion,
     vector,
 )
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import along, cross, dot, length
 from rigidimpulse.motion.trajectory import turning_points
 
 _MAX_STEPS = 100  # on a cubic: 5 to 8, a few dozen where it grazes

@@ -19,20 +19,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, dot, row, subtract
 from rigidimpulse.collision.time_of_impact.free_flight import relative_flight, spheres_safe_until
-from rigidimpulse.collision.time_of_impact.motion_bound import length, put, scaled
+from rigidimpulse.collision.time_of_impact.motion_bound import put
 from rigidimpulse.collision.time_of_impact.scratch_layout import FIRST, GAP, NORMAL, POINT_FIRST, POINT_SECOND, SECOND
 from rigidimpulse.collision.time_of_impact.separating_quadratic import safe_until
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import rotated
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, dot, length, row, scaled, subtract
 from rigidimpulse.motion.trajectory import FIXED, place_at
 
-_ROUND_OFF = TOLERANCES.round_off
-_APPROACH = TOLERANCES.approach
-DEEPEST = 1e-10
-"""Gap below 0 that counts as round-off, relative to the radius of a ball."""
+_ROUND_OFF = TOLERANCES.arithmetic.round_off
+_APPROACH = TOLERANCES.contact.approach
+DEEPEST = TOLERANCES.time_of_impact.sphere_depth
 _NEWTON_ERROR = 10.0
 """Round-offs that may be left of the gap where Newton's method ends."""
 

@@ -9,19 +9,8 @@ from __future__ import annotations
 
 from math import inf, log2
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE
-from rigidimpulse.collision.time_of_impact.motion_bound import (
-    MOTION_SIZE,
-    POSITION,
-    SPIN,
-    VELOCITY,
-    length,
-    scaled,
-    turned,
-    turned_back,
-    vector,
-)
+from rigidimpulse.collision.time_of_impact.motion_bound import MOTION_SIZE, POSITION, SPIN, VELOCITY, turned, turned_back, vector
 from rigidimpulse.collision.time_of_impact.scratch_layout import (
     CARRIER,
     ELEMENT_A,
@@ -38,6 +27,7 @@ from rigidimpulse.collision.time_of_impact.scratch_layout import (
 )
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
+from rigidimpulse.core.vector import along, cross, dot, length, row, scaled, subtract
 from rigidimpulse.motion.trajectory import pose_at
 
 _EPSILON = 2.0**-52

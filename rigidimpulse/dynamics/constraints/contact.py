@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.rolling_friction import (
     Rolling,
     add_rolling_wrench,
@@ -49,14 +50,14 @@ from rigidimpulse.motion.body_state import BodyState
 
 STICK_PASSES = 4
 # Residual asked of the solver and slip that counts, relative to the speed gained in the sub-step.
-SOLVE_TOLERANCE = 1e-12
-POOR = 1e-8
-SLIP = 1e-9
-TINY = 1e-300
+SOLVE_TOLERANCE = TOLERANCES.contact_forces.residual
+POOR = TOLERANCES.contact_forces.poor_residual
+SLIP = TOLERANCES.contact_forces.no_slip
+TINY = TOLERANCES.arithmetic.least_divisor
 # Part of the pressing acceleration that brings a gap back.
 CLOSING = 0.25
 # Length, as a part of the sub-step, over which forces are found that last until a contact stops.
-BRIEF = 1e-6
+BRIEF = TOLERANCES.contact_forces.brief
 
 
 class Held(NamedTuple):

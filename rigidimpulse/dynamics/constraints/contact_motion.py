@@ -26,17 +26,18 @@ import numpy as np
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE
 from rigidimpulse.collision.manifold.rounding import only_primitive
-from rigidimpulse.core.copying import copy_vector
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import copy_vector, dot
 
 # The point of a round cylinder that is nearest to a face is the one found, or one found a moment ago: it is that near to it,
 # relative to the radius. Where normal and axis are nearer than this sine there is none.
 NEAR = 0.3
-LEAST_LEAN = 1e-3
+LEAST_LEAN = TOLERANCES.contact_forces.cylinder_lean
 # Sine of the angle of two edges below which they count as parallel: the place of contact would run along them too fast to follow.
 PARALLEL = 0.05
 # Cosine of normal and axis of a cylinder, or one less it, that is none.
-ALIGNED = 1e-9
+ALIGNED = TOLERANCES.contact_forces.aligned
 POINT, LINE, FACE, UNKNOWN = np.arange(4)
 
 
@@ -46,11 +47,6 @@ def _cross(a, b, out):
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
-
-
-@jit
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @jit
@@ -90,14 +86,14 @@ def _cylinder_skeleton(geometry, p, rotation, normal, direction):
     """A cylinder is a face at its caps, a line with its radius at its side, and at its rims the line along them."""
     axis = np.empty(3)
     _rotated(rotation, geometry.frame[p, 3:6], axis)
-    along = _dot(normal, axis)
+    along = dot(normal, axis)
     if 1.0 - abs(along) < ALIGNED:
         return 0.0, FACE
     if abs(along) < ALIGNED:
         copy_vector(axis, direction)
         return geometry.radius[p], LINE
     _cross(axis, normal, direction)
-    size = sqrt(_dot(direction, direction))
+    size = sqrt(dot(direction, direction))
     for k in range(3):
         direction[k] /= size
     return 0.0, LINE
@@ -144,7 +140,7 @@ def _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, w, out):
     radius, along = geometry.radius[p], 0.0
     for i in range(3):
         along += (arm[i] - centre[i]) * k[i]
-    z = _dot(outward, k)
+    z = dot(outward, k)
     s2 = 1.0 - z * z
     if s2 < LEAST_LEAN * LEAST_LEAN:
         return False
@@ -158,7 +154,7 @@ def _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, w, out):
     k_rate = np.empty(3)
     _cross(w, k, k_rate)
     _cross(w, c, out)
-    z_rate = _dot(outward_rate, k) + _dot(outward, k_rate)
+    z_rate = dot(outward_rate, k) + dot(outward, k_rate)
     for i in range(3):
         e_rate = (outward_rate[i] - z_rate * k[i] - z * k_rate[i]) / s + (outward[i] - z * k[i]) * z * z_rate / (s * s2)
         out[i] -= radius * e_rate
@@ -207,21 +203,21 @@ def _between_lines(first, second, n, distance, place, normal_rate):
     va, wa, ea, ra = first.velocity, first.spin, first.direction, first.radius
     vb, wb, eb = second.velocity, second.spin, second.direction
     x = np.empty(3)
-    cosine = _dot(ea, eb)
+    cosine = dot(ea, eb)
     determinant = 1.0 - cosine * cosine
     if determinant < PARALLEL * PARALLEL:
         return False
     _cross(wa, ea, x)
-    ca = -_dot(n, x)
+    ca = -dot(n, x)
     _cross(wb, eb, x)
-    cb = -_dot(n, x)
+    cb = -dot(n, x)
     alpha, beta = (ca - cosine * cb) / determinant, (cb - cosine * ca) / determinant
-    across = _dot(vb, n) - _dot(va, n)
+    across = dot(vb, n) - dot(va, n)
     for k in range(3):
         normal_rate[k] = alpha * ea[k] + beta * eb[k]
         # The part of the relative velocity of the lines' points that they have to run for.
         x[k] = vb[k] - va[k] - across * n[k] - distance * normal_rate[k]
-    run = (_dot(x, ea) - cosine * _dot(x, eb)) / determinant
+    run = (dot(x, ea) - cosine * dot(x, eb)) / determinant
     for k in range(3):
         place[k] = va[k] + run * ea[k] + ra * normal_rate[k]
     return True
@@ -235,13 +231,13 @@ def _between_skeletons(first, second, n, distance, place, normal_rate):
     x = np.empty(3)
     if skeleton_a == LINE and skeleton_b == LINE and _between_lines(first, second, n, distance, place, normal_rate):
         return
-    across = _dot(vb, n) - _dot(va, n)
+    across = dot(vb, n) - dot(va, n)
     for k in range(3):
         normal_rate[k] = (vb[k] - va[k] - across * n[k]) / distance
     if skeleton_a == LINE or skeleton_b == LINE:
         e = ea if skeleton_a == LINE else eb
         _cross(wa if skeleton_a == LINE else wb, e, x)
-        change = -_dot(n, x) - _dot(normal_rate, e)
+        change = -dot(n, x) - dot(normal_rate, e)
         for k in range(3):
             normal_rate[k] += change * e[k]
     for k in range(3):
@@ -320,9 +316,9 @@ def contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, f
             for k in range(3):
                 u[k] += sign * (bodies.velocity[i, k] + x[k])
             if bodies.inv_mass[i] > 0.0:
-                fastest = max(fastest, sqrt(_dot(arm_rate, arm_rate) / max(_dot(r, r), 1e-300)))
-        along = _dot(u, normal_rate[c])
+                fastest = max(fastest, sqrt(dot(arm_rate, arm_rate) / max(dot(r, r), 1e-300)))
+        along = dot(u, normal_rate[c])
         for k in range(3):
             turning[c, k] += along * n[k]
-        fastest = max(fastest, sqrt(_dot(normal_rate[c], normal_rate[c])))
+        fastest = max(fastest, sqrt(dot(normal_rate[c], normal_rate[c])))
     return Motion(turning, rate_a, rate_b, normal_rate, fastest)

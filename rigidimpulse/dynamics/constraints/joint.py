@@ -29,41 +29,19 @@ and bounds.
 """
 
 from math import atan2, pi, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.copying import copy_vector
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import from_columns
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import copy_vector
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, FREE, write_body, write_row
+from rigidimpulse.scene.joint_coordinates import ABOUT, ACROSS, ANGLE, DISTANCE, RADIUS, SWING, TWIST
 
-ALONG, RADIUS, DISTANCE, ABOUT, TWIST, SWING, ANGLE, ACROSS = 0, 3, 6, 7, 10, 13, 16, 17
-"""Coordinates; ALONG, RADIUS, ABOUT, TWIST and SWING plus the axis k; ACROSS plus 3 k + i."""
-TINY = 1e-300
-SMALL = 1e-8
-FLAT = 1e-3
-"""rad, below which series are taken."""
-
-
-class Joints(NamedTuple):
-    """j joints with k rows; bodies are indices into the world, -1 is the world itself."""
-
-    body_a: np.ndarray  # (j,)
-    body_b: np.ndarray  # (j,)
-    anchor_a: np.ndarray  # (j, 3) m, in the principal frame of a (in the world if a is -1)
-    anchor_b: np.ndarray  # (j, 3)
-    frame_a: np.ndarray  # (j, 3, 3) columns: the axes in the principal frame of a
-    frame_b: np.ndarray  # (j, 3, 3)
-    first: np.ndarray  # (j + 1,) first row of each joint
-    coordinate: np.ndarray  # (k,)
-    target: np.ndarray  # (k,) m or rad
-    lower: np.ndarray  # (k,) N or N m, least and most that the row may exert
-    upper: np.ndarray  # (k,)
-    stiffness: np.ndarray  # (k,) N/m or N m/rad; inf: hard
-    damping: np.ndarray  # (k,) N s/m or N m s/rad
-    rate: np.ndarray  # (k,) m/s or rad/s, the rate that the damping strives for
-    per_mass: np.ndarray  # (k,) bool, stiffness and damping are those of a unit of the mass or inertia that the row moves
+TINY = TOLERANCES.arithmetic.least_divisor
+SMALL = TOLERANCES.joint.least_sine
+FLAT = TOLERANCES.joint.series_angle
 
 
 @jit
@@ -127,7 +105,7 @@ def _along_axes(e, x, y, z, direction):
 def _about(turn, e, k, direction):
     """Part k of the rotation vector of `turn`, with its gradient (3,) in the world."""
     q0, q1, q2, q3 = from_columns(
-        turn[0, 0], turn[1, 0], turn[2, 0], turn[0, 1], turn[1, 1], turn[2, 1], turn[0, 2], turn[1, 2], turn[2, 2]
+        (turn[0, 0], turn[1, 0], turn[2, 0]), (turn[0, 1], turn[1, 1], turn[2, 1]), (turn[0, 2], turn[1, 2], turn[2, 2])
     )
     half = sqrt(q1 * q1 + q2 * q2 + q3 * q3)
     angle = 2.0 * atan2(half, q0)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint import is_linear, joint_rows, relative_point_velocity
 from rigidimpulse.dynamics.constraints.joint_limits import is_reached, limit_side
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
@@ -16,7 +17,7 @@ from rigidimpulse.dynamics.constraints.rows import BOUNDED, Rows, change_velocit
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 
 # Residual asked of the solver, relative to the fastest rate.
-SOLVE_TOLERANCE = 1e-12
+SOLVE_TOLERANCE = TOLERANCES.joint.impact_residual
 
 
 class JointBlock(NamedTuple):

@@ -17,15 +17,16 @@ from math import ceil, sqrt
 
 import numpy as np
 
-from rigidimpulse.core.copying import copy_vector
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import copy_vector
 from rigidimpulse.dynamics.constraints.softness import response
 
 # Gaps that count as closed, and those that a slack limit may overrun, relative to the error at which joints are closed.
 REACHED = 100.0
 OVERRUN = 10.0
 # A row that the joint's hard rows hold has no mass of its own; least W relative to that of the row alone.
-LEAST_WEIGHT = 1e-12
+LEAST_WEIGHT = TOLERANCES.joint.least_weight
 # Steps of w t in which the release of a soft limit is looked for, most of them, and bisections.
 SCAN = 0.5
 MOST_SCANS = 1024

@@ -16,6 +16,7 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix, to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import SLIP, ContactProblem, fill_contact_bias, start_contact_impulses
 from rigidimpulse.dynamics.constraints.joint import is_linear, joint_rows, joint_values, relative_point_velocity
 from rigidimpulse.dynamics.constraints.joint_limits import is_reached, joint_weights, limit_side, spring_of
@@ -44,11 +45,10 @@ from rigidimpulse.motion.trajectory import FORCED, begin, pose_at
 MAX_ROUNDS = 20
 MOST_FAILURES = 3
 """Rounds in a row that close joints no better or are not solved, after which the best is taken."""
-UNSOLVED = 1e-6
-"""Residual of the solver that counts as none, relative to the speed gained in the sub-step."""
+UNSOLVED = TOLERANCES.joint.unsolved
 # Residual asked of the solver, and of closing, relative to the speed gained in the sub-step.
-SOLVE_TOLERANCE = 1e-12
-TINY = 1e-300
+SOLVE_TOLERANCE = TOLERANCES.joint.residual
+TINY = TOLERANCES.arithmetic.least_divisor
 
 
 def stop_joints(island: JointedIsland, elapsed: np.ndarray, moment: np.ndarray) -> None:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import jit
-from rigidimpulse.dynamics.constraints.joint import Joints
+from rigidimpulse.model.joint_table import Joints
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.trajectory import Trajectories, make_trajectories
 

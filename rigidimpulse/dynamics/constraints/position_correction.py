@@ -11,6 +11,7 @@ Velocities do not change. The ledger records the change of potential energy.
 import numpy as np
 
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.rows import contact_rows, move_bodies, take_rows
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.model.contacts import Contacts
@@ -19,7 +20,7 @@ from rigidimpulse.motion.body_state import BodyState
 SUNK = 0.7
 # Other contacts of the island may not sink below this part of the contact margin.
 KEPT = 0.75
-SOLVE_TOLERANCE = 1e-6
+SOLVE_TOLERANCE = TOLERANCES.contact_forces.correction_residual
 
 
 @jit

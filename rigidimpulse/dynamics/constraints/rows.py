@@ -24,7 +24,7 @@ import numpy as np
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import multiply as quaternion_product
 from rigidimpulse.core.quaternion import quaternion_from_rotation_vector
-from rigidimpulse.dynamics.impact.friction import tangents
+from rigidimpulse.core.vector import tangents
 from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.motion.body_state import BodyState
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError, unknown_name
-from rigidimpulse.core.quaternion import cross, rotate, rotate_inverse
+from rigidimpulse.core.quaternion import rotate, rotate_inverse
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.model.effect import Skip
 from rigidimpulse.motion.trajectory import Trajectories, pose_at, state_at
 from rigidimpulse.scene.body import number, vector
@@ -44,7 +45,7 @@ class Instant(NamedTuple):
         x, q, v, w = np.empty(3), np.empty(4), np.empty(3), np.empty(3)
         state_at(self.trajectory, i, time, x, q, v, w)
         r = rotate(q, arm)
-        return x + r, v + cross(w, r)
+        return x + r, v + cross_arrays(w, r)
 
 
 class ForceTable(ABC):

@@ -13,13 +13,14 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.force import Force, body_point, checked_direction, checked_number, checked_vector, dynamic_body, named
 from rigidimpulse.dynamics.forces.timed import TimedForces
 from rigidimpulse.model.world import World
 
 PART_OF_PERIOD = 0.25
 """Longest step in periods: at its ends and middle, where forces are taken, a force of a period or a half is zero or as at the start."""
-TINY = 1e-300
+TINY = TOLERANCES.arithmetic.least_divisor
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.quaternion import conjugate, cross, multiply, quaternion_from_rotation_vector, rotate, rotation_vector
+from rigidimpulse.core.quaternion import conjugate, multiply, quaternion_from_rotation_vector, rotate, rotation_vector
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.forces.force import (
     Force,
     ForceTable,
@@ -169,7 +170,7 @@ class PDForces(ForceTable):
         origin, turn, speed, spin = self._aims(at.time, rows)
         arm = rotate(turn, self._offset[rows])
         spin = np.where(self._has_spin[rows], self._spin[rows], spin)
-        speed = np.where(self._has_velocity[rows], self._velocity[rows], speed + cross(spin, arm))
+        speed = np.where(self._has_velocity[rows], self._velocity[rows], speed + cross_arrays(spin, arm))
         off = multiply(multiply(turn, self._turn[rows]), conjugate(at.bodies.orientation[i]))
         force = k * (origin + arm - at.bodies.position[i]) + c * (speed - at.bodies.velocity[i])
         torque = k_r * rotation_vector(off) + c_r * (spin - at.bodies.angular_velocity[i])

@@ -18,11 +18,11 @@ from numpy.typing import ArrayLike
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.core.quaternion import rotate
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.force import Force, ForceTable, Instant, body_point, checked_number, checked_vector, end_of, named
 from rigidimpulse.model.world import World
 
-AT_LIMIT = 1e-6
-"""Part of its greatest force by which a spring may be short of it and break."""
+AT_LIMIT = TOLERANCES.force.spring_limit
 
 
 @dataclass(frozen=True, eq=False)

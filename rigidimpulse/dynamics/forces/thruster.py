@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.quaternion import cross, rotate_inverse
+from rigidimpulse.core.quaternion import rotate_inverse
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.forces.force import (
     Force,
     Instant,
@@ -118,7 +119,7 @@ class ThrusterForces(BurningForces):
         burns = (at.time[i] >= self._start[rows]) & (at.time[i] < self._end[rows])
         force = np.einsum("ijk,ik->ij", at.rotation[i], self._along[rows] * (self._thrust[rows] * burns)[:, None])
         arm = np.einsum("ijk,ik->ij", at.rotation[i], self._point[rows])
-        return np.hstack([force, cross(arm, force)])
+        return np.hstack([force, cross_arrays(arm, force)])
 
     def burnt(self, times: np.ndarray) -> np.ndarray:
         """Propellant used."""

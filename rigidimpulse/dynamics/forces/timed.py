@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import cross
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.forces.force import ForceTable, Instant, no_links
 
 
@@ -38,7 +38,7 @@ class TimedForces(ForceTable):
         wrench[:, :3] = self._strength(at.time[i], rows)
         if self._turns:
             arm = np.einsum("ijk,ik->ij", at.rotation[i], self._points[rows])
-            wrench[:, 3:] = cross(arm, wrench[:, :3])
+            wrench[:, 3:] = cross_arrays(arm, wrench[:, :3])
         return wrench
 
     def longest_steps(self) -> np.ndarray:

@@ -30,6 +30,7 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint_impact import JointBlock, add_moments, copy_rows
 from rigidimpulse.dynamics.constraints.rows import (
     ContactRows,
@@ -48,13 +49,13 @@ from rigidimpulse.model.contacts import Contacts, select
 from rigidimpulse.motion.body_state import BodyState
 
 # Residual asked of the solver, relative to the speed of the island.
-SOLVE_TOLERANCE = 1e-14
+SOLVE_TOLERANCE = TOLERANCES.impact.block_residual
 # Slip that counts as none, relative to the speed of the island, and energy that counts as none, relative to the energy moved.
-SLIPLESS = 1e-9
-ENERGY_ROUND_OFF = 1e-13
+SLIPLESS = TOLERANCES.impact.block_no_slip
+ENERGY_ROUND_OFF = TOLERANCES.impact.block_energy_round_off
 # The size of the rebound: solutions tried and their relative accuracy.
 SIZES = 12
-SIZE_ACCURACY = 1e-10
+SIZE_ACCURACY = TOLERANCES.impact.rebound_size
 
 
 @dataclass

@@ -29,6 +29,8 @@ from math import hypot, sqrt
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import dot, tangents
 from rigidimpulse.dynamics.impact.restitution import COMPRESSED, J1, J2, JN, PLACES, S1, S2, UN, PointMass, energy_change, go_straight
 from rigidimpulse.dynamics.impact.slip_direction import turn
 
@@ -36,24 +38,9 @@ from rigidimpulse.dynamics.impact.slip_direction import turn
 SLIDES, STICKS, UNFINISHED = 0, 1, 2
 DIRECTION_STEPS = 50
 # Round-off of products: of K, relative to its normal part (below it the normal and the two tangents do not couple), and of u.
-ROUND_OFF = 5e-16
+ROUND_OFF = TOLERANCES.impact.coupling_round_off
 # Energy made by round-off, relative to the energy moved.
-ENERGY_ROUND_OFF = 1e-6
-
-
-@jit
-def tangents(n, t1, t2):
-    """Two unit vectors that complete n to a right-handed frame, without a branch cut near n (Duff et al. 2017)."""
-    s = 1.0 if n[2] >= 0.0 else -1.0
-    a = -1.0 / (s + n[2])
-    b = n[0] * n[1] * a
-    t1[0], t1[1], t1[2] = 1.0 + s * n[0] * n[0] * a, s * b, -s * n[0]
-    t2[0], t2[1], t2[2] = b, s + n[1] * n[1] * a, -n[1]
-
-
-@jit
-def _dot(x, y):
-    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+ENERGY_ROUND_OFF = TOLERANCES.impact.energy_round_off
 
 
 @jit
@@ -68,7 +55,7 @@ def _form(x, k, y):
 @jit
 def _turn_to_slip(u, un, t1, t2):
     """Turn t1, t2 in their plane until t1 points along the tangential part of u; returns its length, 0 if it is round-off of u.n."""
-    s1, s2 = _dot(u, t1), _dot(u, t2)
+    s1, s2 = dot(u, t1), dot(u, t2)
     slip = hypot(s1, s2)
     if slip <= ROUND_OFF * abs(un):
         slip = 0.0
@@ -190,7 +177,7 @@ def contact_impulse(k, n, u, pair, t1, t2, impulse):
     k (3, 3) 1/kg; n (3,); u (3,) m/s with u.n < 0; pair: `PairLaw`; t1, t2 (3,) are working memory.
     """
     law, e, e_t, mu_s, mu_k = pair.law, pair.e, pair.e_t, pair.mu_s, pair.mu_k
-    un = _dot(u, n)
+    un = dot(u, n)
     k_nn = 0.0
     for a in range(3):
         for b in range(3):

@@ -13,6 +13,7 @@ they differ in which of the physically possible answers a chain of bodies gives.
 import numpy as np
 
 from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint_impact import JointBlock
 from rigidimpulse.dynamics.impact.block import rebound_of, solve_block
 from rigidimpulse.dynamics.impact.point import relative_velocity, resolve_contact
@@ -25,7 +26,7 @@ IMPULSES_PER_CONTACT = 200
 # Impulses per contact after which it is asked whether contacts have collapsed, and the part of its approach speed that a collapsed one
 # could still have.
 IMPULSES_PER_ROUND = 8
-COLLAPSED = 1e-3
+COLLAPSED = TOLERANCES.impact.collapsed
 
 
 @jit_making_arrays

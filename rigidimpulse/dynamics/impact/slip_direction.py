@@ -19,13 +19,14 @@ from math import hypot
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.impact.restitution import COMPRESSED, J1, J2, JN, NEWTON, PC, POISSON, PR, S1, S2, UN, WC, WR, energy_change
 
 ORDER = 20
 # What counts as none: truncation of a step, relative to the slip; turning, relative to F; error of an impulse, relative to it.
-TRUNCATION = 1e-15
-STRAIGHT = 1e-14
-ERROR = 1e-14
+TRUNCATION = TOLERANCES.impact.truncation
+STRAIGHT = TOLERANCES.impact.straight
+ERROR = TOLERANCES.impact.impulse_error
 LONGEST_STEP = 100.0
 MOST_STEPS = 400
 BISECTIONS = 53

@@ -37,12 +37,14 @@ from rigidimpulse.collision.manifold.penetrating_points import find_points
 from rigidimpulse.collision.manifold.penetrating_surface import BodyPoses, PointBuffer, Solids, inward_axes, solid_geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.force import ForceTable, Instant
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.evaluate import bring_all
 
-REST_DEPTH, IMPACT_DEPTH = 4e-4, 0.02
+REST_DEPTH = TOLERANCES.penalty.rest_depth
+IMPACT_DEPTH = 0.02
 MOST_DAMPING = 3.0
 """z where restitutions below 0.024 ask for more."""
 CAPACITY = 256

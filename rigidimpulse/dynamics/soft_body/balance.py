@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import cross
+from rigidimpulse.core.vector import cross_arrays
 
 
 def lever_place(position: np.ndarray, velocity: np.ndarray, end_position: np.ndarray, h: float) -> np.ndarray:
@@ -36,8 +36,8 @@ def rigid_motion(mass: np.ndarray, x: np.ndarray, momentum: np.ndarray, angular_
     centre = mass @ x / total
     arm = x - centre
     inertia = np.eye(3) * float(mass @ np.einsum("ij,ij->i", arm, arm)) - np.einsum("i,ij,ik->jk", mass, arm, arm)
-    spin = np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ (angular_momentum - cross(centre, momentum))
-    return momentum / total + cross(spin, arm)
+    spin = np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ (angular_momentum - cross_arrays(centre, momentum))
+    return momentum / total + cross_arrays(spin, arm)
 
 
 def set_momenta(
@@ -46,7 +46,7 @@ def set_momenta(
     """Bring the momenta of points to the given ones, about the origin, by a rigid velocity, in place; twice, against round-off."""
     for _ in range(2):
         lacking = momentum - mass @ velocity
-        lacking_angular = angular_momentum - (mass[:, None] * cross(x, velocity)).sum(0)
+        lacking_angular = angular_momentum - (mass[:, None] * cross_arrays(x, velocity)).sum(0)
         if np.any(lacking) or np.any(lacking_angular):
             velocity += rigid_motion(mass, x, lacking, lacking_angular)
 
@@ -58,7 +58,7 @@ def take_energy(mass: np.ndarray, x: np.ndarray, velocity: np.ndarray, pieces: l
         m, place, v = mass[piece], x[piece], velocity[piece]
         centre = m @ place / m.sum()
         arm = place - centre
-        rigid = rigid_motion(m, arm, m @ v, (m[:, None] * cross(arm, v)).sum(0))
+        rigid = rigid_motion(m, arm, m @ v, (m[:, None] * cross_arrays(arm, v)).sum(0))
         inner.append((piece, rigid, v - rigid, 0.5 * float(m @ np.einsum("ij,ij->i", v - rigid, v - rigid))))
     # The motion relative to the rigid one carries neither momentum nor angular momentum.
     there = sum(part[3] for part in inner)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.collision.geometry import unique_edges
 from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.triangles import unique_edges
 from rigidimpulse.dynamics.soft_body.mass_spring import SpringMesh, sheet
 from rigidimpulse.model.effect import Skip
 from rigidimpulse.scene.body import DEFAULT_MATERIAL, number, vector

@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import cross, row
-from rigidimpulse.core.copying import copy_matrix
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import copy_matrix, cross, row
 from rigidimpulse.dynamics.soft_body.contact_terms import SoftContacts, add_to_ends, miss
 
 

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.distance.point import STACK, first_contact, first_contact_with_triangle, signed_distance
-from rigidimpulse.collision.distance.simplices import dot, row, subtract
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, Geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import dot, row, subtract
 
 RIM_POINTS = 16
 AXIS_POINTS = 9

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.geometry import ROUND, CompiledShape, Geometry, Primitive, build_geometry
-from rigidimpulse.core.quaternion import cross
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.soft_body.contact import (
     BodyShapes,
     MovingFaces,
@@ -28,8 +29,7 @@ from rigidimpulse.dynamics.soft_body.contact_terms import SoftContacts
 
 CORRECTION = 0.2
 """Share of a missing gap that a vertex is moved by, per step, without any velocity."""
-SLIPS = 1e-3
-"""Slip speed above which dynamic friction counts, relative to what gravity gives in the step."""
+SLIPS = TOLERANCES.soft_body.slips
 
 
 class RigidMotion(NamedTuple):
@@ -177,7 +177,7 @@ def sides_of(touches: FoundContacts, x: np.ndarray, rotation: np.ndarray, first_
 
 
 def _face_normals(corners: np.ndarray) -> np.ndarray:
-    return cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return cross_arrays(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def _nothing_found() -> FoundContacts:
@@ -225,7 +225,7 @@ def make_contacts(
     before -= normal * np.einsum("ij,ij->i", before, normal)[:, None]
     aim = rigid.end_position[b] + arm + before + touches.target[:, None] * normal
     slip = np.einsum("mk,mkj->mj", touches.weight, velocity[touches.node]) - rigid.velocity[b]
-    slip -= cross(rigid.angular_velocity[b], place - rigid.position[b])
+    slip -= cross_arrays(rigid.angular_velocity[b], place - rigid.position[b])
     slip -= normal * np.einsum("ij,ij->i", slip, normal)[:, None]
     pair = friction[touches.node[:, 0], b]
     grip = np.where(np.linalg.norm(slip, axis=1) > slow, pair[:, 1], pair[:, 0])

@@ -22,8 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, cross, dot, row, subtract
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.vector import along, cross, dot, row, subtract
 
 
 class SoftContacts(NamedTuple):

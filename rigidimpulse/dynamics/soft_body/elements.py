@@ -22,8 +22,8 @@ from math import atan2, pi, sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import cross, dot, row, subtract
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import cross, dot, row, subtract
 
 
 @jit

@@ -11,7 +11,7 @@ from copy import copy
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import cross
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.forces.force import ForceTable, Instant, no_links
 from rigidimpulse.dynamics.soft_body.contact_planes import RigidMotion
 from rigidimpulse.dynamics.soft_body.soft_bodies import Flexibles, FlexibleStep
@@ -97,7 +97,7 @@ class SoftBodyForces(ForceTable):
         momentum = soft_bodies.soft_body.mass[:, None] * soft_bodies.velocity
         kinetic = 0.5 * float(np.sum(momentum * soft_bodies.velocity))
         stored = soft_bodies.soft_body.energy(soft_bodies.position) - float(np.sum(soft_bodies.weight * soft_bodies.position))
-        return np.array([self._end, kinetic, stored, *momentum.sum(axis=0), *cross(soft_bodies.position, momentum).sum(axis=0)])
+        return np.array([self._end, kinetic, stored, *momentum.sum(axis=0), *cross_arrays(soft_bodies.position, momentum).sum(axis=0)])
 
 
 def _fixed(motion: RigidMotion, held: np.ndarray) -> RigidMotion:

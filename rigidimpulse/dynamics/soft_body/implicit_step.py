@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import cross
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.soft_body.conjugate_gradients import LinearSystem, conjugate_gradients, diagonal_inverses
 from rigidimpulse.dynamics.soft_body.contact_terms import (
     SoftContacts,
@@ -33,8 +34,7 @@ MOST_ITERATIONS = 100
 MOST_LINEAR = 2000
 UPDATE = 0.3
 """Error at which forces of contacts are taken over, relative to the error that this makes."""
-FLOOR = 1e-15
-"""Round-off of forces, relative to stiffness times coordinates."""
+FLOOR = TOLERANCES.soft_body.force_round_off
 
 
 class Problem(NamedTuple):
@@ -94,7 +94,7 @@ def set_penalties(p: Problem, contacts: SoftContacts, x: np.ndarray) -> None:
     give = np.einsum("mk,mk->m", contacts.weight**2, 1.0 / stiffness[contacts.node])
     movable = contacts.unknown >= 0
     inverse = np.linalg.inv(p.rigid)[contacts.unknown[movable]] if movable.any() else np.zeros((0, 6, 6))
-    lever = cross(contacts.arm[movable], contacts.normal[movable])
+    lever = cross_arrays(contacts.arm[movable], contacts.normal[movable])
     lever = np.concatenate([contacts.normal[movable], lever], axis=1)
     give[movable] += np.einsum("mi,mij,mj->m", lever, inverse, lever)
     contacts.penalty[:] = np.where(movable, 1.0, 1.0) / give

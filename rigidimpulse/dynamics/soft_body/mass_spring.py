@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rigidimpulse.collision.geometry import unique_edges
+from rigidimpulse.core.triangles import unique_edges
 from rigidimpulse.dynamics.soft_body.elements import (
     add_hinge_gradient,
     add_hinge_hessian,

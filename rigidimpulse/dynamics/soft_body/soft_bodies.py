@@ -17,8 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.quaternion import cross, quaternion_from_rotation_vector, to_matrix
+from rigidimpulse.core.quaternion import quaternion_from_rotation_vector, to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.union_find import roots
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.soft_body.balance import lever_place, set_momenta, take_energy
 from rigidimpulse.dynamics.soft_body.body import FlexibleBody
 from rigidimpulse.dynamics.soft_body.contact import BodyShapes
@@ -42,10 +44,8 @@ GAP = 0.01
 """Gap at which soft bodies are kept from bodies, relative to the mean length of their edges."""
 ROUNDS = 10
 """Most times that contacts are looked for again on the way that was solved for."""
-MIDPOINT_EXCESS = 1e-3
-"""Energy out of nothing, relative to twice the kinetic energy, above which a step of the midpoint rule is done again by Euler's."""
-MIDPOINT_MADE = 1e-7
-"""The same for what no motion is left to be taken from; the solver's tolerance alone makes 1e-8."""
+MIDPOINT_EXCESS = TOLERANCES.soft_body.midpoint_excess
+MIDPOINT_MADE = TOLERANCES.soft_body.midpoint_energy
 ALIKE = 0.95
 """Cosine of the angle between two normals above which one plane guards both places."""
 AT_ONCE = 0.05
@@ -382,10 +382,10 @@ class Flexibles:
             mine = np.isin(contacts.node[:, 0], piece)
             fall = h * (m[:, None] * self._gravity[piece]).sum(0)
             momentum = m @ before[piece] + fall + impulse[mine].sum(0)
-            angular = (m[:, None] * cross(self.position[piece] - origin, before[piece])).sum(0)
-            angular += cross(place[mine] - origin, impulse[mine]).sum(0)
+            angular = (m[:, None] * cross_arrays(self.position[piece] - origin, before[piece])).sum(0)
+            angular += cross_arrays(place[mine] - origin, impulse[mine]).sum(0)
             if midpoint:  # its centre follows the parabola: gravity acts at the mean of its places, not at the first
-                angular += 0.5 * h * cross(m @ before[piece], fall) / m.sum()
+                angular += 0.5 * h * cross_arrays(m @ before[piece], fall) / m.sum()
             went = 0.5 * h * (momentum + m @ before[piece]) if midpoint else h * momentum
             end[piece] += origin + went / m.sum() - m @ end[piece] / m.sum()
             v = velocity[piece]
@@ -405,11 +405,11 @@ class Flexibles:
     ) -> np.ndarray:
         """Impulses (n, 6) that the soft bodies gave the bodies."""
         given = np.zeros((len(rigid.inv_mass), 6))
-        np.subtract.at(given, contacts.body, np.concatenate([impulse, cross(contacts.arm, impulse)], axis=1))
+        np.subtract.at(given, contacts.body, np.concatenate([impulse, cross_arrays(contacts.arm, impulse)], axis=1))
         vertices, bodies, _ = self._held
         on = bodies >= 0
         arm = end[vertices[on]] - rigid.end_position[bodies[on]]
-        np.subtract.at(given, bodies[on], np.concatenate([hold[vertices[on]], cross(arm, hold[vertices[on]])], axis=1))
+        np.subtract.at(given, bodies[on], np.concatenate([hold[vertices[on]], cross_arrays(arm, hold[vertices[on]])], axis=1))
         return given
 
 

@@ -13,15 +13,15 @@ from math import inf
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import cross, dot, row, subtract
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import cross, dot, row, subtract
 
 SHARE_ALONG, SHARE_TILTED = 0.4, 0.15
 """Shares of the ray along the normal and of each of the four others."""
 LEAST_WEIGHT = 0.05
 """Corners of a face that a ray meets by less than this weight get no strut of their own."""
-SLACK = 1e-9
-"""Rays along edges of a regular mesh shall not slip between its faces: part of a face that it is wider by."""
+SLACK = TOLERANCES.soft_body.ray_slack
 
 
 @jit

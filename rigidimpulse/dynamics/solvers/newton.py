@@ -22,8 +22,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.copying import copy_matrix, copy_vector
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import copy_matrix, copy_vector
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMENT, multiply, multiply_transposed
 from rigidimpulse.dynamics.solvers.sparse_lu import factor, plan_elimination, solve_factored
 
@@ -31,11 +32,11 @@ MAX_OUTER = 60
 MAX_INNER = 60
 MAX_HALVINGS = 8
 MOST_IDLE = 16
-REGULARISATION_START = 1e-3
-REGULARISATION_LEAST = 1e-12
-REGULARISATION_FREE = 1e-9
-TINY = 1e-300
-ROUND_OFF = 4e-16
+REGULARISATION_START = TOLERANCES.solver.regularisation_start
+REGULARISATION_LEAST = TOLERANCES.solver.regularisation_least
+REGULARISATION_FREE = TOLERANCES.solver.regularisation_free
+TINY = TOLERANCES.arithmetic.least_divisor
+ROUND_OFF = TOLERANCES.solver.round_off
 
 
 @jit

@@ -18,6 +18,7 @@ import numpy as np
 from scipy import sparse
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, SEGMENT, Rows, RowSolver
 from rigidimpulse.dynamics.solvers.newton import natural_residual, row_weights, solve_newton
 
@@ -25,10 +26,8 @@ MOST_ROUNDS = 100
 """Fixed-point steps."""
 MOST_STAGNANT = 4
 """Steps in a row that gain nothing: what is left is the precision of the convex solver, about 1e-6 of the speeds."""
-PRECISION = 1e-11
-"""Asked of the convex solver, for a problem scaled to 1."""
-REGULAR = 1e-9
-"""Added to the scaled W, which redundant contacts make singular."""
+PRECISION = TOLERANCES.solver.qp_precision
+REGULAR = TOLERANCES.solver.qp_regularisation
 
 
 def row_solver(name: str) -> RowSolver:

@@ -14,11 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.copying import copy_vector
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import copy_vector
 
 SIZE = 6
-TINY = 1e-300
+TINY = TOLERANCES.arithmetic.least_divisor
 
 
 class Elimination(NamedTuple):

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import ContactProblem, Held, hold_contacts
 from rigidimpulse.dynamics.constraints.contact_motion import Motion, contact_motion
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
@@ -24,8 +25,7 @@ from rigidimpulse.model.contacts import Contacts, select
 from rigidimpulse.model.island import Island
 from rigidimpulse.motion.evaluate import refresh_pose
 
-PLAY = 1e-3
-"""Energy that forces which are no solution may make, relative."""
+PLAY = TOLERANCES.contact_forces.unsolved_energy
 TURN = 0.01
 """rad, how far arms and normals of contacts may turn in a sub-step."""
 MOST_SUB_STEPS = 256
@@ -34,12 +34,9 @@ TURN_OF_BODY = 0.1
 """rad, how far bodies may turn in a sub-step where that matters to gaps."""
 GROWTH = 1.5
 """How many times longer than the one before a sub-step may be."""
-SHORTEST = 1e-5
-"""Part of a step that is not split."""
-SHORTEST_STOP = 1e-3
-"""Part of a step within which it does not matter when a contact stops."""
-STEADY = 1e-9
-"""rad in a step; what turns less does not."""
+SHORTEST = TOLERANCES.contact_forces.shortest
+SHORTEST_STOP = TOLERANCES.contact_forces.shortest_stop
+STEADY = TOLERANCES.contact_forces.steady_turn
 
 
 def hold(run: Run, pair_events: PairEvents, island: Island) -> None:

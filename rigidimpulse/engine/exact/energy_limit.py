@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import cross
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.contacts import Contacts
@@ -24,10 +25,8 @@ from rigidimpulse.model.state import Ground
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 
-GAIN = 1e-11
-"""Part of their kinetic energy that bodies may gain by rounding."""
-PARALLEL = 1e-6
-"""Sine of the angle of directions that count as one."""
+GAIN = TOLERANCES.contact_forces.energy_gain
+PARALLEL = TOLERANCES.contact_forces.same_direction
 
 
 def note_hold(run: Run, island: Island, contacts: Contacts, force: np.ndarray) -> None:
@@ -124,13 +123,13 @@ def take_off(now: BodyState, world: World, members: np.ndarray, energy: float, g
     v, w = now.velocity[members], now.angular_velocity[members]
     inertia = np.linalg.inv(now.inv_inertia[members])
     r = x - (mass * x).sum(axis=0) / mass.sum()
-    momentum = np.concatenate([(mass * v).sum(axis=0), (cross(r, mass * v) + np.einsum("ijk,ik->ij", inertia, w)).sum(axis=0)])
+    momentum = np.concatenate([(mass * v).sum(axis=0), (cross_arrays(r, mass * v) + np.einsum("ijk,ik->ij", inertia, w)).sum(axis=0)])
     steiner = np.einsum("i,ij,ij->", mass[:, 0], r, r) * np.eye(3) - np.einsum("i,ij,ik->jk", mass[:, 0], r, r)
     common = np.zeros((6, 6))
     common[:3, :3], common[3:, 3:] = mass.sum() * np.eye(3), inertia.sum(axis=0) + steiner
     free = _free_motions(ground)
     rigid = free @ np.linalg.solve(free.T @ common @ free, free.T @ momentum)
-    rigid_v = rigid[:3] + cross(rigid[3:], r)
+    rigid_v = rigid[:3] + cross_arrays(rigid[3:], r)
     dv, dw = v - rigid_v, w - rigid[3:]
     available = 0.5 * float((mass * dv**2).sum() + np.einsum("ij,ijk,ik->", dw, inertia, dw))
     if available > 0.0:

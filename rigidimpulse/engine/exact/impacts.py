@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.energy import kinetic_energy
 from rigidimpulse.dynamics.impact.kinematic import respond_kinematic
 from rigidimpulse.dynamics.impact.point import speed_scale
@@ -29,7 +29,7 @@ REASONS = {
     "kinematic": "normal velocity reflected, masses and spins ignored",
 }
 # Approach speed that counts as none, relative to the speed below which contacts are held.
-SLOW = 1e-9
+SLOW = TOLERANCES.contact.slow_approach
 # Calls with a full log before a group is given up.
 MAX_CALLS = 1000
 # Impacts in a row, without a gap worth the name between them, after which a pair no longer rebounds.
@@ -52,7 +52,7 @@ def respond_to_impacts(run: Run, island: Island, kernel: Callable[..., tuple[int
     contacts = island.contacts if len(live) == len(island.live) else select(island.contacts, live)
     rest_speed = np.where(collapses, np.inf, island.rest_speed)[live]
     scale = speed_scale(run.state.now, contacts)
-    tolerance = TOLERANCES.approach * scale + SLOW * float(island.rest_speed[live].max())
+    tolerance = TOLERANCES.contact.approach * scale + SLOW * float(island.rest_speed[live].max())
     island.zero_speed, island.scale = tolerance, scale
     if island.approach[live].min() >= -tolerance:
         return

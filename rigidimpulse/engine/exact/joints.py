@@ -8,9 +8,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
-from rigidimpulse.dynamics.constraints.joint import RADIUS
 from rigidimpulse.dynamics.constraints.joint_impact import JointBlock, impact_rows, stop_at_limits
 from rigidimpulse.dynamics.constraints.joint_limits import next_switch
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_jointed, stop_joints
@@ -27,6 +26,7 @@ from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.evaluate import refresh_pose
 from rigidimpulse.motion.trajectory import FIXED
 from rigidimpulse.scene.joint import Joint
+from rigidimpulse.scene.joint_coordinates import RADIUS
 
 TURN = 0.02
 """rad, how far the bodies of a joint may turn against each other in a sub-step."""
@@ -37,10 +37,8 @@ NOT_CLOSED = 1e3
 MOST_SUB_STEPS, MOST_SWAYS, MOST_SWINGS = 4096, 256, 16
 """Sub-steps in a step, and those that bounds of rates may ask for while energy is kept: light links between heavy bodies mostly stand, and
 what only swings about a fixed point has a far lower rate than its bound."""
-DRIFT = 1e-7
-"""Part of its kinetic energy that an island may gain or lose in a sub-step as if nothing swayed."""
-SHORT = 1e-5
-"""Part of a step below which a sub-step is planned as a longer one: closing divides by its length."""
+DRIFT = TOLERANCES.joint.energy_drift
+SHORT = TOLERANCES.joint.short_sub_step
 MOST_CUTS = 20
 """Times a sub-step is cut to end where a limit is reached or lets go."""
 STEEP = 1e3
@@ -81,7 +79,7 @@ class JointState:
         self.began = np.zeros(len(joints))
         self.length = np.zeros(len(joints))
         self.reactions: list[tuple[float, int, np.ndarray]] = []
-        self._allowed = TOLERANCES.joint * world.joint_size
+        self._allowed = TOLERANCES.joint.closed * world.joint_size
         self._joint_of_row = np.repeat(np.arange(len(joints)), np.diff(self.table.first))
         held = (self.table.coordinate < RADIUS) & np.isinf(self.table.stiffness) & np.isinf(self.table.lower) & np.isinf(self.table.upper)
         movable = [(i >= 0) & world.dynamic[i] for i in (self.table.body_a, self.table.body_b)]

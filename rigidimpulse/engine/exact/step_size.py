@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import cross
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.constraints.contact_motion import Motion, contact_motion
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.contacts import Contacts
@@ -66,8 +66,8 @@ class ErrorEstimate:
         turning = contact_motion(
             world.geometry, world.shape_of_body[touched], self.rotation, self.bodies, ahead, island.kinds[subset], island.features[subset]
         ).turning
-        point_a = self.acceleration[a] + cross(self.angular_acceleration[a], ahead.arm_a)
-        point_b = self.acceleration[b] + cross(self.angular_acceleration[b], ahead.arm_b)
+        point_a = self.acceleration[a] + cross_arrays(self.angular_acceleration[a], ahead.arm_a)
+        point_b = self.acceleration[b] + cross_arrays(self.angular_acceleration[b], ahead.arm_b)
         return np.einsum("ij,ij->i", point_b - point_a + turning, normal) * (h * h / 6.0)
 
     def _take_over(self, run: Run, touched: np.ndarray) -> None:

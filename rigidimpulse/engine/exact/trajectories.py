@@ -7,20 +7,20 @@ from math import isfinite
 import numpy as np
 
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.energy import mechanical_energy
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.pair_table import sweep_pair_again
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.island import Island
-from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, take
+from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, Load, take
 
 HALF_KEPT = 0.55
 """Held contacts nearer than this part of the contact margin have half of their gap as impact margin."""
-LEAVING = 1e-6
-"""Part of its gap by which a leaving pair may come nearer before it counts as contact again."""
-WHOLE = 1.0 - 1e-9
-"""Part of the rest of a step that counts as all of it."""
+LEAVING = TOLERANCES.events.leaving
+WHOLE = 1.0 - TOLERANCES.events.whole
 NOTHING = np.zeros(3)
+NO_LOAD = Load(NOTHING, NOTHING, NOTHING, NOTHING)
 
 
 def begin_trajectories(run: Run, pair_events: PairEvents, island: Island) -> None:
@@ -64,18 +64,18 @@ def begin_trajectory(run: Run, pair_events: PairEvents, i: int, time: float, wre
     pressed = not rests and bool(wrench.any())
     if rests:
         now.velocity[i] = now.angular_velocity[i] = 0.0
-        take(trajectory, i, time, now, NOTHING, NOTHING, NOTHING, NOTHING, FIXED)
+        take(trajectory, i, time, now, NO_LOAD, FIXED)
     elif run.forces.acts[i]:
         total, rate = wrench + run.forces.value[i], run.forces.rate[i]
         acceleration, jerk = world.steady_acceleration[i] + world.inv_mass[i] * total[:3], world.inv_mass[i] * rate[:3]
         turned = total[3:].any() or rate[3:].any()
-        take(trajectory, i, time, now, acceleration, total[3:], jerk, rate[3:], FORCED if turned else FREE)
+        take(trajectory, i, time, now, Load(acceleration, total[3:], jerk, rate[3:]), FORCED if turned else FREE)
     else:
         acceleration = world.steady_acceleration[i]
         if pressed:
             acceleration = acceleration + world.inv_mass[i] * wrench[:3]
         turned = pressed and wrench[3:].any()
-        take(trajectory, i, time, now, acceleration, wrench[3:], NOTHING, NOTHING, FORCED if turned else FREE)
+        take(trajectory, i, time, now, Load(acceleration, wrench[3:], NOTHING, NOTHING), FORCED if turned else FREE)
     state.under_contact[i] = pressed
     if pressed:
         state.energy_at_start[i] = mechanical_energy(now, world, np.array([i])) - work_of_forces(run, i)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import cross
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.constraints.contact import SLIP, SOLVE_TOLERANCE
 from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows, row_velocities, solve_with_slip
 from rigidimpulse.dynamics.solvers.newton import solve_newton
@@ -28,8 +28,8 @@ def remember_forces(
     slides: np.ndarray,
 ) -> None:
     """Keep the forces of m contacts from `time` on: force (m, 3) in their frames, world_force (m, 3) N on b, slides (m,) bool."""
-    torque_a = cross(contacts.arm_a, world_force)
-    torque_b = cross(contacts.arm_b, world_force)
+    torque_a = cross_arrays(contacts.arm_a, world_force)
+    torque_b = cross_arrays(contacts.arm_b, world_force)
     for pair in sorted(set(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True))):
         at = np.flatnonzero((contacts.body_a == pair[0]) & (contacts.body_b == pair[1]))
         pull = world_force[at].sum(axis=0)

@@ -16,12 +16,11 @@ from math import isfinite, sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, dot, moved, relative_pose, turned
 from rigidimpulse.collision.manifold.plane import plane_in_frame
-from rigidimpulse.collision.time_of_impact.motion_bound import scaled
 from rigidimpulse.collision.time_of_impact.spheres import DEEPEST
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, dot, moved, relative_pose, scaled, turned
 from rigidimpulse.dynamics.energy import kinetic_of
 from rigidimpulse.dynamics.impact.point import relative_velocity, resolve_contact, speed_scale
 from rigidimpulse.engine.exact.impacts import SLOW
@@ -32,11 +31,10 @@ from rigidimpulse.engine.spheres.motion import begin_free_trajectory, bring_ball
 from rigidimpulse.engine.spheres.paths import GAP, KIND, MOVES, RADIUS
 from rigidimpulse.recording.events import write_impacts
 
-_APPROACH = TOLERANCES.approach
+_APPROACH = TOLERANCES.contact.approach
 _CLEAR = 2.0
 """How many times faster than what would be held a simple impact is."""
-_ROUND_OFF = 1e-9
-"""Part of the acceleration on a curved path that rounding may add to what presses a contact."""
+_ROUND_OFF = TOLERANCES.time_of_impact.curved_pressure
 _NONE, _ONE = np.int64(0), np.int64(1)
 
 

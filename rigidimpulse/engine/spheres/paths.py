@@ -10,11 +10,11 @@ from math import inf, sqrt
 
 import numpy as np
 
-from rigidimpulse.collision.distance.simplices import along, dot, subtract
-from rigidimpulse.collision.time_of_impact.motion_bound import length, scaled
 from rigidimpulse.collision.time_of_impact.spheres import until_contact
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.quaternion import rotated
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, dot, length, scaled, subtract
 from rigidimpulse.engine.pair_table import MARGIN
 from rigidimpulse.engine.spheres.layout import OTHER
 from rigidimpulse.motion.trajectory import FIXED
@@ -27,8 +27,7 @@ LEVEL, NORMAL, HEIGHT, BODY, PLANE_SIZE = np.array([3, 4, 7, 8, 9])
 along it from the origin; the body."""
 _WIDER = 1.01
 """How much farther away than the margin counts as near."""
-_CURVED = 1e-9
-"""Part of speeds, and of accelerations on curved paths, that rounding may take."""
+_CURVED = TOLERANCES.time_of_impact.curved_path
 
 
 @jit

@@ -19,11 +19,11 @@ from rigidimpulse.collision.manifold.inset_surface import inset_surfaces
 from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
 from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, inner_radii, shrunk_geometry
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.kernels import number_of_cores
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.core.simd import ROW, aligned, machine_simd
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.workers import empty_work_queue
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import SolverBodies, load_bodies
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import energies, mark_quick, note_pressed, slow_down
@@ -53,8 +53,7 @@ LEAST_SUB_STEPS = 16
 """Sub-steps in a whole step."""
 SPAN = 1.0
 """Longest time that is stepped at once, in sqrt(r / g) of the smallest inner radius r."""
-CROSSED = 1e-6
-"""Inner radii below which the surfaces of two inset surfaces cross."""
+CROSSED = TOLERANCES.sub_stepping.crossed
 LEAST_SUB_STEPS_BETWEEN = 2
 """Sub-steps from look to look."""
 COARSEST = 0.3
@@ -116,7 +115,7 @@ class ContactStepper:
         dynamic_shapes = np.zeros(len(world.geometry.shape_first) - 1, bool)
         dynamic_shapes[world.shape_of_body[movable]] = True
         self.inner = np.where(movable, inner_radii(world.geometry)[world.shape_of_body], np.inf)
-        self.skin = TOLERANCES.skin * self.inner
+        self.skin = TOLERANCES.sub_stepping.skin * self.inner
         self.reach = np.where(world.ball, 0.0, world.bound_radius)
         convex = convex_polyhedra(world.geometry)
         cored, depth, self._back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)

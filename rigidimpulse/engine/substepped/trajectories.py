@@ -4,12 +4,12 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.quaternion import product, quaternion_to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.motion.trajectory import FREE, LENGTH, LINEAR, SPEEDS, begin, begin_straight, stepped_at
 
 TURN = 2.5
 """Angle by which a body may turn in one trajectory, rad."""
-EVEN = 1e-6
-"""Part of its way by which a body may miss where an even acceleration would have brought it, for its path to be a parabola."""
+EVEN = TOLERANCES.sub_stepping.even_path
 
 
 @jit

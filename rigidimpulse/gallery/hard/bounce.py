@@ -73,7 +73,7 @@ def check_bounces(run: Recording) -> list[Check]:
             at_most(f"e = {e}: error of ten impact times, s", float(late), 1e-11, "t_k = sqrt(2h/g)(1 + 2(e + ... + e^(k-1)))"),
             at_most(
                 f"e = {e}: last impact from the time of rest, s", abs(float(times[-1]) - rest) if len(times) else math.inf, allowed,
-                "sqrt(2h/g)(1 + e)/(1 - e), but for bounces below delta",
+                "sqrt(2h/g)(1 + e)/(1 - e), without bounces below the contact margin",
             ),
             at_most(
                 f"e = {e}: first frame at rest, s after it", (float(run.times[resting]) if resting < len(run.times) else math.inf) - rest,

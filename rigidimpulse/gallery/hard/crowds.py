@@ -161,7 +161,7 @@ def check_dominoes(run: Recording) -> list[Check]:
 
 
 def superellipsoids() -> Scene:
-    """Return rounded boxes, |x/a|^4 + |y/b|^4 + |z/c|^4 = 1, that fall in a heap."""
+    """Return rounded boxes, |x/a|^4 + |y/b|^4 + |z/c|^4 = 1, that fall onto a pile."""
     from trimesh.creation import icosphere
 
     directions = np.asarray(icosphere(subdivisions=3).vertices)
@@ -192,5 +192,5 @@ SCENES = (
         CLOUD_FPS,
     ),
     GalleryScene("dominoes", "A row of dominoes", dominoes, check_dominoes, 2.0, 480.0),
-    GalleryScene("superellipsoids", "Six superellipsoids fall in a heap", superellipsoids, check_superellipsoids, 4.0),
+    GalleryScene("superellipsoids", "Six superellipsoids fall onto a pile", superellipsoids, check_superellipsoids, 4.0),
 )

@@ -87,7 +87,7 @@ def check_incline(run: Recording) -> list[Check]:
     fitted = 2.0 * way["slides"][-1] / t[-1] ** 2
     return [
         finite(run),
-        at_most("0.1 degrees below: creep, m", farthest(run, ["holds"]), CREEP + 2e-6, "rest, but for one contact gap (4e-7 m) of lift"),
+        at_most("0.1 degrees below: creep, m", farthest(run, ["holds"]), CREEP + 2e-6, "rest, up to one contact margin (4e-7 m) of lift"),
         at_most("0.1 degrees below: creep along the slope, m", np.abs(way["holds"]).max(), CREEP, "mu > tan: rest"),
         at_most("0.1 degrees above: acceleration, relative error", abs(fitted / a - 1.0), RELATIVE, "a = g (sin - mu cos)"),
         at_most("at it: error of the way, relative", np.abs(way["critical"] - PUSH * t).max() / (PUSH * t[-1]), RELATIVE, "x = v0 t"),
@@ -223,8 +223,8 @@ def check_table(run: Recording) -> list[Check]:
     least = float(upward[:, 2].min()) if len(feet) else -math.inf
     return [
         finite(run),
-        at_most("sum of the feet's forces but for the weight, of m g", errors.max() / load, 1e-9, "statics, at every frame"),
-        at_most("moment of the feet's forces but for the weight's, of m g l", np.abs(moment[:2]).max() / load, 1e-9, "statics; l = 1 m"),
+        at_most("sum of the feet's forces without the weight, of m g", errors.max() / load, 1e-9, "statics, at every frame"),
+        at_most("moment of the feet's forces without the weight's, of m g l", np.abs(moment[:2]).max() / load, 1e-9, "statics; l = 1 m"),
         at_least("least force of a foot, N", least, 0.0, "feet push, they do not pull"),
         at_most("table or load moves, m", farthest(run, names), 4e-6, "statics; two contact gaps"),
         energy_never_grows(run, 1.2, 2),

@@ -4,7 +4,7 @@ A body that moves over a floor made of pieces meets the side of each next piece 
 normal that the surface as a whole does not have; an engine that believes it stops or lifts the body (ghost hits). On a flat
 floor without friction a box keeps its velocity, and a ball that rolls without slip keeps both velocity and spin:
 
-    x = x0 + v t,  y = y0,  z = const  (but for one contact gap, 1e-6 of the body's size)
+    x = x0 + v t,  y = y0,  z = const  (up to one contact margin, 1e-6 of the body's size)
 
 A smooth ball of e = 1 thrown at the very corner of four tiles bounces as on one: z = r + h - g s^2 / 2, s the time since it was
 last at the height h it came from. The bound of the issue is 1e-6 m off the path.

@@ -99,7 +99,7 @@ def check_arms(run: Recording) -> list[Check]:
         at_most("holds: error of the sag, relative", abs(held[-1] / sag - 1.0), 1e-6, "k a = m g l cos a"),
         at_most("holds: drive's torque against gravity's, relative", abs(torque / (LOAD * math.cos(held[-1])) - 1.0), 1e-6, "balance"),
         at_most("holds: it passes the sag by, of it", held.max() / sag - 1.0, 1e-6, "overdamped: c > 2 sqrt(k I)"),
-        at_most("holds: reaction but for the weight, of it", np.abs(reaction).max() / (ARM_MASS * GRAVITY), 1e-6, "m g, straight up"),
+        at_most("holds: reaction without the weight, of it", np.abs(reaction).max() / (ARM_MASS * GRAVITY), 1e-6, "m g, straight up"),
         at_most("lifts: error of the speed, of it", np.abs(speed - droop)[run.times > 0.5].max() / SPEED, 2e-5, "w - m g l sin(b) / c"),
         at_most("stalls: error of the highest turn, rad", abs(stalled.max() - high), 1e-3, "energy under the greatest torque"),
         at_most("stalls: error of the lowest turn, rad", abs(stalled[late].min() - low), 1e-3, "energy under the greatest torque"),
@@ -155,8 +155,8 @@ def check_hanging(run: Recording) -> list[Check]:
         finite(run),
         at_most("stretch, of the length", _stretch(run), TENTH_PERCENT, "joints are rigid; the issue's 0.1 %"),
         at_most("anything moves, m", moved, 1e-9, "statics"),
-        at_most("first joint's load but for the weight, of it", np.abs(first - [0.0, 0.0, weight]).max() / weight, 1e-9, "(100 m + M) g"),
-        at_most("last joint's load but for the ball's, of it", np.abs(last - [0.0, 0.0, BALL_MASS * GRAVITY]).max() / weight, 1e-9, "M g"),
+        at_most("first joint's load without the weight, of it", np.abs(first - [0.0, 0.0, weight]).max() / weight, 1e-9, "(100 m + M) g"),
+        at_most("last joint's load without the ball's, of it", np.abs(last - [0.0, 0.0, BALL_MASS * GRAVITY]).max() / weight, 1e-9, "M g"),
         undisturbed(run),
     ]
 

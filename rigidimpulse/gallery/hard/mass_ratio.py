@@ -55,7 +55,7 @@ def check(drop: float, run: Recording) -> list[Check]:
         checks.append(at_most("error of the fall, m", np.abs(fall).max(), 1e-14 * 4, "z = h - g t^2 / 2"))
         late = np.abs(run.impacts["time"][:1] - arrival).max() if len(run.impacts) else math.inf
         # Faces meet at a gap of 1e-10 of the size, passed at 3.1 m/s; the light cube may have been lifted by 1e-6.
-        checks.append(at_most("error of the impact's time, s", late, 2e-6, "sqrt(2 h / g), but for the contact gap"))
+        checks.append(at_most("error of the impact's time, s", late, 2e-6, "sqrt(2 h / g), up to the contact margin"))
     return checks
 
 

@@ -5,7 +5,7 @@ Two promises hold whatever a scene does:
     every number stays finite
     energy never grows: E(t) - min over s <= t of E(s) <= 2 delta sum_i k_i m_i g
 
-A lasting contact is held at a gap of delta = 1e-6 of a body's size. A body that was drawn touching is lifted to that gap,
+A lasting contact is held at a gap of delta = 1e-6 of a body's size. A body that was drawn touching is moved up to that gap,
 and one that stands on k others by k gaps, so the weights times the gaps bound what may honestly be gained; twice that,
 because a contact may be lost and found again, plus 1e-12 of the energy at stake for rounding.
 """
@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.quaternion import quaternion_from_axis_angle, rotate
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.gallery.record import Check, at_most, equal
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.body import Body
@@ -24,7 +24,7 @@ from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
 GRAVITY = 9.81
-DELTA = TOLERANCES.contact_margin
+DELTA = TOLERANCES.contact.margin
 """Gap of lasting contacts, of a body's size."""
 ROUNDING = 1e-12
 """Of the energy at stake: some thousand operations of sixteen digits."""
@@ -54,7 +54,7 @@ def finite(run: Recording) -> Check:
 
 
 def energy_never_grows(run: Recording, size: float, levels: float = 1.0) -> Check:
-    """Return the check that no frame has more energy than an earlier one, but for contact gaps.
+    """Return the check that no frame has more energy than an earlier one, except by contact margins.
 
     Args:
         run: all of its moving bodies are dynamic.
@@ -65,10 +65,13 @@ def energy_never_grows(run: Recording, size: float, levels: float = 1.0) -> Chec
     assert run.ledger is not None
     total = run.ledger.total
     rise = total - np.minimum.accumulate(total)
-    lift = 2.0 * DELTA * size * levels * weight(run)
+    allowed_rise = 2.0 * DELTA * size * levels * weight(run)
     at_stake = np.ptp(run.ledger.potential) + run.ledger.kinetic.max()
     return at_most(
-        "largest rise of energy, J", rise.max(), lift + ROUNDING * at_stake, "E never grows, but for contact gaps (2 delta k m g)"
+        "largest rise of energy, J",
+        rise.max(),
+        allowed_rise + ROUNDING * at_stake,
+        "E never grows, except by contact margins (2 delta k m g)",
     )
 
 

@@ -144,8 +144,8 @@ def house() -> Scene:
                 scene.add(Body(f"card {storey + 1}.{k + 1} {name}", Shape.box(CARD), position=place, orientation=turn, material=material))
         base += 2.0 * height
         if num_pairs > 1:
-            work_queue = Shape.box((num_pairs * pitch, width, DECK))
-            scene.add(Body(f"deck {storey + 1}", work_queue, position=(0.0, 0.0, base + 0.5 * DECK), material=material))
+            deck = Shape.box((num_pairs * pitch, width, DECK))
+            scene.add(Body(f"deck {storey + 1}", deck, position=(0.0, 0.0, base + 0.5 * DECK), material=material))
             base += DECK
     return scene
 

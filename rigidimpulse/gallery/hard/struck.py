@@ -19,6 +19,7 @@ from rigidimpulse.gallery.hard.parts import GRAVITY, above_floor, apart, dull, e
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
@@ -80,7 +81,7 @@ def check_dropped(run: Recording) -> list[Check]:
     ]
 
 
-def _stack(material) -> Scene:
+def _stack(material: Material) -> Scene:
     scene = floor_scene(material)
     for k in range(BOXES):
         scene.add(Body(f"box {k + 1}", Shape.box(1.0), position=(0.0, 0.0, 0.5 + k), material=material))

@@ -89,7 +89,7 @@ def check_wedge(run: Recording) -> list[Check]:
     tilt = np.abs(run.orientation("wedge")[-1, 1:]).max()
     return [
         finite(run),
-        at_most("height above the crack's bottom, m", abs(depth), gap, "faces on faces, but for two contact gaps over sin b"),
+        at_most("height above the crack's bottom, m", abs(depth), gap, "faces on faces, up to two contact margins over sin b"),
         at_most("tilt at the end", tilt, 1e-5, "faces on faces"),
         at_most("speed at the end, m/s", last_speed(run, DEEP), 1e-9, "e = 0: it stays"),
         energy_never_grows(run, DEEP),

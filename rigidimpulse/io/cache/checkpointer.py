@@ -114,8 +114,8 @@ class Checkpointer:
     def _fill_in(self, first: int, last: int) -> None:
         """Write the frames before `last` that are not written yet, from the present trajectories; the recorder writes them again later."""
         recorder, trajectory = self.run.recorder, self.run.state.trajectory
-        behind, frames = np.flatnonzero(recorder.written < last), (getattr(recorder, name) for name in FRAMES)
-        sample_paths(trajectory, behind, recorder.times, last, np.maximum(recorder.written, first), *frames)
+        behind = np.flatnonzero(recorder.written < last)
+        sample_paths(trajectory, behind, last, np.maximum(recorder.written, first), recorder.frames)
 
     def _content(self, frames: int, time: float, state: bytes, tables: dict[str, Any] | None = None) -> Content:
         run = self.run

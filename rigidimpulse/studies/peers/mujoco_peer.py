@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.quaternion import conjugate, cross, from_matrix, rotate
+from rigidimpulse.core.quaternion import conjugate, from_matrix, rotate
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Part
 from rigidimpulse.studies.peers.common import PeerBody, PeerJoint, read_scene
@@ -64,7 +65,7 @@ class MujocoPeer:
         ):
             turn, spin = body.body.unit_orientation(), np.asarray(body.body.angular_velocity, float)
             arm = rotate(turn, body.mass.center_of_mass)
-            data.qvel[columns[:3]] = np.asarray(body.body.velocity, float) - cross(spin, arm)
+            data.qvel[columns[:3]] = np.asarray(body.body.velocity, float) - cross_arrays(spin, arm)
             data.qvel[columns[3:]] = rotate(conjugate(turn), spin)
             data.xfrc_applied[i, :3] = body.force
         mujoco.mj_forward(self._model, data)
@@ -81,7 +82,7 @@ class MujocoPeer:
         velocity, spin = np.zeros((2, len(self._id), 3))
         arm = rotate(turn, self._centre)
         spin[dynamic] = rotate(turn[dynamic], data.qvel[self._columns[:, 3:]])
-        velocity[dynamic] = data.qvel[self._columns[:, :3]] + cross(spin, arm)[dynamic]
+        velocity[dynamic] = data.qvel[self._columns[:, :3]] + cross_arrays(spin, arm)[dynamic]
         return position, turn, velocity, spin, position + arm
 
     def close(self) -> None:

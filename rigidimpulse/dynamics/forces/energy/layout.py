@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.conventions import TOLERANCES
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import multiply, normalize, quaternion_from_rotation_vector
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.energy.minimise import Report, Terms, minimise
 from rigidimpulse.dynamics.forces.energy.pin import CompiledPin
 from rigidimpulse.dynamics.forces.energy.term import CompiledEnergy, Energy, Expansion, Poses, poses
@@ -156,7 +156,7 @@ class _Layout:
 
     def _closed(self, at: Poses) -> float:
         """Return the distance at which pins are closed, m: rounding of where they are."""
-        return TOLERANCES.joint * self.length + 4.0 * TOLERANCES.round_off * self._extent(at)
+        return TOLERANCES.joint.closed * self.length + 4.0 * TOLERANCES.arithmetic.round_off * self._extent(at)
 
     def _value(self, at: Poses) -> float:
         """Return the sum of all but exact pins, J."""

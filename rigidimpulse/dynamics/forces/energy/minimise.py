@@ -17,20 +17,20 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
-STEP = 1e-12
-"""Newton step, relative to `length`, below which a minimum has been found."""
-START, LEAST, MOST = 1e-3, 1e-10, 1e12
+from rigidimpulse.core.tolerances import TOLERANCES
+
+STEP = TOLERANCES.energy.converged
+START = TOLERANCES.energy.first_shift
+LEAST = TOLERANCES.energy.least_shift
+MOST = 1000000000000.0
 """Shift at the start, least and largest one, relative to the largest curvature."""
-ROUND_OFF = 1e-14
-"""Change of the value, relative to its parts, that rounding hides."""
-CALM = 5e-16
-"""Gradient, relative to the largest curvature times `extent`, by the root of the number of variables, that is rounding."""
+ROUND_OFF = TOLERANCES.energy.value_round_off
+CALM = TOLERANCES.energy.gradient_round_off
 CALMER = 0.9
 """Factor by which the gradient must fall where rounding hides the value."""
 LONGEST = 0.5
 """Component of a step, relative to `length`, beyond which it is shortened."""
-NEGATIVE = 1e-8
-"""Curvature, relative to the largest, that is not negative yet."""
+NEGATIVE = TOLERANCES.energy.negative_curvature
 SIDESTEP = 0.1
 """Step along a negative direction, relative to `length`."""
 FAR = 500.0

@@ -22,6 +22,7 @@ import numpy as np
 from rigidimpulse.collision.distance.separating_plane import best_plane, tangents
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, Geometry
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.energy.term import Expansion, Poses, body_indices, eliminated, levers, positive, turning
 from rigidimpulse.model.world import World
 from rigidimpulse.scene.body import number
@@ -29,7 +30,7 @@ from rigidimpulse.scene.body import number
 SIDES = 32
 MOST_EDGES = 24
 """Directions of edges of a piece beyond which their products are not tried as axes."""
-SAME_DIRECTION = 1e-7
+SAME_DIRECTION = TOLERANCES.energy.same_direction
 
 
 class Piece(NamedTuple):

@@ -9,11 +9,11 @@ from scipy.sparse import block_array, bsr_array, csc_array, diags_array, eye_arr
 from scipy.sparse.linalg import splu
 
 from rigidimpulse.core.quaternion import conjugate, multiply, normalize, quaternion_from_rotation_vector, rotation_vector
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.energy.minimise import Report, Terms, minimise
 from rigidimpulse.dynamics.forces.energy.term import cross_matrix
 
-LEAST_SHIFT = 1e-15
-"""Shift relative to the largest curvature; that of f frames comes down to f^-4 of it."""
+LEAST_SHIFT = TOLERANCES.energy.least_path_shift
 SMALL = 1e-2
 """rad; below it a factor of the logarithm's derivative is taken from its series, exact there to 1e-13."""
 

@@ -21,11 +21,11 @@ from scipy.sparse import coo_array, csc_array
 
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.quaternion import rotate_inverse, to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.model.world import World
 from rigidimpulse.scene.body import number
 
-FLAT = 1e-12
-"""Curvature of an eliminated variable, relative to the largest, below which it has no say."""
+FLAT = TOLERANCES.energy.flat_curvature
 
 
 class Poses(NamedTuple):

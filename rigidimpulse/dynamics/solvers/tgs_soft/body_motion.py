@@ -9,9 +9,10 @@ With h the length of the sub-step, v the velocity, w the spin, g gravity, x the 
 
 from math import sqrt
 
-from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, turned, turned_back
+from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE
 from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.quaternion import exponential, product, quaternion_to_matrix
+from rigidimpulse.core.vector import turned_back_by, turned_by
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import set_inverse_inertia
 
 
@@ -41,8 +42,8 @@ def _turn_freely(bodies, i, h):
     (Magnus), h (x_0 + 4 x_m + x_1) / 6 + h^2 (x_0 x x_1) / 12: with that of second order spinning bodies gain energy.
     """
     moments, v, half = bodies.inertia, 8 * i + 3, 0.5 * h
-    x0, x1, x2 = turned_back(bodies.rotation, i, bodies.velocity[v], bodies.velocity[v + 1], bodies.velocity[v + 2])
-    lx, ly, lz = turned(bodies.rotation, i, moments[i, 0] * x0, moments[i, 1] * x1, moments[i, 2] * x2)
+    x0, x1, x2 = turned_back_by(bodies.rotation, i, bodies.velocity[v], bodies.velocity[v + 1], bodies.velocity[v + 2])
+    lx, ly, lz = turned_by(bodies.rotation, i, moments[i, 0] * x0, moments[i, 1] * x1, moments[i, 2] * x2)
     a0, a1, a2 = _spin_rate(moments, i, x0, x1, x2)
     b0, b1, b2 = _spin_rate(moments, i, x0 + half * a0, x1 + half * a1, x2 + half * a2)
     c0, c1, c2 = _spin_rate(moments, i, x0 + half * b0, x1 + half * b1, x2 + half * b2)
@@ -56,7 +57,7 @@ def _turn_freely(bodies, i, h):
     m0 = 0.5 * (x0 + y0) + twelfth * (a0 - e0) + twelfth * (x1 * y2 - x2 * y1)
     m1 = 0.5 * (x1 + y1) + twelfth * (a1 - e1) + twelfth * (x2 * y0 - x0 * y2)
     m2 = 0.5 * (x2 + y2) + twelfth * (a2 - e2) + twelfth * (x0 * y1 - x1 * y0)
-    wx, wy, wz = turned(bodies.rotation, i, m0, m1, m2)
+    wx, wy, wz = turned_by(bodies.rotation, i, m0, m1, m2)
     set_orientation(bodies, i, h * wx, h * wy, h * wz)
     set_inverse_inertia(bodies, i)
     m, o = bodies.mass, 8 * i
@@ -159,7 +160,7 @@ def energies(bodies, masses, pull):
             continue
         o = 8 * i
         v = bodies.velocity
-        x, y, z = turned_back(bodies.rotation, i, v[o + 3], v[o + 4], v[o + 5])
+        x, y, z = turned_back_by(bodies.rotation, i, v[o + 3], v[o + 4], v[o + 5])
         moments = bodies.inertia[i]
         own = 0.5 * masses[i] * (v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2])
         own += 0.5 * (moments[0] * x * x + moments[1] * y * y + moments[2] * z * z)

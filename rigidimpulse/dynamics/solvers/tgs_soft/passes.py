@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.simd import fma, gather, load, root, scatter, spread, store, where_greater, width_of
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     ARM_A,
     ARM_B,
@@ -53,7 +54,7 @@ from rigidimpulse.dynamics.solvers.tgs_soft.records import (
 
 DEEPEST = 10.0
 """Depth, in skins, beyond which a contact pushes no harder."""
-TINY = 1e-30
+TINY = TOLERANCES.sub_stepping.least_divisor
 
 
 @inlined

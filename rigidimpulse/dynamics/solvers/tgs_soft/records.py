@@ -14,11 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import CONTACT_MARGIN, ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, in_play, turned
+from rigidimpulse.collision.contact_records import CONTACT_MARGIN, ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, in_play
 from rigidimpulse.collision.manifold.dispatch import GENERAL
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.simd import ROW, aligned
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import turned_by
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import INVERSE_MASS
 
 ARM_A, ARM_B, ARM_FIELDS = 0, 3, 6
@@ -49,8 +51,7 @@ PATCHES_OF_A_BODY = 8
 """Patches of a body for which memory is reserved at first: it takes no real memory before it is written."""
 COLOURS = 62
 """Patches that find no colour among these have a batch each."""
-ONE_PATCH = 1.0 - 1e-8
-"""Cosine of normals that are one."""
+ONE_PATCH = 1.0 - TOLERANCES.sub_stepping.one_patch
 
 
 class Patches(NamedTuple):
@@ -235,8 +236,8 @@ def tangents(nx, ny, nz):
 def point_of(position, rotation, rows, r, ends, n, share):
     """Where the impulses of row r act, from the centre of a, and the gap less the contact margin, m; ends: bodies a and b."""
     (a, b), (nx, ny, nz) = ends, n
-    ax, ay, az = turned(rotation, a, rows[r, SKELETON_A], rows[r, SKELETON_A + 1], rows[r, SKELETON_A + 2])
-    bx, by, bz = turned(rotation, b, rows[r, SKELETON_B], rows[r, SKELETON_B + 1], rows[r, SKELETON_B + 2])
+    ax, ay, az = turned_by(rotation, a, rows[r, SKELETON_A], rows[r, SKELETON_A + 1], rows[r, SKELETON_A + 2])
+    bx, by, bz = turned_by(rotation, b, rows[r, SKELETON_B], rows[r, SKELETON_B + 1], rows[r, SKELETON_B + 2])
     bx += position[b, 0] - position[a, 0]
     by += position[b, 1] - position[a, 1]
     bz += position[b, 2] - position[a, 2]
@@ -252,15 +253,15 @@ def point_of(position, rotation, rows, r, ends, n, share):
 def normal_of(position, rotation, rows, r, a, b, carrier):
     """The world normal of row r of bodies a and b; that of two rounded surfaces runs between their centres."""
     if rows[r, ROUND_A] > 0.0 and rows[r, ROUND_B] > 0.0:
-        ax, ay, az = turned(rotation, a, rows[r, SKELETON_A], rows[r, SKELETON_A + 1], rows[r, SKELETON_A + 2])
-        bx, by, bz = turned(rotation, b, rows[r, SKELETON_B], rows[r, SKELETON_B + 1], rows[r, SKELETON_B + 2])
+        ax, ay, az = turned_by(rotation, a, rows[r, SKELETON_A], rows[r, SKELETON_A + 1], rows[r, SKELETON_A + 2])
+        bx, by, bz = turned_by(rotation, b, rows[r, SKELETON_B], rows[r, SKELETON_B + 1], rows[r, SKELETON_B + 2])
         x = position[b, 0] + bx - position[a, 0] - ax
         y = position[b, 1] + by - position[a, 1] - ay
         z = position[b, 2] + bz - position[a, 2] - az
         length = sqrt(x * x + y * y + z * z)
         if length > 0.0:
             return x / length, y / length, z / length
-    return turned(rotation, b if carrier else a, rows[r, 0], rows[r, 1], rows[r, 2])
+    return turned_by(rotation, b if carrier else a, rows[r, 0], rows[r, 1], rows[r, 2])
 
 
 @jit_making_arrays
