@@ -70,7 +70,7 @@ def test_parabola_or_cubic(mode, jerk):
 def test_rates_that_a_mode_does_not_read_change_no_bit(mode, unread):
     rates = dict(zip(("torque_rate", "jerk"), ((7.0, 8.0, 9.0), (1.0, 2.0, 3.0)), strict=True))
     length = np.append(np.zeros(12), 10.0)
-    plain, other = one_body(mode, stepped=length), one_body(mode, stepped=length, **dict(list(rates.items())[:unread]))
+    plain, other = one_body(mode, linear=length), one_body(mode, linear=length, **dict(list(rates.items())[:unread]))
     for one, two in zip(state(plain, 3.0), state(other, 3.0), strict=True):
         assert one.tobytes() == two.tobytes()
 
