@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,21 @@ from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.frames import own_pose
 from rigidimpulse.scene.joint import Joint
 from rigidimpulse.scene.scene import Scene
+
+
+class BodyConstants(NamedTuple):
+    """What kernels read of n bodies: arrays of the `World`, which explains them."""
+
+    mass: np.ndarray  # (n,) kg
+    inertia: np.ndarray  # (n, 3) kg m2
+    steady_acceleration: np.ndarray  # (n, 3) m/s2
+    steady_strength: np.ndarray  # (n,) m/s2
+    bound_radius: np.ndarray  # (n,) m
+    size: np.ndarray  # (n,) m
+    dynamic: np.ndarray  # (n,) bool
+    moving: np.ndarray  # (n,) bool
+    shape: np.ndarray  # (n,)
+    material: np.ndarray  # (n,)
 
 
 @dataclass(eq=False)
@@ -95,6 +110,14 @@ class World:
     def steady_strength(self) -> np.ndarray:
         """(n,) m/s2, magnitude of the steady acceleration."""
         return np.linalg.norm(self.steady_acceleration, axis=1)
+
+    @cached_property
+    def constants(self) -> BodyConstants:
+        """What kernels read of the bodies."""
+        return BodyConstants(
+            self.mass, self.inertia, self.steady_acceleration, self.steady_strength, self.bound_radius, self.size, self.dynamic,
+            self.moving, self.shape_of_body, self.material_of_body,
+        )  # fmt: skip
 
     @cached_property
     def largest_contact_margin(self) -> float:
