@@ -262,6 +262,14 @@ def _threads(_process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(MOST_CORES - 1, "rigidimpulse")
 
 
+class _KernelWithCallbacks(Kernel):
+    """A kernel some of whose arguments are None or functions that it calls; with a Python function it runs as plain Python itself."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it from Python."""
+        return self.py_func(*arguments) if any(map(callable, arguments)) else super().__call__(*arguments)
+
+
 @typeof_impl.register(Kernel)
 def _type_of_kernel(kernel: Kernel, _context: Any) -> types.Type:
     return types.Dispatcher(kernel.part)
@@ -275,6 +283,15 @@ def jit(function: Callable[..., Any]) -> Any:
 def jit_making_arrays(function: Callable[..., Any]) -> Any:
     """The same of a function that makes arrays, gets such from others, or fills several places of one at once."""
     return Kernel(function, makes_arrays=True)
+
+
+def jit_with_callbacks(function: Callable[..., Any]) -> Any:
+    """The same of a function some of whose arguments are callbacks: None, or functions that it calls.
+
+    Compiled, it gets None for them, and numba removes the branches that would call them. Where Python gives it a function it runs as plain
+    Python: what is rare, or belongs to an optional library, needs no second implementation.
+    """
+    return _KernelWithCallbacks(function, makes_arrays=True)
 
 
 def inlined(function: Callable[..., Any]) -> Any:

@@ -1,10 +1,6 @@
-"""Kinetic energy of bodies at the instant being worked on."""
-
-import numpy as np
+"""Kinetic and mechanical energy of bodies at the instant being worked on."""
 
 from rigidimpulse.core.kernels import jit
-from rigidimpulse.model.world import World
-from rigidimpulse.motion.body_state import BodyState
 
 
 @jit
@@ -25,14 +21,17 @@ def kinetic_of(velocity, angular_velocity, orientation, mass, inertia, members):
     return total
 
 
-def kinetic_energy(bodies: BodyState, world: World, members: np.ndarray) -> float:
-    """Kinetic energy of the members [J]."""
-    return kinetic_of(
-        bodies.velocity, bodies.angular_velocity, bodies.orientation, world.mass, world.inertia, members
-    )
+@jit
+def kinetic_energy(bodies, constants, members):
+    """Kinetic energy of the members (k,) [J]; constants: `World.constants`."""
+    return kinetic_of(bodies.velocity, bodies.angular_velocity, bodies.orientation, constants.mass, constants.inertia, members)
 
 
-def mechanical_energy(bodies: BodyState, world: World, members: np.ndarray) -> float:
-    """Kinetic energy and potential energy of gravity and constant forces [J]."""
-    potential = -(world.mass[members, None] * world.steady_acceleration[members] * bodies.position[members]).sum()
-    return kinetic_energy(bodies, world, members) + float(potential)
+@jit
+def mechanical_energy(bodies, constants, members):
+    """Kinetic energy and potential energy of gravity and constant forces of the members (k,) [J]."""
+    work = 0.0
+    for i in members:
+        for k in range(3):
+            work += constants.mass[i] * constants.steady_acceleration[i, k] * bodies.position[i, k]
+    return kinetic_energy(bodies, constants, members) - work

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigidimpulse.model.island import Island
 
-NONE = np.zeros(0, np.int64)
+NONE, NO_LINKS = np.zeros(0, np.int64), np.zeros((0, 2), np.int64)
 
 
 class NoJoints:
@@ -28,6 +28,10 @@ class NoJoints:
         """No joint has bodies."""
         return NONE
 
+    def links(self) -> np.ndarray:
+        """No joint joins bodies."""
+        return NO_LINKS
+
     def moving_bodies(self, _run: Any) -> np.ndarray:
         """No joint moves."""
         return NONE
@@ -44,13 +48,9 @@ class NoForces:
     def weigh(self, _bodies: np.ndarray, _time: float) -> None:
         """All masses stay."""
 
-    def partners(self, _bodies: np.ndarray) -> np.ndarray:
+    def links(self) -> np.ndarray:
         """No force ties bodies together."""
-        return NONE
-
-    def ties(self, _bodies: np.ndarray) -> list[tuple[int, int]]:
-        """No force ties bodies together."""
-        return []
+        return NO_LINKS
 
     def finish(self, *_recorded: Any) -> None:
         """No force did any work."""
@@ -80,6 +80,10 @@ class NoSoftBodies:
 class NoSubstepping:
     """A run in which no island may be sub-stepped."""
 
+    def __init__(self, num_bodies: int) -> None:
+        """None of the bodies belongs to one."""
+        self.label, self.solve_count = np.full(num_bodies, -1), np.zeros(num_bodies)
+
     def choose(self, _run: Any, _pair_events: Any) -> None:
         """No island is chosen."""
 
@@ -93,6 +97,14 @@ class NoSubstepping:
 
     def finish(self, _run: Any) -> None:
         """There is nothing to end."""
+
+
+class NoCompiledLoop:
+    """A run whose events all need the loop in Python."""
+
+    def advance(self, _run: Any, _pair_events: Any, time: float, bodies: np.ndarray) -> tuple[float, np.ndarray]:
+        """No event is dealt with."""
+        return time, bodies
 
 
 class NoFlight:

@@ -22,6 +22,7 @@ REASONS = {
 
 MODULES = {"bisection": "bisection", "conservative": "conservative", "linear": "linear", "after": "end_of_step"}
 """The module of `collision/time_of_impact` that holds each method; all have the same function `sweep`."""
+STALLED_REMEDY = "the budget of gap queries was used up; raise iterations or the tolerance"
 
 
 def sweep_with(method: str) -> Callable[[Run, PairEvents], None]:
@@ -36,19 +37,14 @@ def sweep_with(method: str) -> Callable[[Run, PairEvents], None]:
 
 def sweep_stale_pairs(run: Run, pair_events: PairEvents, method: Callable[..., Any]) -> None:
     """Sweep the pairs that ask for it, and note when they come to contact."""
-    stale = np.flatnonzero(~np.isnan(pair_events.start))
+    pairs = pair_events.pairs
+    stale = np.flatnonzero(~np.isnan(pairs["start"]))
     if not len(stale):
         return
-    found = method(
-        run.detector, run.state.trajectory, pair_events.a[stale], pair_events.b[stale], pair_events.start[stale], pair_events.end,
-        pair_events.impact_margin[stale], pair_events.tolerance[stale],
-    )
-    pair_events.time[stale] = found.time
-    pair_events.witness[stale] = found.witness
-    pair_events.start[stale] = np.nan
-    for k in np.flatnonzero(found.status == STALLED):
-        names = run.world.names
-        run.log.report(
-            float(found.time[k]), "sweep stalled", (names[pair_events.a[stale[k]]], names[pair_events.b[stale[k]]]),
-            "the budget of gap queries was used up; raise iterations or the tolerance",
-        )
+    asked = pairs[stale]
+    columns = (np.ascontiguousarray(asked[name]) for name in ("a", "b", "start", "impact_margin", "tolerance"))
+    a, b, start, impact_margin, tolerance = columns
+    found = method(run.detector, run.state.trajectory, a, b, start, pair_events.end, impact_margin, tolerance)
+    pairs["time"][stale], pairs["witness"][stale], pairs["start"][stale] = found.time, found.witness, np.nan
+    for k in np.flatnonzero(found.status == STALLED).tolist():
+        pair_events.report(float(found.time[k]), "sweep stalled", stale[k : k + 1], STALLED_REMEDY)

@@ -135,8 +135,9 @@ class _Search:
         """Pairs that overlap."""
         pair_events = PairEvents(self.run, self.run.state.time)
         pair_events.find_pairs()
-        near = ~self._surely_apart(pair_events.a, pair_events.b)
-        pairs = zip(pair_events.a[near].tolist(), pair_events.b[near].tolist(), strict=True)
+        a, b = pair_events.pairs["a"], pair_events.pairs["b"]
+        near = ~self._surely_apart(a, b)
+        pairs = zip(a[near].tolist(), b[near].tolist(), strict=True)
         return {pair for pair in pairs if self._overlaps(*pair)}
 
     def _surely_apart(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:

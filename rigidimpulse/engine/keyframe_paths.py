@@ -80,4 +80,4 @@ def _let_go(run: Run, i: int, time: float) -> None:
     trajectory.velocity[i], trajectory.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]
     trajectory.acceleration[i], trajectory.start[i], trajectory.mode[i] = world.steady_acceleration[i], time, FREE
     begin(trajectory, i)
-    run.log.account(time, "let go", mechanical_energy(now, world, np.array([i])))
+    run.log.account(time, "let go", mechanical_energy(now, world.constants, np.array([i])))

@@ -3,6 +3,9 @@
 A pair is swept again when a body of it takes a new trajectory. The gap at which it comes to contact is `least_impact_margin`
 for a pair without a past; it is lowered where a pair has just been in contact, so that leaving pairs are not in contact again, and
 raised where a contact is held, so that the other features of the pair stay guarded.
+
+The table has free rows at its end. A kernel that finds no room for a pair of a body says so by `short`: `PairEvents.make_room` makes the
+table larger and looks again whom the body may reach.
 """
 
 from __future__ import annotations
@@ -14,15 +17,68 @@ import numpy as np
 from rigidimpulse.collision.broad_phase import overlapping_with
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.model.world import World
+from rigidimpulse.model.world import BodyConstants, World
 from rigidimpulse.motion.trajectory import FIXED, FREE, JERK, place_at, rate_of, row_at, turning_points
 
 NEAR = TOLERANCES.events.near
 ROUND_OFF = TOLERANCES.events.contact_margin_round_off
+STUCK_STEP = TOLERANCES.events.stuck_step
 MARGIN = 2.0
 """Contacts are looked for within this many contact margins."""
 MAX_REPEATS = 100
 """Contacts of a pair at one instant after which there is no motion that its neighbours allow: bodies are squeezed."""
+MAX_TRIES = 30
+"""Contacts of a pair at one instant without an impulse after which the pair is left alone."""
+FIRST_ROWS = 64
+USED, SHORT = np.arange(2)
+"""Places in `PairTable.number`."""
+
+PAIR = np.dtype(
+    [
+        ("a", np.int64),
+        ("b", np.int64),
+        ("time", np.float64),
+        ("start", np.float64),
+        ("impact_margin", np.float64),
+        ("least_impact_margin", np.float64),
+        ("contact_margin", np.float64),
+        ("tolerance", np.float64),
+        ("tries", np.int64),
+        ("since", np.float64),
+        ("repeats", np.int64),
+        ("witness", np.float64, (10,)),
+    ]
+)
+"""A pair of bodies a < b that may meet in the step:
+
+time: s, when the pair reaches its impact margin; inf if it does not before the end of the step.
+start: s, from when the pair must be swept again; nan if its time stands.
+impact_margin: m, gap at which contact is declared now. least_impact_margin: m, the same for a pair without a past.
+contact_margin: m, gap at which lasting contacts are held. tolerance: m, gap error of an impact.
+tries: how often the pair came to contact at one instant without an impulse.
+since: s, instant of contact. repeats: how often the pair came to contact at it.
+witness: points on a and b, normal and gap where the pair comes to contact.
+"""
+
+
+class PairTable(NamedTuple):
+    """The pairs of a step, and what is known of n bodies in it."""
+
+    pairs: np.ndarray  # (c,) PAIR
+    number: np.ndarray  # (2,) rows in use; whether a body has found no room for a pair
+    box_min: np.ndarray  # (n, 3) m, box of the path of each body until the end of the step
+    box_max: np.ndarray  # (n, 3) m
+    movable: np.ndarray  # (n,) bool, bodies that move or may begin to
+    wake: np.ndarray  # (n,) s, when bodies must be looked at again though nothing meets them
+    inside: np.ndarray  # (n,) bool, members of sub-stepped islands
+    asleep: np.ndarray  # (n,) bool, sleeping members of such islands, and bodies that never move
+    without_room: np.ndarray  # (n,) bool, bodies that found no room for a pair
+    looked_around: np.ndarray  # (n,) s, when a position correction called each body last
+
+
+def make_pairs(capacity: int) -> np.ndarray:
+    """Rows (c,) PAIR of a table."""
+    return np.zeros(capacity, PAIR).view(np.recarray)
 
 
 @jit_making_arrays
@@ -54,104 +110,246 @@ def path_box(trajectory, i, begin, end, radius, box_min, box_max):
 
 @jit
 def path_boxes(trajectory, members, begin, end, radius, box_min, box_max):
+    """Boxes of the members' paths from begin to end [s]; radius (n,) m."""
     for i in members:
         path_box(trajectory, i, begin, end, radius[i], box_min, box_max)
 
 
-class Pairs(NamedTuple):
-    """Columns of k pairs of bodies, a < b."""
-
-    a: np.ndarray  # (k,) body indices
-    b: np.ndarray
-    time: np.ndarray  # (k,) s, when the pair reaches its impact margin; inf if it does not before the end of the step
-    start: np.ndarray  # (k,) s, from when the pair must be swept again; nan if its time stands
-    impact_margin: np.ndarray  # (k,) m, gap at which contact is declared now
-    least_impact_margin: np.ndarray  # (k,) m, the same for a pair without a past
-    contact_margin: np.ndarray  # (k,) m, gap at which lasting contacts are held
-    tolerance: np.ndarray  # (k,) m, gap error of an impact
-    tries: np.ndarray  # (k,) how often the pair came to contact at one instant without an impulse
-    since: np.ndarray  # (k,) s, instant of contact
-    repeats: np.ndarray  # (k,) how often the pair came to contact at it
-    witness: np.ndarray  # (k, 10) points on a and b, normal and gap where the pair comes to contact
-
-
-def new_pairs(world: World, a: np.ndarray, b: np.ndarray, start: float) -> Pairs:
-    """Pairs (k,) without a past, to be swept from `start` [s] on."""
-    k = len(a)
-    size = np.minimum(world.size[a], world.size[b])
-    least = world.least_impact_margin(a, b)
-    return Pairs(
-        a=a,
-        b=b,
-        time=np.full(k, np.inf),
-        start=np.full(k, start),
-        impact_margin=least.copy(),
-        least_impact_margin=least,
-        contact_margin=world.contact_margin * size,
-        tolerance=world.accuracy.tolerance * size,
-        tries=np.zeros(k, np.int64),
-        since=np.full(k, -np.inf),
-        repeats=np.zeros(k, np.int64),
-        witness=np.zeros((k, 10)),
-    )
+@jit
+def _stays_apart(apart, key):
+    """Whether a pair is one of those (p,), ascending, that do not touch each other by order."""
+    low, high = 0, len(apart)
+    while low < high:
+        middle = (low + high) // 2
+        if apart[middle] < key:
+            low = middle + 1
+        else:
+            high = middle
+    return low < len(apart) and apart[low] == key
 
 
 @jit
-def sweep_pair_again(pairs, p, time, dynamic, inside):
-    """Let pair p be swept from `time` on, unless it is given up or the sub-stepped solver looks after it; dynamic, inside (n,) bool."""
-    a, b = pairs.a[p], pairs.b[p]
-    swept = (dynamic[a] and not inside[a]) or (dynamic[b] and not inside[b])
-    pairs.time[p] = np.inf
-    pairs.start[p] = time if swept and pairs.repeats[p] <= MAX_REPEATS else np.nan
+def is_swept(table, dynamic, a, b):
+    """Whether a pair is swept: the sub-stepped regime looks after those of its members, and nothing moves those that sleep."""
+    free = (dynamic[a] and not table.inside[a]) or (dynamic[b] and not table.inside[b])
+    return free and not (table.asleep[a] and table.asleep[b])
 
 
-@jit_making_arrays
-def live_contacts(pairs, place, gap, time):
-    """Which contacts (m,) are at the gap at which contact is declared; of a pair that just came to it at least its nearest.
+@jit
+def append_pairs(bodies, margins, table, first, second, start):
+    """Add pairs (k,) that may meet, without a past, to be swept from `start` [s] on; bodies: `PairBodies`, margins: `Margins`.
+
+    A pair for which there is no room is left out, and its second body marked.
+    """
+    constants, dynamic = bodies.constants, bodies.constants.dynamic
+    for k in range(first.shape[0]):
+        a, b = min(first[k], second[k]), max(first[k], second[k])
+        collides = bodies.can_collide == 1 and (dynamic[a] or dynamic[b])
+        if not (collides and is_swept(table, dynamic, a, b)) or _stays_apart(bodies.apart, a * len(dynamic) + b):
+            continue
+        if table.number[USED] == len(table.pairs):
+            table.number[SHORT] = 1
+            table.without_room[first[k]] = True
+            continue
+        pair = table.pairs[table.number[USED]]
+        table.number[USED] += 1
+        size = min(constants.size[a], constants.size[b])
+        pair.a, pair.b, pair.time, pair.start = a, b, np.inf, start
+        pair.least_impact_margin = margins.impact * size if constants.flat[a] and constants.flat[b] else 0.0
+        pair.impact_margin = pair.least_impact_margin
+        pair.contact_margin, pair.tolerance = margins.contact * size, margins.tolerance * size
+        pair.tries, pair.since, pair.repeats = 0, -np.inf, 0
+        for i in range(10):
+            pair.witness[i] = 0.0
+
+
+class PairBodies(NamedTuple):
+    """What the table asks of the bodies."""
+
+    constants: BodyConstants
+    apart: np.ndarray  # (p,) pairs a n + b, ascending, that do not touch each other by order
+    can_collide: int  # 1 if any two bodies may meet, else 0
+
+
+def pair_bodies(world: World) -> PairBodies:
+    """What the table asks of the bodies of a world."""
+    return PairBodies(world.constants, world.apart, int(world.can_collide))
+
+
+@jit
+def sweep_pair_again(table, p, time, dynamic):
+    """Let pair p be swept from `time` on, unless it is given up or the sub-stepped regime looks after it; dynamic (n,) bool."""
+    pair = table.pairs[p]
+    pair.time = np.inf
+    again = pair.repeats <= MAX_REPEATS and is_swept(table, dynamic, pair.a, pair.b)
+    pair.start = time if again else np.nan
+
+
+@jit
+def sweep_pairs_again(table, places, time, dynamic):
+    """The same for the pairs at all these places."""
+    for p in places:
+        sweep_pair_again(table, p, time, dynamic)
+
+
+@jit
+def zone_of(pair, nearest, time):
+    """Gap up to which contacts of a pair are live at `time`; nearest: m, the least of them."""
+    zone = pair.impact_margin * (1.0 + NEAR) + 2.0 * pair.tolerance
+    if pair.time <= time:
+        zone = max(zone, nearest * (1.0 + NEAR))
+    return zone + ROUND_OFF * pair.contact_margin
+
+
+@jit
+def mark_live(pairs, place, gap, time, live):
+    """Mark (m,) the contacts at the gap at which contact is declared; of a pair that just came to it at least its nearest.
 
     place (m,): their pairs, pair after pair; gap (m,) m.
     """
-    live = np.empty(place.shape[0], np.bool_)
     first = 0
     while first < place.shape[0]:
-        p, last, nearest = place[first], first, np.inf
-        while last < place.shape[0] and place[last] == p:
+        last, nearest = first, np.inf
+        while last < place.shape[0] and place[last] == place[first]:
             nearest = min(nearest, gap[last])
             last += 1
-        zone = pairs.impact_margin[p] * (1.0 + NEAR) + 2.0 * pairs.tolerance[p]
-        if pairs.time[p] <= time:
-            zone = max(zone, nearest * (1.0 + NEAR))
+        zone = zone_of(pairs[place[first]], nearest, time)
         for c in range(first, last):
-            live[c] = gap[c] <= zone + ROUND_OFF * pairs.contact_margin[p]
+            live[c] = gap[c] <= zone
         first = last
-    return live
 
 
 @jit_making_arrays
-def renew_pairs(trajectory, body, time, end, radius, margin, movable, dynamic, inside, pairs, box_min, box_max, fresh):
-    """Let the pairs of a body that took a new trajectory at `time` be swept again, and look whom it may now reach until `end`.
+def renew_pairs(bodies, margins, table, trajectory, body, interval):
+    """Let the pairs of a body that took a new trajectory be swept again, and add those whom it may now reach.
 
-    radius, margin: m, about its centre; movable, dynamic, inside (n,) bool; box_min, box_max (n, 3) m: its row is made anew.
-    Writes the bodies whose boxes overlap its own and that it has no pair with into fresh (n,), in ascending order; returns their number.
+    interval: when it took it and the end of the step, s.
     """
-    path_box(trajectory, body, time, end, radius, box_min, box_max)
+    time, end = interval
+    dynamic = bodies.constants.dynamic
+    path_box(trajectory, body, time, end, bodies.constants.bound_radius[body], table.box_min, table.box_max)
     for k in range(3):
-        box_min[body, k] -= margin
-        box_max[body, k] += margin
-    known = np.zeros(movable.shape[0], np.bool_)
+        table.box_min[body, k] -= MARGIN * margins.largest
+        table.box_max[body, k] += MARGIN * margins.largest
+    known = np.zeros(dynamic.shape[0], np.bool_)
     known[body] = True
-    for p in range(pairs.a.shape[0]):
-        a, b = pairs.a[p], pairs.b[p]
-        if a != body and b != body:
+    for p in range(table.number[USED]):
+        pair = table.pairs[p]
+        if pair.a != body and pair.b != body:
             continue
-        known[a] = known[b] = True
-        sweep_pair_again(pairs, p, time, dynamic, inside)
-        pairs.impact_margin[p] = pairs.least_impact_margin[p]
-        pairs.tries[p] = 0
-    reached = overlapping_with(body, box_min, box_max, movable, fresh)
+        known[pair.a] = known[pair.b] = True
+        sweep_pair_again(table, p, time, dynamic)
+        pair.impact_margin = pair.least_impact_margin
+        pair.tries = 0
+    add_reached(bodies, margins, table, body, known, time)
+
+
+@jit_making_arrays
+def add_reached(bodies, margins, table, body, known, time):
+    """Add the pairs of a body with those whose boxes overlap its own, but for the known (n,) bool."""
+    fresh = np.empty(known.shape[0], np.int64)
+    reached = overlapping_with(body, table.box_min, table.box_max, table.movable, fresh)
     count = 0
     for k in range(reached):
         if not known[fresh[k]]:
             fresh[count] = fresh[k]
             count += 1
+    one = np.empty(count, np.int64)
+    for k in range(count):
+        one[k] = body
+    append_pairs(bodies, margins, table, one, fresh[:count], time)
+
+
+@jit_making_arrays
+def add_missing(bodies, margins, table, body, time):
+    """Add those pairs of a body that it found no room for; nothing else changes."""
+    known = np.zeros(bodies.constants.dynamic.shape[0], np.bool_)
+    known[body] = True
+    for p in range(table.number[USED]):
+        pair = table.pairs[p]
+        if pair.a == body or pair.b == body:
+            known[pair.a] = known[pair.b] = True
+    add_reached(bodies, margins, table, body, known, time)
+
+
+@jit
+def next_time(table):
+    """Time of the earliest contact or call, inf if there is none."""
+    time = np.inf
+    for p in range(table.number[USED]):
+        time = min(time, table.pairs[p].time)
+    for i in range(table.wake.shape[0]):
+        time = min(time, table.wake[i])
+    return time
+
+
+@jit
+def mark_met(table, dynamic, time, mark):
+    """Mark (n,) movable bodies that come to contact, and bodies that are called, at `time`.
+
+    Not what they come to contact with, if it does not move: whoever else touches a floor has nothing to do with them.
+    """
+    for i in range(mark.shape[0]):
+        mark[i] = table.wake[i] <= time
+    for p in range(table.number[USED]):
+        pair = table.pairs[p]
+        if pair.time <= time:
+            mark[pair.a] = mark[pair.a] or dynamic[pair.a]
+            mark[pair.b] = mark[pair.b] or dynamic[pair.b]
+
+
+@jit
+def count_contacts(table, time, instant, given_up):
+    """Count contacts at one instant [s]; writes the pairs with too many, which are left alone, into given_up (k,); returns their number."""
+    count = 0
+    for p in range(table.number[USED]):
+        pair = table.pairs[p]
+        if pair.time > time:
+            continue
+        if time - pair.since <= instant:
+            pair.repeats += 1
+        else:
+            pair.repeats, pair.since = 0, time
+        if pair.repeats > MAX_REPEATS and count < given_up.shape[0]:
+            pair.start, pair.time = np.nan, np.inf
+            given_up[count] = p
+            count += 1
     return count
+
+
+@jit
+def settle_pairs(table, time, dynamic, given_up):
+    """Let pairs that came to contact without consequence be swept again from here with a smaller gap.
+
+    Writes the pairs that did so too often, which are left alone, into given_up (k,); returns their number.
+    """
+    count = 0
+    for p in range(table.number[USED]):
+        pair = table.pairs[p]
+        if pair.time > time:
+            continue
+        pair.tries += 1
+        step = pair.tries * STUCK_STEP * pair.contact_margin
+        pair.impact_margin = 0.5 * pair.impact_margin if pair.least_impact_margin > 0.0 else -step
+        sweep_pair_again(table, p, time, dynamic)
+        if pair.tries > MAX_TRIES and count < given_up.shape[0]:
+            pair.start = np.nan
+            given_up[count] = p
+            count += 1
+    return count
+
+
+@jit
+def look_around(table, members, time, shift):
+    """Call members that a position correction moved by `shift` [m] once more: others may be near now."""
+    least = np.inf
+    for p in range(table.number[USED]):
+        pair = table.pairs[p]
+        for i in members:
+            if (pair.a == i or pair.b == i) and table.looked_around[i] < time:
+                least = min(least, pair.contact_margin)
+    if not shift > least:
+        return
+    for i in members:
+        if table.looked_around[i] < time:
+            table.looked_around[i] = table.wake[i] = time

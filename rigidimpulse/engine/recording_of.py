@@ -10,7 +10,9 @@ from rigidimpulse.engine.exact.joints import reaction_table
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.step import react
+from rigidimpulse.model.contact_memory import bodies_in_sub_steps
 from rigidimpulse.model.world import World
+from rigidimpulse.recording.events import impact_table
 from rigidimpulse.recording.impulses import Impulses
 from rigidimpulse.recording.ledger import Masses, make_ledger
 from rigidimpulse.recording.recording import Recording, Status
@@ -31,7 +33,7 @@ def finish_run(run: Run, duration: float) -> Recording:
 def finish_sub_steps(run: Run, end: float) -> None:
     """End the sub-steps of joints and contacts at the end of the run, so that the last frame has the velocities of its instant."""
     state = run.state
-    bodies = {i for pair in state.pair_force for i in pair if state.under_contact[i]}
+    bodies = {i for i in bodies_in_sub_steps(state.memory, len(state.under_contact)).tolist() if state.under_contact[i]}
     bodies.update(run.joints.moving_bodies(run).tolist())
     if bodies:
         pair_events = PairEvents(run, end)
@@ -43,7 +45,7 @@ def close_stretches(run: Run) -> None:
     """Account for the trajectories under contact forces that are still under way."""
     state = run.state
     for i in np.flatnonzero(state.under_contact).tolist():
-        run.log.stretches.append((state.trajectory.start[i], np.inf, i, state.energy_at_start[i], 0.0))
+        run.log.add_stretch(state.trajectory.start[i], np.inf, i, state.limiter.energy_at_start[i], 0.0)
 
 
 def release_times(world: World) -> np.ndarray:
@@ -72,7 +74,7 @@ def make_recording(run: Run, duration: float) -> Recording:
     """Body-frame poses, impacts and ledger from what the recorder holds."""
     world, recorder, times = run.world, run.recorder, run.recorder.times
     position, orientation = own_frames(recorder.position, recorder.orientation, world.offset, world.turn)
-    impacts = run.log.impacts.table()
+    impacts = impact_table(run.log.impacts)
     close_stretches(run)
     work = run.forces.finish(world, times, recorder)
     mass = np.where(world.dynamic & (times[:, None] >= release_times(world)), world.mass, 0.0)

@@ -12,7 +12,9 @@ from rigidimpulse.collision.geometry import Geometry
 from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch, make_scratch
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.dynamics.solvers.qp import row_solver
-from rigidimpulse.engine.absent import NoFlight, NoForces, NoJoints, NoSoftBodies, NoSubstepping
+from rigidimpulse.engine.absent import NoCompiledLoop, NoFlight, NoForces, NoJoints, NoSoftBodies, NoSubstepping
+from rigidimpulse.engine.finder import Finder
+from rigidimpulse.engine.touching import Motion
 from rigidimpulse.model.plan import Plan
 from rigidimpulse.model.state import State
 from rigidimpulse.model.world import World
@@ -23,6 +25,7 @@ from rigidimpulse.recording.impulses import ImpulseAccounts
 from rigidimpulse.recording.recorder import Recorder
 
 LOG_CAPACITY = 4096
+NOT_FINITE_REMEDY = "the body's velocity was no finite number; it is frozen: check its mass, inertia and restitution"
 
 
 @dataclass(frozen=True)
@@ -55,14 +58,16 @@ class Run:
         self.recorder = recorder
         self.log = log
         self.impulses = ImpulseAccounts(recorder.times)
-        self.contact_log = ContactLog(recorder.times, self.impulses)
+        self.contact_log = ContactLog(recorder.times, n, self.impulses)
         self.detector = Detector(world.geometry, world.shape_of_body, make_scratch(world.geometry), world.accuracy.iterations)
+        self.finder = Finder(n)
         self.contact_buffer = ContactBuffer()
         self.impact_log = np.empty((LOG_CAPACITY, 7))
         self.column = np.zeros(n, np.int64)
         self.acceleration = np.zeros((n, 3))
         self.angular_acceleration = np.zeros((n, 3))
         self.wrench = np.zeros((n, 6))
+        self.motion = Motion(self.state.trajectory, self.state.now, self.state.rotation, self.acceleration, self.angular_acceleration)
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
         self.solve_rows = row_solver(world.accuracy.contact_solver)
@@ -70,10 +75,11 @@ class Run:
         self.joints: Any = NoJoints()
         self.forces: Any = NoForces(n)
         self.soft_bodies: Any = NoSoftBodies(n)
-        self.substepped: Any = NoSubstepping()
+        self.substepped: Any = NoSubstepping(n)
         self.triggers: Any = None
         self.keyframes: Any = None
         self.flight: Any = NoFlight()
+        self.compiled: Any = NoCompiledLoop()
 
     def pose_matrix(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Position (3,) and rotation matrix (3, 3) of body i at `time` on its present trajectory."""
@@ -88,5 +94,5 @@ class Run:
         now.velocity[i] = now.angular_velocity[i] = 0.0
         self.log.report(
             time, "not finite", (self.world.names[i],),
-            "the body's velocity was no finite number; it is frozen: check its mass, inertia and restitution",
+            NOT_FINITE_REMEDY,
         )

@@ -10,37 +10,54 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, length, row, scaled, turned
+from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.island import Island
 
+NO_SPEED = TOLERANCES.contact.rest
+"""Part of what the load gives a body in a sub-step, below which its speed counts as none."""
 SLEEP_SPEED, SLEEP_MOTION = 0.05, 0.5
 """Speed, in sqrt(g r), and motion, in skins, below which the sleep timer of a body runs."""
 
 
-def may_sleep(run: Run, island: Island, h: float) -> bool:
+def may_sleep(run: Run, island: Island, problem: ContactProblem, h: float) -> bool:
     """Whether an exact island falls asleep: all members stand still and their loads are carried, on supports that do not move.
 
-    h: s, length of the sub-step; the speed that counts as none is a part of what the load would give in it.
+    problem: its lasting contacts and loads; h: s, length of the sub-step.
     """
-    world, now = run.world, run.state.now
-    i = island.members
-    moves = world.moving[island.contacts.body_a].any() or world.moving[island.contacts.body_b].any()
-    if len(island.joints):
-        moves = moves or world.moving[run.joints.bodies_of(island.joints)].any()
-    if moves or (island.loaded and not run.forces.may_rest(i)):
+    if len(island.joints) and run.world.moving[run.joints.bodies_of(island.joints)].any():
         return False
-    limit = TOLERANCES.contact.rest * world.steady_strength[i] * h
-    force, torque = run.wrench[i, :3], run.wrench[i, 3:]
-    spin = run.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], torque)
-    gained = h * (run.acceleration[i] + world.inv_mass[i, None] * force)
-    size = np.minimum(world.bound_radius[i], world.size[i])[:, None]
-    slow = (
-        (np.linalg.norm(now.velocity[i], axis=1) <= limit)
-        & (np.linalg.norm(gained, axis=1) <= limit)
-        & (np.linalg.norm(size * now.angular_velocity[i], axis=1) <= limit)
-        & (np.linalg.norm(size * h * spin, axis=1) <= limit)
-    )
-    return bool(np.all(slow))
+    if island.loaded and not run.forces.may_rest(island.members):
+        return False
+    return stands_still(problem, run.world.constants, island.contacts, run.wrench, h)
+
+
+@jit
+def stands_still(problem, constants, contacts, wrench, h):
+    """Whether members stand still and their loads are carried, and nothing moves that their contacts touch.
+
+    problem: a `ContactProblem`; contacts: all of the island; wrench: (n, 6) of the lasting ones; h: s, length of the sub-step. The speed
+    that counts as none is a part of what the load would give in it.
+    """
+    bodies, members = problem.bodies, problem.members
+    for c in range(contacts.gap.shape[0]):
+        if constants.moving[contacts.body_a[c]] or constants.moving[contacts.body_b[c]]:
+            return False
+    for i in members:
+        limit = NO_SPEED * constants.steady_strength[i] * h
+        size, inverse = min(constants.bound_radius[i], constants.size[i]), bodies.inv_mass[i]
+        force, a, w = row(wrench, i), problem.acceleration[i], bodies.angular_velocity[i]
+        gained = (h * (a[0] + inverse * force[0]), h * (a[1] + inverse * force[1]), h * (a[2] + inverse * force[2]))
+        spin = along(problem.angular_acceleration[i], 1.0, turned(bodies.inv_inertia[i], wrench[i, 3:]))
+        if not (
+            length(bodies.velocity[i]) <= limit
+            and length(gained) <= limit
+            and length(scaled(w, size)) <= limit
+            and length(scaled(spin, size * h)) <= limit
+        ):
+            return False
+    return True
 
 
 @jit_making_arrays

@@ -1,13 +1,14 @@
 """One step: the whole order of what happens.
 
-Every body has a trajectory: its exact path since something last acted on it. A step goes from contact to contact. At the earliest time
-at which
-a pair of bodies touches, the island of bodies that touch there is brought to that time and advanced from it; bodies elsewhere do not
-notice.
-An island is advanced by one of two regimes, `exact/` from event to event or `substepped/` by sub-steps to the end of the step. Both have
-the same four verbs: arrive, impacts, contact forces, trajectories.
+Every body has a trajectory: its exact path since something last acted on it. A step goes from contact to contact. At the earliest time at
+which a pair of bodies touches, the island of bodies that touch there is brought to that time and advanced from it; bodies elsewhere do not
+notice. An island is advanced by one of two regimes, `exact/` from event to event or `substepped/` by sub-steps to the end of the step. Both
+have the same four verbs: arrive, impacts, contact forces, trajectories.
 
 What takes part in a verb stands in a list of the plan: an effect that the scene does not call for is in none.
+
+The same order stands once more in `exact/event_loop.py`, compiled, for events that need nothing but exact contact. `run.compiled` deals
+with those, and hands over the first event that this loop must look after. The results are the same bits.
 """
 
 from __future__ import annotations
@@ -25,9 +26,14 @@ def step(run: Run, end: float) -> None:
     """Advance all trajectories to `end` [s]."""
     begin, pair_events = run.state.time, PairEvents(run, end)
     run.plan.perform(run.plan.pairs, run, pair_events)  # islands that are sub-stepped; broad phase over swept boxes
-    react(run, pair_events, begin, pair_events.active_bodies())  # load: resting, jointed, pushed, sub-stepped
-    _from_event_to_event(run, pair_events, may_leave=False)
-    run.plan.perform(run.plan.observe, run, begin, run.state.time)  # triggers
+    time, bodies = begin, pair_events.active_bodies()  # load: resting, jointed, pushed, sub-stepped
+    while time < end:
+        time, bodies = run.compiled.advance(run, pair_events, time, bodies)  # as far as events need nothing but exact contact
+        if time < end:
+            react(run, pair_events, time, bodies)
+            time, bodies = next_event(run, pair_events)
+    run.state.time = end
+    run.plan.perform(run.plan.observe, run, begin, end)  # triggers
 
 
 def go_on(run: Run, begin: float, end: float, may_leave: bool) -> None:
@@ -38,23 +44,25 @@ def go_on(run: Run, begin: float, end: float, may_leave: bool) -> None:
     pair_events = PairEvents(run, end)
     run.plan.perform(run.plan.pairs, run, pair_events)
     pair_events.recall(begin)
-    _from_event_to_event(run, pair_events, may_leave)
-
-
-def _from_event_to_event(run: Run, pair_events: PairEvents, may_leave: bool) -> None:
-    """To the end of the step, or until no pair has a past if it may be left there."""
-    while True:
-        run.plan.perform(run.plan.time_of_impact, run, pair_events)  # of pairs of which a body has a new trajectory
-        time = pair_events.next_time()
-        if time >= pair_events.end:
-            break
-        bodies = pair_events.bodies_at(time)
-        pair_events.count_contacts(time)
+    time, bodies = next_event(run, pair_events)
+    while time < end:
         react(run, pair_events, time, bodies)
         if may_leave and pair_events.is_plain(time):
             run.state.time = time
             return
-    run.state.time = pair_events.end
+        time, bodies = next_event(run, pair_events)
+    run.state.time = end
+
+
+def next_event(run: Run, pair_events: PairEvents) -> tuple[float, np.ndarray]:
+    """Time of the next event, that of the step's end if there is none, and the bodies to which it happens."""
+    run.plan.perform(run.plan.time_of_impact, run, pair_events)  # of pairs of which a body has a new trajectory
+    time = pair_events.next_time()
+    if time >= pair_events.end:
+        return pair_events.end, np.zeros(0, np.int64)
+    bodies = pair_events.bodies_at(time)
+    pair_events.count_contacts(time)
+    return time, bodies
 
 
 def react(run: Run, pair_events: PairEvents, time: float, bodies: np.ndarray) -> None:

@@ -100,15 +100,11 @@ class VaryingForces:
         if self.flow is not None:
             self.flow.weigh(bodies, time)
 
-    def partners(self, bodies: np.ndarray) -> np.ndarray:
-        """All bodies that a force ties to the given ones, themselves included where forces act on them."""
-        bodies = bodies[self.acts[bodies]]
-        return np.flatnonzero(self.acts & np.isin(self._component, self._component[bodies])) if len(bodies) else bodies
-
-    def ties(self, bodies: np.ndarray) -> list[tuple[int, int]]:
-        """Pairs of the given bodies such that those tied by forces hang together."""
-        first: dict[int, int] = {}
-        return [(first.setdefault(int(self._component[i]), int(i)), int(i)) for i in bodies if self.acts[i]]
+    def links(self) -> np.ndarray:
+        """Bodies (l, 2) that forces tie together: each with the first one of those that hang together by forces."""
+        bodies = np.flatnonzero(self.acts)
+        _, first, label = np.unique(self._component[bodies], return_index=True, return_inverse=True)
+        return np.column_stack([bodies[first][label], bodies])
 
     def let_act(self, bodies: np.ndarray) -> None:
         """From now on forces that come and go act on these bodies, (n,) bool, and on no others."""

@@ -23,7 +23,7 @@ SECONDS_OF_A_KIND = 20
 """s that compiling one kind of kernels takes, about."""
 CYLINDERS, CONTACTS, EVENTS, SUBSTEPPED, JOINTS = "cylinders", "contacts", "impacts of balls", "sub-stepped islands", "joints"
 LAST = {
-    CONTACTS: ("collision.manifold.dispatch", "contacts_of_pairs"),
+    CONTACTS: ("engine.touching", "find_touching"),
     EVENTS: ("engine.spheres.flight", "fly"),
     SUBSTEPPED: ("dynamics.solvers.tgs_soft.solver", "advance"),
     JOINTS: ("dynamics.constraints.joint_sub_step", "close_at_end"),

@@ -10,35 +10,33 @@ import sys
 import numpy as np
 
 from rigidimpulse.collision.time_of_impact import bisection
-from rigidimpulse.dynamics.constraints.contact import ContactProblem, hold_contacts
+from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_impact import fill_rates, impact_rows
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, fill_closing_rows, start_joint_rows, stop_rows
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
 from rigidimpulse.dynamics.constraints.position_correction import needs_correction
 from rigidimpulse.dynamics.constraints.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
-from rigidimpulse.dynamics.impact.block import log_block
-from rigidimpulse.dynamics.impact.restitution import LAWS, ImpactRule
-from rigidimpulse.dynamics.impact.sequence import respond_sequential
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
 from rigidimpulse.engine.begin import make_plan, make_run, start_trajectories
 from rigidimpulse.engine.compile_scene import compile_scene
-from rigidimpulse.engine.exact.impacts import respond_to_impacts
+from rigidimpulse.engine.exact.impacts import respond
+from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, hold_turning
 from rigidimpulse.engine.exact.trajectories import set_impact_margins
 from rigidimpulse.engine.islands import touching_islands
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.regime import TALL, island_roots, refusals, support_levels
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.sleeping import advance_sleep_timers
+from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still
 from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, SUBSTEPPED
+from rigidimpulse.model.contacts import Contacts, Touching
 from rigidimpulse.model.island import empty_contacts
 from rigidimpulse.motion.evaluate import bring_all, bring_gyroscopic, refresh_pose
 from rigidimpulse.motion.trajectory import FREE, Load, take
-from rigidimpulse.recording.contact_log import fill_contacts_and_forces
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
 from rigidimpulse.scene.body import Body
@@ -80,28 +78,33 @@ def _respond_and_detect(run) -> None:
     state, world, now, one, contacts = run.state, run.world, run.state.now, np.ones(1), _contact()
     members = np.array([1])
     now.inv_inertia[1] = np.eye(3)
-    respond_sequential(now, contacts, ImpactRule(LAWS["auto"], one, 1.0, 1.0), False, run.column, None, run.impact_log)
     needs_correction(contacts, np.ones(1, bool), one)
     refresh_pose(members, now, state.rotation, state.trajectory.inertia)
     bring_gyroscopic(members, now, state.rotation, state.trajectory.inertia, run.angular_acceleration)
-    fill_contacts_and_forces(contacts, now.position, np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)))
+    _record(run, contacts, members)
     motion = contact_motion(
         world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
     )
     solve_newton(make_rows.py_func(0), 1, 1.0)
     problem = ContactProblem(now, contacts, members, run.column, motion.turning, run.acceleration, run.angular_acceleration)
-    hold_contacts(_leave_unsolved, problem, np.zeros(1), 1.0, 1.0, np.zeros((1, 3)), run.wrench)
+    turning = Turning(motion, Touching(np.zeros(1, np.int64), np.zeros((1, 2), np.int64)), one)
+    limits = StepLimits(1.0, 1.0, state.sub_step, state.under_contact)
+    hold_turning(None, None, problem, turning, run.error_estimate, limits, Forces(np.zeros((1, 3)), run.wrench), None)
+    stands_still(problem, world.constants, contacts, run.wrench, 1.0)
     start_trajectories(run)
     pair_events = PairEvents(run, 1.0 / 60.0)
     pair_events.find_pairs()
     islands, _ = touching_islands(run, pair_events, 0.0, members)
     island = islands[0]
-    respond_to_impacts(run, island, respond_sequential, LAWS["auto"])
+    respond(run, pair_events, island)
 
 
-def _leave_unsolved(_rows, _n: int, _target: float) -> float:
-    """In the place of a solver of rows."""
-    return 0.0
+def _record(run: Run, contacts: Contacts, members: np.ndarray) -> None:
+    """Lasting contacts and their work."""
+    run.contact_log.replace(members, 0.0, contacts, run.state.now.position, np.ones((1, 3)))
+    run.contact_log.close(members, 1.0)
+    run.contact_log.table()
+    run.log.add_stretch(0.0, 1.0, 1, 0.0, 0.0)
 
 
 def _move_and_sweep(run) -> None:
@@ -116,7 +119,6 @@ def _fill_rows(run) -> None:
     rows, first_row, frames = contact_rows(now, contacts, members, run.column, 0)
     row_velocities(now, contacts, first_row, frames, rows.bias)
     response_to(rows, 1, rows.impulse)
-    log_block(now, contacts, rows, first_row, frames, np.zeros(1), run.impact_log, 0)
     change_velocities(now, members, rows)
     changes_of(now, members, rows)
 
@@ -126,12 +128,13 @@ def _move(run) -> None:
     zero = np.zeros(1)
     start_trajectories(run)
     run.recorder.start(state.trajectory)
+    run.recorder.flush(state.trajectory, 1, 0.0, np.zeros(6))
     bring_all(state.trajectory, np.array([1]), 0.0, now, state.rotation, run.acceleration, run.angular_acceleration)
     take(state.trajectory, 1, 0.0, now, Load(*np.zeros((4, 3))), FREE)
     pair_events = PairEvents(run, 1.0 / 60.0)
     pair_events.find_pairs()
     pair_events.trajectory_changed(1, 0.0)
-    set_impact_margins(pair_events.pairs, np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool), 0.0, world.dynamic, pair_events.inside)
+    set_impact_margins(pair_events.table, np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool), 0.0, world.dynamic)
     bisection.sweep(run.detector, state.trajectory, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
 
 

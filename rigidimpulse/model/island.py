@@ -6,14 +6,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.model.contacts import Contacts, Touching
 
-NO_FORCE = np.zeros(3)
 CORRECTED = 10.0
 """Approach speed that a position correction may make, in contact margins of turning (margin over size) times the speed: arms and normals
 turn a little."""
 SLACK = TOLERANCES.contact.as_fast
+MARGIN = TOLERANCES.contact.margin
 
 
 @dataclass
@@ -22,12 +23,9 @@ class Island:
 
     Attributes:
         members: movable bodies, in order of index.
-        pairs: places of the contacting pairs in the table of pairs.
-        contacts: all contacts within the margin; `place` (m,) their pairs, `kinds` (m,) and `features` (m, 2) what touches, `keys`
-            who they are.
+        contacts: all contacts within the margin; `place` (m,) their pairs in the table of pairs, `touching` what touches.
         contact_margin: (m,) gap at which lasting contacts are held, m.
-        approach: (m,) u.n, m/s; negative approaches.
-        rest_speed: (m,) a slower rebound is none, m/s.
+        speeds: (2, m) m/s: `approach`, u.n, negative where contacts approach; `rest_speed`, a slower rebound is none.
         live: (m,) bool, near enough for an impact now.
         velocity, angular_velocity: of the members before anything happened at this instant.
         moved: whether a position correction has changed poses. shift: m, how far it moved points of the members at most.
@@ -42,15 +40,11 @@ class Island:
 
     time: float
     members: np.ndarray
-    pairs: np.ndarray
     contacts: Contacts
     place: np.ndarray
-    kinds: np.ndarray
-    features: np.ndarray
-    keys: list[tuple[int, ...]]
+    touching: Touching
     contact_margin: np.ndarray
-    approach: np.ndarray
-    rest_speed: np.ndarray
+    speeds: np.ndarray
     live: np.ndarray
     velocity: np.ndarray
     angular_velocity: np.ndarray
@@ -66,16 +60,31 @@ class Island:
     loaded: bool = False
 
     @property
+    def approach(self) -> np.ndarray:
+        """Approach speeds (m,) u.n, m/s."""
+        return self.speeds[0]
+
+    @property
+    def rest_speed(self) -> np.ndarray:
+        """Speeds (m,) below which a rebound is none, m/s."""
+        return self.speeds[1]
+
+    @property
     def is_exact(self) -> bool:
         """Whether the exact regime advances it."""
         return self.substepped is None
 
     def slow(self) -> np.ndarray:
         """Contacts (m,) that neither bounce nor come in fast: slower than the speed whose rise would be the contact margin."""
-        zero_speed = self.zero_speed
-        if self.moved:
-            zero_speed += CORRECTED * self.scale * TOLERANCES.contact.margin
-        return np.abs(self.approach) <= self.rest_speed * (1.0 + SLACK) + zero_speed
+        return np.abs(self.approach) <= slow_speed.py_func(self.rest_speed, self.zero_speed, self.moved, self.scale)
+
+
+@jit
+def slow_speed(rest_speed, zero_speed, moved, scale):
+    """Approach or separation speed, m/s, up to which a contact lasts; arguments as in `Island`."""
+    if moved:
+        zero_speed += CORRECTED * scale * MARGIN
+    return rest_speed * (1.0 + SLACK) + zero_speed
 
 
 def empty_contacts(m: int) -> Contacts:
@@ -87,7 +96,6 @@ def island_without_contacts(time: float, members: np.ndarray, velocity: np.ndarr
     """Bodies that touch nothing: what only forces hold, or what only the sub-stepped regime knows the contacts of."""
     none = np.zeros(0, np.int64)
     return Island(
-        time=time, members=members, pairs=none, contacts=empty_contacts(0), place=none, kinds=none,
-        features=np.zeros((0, 2), np.int64), keys=[], contact_margin=np.zeros(0), approach=np.zeros(0), rest_speed=np.zeros(0),
-        live=np.zeros(0, bool), velocity=velocity, angular_velocity=angular_velocity,
+        time=time, members=members, contacts=empty_contacts(0), place=none, touching=Touching(none, np.zeros((0, 2), np.int64)),
+        contact_margin=np.zeros(0), speeds=np.zeros((2, 0)), live=np.zeros(0, bool), velocity=velocity, angular_velocity=angular_velocity,
     )  # fmt: skip

@@ -2,47 +2,59 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.model.island import NO_FORCE
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.model.contact_memory import grown, has_room, make_memory
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.trajectory import Trajectories, make_trajectories
 
-
-@dataclass(frozen=True)
-class PairForce:
-    """Contact forces between two bodies over a sub-step.
-
-    Attributes:
-        start: s, when it began.
-        on_a, on_b: (6,) force [N] and torque about the centre of mass [N m].
-        force: (3,) N of each contact in its frame, by its key.
-        slides: keys of the contacts that slipped at the start.
-
-    """
-
-    start: float
-    on_a: np.ndarray
-    on_b: np.ndarray
-    force: dict[tuple[int, ...], np.ndarray]
-    slides: frozenset[tuple[int, ...]]
+GAIN = TOLERANCES.contact_forces.energy_gain
 
 
-@dataclass(frozen=True)
-class Ground:
-    """What stands by an island.
+class EnergyLimiter(NamedTuple):
+    """What is known of n bodies under contact forces, to see whether these make energy."""
 
-    Attributes:
-        velocity: (3,) m/s of all that stands, seen from where it does no work.
-        pushes: (k, 3) directions along which it may push.
+    under_contact: np.ndarray
+    """(n,) bool, bodies whose trajectory carries contact forces"""
+    sharing: np.ndarray
+    """(n,) first body of the island whose forces bodies under contact share"""
+    closed: np.ndarray
+    """(n,) bool, whether those make no energy"""
+    ground_velocity: np.ndarray
+    """(n, 3) m/s, by that first body: velocity of all that stands by the island, seen from where it does no work"""
+    ground_rank: np.ndarray
+    """(n,) in how many independent directions what stands may push"""
+    ground_axis: np.ndarray
+    """(n, 3) that direction where there is one, the one across them where there are two"""
+    energy_at_start: np.ndarray
+    """(n,) J, when the trajectory began"""
+    end_energy: np.ndarray
+    """(n,) J, when it ended; nan where the work of its contact forces is not to be accounted for"""
+    correction: np.ndarray
+    """(n, 6) change of velocity and spin that a body got at the end of its sub-step"""
+    gain: float
+    """part of their kinetic energy that bodies may gain by rounding"""
 
-    """
 
-    velocity: np.ndarray
-    pushes: np.ndarray
+def make_energy_limiter(num_bodies: int) -> EnergyLimiter:
+    """For bodies that nothing presses yet."""
+    n = num_bodies
+    return EnergyLimiter(
+        under_contact=np.zeros(n, bool),
+        sharing=np.zeros(n, np.int64),
+        closed=np.zeros(n, bool),
+        ground_velocity=np.zeros((n, 3)),
+        ground_rank=np.zeros(n, np.int64),
+        ground_axis=np.zeros((n, 3)),
+        energy_at_start=np.zeros(n),
+        end_energy=np.full(n, np.nan),
+        correction=np.zeros((n, 6)),
+        gain=GAIN,
+    )
 
 
 class State:
@@ -52,15 +64,9 @@ class State:
         time: s, every body's trajectory is known from here on.
         trajectory: path of every body since something last acted on it.
         now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
-        energy_at_start, end_energy: J, of bodies under contact forces, when their trajectory began and when it ended.
-        under_contact: (n,) bool, bodies whose trajectory carries contact forces.
-        sharing: (n,) first body of the island whose forces bodies under contact share. closed: (n,) bool, whether those make no
-            energy. ground: by that first body, what stands by the island.
-        rebounds: by pair, time and speed of the last rebound and how many in a row were short.
-        contact_force: last force of a held contact, in its frame [N], and when it began, by its key (`islands.contact_key`).
+        limiter: of bodies under contact forces, what shows whether these make energy. under_contact, sharing, correction: its arrays.
+        memory: rebounds of pairs, and the forces of held contacts (`contact_memory`).
         sub_step: (n,) s, length of the last one of an island whose contacts turn, at its first body.
-        correction: (n, 6) change of velocity and spin that a body got at the end of its sub-step.
-        pair_force: what acts in the present sub-step between bodies whose contacts turn (`PairForce`).
     """
 
     def __init__(self, world: World) -> None:
@@ -76,19 +82,12 @@ class State:
             inv_inertia=np.zeros((n, 3, 3)),
         )
         self.rotation = np.zeros((n, 3, 3))
-        self.contact_force: dict[tuple[int, ...], tuple[np.ndarray, float]] = {}
+        self.memory = make_memory()
         self.sub_step = np.full(n, np.inf)
-        self.correction = np.zeros((n, 6))
-        self.pair_force: dict[tuple[int, int], PairForce] = {}
-        self.under_contact = np.zeros(n, bool)
-        self.rebounds: dict[tuple[int, int], tuple[float, float, int]] = {}
-        self.energy_at_start = np.zeros(n)
-        self.sharing = np.zeros(n, np.int64)
-        self.closed = np.zeros(n, bool)
-        self.ground: dict[int, Ground] = {}
-        self.end_energy: dict[int, float] = {}
+        self.limiter = make_energy_limiter(n)
+        self.under_contact, self.sharing, self.correction = self.limiter.under_contact, self.limiter.sharing, self.limiter.correction
 
-    def force_of(self, key: tuple[int, ...]) -> np.ndarray:
-        """Force (3,) N that a contact carries until now, in its frame; zeros if its bodies have parted since."""
-        force, time = self.contact_force.get(key, (NO_FORCE, -np.inf))
-        return force if time >= max(self.trajectory.start[key[0]], self.trajectory.start[key[1]]) else NO_FORCE
+    def remember(self, contacts: int) -> None:
+        """Have room for so many more contacts in the memory."""
+        if not has_room(self.memory, contacts):
+            self.memory = grown(self.memory, contacts)

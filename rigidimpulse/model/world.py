@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.geometry import CompiledShape, Geometry, cylinders_of
+from rigidimpulse.collision.geometry import CompiledShape, Geometry, Shapes, cylinders_of
 from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.frames import own_pose
 from rigidimpulse.scene.joint import Joint
@@ -27,8 +27,18 @@ class BodyConstants(NamedTuple):
     size: np.ndarray  # (n,) m
     dynamic: np.ndarray  # (n,) bool
     moving: np.ndarray  # (n,) bool
+    flat: np.ndarray  # (n,) bool
     shape: np.ndarray  # (n,)
     material: np.ndarray  # (n,)
+
+
+class Margins(NamedTuple):
+    """Gaps that count, as fractions of the smaller body of a pair; see `World`."""
+
+    contact: float
+    impact: float
+    tolerance: float  # gap error of an impact
+    largest: float  # m, the largest contact margin of all
 
 
 @dataclass(eq=False)
@@ -102,6 +112,11 @@ class World:
         return len(self.names)
 
     @cached_property
+    def compiled_shapes(self) -> Shapes:
+        """The shapes of the bodies, for kernels."""
+        return Shapes(self.geometry, self.shape_of_body, self.cylinders)
+
+    @cached_property
     def cylinders(self) -> np.ndarray | None:
         """Primitives (c,) that are cylinders, None where there is none; see `geometry.Shapes`."""
         return cylinders_of(self.geometry)
@@ -116,8 +131,13 @@ class World:
         """What kernels read of the bodies."""
         return BodyConstants(
             self.mass, self.inertia, self.steady_acceleration, self.steady_strength, self.bound_radius, self.size, self.dynamic,
-            self.moving, self.shape_of_body, self.material_of_body,
+            self.moving, self.flat, self.shape_of_body, self.material_of_body,
         )  # fmt: skip
+
+    @cached_property
+    def margins(self) -> Margins:
+        """Gaps that count, as fractions of the smaller body of a pair."""
+        return Margins(self.contact_margin, self.impact_margin, self.accuracy.tolerance, self.largest_contact_margin)
 
     @cached_property
     def largest_contact_margin(self) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,26 @@ IMPACT_DTYPE = np.dtype(
 )
 """One row an impulse at a contact point: s, indices, m, unit (a to b), N s >= 0, N s on b, m/s, m/s."""
 ROW_LENGTH = IMPACT_DTYPE.itemsize // 8
+ENERGY_DTYPE = np.dtype([("time", np.float64), ("cause", np.int64), ("change", np.float64)])
+"""One row a change of mechanical energy: s, number in `CAUSES`, J (negative is dissipated)."""
+STRETCH_DTYPE = np.dtype(
+    [("start", np.float64), ("end", np.float64), ("body", np.int64), ("energy", np.float64), ("work", np.float64)]
+)
+"""One row a trajectory under contact forces: s, s, index, energy at the start [J], work of the forces [J]."""
+CAUSES = ("impact", "stick", "position correction", "energy correction", "joints", "sub-stepping", "overlap", "let go")
+"""What changes mechanical energy at an instant, by the numbers that a log keeps."""
+IMPACT, STICK, POSITION_CORRECTION, ENERGY_CORRECTION = np.arange(4)
+"""Numbers of the first of them, for kernels."""
 FIRST_ROWS = 64
+
+
+class LogBuffers(NamedTuple):
+    """What kernels append to; `EventLog.grow` makes new ones where these are full."""
+
+    energy: np.ndarray  # (k,) ENERGY_DTYPE
+    stretches: np.ndarray  # (k,) STRETCH_DTYPE
+    impacts: np.ndarray  # (k, ROW_LENGTH), the columns of IMPACT_DTYPE
+    counts: np.ndarray  # (6,) rows in use of the three, and how many more were last asked for
 
 
 @jit
@@ -47,31 +66,40 @@ def write_impacts(time, contacts, position, log, count, rows, first):
         row[13], row[14] = log[s, 5], log[s, 6]
 
 
-class ImpactRows:
-    """The impacts of a run, in a table of numbers that doubles when it is full; the columns are those of `IMPACT_DTYPE`."""
+@jit
+def has_room(buffers, energy, stretches, impacts):
+    """Whether so many more rows of each kind fit in; if not, `EventLog.grow` makes room for them."""
+    counts = buffers.counts
+    counts[3], counts[4], counts[5] = energy, stretches, impacts
+    return (
+        counts[0] + energy <= buffers.energy.shape[0]
+        and counts[1] + stretches <= buffers.stretches.shape[0]
+        and counts[2] + impacts <= buffers.impacts.shape[0]
+    )
 
-    def __init__(self) -> None:
-        """Empty."""
-        self.rows = np.empty((FIRST_ROWS, ROW_LENGTH))
-        self.count = 0
 
-    def add(self, time: float, contacts: Contacts, position: np.ndarray, log: np.ndarray, count: int) -> None:
-        """Keep the impacts that `write_impacts` describes."""
-        while self.count + count > len(self.rows):
-            self.rows = np.concatenate([self.rows, np.empty_like(self.rows)])
-        write_impacts(time, contacts, position, log, count, self.rows, self.count)
-        self.count += count
+@jit
+def log_energy(buffers, time, cause, change):
+    """Append a change of mechanical energy [J], unless it is 0; there must be room."""
+    if change != 0.0:
+        row = buffers.energy[buffers.counts[0]]
+        row.time, row.cause, row.change = time, cause, change
+        buffers.counts[0] += 1
 
-    def extend(self, rows: np.ndarray) -> None:
-        """Keep impacts (k, ROW_LENGTH) that are written already."""
-        while self.count + len(rows) > len(self.rows):
-            self.rows = np.concatenate([self.rows, np.empty_like(self.rows)])
-        self.rows[self.count : self.count + len(rows)] = rows
-        self.count += len(rows)
 
-    def table(self) -> np.ndarray:
-        """All impacts in order of time, `IMPACT_DTYPE`."""
-        return impact_table(self.rows[: self.count])
+@jit
+def log_stretch(buffers, start, end, body, energy, work):
+    """Append a trajectory under contact forces (see `STRETCH_DTYPE`); there must be room."""
+    row = buffers.stretches[buffers.counts[1]]
+    row.start, row.end, row.body, row.energy, row.work = start, end, body, energy, work
+    buffers.counts[1] += 1
+
+
+@jit
+def log_impacts(buffers, time, contacts, position, log, count):
+    """Append the impacts that `write_impacts` describes; there must be room."""
+    write_impacts(time, contacts, position, log, count, buffers.impacts, buffers.counts[2])
+    buffers.counts[2] += count
 
 
 def impact_table(rows: np.ndarray) -> np.ndarray:
@@ -95,24 +123,75 @@ class Event:
     is_problem: bool = True
 
 
+def _first_buffers() -> LogBuffers:
+    """Empty ones."""
+    impacts = np.zeros((FIRST_ROWS, ROW_LENGTH))
+    return LogBuffers(np.zeros(FIRST_ROWS, ENERGY_DTYPE), np.zeros(FIRST_ROWS, STRETCH_DTYPE), impacts, np.zeros(6, np.int64))
+
+
 @dataclass
 class EventLog:
     """Collects impacts, energy changes by cause, and events while a run goes on.
 
+    buffers: impacts, changes of energy at an instant, and trajectories under contact forces.
     spans: changes of energy that go on for a while: start, end [s], cause, change [J].
-    stretches: trajectories under contact forces: start, end [s], body, energy at the start [J], work of the forces [J].
     """
 
-    impacts: ImpactRows = field(default_factory=ImpactRows)
-    energy: list[tuple[float, str, float]] = field(default_factory=list)
+    buffers: LogBuffers = field(default_factory=_first_buffers)
     spans: list[tuple[float, float, str, float]] = field(default_factory=list)
-    stretches: list[tuple[float, float, int, float, float]] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
 
+    @property
+    def energy(self) -> np.ndarray:
+        """Changes of energy, `ENERGY_DTYPE`."""
+        return self.buffers.energy[: self.buffers.counts[0]]
+
+    @property
+    def stretches(self) -> np.ndarray:
+        """Trajectories under contact forces, `STRETCH_DTYPE`."""
+        return self.buffers.stretches[: self.buffers.counts[1]]
+
+    @property
+    def impacts(self) -> np.ndarray:
+        """Impacts (k, ROW_LENGTH); `impact_table` gives the columns names."""
+        return self.buffers.impacts[: self.buffers.counts[2]]
+
+    def grow(self) -> None:
+        """Make room for the rows that `has_room` was last asked about: buffers that are too small double."""
+        *tables, counts = self.buffers
+        for k, rows in enumerate(tables):
+            while len(tables[k]) < counts[k] + counts[3 + k]:
+                tables[k] = np.concatenate([tables[k], np.zeros_like(rows)])
+        self.buffers = LogBuffers(*tables, counts)
+
+    def _make_room(self, energy: int = 0, stretches: int = 0, impacts: int = 0) -> None:
+        if not has_room.py_func(self.buffers, energy, stretches, impacts):
+            self.grow()
+
     def account(self, time: float, cause: str, change: float) -> None:
-        """Keep a change of mechanical energy [J]; negative is dissipated."""
-        if change != 0.0:
-            self.energy.append((time, cause, change))
+        """Keep a change of mechanical energy [J] by one of the `CAUSES`; negative is dissipated."""
+        self._make_room(energy=1)
+        log_energy(self.buffers, time, CAUSES.index(cause), change)
+
+    def add_stretch(self, start: float, end: float, body: int, energy: float, work: float) -> None:
+        """Keep a trajectory under contact forces from start to end [s]: energy at the start and work of the forces [J]."""
+        self._make_room(stretches=1)
+        log_stretch(self.buffers, start, end, body, energy, work)
+
+    def add_impacts(self, time: float, contacts: Contacts, position: np.ndarray, log: np.ndarray, count: int) -> None:
+        """Keep the impacts that `write_impacts` describes."""
+        self._make_room(impacts=count)
+        log_impacts(self.buffers, time, contacts, position, log, count)
+
+    def extend_impacts(self, rows: np.ndarray, change: np.ndarray) -> None:
+        """Keep impacts (k, ROW_LENGTH) that are written already, and the changes of energy (k,) J by them."""
+        self._make_room(energy=len(rows), impacts=len(rows))
+        buffers, counts, changed = self.buffers, self.buffers.counts, change != 0.0
+        buffers.impacts[counts[2] : counts[2] + len(rows)] = rows
+        energy = buffers.energy[counts[0] : counts[0] + np.count_nonzero(changed)]
+        energy["time"], energy["cause"], energy["change"] = rows[changed, 0], IMPACT, change[changed]
+        counts[2] += len(rows)
+        counts[0] += len(energy)
 
     def account_over(self, start: float, end: float, cause: str, change: float) -> None:
         """Keep a change of mechanical energy [J] that went on from start to end [s]."""

@@ -10,14 +10,29 @@ contacts stick, and what bodies of sub-stepped islands exchange. Of a body that 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidimpulse.core.errors import unknown_name
+from rigidimpulse.core.kernels import jit
+from rigidimpulse.recording.recorder import first_frame
 
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force_log import ForceWork
+
+
+@jit
+def add_forces(times, start, end, force, gain):
+    """Add what constant forces (m, 3) N give from start to end (m,) s to the gains since the frame before (f + 1, 3) N s, one by one."""
+    for r in range(force.shape[0]):
+        begin, last = start[r], first_frame(times, end[r])
+        for f in range(first_frame(times, begin), last + 1):
+            until = times[f] if f < last else end[r]
+            for k in range(3):
+                gain[f, k] += (until - begin) * force[r, k]
+            begin = until
 
 
 class ImpulseAccounts:
@@ -30,10 +45,16 @@ class ImpulseAccounts:
 
     def add(self, cause: str, a: int, b: int, start: float, end: float, force: np.ndarray) -> None:
         """A constant force (3,) N of a cause on b, the opposite on a, from start to end [s]."""
-        first, last = np.searchsorted(self._times, (start, end), side="left")
-        nodes = np.concatenate([[start], self._times[first:last], [end]])
-        gain = self._gain(cause, a, b)
-        gain[first : last + 1] += np.diff(nodes)[:, None] * force
+        add_forces(self._times, np.array([start]), np.array([end]), force[None], self._gain(cause, a, b))
+
+    def add_many(self, cause: str, a: np.ndarray, b: np.ndarray, start: np.ndarray, end: np.ndarray, force: np.ndarray) -> None:
+        """Constant forces (m, 3) N of a cause on b (m,), the opposite on a (m,), from start to end (m,) s; those of a pair one by one."""
+        place = np.lexsort((b, a))
+        a, b, start, end, force = a[place], b[place], start[place], end[place], force[place]
+        new = np.flatnonzero(np.diff(a, prepend=-2) | np.diff(b, prepend=-2)).tolist()
+        for first, last in pairwise([*new, len(place)]):
+            gain = self._gain(cause, int(a[first]), int(b[first]))
+            add_forces(self._times, start[first:last], end[first:last], force[first:last], gain)
 
     def add_at(self, cause: str, a: int, b: int, time: float, impulse: np.ndarray) -> None:
         """An impulse (3,) N s of a cause on b, the opposite on a, at `time`."""
@@ -41,7 +62,10 @@ class ImpulseAccounts:
 
     def _gain(self, cause: str, a: int, b: int) -> np.ndarray:
         """What is gained since the frame before (f + 1, 3); the last row is after all frames."""
-        return self._gains.setdefault((cause, a, b), np.zeros((len(self._times) + 1, 3)))
+        key = (cause, a, b)
+        if key not in self._gains:
+            self._gains[key] = np.zeros((len(self._times) + 1, 3))
+        return self._gains[key]
 
     def of(self, body: int) -> dict[tuple[str, int], np.ndarray]:
         """By cause and the other body: impulses (f, 3) on a body."""

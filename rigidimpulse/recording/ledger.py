@@ -9,7 +9,7 @@ import numpy as np
 
 from rigidimpulse.core.quaternion import rotate, rotate_inverse
 from rigidimpulse.core.vector import cross_arrays
-from rigidimpulse.recording.events import EventLog
+from rigidimpulse.recording.events import CAUSES, EventLog
 from rigidimpulse.recording.recorder import Frames
 
 if TYPE_CHECKING:
@@ -87,14 +87,15 @@ def make_ledger(frames: Frames, masses: Masses, log: EventLog, work: ForceWork |
             np.ones((1, 1)) if share is None else share[block],
         )
     dissipated: dict[str, np.ndarray] = {}
-    for cause in sorted({c for _, c, _ in log.energy}):
-        stamps = np.array([t for t, c, _ in log.energy if c == cause])
-        sums = np.concatenate([[0.0], np.cumsum([-e for _, c, e in log.energy if c == cause])])
-        dissipated[cause] = sums[np.searchsorted(stamps, times, side="right")]
+    energy = log.energy
+    for cause, number in sorted((CAUSES[number], number) for number in np.unique(energy["cause"]).tolist()):
+        changes = energy[energy["cause"] == number]
+        sums = np.concatenate([[0.0], np.cumsum(-changes["change"])])
+        dissipated[cause] = sums[np.searchsorted(changes["time"], times, side="right")]
     for start, end, cause, change in log.spans:
         done = np.clip((times - start) / (end - start), 0.0, 1.0)
         dissipated[cause] = dissipated.get(cause, 0.0) - change * done
-    if log.stretches:
+    if len(log.stretches):
         given = 0.0 if work is None else work.on_bodies(position.shape[1])
         dissipated["contact"] = _contact_work(times, kinetic + potential - given, log.stretches)
     stored = potential.sum(1)
@@ -129,11 +130,11 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.einsum("fnk,fnk->fn", a, b)
 
 
-def _contact_work(times: np.ndarray, energy: np.ndarray, stretches: list[tuple[float, float, int, float, float]]) -> np.ndarray:
+def _contact_work(times: np.ndarray, energy: np.ndarray, stretches: np.ndarray) -> np.ndarray:
     """Energy that contact forces took until each frame (f,); inside a stretch what the body, energy (f, n), lost since."""
-    taken, steps = np.zeros(len(times)), np.zeros(len(times) + 1)
-    for start, end, body, begun, work in stretches:
-        first, last = np.searchsorted(times, start, "right"), np.searchsorted(times, end, "left")
-        taken[first:last] += begun - energy[first:last, body]
-        steps[last] -= work
-    return taken + np.cumsum(steps)[:-1]
+    first, last = np.searchsorted(times, stretches["start"], "right"), np.searchsorted(times, stretches["end"], "left")
+    count = np.maximum(last - first, 0)
+    frames = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+    lost = np.repeat(stretches["energy"], count) - energy[frames, np.repeat(stretches["body"], count)]
+    steps = np.bincount(last, -stretches["work"], len(times) + 1)
+    return np.bincount(frames, lost, len(times)) + np.cumsum(steps)[:-1]

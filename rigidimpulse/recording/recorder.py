@@ -52,19 +52,63 @@ def _write_fixed(trajectory, i, f, frames):
 
 
 @jit
-def sample_paths(trajectory, bodies, last, written, frames):
-    """Write the frames of these bodies from written[i] to last - 1, on their present trajectories, and say so in `written` (n,)."""
+def first_frame(times, time):
+    """Number of the first frame at or after `time` [s]; times (f,) s, increasing."""
+    low, high = np.int64(0), np.int64(times.shape[0])
+    while low < high:
+        middle = (low + high) // 2
+        if times[middle] < time:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@jit
+def sample_path(trajectory, i, last, written, frames):
+    """Write the frames of body i from written[i] to last - 1, on its present trajectory, and say so in `written` (n,)."""
     times, position, orientation = frames.times, frames.position, frames.orientation
     velocity, angular_velocity = frames.velocity, frames.angular_velocity
+    for f in range(written[i], last):
+        if trajectory.mode[i] == LINEAR:
+            _write_linear(trajectory, i, f, frames)
+        elif trajectory.mode[i] == FIXED:
+            _write_fixed(trajectory, i, f, frames)
+        else:
+            motion_at(trajectory, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
+    written[i] = max(written[i], last)
+
+
+@jit
+def sample_paths(trajectory, bodies, last, written, frames):
+    """Write the frames of these bodies before `last`, as `sample_path` does."""
     for i in bodies:
-        for f in range(written[i], last):
-            if trajectory.mode[i] == LINEAR:
-                _write_linear(trajectory, i, f, frames)
-            elif trajectory.mode[i] == FIXED:
-                _write_fixed(trajectory, i, f, frames)
-            else:
-                motion_at(trajectory, i, times[f], position[f, i], orientation[f, i], velocity[f, i], angular_velocity[f, i])
-        written[i] = max(written[i], last)
+        sample_path(trajectory, i, last, written, frames)
+
+
+@jit
+def flush_frames(trajectory, i, time, correction, written, frames):
+    """Write the frames of body i before `time` [s]; its trajectory must still be the one that led there.
+
+    correction (6,): change of velocity [m/s] and spin [rad/s] that it got at the end of its trajectory, for the error of
+    the trajectory, which grew with the square of the time.
+    """
+    first, last = written[i], first_frame(frames.times, time)
+    if last <= first:
+        return
+    sample_path(trajectory, i, last, written, frames)
+    corrected = False
+    for k in range(6):
+        corrected = corrected or correction[k] != 0.0
+    if not corrected:
+        return
+    start, velocity, angular_velocity = trajectory.start[i], frames.velocity, frames.angular_velocity
+    for f in range(first, last):
+        share = (frames.times[f] - start) / (time - start)
+        share *= share
+        for k in range(3):
+            velocity[f, i, k] += share * correction[k]
+            angular_velocity[f, i, k] += share * correction[3 + k]
 
 
 AT_ONCE = 16
@@ -94,18 +138,8 @@ class Recorder:
         self._write(trajectory, self._everyone, 1)
 
     def flush(self, trajectory: Trajectories, i: int, time: float, correction: np.ndarray) -> None:
-        """Write the frames of body i before `time`; its trajectory must still be the one that led there.
-
-        correction (6,): change of velocity [m/s] and spin [rad/s] that it got at the end of its trajectory, for the
-        error of the trajectory, which grew with the square of the time.
-        """
-        first, last = int(self.written[i]), int(np.searchsorted(self.times, time, side="left"))
-        if last > first:
-            self._write(trajectory, self._everyone[i : i + 1], last)
-        if last > first and np.any(correction):
-            share = ((self.times[first:last] - trajectory.start[i]) / (time - trajectory.start[i])) ** 2
-            self.velocity[first:last, i] += share[:, None] * correction[:3]
-            self.angular_velocity[first:last, i] += share[:, None] * correction[3:]
+        """Write the frames of body i before `time` [s], with what it was corrected by (6,) then; see `flush_frames`."""
+        flush_frames(trajectory, i, time, correction, self.written, self.frames)
 
     def flush_all(self, trajectory: Trajectories, bodies: np.ndarray, time: float) -> None:
         """Write the frames of all these bodies before `time`, as `flush` does."""

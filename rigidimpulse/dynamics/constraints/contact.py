@@ -16,35 +16,28 @@ velocity is set to zero in the metric of mass, which only dissipates. Otherwise 
 would hover for ever.
 
 A contact that slips stops at t = |u_t| / |a_t + W_t f|, and its friction changes there, also where it slips back: the sub-step ends at the
-first such time (stop split). The same holds for rolling and spinning friction (see `rolling_friction`).
+first such time (see `stop_split`). The same holds for rolling and spinning friction (see `rolling_friction`).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.kernels import jit, jit_making_arrays, jit_with_callbacks
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.rolling_friction import (
-    Rolling,
-    add_rolling_wrench,
-    count_rolling_rows,
-    fill_rolling_rows,
-    rolling_slip,
-)
+from rigidimpulse.core.vector import copy_vector
+from rigidimpulse.dynamics.constraints.rolling_friction import add_rolling_wrench, count_rolling_rows, fill_rolling_rows
 from rigidimpulse.dynamics.constraints.rows import (
     FREE,
-    Rows,
-    RowSolver,
     change_velocities,
     contact_rows,
     contact_velocity,
     impulse_along,
-    response_to,
     rows_of,
-    solve_with_slip,
     take_rows,
 )
+from rigidimpulse.dynamics.constraints.slip import solve_rows, solve_with_slip
+from rigidimpulse.dynamics.constraints.stop_split import any_stops, find_slips, first_stop
 from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.motion.body_state import BodyState
 
@@ -67,6 +60,14 @@ class Held(NamedTuple):
     length: float  # s, how long the forces last
     slides: np.ndarray  # (m,) bool, contacts that slip
     force: np.ndarray  # (m, 3) N on b, in the world
+
+
+class SubStep(NamedTuple):
+    """The sub-step that forces of m contacts are asked for."""
+
+    excess: np.ndarray  # (m,) m, gaps to be closed
+    length: float  # s
+    shortest: float  # s, it is not split in parts below that
 
 
 class ContactProblem(NamedTuple):
@@ -114,90 +115,99 @@ def fill_contact_bias(problem, excess, h, of_contacts):
     return scale, u
 
 
-def hold_contacts(
-    solve: RowSolver, problem: ContactProblem, excess: np.ndarray, h: float, shortest: float, force: np.ndarray, wrench: np.ndarray,
-    rolling: Rolling | None = None,
-) -> Held:
-    """Contact forces of the sub-step for m contacts.
+@jit_with_callbacks
+def hold_contacts(solve, problem, sub_step, force, wrench, rolling):
+    """Contact forces over a `SubStep` for m contacts, as `Held`.
 
-    excess (m,): gaps to be closed, m; h: length of the sub-step, s, that is not split in parts below `shortest`; force (m, 3) in
-    (n, t1, t2) [N], start and answer; wrench (n, 6): force and torque on the members are added; rolling: their rolling friction, if any.
+    solve: as in `slip.solve_rows`; problem: a `ContactProblem`; force (m, 3) in (n, t1, t2) [N], start and answer; wrench (n, 6): force and
+    torque on the members are added; rolling: their rolling friction, None if there is none.
     May change velocities: contacts that leave slowly stick.
     """
-    bodies, contacts, members = problem.bodies, problem.contacts, problem.members
+    contacts, h = problem.contacts, sub_step.length
     extra = count_rolling_rows(rolling)
-    of_contacts = contact_rows(bodies, contacts, members, problem.number, extra)
+    of_contacts = contact_rows(problem.bodies, contacts, problem.members, problem.number, extra)
     rows, first_row, frames = of_contacts
-    start = len(rows.bias) - extra
     start_contact_impulses(rows, first_row, force, h)
-    n, rough = len(members), contacts.static_friction > 0.0
-
-    def attempt(h: float) -> tuple[float, float, np.ndarray, np.ndarray]:
-        scale, u = fill_contact_bias(problem, excess, h, of_contacts)
-        if rolling is not None:
-            fill_rolling_rows(problem, rolling, h, of_contacts, start)
-        slides = rough & (np.abs(u[:, 1]) + np.abs(u[:, 2]) > SLIP * scale)
-        residual = solve_with_slip(solve, of_contacts, n, contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale)
-        return residual / scale, scale, u, slides
-
-    residual, scale, u, slides = attempt(h)
+    found = attempt(solve, problem, of_contacts, sub_step.excess, h, rolling)
     for _ in range(STICK_PASSES):
-        loaded = np.flatnonzero(rows.impulse[first_row] > 0.0)
-        target = SOLVE_TOLERANCE * scale
-        if not np.any(u[loaded, 0] > target):
+        if not stick(solve, problem, of_contacts, found):
             break
-        stick(solve, bodies, members, rows, first_row[loaded], u[loaded, 0], target)
-        residual, scale, u, slides = attempt(h)
-    disc, slip = first_row[slides] + 1, u[slides, 1:]
-    second = disc + 1
-    if rolling is not None:
-        rolled = rolling_slip(bodies, contacts, rolling, frames, start, SLIP * scale)
-        disc, second, slip = (np.concatenate(both) for both in zip((disc, second, slip), rolled, strict=True))
-    if len(disc) and residual <= POOR and _stops(slip, _end_slip(rows, n, disc, second), SLIP * scale):
-        brief, whole = BRIEF * h, rows.impulse.copy()
-        rows.impulse[:] *= BRIEF
-        attempt(brief)
-        stop = _first_stop(slip, _end_slip(rows, n, disc, second), brief)
-        if shortest < stop < h:
-            rows.impulse[:] *= stop / brief
-            stopped, *_ = attempt(stop)
-            if stopped <= max(residual, POOR):
-                residual, h, whole = stopped, stop, rows.impulse
-        rows.impulse[:] = whole
+        found = attempt(solve, problem, of_contacts, sub_step.excess, h, rolling)
+    slips, residual = find_slips(problem, of_contacts, found.slides, found.velocity, rolling, SLIP * found.scale), found.residual
+    if slips.first.shape[0] > 0 and residual <= POOR and any_stops(rows, problem.members.shape[0], slips, SLIP * found.scale):
+        residual, h = end_at_stop(solve, problem, sub_step, of_contacts, slips, residual, rolling)
     world_force = add_contact_wrench(contacts, rows, first_row, frames, h, force, wrench)
     if rolling is not None:
-        add_rolling_wrench(contacts, rolling, rows, frames, h, start, wrench)
-    return Held(residual, h, slides, world_force)
+        add_rolling_wrench(contacts, rolling, rows, frames, h, rows.bias.shape[0] - extra, wrench)
+    return Held(residual, h, found.slides, world_force)
 
 
-def _end_slip(rows: Rows, n: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Slip (s, 2) at the end along pairs of rows; a single row is given twice."""
-    after = rows.bias + response_to(rows, n, rows.impulse)
-    return np.column_stack([after[first], np.where(second > first, after[second], 0.0)])
+class Attempt(NamedTuple):
+    """Impulses of the rows over a length, as they were found."""
+
+    residual: float  # relative to `scale`
+    scale: float  # m/s, largest speed gained
+    velocity: np.ndarray  # (m, 3) m/s at the start, along the frames
+    slides: np.ndarray  # (m,) bool, contacts that slip at the start
 
 
-def _stops(slip: np.ndarray, end: np.ndarray, none: float) -> bool:
-    """Whether one of s slips (s, 2) stops or turns back until the end; speeds up to `none` are none."""
-    return bool(np.any((np.abs(end).sum(axis=1) <= none) | (np.einsum("ij,ij->i", slip, end) < 0.0)))
+@jit_with_callbacks
+def attempt(solve, problem, of_contacts, excess, h, rolling):
+    """Solve the rows over the length h; `rows.impulse` is start and answer. Other arguments as in `hold_contacts`."""
+    contacts, rows, m = problem.contacts, of_contacts.rows, of_contacts.first_row.shape[0]
+    scale, u = fill_contact_bias(problem, excess, h, of_contacts)
+    if rolling is not None:
+        fill_rolling_rows(problem, rolling, h, of_contacts, rows.bias.shape[0] - count_rolling_rows(rolling))
+    slides = np.empty(m, np.bool_)
+    for c in range(m):
+        slides[c] = contacts.static_friction[c] > 0.0 and abs(u[c, 1]) + abs(u[c, 2]) > SLIP * scale
+    residual = solve_with_slip(solve, of_contacts, problem.members.shape[0], contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale)
+    return Attempt(residual / scale, scale, u, slides)
 
 
-def _first_stop(slip: np.ndarray, end: np.ndarray, brief: float) -> float:
-    """When the first of s slips (s, 2) stops [s], if it goes on to change as it does over a brief time, to `end`."""
-    change = (end - slip) / brief
-    slows = np.einsum("ij,ij->i", slip, change) < 0.0
-    time = -np.einsum("ij,ij->i", slip, change)[slows] / np.einsum("ij,ij->i", change, change)[slows]
-    return float(time.min(initial=np.inf))
+@jit_with_callbacks
+def end_at_stop(solve, problem, sub_step, of_contacts, slips, residual, rolling):
+    """Split the sub-step where the first slip stops; returns the residual and the length that are kept."""
+    rows, n, h = of_contacts.rows, problem.members.shape[0], sub_step.length
+    whole, brief = rows.impulse.copy(), BRIEF * h
+    scale_impulses(rows, BRIEF)
+    attempt(solve, problem, of_contacts, sub_step.excess, brief, rolling)
+    stop = first_stop(rows, n, slips, brief)
+    if sub_step.shortest < stop < h:
+        scale_impulses(rows, stop / brief)
+        stopped = attempt(solve, problem, of_contacts, sub_step.excess, stop, rolling)
+        if stopped.residual <= max(residual, POOR):
+            return stopped.residual, stop
+    copy_vector(whole, rows.impulse)
+    return residual, h
 
 
-def stick(
-    solve: RowSolver, bodies: BodyState, members: np.ndarray, rows: Rows, normals: np.ndarray, leaving: np.ndarray, target: float
-) -> None:
-    """Stop load-bearing contacts that leave slowly; normals: their rows, leaving: their u.n [m/s]."""
-    stops = take_rows(rows, normals)
-    stops.kind[:], stops.bias[:], stops.impulse[:] = FREE, leaving, 0.0
-    stops.lower[:] = -np.inf
-    solve(stops, len(members), target)
-    change_velocities(bodies, members, stops)
+@jit
+def scale_impulses(rows, factor):
+    """Multiply all impulses by a factor."""
+    for i in range(rows.impulse.shape[0]):
+        rows.impulse[i] *= factor
+
+
+@jit_with_callbacks
+def stick(solve, problem, of_contacts, found):
+    """Stop load-bearing contacts if one of them leaves, as an `Attempt` found; returns whether one did."""
+    rows, first_row, target = of_contacts.rows, of_contacts.first_row, SOLVE_TOLERANCE * found.scale
+    normals, leaving = np.empty(first_row.shape[0], np.int64), np.empty(first_row.shape[0])
+    loaded, leaves = 0, False
+    for c in range(first_row.shape[0]):
+        if rows.impulse[first_row[c]] > 0.0:
+            normals[loaded], leaving[loaded] = first_row[c], found.velocity[c, 0]
+            leaves = leaves or leaving[loaded] > target
+            loaded += 1
+    if not leaves:
+        return False
+    stops = take_rows(rows, normals[:loaded])
+    for k in range(loaded):
+        stops.kind[k], stops.lower[k], stops.bias[k], stops.impulse[k] = FREE, -np.inf, leaving[k], 0.0
+    solve_rows(solve, stops, problem.members.shape[0], target)
+    change_velocities(problem.bodies, problem.members, stops)
+    return True
 
 
 @jit_making_arrays

@@ -8,11 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint import is_linear, joint_rows, relative_point_velocity
 from rigidimpulse.dynamics.constraints.joint_limits import is_reached, limit_side
-from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, Rows, change_velocities, make_rows
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 
@@ -72,23 +71,35 @@ def fill_rates(island, rows):
     return fastest
 
 
-def stop_at_limits(island: JointedIsland, moment: np.ndarray) -> None:
+@jit_making_arrays
+def stop_at_limits(island, moment):
     """Impacts without rebound on the hard limits that are reached; moment (j, 3) N s on b by joint, added to."""
     block = impact_rows(island, moment)
     rows = block.rows
     if fill_rates(island, rows) > 0.0:
-        solve_newton(rows, len(island.members), SOLVE_TOLERANCE * float(np.abs(rows.bias).max()))
+        fastest = 0.0
+        for i in range(rows.bias.shape[0]):
+            fastest = max(fastest, abs(rows.bias[i]))
+        solve_newton(rows, island.members.shape[0], SOLVE_TOLERANCE * fastest)
         change_velocities(island.bodies, island.members, rows)
         add_moments(block, rows.impulse)
 
 
-def copy_rows(source: Rows, rows: Rows, start: int) -> None:
+@jit
+def copy_rows(source, rows, start):
     """Copy rows without masters to the places from `start` on."""
-    for name in ("first", "second", "kind", "jacobian", "lower", "upper"):
-        getattr(rows, name)[start:] = getattr(source, name)
+    for i in range(source.bias.shape[0]):
+        k = start + i
+        rows.first[k], rows.second[k], rows.kind[k] = source.first[i], source.second[i], source.kind[i]
+        rows.lower[k], rows.upper[k] = source.lower[i], source.upper[i]
+        for j in range(12):
+            rows.jacobian[k, j] = source.jacobian[i, j]
 
 
-def add_moments(joints: JointBlock, impulse: np.ndarray) -> None:
-    """Add the joints' part of the impulses (r,) of a block to their moments; their rows are the last ones."""
-    last = impulse[len(impulse) - len(joints.joint) :]
-    np.add.at(joints.moment, joints.joint, last[:, None] * joints.direction)
+@jit
+def add_moments(joints, impulse):
+    """Add the joints' part of the impulses (r,) of a block to the moments of a `JointBlock`; its rows are the last ones."""
+    start = impulse.shape[0] - joints.joint.shape[0]
+    for i in range(joints.joint.shape[0]):
+        for k in range(3):
+            joints.moment[joints.joint[i], k] += impulse[start + i] * joints.direction[i, k]

@@ -25,7 +25,6 @@ from rigidimpulse.dynamics.constraints.rolling_friction import Rolling, count_ro
 from rigidimpulse.dynamics.constraints.rows import (
     BOUNDED,
     FREE,
-    RowSolver,
     change_velocities,
     contact_rows,
     make_rows,
@@ -35,8 +34,8 @@ from rigidimpulse.dynamics.constraints.rows import (
     response_to,
     rows_of,
     scaled_wrench,
-    solve_with_slip,
 )
+from rigidimpulse.dynamics.constraints.slip import RowSolver, solve_with_slip
 from rigidimpulse.dynamics.constraints.softness import end_rate, is_slow, soft_row
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.model.contacts import Contacts
@@ -188,8 +187,8 @@ def _end_values(island, acceleration, wrench, h, value):
 
 
 def hold_jointed(
-    solve: RowSolver, problem: ContactProblem, island: JointedIsland, h: float, force: np.ndarray, wrench: np.ndarray, moment: np.ndarray,
-    rolling: Rolling | None,
+    solve: RowSolver | None, problem: ContactProblem, island: JointedIsland, h: float, force: np.ndarray, wrench: np.ndarray,
+    moment: np.ndarray, rolling: Rolling | None,
 ) -> tuple[float, float]:
     """Forces of joints and lasting contacts over a sub-step of length h.
 

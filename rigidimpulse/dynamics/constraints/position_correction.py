@@ -8,14 +8,10 @@ the island are moved by the smallest displacement in the metric of mass that bri
 Velocities do not change. The ledger records the change of potential energy.
 """
 
-import numpy as np
-
-from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.rows import contact_rows, move_bodies, take_rows
 from rigidimpulse.dynamics.solvers.newton import solve_newton
-from rigidimpulse.model.contacts import Contacts
-from rigidimpulse.motion.body_state import BodyState
 
 SUNK = 0.7
 # Other contacts of the island may not sink below this part of the contact margin.
@@ -32,17 +28,31 @@ def needs_correction(contacts, held, contact_margin):
     return False
 
 
-def correct_positions(
-    bodies: BodyState, contacts: Contacts, held: np.ndarray, contact_margin: np.ndarray, members: np.ndarray, number: np.ndarray
-) -> None:
-    """Move the bodies of the island so that held contacts have their contact margin again; other bodies do not move."""
-    rows, first_row, _ = contact_rows(bodies, contacts, members, number, 0)
-    rows = take_rows(rows, first_row)
-    # Bodies that do not belong to the island are taken as immovable.
-    for body, end, half in ((contacts.body_a, rows.first, slice(6)), (contacts.body_b, rows.second, slice(6, 12))):
-        stands = ~np.isin(body, members)
-        end[stands], rows.jacobian[stands, half] = -1, 0.0
-    target = np.where(held, contact_margin, np.minimum(contacts.gap, KEPT * contact_margin))
-    rows.bias[:] = contacts.gap - target
-    solve_newton(rows, len(members), SOLVE_TOLERANCE * float(contact_margin.max()))
+@jit_making_arrays
+def correct_positions(bodies, contacts, held, contact_margin, members, number):
+    """Move the members of the island so that held contacts, held (m,) bool, have their contact margin (m,) again; other bodies do not move.
+
+    number (n,): working memory.
+    """
+    all_rows, first_row, _ = contact_rows(bodies, contacts, members, number, 0)
+    rows, largest = take_rows(all_rows, first_row), 0.0
+    for c in range(first_row.shape[0]):
+        # Bodies that do not belong to the island are taken as immovable.
+        if not _is_member(members, number, contacts.body_a[c]):
+            rows.first[c] = -1
+            rows.jacobian[c, :6] = 0.0
+        if not _is_member(members, number, contacts.body_b[c]):
+            rows.second[c] = -1
+            rows.jacobian[c, 6:] = 0.0
+        target = contact_margin[c] if held[c] else min(contacts.gap[c], KEPT * contact_margin[c])
+        rows.bias[c] = contacts.gap[c] - target
+        largest = max(largest, contact_margin[c])
+    solve_newton(rows, members.shape[0], SOLVE_TOLERANCE * largest)
     move_bodies(bodies, members, rows)
+
+
+@jit
+def _is_member(members, number, body):
+    """Whether a body is a member; number (n,) is right for members, and anything for others."""
+    k = number[body]
+    return 0 <= k < members.shape[0] and members[k] == body

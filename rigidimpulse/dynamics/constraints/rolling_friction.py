@@ -19,11 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import length
 from rigidimpulse.dynamics.constraints.rows import DISC, DISC_SECOND, SEGMENT, write_body
-from rigidimpulse.model.contacts import Contacts
-from rigidimpulse.model.world import World
-from rigidimpulse.motion.body_state import BodyState
 
 
 class Rolling(NamedTuple):
@@ -34,22 +32,36 @@ class Rolling(NamedTuple):
     lever: np.ndarray  # (m,) L, m
 
 
-def rolling_of(world: World, bodies: BodyState, contacts: Contacts) -> Rolling | None:
-    """Of the given contacts; None where no material asks for any."""
-    if world.rolling is None or not len(contacts.gap):
+@jit_making_arrays
+def rolling_of(coefficients, material, bodies, contacts):
+    """The `Rolling` of m contacts.
+
+    coefficients: (k, k, 2) m of pairs of materials, None where no material asks for any: then the answer is None; material (n,) of bodies.
+    """
+    if coefficients is None:
         return None
-    pair = world.rolling[world.material_of_body[contacts.body_a], world.material_of_body[contacts.body_b]]
-    pair = np.where(contacts.static_friction[:, None] > 0.0, pair, 0.0)
-    if not pair.any():
-        return None
-    lever_a = np.where(bodies.inv_mass[contacts.body_a] > 0.0, np.linalg.norm(contacts.arm_a, axis=1), 0.0)
-    lever_b = np.where(bodies.inv_mass[contacts.body_b] > 0.0, np.linalg.norm(contacts.arm_b, axis=1), 0.0)
-    return Rolling(pair[:, 0].copy(), pair[:, 1].copy(), np.maximum(lever_a, lever_b))
+    m = contacts.gap.shape[0]
+    rolling, spinning, lever = np.zeros(m), np.zeros(m), np.zeros(m)
+    for c in range(m):
+        a, b = contacts.body_a[c], contacts.body_b[c]
+        if contacts.static_friction[c] > 0.0:
+            rolling[c], spinning[c] = coefficients[material[a], material[b], 0], coefficients[material[a], material[b], 1]
+        if bodies.inv_mass[a] > 0.0:
+            lever[c] = length(contacts.arm_a[c])
+        if bodies.inv_mass[b] > 0.0:
+            lever[c] = max(lever[c], length(contacts.arm_b[c]))
+    return Rolling(rolling, spinning, lever)
 
 
-def count_rolling_rows(rolling: Rolling | None) -> int:
-    """Rows that `fill_rolling_rows` will fill."""
-    return 0 if rolling is None else int(2 * np.sum(rolling.rolling > 0.0) + np.sum(rolling.spinning > 0.0))
+@jit
+def count_rolling_rows(rolling):
+    """Rows that `fill_rolling_rows` will fill; rolling: a `Rolling` or None."""
+    if rolling is None:
+        return 0
+    count = 0
+    for c in range(rolling.lever.shape[0]):
+        count += (2 if rolling.rolling[c] > 0.0 else 0) + (1 if rolling.spinning[c] > 0.0 else 0)
+    return count
 
 
 @jit
@@ -101,17 +113,28 @@ def add_rolling_wrench(contacts, rolling, rows, frames, h, start, wrench):
             i += 1
 
 
-def rolling_slip(
-    bodies: BodyState, contacts: Contacts, rolling: Rolling, frames: np.ndarray, start: int, slow: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What rolls and spins faster than `slow` [m/s]: first and second row (s,), the same for a spin, and L w along them (s, 2)."""
-    w = rolling.lever[:, None] * (bodies.angular_velocity[contacts.body_b] - bodies.angular_velocity[contacts.body_a])
-    spin, roll = rolling.spinning > 0.0, rolling.rolling > 0.0
-    along = np.einsum("ckj,cj->ck", frames, w)
-    size = 1 * spin + 2 * roll
-    first = start + np.cumsum(size) - size
-    rows = np.concatenate([first[spin], (first + spin)[roll]])
-    seconds = np.concatenate([first[spin], (first + spin)[roll] + 1])
-    slip = np.concatenate([np.column_stack([along[spin, 0], np.zeros(spin.sum())]), along[roll, 1:]])
-    moves = np.abs(slip).sum(axis=1) > slow
-    return rows[moves], seconds[moves], slip[moves]
+@jit
+def add_rolling_slips(problem, rolling, of_contacts, slow, slips, count):
+    """Add to `count` slips (`stop_split.Slips`) what rolls and spins faster than `slow` [m/s]; returns how many there are then."""
+    contacts, frames, w = problem.contacts, of_contacts.frames, problem.bodies.angular_velocity
+    i = of_contacts.rows.bias.shape[0] - count_rolling_rows(rolling)
+    for c in range(frames.shape[0]):
+        a, b, lever = contacts.body_a[c], contacts.body_b[c], rolling.lever[c]
+        x, y, z = lever * (w[b, 0] - w[a, 0]), lever * (w[b, 1] - w[a, 1]), lever * (w[b, 2] - w[a, 2])
+        if rolling.spinning[c] > 0.0:
+            n = frames[c, 0]
+            spin = n[0] * x + n[1] * y + n[2] * z
+            if abs(spin) > slow:
+                slips.first[count], slips.second[count] = i, i
+                slips.velocity[count, 0], slips.velocity[count, 1] = spin, 0.0
+                count += 1
+            i += 1
+        if rolling.rolling[c] > 0.0:
+            t1, t2 = frames[c, 1], frames[c, 2]
+            first, second = t1[0] * x + t1[1] * y + t1[2] * z, t2[0] * x + t2[1] * y + t2[2] * z
+            if abs(first) + abs(second) > slow:
+                slips.first[count], slips.second[count] = i, i + 1
+                slips.velocity[count, 0], slips.velocity[count, 1] = first, second
+                count += 1
+            i += 2
+    return count

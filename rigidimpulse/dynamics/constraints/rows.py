@@ -15,24 +15,17 @@ The normal of a contact is BOUNDED with lower = 0; it is the master of its two r
 are numbered from 0 on in order of their index; immovable ones have the number -1.
 """
 
-from collections.abc import Callable
 from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
-from rigidimpulse.core.quaternion import multiply as quaternion_product
-from rigidimpulse.core.quaternion import quaternion_from_rotation_vector
+from rigidimpulse.core.quaternion import quaternion_exp, quaternion_multiply
 from rigidimpulse.core.vector import tangents
-from rigidimpulse.model.contacts import Contacts
-from rigidimpulse.motion.body_state import BodyState
 
 FREE, BOUNDED, DISC, DISC_SECOND, SEGMENT = np.arange(5)
 """Kinds of rows."""
-SLIP_PASSES = 3
-POOR = 1e4
-"""A residual that many times what was asked for is poor."""
 
 
 class Rows(NamedTuple):
@@ -57,10 +50,6 @@ class ContactRows(NamedTuple):
     rows: Rows
     first_row: np.ndarray  # (m,) the normal row of each contact
     frames: np.ndarray  # (m, 3, 3) n, t1, t2
-
-
-RowSolver = Callable[[Rows, int, float], float]
-"""A solver of rows: (rows, number of movable bodies, residual asked for) -> residual."""
 
 
 @jit_making_arrays
@@ -156,9 +145,18 @@ def contact_rows(bodies, contacts, members, number, extra):
     return ContactRows(rows, first_row, frames)
 
 
-def take_rows(rows: Rows, which: np.ndarray) -> Rows:
-    """Copies of rows without masters."""
-    return Rows(*(column[which] for column in rows))
+@jit_making_arrays
+def take_rows(rows, which):
+    """Copies of the rows `which` (k,), without masters."""
+    taken = make_rows(which.shape[0])
+    for k in range(which.shape[0]):
+        i = which[k]
+        taken.first[k], taken.second[k], taken.kind[k] = rows.first[i], rows.second[i], rows.kind[i]
+        for j in range(12):
+            taken.jacobian[k, j] = rows.jacobian[i, j]
+        taken.bias[k], taken.coefficient[k], taken.softness[k] = rows.bias[i], rows.coefficient[i], rows.softness[i]
+        taken.lower[k], taken.upper[k], taken.impulse[k] = rows.lower[i], rows.upper[i], rows.impulse[i]
+    return taken
 
 
 @jit
@@ -282,12 +280,16 @@ def change_velocities(bodies, members, rows):
             bodies.angular_velocity[members[k], j] += change[k, 3 + j]
 
 
-def move_bodies(bodies: BodyState, members: np.ndarray, rows: Rows) -> None:
+@jit_making_arrays
+def move_bodies(bodies, members, rows):
     """Move bodies by what the rows' impulses make of a displacement (the metric of mass)."""
-    change = changes_of(bodies, members, rows)
-    bodies.position[members] += change[:, :3]
-    turned = quaternion_from_rotation_vector(change[:, 3:])
-    bodies.orientation[members] = quaternion_product(turned, bodies.orientation[members])
+    change, turn = changes_of(bodies, members, rows), np.empty(4)
+    for k in range(members.shape[0]):
+        i = members[k]
+        for j in range(3):
+            bodies.position[i, j] += change[k, j]
+        quaternion_exp(change[k, 3:], turn)
+        quaternion_multiply(turn, bodies.orientation[i], bodies.orientation[i])
 
 
 @jit_making_arrays
@@ -297,49 +299,3 @@ def response_to(rows, n, p):
     multiply_transposed(rows, p, y)
     multiply(rows, y, out)
     return out
-
-
-@jit_making_arrays
-def let_slip(rows, n, first_row, dynamic_friction, slow):
-    """Give contacts that slip faster than `slow` [m/s] their dynamic friction (m,); returns whether any had another one."""
-    y, after = np.empty((n, 6)), np.empty(rows.bias.shape[0])
-    multiply_transposed(rows, rows.impulse, y)
-    multiply(rows, y, after)
-    changed = False
-    for c in range(first_row.shape[0]):
-        i = first_row[c] + 1
-        if rows_of(rows, first_row[c]) < 3 or rows.coefficient[i] == dynamic_friction[c]:
-            continue
-        if abs(rows.bias[i] + after[i]) + abs(rows.bias[i + 1] + after[i + 1]) > slow:
-            rows.coefficient[i] = rows.coefficient[i + 1] = dynamic_friction[c]
-            changed = True
-    return changed
-
-
-def solve_with_slip(
-    solve: RowSolver, of_contacts: ContactRows, n: int, contacts: Contacts, slides: np.ndarray, target: float, slow: float
-) -> float:
-    """Solve rows that begin with those of contacts; contacts that slip, or come to slip, have dynamic friction.
-
-    solve: a solver of rows, as `newton.solve_newton`; slides (m,) bool: contacts that slip from the start; target: residual
-    asked for, m/s; slow: slip that is none, m/s. Returns the residual, m/s: inf where there is no finite answer, and then no impulse.
-    """
-    rows, first_row, _ = of_contacts
-    rough = contacts.static_friction > 0.0
-    disc = first_row[rough] + 1
-    rows.coefficient[disc] = np.where(slides, contacts.dynamic_friction, contacts.static_friction)[rough]
-    rows.coefficient[disc + 1] = rows.coefficient[disc]
-    warm = bool(np.any(rows.impulse))
-    residual = 0.0
-    for _ in range(SLIP_PASSES):
-        residual = solve(rows, n, target)
-        if residual > POOR * target and warm:
-            # A misleading start: once more from nothing.
-            rows.impulse[:] = 0.0
-            warm = False
-        elif not let_slip(rows, n, first_row, contacts.dynamic_friction, slow):
-            break
-    if not np.all(np.isfinite(rows.impulse)):
-        rows.impulse[:] = 0.0
-        return np.inf
-    return residual

@@ -22,31 +22,27 @@ The sums are over contacts that approached. Both are one equation in s, and r(s)
 if the law's s makes energy there is a lesser one that does not.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.joint_impact import JointBlock, add_moments, copy_rows
+from rigidimpulse.core.vector import copy_vector
+from rigidimpulse.dynamics.constraints.joint_impact import add_moments, copy_rows
 from rigidimpulse.dynamics.constraints.rows import (
     ContactRows,
-    Rows,
     change_velocities,
     contact_rows,
     impulse_along,
     response_to,
     row_velocities,
-    solve_with_slip,
 )
+from rigidimpulse.dynamics.constraints.slip import solve_with_slip
 from rigidimpulse.dynamics.impact.point import log_impact
 from rigidimpulse.dynamics.impact.restitution import AUTO, NEWTON, POISSON, ImpactRule
-from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.model.contacts import Contacts, select
-from rigidimpulse.motion.body_state import BodyState
 
 # Residual asked of the solver, relative to the speed of the island.
 SOLVE_TOLERANCE = TOLERANCES.impact.block_residual
@@ -58,47 +54,52 @@ SIZES = 12
 SIZE_ACCURACY = TOLERANCES.impact.rebound_size
 
 
-@dataclass
-class Block:
+class Block(NamedTuple):
     """The problem of one block: its rows (r), those of m contacts first."""
 
     of_contacts: ContactRows
-    n: int
+    n: int  # movable bodies
     contacts: Contacts
     u: np.ndarray  # (r,) velocities before, m/s
     target: np.ndarray  # (r,) velocities after that the rebound asks for
     e: np.ndarray  # (m,) restitution of the contacts that approached, else 0
     scale: float  # speed of the island, m/s
 
-    @property
-    def rows(self) -> Rows:
-        """All rows."""
-        return self.of_contacts.rows
 
-    @property
-    def first_row(self) -> np.ndarray:
-        """Normal rows (m,) of the contacts."""
-        return self.of_contacts.first_row
+@jit_making_arrays
+def _solve(block, u, size):
+    """Impulses (r,) of the cone problem for velocities u (r,) [m/s] and `size` times the targets.
 
-    def solve(self, b: np.ndarray) -> np.ndarray:
-        """Impulses (r,) of the cone problem for b (r,) [m/s]; static friction first, contacts that still slip again with dynamic."""
-        rows, m = self.rows, len(self.first_row)
-        rows.bias[:] = b
-        rows.impulse[:] = 0.0
-        sticks = np.zeros(m, bool)
-        solve_with_slip(
-            solve_newton, self.of_contacts, self.n, self.contacts, sticks, SOLVE_TOLERANCE * self.scale, SLIPLESS * self.scale
-        )
-        return rows.impulse.copy()
+    Contacts have static friction first; those that still slip then are solved again with dynamic friction.
+    """
+    rows, scale = block.of_contacts.rows, block.scale
+    for i in range(u.shape[0]):
+        rows.bias[i], rows.impulse[i] = u[i] - size * block.target[i], 0.0
+    sticks = np.zeros(block.e.shape[0], np.bool_)
+    solve_with_slip(None, block.of_contacts, block.n, block.contacts, sticks, SOLVE_TOLERANCE * scale, SLIPLESS * scale)
+    return rows.impulse.copy()
 
-    def velocity_after(self, u: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """u + W p."""
-        return u + response_to(self.rows, self.n, p)
 
-    def energy_change(self, p: np.ndarray) -> float:
-        """p.u + p.W p / 2, less the round-off of its terms [J]."""
-        quadratic = 0.5 * float(p @ response_to(self.rows, self.n, p))
-        return float(p @ self.u) + quadratic - ENERGY_ROUND_OFF * (float(np.abs(p * self.u).sum()) + quadratic)
+@jit_making_arrays
+def _velocity_after(rows, n, u, p):
+    """u + W p."""
+    after = response_to(rows, n, p)
+    for i in range(u.shape[0]):
+        after[i] += u[i]
+    return after
+
+
+@jit_making_arrays
+def _energy_change(rows, n, u, p):
+    """p.u + p.W p / 2, less the round-off of its terms [J]; u, p (r,)."""
+    response = response_to(rows, n, p)
+    linear = quadratic = moved = 0.0
+    for i in range(p.shape[0]):
+        linear += p[i] * u[i]
+        moved += abs(p[i] * u[i])
+        quadratic += p[i] * response[i]
+    quadratic *= 0.5
+    return linear + quadratic - ENERGY_ROUND_OFF * (moved + quadratic)
 
 
 @jit
@@ -108,45 +109,65 @@ def rebound_of(contacts, c, approach, rest_speed):
     return e if e * abs(approach) > rest_speed[c] else 0.0
 
 
-def _newton(block: Block) -> np.ndarray:
+@jit
+def _largest(e):
+    largest = 0.0
+    for c in range(e.shape[0]):
+        largest = max(largest, e[c])
+    return largest
+
+
+@jit_making_arrays
+def _newton(block):
     """Impulses (r,) by Newton's law."""
-    largest = float(block.e.max())
-    p = block.solve(block.u - block.target)
-    if largest > 0.0 and block.energy_change(p) > 0.0:
-        p = (1.0 + largest) * block.solve(block.u)
+    largest = _largest(block.e)
+    p = _solve(block, block.u, 1.0)
+    if largest > 0.0 and _energy_change(block.of_contacts.rows, block.n, block.u, p) > 0.0:
+        p = _solve(block, block.u, 0.0)
+        for i in range(p.shape[0]):
+            p[i] *= 1.0 + largest
     return p
 
 
-def _measure(law: int, block: Block, share: np.ndarray, p: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
-    """Normal impulse (Poisson) [N s] or work (energetic) [J] of a phase, over contacts that rebound, times share or share^2 (m,)."""
-    rebounds = block.e > 0.0
-    i, share = block.first_row[rebounds], share[rebounds]
-    if law == POISSON:
-        return float(np.sum(share * p[i]))
-    return float(np.sum(0.5 * share**2 * p[i] * (before[i] + after[i])))
+@jit
+def _measure(law, block, share, p, before, after):
+    """Normal impulse (Poisson) [N s] or work (energetic) [J] of a phase, over contacts that rebound, times share or share^2 (m,).
+
+    before, after (r,): velocities of the rows, m/s.
+    """
+    total = 0.0
+    for c in range(share.shape[0]):
+        i = block.of_contacts.first_row[c]
+        if block.e[c] > 0.0 and law == POISSON:
+            total += share[c] * p[i]
+        elif block.e[c] > 0.0:
+            total += 0.5 * (share[c] * share[c]) * p[i] * (before[i] + after[i])
+    return total
 
 
-def _two_phases(law: int, block: Block) -> np.ndarray:
+@jit_making_arrays
+def _two_phases(law, block):
     """Impulses (r,) by Poisson's or the energetic law."""
-    u, e = block.u, block.e
-    compression = block.solve(u)
-    compressed = block.velocity_after(u, compression)
-    asked = abs(_measure(law, block, e, compression, u, compressed))
+    rows, n, u = block.of_contacts.rows, block.n, block.u
+    compression = _solve(block, u, 0.0)
+    compressed = _velocity_after(rows, n, u, compression)
+    asked = abs(_measure(law, block, block.e, compression, u, compressed))
     if asked == 0.0:
         return compression
-    p, whole = compression, np.ones(len(e))
+    p, whole, may_gain = compression, np.ones(block.e.shape[0]), _largest(block.e) > 1.0
     # Secant method for the share of what the law asks. `low` is a size that makes no energy, `high` one that does or is too large.
-    size, low, high = 1.0, 0.0, np.inf
+    size, low, high = 1.0, 0.0, inf
     last_size = last_share = 0.0
     for _ in range(SIZES):
-        r = block.solve(compressed - size * block.target)
-        after = block.velocity_after(compressed, r)
+        r = _solve(block, compressed, size)
+        after = _velocity_after(rows, n, compressed, r)
         made = max(_measure(law, block, whole, r, compressed, after), 0.0)
         share = made / asked if law == POISSON else sqrt(made / asked)
-        total = compression + r
-        lossy = float(e.max()) > 1.0 or block.energy_change(total) <= 0.0
+        for i in range(r.shape[0]):
+            r[i] += compression[i]
+        lossy = may_gain or _energy_change(rows, n, u, r) <= 0.0
         if lossy and share <= 1.0 + SIZE_ACCURACY:
-            low, p = size, total
+            low, p = size, r
             if share >= 1.0 - SIZE_ACCURACY:
                 break
         else:
@@ -158,54 +179,94 @@ def _two_phases(law: int, block: Block) -> np.ndarray:
     return p
 
 
-def solve_block(
-    bodies: BodyState, contacts: Contacts, subset: np.ndarray, rebound: float, rule: ImpactRule, number: np.ndarray,
-    joints: JointBlock | None, log: np.ndarray,
-) -> int:
-    """Resolve the contacts of subset together and apply the impulses; `rebound` 1, or 0 for an inelastic one.
+@jit_making_arrays
+def _movable(bodies, contacts, number):
+    """Movable bodies (n,) of the contacts, in order; number (n_world,): working memory."""
+    first = last = contacts.body_a[0]
+    for c in range(contacts.gap.shape[0]):
+        first = min(first, contacts.body_a[c], contacts.body_b[c])
+        last = max(last, contacts.body_a[c], contacts.body_b[c])
+    number[first : last + 1] = 0
+    for c in range(contacts.gap.shape[0]):
+        number[contacts.body_a[c]] = number[contacts.body_b[c]] = 1
+    members, n = np.empty(min(2 * contacts.gap.shape[0], last + 1 - first), np.int64), 0
+    for i in range(first, last + 1):
+        if number[i] == 1 and bodies.inv_mass[i] > 0.0:
+            members[n] = i
+            n += 1
+    return members[:n]
 
-    joints: None, or the `JointBlock` of the island; log (k, 7): rows not yet written. Returns how many rows of the log were written.
-    """
-    law, rest_speed = rule.law, rule.rest_speed
-    if len(subset) < len(contacts.gap):
-        contacts, rest_speed = select(contacts, subset), rest_speed[subset]
-    if joints is None:
-        ends = np.unique(np.concatenate([contacts.body_a, contacts.body_b]))
-        members, extra = ends[bodies.inv_mass[ends] > 0.0], 0
-    else:
-        members, extra = joints.members, len(joints.rows.bias)
-    of_contacts = contact_rows(bodies, contacts, members, number, extra)
-    rows, first_row, frames = of_contacts
+
+@jit_making_arrays
+def _make_block(bodies, contacts, members, rebound, rule, number, joints):
+    """The `Block` of contacts: velocities now, and those that the rebound asks for; arguments as in `solve_block`."""
+    extra = np.int64(0)
     if joints is not None:
-        copy_rows(joints.rows, rows, len(rows.bias) - extra)
-    u = np.zeros(len(rows.bias))
-    row_velocities(bodies, contacts, first_row, frames, u)
-    approach = u[first_row]
-    e = np.where((approach < 0.0) & (contacts.restitution * -approach > rest_speed), rebound * contacts.restitution, 0.0)
-    target = np.zeros(len(rows.bias))
-    target[first_row] = -e * approach
-    rough = contacts.static_friction > 0.0
-    e_t = np.where(e > 0.0, contacts.tangential_restitution, 0.0)[rough]
-    for k in (1, 2):
-        target[first_row[rough] + k] = -e_t * u[first_row[rough] + k]
-    block = Block(of_contacts, len(members), contacts, u, target, e, rule.scale)
-    smooth = not rough.any()
-    rows.impulse[:] = _newton(block) if law == NEWTON or (law == AUTO and smooth) else _two_phases(law, block)
+        extra = joints.joint.shape[0]
+    of_contacts = contact_rows(bodies, contacts, members, number, extra)
+    rows, first_row = of_contacts.rows, of_contacts.first_row
+    if joints is not None:
+        copy_rows(joints.rows, rows, rows.bias.shape[0] - extra)
+    u, target, e = np.zeros(rows.bias.shape[0]), np.zeros(rows.bias.shape[0]), np.zeros(first_row.shape[0])
+    row_velocities(bodies, contacts, first_row, of_contacts.frames, u)
+    for c in range(e.shape[0]):
+        i = first_row[c]
+        if u[i] < 0.0:
+            e[c] = rebound * rebound_of(contacts, c, u[i], rule.rest_speed)
+        target[i] = -e[c] * u[i]
+        if e[c] > 0.0 and contacts.static_friction[c] > 0.0:
+            for k in range(i + 1, i + 3):
+                target[k] = -contacts.tangential_restitution[c] * u[k]
+    return Block(of_contacts, members.shape[0], contacts, u, target, e, rule.scale)
+
+
+@jit
+def _any_friction(contacts):
+    for c in range(contacts.gap.shape[0]):
+        if contacts.static_friction[c] > 0.0:
+            return True
+    return False
+
+
+@jit_making_arrays
+def solve_block(bodies, contacts, subset, rebound, rule, number, joints, log):
+    """Resolve the contacts of subset (k,) together and apply the impulses.
+
+    rebound: 1, or 0 for an inelastic one; rule: the `ImpactRule` of all contacts; number (n_world,): working memory; joints: None, or the
+    `JointBlock` of the island; log (k, 7): rows not yet written. Returns how many rows of the log were written.
+    """
+    if subset.shape[0] < contacts.gap.shape[0]:
+        contacts, rest_speed = select(contacts, subset), np.empty(subset.shape[0])
+        for s in range(subset.shape[0]):
+            rest_speed[s] = rule.rest_speed[subset[s]]
+        rule = ImpactRule(rule.law, rest_speed, rule.tolerance, rule.scale)
+    if joints is None:
+        members = _movable(bodies, contacts, number)
+    else:
+        members = joints.members
+    block = _make_block(bodies, contacts, members, rebound, rule, number, joints)
+    if rule.law == NEWTON or (rule.law == AUTO and not _any_friction(contacts)):
+        p = _newton(block)
+    else:
+        p = _two_phases(rule.law, block)
+    rows = block.of_contacts.rows
+    copy_vector(p, rows.impulse)
     change_velocities(bodies, members, rows)
     if joints is not None:
         add_moments(joints, rows.impulse)
-    count = log_block(bodies, contacts, rows, first_row, frames, u, log, 0)
-    log[:count, 0] = subset[log[:count, 0].astype(np.int64)]
+    count = log_block(bodies, block, log)
+    for k in range(count):
+        log[k, 0] = subset[np.int64(log[k, 0])]
     return count
 
 
 @jit_making_arrays
-def log_block(bodies, contacts, rows, first_row, frames, u, log, count):
-    """Log the impacts of a block, whose velocities before were u (r,); returns the new count."""
-    impulse = np.empty(3)
+def log_block(bodies, block, log):
+    """Log the impacts of a block, whose rows have the impulses; returns their number."""
+    rows, first_row, impulse, count = block.of_contacts.rows, block.of_contacts.first_row, np.empty(3), np.int64(0)
     for c in range(first_row.shape[0]):
         i = first_row[c]
         if rows.impulse[i] > 0.0:
-            impulse_along(rows, i, frames[c], impulse)
-            count = log_impact(bodies, contacts, c, impulse, u[i], log, count)
+            impulse_along(rows, i, block.of_contacts.frames[c], impulse)
+            count = log_impact(bodies, block.contacts, c, impulse, block.u[i], log, count)
     return count

@@ -19,9 +19,9 @@ def respond_kinematic(bodies, contacts, rule, together, number, joints, log):
     m = contacts.gap.shape[0]
     done = np.zeros(m, np.bool_)
     u, impulse = np.empty(3), np.empty(3)
-    count = 0
+    count = np.int64(0)
     while count < m and count < log.shape[0]:
-        best, fastest = -1, -rule.tolerance
+        best, fastest = np.int64(-1), -rule.tolerance
         for c in range(m):
             approach = relative_velocity(bodies, contacts, c, u)
             if not done[c] and approach < fastest:

@@ -10,16 +10,15 @@ Both follow the rules of Smith et al. 2012 (momentum kept, one-sided impulses, e
 they differ in which of the physically possible answers a chain of bodies gives.
 """
 
+from math import inf
+
 import numpy as np
 
 from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.joint_impact import JointBlock
 from rigidimpulse.dynamics.impact.block import rebound_of, solve_block
 from rigidimpulse.dynamics.impact.point import relative_velocity, resolve_contact
 from rigidimpulse.dynamics.impact.restitution import ImpactRule
-from rigidimpulse.model.contacts import Contacts
-from rigidimpulse.motion.body_state import BodyState
 
 # Impulses per contact before an island is finished without rebound.
 IMPULSES_PER_CONTACT = 200
@@ -33,7 +32,7 @@ COLLAPSED = TOLERANCES.impact.collapsed
 def _approaching(bodies, contacts, tolerance, rebounding, rest_speed):
     """The fastest approaching contact, or -1; only contacts that rebound if `rebounding` is 1."""
     u = np.empty(3)
-    best, fastest = -1, -tolerance
+    best, fastest = np.int64(-1), -tolerance
     for c in range(contacts.gap.shape[0]):
         approach = relative_velocity(bodies, contacts, c, u)
         if approach < fastest and (rebounding == 0.0 or rebound_of(contacts, c, approach, rest_speed) > 0.0):
@@ -49,7 +48,7 @@ def resolve_singles(bodies, contacts, rule, rebound, cap, log, count):
     """
     law, rest_speed, tolerance = rule.law, rule.rest_speed, rule.tolerance
     u = np.empty(3)
-    made, best = 0, -1
+    made, best = np.int64(0), np.int64(-1)
     while made < cap and count + contacts.gap.shape[0] < log.shape[0]:
         best = _approaching(bodies, contacts, tolerance, rebound, rest_speed)
         if best < 0:
@@ -60,79 +59,94 @@ def resolve_singles(bodies, contacts, rule, rebound, cap, log, count):
         e = rebound * rebound_of(contacts, best, relative_velocity(bodies, contacts, best, u), rest_speed)
         count = resolve_contact(bodies, contacts, best, e, law, log, count)
         made += 1
-    return count, made, -1
+    return count, made, np.int64(-1)
 
 
-def respond_sequential(
-    bodies: BodyState, contacts: Contacts, rule: ImpactRule, together: bool, number: np.ndarray, joints: JointBlock | None, log: np.ndarray
-) -> tuple[int, int, bool]:
+@jit_making_arrays
+def respond_sequential(bodies, contacts, rule, together, number, joints, log):
     """Pair after pair, fastest approach first. Returns (rows written to log, impulses made, whether the cap was reached).
 
-    A full log ends the call early, without the inelastic finish: read it and call again.
+    A full log ends the call early, without the inelastic finish: read it and call again. It must have more rows than there are contacts.
 
-    together: whether bodies press on each other, so that all contacts are one block; number (n,): working memory; joints: None, or the
-    `JointBlock` of the island, whose rows take part in every impulse; log (k, 7): see `point.log_impact`.
+    rule: the `ImpactRule` of the m contacts; together: whether bodies press on each other, so that all contacts are one block; number
+    (n,): working memory; joints: None, or the `JointBlock` of the island, whose rows take part in every impulse; log (k, 7): see
+    `point.log_impact`.
     """
-    m = len(contacts.gap)
-    everything = np.arange(m)
-    count = impulses = 0
+    m, count, impulses = contacts.gap.shape[0], np.int64(0), np.int64(0)
     cap, round_cap = IMPULSES_PER_CONTACT * m, IMPULSES_PER_ROUND * m
-    blocks_only = joints is not None or (together and m > 1)
-    while impulses < cap and count + m < len(log):
+    rule, one_block = ImpactRule(rule.law, rule.rest_speed.copy(), rule.tolerance, rule.scale), together and m > 1
+    while impulses < cap and count + m < log.shape[0]:
         if impulses >= round_cap:
-            rule = rule._replace(rest_speed=np.where(_collapsed(contacts, log[:count]), np.inf, rule.rest_speed))
-        if blocks_only:
+            _let_collapse(contacts, log[:count], rule.rest_speed)
+        c = np.int64(-1)
+        if joints is None:
+            if not one_block:
+                count, made, c = resolve_singles(bodies, contacts, rule, 1.0, round_cap, log, count)
+                impulses += made
+                if made == round_cap:
+                    continue
+        if joints is not None or one_block:
             c = _approaching(bodies, contacts, rule.tolerance, 1.0, rule.rest_speed)
-        else:
-            count, made, c = resolve_singles(bodies, contacts, rule, 1.0, round_cap, log, count)
-            impulses += made
-            if made == round_cap:
-                continue
         if c < 0:
             break
-        same_pair = (contacts.body_a == contacts.body_a[c]) & (contacts.body_b == contacts.body_b[c])
-        subset = everything if together else np.flatnonzero(same_pair)
+        subset = _contacts_of_pair(contacts, c, together)
         count += solve_block(bodies, contacts, subset, 1.0, rule, number, joints, log[count:])
         impulses += 1
-    if count + m < len(log) and _approaching(bodies, contacts, rule.tolerance, 0.0, rule.rest_speed) >= 0:
+    if count + m < log.shape[0] and _approaching(bodies, contacts, rule.tolerance, 0.0, rule.rest_speed) >= 0:
         count = _finish(bodies, contacts, rule, number, joints, log, count)
         impulses += 1
     return count, impulses, impulses >= cap
 
 
-def _collapsed(contacts: Contacts, log: np.ndarray) -> np.ndarray:
-    """Contacts (m,) that came back so often at this instant that nothing is left of their rebounds.
+@jit_making_arrays
+def _contacts_of_pair(contacts, best, together):
+    """Contacts (k,) of the pair of one of them; all contacts if all are `together`."""
+    m, count = contacts.gap.shape[0], 0
+    subset = np.empty(m, np.int64)
+    for c in range(m):
+        if together or (contacts.body_a[c] == contacts.body_a[best] and contacts.body_b[c] == contacts.body_b[best]):
+            subset[count] = c
+            count += 1
+    return subset[:count]
+
+
+@jit_making_arrays
+def _let_collapse(contacts, log, rest_speed):
+    """Let contacts that came back so often at this instant that nothing is left of their rebounds not rebound: infinite rest speeds (m,).
 
     A light body between heavy ones is hit by both in turn. With restitutions e, each round either turns the approach speeds and leaves
     a part e of them, or never ends (McNamara and Young 1992: inelastic collapse) and tends to one inelastic impact of all. After n rounds
     that impact is off by e^n at most, either way.
     """
-    hits = np.bincount(log[:, 0].astype(np.int64), minlength=len(contacts.gap))
-    return (hits >= IMPULSES_PER_ROUND) & (contacts.restitution**hits < COLLAPSED)
+    hits = np.zeros(contacts.gap.shape[0])
+    for row in range(log.shape[0]):
+        hits[np.int64(log[row, 0])] += 1.0
+    for c in range(hits.shape[0]):
+        if hits[c] >= IMPULSES_PER_ROUND and contacts.restitution[c] ** hits[c] < COLLAPSED:
+            rest_speed[c] = inf
 
 
-def _finish(
-    bodies: BodyState, contacts: Contacts, rule: ImpactRule, number: np.ndarray, joints: JointBlock | None, log: np.ndarray, count: int
-) -> int:
-    """One inelastic impulse of all contacts."""
-    if len(contacts.gap) == 1 and joints is None:
-        return resolve_singles(bodies, contacts, rule, 0.0, 1, log, count)[0]
-    subset = np.arange(len(contacts.gap))
-    return count + solve_block(bodies, contacts, subset, 0.0, rule, number, joints, log[count:])
+@jit_making_arrays
+def _finish(bodies, contacts, rule, number, joints, log, count):
+    """One inelastic impulse of all contacts; returns the new count of log."""
+    if joints is None:
+        if contacts.gap.shape[0] == 1:
+            return resolve_singles(bodies, contacts, rule, 0.0, np.int64(1), log, count)[0]
+    return count + solve_block(bodies, contacts, np.arange(contacts.gap.shape[0]), 0.0, rule, number, joints, log[count:])
 
 
-def respond_simultaneous(
-    bodies: BodyState, contacts: Contacts, rule: ImpactRule, _together: bool, number: np.ndarray, joints: JointBlock | None, log: np.ndarray
-) -> tuple[int, int, bool]:
+@jit_making_arrays
+def respond_simultaneous(bodies, contacts, rule, together, number, joints, log):
     """The whole island as one block; same arguments and answer as `respond_sequential`."""
+    count, impulses = np.int64(0), np.int64(0)
     if _approaching(bodies, contacts, rule.tolerance, 0.0, rule.rest_speed) < 0:
-        return 0, 0, False
-    if len(contacts.gap) == 1 and joints is None:
-        # The only contact, by the law of a single one; inelastic where it is too slow to rebound.
-        return respond_sequential(bodies, contacts, rule, False, number, joints, log)
-    subset = np.arange(len(contacts.gap))
-    count = solve_block(bodies, contacts, subset, 1.0, rule, number, joints, log)
-    impulses = 1
+        return count, impulses, False
+    if joints is None:
+        if contacts.gap.shape[0] == 1:
+            # The only contact, by the law of a single one; inelastic where it is too slow to rebound.
+            return respond_sequential(bodies, contacts, rule, together, number, joints, log)
+    count = solve_block(bodies, contacts, np.arange(contacts.gap.shape[0]), 1.0, rule, number, joints, log)
+    impulses += 1
     if _approaching(bodies, contacts, rule.tolerance, 0.0, rule.rest_speed) >= 0:
         count = _finish(bodies, contacts, rule, number, joints, log, count)
         impulses += 1

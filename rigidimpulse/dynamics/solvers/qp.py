@@ -19,8 +19,9 @@ from scipy import sparse
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, SEGMENT, Rows, RowSolver
-from rigidimpulse.dynamics.solvers.newton import natural_residual, row_weights, solve_newton
+from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, SEGMENT, Rows
+from rigidimpulse.dynamics.constraints.slip import RowSolver
+from rigidimpulse.dynamics.solvers.newton import natural_residual, row_weights
 
 MOST_ROUNDS = 100
 """Fixed-point steps."""
@@ -30,15 +31,15 @@ PRECISION = TOLERANCES.solver.qp_precision
 REGULAR = TOLERANCES.solver.qp_regularisation
 
 
-def row_solver(name: str) -> RowSolver:
-    """The solver of rows (rows, n, target) -> residual for a value of `Accuracy.contact_solver`.
+def row_solver(name: str) -> RowSolver | None:
+    """The solver of rows (rows, n, target) -> residual for a value of `Accuracy.contact_solver`; None: `newton.solve_newton`.
 
     Raises:
         SceneError: "qp" without the library it needs.
 
     """
     if name != "qp":
-        return solve_newton
+        return None
     try:
         import clarabel  # noqa: F401
     except ImportError:

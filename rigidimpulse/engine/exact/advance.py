@@ -28,14 +28,18 @@ def arrive(run: Run, islands: list[Island], time: float, bodies: np.ndarray) -> 
     for island in islands:
         if project_velocities(run, island):
             classify(run, island)
-    note_end_energy(run, bodies.tolist())
+    state, constants = run.state, run.world.constants
+    note_end_energy(state.limiter, state.now, constants, bodies)
     for island in islands:
         if len(island.joints):
             run.joints.project_velocities(run, island)
             classify(run, island)
-    slowed = limit_energy(run, bodies.tolist(), time)
+    slowed, changes = np.zeros(run.world.num_bodies, bool), np.empty(len(bodies))
+    count = limit_energy(state.limiter, state.now, constants, state.trajectory, bodies, time, slowed, changes)
+    for change in changes[:count].tolist():
+        run.log.account(time, "energy correction", change)
     for island in islands:
-        if not slowed.isdisjoint(island.members.tolist()):
+        if count and slowed[island.members].any():
             classify(run, island)
 
 

@@ -2,48 +2,43 @@
 
 from __future__ import annotations
 
-import math
+from functools import partial
+from math import sqrt
 
 import numpy as np
 
+from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.contact import ContactProblem, Held, hold_contacts
-from rigidimpulse.dynamics.constraints.contact_motion import Motion, contact_motion
+from rigidimpulse.core.vector import turned
+from rigidimpulse.dynamics.constraints.contact import ContactProblem, Held
+from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
 from rigidimpulse.dynamics.constraints.position_correction import correct_positions, needs_correction
-from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
-from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
+from rigidimpulse.dynamics.constraints.rolling_friction import Rolling, rolling_of
+from rigidimpulse.dynamics.energy import kinetic_energy, kinetic_of, mechanical_energy
 from rigidimpulse.engine.exact.energy_limit import limit_correction_energy, note_hold
-from rigidimpulse.engine.exact.step_size import ALLOWED
-from rigidimpulse.engine.exact.velocity_projection import forget_forces, remember_forces
-from rigidimpulse.engine.islands import collect, make_island, near_contacts
+from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, estimate_error, hold_turning, sub_step, turns
+from rigidimpulse.engine.islands import forces_of, look_again, near_contacts
 from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import may_sleep
-from rigidimpulse.model.contacts import Contacts, select
+from rigidimpulse.model.contact_memory import forget_forces, identity, keep_forces, keep_wrenches
+from rigidimpulse.model.contacts import Contacts, Touching, select
 from rigidimpulse.model.island import Island
 from rigidimpulse.motion.evaluate import refresh_pose
 
 PLAY = TOLERANCES.contact_forces.unsolved_energy
-TURN = 0.01
-"""rad, how far arms and normals of contacts may turn in a sub-step."""
-MOST_SUB_STEPS = 256
-"""Sub-steps in a step."""
-TURN_OF_BODY = 0.1
-"""rad, how far bodies may turn in a sub-step where that matters to gaps."""
-GROWTH = 1.5
-"""How many times longer than the one before a sub-step may be."""
-SHORTEST = TOLERANCES.contact_forces.shortest
-SHORTEST_STOP = TOLERANCES.contact_forces.shortest_stop
-STEADY = TOLERANCES.contact_forces.steady_turn
+NOT_SOLVED_REMEDY = "residual {value:.1e}; use a smaller step"
+NO_SUPPORTS = np.zeros(0, np.int64)
 
 
 def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
     """Find the lasting contacts of an island and write the wrenches of its members into run.wrench."""
-    run.contact_log.close(island.members.tolist(), island.time)
+    state, number = run.state, run.world.num_bodies
+    run.contact_log.close(island.members, island.time)
     run.wrench[island.members] = 0.0
-    forget_forces(run.state, island.contacts)
+    forget_forces(state.memory, number, island.contacts)
     island.held = island.slow()
     if not island.held.any() and not len(island.joints):
         return
@@ -52,38 +47,40 @@ def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
     subset = np.flatnonzero(island.held)
     if not len(subset) and not len(island.joints):
         return
-    state, now = run.state, run.state.now
-    contacts = select(island.contacts, subset)
-    motion = contact_motion(
-        run.world.geometry, run.world.shape_of_body, state.rotation, now, contacts, island.kinds[subset],
-        island.features[subset],
-    )
-    keys = [island.keys[c] for c in subset]
-    force = np.array([state.force_of(key) for key in keys]).reshape(-1, 3)
-    before = kinetic_energy(now, run.world, island.members)
-    rest = pair_events.end - island.time
+    now, constants, contacts = state.now, run.world.constants, select(island.contacts, subset)
+    turning, problem = _problem(run, island, subset, contacts)
+    forces = Forces(forces_of(run, contacts, turning.touching), run.wrench)
+    before = kinetic_energy(now, constants, island.members)
+    rest, held = pair_events.end - island.time, None
     if len(island.joints):
-        h, residual = _hold_jointed(run, island, subset, contacts, motion, force, rest)
+        h, residual = _hold_jointed(run, island, problem, turning, forces, rest)
     else:
-        h, residual = _hold_turning(run, island, subset, contacts, motion, force, rest)
-    run.log.account(island.time, "stick", kinetic_energy(now, run.world, island.members) - before)
+        held = _hold_contacts(run, island, problem, turning, forces, rest)
+        h, residual = held.length, held.residual
+    run.log.account(island.time, "stick", kinetic_energy(now, constants, island.members) - before)
     failed = residual > UNSOLVED or (len(island.joints) > 0 and not run.joints.are_closed)
-    if failed and _makes_energy(run, island, h):
+    taken_back = run.joints.memory.wrench if len(island.joints) else None
+    if failed and makes_energy(problem, constants, run.wrench, taken_back, h):
         run.wrench[island.members] = 0.0
-        force[:] = 0.0
-        forget_forces(state, contacts)
+        forces.force[:] = 0.0
+        held = None
         if len(island.joints):
             run.joints.let_go(island)
-    note_hold(run, island, contacts, force)
-    run.contact_log.replace(island.members.tolist(), island.time, contacts, now.position, force)
-    for key, f in zip(keys, force, strict=True):
-        state.contact_force[key] = (f, island.time)
+    supports, passive = _other_supports(run, island)
+    # Without contact joints keep energy by themselves, up and down: what they gain they lose.
+    passive = passive and (not len(island.joints) or bool(np.any(forces.force[:, 0] > 0.0)))
+    note_hold(state.limiter, now, constants, contacts, island.members, supports, passive)
+    run.contact_log.replace(island.members, island.time, contacts, now.position, forces.force)
+    state.remember(len(subset))
+    keep_forces(state.memory, number, island.time, contacts, turning.touching, forces.force)
+    if held is not None and turns(turning.motion, run.world.accuracy.step):
+        keep_wrenches(state.memory, number, island.time, contacts, held.force, held.slides)
     if residual > UNSOLVED:
         names = tuple(run.world.names[i] for i in island.members)
         run.log.report(
-            island.time, "contact forces not solved", names, f"residual {residual:.1e}; use a smaller step"
+            island.time, "contact forces not solved", names, NOT_SOLVED_REMEDY.format(value=residual)
         )
-    island.rests = may_sleep(run, island, h)
+    island.rests = may_sleep(run, island, problem, h)
     if island.rests and len(island.joints):
         run.joints.log_rest(island)
     if h < rest and not island.rests:
@@ -92,94 +89,83 @@ def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
         pair_events.look_around(island.members, island.time, island.shift)
 
 
-def _makes_energy(run: Run, island: Island, h: float) -> bool:
-    """Whether forces that are no solution give the members more kinetic energy than they have, or would have without them.
-
-    On the way, too: half of what joints do is taken back before they are stopped.
-    """
-    now, i = run.state.now, island.members
-    inertia = np.linalg.inv(now.inv_inertia[i])
-    taken_back = run.joints.memory.wrench[i] if len(island.joints) else np.zeros((len(i), 6))
-    energies = []
-    for wrench in (np.zeros((len(i), 6)), run.wrench[i], run.wrench[i] - taken_back):
-        v = now.velocity[i] + h * (run.acceleration[i] + now.inv_mass[i, None] * wrench[:, :3])
-        spin = run.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], wrench[:, 3:])
-        w = now.angular_velocity[i] + h * spin
-        energies.append(0.5 * float((run.world.mass[i] * (v**2).sum(1)).sum() + np.einsum("ij,ijk,ik->", w, inertia, w)))
-    most = max(energies[0], kinetic_energy(now, run.world, i))
-    return not np.max(energies[1:]) <= (1.0 + PLAY) * most
+def _other_supports(run: Run, island: Island) -> tuple[np.ndarray, bool]:
+    """What stands at the joints of an island (see `energy_limit`), and whether neither joints nor varying forces make energy."""
+    if not len(island.joints):
+        return NO_SUPPORTS, island.free is None
+    return run.joints.supports_of(island.joints), island.free is None and run.joints.are_passive(island.joints)
 
 
-def _hold_turning(
-    run: Run, island: Island, subset: np.ndarray, contacts: Contacts, motion: Motion, force: np.ndarray, rest: float
-) -> tuple[float, float]:
-    """Contact forces over a sub-step of at most `rest`; returns its length and the residual."""
-    state, step, contact_margin = run.state, run.world.accuracy.step, island.contact_margin[subset]
-    rolling = rolling_of(run.world, state.now, contacts)
+def _problem(run: Run, island: Island, subset: np.ndarray, contacts: Contacts) -> tuple[Turning, ContactProblem]:
+    """The lasting contacts of an island, which are the given subset of its contacts, as the kernels take them."""
+    shapes, state, touching = run.world.compiled_shapes, run.state, Touching(*(column[subset] for column in island.touching))
+    motion = contact_motion(shapes.geometry, shapes.of_body, state.rotation, state.now, contacts, touching.kind, touching.feature)
+    problem = ContactProblem(
+        state.now, contacts, island.members, run.column, motion.turning, run.acceleration, run.angular_acceleration
+    )
+    return Turning(motion, touching, island.contact_margin[subset]), problem
 
-    def hold_over(h: float, excess: np.ndarray) -> Held:
-        h = load_over(run, island, h)
-        run.wrench[island.members] = 0.0
-        problem = ContactProblem(
-            state.now, contacts, island.members, run.column, motion.turning, run.acceleration, run.angular_acceleration
-        )
-        return hold_contacts(run.solve_rows, problem, excess, h, SHORTEST_STOP * step, force, run.wrench, rolling)
 
-    if motion.fastest * step <= STEADY:
-        held = hold_over(sub_step(motion.fastest, step, rest), np.zeros(len(subset)))
-        return held.length, held.residual
-    excess = contacts.gap - contact_margin
-    first = island.members[0]
-    h = sub_step(motion.fastest, step, rest)
-    plan = GROWTH * state.sub_step[first] if state.under_contact[first] else np.inf
-    h = min(h, float(plan))
-    held = hold_over(h, excess)
-    error, share = _estimate_error(run, island, subset, contacts, motion, force, held.length)
-    if share < 1.0:
-        state.sub_step[first] = share * held.length
-        held = hold_over(share * held.length, excess + share**3 * error)
-    elif h >= plan or not state.under_contact[first]:
-        state.sub_step[first] = max(h, step / MOST_SUB_STEPS)
-    keys = [island.keys[c] for c in subset]
-    remember_forces(state, island.time, keys, contacts, force, held.force, held.slides)
-    return held.length, held.residual
+def _hold_contacts(run: Run, island: Island, problem: ContactProblem, turning: Turning, forces: Forces, rest: float) -> Held:
+    """Contact forces over a sub-step of at most `rest`."""
+    limits = StepLimits(rest, run.world.accuracy.step, run.state.sub_step, run.state.under_contact)
+    load = None if island.free is None else partial(load_over, run, island)
+    return hold_turning(run.solve_rows, load, problem, turning, run.error_estimate, limits, forces, _rolling(run, problem))
 
 
 def _hold_jointed(
-    run: Run, island: Island, subset: np.ndarray, contacts: Contacts, motion: Motion, force: np.ndarray, rest: float
+    run: Run, island: Island, problem: ContactProblem, turning: Turning, forces: Forces, rest: float
 ) -> tuple[float, float]:
     """Forces of joints and contacts over a sub-step of at most `rest`; returns its length and the residual."""
-    joints, step = run.joints, run.world.accuracy.step
-    rolling, moment = rolling_of(run.world, run.state.now, contacts), joints.moment.copy()
-    h, residual = joints.hold(run, island, contacts, motion.turning, force, sub_step(motion.fastest, step, rest), rolling)
-    if motion.fastest * step > STEADY:
-        _, share = _estimate_error(run, island, subset, contacts, motion, force, h)
+    joints, step, motion, rolling = run.joints, run.world.accuracy.step, turning.motion, _rolling(run, problem)
+    contacts, moment = problem.contacts, joints.moment.copy()
+    h, residual = joints.hold(run, island, contacts, motion.turning, forces.force, sub_step(motion.fastest, step, rest), rolling)
+    if turns(motion, step):
+        _, share = estimate_error(problem, turning, run.error_estimate, forces, h, step)
         if share < 1.0:
             joints.moment[:] = moment
-            h, residual = joints.hold(run, island, contacts, motion.turning, force, share * h, rolling)
+            h, residual = joints.hold(run, island, contacts, motion.turning, forces.force, share * h, rolling)
     return h, residual
 
 
-def _estimate_error(
-    run: Run, island: Island, subset: np.ndarray, contacts: Contacts, motion: Motion, force: np.ndarray, h: float
-) -> tuple[np.ndarray, float]:
-    """Errors (m,) of gaps after h [m] under the forces found, and the share of h after which they would be allowed."""
-    error = run.error_estimate.gap_errors(run, island, contacts, subset, motion, h)
-    error[force[:, 0] == 0.0] = 0.0
-    worst = float(np.max(np.abs(error) / (ALLOWED * island.contact_margin[subset])))
-    if worst <= 1.0:
-        return error, 1.0
-    spin = float(np.linalg.norm(run.state.now.angular_velocity[island.members], axis=1).max())
-    share = worst ** (-1.0 / 3.0)
-    if spin > 0.0:
-        share = min(share, TURN_OF_BODY / (spin * h))
-    return error, min(max(share, run.world.accuracy.step / (MOST_SUB_STEPS * h)), 1.0)
+def _rolling(run: Run, problem: ContactProblem) -> Rolling | None:
+    """Rolling friction of the contacts."""
+    return rolling_of(run.world.rolling, run.world.material_of_body, problem.bodies, problem.contacts)
 
 
-def sub_step(rate: float, step: float, rest: float) -> float:
-    """Length of the next sub-step [s], where arms turn at `rate` [rad/s] and the rest of the step is left."""
-    piece = step / min(max(math.ceil(rate * step / TURN), 1), MOST_SUB_STEPS)
-    return piece if rest > piece * (1.0 + SHORTEST) else max(rest, SHORTEST * step)
+@jit_making_arrays
+def makes_energy(problem, constants, wrench, taken_back, h):
+    """Whether forces that are no solution give the members more kinetic energy than they have, or would have after h without them.
+
+    wrench (n, 6); taken_back (n, 6): half of what joints do, which is taken back before they are stopped, None without joints. Energy may
+    not be made on the way, either.
+    """
+    members, bodies = problem.members, problem.bodies
+    given, less = np.zeros((members.shape[0], 6)), np.zeros((members.shape[0], 6))
+    free = _energy_after(problem, constants, given, h)
+    for n in range(members.shape[0]):
+        for k in range(6):
+            given[n, k] = less[n, k] = wrench[members[n], k]
+            if taken_back is not None:
+                less[n, k] -= taken_back[members[n], k]
+    now = kinetic_energy(bodies, constants, members)
+    most = (1.0 + PLAY) * max(free, now)
+    return not (_energy_after(problem, constants, given, h) <= most and _energy_after(problem, constants, less, h) <= most)
+
+
+@jit_making_arrays
+def _energy_after(problem, constants, wrench, h):
+    """Kinetic energy [J] of the k members after h under wrenches (k, 6), at their present pose."""
+    bodies, one, energy = problem.bodies, np.zeros(1, np.int64), 0.0
+    v, w = np.empty((1, 3)), np.empty((1, 3))
+    for n in range(problem.members.shape[0]):
+        i = problem.members[n]
+        torque = turned(bodies.inv_inertia[i], wrench[n, 3:])
+        for k in range(3):
+            v[0, k] = bodies.velocity[i, k] + h * (problem.acceleration[i, k] + bodies.inv_mass[i] * wrench[n, k])
+            w[0, k] = bodies.angular_velocity[i, k] + h * (problem.angular_acceleration[i, k] + torque[k])
+        energy += kinetic_of(v, w, bodies.orientation[i : i + 1], constants.mass[i : i + 1], constants.inertia[i : i + 1], one)
+    return energy
 
 
 def _correct_positions(run: Run, pair_events: PairEvents, island: Island) -> None:
@@ -188,21 +174,48 @@ def _correct_positions(run: Run, pair_events: PairEvents, island: Island) -> Non
     A light body turns far to make room for a heavy one: what it may come near is looked for farther away, and what does not belong to the
     island stands meanwhile.
     """
-    state, now = run.state, run.state.now
-    place, turn = now.position[island.members].copy(), now.orientation[island.members].copy()
-    before = mechanical_energy(now, run.world, island.members)
-    held = dict(zip(island.keys, island.slow().tolist(), strict=True))
-    around, contact_margin, keys = near_contacts(run, pair_events, island.members, island.time)
-    lifted = np.array([held.get(key, False) for key in keys], bool)
-    correct_positions(now, around, lifted, contact_margin, island.members, run.column)
-    refresh_pose(island.members, now, state.rotation, state.trajectory.inertia)
-    run.log.account(island.time, "position correction", mechanical_energy(now, run.world, island.members) - before)
-    limit_correction_energy(run, island, around, now.position[island.members] - place, float(contact_margin.max()))
+    state, now, members, constants = run.state, run.state.now, island.members, run.world.constants
+    place, turn = now.position[members].copy(), now.orientation[members].copy()
+    before = mechanical_energy(now, constants, members)
+    around, contact_margin, touching = near_contacts(run, pair_events, members, island.time)
+    lifted = np.zeros(len(contact_margin), bool)
+    mark_same(island.contacts, island.touching, island.slow(), around, touching, lifted)
+    correct_positions(now, around, lifted, contact_margin, members, run.column)
+    refresh_pose(members, now, state.rotation, state.trajectory.inertia)
+    run.log.account(island.time, "position correction", mechanical_energy(now, constants, members) - before)
+    supports, passive = _other_supports(run, island)
+    if passive:
+        way, depth = now.position[members] - place, float(contact_margin.max())
+        change = limit_correction_energy(now, constants, around, members, supports, way, depth)
+        run.log.account(island.time, "energy correction", change)
     island.moved = True
-    reach = 2.0 * run.world.bound_radius[island.members] * np.linalg.norm(now.orientation[island.members] - turn, axis=1)
-    island.shift = float((np.linalg.norm(now.position[island.members] - place, axis=1) + reach).max())
-    found = collect(run, pair_events, island.pairs, island.time)
-    again = make_island(run, pair_events, island.time, found, np.ones(len(found[0]), bool), island.joints, island.members)
-    for name in ("contacts", "place", "kinds", "features", "keys", "contact_margin", "approach", "rest_speed", "live"):
+    island.shift = shift_of(now, run.world.bound_radius, members, place, turn)
+    again = look_again(run, pair_events, island)
+    for name in ("contacts", "place", "touching", "contact_margin", "speeds", "live"):
         setattr(island, name, getattr(again, name))
     island.held = island.slow()
+
+
+@jit
+def mark_same(contacts, touching, which, others, others_touching, mark):
+    """Mark (k,) those of other contacts that are among the given ones, which (m,) bool."""
+    for c in range(mark.shape[0]):
+        what = identity(others_touching.kind[c], others_touching.feature[c, 0], others_touching.feature[c, 1])
+        for d in range(which.shape[0]):
+            same = contacts.body_a[d] == others.body_a[c] and contacts.body_b[d] == others.body_b[c]
+            if which[d] and same and what == identity(touching.kind[d], touching.feature[d, 0], touching.feature[d, 1]):
+                mark[c] = True
+
+
+@jit
+def shift_of(bodies, radius, members, place, turn):
+    """How far points of the members have moved at most since they were at place (k, 3) and orientation turn (k, 4), m; radius (n,) m."""
+    shift = 0.0
+    for s in range(members.shape[0]):
+        i, moved, turned_by = members[s], 0.0, 0.0
+        for k in range(3):
+            moved += (bodies.position[i, k] - place[s, k]) ** 2
+        for k in range(4):
+            turned_by += (bodies.orientation[i, k] - turn[s, k]) ** 2
+        shift = max(shift, sqrt(moved) + 2.0 * radius[i] * sqrt(turned_by))
+    return shift

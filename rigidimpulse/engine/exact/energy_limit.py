@@ -9,139 +9,299 @@ gained is taken off what moves against the motion of their common rigid body, V,
 T_rigid and T_d are orthogonal, so momentum and angular momentum stay. Ground that takes part pushes along some directions, and turns
 about those across them: V and W then have only what is left, the part of the common motion whose momentum no such push changes (along
 a smooth floor: V level, W upright), and are zero where the ground has friction.
+
+The energy that ground of velocity U sees grows by this from t_0 to t; a is the acceleration by gravity and constant forces:
+
+    gained = E - E_0 - sum m (v - v_0).U + sum m a.U (t - t_0)
 """
 
 from __future__ import annotations
 
+from math import sqrt
+from typing import NamedTuple
+
 import numpy as np
 
+from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.core.vector import cross_arrays
+from rigidimpulse.core.vector import along, cross, dot, length, row, scaled, subtract
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.engine.run import Run
-from rigidimpulse.model.contacts import Contacts
-from rigidimpulse.model.island import Island
-from rigidimpulse.model.state import Ground
-from rigidimpulse.model.world import World
-from rigidimpulse.motion.body_state import BodyState
 
-GAIN = TOLERANCES.contact_forces.energy_gain
 PARALLEL = TOLERANCES.contact_forces.same_direction
+AT_REST = (0.0, 0.0, 0.0)
+MAY_GIVE = -1
+"""Rank of ground that may give energy."""
 
 
-def note_hold(run: Run, island: Island, contacts: Contacts, force: np.ndarray) -> None:
-    """Remember who shares the forces (m, 3) of the held contacts from now on, and whether they may make energy."""
-    state, first = run.state, int(island.members[0])
-    ground = _passive_ground(run, island, contacts, bool(np.any(force[:, 0] > 0.0)))
-    state.sharing[island.members] = first
-    state.closed[island.members] = ground is not None
-    if ground is not None:
-        state.ground[first] = ground
+class Ground(NamedTuple):
+    """What stands by an island."""
+
+    rank: int  # in how many independent directions it may push, MAY_GIVE where it may give energy
+    velocity: tuple[float, float, float]  # m/s of all that stands, seen from where it does no work
+    axis: tuple[float, float, float]  # that direction if there is one, the one across them if there are two
 
 
-def _passive_ground(run: Run, island: Island, contacts: Contacts, presses: bool) -> Ground | None:
-    """What stands by an island, or None where forces may make energy.
+@jit
+def note_hold(limiter, bodies, constants, contacts, members, supports, passive):
+    """Remember who shares the forces of the held contacts from now on, and whether they may make energy.
 
-    They may not where all that stands moves with one velocity, joints are neither driven nor springs, and no other force varies.
-    presses: whether contacts press.
+    supports (k,): what else stands by the island, see `_ground_of`; passive: whether neither joints nor varying forces make energy.
     """
-    world, now = run.world, run.state.now
-    pairs = np.column_stack([contacts.body_a, contacts.body_b])
-    stands = ~world.dynamic[pairs]
-    supports, rough = np.unique(pairs[stands]), bool(np.any(stands.any(axis=1) & (contacts.static_friction > 0.0)))
-    passive, tied = island.free is None, False
-    if len(island.joints):
-        ends = run.joints.bodies_of(island.joints)
-        tied = run.joints.hold_to_world(island.joints)
-        rough = rough or tied or not np.all(world.dynamic[ends])
-        supports = np.union1d(supports, ends[~world.dynamic[ends]])
-        # Without contact joints keep energy by themselves, up and down: what they gain they lose.
-        passive = passive and run.joints.are_passive(island.joints) and presses
-    velocity = now.velocity[supports[0]].copy() if len(supports) else np.zeros(3)
-    steady = not np.any(now.angular_velocity[supports]) and not np.any(now.velocity[supports] != velocity)
-    if not (passive and steady) or (tied and np.any(velocity)):
-        return None
-    return Ground(velocity, np.eye(3) if rough else contacts.normal[stands.any(axis=1)])
+    first = members[0]
+    ground = _ground_of(bodies, constants.dynamic, contacts, supports)
+    closed = passive and ground.rank != MAY_GIVE
+    for i in members:
+        limiter.sharing[i] = first
+        limiter.closed[i] = closed
+    if closed:
+        limiter.ground_rank[first] = ground.rank
+        for k in range(3):
+            limiter.ground_velocity[first, k] = ground.velocity[k]
+            limiter.ground_axis[first, k] = ground.axis[k]
 
 
-def limit_correction_energy(run: Run, island: Island, contacts: Contacts, way: np.ndarray, depth: float) -> None:
-    """Take off the members' speeds what a position correction by `way` (k, 3) m gained.
+@jit
+def _ground_of(bodies, dynamic, contacts, supports):
+    """What stands by an island: at its contacts, and the supports (k,), which hold it in every direction, -1 for the world.
 
-    That is beyond their weight times the depth [m] that contacts may sink.
+    It may give no energy where all of it moves with one velocity.
     """
-    world, now, members = run.world, run.state.now, island.members
-    weight = world.mass[members, None] * world.steady_acceleration[members]
-    excess = -float((weight * way).sum()) - depth * float(np.linalg.norm(weight, axis=1).sum())
-    ground = _passive_ground(run, island, contacts, True) if excess > 0.0 else None
-    if ground is not None:
-        before = kinetic_energy(now, world, members)
-        now.velocity[members] -= ground.velocity
-        take_off(now, world, members, excess, ground.pushes)
-        now.velocity[members] += ground.velocity
-        run.log.account(island.time, "energy correction", kinetic_energy(now, world, members) - before)
+    m = contacts.body_a.shape[0]
+    velocity, known, steady = AT_REST, False, True
+    for c in range(2 * m + supports.shape[0]):
+        i = contacts.body_a[c] if c < m else contacts.body_b[c - m] if c < 2 * m else supports[c - 2 * m]
+        if i >= 0 and dynamic[i]:
+            continue
+        v, w = (row(bodies.velocity, i), row(bodies.angular_velocity, i)) if i >= 0 else (AT_REST, AT_REST)
+        if not known:
+            velocity, known = v, True
+        steady = steady and v == velocity and w == AT_REST
+    rank, axis = _pushes(dynamic, contacts)
+    if not steady:
+        rank = MAY_GIVE
+    elif supports.shape[0] > 0:
+        rank = 3
+    return Ground(rank, velocity, axis)
 
 
-def note_end_energy(run: Run, bodies: list[int]) -> None:
-    """Keep the energy with which bodies under contact forces arrive, from which the work of those forces follows."""
-    for i in bodies:
-        if run.state.under_contact[i]:
-            run.state.end_energy[i] = mechanical_energy(run.state.now, run.world, np.array([i]))
+@jit
+def _pushes(dynamic, contacts):
+    """In how many independent directions contacts push that dynamic bodies have with others, and the axis of `Ground`."""
+    rank, first, axis, widest = 0, AT_REST, AT_REST, PARALLEL
+    for c in range(contacts.gap.shape[0]):
+        if dynamic[contacts.body_a[c]] and dynamic[contacts.body_b[c]]:
+            continue
+        if contacts.static_friction[c] > 0.0:
+            return 3, AT_REST
+        n = row(contacts.normal, c)
+        if rank == 0:
+            rank, first = 1, n
+        across = cross(first, n)
+        if length(across) > widest:
+            rank, axis, widest = 2, across, length(across)
+    if rank < 2:
+        return rank, first
+    axis = scaled(axis, 1.0 / widest)
+    for c in range(contacts.gap.shape[0]):
+        stands = not (dynamic[contacts.body_a[c]] and dynamic[contacts.body_b[c]])
+        if stands and abs(dot(axis, row(contacts.normal, c))) > PARALLEL:
+            rank = 3
+    return rank, axis
 
 
-def limit_energy(run: Run, bodies: list[int], time: float) -> set[int]:
-    """Take what islands of the bodies gained since they share their forces off their velocities; returns those slowed.
+@jit
+def limit_correction_energy(bodies, constants, contacts, members, supports, way, depth):
+    """Take off the members' speeds what a position correction by `way` (k, 3) m gained; returns how their energy changes, J.
 
-    All that share forces arrive together. The energy is that seen from the ground, which has the velocity U:
-
-        E - E_0 - sum m (v - v_0).U + sum m a.U (t - t_0),    a: gravity and constant forces.
+    That is beyond their weight times the depth [m] that contacts may sink. supports (k,): as for `note_hold`.
     """
-    world, state, trajectory, now = run.world, run.state, run.state.trajectory, run.state.now
-    slowed: set[int] = set()
-    touched = [i for i in bodies if state.under_contact[i]]
-    for first in sorted({int(state.sharing[i]) for i in touched if state.closed[i]}):
-        island, ground = np.array([i for i in touched if state.sharing[i] == first]), state.ground[first]
-        fallen = (time - trajectory.start[island, None]) * world.steady_acceleration[island]
-        change = now.velocity[island] - trajectory.velocity[island] - fallen
-        gained = mechanical_energy(now, world, island) - float(state.energy_at_start[island].sum())
-        gained -= float(world.mass[island] @ (change @ ground.velocity))
-        before = kinetic_energy(now, world, island)
-        if gained > GAIN * before:
-            v, w = now.velocity[island].copy(), now.angular_velocity[island].copy()
-            now.velocity[island] -= ground.velocity
-            take_off(now, world, island, gained, ground.pushes)
-            now.velocity[island] += ground.velocity
-            # Frames on the way have their share of it.
-            state.correction[island] += np.hstack([now.velocity[island] - v, now.angular_velocity[island] - w])
-            run.log.account(time, "energy correction", kinetic_energy(now, world, island) - before)
-            slowed.update(island.tolist())
-    return slowed
+    lost, sinking = 0.0, 0.0
+    for n in range(members.shape[0]):
+        weight = scaled(row(constants.steady_acceleration, members[n]), constants.mass[members[n]])
+        lost += dot(weight, row(way, n))
+        sinking += length(weight)
+    excess = -lost - depth * sinking
+    if not excess > 0.0:
+        return 0.0
+    ground = _ground_of(bodies, constants.dynamic, contacts, supports)
+    return _slow_down(bodies, constants, members, excess, ground) if ground.rank != MAY_GIVE else 0.0
 
 
-def take_off(now: BodyState, world: World, members: np.ndarray, energy: float, ground: np.ndarray) -> None:
-    """Take energy [J], or all there is, off how the members move against each other or the ground, which pushes along `ground` (k, 3)."""
-    mass, x = world.mass[members, None], now.position[members]
-    v, w = now.velocity[members], now.angular_velocity[members]
-    inertia = np.linalg.inv(now.inv_inertia[members])
-    r = x - (mass * x).sum(axis=0) / mass.sum()
-    momentum = np.concatenate([(mass * v).sum(axis=0), (cross_arrays(r, mass * v) + np.einsum("ijk,ik->ij", inertia, w)).sum(axis=0)])
-    steiner = np.einsum("i,ij,ij->", mass[:, 0], r, r) * np.eye(3) - np.einsum("i,ij,ik->jk", mass[:, 0], r, r)
-    common = np.zeros((6, 6))
-    common[:3, :3], common[3:, 3:] = mass.sum() * np.eye(3), inertia.sum(axis=0) + steiner
-    free = _free_motions(ground)
-    rigid = free @ np.linalg.solve(free.T @ common @ free, free.T @ momentum)
-    rigid_v = rigid[:3] + cross_arrays(rigid[3:], r)
-    dv, dw = v - rigid_v, w - rigid[3:]
-    available = 0.5 * float((mass * dv**2).sum() + np.einsum("ij,ijk,ik->", dw, inertia, dw))
-    if available > 0.0:
-        share = np.sqrt(max(1.0 - energy / available, 0.0))
-        now.velocity[members], now.angular_velocity[members] = rigid_v + share * dv, rigid[3:] + share * dw
+@jit
+def note_end_energy(limiter, bodies, constants, members):
+    """Keep the energy with which members under contact forces arrive, from which the work of those forces follows."""
+    for n in range(members.shape[0]):
+        if limiter.under_contact[members[n]]:
+            limiter.end_energy[members[n]] = mechanical_energy(bodies, constants, members[n : n + 1])
 
 
-def _free_motions(ground: np.ndarray) -> np.ndarray:
-    """Basis (6, k) of translations and rotations of a common body that pushes along `ground` (k, 3) do no work on, wherever they act."""
-    _, size, directions = np.linalg.svd(np.vstack([ground, np.zeros((1, 3))]))
-    rank = int((size > PARALLEL).sum())
-    turns = directions if rank == 0 else directions[:1] if rank == 1 else directions[:0]
-    free = np.zeros((3 - rank + len(turns), 6))
-    free[: 3 - rank, :3], free[3 - rank :, 3:] = directions[rank:], turns
-    return free.T
+@jit_making_arrays
+def limit_energy(limiter, bodies, constants, trajectory, brought, time, slowed, changes):
+    """Take what islands gained since they share their forces off the velocities of the bodies (k,) that are brought to `time`.
+
+    All that share forces arrive together. Marks in slowed (n,) whom it slows, writes into changes (k,) how the energy of each such island
+    changes [J], and returns how many these are.
+    """
+    # Island by island, in order of their first bodies.
+    order, count = np.empty(brought.shape[0], np.int64), 0
+    for i in brought:
+        if limiter.under_contact[i] and limiter.closed[i]:
+            place = count
+            while place > 0 and limiter.sharing[order[place - 1]] > limiter.sharing[i]:
+                order[place] = order[place - 1]
+                place -= 1
+            order[place] = i
+            count += 1
+    before = np.empty((count, 6))
+    begin, done = 0, 0
+    while begin < count:
+        first, end = limiter.sharing[order[begin]], begin
+        while end < count and limiter.sharing[order[end]] == first:
+            end += 1
+        members = order[begin:end]
+        gained = _gained(limiter, bodies, constants, trajectory, members, time)
+        if gained > limiter.gain * kinetic_energy(bodies, constants, members):
+            for n in range(begin, end):
+                for k in range(3):
+                    before[n, k], before[n, 3 + k] = bodies.velocity[order[n], k], bodies.angular_velocity[order[n], k]
+            ground = Ground(limiter.ground_rank[first], row(limiter.ground_velocity, first), row(limiter.ground_axis, first))
+            changes[done] = _slow_down(bodies, constants, members, gained, ground)
+            done += 1
+            for n in range(begin, end):
+                slowed[order[n]] = True
+                for k in range(3):
+                    # Frames on the way have their share of it.
+                    limiter.correction[order[n], k] += bodies.velocity[order[n], k] - before[n, k]
+                    limiter.correction[order[n], 3 + k] += bodies.angular_velocity[order[n], k] - before[n, 3 + k]
+        begin = end
+    return done
+
+
+@jit
+def _gained(limiter, bodies, constants, trajectory, members, time):
+    """What members gained since they share their forces, as their ground sees it, J."""
+    begun, moved, first = 0.0, 0.0, limiter.sharing[members[0]]
+    U = row(limiter.ground_velocity, first)
+    for i in members:
+        begun += limiter.energy_at_start[i]
+        change = subtract(row(bodies.velocity, i), row(trajectory.velocity, i))
+        change = along(change, -(time - trajectory.start[i]), row(constants.steady_acceleration, i))
+        moved += constants.mass[i] * dot(change, U)
+    return mechanical_energy(bodies, constants, members) - begun - moved
+
+
+@jit
+def _slow_down(bodies, constants, members, energy, ground):
+    """Take energy [J], seen from the ground, off the members' motion; returns how their kinetic energy changes, J."""
+    before = kinetic_energy(bodies, constants, members)
+    for i in members:
+        for k in range(3):
+            bodies.velocity[i, k] -= ground.velocity[k]
+    take_off(bodies, constants.mass, members, energy, ground)
+    for i in members:
+        for k in range(3):
+            bodies.velocity[i, k] += ground.velocity[k]
+    return kinetic_energy(bodies, constants, members) - before
+
+
+@jit
+def take_off(bodies, mass, members, energy, ground):
+    """Take energy [J], or all there is, off how the members move against each other or the ground, which stands."""
+    X, V, W = _common_motion(bodies, mass, members, ground)
+    available = 0.0
+    for i in members:
+        dv, dw = _against(bodies, i, X, V, W)
+        available += mass[i] * dot(dv, dv) + dot(dw, _solved(_matrix(bodies.inv_inertia, i), dw))
+    available *= 0.5
+    if not available > 0.0:
+        return
+    share = sqrt(max(1.0 - energy / available, 0.0))
+    for i in members:
+        dv, dw = _against(bodies, i, X, V, W)
+        v = along(V, 1.0, cross(W, subtract(row(bodies.position, i), X)))
+        for k in range(3):
+            bodies.velocity[i, k] = v[k] + share * dv[k]
+            bodies.angular_velocity[i, k] = W[k] + share * dw[k]
+
+
+@jit
+def _against(bodies, i, X, V, W):
+    """Return dv, dw: how body i moves against the common motion."""
+    v = along(V, 1.0, cross(W, subtract(row(bodies.position, i), X)))
+    return subtract(row(bodies.velocity, i), v), subtract(row(bodies.angular_velocity, i), W)
+
+
+@jit
+def _common_motion(bodies, mass, members, ground):
+    """Return X, V, W: the centre of mass, and the part of the common motion that no push of the ground changes."""
+    M, X, P = 0.0, AT_REST, AT_REST
+    for i in members:
+        M += mass[i]
+        X = along(X, mass[i], row(bodies.position, i))
+        P = along(P, mass[i], row(bodies.velocity, i))
+    X, axis = scaled(X, 1.0 / M), ground.axis
+    if ground.rank > 2:
+        return X, AT_REST, AT_REST
+    if ground.rank == 2:
+        return X, scaled(axis, dot(axis, P) / M), AT_REST
+    L, J = _turning(bodies, mass, members, X)
+    if ground.rank == 1:
+        turn = dot(axis, L) / dot(axis, _times(J, axis))
+        return X, scaled(along(P, -dot(axis, P), axis), 1.0 / M), scaled(axis, turn)
+    return X, scaled(P, 1.0 / M), _solved(J, L)
+
+
+@jit
+def _turning(bodies, mass, members, X):
+    """Return the angular momentum about X and the inertia of the members as one body, a symmetric matrix."""
+    L, J = AT_REST, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for i in members:
+        m, r = mass[i], subtract(row(bodies.position, i), X)
+        inverse = _matrix(bodies.inv_inertia, i)
+        L = along(along(L, m, cross(r, row(bodies.velocity, i))), 1.0, _solved(inverse, row(bodies.angular_velocity, i)))
+        x, y = _solved(inverse, (1.0, 0.0, 0.0)), _solved(inverse, (0.0, 1.0, 0.0))
+        z = _solved(inverse, (0.0, 0.0, 1.0))
+        J = (
+            J[0] + x[0] + m * (r[1] * r[1] + r[2] * r[2]),
+            J[1] + x[1] - m * r[0] * r[1],
+            J[2] + x[2] - m * r[0] * r[2],
+            J[3] + y[1] + m * (r[0] * r[0] + r[2] * r[2]),
+            J[4] + y[2] - m * r[1] * r[2],
+            J[5] + z[2] + m * (r[0] * r[0] + r[1] * r[1]),
+        )
+    return L, J
+
+
+# -- symmetric matrices of three dimensions: xx, xy, xz, yy, yz, zz ----------------------------------------------------
+
+
+@jit
+def _matrix(matrices, i):
+    """Return matrices[i] of an array (n, 3, 3)."""
+    return (matrices[i, 0, 0], matrices[i, 0, 1], matrices[i, 0, 2], matrices[i, 1, 1], matrices[i, 1, 2], matrices[i, 2, 2])
+
+
+@jit
+def _times(A, b):
+    """Return A b."""
+    return (
+        A[0] * b[0] + A[1] * b[1] + A[2] * b[2],
+        A[1] * b[0] + A[3] * b[1] + A[4] * b[2],
+        A[2] * b[0] + A[4] * b[1] + A[5] * b[2],
+    )
+
+
+@jit
+def _solved(A, b):
+    """Return x, A x = b, of a positive definite A = C C^T, by Cholesky's factor C."""
+    xx = sqrt(A[0])
+    yx, zx = A[1] / xx, A[2] / xx
+    yy = sqrt(A[3] - yx * yx)
+    zy = (A[4] - zx * yx) / yy
+    zz = sqrt(A[5] - zx * zx - zy * zy)
+    p = b[0] / xx
+    q = (b[1] - yx * p) / yy
+    r = (b[2] - zx * p - zy * q) / zz
+    z = r / zz
+    y = (q - zy * z) / yy
+    return (p - yx * y - zx * z) / xx, y, z

@@ -2,113 +2,214 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.energy import kinetic_energy
 from rigidimpulse.dynamics.impact.kinematic import respond_kinematic
 from rigidimpulse.dynamics.impact.point import speed_scale
 from rigidimpulse.dynamics.impact.restitution import LAWS, ImpactRule
 from rigidimpulse.dynamics.impact.sequence import respond_sequential, respond_simultaneous
-from rigidimpulse.engine.islands import classify
+from rigidimpulse.engine.islands import classify, forces_of
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
+from rigidimpulse.model.contact_memory import claimed_place, place_of
 from rigidimpulse.model.contacts import Contacts, select
 from rigidimpulse.model.island import Island
 
-KERNELS = {
-    "sequential": respond_sequential,
-    "simultaneous": respond_simultaneous,
-    "kinematic": respond_kinematic,
-}
+SEQUENTIAL, SIMULTANEOUS, KINEMATIC = 0, 1, 2
+RESPONSES = {"sequential": SEQUENTIAL, "simultaneous": SIMULTANEOUS, "kinematic": KINEMATIC}
+"""Numbers of the responses in kernels."""
 REASONS = {
     "sequential": "impacts pair after pair, fastest first; points of a pair together",
     "simultaneous": "all impacts of touching bodies at once",
     "kinematic": "normal velocity reflected, masses and spins ignored",
 }
-# Approach speed that counts as none, relative to the speed below which contacts are held.
+WITHOUT_REBOUND_REMEDY = "too many impacts at one instant; try response='simultaneous'"
+# Approach speed that counts as none, relative to the speed of the island, and to the speed below which contacts are held.
+APPROACH = TOLERANCES.contact.approach
 SLOW = TOLERANCES.contact.slow_approach
 # Calls with a full log before a group is given up.
 MAX_CALLS = 1000
 # Impacts in a row, without a gap worth the name between them, after which a pair no longer rebounds.
 COLLAPSE_REBOUNDS = 8
-NEVER = (-np.inf, np.inf, 0)
+
+
+class Response(NamedTuple):
+    """How an island responds to impacts."""
+
+    kind: int  # one of RESPONSES
+    together: bool  # whether its contacts are one block, see `sequence`
+
+
+class LiveContacts(NamedTuple):
+    """The contacts of an island that are near enough for an impact now."""
+
+    which: np.ndarray  # (k,) their places among the contacts of the island
+    contacts: Contacts
+    rule: ImpactRule
+    approach: bool  # whether one of them approaches
+    collapse: bool  # whether one of them collapses
+
+
+class Impacts(NamedTuple):
+    """What impacts did."""
+
+    log: np.ndarray  # (k, 7) see `point.log_impact`; contacts are numbered as in the island
+    count: int  # rows of it that are written
+    energy: float  # J, change of the kinetic energy
+    capped: bool  # whether there were too many, so that the last one was inelastic
 
 
 def respond(run: Run, _pair_events: PairEvents, island: Island) -> None:
     """Apply the impulses of the island's approaching contacts, by the response and the law of restitution of the run's accuracy."""
-    accuracy = run.world.accuracy
-    respond_to_impacts(run, island, KERNELS[accuracy.response], LAWS[accuracy.restitution])
-
-
-def respond_to_impacts(run: Run, island: Island, kernel: Callable[..., tuple[int, int, bool]], law: int) -> None:
-    """Apply the impulses of the group's approaching contacts and log them."""
-    collapses = _collapsing(run, island)
-    live = (island.live | collapses).nonzero()[0]
-    if not len(live):
+    accuracy, state, number, contacts = run.world.accuracy, run.state, run.world.num_bodies, island.contacts
+    collapses = find_collapsing(state.memory, number, contacts)
+    live = find_live(state.now, contacts, island.live, island.speeds, collapses, LAWS[accuracy.restitution])
+    island.zero_speed, island.scale = live.rule.tolerance, live.rule.scale
+    if not live.approach:
         return
-    contacts = island.contacts if len(live) == len(island.live) else select(island.contacts, live)
-    rest_speed = np.where(collapses, np.inf, island.rest_speed)[live]
-    scale = speed_scale(run.state.now, contacts)
-    tolerance = TOLERANCES.contact.approach * scale + SLOW * float(island.rest_speed[live].max())
-    island.zero_speed, island.scale = tolerance, scale
-    if island.approach[live].min() >= -tolerance:
-        return
-    now = run.state.now
-    before = kinetic_energy(now, run.world, island.members)
-    joints = run.joints.impact_block(run, island) if len(island.joints) else None
-    together = len(live) > 1 and (bool(collapses.any()) or _bear_each_other(run, island))
-    rule = ImpactRule(law, rest_speed, tolerance, scale)
-    for _ in range(MAX_CALLS):
-        count, _, capped = kernel(
-            now, contacts, rule, together, run.column, joints, run.impact_log
+    together = live.collapse or bear_each_other(contacts, run.world.dynamic, forces_of(run, contacts, island.touching))
+    done = resolve_impacts(
+        state.now, run.world.constants, island.members, live, Response(RESPONSES[accuracy.response], together), run.column,
+        run.joints.impact_block(run, island) if len(island.joints) else None, run.impact_log,
+    )  # fmt: skip
+    run.log.add_impacts(island.time, contacts, state.now.position, done.log, done.count)
+    state.remember(len(contacts.gap))
+    remember_rebounds(state.memory, number, island.time, contacts, island.contact_margin, done.log[: done.count])
+    if done.capped:
+        names = tuple(run.world.names[i] for i in island.members)
+        run.log.report(
+            island.time, "impacts finished without rebound", names, WITHOUT_REBOUND_REMEDY
         )
-        run.log.impacts.add(island.time, contacts, now.position, run.impact_log, count)
-        _remember_rebounds(run, island, contacts, run.impact_log[:count])
-        if capped:
-            names = tuple(run.world.names[i] for i in island.members)
-            run.log.report(
-                island.time, "impacts finished without rebound", names,
-                "too many impacts at one instant; try response='simultaneous'",
-            )
-        if not count or count + len(contacts.gap) < len(run.impact_log):
-            break
-    run.log.account(island.time, "impact", kinetic_energy(now, run.world, island.members) - before)
+    run.log.account(island.time, "impact", done.energy)
     classify(run, island)
 
 
-def _bear_each_other(run: Run, island: Island) -> bool:
-    """Whether a contact between two movable bodies of the group carried load before."""
-    state, dynamic = run.state, run.world.dynamic
-    between = dynamic[island.contacts.body_a] & dynamic[island.contacts.body_b]
-    return any(state.force_of(island.keys[c])[0] > 0.0 for c in np.flatnonzero(between).tolist())
+@jit_making_arrays
+def find_live(bodies, contacts, live, speeds, collapses, law):
+    """The `LiveContacts` of an island with m contacts.
+
+    live (m,) bool: near enough for an impact; speeds (2, m) m/s: approach, and below which a rebound is none; collapses (m,) bool: from
+    `find_collapsing`, they are live too, and do not rebound; law: one of LAWS.
+    """
+    m, count, collapse = live.shape[0], 0, False
+    which = np.empty(m, np.int64)
+    for c in range(m):
+        if live[c] or collapses[c]:
+            which[count] = c
+            count += 1
+        collapse = collapse or collapses[c]
+    which = which[:count]
+    if count < m:
+        contacts = select(contacts, which)
+    rest_speed, scale, fastest_rest = np.empty(count), speed_scale(bodies, contacts), 0.0
+    for k in range(count):
+        c = which[k]
+        rest_speed[k] = inf if collapses[c] else speeds[1, c]
+        fastest_rest = max(fastest_rest, speeds[1, c])
+    tolerance, approach = APPROACH * scale + SLOW * fastest_rest, False
+    for k in range(count):
+        # A speed that is no number counts.
+        approach = approach or not speeds[0, which[k]] >= -tolerance
+    return LiveContacts(which, contacts, ImpactRule(law, rest_speed, tolerance, scale), approach, collapse)
 
 
-def _collapsing(run: Run, island: Island) -> np.ndarray:
-    """Contacts (m,) of pairs that came back RATTLES times in a row without ever having been farther apart than the held gap.
+@jit_making_arrays
+def resolve_impacts(bodies, constants, members, live, response, number, joints, log):
+    """Apply the impulses of `LiveContacts`; returns the `Impacts`.
+
+    constants: `World.constants`; members (k,): movable bodies of the island; response: a `Response`; number (n,): working memory; joints:
+    None, or the `JointBlock` of the island; log (k, 7): working memory, the returned log where it is long enough.
+    """
+    before, m = kinetic_energy(bodies, constants, members), live.which.shape[0]
+    # Each call gets a log of this size, and is repeated where it fills it.
+    size, count, capped = max(log.shape[0], 2 * m), np.int64(0), False
+    for _ in range(MAX_CALLS):
+        log = _with_room(log, count, size)
+        made, stopped = _respond(bodies, live, response, number, joints, log[count : count + size])
+        count += made
+        capped = capped or stopped
+        if made == 0 or made + m < size:
+            break
+    for row in range(count):
+        log[row, 0] = live.which[np.int64(log[row, 0])]
+    return Impacts(log, count, kinetic_energy(bodies, constants, members) - before, capped)
+
+
+@jit_making_arrays
+def _respond(bodies, live, response, number, joints, log):
+    """Apply impulses until the log is full or nothing approaches; returns the rows written, and whether there were too many impulses."""
+    contacts, rule, together = live.contacts, live.rule, response.together
+    if response.kind == KINEMATIC:
+        count, _, capped = respond_kinematic(bodies, contacts, rule, together, number, joints, log)
+    elif response.kind == SIMULTANEOUS:
+        count, _, capped = respond_simultaneous(bodies, contacts, rule, together, number, joints, log)
+    else:
+        count, _, capped = respond_sequential(bodies, contacts, rule, together, number, joints, log)
+    return count, capped
+
+
+@jit_making_arrays
+def _with_room(log, count, size):
+    """A log of the same first rows with room for `size` more; the same one where it has the room."""
+    if count + size <= log.shape[0]:
+        return log
+    longer = np.empty((2 * count + size, log.shape[1]))
+    for row in range(count):
+        for k in range(log.shape[1]):
+            longer[row, k] = log[row, k]
+    return longer
+
+
+@jit
+def bear_each_other(contacts, dynamic, force):
+    """Whether a contact between two movable bodies carried load before; dynamic (n,) bool; force (m, 3) N, in the contacts' frames."""
+    for c in range(force.shape[0]):
+        if force[c, 0] > 0.0 and dynamic[contacts.body_a[c]] and dynamic[contacts.body_b[c]]:
+            return True
+    return False
+
+
+@jit_making_arrays
+def find_collapsing(memory, number, contacts):
+    """Contacts (m,) of pairs that came back COLLAPSE_REBOUNDS times in a row without ever having been farther apart than the held gap.
 
     Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
     a bouncing ball they are replaced by one inelastic impact, of all that rattle together: pair after pair, a light body would stop
     heavy ones in as many impacts as their masses' ratio, and each impact would be followed by the next. A body between two others hits
     them in turn, so pairs on their way rattle as soon as one does.
+
+    memory: the `ContactMemory`; number: of bodies.
     """
-    contacts, rebounds = island.contacts, run.state.rebounds
-    pairs = zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)
-    count = np.array([rebounds.get(pair, NEVER)[2] for pair in pairs], np.int64)
-    count[contacts.restitution >= 1.0] = 0
-    return count >= (COLLAPSE_REBOUNDS // 2 if (count >= COLLAPSE_REBOUNDS).any() else COLLAPSE_REBOUNDS)
+    m, least = contacts.gap.shape[0], COLLAPSE_REBOUNDS
+    count, collapses = np.zeros(m, np.int64), np.empty(m, np.bool_)
+    for c in range(m):
+        key = contacts.body_a[c] * number + contacts.body_b[c]
+        at = place_of(memory, key)
+        if memory.key[at] == key and contacts.restitution[c] < 1.0:
+            count[c] = memory.count[at]
+        if count[c] >= COLLAPSE_REBOUNDS:
+            least = COLLAPSE_REBOUNDS // 2
+    for c in range(m):
+        collapses[c] = count[c] >= least
+    return collapses
 
 
-def _remember_rebounds(run: Run, island: Island, contacts: Contacts, rows: np.ndarray) -> None:
-    """Count for each pair how often in a row it came back after less than its held gap."""
-    pairs = zip(island.contacts.body_a.tolist(), island.contacts.body_b.tolist())
-    contact_margin = dict(zip(pairs, island.contact_margin))
-    for row in rows:
-        c = int(row[0])
-        pair = (int(contacts.body_a[c]), int(contacts.body_b[c]))
-        last, speed, count = run.state.rebounds.get(pair, NEVER)
-        if island.time > last:
-            count = count + 1 if speed * (island.time - last) < contact_margin[pair] else 0
-        run.state.rebounds[pair] = (island.time, float(row[6]), count)
+@jit
+def remember_rebounds(memory, number, time, contacts, contact_margin, log):
+    """Count for each pair how often in a row it came back after less than its held gap.
+
+    memory: the `ContactMemory`, which must have room; number: of bodies; contact_margin (m,) m; log (k, 7): of impacts at `time`.
+    """
+    for row in range(log.shape[0]):
+        c = np.int64(log[row, 0])
+        at = claimed_place(memory, contacts.body_a[c] * number + contacts.body_b[c])
+        if time > memory.time[at]:
+            is_short = memory.speed[at] * (time - memory.time[at]) < contact_margin[c]
+            memory.count[at] = memory.count[at] + 1 if is_short else 0
+        memory.time[at], memory.speed[at] = time, log[row, 6]

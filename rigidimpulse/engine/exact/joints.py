@@ -99,6 +99,11 @@ class JointState:
         found = {j for i in bodies for j in self._of_body.get(int(i), ()) if self.whole[j]}
         return np.array(sorted(found), np.int64)
 
+    def links(self) -> np.ndarray:
+        """Bodies (l, 2) that whole joints join."""
+        both = np.column_stack([self.table.body_a, self.table.body_b])
+        return both[self.whole & np.all(both >= 0, axis=1)]
+
     def movable_end(self, joint: int) -> int:
         """A dynamic body of a joint."""
         a, b = int(self.table.body_a[joint]), int(self.table.body_b[joint])
@@ -114,9 +119,10 @@ class JointState:
         rows = np.isin(self._joint_of_row, which)
         return bool(np.all(np.isinf(self.table.stiffness[rows])))
 
-    def hold_to_world(self, which: np.ndarray) -> bool:
-        """Whether one of the joints is fixed to the world."""
-        return bool(np.any(self.table.body_a[which] < 0) or np.any(self.table.body_b[which] < 0))
+    def supports_of(self, which: np.ndarray) -> np.ndarray:
+        """Ends of the joints that are not dynamic, in order, -1 for the world."""
+        ends = np.unique(np.concatenate([self.table.body_a[which], self.table.body_b[which]]))
+        return ends[(ends < 0) | ~self._dynamic[ends]]
 
     def moving_bodies(self, run: Run) -> np.ndarray:
         """Dynamic bodies with joints that do not rest."""
@@ -130,7 +136,7 @@ class JointState:
         elapsed = np.zeros(len(self.whole))
         elapsed[which] = island.time - self.began[which]
         self.moment[which] = 0.0
-        before = mechanical_energy(now, run.world, members)
+        before = mechanical_energy(now, run.world.constants, members)
         arrived = np.hstack([now.velocity[members], now.angular_velocity[members]])
         for i in members:
             held = memory.wrench[i] * max(elapsed[j] for j in self.at([i])) if int(i) in self._of_body else np.zeros(6)
@@ -148,9 +154,9 @@ class JointState:
             stop_at_limits(jointed, self.shock)
         memory.wrench[members] = 0.0
         self.length[which] = elapsed[which]
-        after = mechanical_energy(now, run.world, members)
+        after = mechanical_energy(now, run.world.constants, members)
         run.log.account(island.time, "joints", after - before)
-        self._note_drift(which, after, kinetic_energy(now, run.world, members))
+        self._note_drift(which, after, kinetic_energy(now, run.world.constants, members))
 
     def _note_drift(self, which: np.ndarray, energy: float, kinetic: float) -> None:
         """What the sub-step that ends has made or lost of the energy that joints keep by themselves."""
@@ -267,7 +273,7 @@ class JointState:
         self._log(island, h)
         self.began[island.joints] = island.time
         if not len(island.contacts.gap) and island.free is None and self.are_passive(island.joints):
-            self._energy[island.joints] = mechanical_energy(state.now, run.world, island.members)
+            self._energy[island.joints] = mechanical_energy(state.now, run.world.constants, island.members)
         self._report(run, island, worst)
         self.are_closed = worst <= NOT_CLOSED * self._allowed
         return h, residual

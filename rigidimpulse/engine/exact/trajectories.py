@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, isnan
 
 import numpy as np
 
-from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.energy import mechanical_energy
 from rigidimpulse.engine.pair_events import PairEvents
@@ -19,8 +19,6 @@ HALF_KEPT = 0.55
 """Held contacts nearer than this part of the contact margin have half of their gap as impact margin."""
 LEAVING = TOLERANCES.events.leaving
 WHOLE = 1.0 - TOLERANCES.events.whole
-NOTHING = np.zeros(3)
-NO_LOAD = Load(NOTHING, NOTHING, NOTHING, NOTHING)
 
 
 def begin_trajectories(run: Run, pair_events: PairEvents, island: Island) -> None:
@@ -58,36 +56,55 @@ def begin_trajectory(run: Run, pair_events: PairEvents, i: int, time: float, wre
         rests = True
     run.recorder.flush(trajectory, i, time, state.correction[i])
     state.correction[i] = 0.0
-    run.contact_log.close([i], time)
+    run.contact_log.close(np.array([i]), time)
     run.forces.log.end(i, time)
     account_contact_work(run, i, time)
-    pressed = not rests and bool(wrench.any())
-    if rests:
-        now.velocity[i] = now.angular_velocity[i] = 0.0
-        take(trajectory, i, time, now, NO_LOAD, FIXED)
-    elif run.forces.acts[i]:
+    if run.forces.acts[i] and not rests:
         total, rate = wrench + run.forces.value[i], run.forces.rate[i]
         acceleration, jerk = world.steady_acceleration[i] + world.inv_mass[i] * total[:3], world.inv_mass[i] * rate[:3]
         turned = total[3:].any() or rate[3:].any()
         take(trajectory, i, time, now, Load(acceleration, total[3:], jerk, rate[3:]), FORCED if turned else FREE)
+        pressed = bool(wrench.any())
     else:
-        acceleration = world.steady_acceleration[i]
-        if pressed:
-            acceleration = acceleration + world.inv_mass[i] * wrench[:3]
-        turned = pressed and wrench[3:].any()
-        take(trajectory, i, time, now, Load(acceleration, wrench[3:], NOTHING, NOTHING), FORCED if turned else FREE)
+        pressed = take_steady_load(run.motion, world.constants, i, time, wrench, rests)
     state.under_contact[i] = pressed
     if pressed:
-        state.energy_at_start[i] = mechanical_energy(now, world, np.array([i])) - work_of_forces(run, i)
+        state.limiter.energy_at_start[i] = mechanical_energy(now, world.constants, np.array([i])) - work_of_forces(run, i)
     pair_events.trajectory_changed(i, time)
+
+
+@jit_making_arrays
+def take_steady_load(motion, constants, i, time, wrench, rests):
+    """Let body i go on from its present state at `time` under its steady load and a constant wrench (6,), or stay where it rests.
+
+    Returns whether the wrench presses it.
+    """
+    now, zero, acceleration, torque = motion.now, np.zeros(3), np.empty(3), np.empty(3)
+    pressed, turned = False, False
+    for k in range(3):
+        pressed = pressed or wrench[k] != 0.0 or wrench[3 + k] != 0.0
+        turned = turned or wrench[3 + k] != 0.0
+        torque[k] = wrench[3 + k]
+        if rests:
+            now.velocity[i, k] = now.angular_velocity[i, k] = 0.0
+    if rests:
+        take(motion.trajectory, i, time, now, Load(zero, zero, zero, zero), FIXED)
+        return False
+    for k in range(3):
+        acceleration[k] = constants.steady_acceleration[i, k]
+        if pressed:
+            acceleration[k] += now.inv_mass[i] * wrench[k]
+    take(motion.trajectory, i, time, now, Load(acceleration, torque, zero, zero), FORCED if turned else FREE)
+    return pressed
 
 
 def account_contact_work(run: Run, i: int, time: float) -> None:
     """Work that contact forces did along the trajectory that ends: what its energy changed by."""
-    arrival = run.state.end_energy.pop(i, None)
-    if arrival is not None:
-        begun, arrival = run.state.energy_at_start[i], arrival - work_of_forces(run, i)
-        run.log.stretches.append((run.state.trajectory.start[i], time, i, begun, arrival - begun))
+    limiter = run.state.limiter
+    begun, arrival = limiter.energy_at_start[i], limiter.end_energy[i]
+    if not isnan(arrival):
+        limiter.end_energy[i] = np.nan
+        run.log.add_stretch(run.state.trajectory.start[i], time, i, begun, arrival - work_of_forces(run, i) - begun)
 
 
 def work_of_forces(run: Run, i: int) -> float:
@@ -97,14 +114,12 @@ def work_of_forces(run: Run, i: int) -> float:
 
 def set_margins(run: Run, pair_events: PairEvents, island: Island) -> None:
     """Gaps at which the island's pairs come to contact next."""
-    if len(island.place):
-        held = np.zeros(len(island.place), bool) if island.held is None else island.held
-        pairs, dynamic = pair_events.pairs, run.world.dynamic
-        set_impact_margins(pairs, island.place, island.contacts.gap, held, island.time, dynamic, pair_events.inside)
+    held = np.zeros(len(island.place), bool) if island.held is None else island.held
+    set_impact_margins(pair_events.table, island.place, island.contacts.gap, held, island.time, run.world.dynamic)
 
 
 @jit
-def set_impact_margins(pairs, place, gap, held, time, dynamic, inside):
+def set_impact_margins(table, place, gap, held, time, dynamic):
     """Held pairs are guarded at half their gap, leaving ones where they are; place, gap, held (m,) of contacts, pair after pair."""
     first = 0
     while first < place.shape[0]:
@@ -113,11 +128,12 @@ def set_impact_margins(pairs, place, gap, held, time, dynamic, inside):
             nearest, is_held = min(nearest, gap[last]), is_held or held[last]
             last += 1
         first = last
-        contact_margin, impact_margin = pairs.contact_margin[p], pairs.least_impact_margin[p]
+        pair = table.pairs[p]
+        impact_margin = pair.least_impact_margin
         if is_held:
-            impact_margin = 0.5 * contact_margin if nearest > HALF_KEPT * contact_margin else 0.5 * nearest
+            impact_margin = 0.5 * pair.contact_margin if nearest > HALF_KEPT * pair.contact_margin else 0.5 * nearest
         elif nearest <= impact_margin:
             impact_margin = nearest * (1.0 - LEAVING) if impact_margin > 0.0 else min(nearest, 0.0)
-        if impact_margin != pairs.impact_margin[p]:
-            pairs.impact_margin[p] = impact_margin
-            sweep_pair_again(pairs, p, time, dynamic, inside)
+        if impact_margin != pair.impact_margin:
+            pair.impact_margin = impact_margin
+            sweep_pair_again(table, p, time, dynamic)

@@ -11,77 +11,118 @@ J_1 = J_0 and nothing would change: such islands do without.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from rigidimpulse.core.vector import cross_arrays
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import SLIP, SOLVE_TOLERANCE
-from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows, row_velocities, solve_with_slip
-from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows, row_velocities
+from rigidimpulse.dynamics.constraints.slip import solve_with_slip
 from rigidimpulse.engine.run import Run
-from rigidimpulse.model.contacts import Contacts, select
+from rigidimpulse.model.contact_memory import find_force, held_row
+from rigidimpulse.model.contacts import select
 from rigidimpulse.model.island import Island
-from rigidimpulse.model.state import PairForce, State
+
+TINY = TOLERANCES.arithmetic.least_divisor
 
 
-def remember_forces(
-    state: State, time: float, keys: list[tuple[int, ...]], contacts: Contacts, force: np.ndarray, world_force: np.ndarray,
-    slides: np.ndarray,
-) -> None:
-    """Keep the forces of m contacts from `time` on: force (m, 3) in their frames, world_force (m, 3) N on b, slides (m,) bool."""
-    torque_a = cross_arrays(contacts.arm_a, world_force)
-    torque_b = cross_arrays(contacts.arm_b, world_force)
-    for pair in sorted(set(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True))):
-        at = np.flatnonzero((contacts.body_a == pair[0]) & (contacts.body_b == pair[1]))
-        pull = world_force[at].sum(axis=0)
-        state.pair_force[pair] = PairForce(
-            time,
-            -np.concatenate([pull, torque_a[at].sum(axis=0)]),
-            np.concatenate([pull, torque_b[at].sum(axis=0)]),
-            {keys[c]: force[c] for c in at},
-            frozenset(keys[c] for c in at if slides[c]),
-        )
+class ProjectionScratch(NamedTuple):
+    """Arrays of n bodies that a projection writes into."""
+
+    number: np.ndarray  # (n,) working memory: the number of each member among the members
+    correction: np.ndarray  # (n, 6) change of velocity and spin that a body got at the end of its sub-step
 
 
-def forget_forces(state: State, contacts: Contacts) -> None:
-    """Whatever acted between the bodies of these contacts does not any more."""
-    for pair in set(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)):
-        state.pair_force.pop(pair, None)
+@jit
+def _ends(memory, row, start, a, b, time):
+    """Whether the forces of a held pair end at `time`, with neither body on a new trajectory since they began."""
+    if row < 0:
+        return False
+    began = memory.held[row].start
+    return max(start[a], start[b]) <= began and began < time
+
+
+@jit
+def _take_back(bodies, i, half, wrench):
+    """Take half [s] of a wrench (6,) off the velocities of body i."""
+    inv_mass, inv_inertia = bodies.inv_mass[i], bodies.inv_inertia[i]
+    for k in range(3):
+        bodies.velocity[i, k] -= half * inv_mass * wrench[k]
+        turn = inv_inertia[k, 0] * wrench[3] + inv_inertia[k, 1] * wrench[4] + inv_inertia[k, 2] * wrench[5]
+        bodies.angular_velocity[i, k] -= half * turn
+
+
+@jit_making_arrays
+def _stop(bodies, contacts, members, number, slides):
+    """The impulses nu of contacts; slides (m,) bool: those that slip."""
+    of_contacts = contact_rows(bodies, contacts, members, number, 0)
+    rows = of_contacts.rows
+    row_velocities(bodies, contacts, of_contacts.first_row, of_contacts.frames, rows.bias)
+    scale = TINY
+    for i in range(rows.bias.shape[0]):
+        scale = max(scale, abs(rows.bias[i]))
+    solve_with_slip(None, of_contacts, members.shape[0], contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale)
+    change_velocities(bodies, members, rows)
+
+
+@jit_making_arrays
+def take_back_and_stop(memory, motion, contacts, touching, held, time, members, number):
+    """End the sub-steps of an island's pairs at `time` [s]; returns whether there were any.
+
+    motion: `touching.Motion`; touching: what touches at the contacts; held (m,) bool: those that may have carried forces;
+    number (n,): working memory.
+    """
+    bodies, start = motion.now, motion.trajectory.start
+    m, n = contacts.gap.shape[0], start.shape[0]
+    which, slides = np.empty(m, np.int64), np.zeros(m, np.bool_)
+    count, first = np.int64(0), np.int64(0)
+    while first < m:
+        a, b, last, any_held = contacts.body_a[first], contacts.body_b[first], first, False
+        while last < m and contacts.body_a[last] == a and contacts.body_b[last] == b:
+            any_held = any_held or held[last]
+            last += 1
+        row = held_row(memory, a * n + b) if any_held else np.int64(-1)
+        if _ends(memory, row, start, a, b, time):
+            pair = memory.held[row]
+            half = 0.5 * (time - pair.start)
+            _take_back(bodies, a, half, pair.on_a)
+            _take_back(bodies, b, half, pair.on_b)
+            for c in range(first, last):
+                if held[c]:
+                    entry = find_force(memory, row, touching.kind[c], touching.feature[c, 0], touching.feature[c, 1])
+                    # What has just come to touch slips if its pair does.
+                    slides[count] = memory.force[entry].slips if entry >= 0 else pair.slips
+                    which[count] = c
+                    count += 1
+            pair.start = np.nan
+        first = last
+    if count > 0:
+        _stop(bodies, select(contacts, which[:count]), members, number, slides[:count])
+    return count > 0
+
+
+@jit_making_arrays
+def project(memory, motion, contacts, touching, held, time, members, scratch):
+    """The same, and what it changed of velocities and spins, into scratch.correction (n, 6); scratch: `ProjectionScratch`."""
+    bodies, k = motion.now, members.shape[0]
+    before = np.empty((k, 6))
+    for s in range(k):
+        for j in range(3):
+            before[s, j], before[s, 3 + j] = bodies.velocity[members[s], j], bodies.angular_velocity[members[s], j]
+    if not take_back_and_stop(memory, motion, contacts, touching, held, time, members, scratch.number):
+        return False
+    for s in range(k):
+        for j in range(3):
+            scratch.correction[members[s], j] = bodies.velocity[members[s], j] - before[s, j]
+            scratch.correction[members[s], 3 + j] = bodies.angular_velocity[members[s], j] - before[s, 3 + j]
+    return True
 
 
 def project_velocities(run: Run, island: Island) -> bool:
     """End the sub-steps of the island's pairs; returns whether there were any."""
-    state, now, contacts = run.state, run.state.now, island.contacts
-    start = state.trajectory.start
-    ended: dict[tuple[int, int], PairForce] = {}
-    held = island.slow()
-    for pair in set(zip(contacts.body_a[held].tolist(), contacts.body_b[held].tolist(), strict=True)):
-        entry = state.pair_force.get(pair)
-        if entry is not None and max(start[pair[0]], start[pair[1]]) <= entry.start < island.time:
-            ended[pair] = state.pair_force.pop(pair)
-    if not ended:
-        return False
-    before = np.hstack([now.velocity[island.members], now.angular_velocity[island.members]])
-    for pair, entry in sorted(ended.items()):
-        half = 0.5 * (island.time - entry.start)
-        for i, wrench in zip(pair, (entry.on_a, entry.on_b), strict=True):
-            now.velocity[i] -= half * now.inv_mass[i] * wrench[:3]
-            now.angular_velocity[i] -= half * now.inv_inertia[i] @ wrench[3:]
-    of_pair = [ended.get(pair) for pair in zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)]
-    which = np.array([c for c, entry in enumerate(of_pair) if entry is not None and held[c]], np.int64)
-    _stop(run, island, select(contacts, which), [(entry, island.keys[c]) for c in which if (entry := of_pair[c]) is not None])
-    state.correction[island.members] = np.hstack([now.velocity[island.members], now.angular_velocity[island.members]]) - before
-    return True
-
-
-def _stop(run: Run, island: Island, contacts: Contacts, entries: list[tuple[PairForce, tuple[int, ...]]]) -> None:
-    """The impulses nu of contacts; entries: for each the forces of its pair and its key."""
-    now, members = run.state.now, island.members
-    of_contacts = contact_rows(now, contacts, members, run.column, 0)
-    rows, first_row, frames = of_contacts
-    row_velocities(now, contacts, first_row, frames, rows.bias)
-    slides = np.array([key in entry.slides or (key not in entry.force and bool(entry.slides)) for entry, key in entries])
-    scale = float(np.abs(rows.bias).max(initial=np.finfo(float).tiny))
-    solve_with_slip(
-        solve_newton, of_contacts, len(members), contacts, slides, SOLVE_TOLERANCE * scale, SLIP * scale
+    return project(
+        run.state.memory, run.motion, island.contacts, island.touching, island.slow(), island.time, island.members,
+        ProjectionScratch(run.column, run.state.correction),
     )
-    change_velocities(now, members, rows)

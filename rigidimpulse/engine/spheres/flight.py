@@ -21,6 +21,7 @@ from rigidimpulse.engine.spheres.layout import AT_BOUNDARY, AT_ONCE
 from rigidimpulse.engine.spheres.motion import write_frames
 from rigidimpulse.engine.spheres.paths import place_planes, write_path
 from rigidimpulse.engine.spheres.table import fill_table, renew, time_waiting, touches_more
+from rigidimpulse.model.contact_memory import has_room
 from rigidimpulse.motion.trajectory import FIXED
 
 LONGEST = 4096
@@ -66,7 +67,7 @@ def _rebound(fixed, motion, table, record, rebounds, p, time):
 @jit
 def _has_capacity(record, rebounds):
     """Whether one more impact can be kept."""
-    return record.count[0] < len(record.energy) and 2 * rebounds.used[0] < len(rebounds.key)
+    return record.count[0] < len(record.energy) and has_room(rebounds, 1)
 
 
 @jit

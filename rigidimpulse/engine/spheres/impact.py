@@ -29,6 +29,7 @@ from rigidimpulse.engine.pair_table import MARGIN
 from rigidimpulse.engine.spheres.layout import PLANE
 from rigidimpulse.engine.spheres.motion import begin_free_trajectory, bring_ball, write_frames
 from rigidimpulse.engine.spheres.paths import GAP, KIND, MOVES, RADIUS
+from rigidimpulse.model.contact_memory import place_of, remember_rebound
 from rigidimpulse.recording.events import write_impacts
 
 _APPROACH = TOLERANCES.contact.approach
@@ -36,34 +37,6 @@ _CLEAR = 2.0
 """How many times faster than what would be held a simple impact is."""
 _ROUND_OFF = TOLERANCES.time_of_impact.curved_pressure
 _NONE, _ONE = np.int64(0), np.int64(1)
-
-
-@jit
-def place_of(rebounds, key):
-    """Place of a key, or the free place where it belongs."""
-    last = len(rebounds.key) - 1
-    at = (key * np.int64(0x9E3779B97F4A7C1) >> 7) & last
-    while rebounds.key[at] >= 0 and rebounds.key[at] != key:
-        at = (at + 1) & last
-    return at
-
-
-@jit
-def remember(rebounds, key, time, speed, count):
-    """Keep the last rebound of a pair; there must be a free place."""
-    at = place_of(rebounds, key)
-    if rebounds.key[at] < 0:
-        rebounds.key[at] = key
-        rebounds.used[0] += 1
-    rebounds.time[at], rebounds.speed[at], rebounds.count[at] = time, speed, count
-
-
-@jit
-def copy_rebounds(source, target):
-    """Put all rebounds into a larger, empty table."""
-    for at in range(len(source.key)):
-        if source.key[at] >= 0:
-            remember(target, source.key[at], source.time[at], source.speed[at], source.count[at])
 
 
 @jit_making_arrays
@@ -189,7 +162,7 @@ def simple_impact(fixed, motion, record, rebounds, paths, planes, a, b, plane, t
     write_impacts(time, contacts, now.position, record.log, _ONE, record.rows, at)
     record.energy[at] = kinetic_of(now.velocity, now.angular_velocity, now.orientation, fixed.mass, fixed.inertia, members) - energy
     record.count[0] = at + 1
-    remember(rebounds, key, time, record.log[0, 6], _NONE)
+    remember_rebound(rebounds, key, time, record.log[0, 6], _NONE)
     for i in members:
         write_frames(motion.trajectory, record, i, i + 1, time)
         begin_free_trajectory(motion, i, time, fixed.steady[i])

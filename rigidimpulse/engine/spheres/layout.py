@@ -79,19 +79,3 @@ class SphereRecord(NamedTuple):
     contacts: Contacts  # of one contact
     log: np.ndarray  # (1, 7)
     members: np.ndarray  # (2,)
-
-
-class Rebounds(NamedTuple):
-    """The last rebound of each pair, by its key a n + b: open addressing, a power of two of places."""
-
-    key: np.ndarray  # (k,) -1 for a free place
-    time: np.ndarray  # (k,) s
-    speed: np.ndarray  # (k,) m/s
-    count: np.ndarray  # (k,) how many in a row were short
-    used: np.ndarray  # (1,)
-
-
-def make_rebounds(capacity: int) -> Rebounds:
-    """Make an empty table with so many places."""
-    integers = np.full((2, capacity), -1, np.int64)
-    return Rebounds(integers[0], np.full(capacity, -np.inf), np.zeros(capacity), integers[1] + 1, np.zeros(1, np.int64))

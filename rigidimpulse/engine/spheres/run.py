@@ -9,11 +9,11 @@ from rigidimpulse.engine.pair_table import NEAR, ROUND_OFF
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.spheres.effect import FULL, STEP, kinds
 from rigidimpulse.engine.spheres.flight import fly
-from rigidimpulse.engine.spheres.impact import copy_rebounds, remember
-from rigidimpulse.engine.spheres.layout import PLANE, Fixed, Motion, Rebounds, SphereRecord, Table, make_rebounds
+from rigidimpulse.engine.spheres.layout import PLANE, Fixed, Motion, SphereRecord, Table
 from rigidimpulse.engine.spheres.paths import BODY, DYNAMIC, GAP, KIND, LEVEL, PATH_SIZE, PLANE_SIZE, RADIUS
 from rigidimpulse.engine.spheres.queue import make_queue
 from rigidimpulse.engine.spheres.tree import make_tree
+from rigidimpulse.model.contact_memory import any_short_rebound, has_room
 from rigidimpulse.model.island import empty_contacts
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.events import ROW_LENGTH
@@ -46,7 +46,7 @@ class EventRun:
         self._motion = Motion(state.trajectory, state.now, state.rotation)
         self._pairs, self._rows = CAPACITY + world.num_bodies, CAPACITY
         self._table, self._book = self._make_table(), self._make_record()
-        self._rebounds, self._known = make_rebounds(2 * CAPACITY), 0
+        self._known = 0
         self._step_begin = 0.0
         gap = world.contact_margin
         self._live = LIVE * (NEAR + ROUND_OFF + 2.0 * world.accuracy.tolerance / gap)
@@ -90,7 +90,7 @@ class EventRun:
         how, number, interval_end = FULL, 0, -1.0
         while how == FULL:
             how, now, at_boundary, number, self._interval, interval_end = fly(
-                self._fixed, self._motion, self._table, self._book, self._rebounds, now, end, at_boundary, self._interval,
+                self._fixed, self._motion, self._table, self._book, run.state.memory, now, end, at_boundary, self._interval,
                 self._live, interval_end,
             )
             self._keep_impacts()
@@ -106,15 +106,10 @@ class EventRun:
     def _learn(self) -> None:
         """Take over the rebounds since the last flight, and what has become dynamic."""
         self._paths[:, DYNAMIC] = self._run.world.dynamic
-        rows = self._run.log.impacts
-        known = self._run.state.rebounds
-        for a, b in rows.rows[self._known : rows.count, 1:3].astype(np.int64).tolist():
-            if 2 * self._rebounds.used[0] >= len(self._rebounds.key):
-                self._grow_rebounds()
-            remember(self._rebounds, a * self._run.world.num_bodies + b, *known[a, b])
-            if known[a, b][2] > 0:
-                self._live = np.inf  # what came back fast may be dealt with before it touches
-        self._known = rows.count
+        impacts, run = self._run.log.impacts, self._run
+        if any_short_rebound(run.state.memory, run.world.num_bodies, impacts[self._known :]):
+            self._live = np.inf  # what came back fast may be dealt with before it touches
+        self._known = len(impacts)
 
     def _keep_impacts(self) -> None:
         """Hand impacts, their energies and rebounds to the run."""
@@ -122,18 +117,14 @@ class EventRun:
         if not count:
             return
         rows = self._book.rows[:count]
-        run.log.impacts.extend(rows)
-        self._known = run.log.impacts.count
-        times, speeds = rows[:, 0].tolist(), rows[:, 14].tolist()
-        run.log.energy.extend((t, "impact", e) for t, e in zip(times, self._book.energy[:count].tolist(), strict=True) if e != 0.0)
-        pairs = map(tuple, rows[:, 1:3].astype(np.int64).tolist())
-        run.state.rebounds.update((pair, (t, speed, 0)) for pair, t, speed in zip(pairs, times, speeds, strict=True))
+        run.log.extend_impacts(rows, self._book.energy[:count])
+        self._known = len(run.log.impacts)
         self._book.count[0] = 0
 
     def _grow(self) -> bool:
         """Make the table that is full larger; returns whether that is the one of events, which then has to be filled again."""
-        if 2 * self._rebounds.used[0] >= len(self._rebounds.key):
-            self._grow_rebounds()
+        if not has_room(self._run.state.memory, 1):
+            self._run.state.remember(1)
         elif self._table.count[0] >= len(self._table.first):
             self._pairs *= 2
             self._table = self._make_table()
@@ -142,11 +133,6 @@ class EventRun:
             self._rows = min(2 * self._rows, MOST_ROWS)
             self._book = self._make_record()
         return False
-
-    def _grow_rebounds(self) -> None:
-        old: Rebounds = self._rebounds
-        self._rebounds = make_rebounds(4 * len(old.key))
-        copy_rebounds(old, self._rebounds)
 
 
 def _constants(world: World) -> tuple[np.ndarray, np.ndarray]:

@@ -232,13 +232,13 @@ class SubsteppedIslands:
         world, trajectory, now = run.world, run.state.trajectory, run.state.now
         if not len(members):
             return
-        before = mechanical_energy(now, world, members)
+        before = mechanical_energy(now, world.constants, members)
         run.recorder.flush_all(trajectory, members, time)
         now.velocity[members] = now.angular_velocity[members] = 0.0
         trajectory.mode[members], trajectory.start[members] = FIXED, time
         trajectory.velocity[members] = trajectory.angular_velocity[members] = 0.0
         self.stepper.report_crossed(run, members, time)
-        run.log.account(time, "sub-stepping", mechanical_energy(now, world, members) - before)
+        run.log.account(time, "sub-stepping", mechanical_energy(now, world.constants, members) - before)
 
     def _end_trajectories(self, run: Run, members: np.ndarray, time: float) -> None:
         """Bring members to `time`, the end of their trajectories; account for what the step took of their energy."""
@@ -256,7 +256,7 @@ class SubsteppedIslands:
     def _account(self, run: Run, label: int, time: float) -> None:
         if label in self._began:
             start, members, energy = self._began.pop(label)
-            change = mechanical_energy(run.state.now, run.world, members) - energy
+            change = mechanical_energy(run.state.now, run.world.constants, members) - energy
             run.log.account_over(start, time, "sub-stepping", change)
 
     def finish(self, run: Run) -> None:
@@ -307,7 +307,7 @@ class SubsteppedIslands:
 
     def contact_forces(self, run: Run, pair_events: PairEvents, island: Island) -> None:
         """Step an island from its time to the end of the step, with what touches it and is slow."""
-        run.contact_log.close(island.members.tolist(), island.time)
+        run.contact_log.close(island.members, island.time)
         world, members = run.world, island.substepped
         assert members is not None
         if len(island.members):
@@ -332,7 +332,7 @@ class SubsteppedIslands:
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
             self._ends[label] = end
-            self._began[label] = island.time, mine, mechanical_energy(run.state.now, world, mine)
+            self._began[label] = island.time, mine, mechanical_energy(run.state.now, world.constants, mine)
         if len(fresh):
             self.stepper.move_apart(run, fresh)
         self._outcome = self.stepper.step(run, island.time, end)
@@ -344,9 +344,9 @@ class SubsteppedIslands:
         """What exact contact did to bodies ends where they come to a sub-stepped island."""
         self._taken[fresh] = True
         run.wrench[fresh] = 0.0
-        run.contact_log.close(fresh.tolist(), time)
+        run.contact_log.close(fresh, time)
+        note_end_energy(run.state.limiter, run.state.now, run.world.constants, fresh)
         for i in fresh[run.state.under_contact[fresh]].tolist():
-            note_end_energy(run, [i])
             account_contact_work(run, i, time)
             run.state.under_contact[i] = False
 

@@ -79,10 +79,10 @@ class Checkpointer:
 
     def _recall(self, run: Run, stored: Content) -> Run:
         """The run as its checkpoint left it."""
-        recorder, impacts = run.recorder, run.log.impacts
+        recorder, log = run.recorder, run.log
         for name, frames in stored.frames.items():
             getattr(recorder, name)[: len(frames)] = frames
-        impacts.rows = np.concatenate([stored.impacts, impacts.rows])
+        log.buffers = log.buffers._replace(impacts=np.concatenate([stored.impacts, log.buffers.impacts]))
         self._frames, self._impacts = len(stored.frames["position"]), len(stored.impacts)
         return thaw(stored.state or b"", _constants(run))
 
@@ -119,9 +119,8 @@ class Checkpointer:
 
     def _content(self, frames: int, time: float, state: bytes, tables: dict[str, Any] | None = None) -> Content:
         run = self.run
-        impacts = run.log.impacts
         recorded = {name: getattr(run.recorder, name)[:frames] for name in FRAMES}
-        return Content(recorded, impacts.rows[: impacts.count], time, state, tables is not None, tables or {})
+        return Content(recorded, run.log.impacts, time, state, tables is not None, tables or {})
 
     def finish(self, recording: Recording) -> None:
         """Add what only a finished run has, and say that it is complete."""
@@ -141,7 +140,7 @@ class Checkpointer:
 def _constants(run: Run) -> Constants:
     """Return the parts of a run that its checkpoints do not hold."""
     world, recorder = run.world, run.recorder
-    own = [run.plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), run.log.impacts.rows]
+    own = [run.plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), run.log.buffers.impacts]
     return Constants([world.scene, world.scene.bodies, world.scene.effects, world.shapes, world.geometry, *own])
 
 

@@ -1,0 +1,90 @@
+"""Rows of contacts that stick or slip: static friction where they stick, dynamic friction where they slip.
+
+What slips from the start has its dynamic friction. All others are solved with the static one; those that come to slip are given the
+dynamic one, and all are solved again.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rigidimpulse.core.kernels import jit, jit_making_arrays, jit_with_callbacks
+from rigidimpulse.dynamics.constraints.rows import Rows, multiply, multiply_transposed, rows_of
+from rigidimpulse.dynamics.solvers.newton import solve_newton
+
+SLIP_PASSES = 3
+POOR = 1e4
+"""A residual that many times what was asked for is poor."""
+
+RowSolver = Callable[[Rows, int, float], float]
+"""A solver of rows: (rows, number of movable bodies, residual asked for) -> residual."""
+
+
+@jit_with_callbacks
+def solve_rows(solve, rows, n, target):
+    """Solve the rows of an island of n movable bodies, see `newton.solve_newton`; solve: another `RowSolver`, or None."""
+    if solve is None:
+        return solve_newton(rows, n, target)
+    return solve(rows, n, target)
+
+
+@jit
+def set_friction(of_contacts, contacts, slides):
+    """Give contacts that slip, slides (m,) bool, their dynamic friction, all others the static one."""
+    rows, first_row = of_contacts.rows, of_contacts.first_row
+    for c in range(first_row.shape[0]):
+        if contacts.static_friction[c] > 0.0:
+            i = first_row[c] + 1
+            rows.coefficient[i] = contacts.dynamic_friction[c] if slides[c] else contacts.static_friction[c]
+            rows.coefficient[i + 1] = rows.coefficient[i]
+
+
+@jit_making_arrays
+def let_slip(rows, n, first_row, dynamic_friction, slow):
+    """Give contacts that slip faster than `slow` [m/s] their dynamic friction (m,); returns whether any had another one."""
+    y, after = np.empty((n, 6)), np.empty(rows.bias.shape[0])
+    multiply_transposed(rows, rows.impulse, y)
+    multiply(rows, y, after)
+    changed = False
+    for c in range(first_row.shape[0]):
+        i = first_row[c] + 1
+        if rows_of(rows, first_row[c]) < 3 or rows.coefficient[i] == dynamic_friction[c]:
+            continue
+        if abs(rows.bias[i] + after[i]) + abs(rows.bias[i + 1] + after[i + 1]) > slow:
+            rows.coefficient[i] = rows.coefficient[i + 1] = dynamic_friction[c]
+            changed = True
+    return changed
+
+
+@jit_with_callbacks
+def solve_with_slip(solve, of_contacts, n, contacts, slides, target, slow):
+    """Solve rows that begin with those of contacts; contacts that slip, or come to slip, have dynamic friction.
+
+    solve: as in `solve_rows`; of_contacts: `ContactRows`; n: movable bodies; slides (m,) bool: contacts that slip from the start; target:
+    residual asked for, m/s; slow: slip that is none, m/s. Returns the residual, m/s: inf where there is no finite answer, and then no
+    impulse.
+    """
+    rows, first_row = of_contacts.rows, of_contacts.first_row
+    set_friction(of_contacts, contacts, slides)
+    warm, residual = _has_impulse(rows), 0.0
+    for _ in range(SLIP_PASSES):
+        residual = solve_rows(solve, rows, n, target)
+        if residual > POOR * target and warm:
+            # A misleading start: once more from nothing.
+            rows.impulse[:] = 0.0
+            warm = False
+        elif not let_slip(rows, n, first_row, contacts.dynamic_friction, slow):
+            break
+    for i in range(rows.impulse.shape[0]):
+        if not np.isfinite(rows.impulse[i]):
+            rows.impulse[:] = 0.0
+            return np.inf
+    return residual
+
+
+@jit
+def _has_impulse(rows):
+    for i in range(rows.impulse.shape[0]):
+        if rows.impulse[i] != 0.0:
+            return True
+    return False

@@ -1,0 +1,76 @@
+"""Stop split: a sub-step ends where the first slip stops, as friction changes there.
+
+A slip is a velocity s (2,) along a pair of rows: the slip of a contact, its roll, or its spin (one row). With s' its change over a brief
+time it stops at
+
+    t = -s.s' / |s'|^2    where s.s' < 0.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.dynamics.constraints.rolling_friction import add_rolling_slips
+from rigidimpulse.dynamics.constraints.rows import response_to
+
+
+class Slips(NamedTuple):
+    """What slips at the start of a sub-step."""
+
+    first: np.ndarray  # (s,) row
+    second: np.ndarray  # (s,) the row after it; a single row is given twice
+    velocity: np.ndarray  # (s, 2) m/s
+
+
+@jit_making_arrays
+def find_slips(problem, of_contacts, slides, velocity, rolling, slow):
+    """The `Slips` of contacts that slip, slides (m,) bool, at velocity (m, 3) along their frames, and of their rolling friction.
+
+    problem: a `ContactProblem`; of_contacts: `ContactRows`; rolling: a `Rolling` or None; slow: rolling that is none, m/s.
+    """
+    first_row, m, count = of_contacts.first_row, slides.shape[0], 0
+    capacity = m if rolling is None else 3 * m
+    slips = Slips(np.empty(capacity, np.int64), np.empty(capacity, np.int64), np.empty((capacity, 2)))
+    for c in range(m):
+        if slides[c]:
+            slips.first[count], slips.second[count] = first_row[c] + 1, first_row[c] + 2
+            slips.velocity[count, 0], slips.velocity[count, 1] = velocity[c, 1], velocity[c, 2]
+            count += 1
+    if rolling is not None:
+        count = add_rolling_slips(problem, rolling, of_contacts, slow, slips, count)
+    return Slips(slips.first[:count], slips.second[:count], slips.velocity[:count])
+
+
+@jit_making_arrays
+def end_slips(rows, n, slips):
+    """Slip (s, 2) at the end, after the rows' impulses on n movable bodies."""
+    response, end = response_to(rows, n, rows.impulse), np.zeros((slips.first.shape[0], 2))
+    for k in range(slips.first.shape[0]):
+        i, j = slips.first[k], slips.second[k]
+        end[k, 0] = rows.bias[i] + response[i]
+        if j > i:
+            end[k, 1] = rows.bias[j] + response[j]
+    return end
+
+
+@jit_making_arrays
+def any_stops(rows, n, slips, none):
+    """Whether one of the slips stops or turns back until the end; speeds up to `none` are none."""
+    start, end = slips.velocity, end_slips(rows, n, slips)
+    for k in range(end.shape[0]):
+        if abs(end[k, 0]) + abs(end[k, 1]) <= none or start[k, 0] * end[k, 0] + start[k, 1] * end[k, 1] < 0.0:
+            return True
+    return False
+
+
+@jit_making_arrays
+def first_stop(rows, n, slips, brief):
+    """When the first of the slips stops [s], inf if none does, if it goes on to change as it does over a brief time under the impulses."""
+    start, end, stop = slips.velocity, end_slips(rows, n, slips), np.inf
+    for k in range(end.shape[0]):
+        x, y = (end[k, 0] - start[k, 0]) / brief, (end[k, 1] - start[k, 1]) / brief
+        along = start[k, 0] * x + start[k, 1] * y
+        if along < 0.0:
+            stop = min(stop, -along / (x * x + y * y))
+    return stop

@@ -1,0 +1,181 @@
+"""Where the compiled order of events (`event_loop`) meets the run: who may be dealt with by it, growing buffers, and problems in words."""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS
+from rigidimpulse.collision.time_of_impact.bisection import LOOK_AHEAD
+from rigidimpulse.core.packed import Packed
+from rigidimpulse.dynamics.impact.restitution import LAWS
+from rigidimpulse.engine.exact.contact_forces import NOT_SOLVED_REMEDY
+from rigidimpulse.engine.exact.event_loop import (
+    AT_END,
+    AT_EVENT,
+    ENERGIES,
+    HOLD,
+    LOAD,
+    MOVE,
+    NO_ROOM,
+    NOT_FINITE,
+    NOT_RECORDED,
+    NOT_RESOLVED,
+    NOT_SOLVED,
+    REPORT,
+    RESPOND,
+    ROWS,
+    SHORT_OF_PAIRS,
+    SQUEEZED,
+    SWEEP,
+    SWEEP_STALLED,
+    VERBS,
+    WITHOUT_REBOUND,
+    Loop,
+    Reports,
+    Settings,
+    run_events,
+)
+from rigidimpulse.engine.exact.impacts import WITHOUT_REBOUND_REMEDY
+from rigidimpulse.engine.impact_time import STALLED_REMEDY
+from rigidimpulse.engine.pair_events import INSTANT, NOT_RESOLVED_REMEDY, SQUEEZED_REMEDY, PairEvents
+from rigidimpulse.engine.pair_table import pair_bodies
+from rigidimpulse.engine.run import NOT_FINITE_REMEDY, Run
+from rigidimpulse.model.world import World
+
+if TYPE_CHECKING:
+    from rigidimpulse.model.plan import Plan
+
+NONE = np.zeros(0, np.int64)
+EFFECTS = {
+    SWEEP: ("impact time",),
+    RESPOND: ("impulses",),
+    LOAD: ("steady load", "gyroscopic term"),
+    HOLD: ("contact forces",),
+    MOVE: ("exact flight",),
+}
+"""The effects whose verbs the loop calls, by their place in `Work.cycles`."""
+PROBLEMS = {
+    int(SQUEEZED): ("squeezed", SQUEEZED_REMEDY),
+    int(NOT_RESOLVED): ("contact not resolved", NOT_RESOLVED_REMEDY),
+    int(SWEEP_STALLED): ("sweep stalled", STALLED_REMEDY),
+    int(WITHOUT_REBOUND): ("impacts finished without rebound", WITHOUT_REBOUND_REMEDY),
+    int(NOT_SOLVED): ("contact forces not solved", NOT_SOLVED_REMEDY),
+    int(NOT_FINITE): ("not finite", NOT_FINITE_REMEDY),
+    int(NOT_RECORDED): ("not recorded", "{value:.0f} contacts of one instant had no space in the record; the motion is not affected"),
+}
+"""Kind and remedy of the problems."""
+NEEDED = ("contact detection", "impulses", "steady load", "contact forces", "impact time", "exact flight")
+
+
+def why_not(world: World, plan: Plan) -> str:
+    """Why events of a world are not dealt with by the compiled loop; empty where they are."""
+    accuracy = world.accuracy
+    if accuracy.response != "sequential":
+        return f"the response is {accuracy.response!r}"
+    if accuracy.impact_time not in ("bisection", "conservative"):
+        return f"the time of impact is found by {accuracy.impact_time!r}"
+    if accuracy.contact_solver == "qp":
+        return "the solver of contact forces is a library"
+    if world.joints_of_scene or world.force_tables:
+        return "there are joints, or forces vary"
+    missing = [name for name in NEEDED if not plan.includes(name)]
+    return f"without {missing[0]}" if missing else ""
+
+
+TABLE, MEMORY, LOG, CONTACT_LOG, SOLVE_COUNT, REPORTS = (
+    Loop._fields.index(name) for name in ("table", "memory", "log", "contact_log", "solve_count", "reports")
+)
+
+
+def _make_reports(number: int) -> Reports:
+    """Room for the problems of an event of so many bodies, twice."""
+    most = 2 * ENERGIES * (number + 1)
+    return Reports(np.zeros(most, REPORT), np.empty(most, np.int64), np.zeros(2, np.int64))
+
+
+class CompiledLoop:
+    """The compiled order of events in a run."""
+
+    def __init__(self, run: Run) -> None:
+        """run: with its participants."""
+        world, accuracy, n = run.world, run.world.accuracy, run.world.num_bodies
+        ahead = LOOK_AHEAD if accuracy.impact_time == "bisection" else 0.0
+        settings = Settings(
+            accuracy.step, INSTANT * accuracy.step, LAWS[accuracy.restitution], ahead, accuracy.iterations,
+            int(run.plan.includes("gyroscopic term")),
+        )  # fmt: skip
+        self._elsewhere = np.zeros(n, bool)
+        self._cycles, self._calls = np.zeros(VERBS, np.int64), np.zeros(VERBS, np.int64)
+        self._scratch = np.empty((SCRATCH_ROWS, 2), np.int64)
+        self._reports = _make_reports(n)
+        state = run.state
+        self._packed = Packed(
+            Loop(
+                settings, world.compiled_shapes, pair_bodies(world), world.margins, world.coefficients, world.rolling, self._elsewhere,
+                run.motion, PairEvents(run, state.time).table, state.memory, state.limiter, run.log.buffers, run.contact_log.buffers,
+                run.recorder.frames, run.recorder.written, self._reports, run.error_estimate, run.detector.sweep_scratch, run.wrench,
+                run.column, state.sub_step, run.substepped.solve_count, run.impact_log, self._cycles, self._calls,
+            )
+        )  # fmt: skip
+
+    def advance(self, run: Run, pair_events: PairEvents, time: float, bodies: np.ndarray) -> tuple[float, np.ndarray]:
+        """Go on from the event of these bodies at `time` to the end of the step [s], or to an event for the loop in Python.
+
+        Returns the time and the bodies of that event.
+        """
+        if not pair_events.substepped_begun and pair_events.inside.any():
+            return time, bodies
+        mark, is_given, how = np.zeros(run.world.num_bodies, bool), True, NO_ROOM
+        mark[bodies] = True
+        self._elsewhere[:] = run.substepped.label >= 0
+        while how not in (AT_END, AT_EVENT):
+            start, before = perf_counter(), self._cycles.copy()
+            how, time, is_given = run_events(self._words(run, pair_events), mark, is_given, time, pair_events.end, self._scratch)
+            self._account(run, perf_counter() - start, before)
+            self._tell(run)
+            if how == NO_ROOM:
+                self._make_room(run)
+            elif how == SHORT_OF_PAIRS:
+                pair_events.make_room(time)
+        if how == AT_EVENT and not is_given:
+            pair_events.count_contacts(time)
+        return float(time), mark.nonzero()[0] if how == AT_EVENT else NONE
+
+    def _words(self, run: Run, pair_events: PairEvents) -> np.ndarray:
+        """What the kernel gets: the record, with what may have grown or is another in each step."""
+        packed, state = self._packed, run.state
+        packed.replace(TABLE, pair_events.table)
+        packed.replace(MEMORY, state.memory)
+        packed.replace(LOG, run.log.buffers)
+        packed.replace(CONTACT_LOG, run.contact_log.buffers)
+        packed.replace(SOLVE_COUNT, run.substepped.solve_count)
+        packed.replace(REPORTS, self._reports)
+        return packed.words
+
+    def _make_room(self, run: Run) -> None:
+        """Make room for what the kernel has asked for."""
+        run.log.grow()
+        run.contact_log.grow()
+        run.state.remember(int(run.contact_log.buffers.counts[2]))
+
+    def _tell(self, run: Run) -> None:
+        """Report the problems that the kernel met, in words."""
+        for row in self._reports.rows[: self._reports.used[ROWS]]:
+            kind, remedy = PROBLEMS[int(row["kind"])]
+            bodies = self._reports.bodies[row["first"] : row["first"] + row["count"]]
+            names = tuple(run.world.names[i] for i in bodies.tolist())
+            run.log.report(float(row["time"]), kind, names, remedy.format(value=float(row["value"])))
+        self._reports.used[:] = 0
+
+    def _account(self, run: Run, seconds: float, before: np.ndarray) -> None:
+        """Give the time of the kernel to the effects whose verbs it called, in proportion to the processor's cycles."""
+        spent = (self._cycles - before).astype(float)
+        for verb, effects in EFFECTS.items():
+            lines = [run.plan.line(name) for name in effects if run.plan.includes(name)]
+            for line in lines:
+                line.seconds += seconds * spent[verb] / max(spent.sum(), 1.0) / len(lines)
+                line.calls += int(self._calls[verb])
+        self._calls[:] = 0

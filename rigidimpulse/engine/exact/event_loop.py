@@ -1,0 +1,772 @@
+"""The order of a step, compiled: that of `engine/step.py`, for what is neither jointed nor pushed by varying forces nor sub-stepped.
+
+From event to event it calls the kernels that the loop in Python calls, in the same order, so the results are the same bits. It returns to
+Python at the end of the step, and before an event
+
+    that reaches a body which the loop in Python must look after (`Fixed.elsewhere`),
+    for which there is no room in what is remembered of contacts or recorded.
+
+`compiled_loop` calls it.
+"""
+
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimpulse.collision.geometry import Shapes
+from rigidimpulse.collision.manifold.contact_points import Contacts as ContactBuffers
+from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS
+from rigidimpulse.collision.time_of_impact.result import STALLED, ImpactTimes, PairsToSweep, SearchEffort
+from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch
+from rigidimpulse.collision.time_of_impact.search import first_contacts
+from rigidimpulse.core.cycles import cycles
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.packed import field
+from rigidimpulse.dynamics.constraints.contact import ContactProblem
+from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
+from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
+from rigidimpulse.dynamics.constraints.position_correction import correct_positions, needs_correction
+from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
+from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
+from rigidimpulse.engine.exact.contact_forces import makes_energy, mark_same, shift_of
+from rigidimpulse.engine.exact.energy_limit import limit_correction_energy, limit_energy, note_end_energy, note_hold
+from rigidimpulse.engine.exact.impacts import (
+    SEQUENTIAL,
+    Response,
+    bear_each_other,
+    find_collapsing,
+    find_live,
+    remember_rebounds,
+    resolve_impacts,
+)
+from rigidimpulse.engine.exact.step_size import ErrorEstimate, Forces, StepLimits, Turning, hold_turning, turns
+from rigidimpulse.engine.exact.trajectories import set_impact_margins, take_steady_load
+from rigidimpulse.engine.exact.velocity_projection import ProjectionScratch, project
+from rigidimpulse.engine.pair_table import (
+    MARGIN,
+    SHORT,
+    USED,
+    PairBodies,
+    PairTable,
+    count_contacts,
+    look_around,
+    mark_live,
+    mark_met,
+    next_time,
+    renew_pairs,
+    settle_pairs,
+)
+from rigidimpulse.engine.sleeping import stands_still
+from rigidimpulse.engine.touching import (
+    FAR_MARGIN,
+    Found,
+    Motion,
+    Pressing,
+    Shared,
+    contacts_at,
+    fill_contacts,
+    find_touching,
+    make_contacts,
+    near_pairs,
+    press,
+    sort_contacts,
+    split_islands,
+    witness_contacts,
+)
+from rigidimpulse.model.contact_memory import ContactMemory, forget_forces, has_room, keep_forces, keep_wrenches, read_forces
+from rigidimpulse.model.contacts import Contacts, Touching, select
+from rigidimpulse.model.island import slow_speed
+from rigidimpulse.model.state import EnergyLimiter
+from rigidimpulse.model.world import Margins
+from rigidimpulse.motion.evaluate import bring_gyroscopic, refresh_pose
+from rigidimpulse.motion.trajectory import FIXED, pose_at
+from rigidimpulse.recording.contact_log import ContactBuffers as ContactLogBuffers
+from rigidimpulse.recording.contact_log import close_contacts, has_contact_room, replace_contacts
+from rigidimpulse.recording.events import (
+    ENERGY_CORRECTION,
+    IMPACT,
+    POSITION_CORRECTION,
+    STICK,
+    LogBuffers,
+    log_energy,
+    log_impacts,
+    log_stretch,
+)
+from rigidimpulse.recording.events import has_room as has_log_room
+from rigidimpulse.recording.recorder import Frames, flush_frames
+
+AT_END, AT_EVENT, NO_ROOM, SHORT_OF_PAIRS = np.arange(4)
+"""How the loop ends: at the end of the step; before an event that Python looks after; before one for which there is no room; after one
+that found no room for a pair."""
+SWEEP, RESPOND, LOAD, HOLD, MOVE, VERBS = np.arange(6)
+"""Places in `Work.cycles` and `Work.calls`."""
+ENERGIES = 6
+"""Changes of energy, or problems, at an instant of a body, at most."""
+FIRST_CONTACTS, NONE, NO_ROWS = np.int64(256), np.int64(-1), np.int64(0)
+MORE_CONTACTS, MOST_NEW = 4, 256
+"""An island may have so many times more contacts after a position correction, and so many more on top."""
+IMPULSES = 256
+"""Impulses of a contact at an instant that there is room for."""
+
+REPORT = np.dtype([("kind", np.int64), ("time", np.float64), ("value", np.float64), ("first", np.int64), ("count", np.int64)])
+"""A problem: what it is, when [s], a number that goes with it, and its stretch of `Work.reported`."""
+SQUEEZED, NOT_RESOLVED, SWEEP_STALLED, WITHOUT_REBOUND, NOT_SOLVED, NOT_FINITE, NOT_RECORDED = np.arange(7)
+ROWS, BODIES = np.arange(2)
+"""Places in `Work.used`."""
+
+
+class Settings(NamedTuple):
+    """The accuracy of a run."""
+
+    step: float  # s
+    instant: float  # s, two contacts of a pair nearer in time than that count as one
+    law: int  # one of `restitution.LAWS`
+    ahead: float  # see `SearchEffort`
+    queries: int  # gap evaluations a pair may use
+    gyroscopic: int  # 1 if the gyroscopic term is in, else 0
+
+
+class Reports(NamedTuple):
+    """Problems, to be told in words when the loop has ended."""
+
+    rows: np.ndarray  # (r,) REPORT
+    bodies: np.ndarray  # (b,) of the reports
+    used: np.ndarray  # (2,) of both
+
+
+class Loop(NamedTuple):
+    """Everything the loop needs; kernels get it packed (`core.packed`), and its fields by the functions below."""
+
+    settings: Settings
+    shapes: Shapes
+    bodies: PairBodies
+    margins: Margins
+    coefficients: np.ndarray  # (k, k, 4), see material.combine
+    rolling: np.ndarray | None  # (k, k, 2) m, None where no material asks for it
+    elsewhere: np.ndarray  # (n,) bool, bodies that the loop in Python looks after
+    motion: Motion
+    table: PairTable
+    memory: ContactMemory
+    limiter: EnergyLimiter
+    log: LogBuffers
+    contact_log: ContactLogBuffers
+    frames: Frames
+    written: np.ndarray  # (n,) frames of each body
+    reports: Reports
+    estimate: ErrorEstimate
+    sweep: SweepScratch
+    wrench: np.ndarray  # (n, 6) N, N m by contacts
+    number: np.ndarray  # (n,) working memory
+    sub_step: np.ndarray  # (n,) s, see `State`
+    solve_count: np.ndarray  # (n,) how often a body was dealt with in the step
+    impacts: np.ndarray  # (k, 7) working memory, see `point.log_impact`
+    cycles: np.ndarray  # (VERBS,) processor cycles of each verb
+    calls: np.ndarray  # (VERBS,)
+
+
+settings_of, shapes_of, bodies_of, margins_of = field("settings"), field("shapes"), field("bodies"), field("margins")
+coefficients_of, rolling_coefficients_of, elsewhere_of = field("coefficients"), field("rolling"), field("elsewhere")
+motion_of, table_of, memory_of, limiter_of = field("motion"), field("table"), field("memory"), field("limiter")
+log_of, contact_log_of, frames_of, written_of = field("log"), field("contact_log"), field("frames"), field("written")
+reports_of, estimate_of, sweep_of, wrench_of = field("reports"), field("estimate"), field("sweep"), field("wrench")
+number_of, sub_step_of, solve_count_of = field("number"), field("sub_step"), field("solve_count")
+impacts_of, cycles_of, calls_of = field("impacts"), field("cycles"), field("calls")
+
+
+ISLAND = np.dtype(
+    [
+        ("time", np.float64),
+        ("end", np.float64),
+        ("zero_speed", np.float64),
+        ("scale", np.float64),
+        ("shift", np.float64),
+        ("moved", np.bool_),
+        ("rests", np.bool_),
+    ]
+)
+"""An island at an instant: see `model.island.Island`; end: of the step, s."""
+
+
+class Islands(NamedTuple):
+    """The islands of an instant: k of them, with m contacts and n movable bodies in all."""
+
+    record: np.ndarray  # (k,) ISLAND
+    contact_first: np.ndarray  # (k + 1,) where the contacts of each begin
+    member_first: np.ndarray  # (k + 1,) where the members of each begin
+    member: np.ndarray  # (n,) bodies, island after island
+    velocity: np.ndarray  # (n, 6) m/s, rad/s, of the members before anything happened
+
+
+class Touch(NamedTuple):
+    """The m contacts of an island."""
+
+    contacts: Contacts
+    touching: Touching
+    place: np.ndarray  # (m,) pairs
+    contact_margin: np.ndarray  # (m,) m
+    speeds: np.ndarray  # (2, m) m/s, approach and rest speed
+    live: np.ndarray  # (m,) bool
+
+
+@jit
+def report(reports, kind, time, value, bodies):
+    """Keep a problem of some bodies; there is room."""
+    used = reports.used
+    row = reports.rows[used[ROWS]]
+    row.kind, row.time, row.value, row.first, row.count = kind, time, value, used[BODIES], bodies.shape[0]
+    for i in bodies:
+        reports.bodies[used[BODIES]] = i
+        used[BODIES] += 1
+    used[ROWS] += 1
+
+
+@jit_making_arrays
+def _report_pairs(reports, kind, time, table, places):
+    """Keep a problem of each of the pairs."""
+    both = np.empty(2, np.int64)
+    for p in places:
+        if reports.used[ROWS] < len(reports.rows) and reports.used[BODIES] + 2 <= len(reports.bodies):
+            both[0], both[1] = table.pairs[p].a, table.pairs[p].b
+            report(reports, kind, time, 0.0, both)
+
+
+@jit_making_arrays
+def _sweep_stale(loop, end):
+    """Sweep the pairs that ask for it until `end` [s], and note when they come to contact."""
+    table, shapes, settings, count = table_of(loop), shapes_of(loop), settings_of(loop), np.int64(0)
+    for p in range(table.number[USED]):
+        start = table.pairs[p].start
+        count += start == start
+    if count == 0:
+        return
+    places, k = np.empty(count, np.int64), np.int64(0)
+    asked = PairsToSweep(np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count), np.empty(count), np.empty(count))
+    found = ImpactTimes(np.full(count, np.inf), np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros((count, 10)))
+    for p in range(table.number[USED]):
+        pair = table.pairs[p]
+        if pair.start == pair.start:
+            places[k], asked.a[k], asked.b[k], asked.start[k] = p, pair.a, pair.b, pair.start
+            asked.impact_margin[k], asked.tolerance[k] = pair.impact_margin, pair.tolerance
+            k += 1
+    effort = SearchEffort(settings.ahead, settings.queries)
+    first_contacts(shapes.geometry, motion_of(loop).trajectory, sweep_of(loop), shapes.of_body, asked, end, effort, found)
+    for k in range(count):
+        pair = table.pairs[places[k]]
+        pair.time, pair.start = found.time[k], np.nan
+        for j in range(10):
+            pair.witness[j] = found.witness[k, j]
+        if found.status[k] == STALLED:
+            _report_pairs(reports_of(loop), SWEEP_STALLED, found.time[k], table, places[k : k + 1])
+
+
+@jit_making_arrays
+def make_found(capacity, number, scratch):
+    """Buffers for contacts of so many bodies."""
+    buffers = ContactBuffers(np.empty((capacity, 10)), np.empty((capacity, 5), np.int64), scratch)
+    return Found(buffers, np.empty(capacity, np.int64), np.zeros(number, np.bool_), np.zeros(number, np.bool_))
+
+
+@jit_making_arrays
+def run_events(loop, bodies, is_given, time, end, scratch):
+    """Go from event to event, from `time` to the end of the step [s].
+
+    bodies (n,) bool: of the event at `time` if `is_given`, else after that; and then those of the event before which it ends. scratch: see
+    `manifold.contact_points`. Returns how it ends, when, and whether that is the event that was given.
+    """
+    motion, table, shapes, constants = motion_of(loop), table_of(loop), shapes_of(loop), bodies_of(loop).constants
+    number, limiter, used_cycles, calls = len(bodies), limiter_of(loop), cycles_of(loop), calls_of(loop)
+    shared = Shared(limiter.under_contact, limiter.sharing, np.empty((0, 2), np.int64))
+    found = make_found(FIRST_CONTACTS, number, scratch)
+    while True:
+        if not is_given:
+            start = cycles()
+            _sweep_stale(loop, end)
+            used_cycles[SWEEP] += cycles() - start
+            calls[SWEEP] += 1
+            time = next_time(table)
+            if time >= end:
+                return AT_END, end, is_given
+            mark_met(table, constants.dynamic, time, bodies)
+        count = NONE
+        while count < 0:
+            for i in range(number):
+                found.reached[i] = bodies[i]
+            count = find_touching(shapes, constants, motion, table, shared, found, time)
+            if count < 0:
+                found = make_found(-2 * count, number, scratch)
+        if _is_elsewhere(elsewhere_of(loop), found.brought, bodies):
+            return AT_EVENT, time, is_given
+        if not _has_room(loop, count):
+            return NO_ROOM, time, is_given
+        if not is_given:
+            _count_contacts(table, reports_of(loop), time, settings_of(loop).instant)
+        is_given = False
+        for i in range(number):
+            if bodies[i]:
+                table.wake[i] = np.inf
+        _react(loop, found, count, time, end)
+        if table.number[SHORT]:
+            return SHORT_OF_PAIRS, time, is_given
+
+
+@jit
+def _is_elsewhere(elsewhere, brought, bodies):
+    """Whether an event touches bodies (n,) bool that the loop in Python looks after."""
+    for i in range(elsewhere.shape[0]):
+        if elsewhere[i] and (brought[i] or bodies[i]):
+            return True
+    return False
+
+
+@jit
+def _has_room(loop, count):
+    """Whether an event of so many contacts can be remembered and recorded, whatever becomes of it."""
+    number, reports, log, contacts = len(elsewhere_of(loop)), reports_of(loop), log_of(loop), MORE_CONTACTS * count + MOST_NEW
+    most = ENERGIES * number
+    fits = has_log_room(log, most, number, len(impacts_of(loop)) + IMPULSES * count)
+    fits = has_contact_room(contact_log_of(loop), contacts) and fits
+    fits = fits and reports.used[ROWS] + most <= len(reports.rows) and reports.used[BODIES] + most <= len(reports.bodies)
+    return fits and has_room(memory_of(loop), contacts)
+
+
+@jit_making_arrays
+def _count_contacts(table, reports, time, instant):
+    """Count contacts at one instant [s]; pairs with too many are left alone until the end of the step, and reported."""
+    given_up = np.empty(table.number[USED], np.int64)
+    count = count_contacts(table, time, instant, given_up)
+    _report_pairs(reports, SQUEEZED, time, table, given_up[:count])
+
+
+@jit_making_arrays
+def _react(loop, found, count, time, end):
+    """Everything that happens at `time` to the islands of the contacts found, and to the bodies reached."""
+    motion, table, dynamic, number = motion_of(loop), table_of(loop), bodies_of(loop).constants.dynamic, len(found.reached)
+    root, order = np.empty(number, np.int64), np.empty(count, np.int64)
+    split_islands(dynamic, np.empty((0, 2), np.int64), found, count, root, order)
+    touch = _touch(loop, found, order, time)
+    islands = _islands(motion.now, root, touch.contacts, dynamic, time, end)
+    _arrive(loop, islands, touch, found.reached, time)
+    solve_count = solve_count_of(loop)
+    for i in islands.member:
+        solve_count[i] += 1.0
+    _let_go(loop, islands.member, found.reached, time, end)
+    for k in range(len(islands.record)):
+        first, last = islands.member_first[k], islands.member_first[k + 1]
+        _advance(
+            loop, islands.record[k : k + 1], _part(touch, islands.contact_first[k], islands.contact_first[k + 1]),
+            islands.member[first:last], islands.velocity[first:last],
+        )  # fmt: skip
+    given_up = np.empty(table.number[USED], np.int64)
+    stuck = settle_pairs(table, time, dynamic, given_up)
+    _report_pairs(reports_of(loop), NOT_RESOLVED, time, table, given_up[:stuck])
+
+
+@jit_making_arrays
+def _touch(loop, found, order, time):
+    """The contacts found, in this order (m,)."""
+    m, buffers, table, material = len(order), found.buffers, table_of(loop), bodies_of(loop).constants.material
+    contacts = make_contacts(m)
+    fill_contacts(motion_of(loop).now, buffers.real, buffers.integer, order, material, coefficients_of(loop), contacts)
+    touching = Touching(np.empty(m, np.int64), np.empty((m, 2), np.int64))
+    place, contact_margin, live = np.empty(m, np.int64), np.empty(m), np.empty(m, np.bool_)
+    for c in range(m):
+        row = order[c]
+        place[c] = found.place[row]
+        contact_margin[c] = table.pairs[place[c]].contact_margin
+        touching.kind[c] = buffers.integer[row, 2]
+        touching.feature[c, 0], touching.feature[c, 1] = buffers.integer[row, 3], buffers.integer[row, 4]
+    mark_live(table.pairs, place, contacts.gap, time, live)
+    return Touch(contacts, touching, place, contact_margin, np.empty((2, m)), live)
+
+
+@jit_making_arrays
+def _part(touch, first, last):
+    """The contacts from `first` to `last` - 1, in copies: the approach of each island is measured for itself."""
+    which = np.empty(last - first, np.int64)
+    for c in range(first, last):
+        which[c - first] = c
+    return _chosen(touch, which)
+
+
+@jit_making_arrays
+def _chosen(touch, which):
+    """Copies of some contacts (k,)."""
+    m = len(which)
+    kind, feature, place, margin = np.empty(m, np.int64), np.empty((m, 2), np.int64), np.empty(m, np.int64), np.empty(m)
+    speeds, live = np.empty((2, m)), np.empty(m, np.bool_)
+    for s in range(m):
+        c = which[s]
+        kind[s], place[s], margin[s], live[s] = touch.touching.kind[c], touch.place[c], touch.contact_margin[c], touch.live[c]
+        for k in range(2):
+            feature[s, k], speeds[k, s] = touch.touching.feature[c, k], touch.speeds[k, c]
+    return Touch(select(touch.contacts, which), Touching(kind, feature), place, margin, speeds, live)
+
+
+@jit_making_arrays
+def _islands(bodies, root, contacts, dynamic, time, end):
+    """The islands of contacts that are sorted by island."""
+    m, number = contacts.gap.shape[0], len(root)
+    contact_first, count, last = np.empty(m + 1, np.int64), np.int64(0), NONE
+    for c in range(m):
+        a = contacts.body_a[c]
+        owner = root[a] if dynamic[a] else root[contacts.body_b[c]]
+        if owner != last:
+            contact_first[count] = c
+            count += 1
+        last = owner
+    contact_first[count] = m
+    member_first, member, used = np.zeros(count + 1, np.int64), np.empty(min(2 * m, number), np.int64), np.int64(0)
+    mark = np.full(number, NONE)
+    for k in range(count):
+        low, high = number, NONE
+        for c in range(contact_first[k], contact_first[k + 1]):
+            a, b = contacts.body_a[c], contacts.body_b[c]
+            mark[a] = mark[b] = k
+            low, high = min(low, min(a, b)), max(high, max(a, b))
+        for i in range(low, high + 1):
+            if mark[i] == k and dynamic[i]:
+                member[used] = i
+                used += 1
+        member_first[k + 1] = used
+    velocity, record = np.empty((used, 6)), np.zeros(count, ISLAND)
+    for s in range(used):
+        for k in range(3):
+            velocity[s, k], velocity[s, 3 + k] = bodies.velocity[member[s], k], bodies.angular_velocity[member[s], k]
+    for k in range(count):
+        record[k].time, record[k].end = time, end
+    return Islands(record, contact_first[: count + 1], member_first, member[:used], velocity)
+
+
+@jit_making_arrays
+def _classify(loop, touch, members):
+    """Measure approach speeds and what presses each contact; slow approaches within the margin are live (see `islands.classify`)."""
+    constants, contacts = bodies_of(loop).constants, touch.contacts
+    m, least, supported = contacts.gap.shape[0], 0.0, False
+    for c in range(m):
+        supported = supported or not (constants.dynamic[contacts.body_a[c]] and constants.dynamic[contacts.body_b[c]])
+    if supported:
+        for i in members:
+            least = max(least, constants.steady_strength[i])
+    force, normal_force = np.empty((m, 3)), np.empty(m)
+    read_forces(memory_of(loop), motion_of(loop).trajectory.start, contacts, touch.touching, force)
+    for c in range(m):
+        normal_force[c] = force[c, 0]
+    pressing = Pressing(least, settings_of(loop).step)
+    press(shapes_of(loop), motion_of(loop), contacts, touch.touching, normal_force, pressing, touch.contact_margin, touch.speeds)
+    for c in range(m):
+        touch.live[c] = touch.live[c] or abs(touch.speeds[0, c]) <= touch.speeds[1, c]
+
+
+@jit_making_arrays
+def _slow(island, speeds):
+    """Contacts (m,) that neither bounce nor come in fast (see `Island.slow`); island: `ISLAND`, speeds (2, m)."""
+    slow = np.empty(speeds.shape[1], np.bool_)
+    for c in range(speeds.shape[1]):
+        slow[c] = abs(speeds[0, c]) <= slow_speed(speeds[1, c], island.zero_speed, island.moved, island.scale)
+    return slow
+
+
+@jit_making_arrays
+def _arrive(loop, islands, touch, reached, time):
+    """End the sub-steps of all bodies reached (n,) bool, and measure the islands' contacts (see `exact.advance.arrive`)."""
+    motion, memory, limiter, constants = motion_of(loop), memory_of(loop), limiter_of(loop), bodies_of(loop).constants
+    scratch = ProjectionScratch(number_of(loop), limiter.correction)
+    for k in range(len(islands.record)):
+        members = islands.member[islands.member_first[k] : islands.member_first[k + 1]]
+        mine = _part(touch, islands.contact_first[k], islands.contact_first[k + 1])
+        _classify(loop, mine, members)
+        if project(memory, motion, mine.contacts, mine.touching, _slow(islands.record[k], mine.speeds), time, members, scratch):
+            _classify(loop, mine, members)
+        _keep_speeds(touch, mine, islands.contact_first[k])
+    bodies = np.empty(len(reached), np.int64)
+    count = np.int64(0)
+    for i in range(len(reached)):
+        if reached[i]:
+            bodies[count] = i
+            count += 1
+    bodies = bodies[:count]
+    note_end_energy(limiter, motion.now, constants, bodies)
+    slowed, changes = np.zeros(len(reached), np.bool_), np.empty(count)
+    done = limit_energy(limiter, motion.now, constants, motion.trajectory, bodies, time, slowed, changes)
+    for s in range(done):
+        log_energy(log_of(loop), time, ENERGY_CORRECTION, changes[s])
+    if done == 0:
+        return
+    for k in range(len(islands.record)):
+        members = islands.member[islands.member_first[k] : islands.member_first[k + 1]]
+        if _any_marked(slowed, members):
+            mine = _part(touch, islands.contact_first[k], islands.contact_first[k + 1])
+            _classify(loop, mine, members)
+            _keep_speeds(touch, mine, islands.contact_first[k])
+
+
+@jit
+def _any_marked(mark, members):
+    for i in members:
+        if mark[i]:
+            return True
+    return False
+
+
+@jit
+def _keep_speeds(touch, mine, first):
+    """Write what was measured of an island's contacts back to where those of all islands stand."""
+    for c in range(mine.live.shape[0]):
+        touch.live[first + c] = mine.live[c]
+        for k in range(2):
+            touch.speeds[k, first + c] = mine.speeds[k, c]
+
+
+@jit_making_arrays
+def _let_go(loop, member, reached, time, end):
+    """Let those of the bodies reached fly freely that still carry forces of contacts they have left (see `exact.advance.let_go`)."""
+    in_island, no_wrench = np.zeros(len(reached), np.bool_), np.zeros(6)
+    for i in member:
+        in_island[i] = True
+    for i in range(len(reached)):
+        left = reached[i] and not in_island[i] and limiter_of(loop).under_contact[i]
+        if left and motion_of(loop).trajectory.start[i] < time:
+            _begin_trajectory(loop, i, (time, end), no_wrench, False)
+
+
+@jit_making_arrays
+def _advance(loop, island, touch, members, velocity):
+    """Advance an island from its instant: impacts, loads, contact forces, trajectories; island (1,) ISLAND."""
+    motion, constants, used_cycles, calls = motion_of(loop), bodies_of(loop).constants, cycles_of(loop), calls_of(loop)
+    start = cycles()
+    _respond(loop, island[0], touch, members)
+    responded = cycles()
+    for i in members:
+        for k in range(3):
+            motion.acceleration[i, k] = constants.steady_acceleration[i, k]
+            motion.angular_acceleration[i, k] = 0.0
+    if settings_of(loop).gyroscopic == 1:
+        bring_gyroscopic(members, motion.now, motion.rotation, motion.trajectory.inertia, motion.angular_acceleration)
+    loaded = cycles()
+    touch, held = _hold(loop, island[0], touch, members)
+    holding = cycles()
+    _begin_trajectories(loop, island[0], members, velocity)
+    set_impact_margins(table_of(loop), touch.place, touch.contacts.gap, held, island[0].time, constants.dynamic)
+    used_cycles[RESPOND] += responded - start
+    used_cycles[LOAD] += loaded - responded
+    used_cycles[HOLD] += holding - loaded
+    used_cycles[MOVE] += cycles() - holding
+    for verb in range(RESPOND, VERBS):
+        calls[verb] += 1
+
+
+@jit_making_arrays
+def _respond(loop, island, touch, members):
+    """Impulses at the contacts that approach (see `exact.impacts`)."""
+    motion, memory, log, contacts, number = motion_of(loop), memory_of(loop), log_of(loop), touch.contacts, len(elsewhere_of(loop))
+    now, collapses = motion.now, find_collapsing(memory, number, contacts)
+    live = find_live(now, contacts, touch.live, touch.speeds, collapses, settings_of(loop).law)
+    island.zero_speed, island.scale = live.rule.tolerance, live.rule.scale
+    if not live.approach:
+        return
+    force, constants = np.empty((contacts.gap.shape[0], 3)), bodies_of(loop).constants
+    read_forces(memory, motion.trajectory.start, contacts, touch.touching, force)
+    response = Response(SEQUENTIAL, live.collapse or bear_each_other(contacts, constants.dynamic, force))
+    done = resolve_impacts(now, constants, members, live, response, number_of(loop), None, impacts_of(loop))
+    if has_log_room(log, ENERGIES, NO_ROWS, done.count):
+        log_impacts(log, island.time, contacts, now.position, done.log, done.count)
+    else:
+        report(reports_of(loop), NOT_RECORDED, island.time, float(done.count), members)
+    remember_rebounds(memory, number, island.time, contacts, touch.contact_margin, done.log[: done.count])
+    if done.capped:
+        report(reports_of(loop), WITHOUT_REBOUND, island.time, 0.0, members)
+    log_energy(log, island.time, IMPACT, done.energy)
+    _classify(loop, touch, members)
+
+
+@jit_making_arrays
+def _hold(loop, island, touch, members):
+    """Find the lasting contacts of an island, and their forces; returns the contacts and which of them last (see `contact_forces.hold`)."""
+    motion, wrench, memory, constants = motion_of(loop), wrench_of(loop), memory_of(loop), bodies_of(loop).constants
+    time, number, now, contact_log = island.time, len(constants.dynamic), motion.now, contact_log_of(loop)
+    close_contacts(contact_log, members, time)
+    for i in members:
+        for k in range(6):
+            wrench[i, k] = 0.0
+    forget_forces(memory, number, touch.contacts)
+    held = _slow(island, touch.speeds)
+    if not _any(held):
+        return touch, held
+    if needs_correction(touch.contacts, held, touch.contact_margin):
+        touch = _correct_positions(loop, island, touch, held, members)
+        held = _slow(island, touch.speeds)
+        if not _any(held):
+            return touch, held
+    lasting = _chosen(touch, _places(held))
+    contacts, touching = lasting.contacts, lasting.touching
+    shapes = shapes_of(loop)
+    moves = contact_motion(shapes.geometry, shapes.of_body, motion.rotation, now, contacts, touching.kind, touching.feature)
+    turning = Turning(moves, touching, lasting.contact_margin)
+    problem = ContactProblem(now, contacts, members, number_of(loop), moves.turning, motion.acceleration, motion.angular_acceleration)
+    forces = Forces(np.empty((contacts.gap.shape[0], 3)), wrench)
+    read_forces(memory, motion.trajectory.start, contacts, touching, forces.force)
+    before, rest, step = kinetic_energy(now, constants, members), island.end - time, settings_of(loop).step
+    limits = StepLimits(rest, step, sub_step_of(loop), limiter_of(loop).under_contact)
+    rolling = rolling_of(rolling_coefficients_of(loop), constants.material, now, contacts)
+    solution = hold_turning(None, None, problem, turning, estimate_of(loop), limits, forces, rolling)
+    log_energy(log_of(loop), time, STICK, kinetic_energy(now, constants, members) - before)
+    failed = solution.residual > UNSOLVED and makes_energy(problem, constants, wrench, None, solution.length)
+    if failed:
+        for i in members:
+            for k in range(6):
+                wrench[i, k] = 0.0
+        for c in range(contacts.gap.shape[0]):
+            for k in range(3):
+                forces.force[c, k] = 0.0
+    note_hold(limiter_of(loop), now, constants, contacts, members, np.empty(0, np.int64), True)
+    lasts = contacts.gap.shape[0]
+    if has_contact_room(contact_log, lasts) and has_room(memory, lasts):
+        replace_contacts(contact_log, members, time, contacts, now.position, forces.force)
+        keep_forces(memory, number, time, contacts, touching, forces.force)
+        if turns(moves, step) and not failed:
+            keep_wrenches(memory, number, time, contacts, solution.force, solution.slides)
+    else:
+        report(reports_of(loop), NOT_RECORDED, time, float(lasts), members)
+    if solution.residual > UNSOLVED:
+        report(reports_of(loop), NOT_SOLVED, time, solution.residual, members)
+    island.rests = stands_still(problem, constants, touch.contacts, wrench, solution.length)
+    if solution.length < rest and not island.rests:
+        wake = table_of(loop).wake
+        for i in members:
+            wake[i] = time + solution.length
+    if island.shift > 0.0:
+        look_around(table_of(loop), members, time, island.shift)
+    return touch, held
+
+
+@jit
+def _any(which):
+    for c in range(which.shape[0]):
+        if which[c]:
+            return True
+    return False
+
+
+@jit_making_arrays
+def _places(which):
+    """Places (k,) of what is marked."""
+    places, count = np.empty(which.shape[0], np.int64), np.int64(0)
+    for c in range(which.shape[0]):
+        if which[c]:
+            places[count] = c
+            count += 1
+    return places[:count]
+
+
+@jit_making_arrays
+def _correct_positions(loop, island, touch, held, members):
+    """Bring sunken contacts back to their gap and look at the island's contacts again (see `contact_forces`)."""
+    motion, constants, time = motion_of(loop), bodies_of(loop).constants, island.time
+    now, k = motion.now, len(members)
+    place, turn, way = np.empty((k, 3)), np.empty((k, 4)), np.empty((k, 3))
+    for s in range(k):
+        for j in range(3):
+            place[s, j] = now.position[members[s], j]
+        for j in range(4):
+            turn[s, j] = now.orientation[members[s], j]
+    before = mechanical_energy(now, constants, members)
+    around = _contacts_near(loop, members, time)
+    lifted, depth = np.zeros(len(around.live), np.bool_), 0.0
+    mark_same(touch.contacts, touch.touching, held, around.contacts, around.touching, lifted)
+    correct_positions(now, around.contacts, lifted, around.contact_margin, members, number_of(loop))
+    refresh_pose(members, now, motion.rotation, motion.trajectory.inertia)
+    log_energy(log_of(loop), time, POSITION_CORRECTION, mechanical_energy(now, constants, members) - before)
+    for s in range(k):
+        for j in range(3):
+            way[s, j] = now.position[members[s], j] - place[s, j]
+    for c in range(len(around.live)):
+        depth = max(depth, around.contact_margin[c])
+    change = limit_correction_energy(now, constants, around.contacts, members, np.empty(0, np.int64), way, depth)
+    log_energy(log_of(loop), time, ENERGY_CORRECTION, change)
+    island.moved = True
+    island.shift = shift_of(now, constants.bound_radius, members, place, turn)
+    pairs = np.empty(len(touch.place), np.int64)
+    count = np.int64(0)
+    for c in range(len(touch.place)):
+        if c == 0 or touch.place[c] != touch.place[c - 1]:
+            pairs[count] = touch.place[c]
+            count += 1
+    again = _contacts_of(loop, pairs[:count], MARGIN, time)
+    _classify(loop, again, members)
+    return again
+
+
+@jit_making_arrays
+def _contacts_near(loop, members, time):
+    """What a position correction of the members may close: contacts with all that is near."""
+    used, asked = table_of(loop).number[USED], np.zeros(motion_of(loop).rotation.shape[0], np.bool_)
+    for i in members:
+        asked[i] = True
+    near = np.empty(used, np.int64)
+    radius = bodies_of(loop).constants.bound_radius
+    count = near_pairs(motion_of(loop).trajectory, time, table_of(loop), radius, asked, np.zeros(used, np.bool_), near)
+    return _contacts_of(loop, near[:count], FAR_MARGIN, time)
+
+
+@jit_making_arrays
+def _contacts_of(loop, places, margin, time):
+    """The contacts of the pairs at these places within so many contact margins, at the present poses, sorted by pair."""
+    table, motion, shapes, count = table_of(loop), motion_of(loop), shapes_of(loop), NONE
+    found = make_found(FIRST_CONTACTS, np.int64(0), np.empty((SCRATCH_ROWS, 2), np.int64))
+    while count < 0:
+        count = contacts_at(shapes, motion, table, places, margin, found, np.int64(0))
+        if count >= 0:
+            count = witness_contacts(table, places, time, found, np.int64(0), count)
+        if count < 0:
+            found = make_found(-2 * count, np.int64(0), np.empty((-8 * count, 2), np.int64))
+    order, owner = np.empty(count, np.int64), np.zeros(count, np.int64)
+    for c in range(count):
+        order[c] = c
+    sort_contacts(owner, found.buffers.integer, order)
+    return _touch(loop, found, order, time)
+
+
+@jit
+def _begin_trajectories(loop, island, members, velocity):
+    """New trajectories for members whose velocity, pose or wrench changed (see `exact.trajectories`); velocity (k, 6): before."""
+    now, mode, wrench, under_contact = motion_of(loop).now, motion_of(loop).trajectory.mode, wrench_of(loop), limiter_of(loop).under_contact
+    for s in range(members.shape[0]):
+        i = members[s]
+        if island.rests and mode[i] == FIXED and not island.moved:
+            continue
+        changed = island.moved or under_contact[i]
+        for k in range(3):
+            changed = changed or now.velocity[i, k] != velocity[s, k] or now.angular_velocity[i, k] != velocity[s, 3 + k]
+        for k in range(6):
+            changed = changed or wrench[i, k] != 0.0
+        if changed:
+            _begin_trajectory(loop, i, (island.time, island.end), wrench[i], island.rests)
+
+
+@jit_making_arrays
+def _begin_trajectory(loop, i, interval, wrench, rests):
+    """Body i gets a new trajectory, from its present state, with a constant wrench (6,); interval: from when to the end of the step, s."""
+    motion, limiter, log, contact_log, time = motion_of(loop), limiter_of(loop), log_of(loop), contact_log_of(loop), interval[0]
+    constants = bodies_of(loop).constants
+    now, trajectory, one = motion.now, motion.trajectory, np.empty(1, np.int64)
+    one[0], total = i, 0.0
+    for k in range(3):
+        total += now.velocity[i, k] + now.angular_velocity[i, k]
+    if not isfinite(total):
+        pose_at(trajectory, i, time, now.position[i], now.orientation[i])
+        report(reports_of(loop), NOT_FINITE, time, 0.0, one)
+        rests = True
+    flush_frames(trajectory, i, time, limiter.correction[i], written_of(loop), frames_of(loop))
+    for k in range(6):
+        limiter.correction[i, k] = 0.0
+    close_contacts(contact_log, one, time)
+    arrival, begun = limiter.end_energy[i], limiter.energy_at_start[i]
+    if arrival == arrival:
+        limiter.end_energy[i] = np.nan
+        log_stretch(log, trajectory.start[i], time, i, begun, arrival - begun)
+    pressed = take_steady_load(motion, constants, i, time, wrench, rests)
+    limiter.under_contact[i] = pressed
+    if pressed:
+        limiter.energy_at_start[i] = mechanical_energy(now, constants, one)
+    renew_pairs(bodies_of(loop), margins_of(loop), table_of(loop), trajectory, i, interval)

@@ -1,0 +1,90 @@
+"""Records that kernels get by address: what a kernel reads is what the tuple holds."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.packed import Packed, field
+
+
+class Inner(NamedTuple):
+    matrix: np.ndarray
+    optional: np.ndarray | None
+    number: float
+    flags: np.ndarray
+
+
+class Outer(NamedTuple):
+    count: int
+    inner: Inner
+    rows: np.ndarray
+
+
+ROW = np.dtype([("a", np.float64), ("b", np.float64, (3,)), ("c", np.bool_)])
+count_of, inner_of, rows_of = field("count"), field("inner"), field("rows")
+
+
+@jit
+def first_of(optional):
+    """Numba removes the branch of an argument that is None before it asks for types."""
+    if optional is not None:
+        return optional[0]
+    return 0.0
+
+
+@jit_making_arrays
+def read_and_write(words, out):
+    """Numbers of all fields into out, and a change of each array."""
+    inner, rows = inner_of(words), rows_of(words)
+    out[0], out[1] = count_of(words), inner.number
+    out[2], out[3] = inner.matrix[1, 2], rows[1].b[2]
+    out[4] = 1.0 if inner.flags[1] else 0.0
+    out[5] = first_of(inner.optional)
+    inner.matrix[0, 0], rows[0].a = -1.0, -2.0
+    return inner.matrix.shape[0] * 10 + inner.matrix.shape[1]
+
+
+@jit
+def through(words, out):
+    return read_and_write(words, out)
+
+
+def make(optional: np.ndarray | None, matrix: np.ndarray) -> Outer:
+    """A record."""
+    rows = np.zeros(2, ROW).view(np.recarray)
+    rows["b"][1, 2] = 7.0
+    return Outer(3, Inner(matrix, optional, 0.25, np.array([False, True])), rows)
+
+
+@pytest.mark.parametrize("optional", [None, np.array([9.0])])
+@pytest.mark.parametrize("is_view", [False, True])
+def test_kernels_read_and_write_what_the_tuple_holds(optional: np.ndarray | None, is_view: bool):
+    """Integers, floats, arrays of numbers and records, views with strides, and a field that may be None."""
+    matrix = np.arange(24.0).reshape(4, 6)[::2, ::2] if is_view else np.arange(6.0).reshape(2, 3)
+    record, out = make(optional, matrix), np.zeros(6)
+    expected = matrix[1, 2]
+    assert through(Packed(record).words, out) == 23
+    np.testing.assert_array_equal(out, [3, 0.25, expected, 7.0, 1.0, 0.0 if optional is None else 9.0])
+    assert matrix[0, 0] == -1.0
+    assert record.rows["a"][0] == -2.0
+
+
+def test_a_part_can_be_replaced():
+    """Buffers grow: the words then hold the new ones."""
+    record, out = make(None, np.zeros((2, 3))), np.zeros(6)
+    packed = Packed(record)
+    larger = np.zeros(5, ROW).view(np.recarray)
+    larger["b"][1, 2] = 5.0
+    packed.replace(2, larger)
+    through(packed.words, out)
+    assert out[3] == 5.0
+
+
+def test_other_things_are_refused():
+    """A bool has a size of its own, so the layout would not be what Python writes."""
+    with pytest.raises(TypeError, match="not bool"):
+        Packed(Outer(True, make(None, np.zeros((2, 3))).inner, np.zeros(1, ROW)))
