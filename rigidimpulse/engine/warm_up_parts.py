@@ -15,14 +15,15 @@ from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_impact import fill_rates, impact_rows
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, fill_closing_rows, start_joint_rows, stop_rows
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
-from rigidimpulse.dynamics.constraints.position_correction import needs_correction
+from rigidimpulse.dynamics.constraints.position_correction import correct_positions, needs_correction
+from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
 from rigidimpulse.dynamics.constraints.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
 from rigidimpulse.engine.begin import make_plan, make_run, start_trajectories
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.exact.impacts import respond
-from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, hold_turning
+from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, hold_turning, turns
 from rigidimpulse.engine.exact.trajectories import set_impact_margins
 from rigidimpulse.engine.islands import touching_islands
 from rigidimpulse.engine.pair_events import PairEvents
@@ -79,6 +80,7 @@ def _respond_and_detect(run) -> None:
     members = np.array([1])
     now.inv_inertia[1] = np.eye(3)
     needs_correction(contacts, np.ones(1, bool), one)
+    correct_positions(now, contacts, np.ones(1, bool), np.zeros(1), members, run.column)
     refresh_pose(members, now, state.rotation, state.trajectory.inertia)
     bring_gyroscopic(members, now, state.rotation, state.trajectory.inertia, run.angular_acceleration)
     _record(run, contacts, members)
@@ -89,7 +91,9 @@ def _respond_and_detect(run) -> None:
     problem = ContactProblem(now, contacts, members, run.column, motion.turning, run.acceleration, run.angular_acceleration)
     turning = Turning(motion, Touching(np.zeros(1, np.int64), np.zeros((1, 2), np.int64)), one)
     limits = StepLimits(1.0, 1.0, state.sub_step, state.under_contact)
-    hold_turning(None, None, problem, turning, run.error_estimate, limits, Forces(np.zeros((1, 3)), run.wrench), None)
+    rolling = rolling_of(world.rolling, world.material_of_body, now, contacts)
+    turns(motion, 1.0)
+    hold_turning(None, None, problem, turning, run.error_estimate, limits, Forces(np.zeros((1, 3)), run.wrench), rolling)
     stands_still(problem, world.constants, contacts, run.wrench, 1.0)
     start_trajectories(run)
     pair_events = PairEvents(run, 1.0 / 60.0)

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 KERNEL_DECORATORS = frozenset(
-    "jit jit_making_arrays inlined inner njit vectorize intrinsic overload overload_method overload_attribute lower_builtin lower_cast "
-    "lower_constant type_callable unbox box register_jitable register".split()
+    "jit jit_making_arrays jit_with_callbacks inlined inner njit vectorize intrinsic overload overload_method overload_attribute "
+    "lower_builtin lower_cast lower_constant type_callable unbox box register_jitable register".split()
 )
 """Decorators of functions whose parameters numba types by itself, or calls with arguments of its own (`typeof_impl.register`)."""
 

@@ -63,7 +63,7 @@ class ErrorEstimate(NamedTuple):
 def make_error_estimate(world: World, rotation: np.ndarray) -> ErrorEstimate:
     """Working memory for the bodies of a world; rotation (n, 3, 3): theirs now, a live array."""
     n = world.num_bodies
-    end = BodyState(*(np.empty((n, k)) for k in (3, 4, 3, 3)), world.inv_mass, np.empty((n, 3, 3)))
+    end = BodyState(np.empty((n, 3)), np.empty((n, 4)), np.empty((n, 3)), np.empty((n, 3)), world.inv_mass, np.empty((n, 3, 3)))
     trajectory = make_trajectories(n)._replace(inertia=world.inertia)
     return ErrorEstimate(
         world.geometry, world.shape_of_body, rotation, trajectory, end, np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, 3))
