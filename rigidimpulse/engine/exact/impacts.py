@@ -128,7 +128,7 @@ def resolve_impacts(bodies, constants, members, live, response, number, joints, 
     """
     before, m = kinetic_energy(bodies, constants, members), live.which.shape[0]
     # Each call gets a log of this size, and is repeated where it fills it.
-    size, count, capped = max(log.shape[0], 2 * m), np.int64(0), False
+    size, count, capped = max(log.shape[0], 2 * m), 0, False
     for _ in range(MAX_CALLS):
         log = _with_room(log, count, size)
         made, stopped = _respond(bodies, live, response, number, joints, log[count : count + size])
