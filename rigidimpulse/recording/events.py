@@ -129,6 +129,13 @@ def _first_buffers() -> LogBuffers:
     return LogBuffers(np.zeros(FIRST_ROWS, ENERGY_DTYPE), np.zeros(FIRST_ROWS, STRETCH_DTYPE), impacts, np.zeros(6, np.int64))
 
 
+def _doubled(rows: np.ndarray, least: int) -> np.ndarray:
+    """Rows that double until there are so many."""
+    while len(rows) < least:
+        rows = np.concatenate([rows, np.zeros_like(rows)])
+    return rows
+
+
 @dataclass
 class EventLog:
     """Collects impacts, energy changes by cause, and events while a run goes on.
@@ -158,11 +165,9 @@ class EventLog:
 
     def grow(self) -> None:
         """Make room for the rows that `has_room` was last asked about: buffers that are too small double."""
-        *tables, counts = self.buffers
-        for k, rows in enumerate(tables):
-            while len(tables[k]) < counts[k] + counts[3 + k]:
-                tables[k] = np.concatenate([tables[k], np.zeros_like(rows)])
-        self.buffers = LogBuffers(*tables, counts)
+        energy, stretches, impacts, counts = self.buffers
+        least = (counts[:3] + counts[3:]).tolist()
+        self.buffers = LogBuffers(_doubled(energy, least[0]), _doubled(stretches, least[1]), _doubled(impacts, least[2]), counts)
 
     def _make_room(self, energy: int = 0, stretches: int = 0, impacts: int = 0) -> None:
         if not has_room.py_func(self.buffers, energy, stretches, impacts):
