@@ -73,6 +73,17 @@ class _KernelCache(FunctionCache):
 class _PartLibrary(JITCodeLibrary):
     """Code that is only ever linked into other kernels: optimised there, and never turned into machine code by itself."""
 
+    def add_linking_library(self, library: Any) -> None:
+        """Remember a part that this one calls; what is called from Python links them all."""
+        library._ensure_finalized()
+        self._linking_libraries.append(library)
+
+    def finalize(self) -> None:
+        """Make ready for being linked, without the parts that it calls: numba would copy those into each of their callers in turn."""
+        self._raise_if_finalized()
+        self._final_module.verify()
+        self._finalize_final_module()
+
     def _optimize_final_module(self) -> None:
         pass
 
@@ -91,6 +102,29 @@ class _PartLibrary(JITCodeLibrary):
 
     def set_env(self, _name: str, _environment: Any) -> None:
         """A part has none."""
+
+
+class _EntryLibrary(JITCodeLibrary):
+    """Code that Python calls, with all parts that it needs."""
+
+    def finalize(self) -> None:
+        """Link the parts, each of them once, and make machine code.
+
+        LLVM links only what is asked for by what is linked already: each part comes after all that call it.
+        """
+        order: list[Any] = []
+        reached, waiting = {id(self)}, [(self, iter(self._linking_libraries))]
+        while waiting:
+            library, called = waiting[-1]
+            callee = next((part for part in called if id(part) not in reached), None)
+            if callee is None:
+                order.append(library)
+                waiting.pop()
+            else:
+                reached.add(id(callee))
+                waiting.append((callee, iter(callee._linking_libraries)))
+        self._linking_libraries = order[-2::-1]
+        super().finalize()
 
 
 def _holds_array(kind: Any) -> bool:
@@ -168,6 +202,9 @@ class _KernelCompiler(Compiler):
 
     def __init__(self, typing_context: Any, target_context: Any, library: Any, arguments: Any, result: Any, flags: Any, local: Any) -> None:
         remembered = _RememberedTypes(typing_context, flags.nrt)
+        if not isinstance(library, _PartLibrary):
+            library = _EntryLibrary(target_context.codegen(), "kernel")
+            library.enable_object_caching()
         super().__init__(remembered, target_context, library, arguments, result, _KernelFlags(flags), local)
 
     def define_pipelines(self) -> list[Any]:
