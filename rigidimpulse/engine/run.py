@@ -11,6 +11,7 @@ from rigidimpulse.collision.contact_buffer import ContactBuffer
 from rigidimpulse.collision.geometry import Geometry
 from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch, make_scratch
 from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.solvers.qp import row_solver
 from rigidimpulse.engine.absent import NoFlight, NoForces, NoJoints, NoSoftBodies, NoSubstepping
 from rigidimpulse.model.plan import Plan
@@ -40,9 +41,10 @@ class Run:
 
     Attributes:
         joints, forces, substepped, soft_bodies: participants; what the scene does not call for is one of `absent.py`.
-        triggers: None where the scene has none; only the effect "triggers" asks it. keyframes: paths of kinematic bodies. flight: the
-        kernel of
-            balls.
+        triggers: None where the scene has none; only the effect "triggers" asks it. keyframes: paths of kinematic bodies.
+        flight: the kernel of balls.
+        solve_rows: the solver of contacts and joints. energy_gain: part of the kinetic energy beyond which what contact forces made is
+            taken off again.
 
     """
 
@@ -66,6 +68,7 @@ class Run:
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
         self.solve_rows = row_solver(world.accuracy.contact_solver)
+        self.energy_gain = TOLERANCES.contact_forces.energy_gain
         self.error_estimate: Any = None
         self.joints: Any = NoJoints()
         self.forces: Any = NoForces(n)

@@ -25,7 +25,6 @@ from rigidimpulse.model.state import Ground
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 
-GAIN = TOLERANCES.contact_forces.energy_gain
 PARALLEL = TOLERANCES.contact_forces.same_direction
 
 
@@ -105,7 +104,7 @@ def limit_energy(run: Run, bodies: list[int], time: float) -> set[int]:
         gained = mechanical_energy(now, world, island) - float(state.energy_at_start[island].sum())
         gained -= float(world.mass[island] @ (change @ ground.velocity))
         before = kinetic_energy(now, world, island)
-        if gained > GAIN * before:
+        if gained > run.energy_gain * before:
             v, w = now.velocity[island].copy(), now.angular_velocity[island].copy()
             now.velocity[island] -= ground.velocity
             take_off(now, world, island, gained, ground.pushes)
