@@ -80,7 +80,7 @@ def alone() -> str:
 
 def crowded(sharing: Sharing) -> str:
     """The hash of a pile with colours of many batches."""
-    return shared(cloud([ri.Shape.box(0.2)], 396, 0.24), 0.2, sharing)
+    return shared(cloud([ri.Shape.box(0.2)], 396, 0.24), 0.1, sharing)
 
 
 @pytest.mark.parametrize("how", ["at once", "nobody helps", "help comes too late"])
