@@ -65,10 +65,10 @@ def test_substepped_islands_have_the_same_bits_on_one_core_and_on_several(shapes
     soon = {"pairs": 20, "general_pairs": 4, "together": together}
     # The third has so little memory at first that points, patches and batches are moved when they become more.
     little = {"first_points": 48, "points_of_a_body": 0, "patches_of_a_body": 0}
-    for sharing in (Sharing(cores=1, **soon), Sharing(cores=2, **soon), Sharing(cores=3, **soon, **little)):
+    for sharing in (Sharing(most_cores=1, **soon), Sharing(most_cores=2, **soon), Sharing(most_cores=3, **soon, **little)):
         dealt.clear()
         hashes.add(shared(cloud(shapes, number), duration, sharing))
-        assert max(dealt) == sharing.cores
+        assert max(dealt) == sharing.most_cores
     assert len(hashes) == 1
 
 
@@ -97,7 +97,7 @@ def test_sub_steps_have_the_same_bits_however_much_the_helper_does(alone: str, h
             return kernel.together(calls)
         return [kernel(*arguments) for arguments in (calls[:1] if how == "nobody helps" else calls)]
 
-    assert crowded(Sharing(cores=2, batches=0, together=workers)) == alone
+    assert crowded(Sharing(most_cores=2, batches=0, together=workers)) == alone
     assert set(asked) == {2}
     # Some colours have more than two pieces, so that both take of them.
     assert largest > 2 * BATCHES_EACH
@@ -105,8 +105,8 @@ def test_sub_steps_have_the_same_bits_however_much_the_helper_does(alone: str, h
 
 def test_contacts_that_find_no_space_are_found_again() -> None:
     """Whatever a buffer holds at first, in whichever share."""
-    usual = shared(cloud(rings(), 72), 0.3, Sharing(cores=2, general_pairs=4))
-    assert shared(cloud(rings(), 72), 0.3, Sharing(cores=2, general_pairs=4, buffer=40), contacts=40) == usual
+    usual = shared(cloud(rings(), 72), 0.3, Sharing(most_cores=2, general_pairs=4))
+    assert shared(cloud(rings(), 72), 0.3, Sharing(most_cores=2, general_pairs=4, buffer=40), contacts=40) == usual
 
 
 @pytest.mark.parametrize("shares", [1, 2, 3])

@@ -79,7 +79,7 @@ class SubsteppedIslands:
 
         Args:
             world: the compiled scene.
-            sharing: of the work by the cores; None: what suits this machine.
+            sharing: of the work by several cores; None: what suits this machine.
             rest: for how long members must have hardly moved to be sleepy, in sqrt(r / g); inf: none ever sleeps.
 
         """

@@ -101,7 +101,7 @@ class ContactStepper:
             world: the compiled scene.
             movable: (n,) bool, bodies that are dynamic, or will be when they are let go.
             finer: for scenes of few bodies.
-            sharing: of the work by the cores; None: what suits this machine.
+            sharing: of the work by several cores; None: what suits this machine.
 
         """
         n = world.num_bodies
@@ -125,7 +125,7 @@ class ContactStepper:
         self._taken_off = self._depth + (1.0 - self._factor) * bound[self.order]
         self.bodies = self._make_bodies()
         self._masses, self._pull = world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order])
-        self._shares, self._looked_at = self._sharing.cores, 0
+        self._shares, self._looked_at = self._sharing.most_cores, 0
         self._workspaces = [make_workspace() for _ in range(self._shares)]
         self._more_buffers: list[ContactBuffer] = []
         self.table = ContactTable(self._shares, n, self._sharing.first_points, self._sharing.points_of_a_body)

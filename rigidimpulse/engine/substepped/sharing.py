@@ -1,4 +1,4 @@
-"""How the work of sub-stepped islands is shared by the cores, and how much memory it takes at first. A run has the same bits with any."""
+"""How several cores share the work of sub-stepped islands, and how much memory it takes at first. A run has the same bits with any."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ Together = Callable[[Kernel, Sequence[tuple]], list[Any]]
 
 @dataclass(frozen=True)
 class Sharing:
-    """Cores, the work that makes it worthwhile to use more than one, and first sizes of memory.
+    """How many cores work, what makes several cores worthwhile, and first sizes of memory.
 
     Attributes:
-        cores: that work at once, at most. simd: width of the vectors.
+        most_cores: that work at once. simd: width of the vectors.
         pairs, general_pairs: beyond which several cores look at them: some tens of microseconds are lost by it.
-        batches: each counted in every sub-step, beyond which several cores solve them. solvers: cores that solve, at most.
+        batches: each counted in every sub-step, beyond which several cores solve them. solvers: how many of them at most.
         first_points, points_of_a_body: see `ContactTable`. patches_of_a_body: patches that are reserved for each body.
         buffer: contacts that a buffer of general pairs holds at first.
         together: how a kernel is called on several cores; None: by `Kernel.together`.
 
     """
 
-    cores: int = field(default_factory=number_of_cores)
+    most_cores: int = field(default_factory=number_of_cores)
     simd: Simd = field(default_factory=machine_simd)
     pairs: int = 400
     general_pairs: int = 16
