@@ -45,6 +45,11 @@ def test_scene_runs_without_events(name):
     assert run.status.ok, run.status.message
 
 
+def test_a_pile_at_rest_stands_still_to_the_bit():
+    run = run_of("pile")
+    np.testing.assert_array_equal(run.positions[-1], run.positions[-5])
+
+
 @pytest.mark.parametrize("name", REPEATED)
 def test_the_same_scene_gives_the_same_bits(name):
     entry = gallery.load(name)

@@ -39,9 +39,9 @@ class ContactBuffer:
 
     """
 
-    def __init__(self) -> None:
-        """Buffers for a small scene."""
-        self.real, self.integer = np.empty((CONTACT_CAPACITY, 10)), np.empty((CONTACT_CAPACITY, 5), np.int64)
+    def __init__(self, contacts: int = CONTACT_CAPACITY) -> None:
+        """Buffers for a small scene; contacts: that they hold at first."""
+        self.real, self.integer = np.empty((contacts, 10)), np.empty((contacts, 5), np.int64)
         self.scratch = np.empty((PAIR_CAPACITY, 2), np.int64)
 
     def find(self, question: Question) -> int:

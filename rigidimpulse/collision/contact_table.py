@@ -119,11 +119,21 @@ class ContactTable:
 
     """
 
-    def __init__(self, shares: int, bodies: int) -> None:
-        """An empty table; shares: number of parts into which the pairs are divided at most."""
-        self.pairs, self.taken = empty_pairs(0), FIRST_POINTS
-        self.lines, self.points, self.ids = _make_points(max(FIRST_POINTS, POINTS_OF_A_BODY * bodies))
-        self.free = _parts(1, FIRST_POINTS, shares)
+    def __init__(
+        self, shares: int, bodies: int, first_points: int = FIRST_POINTS, points_of_a_body: int = POINTS_OF_A_BODY
+    ) -> None:
+        """An empty table.
+
+        Args:
+            shares: number of parts into which the pairs are divided at most.
+            bodies: of the scene.
+            first_points: points that are taken at first, and at least when more are needed.
+            points_of_a_body: points that are reserved for each body.
+
+        """
+        self.pairs, self.taken, self._least = empty_pairs(0), first_points, first_points
+        self.lines, self.points, self.ids = _make_points(max(first_points, points_of_a_body * bodies))
+        self.free = _parts(1, first_points, shares)
 
     @property
     def arrays(self) -> Table:
@@ -144,7 +154,7 @@ class ContactTable:
         if (self.free[:, 1] - self.free[:, 0]).min() >= needed:
             return
         old, shares = self.taken, len(self.free)
-        self.taken = old + max(needed * shares, FIRST_POINTS, int(MORE * old))
+        self.taken = old + max(needed * shares, self._least, int(MORE * old))
         if self.taken > len(self.points):
             lines, points, ids = _make_points(2 * self.taken)
             points[:old], ids[:old] = self.points[:old], self.ids[:old]

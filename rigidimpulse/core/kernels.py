@@ -224,6 +224,8 @@ class _PartCompiler(_KernelCompiler):
         super().__init__(typing_context, target_context, library, *arguments)
 
 
+INTERPRETED = bool(vars(config)["DISABLE_JIT"])
+"""Whether kernels run as the Python they are written in (NUMBA_DISABLE_JIT=1): slow, but nothing is compiled. Not those with intrinsics."""
 MOST_CORES = 4
 """Cores on which a kernel is worth calling at once."""
 KERNELS: list[Kernel] = []
@@ -265,6 +267,8 @@ class Kernel:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python."""
+        if INTERPRETED:
+            return self.py_func(*arguments)
         entry = self.entry
         known, start = len(entry.overloads), perf_counter()
         result = entry(*arguments)
@@ -278,7 +282,7 @@ class Kernel:
 
     def together(self, calls: Sequence[tuple]) -> list[Any]:
         """Call it from Python with each of these tuples of arguments at once, on as many cores; results in their order."""
-        if len(calls) == 1 or not self.entry.overloads:
+        if INTERPRETED or len(calls) == 1 or not self.entry.overloads:
             return [self(*arguments) for arguments in calls]
         start = perf_counter()
         others = [_threads(os.getpid()).submit(self.entry, *arguments) for arguments in calls[1:]]
@@ -341,7 +345,7 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 def is_cached(kernel: Kernel) -> bool:
     """Whether a kernel of these sources is in use, or lies in the cache on disk, for whatever types."""
-    if kernel.entry.overloads:
+    if INTERPRETED or kernel.entry.overloads:
         return True
     digest = source_digest(Path(kernel.py_func.__code__.co_filename))
     return any(key[-1] == digest for key in kernel.entry._cache._cache_file._load_index())

@@ -18,6 +18,7 @@ from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.effects import EventKernel
 from rigidimpulse.engine.loop import run_to_end
 from rigidimpulse.engine.recording_of import finish_run
+from rigidimpulse.engine.run import Run
 from rigidimpulse.recording.profile import Stopwatch
 from rigidimpulse.recording.recording import Recording, RunSettings
 from rigidimpulse.scene.accuracy import Accuracy
@@ -80,16 +81,10 @@ def _simulate(
 ) -> Recording:
     """See `simulate`."""
     stopwatch = Stopwatch()
-    times = frame_times(duration, fps)
-    left_out = chosen_out(scene, accuracy, effects)
-    world = compile_scene(scene, accuracy, frozenset(left_out))
-    if len(times) * world.num_bodies > MOST_POSES:
-        raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
-    run = begin_run(world, make_plan(world, effects), times, left_out)
-    settings = RunSettings(float(duration), float(fps), world.accuracy, dict(effects or {}))
+    run = prepare(scene, frame_times(duration, fps), accuracy, effects)
+    settings = RunSettings(float(duration), float(fps), run.world.accuracy, dict(effects or {}))
     if cache is None:
-        run_to_end(run, duration, progress)
-        recording = finish_run(run, duration)
+        recording = complete(run, duration, progress)
     else:
         with closing(provider("checkpoints")(cache, settings, run)) as checkpointer:
             run_to_end(checkpointer.run, duration, lambda time: checkpointer.look(time, progress))
@@ -97,6 +92,23 @@ def _simulate(
             recording = finish_run(checkpointer.run, duration)
             checkpointer.finish(recording)
     return replace(recording, profile=stopwatch.read(run.plan), settings=settings)
+
+
+def prepare(
+    scene: Scene, times: np.ndarray, accuracy: str | Accuracy = "standard", effects: Mapping[str, bool] | None = None
+) -> Run:
+    """A run of a scene at its start, with frames at times (f,) s, for `complete`."""
+    left_out = chosen_out(scene, accuracy, effects)
+    world = compile_scene(scene, accuracy, frozenset(left_out))
+    if len(times) * world.num_bodies > MOST_POSES:
+        raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
+    return begin_run(world, make_plan(world, effects), times, left_out)
+
+
+def complete(run: Run, duration: float, progress: Callable[[float], None] | None = None) -> Recording:
+    """Step a run to its end at `duration` [s]; hand back what was recorded."""
+    run_to_end(run, duration, progress)
+    return finish_run(run, duration)
 
 
 def frame_times(duration: float, fps: float) -> np.ndarray:

@@ -11,11 +11,11 @@ import gc
 import logging
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from importlib import import_module
 
-from rigidimpulse.core.kernels import is_cached
+from rigidimpulse.core.kernels import Kernel, is_cached
 from rigidimpulse.model.world import World
 
 logger = logging.getLogger("rigidimpulse")
@@ -42,12 +42,17 @@ def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> N
         compile_kernels(world, missing)
 
 
-def kernels_to_compile(world: World, with_events: bool, with_substepped: bool) -> list[str]:
-    """Kinds of kernels that a run of a world needs and that do not lie in the cache: what is compiled last of each tells."""
+def kernels_to_compile(
+    world: World, with_events: bool, with_substepped: bool, is_ready: Callable[[Kernel], bool] = is_cached
+) -> list[str]:
+    """Kinds of kernels that a run of a world needs and that do not lie in the cache: what is compiled last of each tells.
+
+    is_ready: whether a kernel need not be compiled.
+    """
     needed = {CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: bool(world.joints_of_scene)}
     missing = []
     for kind, (module, name) in LAST.items():
-        if needed[kind] and not is_cached(getattr(import_module(f"rigidimpulse.{module}"), name)):
+        if needed[kind] and not is_ready(getattr(import_module(f"rigidimpulse.{module}"), name)):
             missing.append(kind)
     return missing
 

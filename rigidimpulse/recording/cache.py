@@ -12,7 +12,8 @@ class Cache:
 
     Attributes:
         path: a file that ends in .h5 or .hdf5.
-        every: s of computing between checkpoints, at least; 20 times the duration of one checkpoint if that is longer.
+        every: s of computing between checkpoints, at least; 20 times the duration of one checkpoint if that is longer. 0: a checkpoint
+            after every step, however long that takes.
 
     """
 

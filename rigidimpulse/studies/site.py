@@ -18,6 +18,7 @@ from pathlib import Path
 from time import perf_counter
 
 from rigidimpulse import gallery
+from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.studies.hard_cases import FAILED, PASSED, CaseResult, as_plain, lost_case, run_limited
 
 LIMIT = 900.0
@@ -97,14 +98,13 @@ def _run_apart(folder: Path, name: str, limit: float) -> CaseResult:
     return lost_case(gallery.load(name), "", code, last, perf_counter() - start, limit)
 
 
-def run_scene(name: str, folder: Path) -> CaseResult:
+def run_scene(entry: GalleryScene, folder: Path) -> CaseResult:
     """Run a scene in this process and write its page, its still and, last, its result."""
     from rigidimpulse.engine.simulate import simulate
     from rigidimpulse.view.page import write_html
     from rigidimpulse.view.picture import draw_picture, png
 
-    entry = gallery.load(name)
-    start = perf_counter()
+    start, name = perf_counter(), entry.name
     run = simulate(entry.scene(), entry.duration, entry.fps, accuracy=entry.accuracy)
     checks = [as_plain(check) for check in entry.check(run)]
     seconds = perf_counter() - start
@@ -120,4 +120,4 @@ def run_scene(name: str, folder: Path) -> CaseResult:
 
 
 if __name__ == "__main__":
-    run_scene(sys.argv[1], Path(sys.argv[2]))
+    run_scene(gallery.load(sys.argv[1]), Path(sys.argv[2]))

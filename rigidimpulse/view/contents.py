@@ -21,7 +21,9 @@ Messages, each with its kind
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -57,8 +59,12 @@ SOFT_BODY_MARGIN = 0.03
 """Margin about the vertices of a flexible body in the picture, relative to its extent."""
 
 
+DrawnMeshes = Callable[[Any, dict[str, DisplayMesh]], dict[str, DisplayMesh]]
+"""Finds what is drawn of the bodies of a scene in the place of their shapes, see `rendered_meshes`."""
+
+
 def page_contents(
-    recording: RecordingLike, other: RecordingLike | None = None, large: bool = False
+    recording: RecordingLike, other: RecordingLike | None = None, large: bool = False, drawn_of: DrawnMeshes = rendered_meshes
 ) -> tuple[dict[str, Any], list[tuple[str, dict[str, Any]]]]:
     """Return the manifest of a recording's page and its messages, each with its kind.
 
@@ -66,6 +72,7 @@ def page_contents(
         recording: the motion.
         other: another motion of the same bodies, which the picture must hold as well.
         large: have the motion as a glTF file.
+        drawn_of: finds what is drawn of bodies in the place of their shapes.
 
     Raises:
         ValueError: the recording has no frames, or a pose is not finite.
@@ -77,7 +84,7 @@ def page_contents(
     bodies = list(recording.scene.bodies)
     poses = [finite_poses(recording, body.name) for body in bodies]
     numbers, meshes = _shared_meshes(bodies)
-    rendered, meshes = _with_rendered(recording.scene, bodies, numbers, meshes)
+    rendered, meshes = _with_rendered(bodies, numbers, meshes, partial(drawn_of, recording.scene))
     up = up_axis(recording.scene.gravity)
     soft_bodies = list(recording.soft_bodies)
     framed = poses if other is None else [_both(pose, finite_poses(other, body.name)) for body, pose in zip(bodies, poses, strict=True)]
@@ -141,13 +148,13 @@ def _entries(
     return entries
 
 
-def is_large(recording: RecordingLike) -> bool:
-    """Return whether a recording has more than `MOST_KEYS` keys: bodies that move, times frames."""
+def is_large(recording: RecordingLike, most_keys: int = MOST_KEYS) -> bool:
+    """Return whether a recording has more keys than that: bodies that move, times frames."""
     names = [body.name for body in recording.scene.bodies if body.motion != "static"]
-    if len(names) * len(recording.times) <= MOST_KEYS:
+    if len(names) * len(recording.times) <= most_keys:
         return False
     poses = [(recording.position(name), recording.orientation(name)) for name in names]
-    return sum(any(np.any(part != part[0]) for part in pose) for pose in poses) * len(recording.times) > MOST_KEYS
+    return sum(any(np.any(part != part[0]) for part in pose) for pose in poses) * len(recording.times) > most_keys
 
 
 def _motion(
@@ -197,7 +204,7 @@ def page_scene(recording: RecordingLike) -> tuple[Framing, list[tuple[Any, Displ
     bodies = list(recording.scene.bodies)
     poses = [finite_poses(recording, body.name) for body in bodies]
     numbers, meshes = _shared_meshes(bodies)
-    rendered, meshes = _with_rendered(recording.scene, bodies, numbers, meshes)
+    rendered, meshes = _with_rendered(bodies, numbers, meshes, partial(rendered_meshes, recording.scene))
     paths = _paths(bodies, poses, numbers, meshes) + [_soft_body_path(track) for track in recording.soft_bodies]
     framing, drawn = frame_action(paths, up_axis(recording.scene.gravity)), []
     for entry, body in zip(_entries(recording, bodies, poses, numbers, rendered), bodies, strict=True):
@@ -242,10 +249,12 @@ def _shared_meshes(bodies: list[Any]) -> tuple[list[int], list[DisplayMesh]]:
     return [number_of[key] for key in keys], meshes
 
 
-def _with_rendered(scene: Any, bodies: list[Any], numbers: list[int], meshes: list[DisplayMesh]) -> tuple[list[int], list[DisplayMesh]]:
+def _with_rendered(
+    bodies: list[Any], numbers: list[int], meshes: list[DisplayMesh], drawn_of: Callable[[dict[str, DisplayMesh]], dict[str, DisplayMesh]]
+) -> tuple[list[int], list[DisplayMesh]]:
     """Return for each body the number of the mesh that is drawn where it is not the one that collides, else -1, and all meshes."""
     collision = {body.name: meshes[number] for body, number in zip(bodies, numbers, strict=True) if number >= 0}
-    drawn = rendered_meshes(scene, collision)
+    drawn = drawn_of(collision)
     place = {name: len(meshes) + k for k, name in enumerate(drawn)}
     return [place.get(body.name, -1) for body in bodies], meshes + list(drawn.values())
 

@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from rigidimpulse.recording.exporters import ExportTarget
-from rigidimpulse.view.contents import is_large, page_contents
+from rigidimpulse.view.contents import MOST_KEYS, DrawnMeshes, is_large, page_contents
 from rigidimpulse.view.protocol import RecordingLike
+from rigidimpulse.view.rendered import rendered_meshes
 
 SCRIPTS = (
     "look.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "soft_bodies.js", "shapes.js", "transport.js", "plot.js", "timeline.js",
@@ -50,10 +51,12 @@ def export_html(recording: RecordingLike, target: ExportTarget) -> None:
     write_html(recording, target.path, title=target.title)
 
 
-def render_page(recording: RecordingLike, title: str = DEFAULT_TITLE) -> str:
-    """Return the HTML page of a recording, as `write_html` writes it."""
-    large = is_large(recording)
-    return assemble(*page_contents(recording, large=large), title, LARGE_SCRIPTS if large else SCRIPTS)
+def render_page(
+    recording: RecordingLike, title: str = DEFAULT_TITLE, most_keys: int = MOST_KEYS, drawn_of: DrawnMeshes = rendered_meshes
+) -> str:
+    """Return the HTML page of a recording, as `write_html` writes it; most_keys, drawn_of: see `contents`."""
+    large = is_large(recording, most_keys)
+    return assemble(*page_contents(recording, large=large, drawn_of=drawn_of), title, LARGE_SCRIPTS if large else SCRIPTS)
 
 
 def assemble(

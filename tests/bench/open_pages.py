@@ -16,8 +16,7 @@ import numpy as np
 
 import rigidimpulse as ri
 from rigidimpulse.recording.events import IMPACT_DTYPE
-from rigidimpulse.view import contents
-from rigidimpulse.view.page import write_html
+from rigidimpulse.view.page import render_page
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "browser"))
 from chromium import FLAGS, find_chromium
@@ -91,9 +90,8 @@ def main() -> None:
         for num_bodies, num_frames in zip(sizes[::2], sizes[1::2]):
             run = many(num_bodies, num_frames)
             for kind, bound in (("tracks", 10**9), ("glTF", 0)):
-                contents.MOST_KEYS = bound
                 path = Path(folder) / f"{kind}.html"
-                write_html(run, path)
+                path.write_text(render_page(run, most_keys=bound), encoding="utf-8")
                 print(f"{num_bodies} x {num_frames} as {kind:7}", measure(playwright, path), flush=True)
 
 

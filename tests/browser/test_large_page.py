@@ -14,9 +14,8 @@ from chromium import Opened, open_page
 from test_html import STRANGE_NAME, recording
 from test_recording_page import full_run
 
-from rigidimpulse.view import contents
 from rigidimpulse.view.contents import is_large
-from rigidimpulse.view.page import render_page, write_html
+from rigidimpulse.view.page import render_page
 
 pytestmark = pytest.mark.browser
 
@@ -27,21 +26,19 @@ POSE = 1e-5
 def opened(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Opened:
     """The page of `full_run` as a large one, paused."""
     path = tmp_path_factory.mktemp("page") / "large.html"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contents, "MOST_KEYS", 2 * 61 - 1)
-        write_html(full_run(), path)
+    path.write_text(render_page(full_run(), most_keys=2 * 61 - 1), encoding="utf-8")
     page = open_page(browser, path.as_uri())
     page.do("r.pause()")
     return page
 
 
-def test_large_is_more_keys_of_moving_bodies_than_the_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_is_more_keys_of_moving_bodies_than_the_bound() -> None:
     # Of the four bodies two move, at 61 frames; floor and wall are no keys.
     for most, large in ((2 * 61, False), (2 * 61 - 1, True)):
-        monkeypatch.setattr(contents, "MOST_KEYS", most)
-        assert is_large(recording()) is large
-        assert ('data-kind="glb"' in render_page(recording())) is large
-        assert ('data-kind="motion"' in render_page(recording())) is not large
+        assert is_large(recording(), most) is large
+        page = render_page(recording(), most_keys=most)
+        assert ('data-kind="glb"' in page) is large
+        assert ('data-kind="motion"' in page) is not large
 
 
 def test_poses_are_those_of_the_recording(opened: Opened) -> None:

@@ -18,9 +18,8 @@ import rigidimpulse as ri
 from rigidimpulse.core.quaternion import rotate
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.ledger import Ledger
-from rigidimpulse.view import contents
 from rigidimpulse.view.display import display_mesh
-from rigidimpulse.view.page import write_html
+from rigidimpulse.view.page import render_page
 
 pytestmark = pytest.mark.browser
 
@@ -50,9 +49,7 @@ def shared(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Opened:
     """The page of `full_run`, opened once from its file."""
     path = tmp_path_factory.mktemp("page") / "run.html"
     drawn = display_mesh(ri.Shape.box((0.7, 0.2, 0.1)))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contents, "rendered_meshes", lambda scene, collision: {STRANGE_NAME: drawn})
-        write_html(full_run(), path)
+    path.write_text(render_page(full_run(), drawn_of=lambda scene, collision: {STRANGE_NAME: drawn}), encoding="utf-8")
     page = open_page(browser, path.as_uri(), WIDTH, HEIGHT)
     page.page.keyboard.press("p")  # so low a window has the plots put away
     return page

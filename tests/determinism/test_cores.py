@@ -6,18 +6,21 @@ import multiprocessing
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 
 import rigidimpulse as ri
-from rigidimpulse.collision import contact_table
 from rigidimpulse.collision.contact_buffer import ContactBuffer
 from rigidimpulse.collision.contact_cache import BLOCK, find_contacts, share_of
-from rigidimpulse.core.kernels import MOST_CORES, number_of_cores
+from rigidimpulse.core.kernels import MOST_CORES, Kernel, number_of_cores
 from rigidimpulse.dynamics.solvers.tgs_soft.solver import BATCHES_EACH, advance
-from rigidimpulse.engine.substepped import contact_forces
+from rigidimpulse.engine.simulate import complete, frame_times, prepare
+from rigidimpulse.engine.substepped.advance import SubsteppedIslands
+from rigidimpulse.engine.substepped.sharing import Sharing
 
 ROUGH = ri.Material(density=500, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
 
@@ -41,75 +44,69 @@ def rings() -> list[ri.Shape]:
     return [ri.Shape.mesh(ring.vertices, ring.faces), ri.Shape.box((0.2, 0.15, 0.1))]
 
 
+def shared(scene: ri.Scene, duration: float, sharing: Sharing, contacts: int | None = None) -> str:
+    """The hash of a run whose islands share their work so; contacts: that the buffer of the run holds at first."""
+    run = prepare(scene, frame_times(duration, 60.0))
+    run.substepped = SubsteppedIslands(run.world, sharing)
+    if contacts is not None:
+        run.contact_buffer = ContactBuffer(contacts)
+    return complete(run, duration).state_hash()
+
+
 @pytest.mark.parametrize(("shapes", "number", "duration"), [([ri.Shape.box(0.2)], 144, 0.6), (rings(), 72, 0.45)], ids=["boxes", "rings"])
-def test_substepped_islands_have_the_same_bits_on_one_core_and_on_several(monkeypatch, shapes, number, duration) -> None:
+def test_substepped_islands_have_the_same_bits_on_one_core_and_on_several(shapes, number, duration) -> None:
     hashes, dealt = set(), []
 
-    def together(calls):
-        dealt.append(len(calls))
-        return type(find_contacts).together(find_contacts, calls)
+    def together(kernel: Kernel, calls: Sequence[tuple]) -> list[Any]:
+        if kernel is find_contacts:
+            dealt.append(len(calls))
+        return kernel.together(calls)
 
-    monkeypatch.setattr(find_contacts, "together", together, raising=False)
-    monkeypatch.setattr(contact_forces, "WORTHWHILE", 20)
-    monkeypatch.setattr(contact_forces, "WORTHWHILE_GENERAL", 4)
-    # The third has so little room at first that rows, patches and batches are moved when they become more.
-    for cores, rows, rows_of_a_body, patches_of_a_body in ((1, 1024, 32, 8), (2, 1024, 32, 8), (3, 48, 0, 0)):
-        monkeypatch.setattr(contact_forces, "number_of_cores", lambda cores=cores: cores)
-        monkeypatch.setattr(contact_table, "FIRST_POINTS", rows)
-        monkeypatch.setattr(contact_table, "POINTS_OF_A_BODY", rows_of_a_body)
-        monkeypatch.setattr(contact_forces, "PATCHES_OF_A_BODY", patches_of_a_body)
+    soon = {"pairs": 20, "general_pairs": 4, "together": together}
+    # The third has so little memory at first that points, patches and batches are moved when they become more.
+    little = {"first_points": 48, "points_of_a_body": 0, "patches_of_a_body": 0}
+    for sharing in (Sharing(most_cores=1, **soon), Sharing(most_cores=2, **soon), Sharing(most_cores=3, **soon, **little)):
         dealt.clear()
-        run = ri.simulate(cloud(shapes, number), duration)
-        hashes.add(run.state_hash())
-        assert max(dealt) == cores
+        hashes.add(shared(cloud(shapes, number), duration, sharing))
+        assert max(dealt) == sharing.most_cores
     assert len(hashes) == 1
 
 
 @pytest.fixture(scope="module")
 def alone() -> str:
-    """The hash of a heap whose sub-steps had no helper."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contact_forces, "WORTHWHILE_BATCHES", 10**9)
-        return crowded()
+    """The hash of a pile whose sub-steps had no helper."""
+    return crowded(Sharing(batches=10**9))
 
 
-def crowded() -> str:
-    """The hash of a heap with colours of many batches."""
-    return ri.simulate(cloud([ri.Shape.box(0.2)], 288, 0.24), 0.3).state_hash()
+def crowded(sharing: Sharing) -> str:
+    """The hash of a pile with colours of many batches."""
+    return shared(cloud([ri.Shape.box(0.2)], 396, 0.24), 0.1, sharing)
 
 
-@pytest.mark.parametrize("together", ["at once", "nobody helps", "help comes too late"])
-def test_sub_steps_have_the_same_bits_however_much_the_helper_does(monkeypatch, alone: str, together: str) -> None:
+@pytest.mark.parametrize("how", ["at once", "nobody helps", "help comes too late"])
+def test_sub_steps_have_the_same_bits_however_much_the_helper_does(alone: str, how: str) -> None:
     asked, largest = [], 0
 
-    def workers(calls):
+    def workers(kernel: Kernel, calls: Sequence[tuple]) -> list[Any]:
         nonlocal largest
+        if kernel is not advance:
+            return kernel.together(calls)
         asked.append(len(calls))
-        largest = max(largest, int(np.diff(calls[0][5]).max(initial=0)))
-        if together == "at once":
-            return type(advance).together(advance, calls)
-        return [advance(*arguments) for arguments in (calls[:1] if together == "nobody helps" else calls)]
+        largest = max(largest, int(np.diff(calls[0][1].edges).max(initial=0)))
+        if how == "at once":
+            return kernel.together(calls)
+        return [kernel(*arguments) for arguments in (calls[:1] if how == "nobody helps" else calls)]
 
-    monkeypatch.setattr(contact_forces, "number_of_cores", lambda: 2)
-    monkeypatch.setattr(contact_forces, "WORTHWHILE_BATCHES", 0)
-    monkeypatch.setattr(advance, "together", workers, raising=False)
-    assert crowded() == alone
+    assert crowded(Sharing(most_cores=2, batches=0, together=workers)) == alone
     assert set(asked) == {2}
     # Some colours have more than two pieces, so that both take of them.
     assert largest > 2 * BATCHES_EACH
 
 
-def test_contacts_that_find_no_room_are_found_again(monkeypatch) -> None:
+def test_contacts_that_find_no_space_are_found_again() -> None:
     """Whatever a buffer holds at first, in whichever share."""
-
-    def small(buffer: ContactBuffer) -> None:
-        buffer.real, buffer.integer, buffer.scratch = np.empty((40, 10)), np.empty((40, 5), np.int64), np.empty((4096, 2), np.int64)
-
-    monkeypatch.setattr(contact_forces, "WORTHWHILE_GENERAL", 4)
-    monkeypatch.setattr(contact_forces, "number_of_cores", lambda: 2)
-    usual = ri.simulate(cloud(rings(), 72), 0.3).state_hash()
-    monkeypatch.setattr(ContactBuffer, "__init__", small)
-    assert ri.simulate(cloud(rings(), 72), 0.3).state_hash() == usual
+    usual = shared(cloud(rings(), 72), 0.3, Sharing(most_cores=2, general_pairs=4))
+    assert shared(cloud(rings(), 72), 0.3, Sharing(most_cores=2, general_pairs=4, buffer=40), contacts=40) == usual
 
 
 @pytest.mark.parametrize("shares", [1, 2, 3])

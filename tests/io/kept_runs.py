@@ -15,7 +15,6 @@ import time
 import numpy as np
 
 import rigidimpulse as ri
-from rigidimpulse.io.cache import checkpointer
 
 
 def pile() -> ri.Scene:
@@ -72,7 +71,6 @@ def run(name: str, duration: float, cache: str | None) -> ri.Recording:
 
 def main(name: str, duration: str, cache: str, seed: str) -> None:
     """See the head of the file."""
-    checkpointer.EXPENSIVE = 0.0
     run(name, 0.05, None)  # kernels are there, so that what is killed is the run
     random_numbers = random.Random(int(seed))
     kills = 0

@@ -16,7 +16,6 @@ from kept_runs import SCENES, gas, pile, run
 import rigidimpulse as ri
 from rigidimpulse import gallery
 from rigidimpulse.cli.cli import BAD_SCENE, main
-from rigidimpulse.io.cache import checkpointer
 
 h5py = pytest.importorskip("h5py")
 DURATIONS = {"pile": 0.5, "gas": 40.0, "forces": 0.4}
@@ -63,9 +62,8 @@ EFFECTS = ["spot", "pile", "cloth_on_ball", "rocket", "pendulum", "driven_oscill
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_every_effect_goes_on(name, tmp_path, monkeypatch):
+def test_every_effect_goes_on(name, tmp_path):
     # Each step is a checkpoint, and the run is stopped three times on its way: what a checkpoint leaves out would show.
-    monkeypatch.setattr(checkpointer, "EXPENSIVE", 0.0)
     entry = gallery.load(name)
     settings = {"duration": 0.3, "fps": entry.fps, "accuracy": entry.accuracy}
     whole = ri.simulate(entry.scene(), **settings)
@@ -96,8 +94,7 @@ def test_flexible_bodies_are_in_the_cache(tmp_path):
         np.testing.assert_array_equal(loaded.soft_body(track.name)[0], track.vertices)
 
 
-def test_a_stopped_run_leaves_its_frames(tmp_path, monkeypatch):
-    monkeypatch.setattr(checkpointer, "EXPENSIVE", 0.0)
+def test_a_stopped_run_leaves_its_frames(tmp_path):
     cache = ri.Cache(tmp_path / "run.h5", every=0.0)
     with pytest.raises(Stopped):
         ri.simulate(pile(), 0.4, 100.0, cache=cache, progress=stop_after(0.25))
@@ -112,8 +109,7 @@ def test_a_stopped_run_leaves_its_frames(tmp_path, monkeypatch):
     assert "go on from there" in left.status.message
 
 
-def test_the_older_checkpoint_does_where_the_newer_one_is_damaged(tmp_path, monkeypatch):
-    monkeypatch.setattr(checkpointer, "EXPENSIVE", 0.0)
+def test_the_older_checkpoint_does_where_the_newer_one_is_damaged(tmp_path):
     cache = ri.Cache(tmp_path / "run.h5", every=0.0)
     with pytest.raises(Stopped):
         ri.simulate(pile(), 0.4, cache=cache, progress=stop_after(0.25))

@@ -13,7 +13,7 @@ import pytest
 import rigidimpulse as ri
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.solvers.newton import solve_newton
-from rigidimpulse.engine import run as run_module
+from rigidimpulse.engine.simulate import complete, frame_times, prepare
 
 G, SIZE, SPEED = 9.81, 0.2, 2.0
 GAP = 2.0 * TOLERANCES.contact.margin * SIZE
@@ -35,9 +35,8 @@ def spoilt(factor: float, start: float, end: float = np.inf):
     return solve
 
 
-def sliding_box(monkeypatch: pytest.MonkeyPatch, solver, hinged: bool = False) -> ri.Recording:
+def sliding_box(solver, hinged: bool = False) -> ri.Recording:
     """Run of a box of 1 kg that slides on a floor, maybe with a flap hinged to it."""
-    monkeypatch.setattr(run_module, "row_solver", lambda name: solver)
     rough = ri.Material(static_friction=0.2, dynamic_friction=0.2, restitution=0.0)
     scene = ri.Scene(gravity=(0, 0, -G))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=rough))
@@ -46,7 +45,9 @@ def sliding_box(monkeypatch: pytest.MonkeyPatch, solver, hinged: bool = False) -
     if hinged:
         scene.add(ri.Body("flap", ri.Shape.box((SIZE, SIZE, 0.02)), position=(0, 0, SIZE + 0.01), **moves))
         scene.add(ri.HingeJoint("box", "flap", (0.5 * SIZE, 0, SIZE), (0, 1, 0), name="hinge"))
-    return ri.simulate(scene, 0.5)
+    run = prepare(scene, frame_times(0.5, 60.0))
+    run.solve_rows = solver
+    return complete(run, 0.5)
 
 
 def rise(run: ri.Recording) -> float:
@@ -57,29 +58,29 @@ def rise(run: ri.Recording) -> float:
 
 @pytest.mark.parametrize("factor", [30.0, 1e6, np.nan])
 @pytest.mark.parametrize(("start", "end"), [(1, np.inf), (10, 16)])
-def test_energy_never_grows_by_forces_that_are_no_solution(factor, start, end, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = sliding_box(monkeypatch, spoilt(factor, start, end))
+def test_energy_never_grows_by_forces_that_are_no_solution(factor, start, end) -> None:
+    run = sliding_box(spoilt(factor, start, end))
     assert np.all(np.isfinite(run.positions)) and np.all(np.isfinite(run.velocities))
     assert [event.kind for event in run.status.events] == ["contact forces not solved"]
     assert rise(run) < 2.0 * GAP * G
 
 
 @pytest.mark.parametrize("factor", [1e6, np.nan])
-def test_nor_by_those_of_joints(factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nor_by_those_of_joints(factor: float) -> None:
     """All of the twenty rounds that close the joints are spoilt, for some sub-steps. Joints are of second order: 1e-3 of the energy."""
-    run = sliding_box(monkeypatch, spoilt(factor, 30, 75), hinged=True)
+    run = sliding_box(spoilt(factor, 30, 75), hinged=True)
     assert np.all(np.isfinite(run.positions)) and np.all(np.isfinite(run.velocities))
     assert np.all(np.isfinite(run.reaction("hinge")))
     assert {"contact forces not solved", "joints not closed"} & {event.kind for event in run.status.events}
     assert rise(run) < 1e-3 * run.ledger.kinetic[0]
 
 
-def test_forces_that_fall_short_are_used_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_forces_that_fall_short_are_used_and_said() -> None:
     """Half of what is needed makes no energy: better than nothing. The status tells, and the contacts show what acted."""
-    exact = sliding_box(monkeypatch, solve_newton)
+    exact = sliding_box(solve_newton)
     assert exact.status.ok
     np.testing.assert_allclose(exact.velocity("box")[:, 0], SPEED - 0.2 * G * exact.times, atol=1e-9)
-    run = sliding_box(monkeypatch, spoilt(0.5, 1))
+    run = sliding_box(spoilt(0.5, 1))
     assert [event.kind for event in run.status.events] == ["contact forces not solved"]
     assert "use a smaller step" in run.status.message
     assert rise(run) < 2.0 * GAP * G

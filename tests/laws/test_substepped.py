@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,7 +12,11 @@ from box_pit import pit
 
 import rigidimpulse as ri
 from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.core.simd import Simd
 from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.engine.simulate import complete, frame_times, prepare
+from rigidimpulse.engine.substepped.advance import SubsteppedIslands
+from rigidimpulse.engine.substepped.sharing import Sharing
 
 GRAVITY = 9.81
 SUBSTEPPED = ri.Accuracy(contact_solver="substepped")
@@ -124,16 +129,16 @@ def cloud() -> ri.Scene:
     return scene
 
 
-def test_a_substepped_island_that_must_not_stand_still_comes_to_rest_by_itself(monkeypatch):
+def test_a_substepped_island_that_must_not_stand_still_comes_to_rest_by_itself():
     """What is left of its speeds is round-off of records in single precision: eps g h is 2e-9 m/s.
 
     With places of the points off by round-off of where their bodies are, single points hold twists, and boxes creep at 2e-3 m/s for ever.
     """
-    from rigidimpulse.engine.substepped import advance
     from rigidimpulse.gallery.pile import pile
 
-    monkeypatch.setattr(advance, "REST", np.inf)
-    run = ri.simulate(pile(90), 6.0, fps=10.0, accuracy="preview")
+    begun = prepare(pile(90), frame_times(6.0, 10.0), "preview")
+    begun.substepped = SubsteppedIslands(begun.world, rest=np.inf)
+    run = complete(begun, 6.0)
     assert run.status.ok
     assert np.abs(run.velocities[-1]).max() < 1e-7
 
@@ -182,10 +187,16 @@ def mixed(reordered: bool, prefix: str) -> ri.Scene:
     return scene
 
 
+@cache
+def mixed_run() -> ri.Recording:
+    """The run of the mixed pile as it is, for all that compare with it."""
+    return ri.simulate(mixed(False, ""), 2.0, accuracy=SUBSTEPPED)
+
+
 def test_same_bits_again_renamed_and_in_another_order():
     # Bodies and pairs are worked through in an order of places, so not a bit may differ; in any other order the heap, which
     # amplifies round-off tenfold with every impact, would lie differently by centimetres.
-    first = ri.simulate(mixed(False, ""), 2.0, accuracy=SUBSTEPPED)
+    first = mixed_run()
     for reordered, prefix in ((False, ""), (True, ""), (False, "z")):
         run = ri.simulate(mixed(reordered, prefix), 2.0, accuracy=SUBSTEPPED)
         for k in range(10):
@@ -223,24 +234,13 @@ def test_auto_leaves_tall_columns_to_newton(tall):
     assert (counts["largest island"] == 64) != tall
 
 
-def test_pile_rests_with_positive_gaps():
-    from rigidimpulse import gallery
-
-    entry = gallery.load("pile")
-    run = ri.simulate(entry.scene(), entry.duration, entry.fps)
-    assert [check for check in entry.check(run) if not check.passed] == []
-    np.testing.assert_array_equal(run.positions[-1], run.positions[-5])
-
-
-def test_same_bits_at_every_width_of_simd_lanes(monkeypatch):
-    # Lanes never read each other and products are added by fma, so batches of 2 give the bits of the machine's own width; patches
+def test_same_bits_at_every_width_of_simd_vectors():
+    # Elements never read each other and products are added by fma, so batches of 2 give the bits of the machine's own width; patches
     # solved in another order, or sums rounded otherwise, would lie centimetres apart after 2 s.
-    from rigidimpulse.core.simd import Simd
-    from rigidimpulse.engine.substepped import contact_forces
-
-    first = ri.simulate(mixed(False, ""), 2.0, accuracy=SUBSTEPPED)
-    monkeypatch.setattr(contact_forces, "machine_simd", lambda: Simd(2))
-    again = ri.simulate(mixed(False, ""), 2.0, accuracy=SUBSTEPPED)
+    first = mixed_run()
+    begun = prepare(mixed(False, ""), first.times, SUBSTEPPED)
+    begun.substepped = SubsteppedIslands(begun.world, Sharing(simd=Simd(2)))
+    again = complete(begun, 2.0)
     np.testing.assert_array_equal(again.positions, first.positions)
     np.testing.assert_array_equal(again.orientations, first.orientations)
 

@@ -27,7 +27,8 @@ NUMBER = 40
 def random_contacts(rng: np.random.Generator, pairs: int) -> tuple[Contacts, Touching]:
     """Contacts of so many pairs of bodies, 1 to 9 of each, no two alike."""
     bodies = sorted({tuple(sorted(rng.choice(NUMBER, 2, replace=False).tolist())) for _ in range(pairs)})
-    rows = [(a, b, kind, k, 3 * k) for a, b in bodies for k, kind in enumerate(rng.choice([VERTEX_FACE, FACE_VERTEX, EDGE_EDGE], rng.integers(1, 10)))]
+    kinds = [rng.choice([VERTEX_FACE, FACE_VERTEX, EDGE_EDGE], rng.integers(1, 10)) for _ in bodies]
+    rows = [(a, b, kind, k, 3 * k) for (a, b), mine in zip(bodies, kinds, strict=True) for k, kind in enumerate(mine)]
     a, b, kind, first, second = np.array(rows, np.int64).T.copy()
     m = len(rows)
     contacts = Contacts(a, b, *rng.normal(size=(3, m, 3)), *np.zeros((5, m)))

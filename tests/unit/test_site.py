@@ -8,6 +8,7 @@ import re
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 from click.testing import CliRunner
@@ -15,8 +16,7 @@ from click.testing import CliRunner
 import rigidimpulse as ri
 from rigidimpulse import gallery
 from rigidimpulse.cli.cli import BAD_SCENE, CHECK_FAILED, main
-from rigidimpulse.studies import site
-from rigidimpulse.studies.hard_cases import FAILED, HUNG, PASSED
+from rigidimpulse.studies.hard_cases import FAILED, HUNG, PASSED, CaseResult
 from rigidimpulse.studies.site import make_site, run_scene
 from rigidimpulse.studies.site_pages import coloured, index_page, scene_page
 
@@ -51,15 +51,18 @@ def test_index_and_pages_name_every_scene_with_its_checks(folder: Path) -> None:
         assert "<title>" + name in (folder / f"{name}_play.html").read_text(encoding="utf-8")
 
 
-def test_a_scene_is_kept_until_the_package_is_newer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    runs: list[str] = []
-    monkeypatch.setattr(site, "_run_apart", lambda folder, name, limit: runs.append(name) or site._kept(folder, name, 0.0))
-    kept = []
-    make_site(folder, ["two_spheres"], report=lambda result, was_kept: kept.append(was_kept))
-    assert kept == [True] and runs == []
-    os.utime(folder / "two_spheres.json", (1.0, 1.0))
-    make_site(folder, ["two_spheres"])
-    assert runs == ["two_spheres"]
+def test_a_scene_is_kept_until_the_package_is_newer(folder: Path, tmp_path: Path) -> None:
+    site = copytree(folder, tmp_path / "site")
+    kept: list[bool] = []
+
+    def report(_result: CaseResult, was_kept: bool) -> None:
+        kept.append(was_kept)
+
+    make_site(site, ["two_spheres"], report=report)
+    os.utime(site / "two_spheres.json", (1.0, 1.0))
+    # That it is run again shows by its hanging: it has hardly any time.
+    (again,) = make_site(site, ["two_spheres"], limit=0.02, report=report)
+    assert kept == [True, False] and again.outcome == HUNG
 
 
 def test_a_scene_that_takes_too_long_is_shown_as_such(tmp_path: Path) -> None:
@@ -70,11 +73,10 @@ def test_a_scene_that_takes_too_long_is_shown_as_such(tmp_path: Path) -> None:
     assert "no picture" in index and "hung" in index and "<b>0</b> of 1 scenes" in index
 
 
-def test_a_check_that_fails_is_marked_and_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_check_that_fails_is_marked_and_comes_first(tmp_path: Path) -> None:
     entry = gallery.load("two_spheres")
     spoiled = replace(entry, check=lambda run: [replace(check, passed=False) for check in entry.check(run)[:1]] + entry.check(run)[1:])
-    monkeypatch.setattr(gallery, "load", lambda name: spoiled)
-    result = run_scene("two_spheres", tmp_path)
+    result = run_scene(spoiled, tmp_path)
     assert result.outcome == FAILED
     number = len(result.checks)
     assert f"✗ {number - 1} of {number} checks" in scene_page(spoiled, result, tmp_path)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.collision.contact_records import in_play
+from rigidimpulse.collision.contact_records import MEMBER, in_play
+from rigidimpulse.core.kernels import Kernel
 from rigidimpulse.dynamics.solvers.tgs_soft.records import LINES, POINTS
-from rigidimpulse.engine.substepped import contact_forces
+from rigidimpulse.dynamics.solvers.tgs_soft.solver import advance
+from rigidimpulse.engine.simulate import complete, frame_times, prepare
+from rigidimpulse.engine.substepped.advance import SubsteppedIslands
+from rigidimpulse.engine.substepped.sharing import Sharing
 
 
 def pile(number: int) -> ri.Scene:
@@ -25,14 +29,16 @@ def pile(number: int) -> ri.Scene:
     return scene
 
 
-def test_every_contact_is_in_one_lane_with_the_motion_since_it_was_put_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_contact_is_in_one_element_with_the_motion_since_it_was_put_there() -> None:
     """In the middle of a step only contacts of quick bodies are put anew; none may be lost or doubled by it.
 
     And what a body has drifted is how far it has come since the steady batches were made, to round-off of places of 1 m.
     """
-    advance, made, steps = contact_forces.advance, {}, {"whole": 0, "steady": 0}
+    made, steps = {}, {"whole": 0, "steady": 0}
 
-    def checked(calls: list[tuple]) -> list[float]:
+    def checked(kernel: Kernel, calls: Sequence[tuple]) -> list[Any]:
+        if kernel is not advance:
+            return kernel.together(calls)
         simd, solve, *_ = calls[0]
         bodies, pairs, _, batches, _, edges, steady = solve
         rows = batches.row[: POINTS * edges[-1] * simd.width]
@@ -47,10 +53,11 @@ def test_every_contact_is_in_one_lane_with_the_motion_since_it_was_put_there(mon
         if steady == 0:
             made["place"] = bodies.position.copy()
         drift = bodies.drift.reshape(-1, 8)[:, :3]
-        moves = bodies.part == contact_forces.MEMBER
+        moves = bodies.part == MEMBER
         assert np.abs(drift - (bodies.position - made["place"]))[moves].max(initial=0.0) < 1e-13
-        return advance.together(calls)
+        return kernel.together(calls)
 
-    monkeypatch.setattr(contact_forces, "advance", SimpleNamespace(together=checked))
-    assert ri.simulate(pile(100), 1.2).status.ok
+    run = prepare(pile(100), frame_times(1.2, 60.0))
+    run.substepped = SubsteppedIslands(run.world, Sharing(together=checked))
+    assert complete(run, 1.2).status.ok
     assert min(steps.values()) > 50

@@ -6,6 +6,7 @@ import sys
 import pytest
 
 import rigidimpulse as ri
+from rigidimpulse.core.kernels import Kernel
 from rigidimpulse.engine import warm_up
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.gallery import load
@@ -68,13 +69,21 @@ def test_nothing_is_left_to_compile_for_a_box_that_falls_on_a_floor():
     assert done.stdout.split() == []
 
 
-def test_only_what_a_scene_needs_and_the_cache_lacks_is_compiled(monkeypatch):
+def test_only_what_a_scene_needs_and_the_cache_lacks_is_compiled():
     ball = ri.Body("ball", ri.Shape.sphere(0.1), position=(0, 0, 1))
     flies = compile_scene(ri.Scene(bodies=[ball]))
     arm = compile_scene(load("arm").scene())
-    monkeypatch.setattr(warm_up, "is_cached", lambda _kernel: False)
-    assert warm_up.kernels_to_compile(flies, False, False) == []
-    assert warm_up.kernels_to_compile(flies, True, True) == ["impacts of balls", "sub-stepped islands"]
-    assert "joints" in warm_up.kernels_to_compile(arm, False, False)
-    monkeypatch.setattr(warm_up, "is_cached", lambda _kernel: True)
-    assert warm_up.kernels_to_compile(arm, True, True) == []
+    assert warm_up.kernels_to_compile(flies, False, False, never) == []
+    assert warm_up.kernels_to_compile(flies, True, True, never) == ["impacts of balls", "sub-stepped islands"]
+    assert "joints" in warm_up.kernels_to_compile(arm, False, False, never)
+    assert warm_up.kernels_to_compile(arm, True, True, always) == []
+
+
+def never(_kernel: Kernel) -> bool:
+    """A machine that has run nothing yet."""
+    return False
+
+
+def always(_kernel: Kernel) -> bool:
+    """A machine that has run everything."""
+    return True

@@ -85,8 +85,8 @@ def why_not(world: World, plan: Plan) -> str:
     return f"without {missing[0]}" if missing else ""
 
 
-TABLE, MEMORY, LOG, CONTACT_LOG, SOLVE_COUNT, REPORTS = (
-    Loop._fields.index(name) for name in ("table", "memory", "log", "contact_log", "solve_count", "reports")
+TABLE, MEMORY, LIMITER, LOG, CONTACT_LOG, SOLVE_COUNT, REPORTS = (
+    Loop._fields.index(name) for name in ("table", "memory", "limiter", "log", "contact_log", "solve_count", "reports")
 )
 
 
@@ -149,6 +149,7 @@ class CompiledLoop:
         packed, state = self._packed, run.state
         packed.replace(TABLE, pair_events.table)
         packed.replace(MEMORY, state.memory)
+        packed.replace(LIMITER, state.limiter)
         packed.replace(LOG, run.log.buffers)
         packed.replace(CONTACT_LOG, run.contact_log.buffers)
         packed.replace(SOLVE_COUNT, run.substepped.solve_count)

@@ -41,6 +41,7 @@ from rigidimpulse.engine.regime import (
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import advance_sleep_timers, wake_by_contact
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Outcome
+from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.warm_up import prepare_kernels
 from rigidimpulse.model.island import Island, island_without_contacts
@@ -73,8 +74,16 @@ class SubsteppedIslands:
 
     """
 
-    def __init__(self, world: World) -> None:
-        """No island is sub-stepped yet."""
+    def __init__(self, world: World, sharing: Sharing | None = None, rest: float = REST) -> None:
+        """No island is sub-stepped yet.
+
+        Args:
+            world: the compiled scene.
+            sharing: of the work by several cores; None: what suits this machine.
+            rest: for how long members must have hardly moved to be sleepy, in sqrt(r / g); inf: none ever sleeps.
+
+        """
+        self._sharing, self._rest = sharing, rest
         self._world, self._only_expensive, self._movable = world, only_expensive(world), world.dynamic.copy()
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.sleep_timer = np.zeros(world.num_bodies)
@@ -95,7 +104,7 @@ class SubsteppedIslands:
     def stepper(self) -> ContactStepper:
         """The solver and its contacts; its kernels are compiled here where they were not needed at the start."""
         prepare_kernels(self._world, with_events=False, with_substepped=True)
-        return ContactStepper(self._world, self._movable, self._only_expensive)
+        return ContactStepper(self._world, self._movable, self._only_expensive, self._sharing)
 
     def is_idle(self) -> bool:
         """Whether no island is sub-stepped and none may begin to be."""
@@ -215,7 +224,7 @@ class SubsteppedIslands:
             self.label[members] = r
             strength = float(world.steady_strength[members].max())
             if strength > 0.0 and r not in moving:
-                restless[members] = self.sleep_timer[members] < REST * np.sqrt(inner[members] / strength)
+                restless[members] = self.sleep_timer[members] < self._rest * np.sqrt(inner[members] / strength)
         if np.array_equal(restless, chosen):
             self.asleep[:] = False
             return

@@ -19,10 +19,9 @@ from rigidimpulse.collision.manifold.inset_surface import inset_surfaces
 from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
 from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, inner_radii, shrunk_geometry
-from rigidimpulse.core.kernels import number_of_cores
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.quaternion import to_matrix
-from rigidimpulse.core.simd import ROW, aligned, machine_simd
+from rigidimpulse.core.simd import ROW, aligned
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.workers import empty_work_queue
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import SolverBodies, load_bodies
@@ -30,7 +29,6 @@ from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import energies, mark_qu
 from rigidimpulse.dynamics.solvers.tgs_soft.depenetration import move_apart
 from rigidimpulse.dynamics.solvers.tgs_soft.fill import fill, keep_impulses, place_bodies
 from rigidimpulse.dynamics.solvers.tgs_soft.records import (
-    PATCHES_OF_A_BODY,
     POINTS,
     Batches,
     colour_patches,
@@ -43,6 +41,7 @@ from rigidimpulse.dynamics.solvers.tgs_soft.records import (
 )
 from rigidimpulse.dynamics.solvers.tgs_soft.solver import FREQUENCY, Solve, SpecialPatches, advance, softness, special_patches
 from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.evaluate import refresh_pose
 
@@ -65,10 +64,6 @@ QUICK = 0.4
 """Part of `kept` beyond which a body is quick: its contacts are looked for, and their records made anew, in the middle of a step."""
 MOSTLY = 0.3
 """Part of the bodies that are quick beyond which all count as such."""
-WORTHWHILE, WORTHWHILE_GENERAL = 400, 16
-"""Pairs, all and general ones, beyond which several cores look at them: some tens of microseconds are lost by it."""
-WORTHWHILE_BATCHES, MOST_SOLVERS = 2000, 2
-"""Batches, each counted in every sub-step, beyond which two cores solve them."""
 _NO_STEADY = 0, np.zeros(1, np.int64)
 """Patches, and edges of the colours of batches, that were made before the last find_contacts."""
 FINER_STEP, FINER_SUB_STEP, FINER_MOTION = 1.0 / 8.0, 1.0 / 32.0, 1.0 / 10.0
@@ -99,17 +94,18 @@ class ContactStepper:
 
     """
 
-    def __init__(self, world: World, movable: np.ndarray, finer: bool) -> None:
+    def __init__(self, world: World, movable: np.ndarray, finer: bool, sharing: Sharing | None = None) -> None:
         """Make the arrays of the bodies; shrink the shapes for the contact kernels.
 
         Args:
             world: the compiled scene.
             movable: (n,) bool, bodies that are dynamic, or will be when they are let go.
             finer: for scenes of few bodies.
+            sharing: of the work by several cores; None: what suits this machine.
 
         """
         n = world.num_bodies
-        self.world = world
+        self.world, self._sharing = world, sharing or Sharing()
         self.order = np.lexsort(np.column_stack([np.arange(n), world.position[:, ::-1]]).T)
         self.rank = np.argsort(self.order, kind="stable")
         dynamic_shapes = np.zeros(len(world.geometry.shape_first) - 1, bool)
@@ -129,18 +125,18 @@ class ContactStepper:
         self._taken_off = self._depth + (1.0 - self._factor) * bound[self.order]
         self.bodies = self._make_bodies()
         self._masses, self._pull = world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order])
-        self._shares, self._looked_at = number_of_cores(), 0
+        self._shares, self._looked_at = self._sharing.most_cores, 0
         self._workspaces = [make_workspace() for _ in range(self._shares)]
         self._more_buffers: list[ContactBuffer] = []
-        self.table = ContactTable(self._shares, n)
+        self.table = ContactTable(self._shares, n, self._sharing.first_points, self._sharing.points_of_a_body)
         least = CLEAR * np.where(movable, self.inner, 0.0)
         moves = world.dynamic | world.moving
         bounds = BodyBounds(self.order, moves, world.bound_radius, self.inner, least, world.static_min, world.static_max)
         self.fat_boxes = FatBoxes(bounds, world.dynamic, world.may_collide if len(world.apart) else None)
-        self.simd = machine_simd()
-        self._patches, self._count, self._steady = empty_patches(PATCHES_OF_A_BODY * n), 0, _NO_STEADY
+        self.simd, patches = self._sharing.simd, self._sharing.patches_of_a_body * n
+        self._patches, self._count, self._steady = empty_patches(patches), 0, _NO_STEADY
         none = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
-        self._batches = more_batches(none, PATCHES_OF_A_BODY * n // self.simd.width + 1, self.simd.width)
+        self._batches = more_batches(none, patches // self.simd.width + 1, self.simd.width)
         self._begins, self._edges = np.zeros(256, np.int64), np.zeros(1, np.int64)
         self._work_queue = empty_work_queue()
         self._places_of_bodies = aligned(n + 1)
@@ -216,13 +212,13 @@ class ContactStepper:
     def _look(self, run: Run, kept: float) -> None:
         """Look at the contacts of all pairs in play, on several cores where the last look had much to do; kept: see `review`."""
         table, number = self.table, len(self.table.pairs.first)
-        shares = self._shares if self._looked_at > WORTHWHILE else 1
+        shares = self._shares if self._looked_at > self._sharing.pairs else 1
         room = share_of(number, shares, shares)
         if room > len(self._places):
             self._places, self._margins = reserve((2 * room,), np.int64), reserve((2 * room,), np.float64)
         while True:
             convex, limits = Convex(self.shapes, self._solids, self._inset), Limits(self.ahead, SAME * self.motion, kept)
-            outcome = find_contacts.together([
+            outcome = self._sharing.call(find_contacts, [
                 (
                     convex, self.bodies, table.arrays, Share(share, shares, self._places, self._margins), limits, self.world.coefficients,
                     self._workspaces[share],
@@ -253,9 +249,9 @@ class ContactStepper:
         at = self.order[mine]
         now.position[at], now.orientation[at] = self.bodies.position[:n][mine], self.bodies.orientation[:n][mine]
         rotation[at] = self.bodies.rotation[:n][mine]
-        shares = np.array_split(np.arange(len(places)), self._shares if len(places) > WORTHWHILE_GENERAL else 1)
+        shares = np.array_split(np.arange(len(places)), self._shares if len(places) > self._sharing.general_pairs else 1)
         while len(self._more_buffers) < len(shares) - 1:
-            self._more_buffers.append(ContactBuffer())
+            self._more_buffers.append(ContactBuffer(self._sharing.buffer))
         buffers = [run.contact_buffer, *self._more_buffers][: len(shares)]
         a, b = self.order[first], self.order[second]
         shapes = Shapes(self.geometry, world.shape_of_body, world.cylinders)
@@ -378,9 +374,9 @@ class ContactStepper:
                 width, solve, self._steady[0], self._count, self.world.coefficients, strength, lists, target
             )
         special = SpecialPatches(lists[0, :balls], lists[1, :rebounds], lists[2, :supports], target)
-        shares = min(self._shares, MOST_SOLVERS) if number * sub_steps > WORTHWHILE_BATCHES else 1
+        shares = min(self._shares, self._sharing.solvers) if number * sub_steps > self._sharing.batches else 1
         self._work_queue[:] = empty_work_queue()
-        work, *_ = advance.together([
+        work, *_ = self._sharing.call(advance, [
             (self.simd, solve, special, sub_steps, h, self._work_queue, share, shares) for share in range(shares)
         ])  # fmt: skip
         keep_impulses(self.simd, self._batches, number, table.lines)

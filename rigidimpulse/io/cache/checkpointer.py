@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rigidimpulse.engine.run import Run
 
 EXPENSIVE = 20.0
-"""How many times longer than the last checkpoint took the run goes on before the next."""
+"""How many times longer than the last checkpoint took the run goes on before the next, unless one is wanted after every step."""
 
 
 class Checkpointer:
@@ -88,7 +88,9 @@ class Checkpointer:
 
     def look(self, time: float, more: Callable[[float], None] | None = None) -> None:
         """Write a checkpoint if it is time to; call `more` with the time of the run [s]."""
-        if self._file is not None and perf_counter() - self._last >= max(self._cache.every, EXPENSIVE * self._cost):
+        every = self._cache.every
+        pause = max(every, EXPENSIVE * self._cost) if every > 0.0 else 0.0
+        if self._file is not None and perf_counter() - self._last >= pause:
             self.write(time)
         if more is not None:
             more(time)
