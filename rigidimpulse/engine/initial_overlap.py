@@ -12,7 +12,7 @@ several are as good the one nearest to that of the centres is taken, else the fi
     min sum of m |D|^2 / 2    with    n.(D_b - D_a) >= s   for all pairs that overlap or came to on the way
 
 gives the displacements D of all bodies together, again and again until no pair overlaps. Bodies do not turn, so what
-joints join moves as one. Velocities stay; the potential energy is accounted for as "overlap". Pairs for which there is no room
+joints join moves as one. Velocities stay; the potential energy is accounted for as "overlap". Pairs for which there is no space
 are reported, and do not touch each other in that run.
 """
 
@@ -41,7 +41,7 @@ EQUAL = TOLERANCES.initial_overlap.equal_ways
 SOFTNESS = TOLERANCES.initial_overlap.softness
 SURE = 1.0 + TOLERANCES.initial_overlap.surely_apart
 STALLED = 5
-"""Rounds without a lesser overlap after which there is no room."""
+"""Rounds without a smaller overlap after which the search gives up."""
 
 
 @dataclass
@@ -66,7 +66,7 @@ def resolve_overlaps(run: Run) -> None:
     for demand in demands.values():
         run.log.report(
             0.0, "overlap at the start", (world.names[demand.a], world.names[demand.b]),
-            f"the bodies are inside each other by {demand.way:.4g} m; as far as there is room they are moved apart before the "
+            f"the bodies are inside each other by {demand.way:.4g} m; where there is space they are moved apart before the "
             "first step, without a change of velocity: move them apart in the scene to see no jump",
         )
     _take_apart(search, demands)
@@ -74,14 +74,15 @@ def resolve_overlaps(run: Run) -> None:
     for a, b in stuck:
         run.log.report(
             0.0, "overlap not resolved", (world.names[a], world.names[b]),
-            "there is no room to move the bodies apart, or joints hold them: in this run they do not touch each other; make room",
+            "there is no space to move the bodies apart, or joints hold them: in this run they do not touch each other; "
+            "give them space",
         )
     if stuck:
         keys = np.array([a * world.num_bodies + b for a, b in stuck])
         run.world = replace(world, apart=np.union1d(world.apart, keys))
     moved = search.position - world.position
     gained = -float(np.sum(np.where(world.dynamic, world.mass, 0.0)[:, None] * world.steady_acceleration * moved))
-    # Frame 0 is the state as given: the books change right after it.
+    # Frame 0 is the state as given: the ledger changes right after it.
     run.log.account(float(np.nextafter(0.0, 1.0)), "overlap", gained)
 
 
@@ -167,7 +168,7 @@ class _Search:
         return {pair: self._demand(*pair) for pair in sorted(self.overlapping() - set(known))}
 
     def measure(self, demand: _Demand) -> None:
-        """Bring the way of a demand up to date; negative if there is room, inf if none can be told."""
+        """Bring the way of a demand up to date; negative if the bodies are apart, inf if it cannot be found."""
         a, b = demand.a, demand.b
         if self._is_endless(a, b):
             found = self.separation(a, b, np.zeros(3))

@@ -34,7 +34,7 @@ FAR_MARGIN = 30.0
 def collect(
     run: Run, pair_events: PairEvents, pairs: np.ndarray, time: float, margin: float = MARGIN
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Manifolds of window pairs at the present poses within so many contact margins: copies of the filled buffer rows.
+    """Manifolds of the given pairs at the present poses within `margin` contact margins: copies of the filled rows of the buffer.
 
     A pair that just came to contact but has no manifold (it overlaps, since its sweep does not back up time) has the
     witness of its sweep for a contact.

@@ -187,7 +187,7 @@ class PairEvents:
         return self._order[self._sorted_key.searchsorted(a * self.run.world.num_bodies + b)]
 
     def sweep_again(self, places: np.ndarray, time: float) -> None:
-        """Let pairs be swept from `time` on, but for those that are given up."""
+        """Let pairs be swept from `time` on, except for those that are given up."""
         self.time[places] = np.inf
         again = (self.repeats[places] <= MAX_REPEATS) & ~self._is_shut(self.a[places], self.b[places])
         self.start[places[again]] = time
@@ -204,7 +204,7 @@ class PairEvents:
             self.start[p], self.time[p] = np.nan, np.inf
             self.run.log.report(
                 time, "squeezed", (names[self.a[p]], names[self.b[p]]),
-                "no motion keeps the body apart from all that presses on it; make room, or let the pressing bodies move freely",
+                "no motion keeps the body apart from all that presses on it; give it space, or let the pressing bodies move freely",
             )
 
     def settle(self, time: float) -> None:

@@ -131,7 +131,7 @@ def live_contacts(pairs, place, gap, time):
 def renew_pairs(trajectory, body, time, end, radius, margin, movable, dynamic, inside, pairs, box_min, box_max, fresh):
     """Let the pairs of a body that took a new trajectory at `time` be swept again, and look whom it may now reach until `end`.
 
-    radius, margin: m, about its centre; movable, dynamic, inside (n,) bool; box_min, box_max (n, 3) m: its row is made anew.
+    radius, margin: m, about its centre; movable, dynamic, inside (n,) bool; box_min, box_max (n, 3) m: its row is written.
     Writes the bodies whose boxes overlap its own and that it has no pair with into fresh (n,), in ascending order; returns their number.
     """
     path_box(trajectory, body, time, end, radius, box_min, box_max)

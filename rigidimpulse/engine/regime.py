@@ -113,7 +113,7 @@ def support_levels(bodies, pairs, rows, tall):
 
 
 def lively(now: BodyState, strength: np.ndarray, inner: np.ndarray) -> np.ndarray:
-    """Which bodies (n,) bool are faster than what is calm; strength (n,) m/s2 of what pulls them, inner (n,) m."""
+    """Which bodies (n,) bool are faster than the sleep speed; strength (n,) m/s2 of what pulls them, inner (n,) m."""
     radius = np.where(np.isfinite(inner), inner, 0.0)
     v, w = now.velocity, now.angular_velocity
     speed = np.sqrt(np.einsum("ij,ij->i", v, v)) + radius * np.sqrt(np.einsum("ij,ij->i", w, w))
@@ -132,7 +132,7 @@ def refusals(
         world: the compiled scene.
         root: (n,) of every body; -1 for those in no island.
         substepped_before: (n,) bool, members of sub-stepped islands. joined, moves: (n,) bool.
-        toil: (n,) how often the exact solver dealt with each body in the last step.
+        solve_count: (n,) how often the exact solver dealt with each body in the last step.
         a: (k,) bodies of the pairs that may touch in the step; likewise b.
         auto: False where every island without joints is taken.
 
@@ -149,9 +149,9 @@ def refusals(
         alone = np.setdiff1d(np.flatnonzero(size), owner)
         out.update(dict.fromkeys(alone.tolist(), "alone"))
         return out
-    stir = np.bincount(root[members[moves[members]]], minlength=len(root))
+    moving_count = np.bincount(root[members[moves[members]]], minlength=len(root))
     expensive = np.bincount(root[members], weights=solve_count[members], minlength=len(root)) > EXPENSIVE_SOLVES * size
-    lively_enough = expensive if only_expensive(world) else expensive | (stir >= FEW)
+    lively_enough = expensive if only_expensive(world) else expensive | (moving_count >= FEW)
     least = np.where(was_substepped, KEPT, np.where(lively_enough, FEW, MANY))
     for r in np.flatnonzero((size > 0) & (size < least)).tolist():
         out[r] = "few bodies"

@@ -1,9 +1,9 @@
 """Triggers: volumes that report which bodies overlap them, and never push.
 
-What is inside is looked at where each step ends, at the start of the run, and in between on the courses that the bodies
-have at the end of the step: often enough that neither side moves by more than half the thickness of both in between. Where
-the answer changes, the time is found by bisection on these courses to `SHARPNESS`; it is late by at most a step where a
-body was in an impact since.
+Overlap is tested at the start of the run, at the end of each step, and at times inside the step. Inside the step bodies are taken on the
+trajectories that they have at its end. The tests are so close in time that neither side moves by more than half the thickness of both
+between two of them. Where the answer changes, bisection on these trajectories finds the time to `SHARPNESS`. The time is late by at
+most a step if the body had an impact in that step.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ class Triggers:
         return bool(self._narrowphase.overlap(watched.shape, self._pose(watched, time), shape, self._body(i, time)))
 
     def _speed(self, i: int, low: float, high: float, reach: float | None = None) -> float:
-        """Bound of the speed of any point of a body on its course, m/s."""
+        """Bound of the speed of any point of a body on its trajectory, m/s."""
         trajectory = self._run.state.trajectory
         if i < 0 or trajectory.mode[i] == FIXED:
             return 0.0

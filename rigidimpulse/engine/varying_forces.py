@@ -115,7 +115,7 @@ class VaryingForces:
         self.acts = self._always | bodies
 
     def present(self, table: ForceTable, time: float) -> np.ndarray:
-        """Wrenches (k, 6) of the rows of a table as courses have them at `time`, which lies in all of them."""
+        """Wrenches (k, 6) of the rows of a table at `time`, which lies within the present trajectory of every body."""
         first = self._first[self._tables.index(table)]
         return self.log.wrench(np.arange(first, first + len(table.body)), table.body, time)
 

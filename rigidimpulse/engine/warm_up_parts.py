@@ -105,7 +105,7 @@ def _leave_unsolved(_rows, _n: int, _target: float) -> float:
 
 
 def _move_and_sweep(run) -> None:
-    """Rows of contacts, courses, frames and the sweep."""
+    """Rows of contacts, trajectories, frames and the sweep."""
     _fill_rows(run)
     _move(run)
 
@@ -136,7 +136,7 @@ def _move(run) -> None:
 
 
 def _find_substepped_contacts(run) -> None:
-    """What comes before the solver of heaps: pairs and their contacts."""
+    """Pairs and contacts of sub-stepped islands, before they are solved."""
     world, state, member = run.world, run.state, np.array([False, True])
     state.now.inv_inertia[1] = np.eye(3)
     stepper = ContactStepper(world, world.dynamic, finer=False)
@@ -150,7 +150,7 @@ def _find_substepped_contacts(run) -> None:
 
 
 def _step_substepped(run) -> None:
-    """The solver of heaps, and what brings bodies from step to step."""
+    """The sub-stepped solver, and the trajectories between its steps."""
     state, now, members = run.state, run.state.now, np.array([1])
     stepper = ContactStepper(run.world, run.world.dynamic, finer=False)
     stepper.members = members

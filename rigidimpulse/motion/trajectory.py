@@ -59,7 +59,7 @@ class Trajectories(NamedTuple):
     mode: np.ndarray
     """(n,) int64: FIXED, PRESCRIBED, FREE, FORCED, LINEAR"""
     inertia: np.ndarray
-    """(n, 3) kg m^2, principal moments; read in modes FREE and FORCED"""
+    """(n, 3) kg m^2, principal moments; read where the mode is FREE or FORCED, to rotate the body"""
     top: np.ndarray
     """(n, TOP_SIZE) constants of the rotation, written by `begin`, and from SPEEDS on those of mode LINEAR, then jerk and torque rate
     (arrays of their own would cost every kernel that gets trajectories some 3 % of its time)"""

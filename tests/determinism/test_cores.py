@@ -1,4 +1,4 @@
-"""Heaps on several cores: the same bits as on one, whatever is dealt out to whom, and however their memory grows."""
+"""Sub-stepped islands on several cores: the same bits as on one core, however the work is shared and however memory grows."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_substepped_islands_have_the_same_bits_on_one_core_and_on_several(monkey
     monkeypatch.setattr(find_contacts, "together", together, raising=False)
     monkeypatch.setattr(contact_forces, "WORTHWHILE", 20)
     monkeypatch.setattr(contact_forces, "WORTHWHILE_GENERAL", 4)
-    # The third has so little room at first that rows, patches and batches are moved when they become more.
+    # The third has so little capacity at first that rows, patches and batches are moved when they become more.
     for cores, rows, rows_of_a_body, patches_of_a_body in ((1, 1024, 32, 8), (2, 1024, 32, 8), (3, 48, 0, 0)):
         monkeypatch.setattr(contact_forces, "number_of_cores", lambda cores=cores: cores)
         monkeypatch.setattr(contact_table, "FIRST_POINTS", rows)
@@ -67,14 +67,14 @@ def test_substepped_islands_have_the_same_bits_on_one_core_and_on_several(monkey
 
 @pytest.fixture(scope="module")
 def alone() -> str:
-    """The hash of a heap whose sub-steps had no helper."""
+    """The hash of a pile whose sub-steps had no helper."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contact_forces, "WORTHWHILE_BATCHES", 10**9)
         return crowded()
 
 
 def crowded() -> str:
-    """The hash of a heap with colours of many batches."""
+    """The hash of a pile with colours of many batches."""
     return ri.simulate(cloud([ri.Shape.box(0.2)], 288, 0.24), 0.3).state_hash()
 
 
@@ -99,7 +99,7 @@ def test_sub_steps_have_the_same_bits_however_much_the_helper_does(monkeypatch, 
     assert largest > 2 * BATCHES_EACH
 
 
-def test_contacts_that_find_no_room_are_found_again(monkeypatch) -> None:
+def test_contacts_beyond_the_capacity_are_found_again(monkeypatch) -> None:
     """Whatever a buffer holds at first, in whichever share."""
 
     def small(buffer: ContactBuffer) -> None:
@@ -114,7 +114,7 @@ def test_contacts_that_find_no_room_are_found_again(monkeypatch) -> None:
 
 @pytest.mark.parametrize("shares", [1, 2, 3])
 @pytest.mark.parametrize("number", [0, 1, BLOCK - 1, BLOCK, 5 * BLOCK + 3, 1000])
-def test_every_share_has_room_for_its_pairs(number: int, shares: int) -> None:
+def test_every_share_has_capacity_for_its_pairs(number: int, shares: int) -> None:
     dealt = [sum(len(range(b, min(b + BLOCK, number))) for b in range(s * BLOCK, number, shares * BLOCK)) for s in range(shares)]
     begins = [share_of(number, share, shares) for share in range(shares + 1)]
     assert sum(dealt) == number

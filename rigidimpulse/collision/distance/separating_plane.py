@@ -1,6 +1,6 @@
-"""The plane that parts two convex bodies best, where none parts them.
+"""The plane that comes closest to separating two convex bodies, where none separates them.
 
-Bodies are points y grown by a radius. A plane n.y = d parts a (below) from b (above) but for the depths
+Bodies are points y grown by a radius. A plane n.y = d has a below and b above it, up to the depths
 
     r = max(0, n.y + r_a - d)  of the points of a,    r = max(0, d + r_b - n.y)  of those of b,    E(n, d) = sum of r^2 / 2
 

@@ -47,7 +47,7 @@ class RigidMotion(NamedTuple):
 
 
 class FoundContacts(NamedTuple):
-    """Places found by `Surfaces.find`: what `SoftContacts` needs but for the solver's own numbers."""
+    """Places found by `Surfaces.find`: what `SoftContacts` needs, without the solver's own numbers."""
 
     key: np.ndarray  # (m,)
     node: np.ndarray  # (m, 3)

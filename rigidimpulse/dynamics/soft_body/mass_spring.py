@@ -113,7 +113,9 @@ class SpringMesh:
         return block
 
     def damped(self, x: np.ndarray, h: float) -> SpringMesh:
-        """Net whose energy, but for a constant, is E + c (l - l(x))^2 / 2 h + ...: dampers over an implicit step h from x (n, 3).
+        """Springs that act as springs and dampers do over an implicit step h from x (n, 3).
+
+        Up to a constant their energy is E + c (l - l(x))^2 / 2 h + ...
 
         A spring and a damper of rate (l - l(x)) / h add up to one spring of stiffness k + c / h with another rest length.
         """
@@ -136,7 +138,7 @@ class SpringMesh:
 def sheet(
     position: np.ndarray, face: np.ndarray, mass: float, stiffness: float, bending: float, inner: float, damping: float
 ) -> SpringMesh:
-    """Net of a triangle mesh.
+    """Springs along the edges of a triangle mesh, hinges across them, and struts inside.
 
     Args:
         position: (n, 3) m, at rest.

@@ -47,7 +47,7 @@ ROUNDS = 10
 MIDPOINT_EXCESS = TOLERANCES.soft_body.midpoint_excess
 MIDPOINT_MADE = TOLERANCES.soft_body.midpoint_energy
 ALIKE = 0.95
-"""Cosine of the angle between two normals above which one plane guards both places."""
+"""Cosine of the angle between two normals above which one plane keeps both places apart."""
 AT_ONCE = 0.05
 """Share of the step in which faces that a sample point meets count as met at once: what it meets later depends on what these do to it."""
 SCHEMES = ("euler", "midpoint")
@@ -80,7 +80,7 @@ class Flexibles:
 
     Attributes:
         bodies: the flexible bodies, in the order they were added. first: (k + 1,) vertices of each.
-        net: all of them as one net.
+        soft_body: all of them as one `SpringMesh`.
         position: (v, 3) m. velocity: (v, 3) m/s.
         energy_taken: J so far.
 
@@ -311,7 +311,7 @@ class Flexibles:
     def _missing(self, known: FoundContacts, end: np.ndarray, start: np.ndarray, rigid: RigidMotion, moved: RigidMotion) -> FoundContacts:
         """Contacts on the way solved for, on which bodies are `moved`, that no plane covers yet; of a sample point the earliest ones.
 
-        They are looked for at half the gap: nearer than planes let anything come, but for what had less than that from the start.
+        They are looked for at half the gap. Planes let nothing come that near, except what was nearer from the start.
         """
         found = self._surfaces.find(start, end, moved, self._sides, 0.5 * self._surfaces.gap, rigid.end_rotation, True)
         covered: dict[tuple[int, ...], list[np.ndarray]] = {}

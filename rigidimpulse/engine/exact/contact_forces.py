@@ -185,8 +185,8 @@ def sub_step(rate: float, step: float, rest: float) -> float:
 def _correct_positions(run: Run, pair_events: PairEvents, island: Island) -> None:
     """Bring sunken contacts back to their gap and look at the island's contacts again.
 
-    A light body turns far to make room for a heavy one: what it may come near is looked for farther away, and what does not belong to the
-    island stands meanwhile.
+    A light body may turn far to get out of the way of a heavy one, so its neighbours are looked for within a larger distance. Bodies
+    outside the island do not move.
     """
     state, now = run.state, run.state.now
     place, turn = now.position[island.members].copy(), now.orientation[island.members].copy()

@@ -30,7 +30,7 @@ REASONS = {
 }
 # Approach speed that counts as none, relative to the speed below which contacts are held.
 SLOW = TOLERANCES.contact.slow_approach
-# Calls with a full log before a group is given up.
+# Calls with a full log before an island is given up.
 MAX_CALLS = 1000
 # Impacts in a row, without a gap worth the name between them, after which a pair no longer rebounds.
 COLLAPSE_REBOUNDS = 8
@@ -44,7 +44,7 @@ def respond(run: Run, _pair_events: PairEvents, island: Island) -> None:
 
 
 def respond_to_impacts(run: Run, island: Island, kernel: Callable[..., tuple[int, int, bool]], law: int) -> None:
-    """Apply the impulses of the group's approaching contacts and log them."""
+    """Apply the impulses of the island's approaching contacts and log them."""
     collapses = _collapsing(run, island)
     live = (island.live | collapses).nonzero()[0]
     if not len(live):
@@ -80,19 +80,19 @@ def respond_to_impacts(run: Run, island: Island, kernel: Callable[..., tuple[int
 
 
 def _bear_each_other(run: Run, island: Island) -> bool:
-    """Whether a contact between two movable bodies of the group carried load before."""
+    """Whether a contact between two movable bodies of the island carried load before."""
     state, dynamic = run.state, run.world.dynamic
     between = dynamic[island.contacts.body_a] & dynamic[island.contacts.body_b]
     return any(state.force_of(island.keys[c])[0] > 0.0 for c in np.flatnonzero(between).tolist())
 
 
 def _collapsing(run: Run, island: Island) -> np.ndarray:
-    """Contacts (m,) of pairs that came back RATTLES times in a row without ever having been farther apart than the held gap.
+    """Contacts (m,) of pairs that rebounded COLLAPSE_REBOUNDS times in a row and never came farther apart than the contact margin.
 
-    Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
-    a bouncing ball they are replaced by one inelastic impact, of all that rattle together: pair after pair, a light body would stop
-    heavy ones in as many impacts as their masses' ratio, and each impact would be followed by the next. A body between two others hits
-    them in turn, so pairs on their way rattle as soon as one does.
+    A body caught between others has infinitely many impacts, each smaller than the one before, wherever e < 1: inelastic collapse
+    (McNamara and Young 1992). Like the last bounces of a ball they are replaced by one inelastic impact, of all collapsing pairs at once.
+    Taken one pair at a time, a light body would need as many impacts as the ratio of the masses to stop a heavy one. A body between two
+    others hits them in turn. Therefore pairs with half that number of rebounds collapse, too, as soon as one pair does.
     """
     contacts, rebounds = island.contacts, run.state.rebounds
     pairs = zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)
@@ -102,7 +102,7 @@ def _collapsing(run: Run, island: Island) -> np.ndarray:
 
 
 def _remember_rebounds(run: Run, island: Island, contacts: Contacts, rows: np.ndarray) -> None:
-    """Count for each pair how often in a row it came back after less than its held gap."""
+    """Count for each pair how often in a row it came back before its gap exceeded the contact margin."""
     pairs = zip(island.contacts.body_a.tolist(), island.contacts.body_b.tolist())
     contact_margin = dict(zip(pairs, island.contact_margin))
     for row in rows:

@@ -32,12 +32,12 @@ class ErrorEstimate:
     """The state of some bodies at the end of a sub-step, each in a row of its own."""
 
     def __init__(self, world: World) -> None:
-        """Without room for any yet."""
+        """With a capacity of 0 bodies."""
         self._world = world
         self._grow(0)
 
     def _grow(self, k: int) -> None:
-        """Room for k bodies."""
+        """Make arrays with a capacity of k bodies."""
         self.trajectory = make_trajectories(k)
         self.bodies = BodyState(
             np.empty((k, 3)), np.empty((k, 4)), np.empty((k, 3)), np.empty((k, 3)), np.empty(k), np.zeros((k, 3, 3))

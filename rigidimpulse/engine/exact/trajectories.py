@@ -84,10 +84,10 @@ def begin_trajectory(run: Run, pair_events: PairEvents, i: int, time: float, wre
 
 def account_contact_work(run: Run, i: int, time: float) -> None:
     """Work that contact forces did along the trajectory that ends: what its energy changed by."""
-    arrival = run.state.end_energy.pop(i, None)
-    if arrival is not None:
-        begun, arrival = run.state.energy_at_start[i], arrival - work_of_forces(run, i)
-        run.log.stretches.append((run.state.trajectory.start[i], time, i, begun, arrival - begun))
+    end_energy = run.state.end_energy.pop(i, None)
+    if end_energy is not None:
+        begun, ended = run.state.energy_at_start[i], end_energy - work_of_forces(run, i)
+        run.log.stretches.append((run.state.trajectory.start[i], time, i, begun, ended - begun))
 
 
 def work_of_forces(run: Run, i: int) -> float:

@@ -1,11 +1,11 @@
 """Balls in free flight, from impact to impact.
 
-A window of many steps holds, for every body and plane and for every pair whose boxes overlap, the time of its contact
-(`table`). The earliest one is taken, its bodies rebound (`impact`), and only what they may meet is timed anew: an impact
-costs as much as its bodies have neighbours, and log n. Times follow from the courses alone, so the length of the window
-changes nothing; it is chosen such that bodies have a few neighbours.
+Time is divided into intervals of many steps. For an interval the table (`table`) holds the time of the next contact of every body with
+a plane, and of every pair whose boxes overlap. The earliest contact is taken and its bodies rebound (`impact`). Only the entries of these
+bodies are timed again, so an impact costs as much as its bodies have neighbours, and log n for the queue. Times follow from the
+trajectories alone. The length of the interval therefore changes no result; it is chosen such that bodies have a few neighbours.
 
-As soon as something is not simple the kernel ends, at the very instant, and the loop in Python goes on (`step`).
+The kernel ends as soon as something is not simple, at the instant where it happens, and the loop in Python goes on (`engine/step.py`).
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from rigidimpulse.engine.spheres.table import fill_table, renew, time_waiting, t
 from rigidimpulse.motion.trajectory import FIXED
 
 LONGEST = 4096
-"""Steps in a window at most."""
+"""Steps in an interval at most."""
 FEW, MANY = 1.5, 6.0
-"""Pairs a body below which windows grow, above which they shrink."""
+"""Pairs per body below which intervals grow, and above which they shrink."""
 
 
 _NO_PLANE, _FIRST = np.int64(-1), np.int64(0)
@@ -36,9 +36,9 @@ class Clock(NamedTuple):
     """Where a flight is."""
 
     step: float  # s, between boundaries
-    live: float  # gap, relative to the held one, up to which contacts act; inf where even farther ones may
+    live: float  # gap, relative to the contact margin, up to which contacts act; inf where even farther ones may
     now: float  # s
-    end: float  # s, of the window
+    end: float  # s, of the interval
     number: int  # of the next boundary after now
     at_boundary: bool
 
@@ -71,7 +71,7 @@ def _has_capacity(record, rebounds):
 
 @jit
 def _fly_interval(fixed, motion, table, record, rebounds, clock):
-    """Go through the events of a window; returns how it ends and the clock then."""
+    """Go through the events of an interval; returns how it ends and the clock then."""
     while True:
         time_waiting(fixed.apart, table, clock)
         if table.queue.size[0] == 0:
@@ -101,10 +101,11 @@ def _fly_interval(fixed, motion, table, record, rebounds, clock):
 def fly(fixed, motion, table, record, rebounds, now, end, at_boundary, interval, live, interval_end):
     """Carry all bodies from `now` towards `end` [s].
 
-    now, end: s; at_boundary: whether `now` is one; window: steps of the first window; live: see `Clock`; interval_end: s, of the window to
-    go on with, which a flight left for want of room for impacts, or a time before `now` to begin a new one.
+    now, end: s; at_boundary: whether `now` is a boundary of steps; interval: steps of the first interval; live: see `Clock`;
+    interval_end: s, end of the interval to go on with, where a flight ended because its buffer of impacts was full; a time before `now`
+    begins a new interval.
 
-    Returns how the flight ends, the time reached, whether that is a boundary, number of the next one, steps of the next window, and
+    Returns how the flight ends, the time reached, whether that is a boundary, number of the next boundary, steps of the next interval, and
     the end of the present one.
     """
     trajectory, how = motion.trajectory, ARRIVED

@@ -1,13 +1,13 @@
 """One simple impact: two bodies that touch at one point and nothing else, fast enough to rebound.
 
-The kernels are those of the loop in Python (detect, respond, integrate, observe), called in its order, so the results are
-the same bits. An impact is simple where the loop would do nothing but one impulse. With the approach speed c, restitution
+The kernels are those of the loop in Python, called in its order, so the results are the same bits.
+An impact is simple where the loop would do nothing but one impulse. With the approach speed c, restitution
 e, and the speed r below which contacts are held (engine/touching.py),
 
     c > 2 r,   e c > 2 r,   and 2 r is exceeded by the speed at which the bodies part.
 
 r is bounded from above by the accelerations alone: what the curvature of balls adds to the gap only lessens r. Bodies
-at rest, and pairs that come back at the same instant or after less than the held gap, are left to the loop.
+at rest, and pairs that come back at the same instant or after less than the contact margin, are left to the loop.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ def _members(fixed, record, a, b):
 
 @jit
 def _comes_back(rebounds, key, time, contact_margin, instant):
-    """Whether a pair rebounded so lately, or so often after less than its held gap delta, that the loop counts it."""
+    """Whether a pair rebounded so lately, or so often after less than its contact margin delta, that the loop counts it."""
     last = place_of(rebounds, key)
     if rebounds.key[last] != key:
         return False

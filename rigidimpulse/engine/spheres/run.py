@@ -19,11 +19,11 @@ from rigidimpulse.model.world import World
 from rigidimpulse.recording.events import ROW_LENGTH
 
 CAPACITY = 256
-"""Impacts, pairs and rebounds that there is room for at first; doubled where it does not do."""
+"""Capacity for impacts, pairs and rebounds at first; it is doubled when it is used up."""
 MOST_ROWS = 2**14
 """Impacts at most that are handed over at once."""
 FIRST_INTERVAL = 16
-"""Steps in the first window."""
+"""Steps in the first interval."""
 LIVE = 2.0
 """How much farther away contacts are left to the loop in Python than it takes them for touching."""
 LONGEST_PAUSE = 16
@@ -45,7 +45,7 @@ class EventRun:
         state = run.state
         self._motion = Motion(state.trajectory, state.now, state.rotation)
         self._pairs, self._rows = CAPACITY + world.num_bodies, CAPACITY
-        self._table, self._book = self._make_table(), self._make_record()
+        self._table, self._record = self._make_table(), self._make_record()
         self._rebounds, self._known = make_rebounds(2 * CAPACITY), 0
         self._step_begin = 0.0
         gap = world.contact_margin
@@ -90,7 +90,7 @@ class EventRun:
         how, number, interval_end = FULL, 0, -1.0
         while how == FULL:
             how, now, at_boundary, number, self._interval, interval_end = fly(
-                self._fixed, self._motion, self._table, self._book, self._rebounds, now, end, at_boundary, self._interval,
+                self._fixed, self._motion, self._table, self._record, self._rebounds, now, end, at_boundary, self._interval,
                 self._live, interval_end,
             )
             self._keep_impacts()
@@ -118,17 +118,17 @@ class EventRun:
 
     def _keep_impacts(self) -> None:
         """Hand impacts, their energies and rebounds to the run."""
-        run, count = self._run, int(self._book.count[0])
+        run, count = self._run, int(self._record.count[0])
         if not count:
             return
-        rows = self._book.rows[:count]
+        rows = self._record.rows[:count]
         run.log.impacts.extend(rows)
         self._known = run.log.impacts.count
         times, speeds = rows[:, 0].tolist(), rows[:, 14].tolist()
-        run.log.energy.extend((t, "impact", e) for t, e in zip(times, self._book.energy[:count].tolist(), strict=True) if e != 0.0)
+        run.log.energy.extend((t, "impact", e) for t, e in zip(times, self._record.energy[:count].tolist(), strict=True) if e != 0.0)
         pairs = map(tuple, rows[:, 1:3].astype(np.int64).tolist())
         run.state.rebounds.update((pair, (t, speed, 0)) for pair, t, speed in zip(pairs, times, speeds, strict=True))
-        self._book.count[0] = 0
+        self._record.count[0] = 0
 
     def _grow(self) -> bool:
         """Make the table that is full larger; returns whether that is the one of events, which then has to be filled again."""
@@ -140,7 +140,7 @@ class EventRun:
             return True
         else:
             self._rows = min(2 * self._rows, MOST_ROWS)
-            self._book = self._make_record()
+            self._record = self._make_record()
         return False
 
     def _grow_rebounds(self) -> None:

@@ -1,4 +1,4 @@
-"""One step of heaps: bodies put before the kernels, contacts looked at, sub-steps, energy kept in bounds."""
+"""One step of sub-stepped islands: bodies are handed to the kernels, contacts found, sub-steps taken, gained energy taken off."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ SAME, KEPT = 0.02, 0.2
 """Parts of the motion until a look (`Accuracy.substep_motion`) that a pair may make with the contacts it has: at any time, and in the
 middle of a step."""
 QUICK = 0.4
-"""Part of `kept` beyond which a body is quick: its contacts are looked for, and their records made anew, in the middle of a step."""
+"""Part of `kept` beyond which a body is quick: its contacts are looked for, and their records made, again in the middle of a step."""
 MOSTLY = 0.3
 """Part of the bodies that are quick beyond which all count as such."""
 WORTHWHILE, WORTHWHILE_GENERAL = 400, 16
@@ -79,7 +79,7 @@ CLEAR = 0.2
 
 @dataclass
 class Outcome:
-    """What a step of heaps gave: bodies (k,) of the scene, in order of the heap, their poses and velocities (k, 6) at its end."""
+    """Result of a step: bodies (k,) of the scene in the solver's order, and their poses and velocities (k, 6) at its end."""
 
     members: np.ndarray
     position: np.ndarray
@@ -118,8 +118,8 @@ class ContactStepper:
         self.skin = TOLERANCES.sub_stepping.skin * self.inner
         self.reach = np.where(world.ball, 0.0, world.bound_radius)
         convex = convex_polyhedra(world.geometry)
-        cored, depth, self._back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
-        self.geometry, factor = shrunk_geometry(cored, dynamic_shapes)
+        inset, depth, self._back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
+        self.geometry, factor = shrunk_geometry(inset, dynamic_shapes)
         self.shapes = make_polyhedra(world.geometry, convex)
         self._solids, drum, self._inset = solids(world.shapes, world.geometry, convex, self.shapes)
         convex |= drum
@@ -194,7 +194,7 @@ class ContactStepper:
             classify(self.table.pairs, self.bodies, self.shapes)
 
     def near(self, run: Run, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
-        """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `Cover.near`."""
+        """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `FatBoxes.near`."""
         return self.fat_boxes.near(self.table.pairs, run.state.now, run.acceleration, member, other, ahead)
 
     def set_up(self, run: Run, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0) -> None:
@@ -217,9 +217,9 @@ class ContactStepper:
         """Look at the contacts of all pairs in play, on several cores where the last look had much to do; kept: see `review`."""
         table, number = self.table, len(self.table.pairs.first)
         shares = self._shares if self._looked_at > WORTHWHILE else 1
-        room = share_of(number, shares, shares)
-        if room > len(self._places):
-            self._places, self._margins = reserve((2 * room,), np.int64), reserve((2 * room,), np.float64)
+        needed = share_of(number, shares, shares)
+        if needed > len(self._places):
+            self._places, self._margins = reserve((2 * needed,), np.int64), reserve((2 * needed,), np.float64)
         while True:
             convex, limits = Convex(self.shapes, self._solids, self._inset), Limits(self.ahead, SAME * self.motion, kept)
             outcome = find_contacts.together([
@@ -240,14 +240,14 @@ class ContactStepper:
             self._look_at_general(run, self._places[waits], self._margins[waits])
 
     def _look_at_general(self, run: Run, places: np.ndarray, margin: np.ndarray) -> None:
-        """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `detect`."""
+        """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `collision.manifold`."""
         table, world, pairs = self.table, self.world, self.table.pairs
         first, second = pairs.first[places], pairs.second[places]
-        # A wide margin is dear for meshes.
+        # A wide margin is expensive for meshes.
         far = np.where(self._depth[first] + self._depth[second] > 0.0, margin, FARTHER * margin)
         shown = far + self._taken_off[first] + self._taken_off[second]
         n, now, rotation = world.num_bodies, run.state.now, run.state.rotation.copy()
-        # In the course of a step bodies are elsewhere than at its start.
+        # In the middle of a step bodies are elsewhere than at its start.
         now = now._replace(position=now.position.copy(), orientation=now.orientation.copy())
         mine = self.bodies.part[:n] != OUTSIDE
         at = self.order[mine]
@@ -289,7 +289,7 @@ class ContactStepper:
                 )  # fmt: skip
 
     def _look_again(self, run: Run) -> None:
-        """Look at the contacts of quick bodies in the course of a step; those of all others stay in the steady batches, where they are."""
+        """Find the contacts of quick bodies again in the middle of a step; those of all others stay in the steady batches."""
         bodies, width = self.bodies, self.simd.width
         all_quick = self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY
         if all_quick:

@@ -26,7 +26,7 @@ from rigidimpulse.scene.shape import Shape
 BOXES = 5
 THROWN = 0.6
 BALL = 0.5
-ARRIVAL = 5.0
+IMPACT_SPEED = 5.0
 """m/s, of the ball."""
 REBOUND = (1.8, 2.7)
 """m/s, of compliant references."""
@@ -59,7 +59,7 @@ def dropped() -> Scene:
     material = dull(0.5, 0.5)
     scene = _stack(material)
     height = BOXES + BALL + 0.01
-    ball = {"position": (0.1, 0.0, height), "velocity": (0.0, 0.0, -math.sqrt(ARRIVAL**2 - 0.02 * GRAVITY)), "mass": 1000.0}
+    ball = {"position": (0.1, 0.0, height), "velocity": (0.0, 0.0, -math.sqrt(IMPACT_SPEED**2 - 0.02 * GRAVITY)), "mass": 1000.0}
     scene.add(Body("ball", Shape.sphere(BALL), material=material, **ball))
     return scene
 

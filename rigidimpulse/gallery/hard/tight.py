@@ -148,12 +148,12 @@ def hole() -> Scene:
 
 def check_hole(run: Recording) -> list[Check]:
     """Check that it falls freely, lands and stays."""
-    arrival = math.sqrt(2.0 * DROP / GRAVITY)
-    falling = run.times < arrival
+    landing = math.sqrt(2.0 * DROP / GRAVITY)
+    falling = run.times < landing
     path = DROP + 0.5 * HOLE - 0.5 * GRAVITY * run.times[falling] ** 2
     floor = run.index("floor")
     landings = run.impacts["time"][(run.impacts["body_a"] == floor) | (run.impacts["body_b"] == floor)]
-    late = abs(float(landings[0]) - arrival) if len(landings) else math.inf
+    late = abs(float(landings[0]) - landing) if len(landings) else math.inf
     return [
         finite(run),
         at_most("error of the fall, m", np.abs(run.position("cube")[falling, 2] - path).max(), 1e-6, "smooth walls carry nothing"),
