@@ -6,7 +6,7 @@ Convex solid (animation notes: point in convex polyhedron): p is inside where or
 
 Any solid (point in concave polyhedron): a ray from p along +x leaves the surface as often as it enters it, plus the
 winding number of p, so p is inside where the signed count of crossings is not zero. For one clean surface this is ray
-parity; it also holds where parts of a mesh overlap. A ray through an edge or a vertex is moved, in thought, by (0,
+parity; it also holds where parts of a mesh overlap. A ray through an edge or a vertex counts as moved by (0,
 e^2, e) with e > 0 infinitely small (Edelsbrunner & Mücke 1990, simulation of simplicity): then it meets no edge, and
 every crossing belongs to one face.
 

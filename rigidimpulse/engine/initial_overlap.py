@@ -1,19 +1,18 @@
-"""Overlap at the start: found with FCL before the first frame, reported, and taken out by position alone.
+"""Overlap at the start: found with FCL before the first frame, reported, and removed by moving bodies apart.
 
-Bodies that merely touch are no overlap. FCL's yes-or-no answer counts touching, so a pair is an overlap only if it
-stays one when a body is moved by DEPTH of its size along each axis: whoever only touches, along whatever normal, is
-free in one of the six directions.
+Bodies that merely touch do not overlap, but FCL's yes-or-no answer counts touching. Therefore a pair overlaps only if FCL says so, too,
+when one body is moved by DEPTH of its size along each axis. Bodies that only touch are free in one of the six directions.
 
-The depth of a pair is the least way s along a direction n by which b, come from outside, stands at the gap of lasting
-contacts. Directions tried: that of the centres, the principal axes of both bodies, and, from the best of them, the
-normal where the bodies touch, as long as it is better (the descent of expanding polytopes, van den Bergen 2001). If
-several are as good the one nearest to that of the centres is taken, else the first axis of a. Then
+The depth of a pair is the least displacement s of b along a direction n after which the gap is that of lasting contacts. These
+directions are tried: the line of the centres and the principal axes of both bodies. From the best of them the search descends: it takes
+the normal where the bodies then touch, as long as that is better (expanding polytopes, van den Bergen 2001). Of equally good directions
+the one nearest to the line of the centres is taken, else the first axis of a. Then
 
-    min sum of m |D|^2 / 2    with    n.(D_b - D_a) >= s   for all pairs that overlap or came to on the way
+    min sum of m |D|^2 / 2    with    n.(D_b - D_a) >= s   for all pairs that overlap, or did so after an earlier round
 
-gives the displacements D of all bodies together, again and again until no pair overlaps. Bodies do not turn, so what
-joints join moves as one. Velocities stay; the potential energy is accounted for as "overlap". Pairs for which there is no space
-are reported, and do not touch each other in that run.
+gives the displacements D of all bodies. This is repeated until no pair overlaps. Bodies do not turn, so jointed bodies move together.
+Velocities stay. The change of potential energy is in the ledger as "overlap". Pairs for which there is no space are reported and do not
+collide in that run.
 """
 
 from __future__ import annotations
@@ -218,7 +217,7 @@ class _Search:
         return directions
 
     def _way(self, a: int, b: int, n: np.ndarray) -> float:
-        """How far b has to move along n to stand off a, coming from outside; inf where that cannot be told."""
+        """How far b has to move along n from where it is until it is apart from a; inf where that cannot be found."""
         reach = float(self.world.bound_radius[a] + self.world.bound_radius[b])
         way, gap = reach - float(n @ (self.position[b] - self.position[a])), self._contact_margin(a, b)
         free, careful = np.inf, False

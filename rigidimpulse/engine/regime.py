@@ -1,6 +1,6 @@
 """Which islands are sub-stepped, of the islands of bodies that may touch in a step.
 
-The exact regime is the better one wherever it can be afforded. "auto" sub-steps an island only where all of this holds:
+The exact regime is more accurate, so it is used wherever it can be afforded. "auto" sub-steps an island only where all of this holds:
 
     many        at least MANY movable bodies, or FEW that move (faster than the sleep speed, see `sleeping.py`) in a scene of MANY;
                 KEPT for an island that is sub-stepped already
@@ -84,7 +84,7 @@ def island_roots(number: int, first: np.ndarray, second: np.ndarray, movable: np
 
 @jit_making_arrays
 def support_levels(bodies, pairs, rows, tall):
-    """How many bodies each one is above what cannot be moved, by closed contacts, (n+1,): at most tall + 1; 0 for immovable ones.
+    """Level (n+1,) of each body above the supports, counted in bodies along closed contacts: at most tall + 1; 0 for immovable bodies.
 
     Bodies without support, and those that play no part, have tall + 2.
     """
@@ -126,7 +126,7 @@ def refusals(
     b: np.ndarray,
     auto: bool,
 ) -> dict[int, str]:  # fmt: skip
-    """Why islands are not sub-stepped, by their root; what holds of contacts (`low`) is not looked at here.
+    """Why islands are not sub-stepped, by their root; the condition `low` is not tested here.
 
     Args:
         world: the compiled scene.

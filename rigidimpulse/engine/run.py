@@ -40,9 +40,8 @@ class Run:
 
     Attributes:
         joints, forces, substepped, soft_bodies: participants; what the scene does not call for is one of `absent.py`.
-        triggers: None where the scene has none; only the effect "triggers" asks it. keyframes: paths of kinematic bodies. flight: the
-        kernel of
-            balls.
+        triggers: None where the scene has none; only the effect "triggers" asks it.
+        keyframes: paths of kinematic bodies. flight: the kernel of balls.
 
     """
 

@@ -1,4 +1,4 @@
-"""Sleeping: when bodies stand still for good until something touches them.
+"""Sleeping: when bodies stand still until something touches them.
 
 An exact island falls asleep as a whole (`may_sleep`). In a sub-stepped island each body has a sleep timer; see `substepped/advance.py`
 for what wakes it.
@@ -45,10 +45,10 @@ def may_sleep(run: Run, island: Island, h: float) -> bool:
 
 @jit_making_arrays
 def wake_by_contact(first, second, member, restless, bodies, mass, strength, inner):
-    """Mark (n,) the members that are awake, and sleepers that such a one may move, over pairs (k,) that may touch.
+    """Mark (n,) the members that are awake, and the sleepers that a moving member may wake over pairs (k,) that may touch.
 
     A moving body of mass m and speed v wakes sleepers up to k contacts away, k = max(1, m v / (m_0 u)), m_0: the least mass of a member,
-    u = SLEEP_SPEED sqrt(g r). Shared by more bodies than that, the impact cannot move any of them faster than the sleep speed u.
+    u = SLEEP_SPEED sqrt(g r). An impact that is shared by more bodies than that cannot move any of them faster than the sleep speed u.
     """
     reach, least = np.zeros(member.shape[0]), np.inf
     for i in range(member.shape[0]):

@@ -1,9 +1,7 @@
 """One step: the whole order of what happens.
 
-Every body has a trajectory: its exact path since something last acted on it. A step goes from contact to contact. At the earliest time
-at which
-a pair of bodies touches, the island of bodies that touch there is brought to that time and advanced from it; bodies elsewhere do not
-notice.
+Every body has a trajectory: its exact path since something last acted on it. A step goes from contact to contact. At the earliest time at
+which a pair touches, the island of touching bodies is brought to that time and advanced from it; bodies elsewhere keep their trajectories.
 An island is advanced by one of two regimes, `exact/` from event to event or `substepped/` by sub-steps to the end of the step. Both have
 the same four verbs: arrive, impacts, contact forces, trajectories.
 

@@ -34,7 +34,7 @@ NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 2}
 
 
 def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> None:
-    """Say so and compile on several cores what a run needs, where this machine has never run these sources."""
+    """Compile the kernels that a run needs on several cores, and say so, where this machine has never run these sources."""
     missing = kernels_to_compile(world, with_events, with_substepped)
     if missing:
         kinds, seconds = ", ".join(missing), SECONDS_OF_A_KIND * len(missing)
@@ -43,7 +43,7 @@ def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> N
 
 
 def kernels_to_compile(world: World, with_events: bool, with_substepped: bool) -> list[str]:
-    """Kinds of kernels that a run of a world needs and that do not lie in the cache: what is compiled last of each tells."""
+    """Kinds of kernels that a run of a world needs and the cache lacks; the kernel of each kind that is compiled last shows it."""
     needed = {CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: bool(world.joints_of_scene)}
     missing = []
     for kind, (module, name) in LAST.items():

@@ -1,4 +1,4 @@
-"""What is compiled ahead for each kind of kernels, in parts that take about as long and share little; see `warm_up.py`.
+"""Kernels of each kind that are compiled ahead, in parts of about equal time that share little; see `warm_up.py`.
 
 As a program it compiles one part, in a process of its own: `python -m rigidimpulse.engine.warm_up_parts KIND PART [cylinders]`.
 """

@@ -15,7 +15,7 @@ Inside the step it leaves the true path by
 
     error = |d| h^2 / (12 m),    d = F_4 - L(h) = (F_1 - F_2 - F_3 + F_4) / 3,
 
-of order 4 and larger than the error at the end, which is of order 5: it chooses h.
+of order 4 and larger than the error at the end, which is of order 5. This error chooses h.
 
 In steps of one length the semi-implicit rule of Euler, v' = v + F h / m, x' = x + v' h, has the moments  M0 = h F, M1 = h^2 F  and so
 the line

@@ -199,7 +199,7 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out, series_out)
     """Write constants (FORCED_ROTATION_SIZE,) and series (SERIES_SIZE,) of the motion from orientation q (4,) and spin (3,), rad/s.
 
     `w_world`, `torque` (3,), N m, and `torque_rate` (3,), N m/s, are in the world; `inertia` (3,): principal moments,
-    kg m^2, all > 0. Returns False and writes nothing if torque and rate are none: then the body rotates freely.
+    kg m^2, all > 0. Returns False and writes nothing if torque and rate are 0: then the body rotates freely.
     """
     c = constants_out
     i1, i2, i3 = inertia[0], inertia[1], inertia[2]

@@ -6,7 +6,7 @@
       PRESCRIBED   q(t) = exp(w0 s) q0, constant velocity and world angular velocity (its acceleration must be 0)
       FREE         no torque: closed form (free_rotation)
       FORCED       world torque tau0 + tau1 s: power series (forced_rotation)
-      LINEAR       as PRESCRIBED, with a constant acceleration: the way to a pose that the sub-stepped solver found; the body's own
+      LINEAR       as PRESCRIBED, with a constant acceleration: the path to a pose that the sub-stepped solver found; the body's own
                    velocities run from those at the start to those at the end of the step
 
 The search for impacts and the motion both read the path here, so the impact time and the motion cannot disagree. A row is set

@@ -1,4 +1,4 @@
-"""Events of a run: the impacts table, and what else happened and when."""
+"""Events of a run: the impacts table, energy changes by cause, and reports with their times."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
 """Energies of layouts: their gradients, and the minima that closed forms tell.
 
-Laws. A gradient is the derivative of its value: central differences with a step of 1e-6 leave 1e-12 of the third derivative and 1e-10
-of rounding, so 1e-8 relative is asked; a wrong factor or a left-out rotation shows as 1e-1. Internal energies neither push nor turn
-free bodies as a whole: force and torque sum to 0. Exact pins close to 1e-12 of the size. Chains of n rods of mass m and length l
-hang as static equilibrium says: straight down, rod i of soft pins lower by sum of (n - j) m g / k; between two hooks at equal height
-rod i rises by tan t_i = (i - (n + 1) / 2) m g / H, where H follows from the span, sum of l cos t_i. The best common motion of bodies is
-Kabsch's, here by scipy on six points for each body. Bodies that overlap by s: balls k s^2 / 4, boxes face to face
-8 k (s / 2)^2 / 2; n corners sink under F by F / (n k). Poses at a minimum of curvature c are exact to the rounding of forces over c: bounds 1e-9.
+Laws. A gradient is the derivative of its value: central differences with a step of 1e-6 leave 1e-12 of the third derivative and 1e-10 of
+rounding, so 1e-8 relative is asked; a wrong factor or a left-out rotation shows as 1e-1. Internal energies neither push nor turn free
+bodies as a whole: force and torque sum to 0. Exact pins close to 1e-12 of the size. Chains of n rods of mass m and length l hang as static
+equilibrium says: straight down, rod i of soft pins lower by sum of (n - j) m g / k; between two hooks at equal height rod i rises by tan
+t_i = (i - (n + 1) / 2) m g / H, where H follows from the span, sum of l cos t_i. The best common motion of bodies is Kabsch's, here by
+scipy on six points for each body. Bodies that overlap by s: balls k s^2 / 4, boxes face to face 8 k (s / 2)^2 / 2; n corners sink under F
+by F / (n k). Poses at a minimum of curvature c are exact to the rounding of forces over c: bounds 1e-9.
 """
 
 from __future__ import annotations

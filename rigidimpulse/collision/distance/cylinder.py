@@ -7,7 +7,7 @@
     out = point on the first cylinder, point on the second shape, unit normal from first to second. Where they overlap
     the distance is 0, both points are a common one, and the normal is 0.
 
-The normal n is worth as much as the distance: n . p over the second shape less n . p over the first is a lower bound
+The normal n certifies the distance: n . p over the second shape less n . p over the first is a lower bound
 of the distance, and equals it up to round-off (`least n . p`, that is min_B n . p - n . centre_a - s_a(n), certifies
 the answer).
 

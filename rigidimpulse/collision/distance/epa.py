@@ -1,4 +1,4 @@
-"""How deep two convex polyhedra are inside each other: the expanding polytope algorithm (van den Bergen 2001).
+"""Penetration depth of two convex polyhedra: the expanding polytope algorithm (van den Bergen 2001).
 
 With X_a, X_b the corners of the bodies, 0 is inside the hull of all w = y - x. The shortest displacement to its surface separates the
 bodies. A polytope inside that hull, at first the tetrahedron about 0 that the algorithm of Gilbert, Johnson and Keerthi found, has a face

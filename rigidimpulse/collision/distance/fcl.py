@@ -5,10 +5,10 @@ grown by a radius. Skeletons go to FCL as trees of triangles, for which its dist
 distance of the skeletons less both radii. Half spaces have closed forms and cylinders exact kernels of their own
 (`manifold.pair_gap`).
 
-Nothing that aborts, hangs or lies is in reach: FCL sees only unsigned distance and yes-or-no collision of non-empty
-trees, with indices in range, finite poses, and coordinates scaled so that no triangle is small (its normal, squared,
-is compared with 1e-15). Trees are hollow: if surfaces are apart, a point of each connected part of one body is looked
-for inside the other (`inside`).
+Some calls of FCL abort, hang or give wrong answers. They are avoided: FCL is asked only for unsigned distance and yes-or-no collision of
+non-empty trees, with indices in range and finite poses. Coordinates are scaled so that no triangle is small (FCL compares the square of
+its normal with 1e-15). Trees are hollow: if surfaces are apart, a point of each connected part of one body is looked
+for inside the other (`containment`).
 """
 
 from __future__ import annotations

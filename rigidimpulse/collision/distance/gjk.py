@@ -1,9 +1,9 @@
-"""How far apart two convex polyhedra are: the algorithm of Gilbert, Johnson and Keerthi (1988).
+"""Distance of two convex polyhedra: the algorithm of Gilbert, Johnson and Keerthi (1988).
 
 With X_a the points of body a less their centre c_a, the gap of the bodies is the least |v| of v = y - x, x in X_a + c_a, y in X_b + c_b,
-and v / |v| the axis of largest gap. From simplices of corners, w = argmin over y - x of v.w is added until |v|^2 - v.w is round-off,
-and corners that do not bear v are dropped. Where faces or edges are parallel, w may lie in the plane of the simplex: its tetrahedron
-is flat then, and which side of a face 0 is on is round-off. So it ends where |v| does not get less, with the simplex of before.
+and v / |v| the axis of largest gap. From simplices of corners, w = argmin over y - x of v.w is added until |v|^2 - v.w is round-off, and
+corners that do not bear v are dropped. Where faces or edges are parallel, w may lie in the plane of the simplex: its tetrahedron is flat
+then, and which side of a face 0 is on is round-off. Therefore the search also ends where |v| does not decrease, with the previous simplex.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ Bodies are points y grown by a radius. A plane n.y = d has a below and b above i
 
     r = max(0, n.y + r_a - d)  of the points of a,    r = max(0, d + r_b - n.y)  of those of b,    E(n, d) = sum of r^2 / 2
 
-The least E is 0 exactly if the bodies are apart, and it is smooth in their poses. The forces r that act on the plane balance, so that
-they act within what of the two bodies lies face to face, as contact forces do.
+The least E is 0 exactly if the bodies are apart, and it is smooth in their poses. The forces r on the plane balance. Therefore they act
+within the area where the two bodies face each other, as contact forces do.
 
 With u, v normal to n and n(a, b) = n + a u + b v - (a^2 + b^2) n / 2 the minimum is found by Newton's method with a shift. It starts at the
 best of the separating axes (normals of faces, products of edges; Gottschalk, Lin and Manocha 1996) and of the line of the centres.

@@ -10,9 +10,9 @@ capsule the two ends of its axis, and where a corner of a surface comes at the m
 and both bodies are pushed along the same line.
 
 The nearest surface point of a corner is looked for on faces that push it back into its own body (n.m > 0, m the mean direction of its
-edges): the corners of a box that stands flush on another would else leave by its side. Whether a point is inside is asked a little way,
-NUDGE of the edges' length, inside of its own body: flush corners do not come and go. Edges much deeper than the corners of the pair, or
-than its least deep edges, are no way out and left away.
+edges): otherwise the corners of a box that stands flush on another would be pushed out through its side. The test whether a point is inside
+uses a place NUDGE of the edges' length inside its own body, so that flush corners do not come and go. Edges much deeper than the corners of
+the pair, or than its least deep edges, are no way out and are dropped.
 
 Sources: P. Moore, J. Wilhelms, Collision detection and response for computer animation, SIGGRAPH 1988 (a spring from each point that is
 inside to the nearest point of the surface); Ericson, Real-Time Collision Detection, 2005, section 5.1.5 (nearest point of a triangle).

@@ -46,7 +46,7 @@ def _prism(cylinder: Primitive) -> Primitive:
 
 
 class Solids(NamedTuple):
-    """The shapes of a scene as the penalty method asks them."""
+    """The shapes of a scene as the penalty method reads them."""
 
     geometry: Geometry
     axes: np.ndarray  # (V, 3) and

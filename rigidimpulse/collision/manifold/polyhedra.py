@@ -2,7 +2,7 @@
 
 The gap of two convex bodies along a unit normal n from a to b is  s(n) = min_b n.x - max_a n.x.  Its largest value over the normals
 of faces and the cross products of edges (the separating axes; Gottschalk, Lin and Manocha 1996) is the gap where a face or two edges
-are nearest, at most the gap elsewhere, and minus the depth of bodies inside each other. Where a face has it, the polygon of
+are nearest, a lower bound of the gap elsewhere, and minus the depth of bodies inside each other. Where a face has it, the polygon of
 the other body that faces it most squarely is cut by its sides (Sutherland and Hodgman 1974), and of the points within
 the margin four stay: the deepest, the one farthest from it, and the ones farthest from their line on either side. Where two
 edges have it by more than EDGE_WINS of the smaller inner radius, their closest points are the contact. There is one exception: if the

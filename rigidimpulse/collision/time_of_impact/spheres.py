@@ -9,7 +9,7 @@ trajectories hold, and s = t - t0:
 
 The distance of closest approach x + v s_c is small where it matters, so s has no cancellation. A pair that touches and
 leaves needs no gap of its own: the root at which it came is not the one at which g falls again. So the time depends on
-the trajectories and on nothing else, in particular not on when it is asked for.
+the trajectories alone, and not on the instant at which it is computed.
 """
 
 from __future__ import annotations

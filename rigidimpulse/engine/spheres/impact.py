@@ -1,13 +1,13 @@
 """One simple impact: two bodies that touch at one point and nothing else, fast enough to rebound.
 
-The kernels are those of the loop in Python, called in its order, so the results are the same bits.
-An impact is simple where the loop would do nothing but one impulse. With the approach speed c, restitution
-e, and the speed r below which contacts are held (engine/touching.py),
+The kernels are those of the loop in Python, called in its order, so the results are the same bits. An impact is simple where the loop
+would apply one impulse and do nothing else. With the approach speed c, the speed s at which the bodies part, restitution e, and the speed r
+below which contacts are held (`engine/touching.py`),
 
-    c > 2 r,   e c > 2 r,   and 2 r is exceeded by the speed at which the bodies part.
+    c > 2 r,   e c > 2 r,   s > 2 r.
 
-r is bounded from above by the accelerations alone: what the curvature of balls adds to the gap only lessens r. Bodies
-at rest, and pairs that come back at the same instant or after less than the contact margin, are left to the loop.
+The accelerations alone bound r from above, because the curvature of balls only lessens it. Bodies at rest are left to the loop, and so
+are pairs that come back at the same instant or before their gap exceeded the contact margin.
 """
 
 from __future__ import annotations

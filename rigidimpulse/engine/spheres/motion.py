@@ -1,7 +1,7 @@
 """Motion of bodies that turn about a fixed axis, or not at all: balls in free flight, and what stands or is driven evenly.
 
 The operations are those of `motion.trajectory` and `motion.evaluate.bring`, so the results are the same bits, without the
-paths of tops and of bodies under torques, which would have to be compiled into the kernel.
+rotation of asymmetric bodies and of bodies under torques, which would have to be compiled into the kernel.
 """
 
 from __future__ import annotations

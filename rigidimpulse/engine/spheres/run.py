@@ -1,4 +1,4 @@
-"""The event kernel in a run: its tables, and what it hands to the loop in Python."""
+"""The event kernel in a run: its tables, and the results that it hands to the loop in Python."""
 
 from __future__ import annotations
 
@@ -71,14 +71,14 @@ class EventRun:
         )  # fmt: skip
 
     def may_fly(self) -> bool:
-        """Whether to try the kernel now: not where contacts last, and not at once again where it did not get on."""
+        """Whether to try the kernel now: not while contacts last, and not directly after a step that it could not take."""
         waits, self._waits = self._waits > 0, max(self._waits - 1, 0)
         run = self._run
         idle = run.substepped.is_idle()
         return not waits and idle and not run.state.under_contact.any() and not run.soft_bodies.moves
 
     def fly(self, end: float, at_boundary: bool = True) -> tuple[int, float, float]:
-        """Carry the scene from a boundary of steps, or from the middle of one, towards `end` [s] as far as what happens is simple.
+        """Advance the scene from `state.time` towards `end` [s], until something happens that is not simple.
 
         Returns how the flight ends (see `effect`), and where the step begins and ends in which it does, s.
         """

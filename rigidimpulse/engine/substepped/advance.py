@@ -1,14 +1,13 @@
 """Sub-stepped islands: which bodies are advanced by sub-steps, how they arrive, and when they sleep.
 
-At the start of a step islands are chosen (`regime.py`). Their bodies get trajectories (mode LINEAR) that end in the poses which the
-solver found
-for the end of the step. Pairs inside such an island are not swept. Pairs of a member and any other body are: at their contact the
-impulse is
-found exactly and the island is stepped again from there, with the other body if it is slow enough. Contacts are held at a gap, the skin.
+Islands are chosen at the start of a step (`regime.py`). Their bodies get trajectories (mode LINEAR) that end in the poses that the solver
+found for the end of the step. Pairs inside such an island are not swept. Pairs of a member and any other body are swept: at their contact
+the impulse is found exactly, and the island is stepped again from there, with the other body if it is slow enough. Contacts are held at a
+gap, the skin.
 
-A member that stays within SLEEP_MOTION skins of one place and below SLEEP_SPEED sqrt(g r) for REST sqrt(r / g) s (r: inner radius) is
-sleepy. Sleepy members that no moving one wakes (`sleeping.wake_by_contact`) stand still, to the bit, and bear the others. An island whose
-members are all asleep stands still until something touches it.
+A member is sleepy if it stays within SLEEP_MOTION skins of one place and below SLEEP_SPEED sqrt(g r) for REST sqrt(r / g) s (r: inner
+radius). Sleepy members that no moving one wakes (`sleeping.wake_by_contact`) sleep: they stay exactly still and bear the others. An island
+whose members are all asleep stands still until something touches it.
 """
 
 from __future__ import annotations
@@ -260,7 +259,7 @@ class SubsteppedIslands:
             run.log.account_over(start, time, "sub-stepping", change)
 
     def finish(self, run: Run) -> None:
-        """Account for what the sub-steps under way take until the end of the run, and tell the plan what was done."""
+        """Account for the energy of sub-steps that last until the end of the run, and tell the plan what was done."""
         refused = {f"refused: {reason}": count for reason, count in self._refused.items()}
         run.plan.tell(NAME, self.summary(), {"steps": self._steps, "largest island": self._most, **refused})
         members, time = np.flatnonzero(run.state.trajectory.mode == LINEAR), run.state.time
