@@ -190,7 +190,7 @@ class Recording:
 
         """
         if self.by_cause is None:
-            raise SceneError("a loaded recording knows no causes", "ask the run that simulate() returned")
+            raise SceneError("a loaded recording has no impulses by cause", "ask the run that simulate() returned")
         return self.by_cause.of(name)
 
     def contacts_at(self, frame: int) -> np.ndarray:
