@@ -101,6 +101,7 @@ def match_contacts(old, new, near):
     """
     old_points, old_ids, old_begin, old_end = old
     points, ids, new_begin, new_end = new
+    # First by features; what is left then by place.
     for nearby in range(2):
         for c in range(new_begin, new_end):
             if points[c, IMPULSE] > 0.0:
@@ -116,6 +117,7 @@ def match_contacts(old, new, near):
                     same = x * x + y * y + z * z < near * near
                 if not same or cosine < 0.9:
                     continue
+                # The old point is emptied, so that its impulse is given once.
                 points[c, IMPULSE], old_points[o, IMPULSE] = old_points[o, IMPULSE], 0.0
                 for k in range(FRICTION, FRICTION + 3):
                     points[c, k] = old_points[o, k]

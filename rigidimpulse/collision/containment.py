@@ -125,6 +125,7 @@ def point_in_mesh(geometry, primitive, point):
         node = stack[depth]
         low, high = geometry.node_min[node], geometry.node_max[node]
         beside = point[1] < low[1] or point[1] > high[1] or point[2] < low[2] or point[2] > high[2]
+        # The ray runs along +x: boxes beside it or behind its start are not met.
         if beside or point[0] > high[0]:
             continue
         child = geometry.node_child[node]

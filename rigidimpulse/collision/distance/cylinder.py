@@ -383,6 +383,7 @@ def _closest_on_disc(centre, u, v, rim_radius, radius, half):
         q = along(start, t, chord)
         inner = 0.0 < t < 1.0
         slope, _ = slope_along(q, u, ZERO, radius, half)
+        # At the rim the chord's end moves with the angle, so the slope along the chord counts, too.
         if not inner:
             angle = 0.5 * pi - middle if t > 0.5 else middle - 0.5 * pi
             slope_chord, _ = slope_along(q, v, ZERO, radius, half)

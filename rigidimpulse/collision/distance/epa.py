@@ -143,6 +143,7 @@ def least_deep(shapes, s, t, pose, small, exact, simplex, polytope):
         i, high, j, low = farthest_of_both(corner, (a0, a1), (b0, b1), c, x, y, z)
         middle = d[0] * x + d[1] * y + d[2] * z
         gap = middle - low - high
+        # No corner of the hull lies beyond the face: n.w = h, its normal is the axis.
         if corners == MOST_CORNERS or -(middle - small * (low + high)) <= polytope.plane[f, 3] + exact:
             break
         for m in range(3):
@@ -155,5 +156,6 @@ def least_deep(shapes, s, t, pose, small, exact, simplex, polytope):
         for m in range(3):
             simplex.w[n, m] = w[k, m]
         simplex.corner[n, 0], simplex.corner[n, 1] = polytope.corner[k, 0], polytope.corner[k, 1]
+    # The corners of the face that bear the point nearest to 0.
     count = reduce_simplex(simplex, 3)
     return -polytope.plane[f, 0], -polytope.plane[f, 1], -polytope.plane[f, 2], gap, count

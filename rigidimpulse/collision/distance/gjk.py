@@ -210,12 +210,14 @@ def closest(shapes, s, t, d, c, small, margin, simplex):
             return x, y, z, 0.0, np.int64(5)
         middle = d[0] * x + d[1] * y + d[2] * z
         gap = (middle - low - high) / length
+        # The gap along any axis is a lower bound of the distance: this is far enough.
         if gap > margin:
             return x / length, y / length, z / length, gap, np.int64(0)
         short = square - (middle - small * (low + high))
         known = False
         for n in range(count):
             known = known or (simplex.corner[n, 0] == i and simplex.corner[n, 1] == j)
+        # No corner gets nearer to 0 by more than round-off.
         if count > 0 and (known or short <= CLOSE * square + ROUND * greatest):
             break
         for m in range(3):
@@ -231,6 +233,7 @@ def closest(shapes, s, t, d, c, small, margin, simplex):
         nx, ny, nz = 0.0, 0.0, 0.0
         for n in range(count):
             nx, ny, nz = nx + simplex.weight[n] * w[n, 0], ny + simplex.weight[n] * w[n, 1], nz + simplex.weight[n] * w[n, 2]
+        # Parallel faces make flat tetrahedra, where the side of 0 is round-off: the previous simplex is the answer.
         if before > 0 and nx * nx + ny * ny + nz * nz >= square:
             count = _take_back(simplex, before)
             break

@@ -171,6 +171,7 @@ def edge_contacts(geometry, view, pairs, end, found, count):
         start_b, count_b = geometry.node_start[b], geometry.node_count[b]
         for j in range(3 * start_b, 3 * (start_b + count_b)):
             edge_b = triangle_edge[j // 3, j % 3]
+            # Flat and concave edges touch no other edge; each edge is visited by its owner only.
             if not owns[j // 3] >> (3 + j % 3) & 1 or kind[edge_b] == EDGE_HIDDEN:
                 continue
             q = moved(view.R, view.t, row(vertex, edge[edge_b, 0]))
@@ -193,6 +194,7 @@ def edge_contacts(geometry, view, pairs, end, found, count):
                 edges = _Edges(edge_a, edge_b, p, d, q, e)
                 if sine_squared > CROSSING * CROSSING:
                     count = _crossing_contact(geometry, view, found, count, edges)
+                # Nearly parallel edges of meshes have both ends of their overlap.
                 if meshes and sine_squared < NEARLY_PARALLEL * NEARLY_PARALLEL:
                     count = _parallel_contacts(geometry, view, found, count, edges)
     return count

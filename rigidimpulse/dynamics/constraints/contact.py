@@ -129,6 +129,7 @@ def hold_contacts(
     of_contacts = contact_rows(bodies, contacts, members, problem.number, extra)
     rows, first_row, frames = of_contacts
     start = len(rows.bias) - extra
+    # Warm start from the forces of the last sub-step.
     start_contact_impulses(rows, first_row, force, h)
     n, rough = len(members), contacts.static_friction > 0.0
 
@@ -141,6 +142,7 @@ def hold_contacts(
         return residual / scale, scale, u, slides
 
     residual, scale, u, slides = attempt(h)
+    # Contacts that carry load but leave slowly stick; that changes velocities, so the forces are found again.
     for _ in range(STICK_PASSES):
         loaded = np.flatnonzero(rows.impulse[first_row] > 0.0)
         target = SOLVE_TOLERANCE * scale
@@ -153,13 +155,16 @@ def hold_contacts(
     if rolling is not None:
         rolled = rolling_slip(bodies, contacts, rolling, frames, start, SLIP * scale)
         disc, second, slip = (np.concatenate(both) for both in zip((disc, second, slip), rolled, strict=True))
+    # Stop split. A failed solve has no reliable slip, so it is not split.
     if len(disc) and residual <= POOR and _stops(slip, _end_slip(rows, n, disc, second), SLIP * scale):
+        # A very short trial gives the deceleration |a_t + W_t f| of every slip, and so the first stop.
         brief, whole = BRIEF * h, rows.impulse.copy()
         rows.impulse[:] *= BRIEF
         attempt(brief)
         stop = _first_stop(slip, _end_slip(rows, n, disc, second), brief)
         if shortest < stop < h:
             rows.impulse[:] *= stop / brief
+            # The split must not replace a good solution by a poor one.
             stopped, *_ = attempt(stop)
             if stopped <= max(residual, POOR):
                 residual, h, whole = stopped, stop, rows.impulse

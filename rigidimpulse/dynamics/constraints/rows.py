@@ -136,6 +136,7 @@ def contact_rows(bodies, contacts, members, number, extra):
     r = np.int64(0)
     for c in range(m):
         first_row[c] = r
+        # Smooth contacts need no tangents: fewer rows to solve.
         r += 3 if contacts.static_friction[c] > 0.0 else 1
     rows = make_rows(r + extra)
     for c in range(m):

@@ -181,6 +181,7 @@ def solve_block(
     u = np.zeros(len(rows.bias))
     row_velocities(bodies, contacts, first_row, frames, u)
     approach = u[first_row]
+    # A rebound that rises less than the contact margin counts as none.
     e = np.where((approach < 0.0) & (contacts.restitution * -approach > rest_speed), rebound * contacts.restitution, 0.0)
     target = np.zeros(len(rows.bias))
     target[first_row] = -e * approach
@@ -189,12 +190,14 @@ def solve_block(
     for k in (1, 2):
         target[first_row[rough] + k] = -e_t * u[first_row[rough] + k]
     block = Block(of_contacts, len(members), contacts, u, target, e, rule.scale)
+    # Newton's law can make energy with friction only, so "auto" takes it for smooth contacts.
     smooth = not rough.any()
     rows.impulse[:] = _newton(block) if law == NEWTON or (law == AUTO and smooth) else _two_phases(law, block)
     change_velocities(bodies, members, rows)
     if joints is not None:
         add_moments(joints, rows.impulse)
     count = log_block(bodies, contacts, rows, first_row, frames, u, log, 0)
+    # The block numbers its own contacts, the log those of the island.
     log[:count, 0] = subset[log[:count, 0].astype(np.int64)]
     return count
 

@@ -77,8 +77,10 @@ def respond_sequential(
     everything = np.arange(m)
     count = impulses = 0
     cap, round_cap = IMPULSES_PER_CONTACT * m, IMPULSES_PER_ROUND * m
+    # Joints hold during an impact, and bodies that bear each other share it: both need blocks.
     blocks_only = joints is not None or (together and m > 1)
     while impulses < cap and count + m < len(log):
+        # Rounds without end between the same bodies: their contacts lose restitution (inelastic collapse).
         if impulses >= round_cap:
             rule = rule._replace(rest_speed=np.where(_collapsed(contacts, log[:count]), np.inf, rule.rest_speed))
         if blocks_only:
@@ -90,10 +92,12 @@ def respond_sequential(
                 continue
         if c < 0:
             break
+        # All points of a pair rebound together, as a box that lands on its face does.
         same_pair = (contacts.body_a == contacts.body_a[c]) & (contacts.body_b == contacts.body_b[c])
         subset = everything if together else np.flatnonzero(same_pair)
         count += solve_block(bodies, contacts, subset, 1.0, rule, number, joints, log[count:])
         impulses += 1
+    # What still approaches does so without rebound.
     if count + m < len(log) and _approaching(bodies, contacts, rule.tolerance, 0.0, rule.rest_speed) >= 0:
         count = _finish(bodies, contacts, rule, number, joints, log, count)
         impulses += 1
