@@ -137,6 +137,7 @@ def nystroem(
     half = 0.5 * h
     workspace.fly(members, half, bodies, steady, first[1])
     second = evaluate(0.5, workspace.bodies, workspace.rotation)
+    # Stage 3 has the pose of stage 2: only velocities are flown again.
     workspace.fly_speeds(members, half, bodies, steady, second[1])
     third = evaluate(0.5, workspace.bodies, workspace.rotation)
     workspace.fly(members, h, bodies, steady, third[1])

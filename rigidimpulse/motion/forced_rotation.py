@@ -224,6 +224,7 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out, series_out)
     vx, vy, vz = w_world[0], w_world[1], w_world[2]
     wx, wy, wz = rotated(q0, -q1, -q2, -q3, vx, vy, vz)
     ax, ay, az = magnitude * ex / i1, magnitude * ey / i2, magnitude * ez / i3
+    # Torque, its rate and spin along one principal axis: that axis is kept, in closed form.
     if _parallel(ex, ey, ez, ax, ay, az) and _parallel(ex, ey, ez, wx, wy, wz) and _parallel(ex, ey, ez, bx, by, bz):
         c[KIND] = FORCED_AXIS
         ax, ay, az = rotated(q0, q1, q2, q3, ax, ay, az)

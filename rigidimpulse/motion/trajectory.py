@@ -116,6 +116,7 @@ def begin(trajectory, i):
         for k in range(TORQUE_RATE if mode == FREE else JERK, TOP_SIZE):
             trajectory.top[i, k] = 0.0
     inertia, q, w, top = trajectory.inertia[i], trajectory.orientation[i], trajectory.angular_velocity[i], trajectory.top[i]
+    # A torque of round-off is none: the body then rotates freely.
     if mode == FORCED and forced_rotation.prepare(inertia, q, w, trajectory.torque[i], top[TORQUE_RATE:], top, trajectory.series[i]):
         return
     if mode == FREE or mode == FORCED:
@@ -238,6 +239,7 @@ def stepped_at(trajectory, i, t):
     """
     s = t - trajectory.start[i]
     top = trajectory.top
+    # The body's own velocities change evenly over the step, while the path runs straight to the pose.
     share = min(s / top[i, LENGTH], 1.0)
     x = (
         _moved(trajectory.position[i, 0], trajectory.velocity[i, 0], trajectory.acceleration[i, 0], 0.0, s),

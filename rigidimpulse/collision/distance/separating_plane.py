@@ -51,6 +51,7 @@ def _side(points, radius, sign, plane, g, H):
         x, y, z = points[k, 0], points[k, 1], points[k, 2]
         height = n[0] * x + n[1] * y + n[2] * z
         r = sign * (height - d) + radius
+        # Points on their own side of the plane have no energy.
         if r <= 0.0:
             continue
         along_u = sign * (u[0] * x + u[1] * y + u[2] * z)
@@ -114,6 +115,7 @@ def best_plane(a, radius_a, b, radius_b, n, d):
     for _ in range(ROUNDS):
         least = LEAST_SHIFT * (abs(H[0, 0]) + abs(H[1, 1]) + H[2, 2])
         shift = max(shift, least)
+        # The bodies are apart: any plane between them will do.
         if energy == 0.0:
             break
         while not _solve(H, shift, g, s):
@@ -126,6 +128,7 @@ def best_plane(a, radius_a, b, radius_b, n, d):
         trial /= sqrt(trial[0] * trial[0] + trial[1] * trial[1] + trial[2] * trial[2])
         trial_energy = _expand(a, radius_a, b, radius_b, (trial, u, v, d + s[2]), trial_g, other)
         lower = trial_energy < energy
+        # Near the minimum rounding hides the fall of E; the gradient shows it longer.
         if lower or (size <= 1e-9 and np.abs(trial_g).sum() < np.abs(g).sum()):
             energy = trial_energy
             copy_vector(trial, n)
@@ -136,6 +139,8 @@ def best_plane(a, radius_a, b, radius_b, n, d):
         else:
             if size <= CONVERGED * 10.0:
                 break
+            # The trial has changed u and v; g and H belong to those of n.
             tangents(n, u, v)
+            # A larger shift shortens the step.
             shift *= 8.0
     return d, energy

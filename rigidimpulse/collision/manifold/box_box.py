@@ -64,7 +64,7 @@ def box_axis(half, pair, between, far, c):
     for j in range(3):
         along = abs(c[0, j] * d[0] + c[1, j] * d[1] + c[2, j] * d[2])
         gap = along - k[j] - (abs(c[0, j]) * h[0] + abs(c[1, j]) * h[1] + abs(c[2, j]) * h[2])
-        # A face of b must win clearly, so that nearly equal gaps do not change the face from step to step.
+        # A tie keeps the face of a.
         if gap > best + SECOND_WINS * size:
             best, axis = gap, 3 + j
     if best > far:
@@ -82,7 +82,7 @@ def box_axis(half, pair, between, far, c):
             gap = (abs(d[i2] * c[i1, j] - d[i1] * c[i2, j]) - reach) / sqrt(square)
             if gap > edge:
                 edge, edges = gap, 6 + 3 * i + j
-    # Edges must win clearly, too: they have one contact, a face has up to four.
+    # Edges must win clearly: faces give more points.
     if edges >= 0 and (edge > far or edge > best + EDGE_WINS * size):
         return edge, edges
     return best, axis

@@ -81,11 +81,13 @@ def _points_in_surface(solids, surface, other, bodies, poses, points, count):
         p = turned_back(rotation[a], subtract(world, row(position, a)))
         if box_squared(geometry, root, p) > radius * radius:
             continue
+        # Asked a little inside its own body, so that flush corners do not come and go.
         axis = turned_back(rotation[a], turned(rotation[b], row(axes, v)))
         inside = geometry.closed[surface] and point_in_mesh(geometry, surface, along(p, NUDGE * sizes[v], axis))
         if radius == 0.0 and not inside:
             continue
         squared, q, t = nearest_on_surface(geometry, surface, p, axis)
+        # No face pushes the corner back into its body: the nearest one counts.
         if t < 0:
             squared, q, t = nearest_on_surface(geometry, surface, p, (0.0, 0.0, 0.0))
         distance = sqrt(squared)
@@ -94,6 +96,7 @@ def _points_in_surface(solids, surface, other, bodies, poses, points, count):
         out = subtract(q, p) if inside else subtract(p, q)
         face = row(geometry.triangle_normal, t)
         normal = face
+        # On a face its normal is exact, however small the distance; elsewhere it is the way to the nearest point.
         if dot(out, face) < (1.0 - ON_FACE) * distance:
             normal = (out[0] / distance, out[1] / distance, out[2] / distance)
         depth = radius + (dot(out, normal) if inside else -distance)

@@ -141,6 +141,7 @@ def nearest_on_surface(geometry, primitive, p, axis):
             continue
         child = geometry.node_child[node]
         if child >= 0:
+            # The nearer box is walked first, so that the farther one can be left out.
             first_is_nearer = box_squared(geometry, child, p) <= box_squared(geometry, child + 1, p)
             stack[depth] = child + 1 if first_is_nearer else child
             stack[depth + 1] = child if first_is_nearer else child + 1

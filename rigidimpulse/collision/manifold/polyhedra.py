@@ -138,6 +138,7 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | No
                 loops.append([before + v for v in loop])
             corners.append(vertex)
             size = vertex.max(0)
+            # Eight corners at +- the same lengths: a box along the principal axes, which has kernels of its own.
             if len(vertex) == 8 and np.allclose(np.abs(vertex), size, rtol=1e-12, atol=0.0):
                 half[s] = size
         for first, number in zip(firsts, (sum(map(len, corners)), len(planes)), strict=True):
@@ -243,6 +244,7 @@ def half_space_contacts(shapes, s, rotation, j, plane, margin, polygon, points):
             count += 1
     if count == 0:
         return np.int64(0), least
+    # Four points can carry the load of all.
     number = four_of(corner, height, count, chosen)
     on_plane, on_shape = (0, 3) if sign > 0.0 else (3, 0)
     for c in range(number):

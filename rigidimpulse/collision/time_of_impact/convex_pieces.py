@@ -116,6 +116,7 @@ def _with_edges(work, index, edges, normal, threshold, horizon):
     edge_first = subtract(vector(work, CORNER + 3 * ((k + 1) % num_first)), vector(work, CORNER + 3 * k))
     edge_second = subtract(vector(work, CORNER + 9 + 3 * ((j + 1) % num_second)), vector(work, CORNER + 9 + 3 * j))
     m = cross(normal, edge_first)
+    # m = f (n x e_a): see the head of the file; parallel edges have none.
     wanted, available = -dot(normal, cross(vector(work, SEEN + SEEN_SPIN), edge_second)), dot(m, edge_second)
     if available == 0.0:
         return 0.0
@@ -128,11 +129,13 @@ def _with_edges(work, index, edges, normal, threshold, horizon):
         arm = subtract(point, vector(work, ORIGIN + 3))
         velocity, acceleration = seen_motion(work, SEEN, arm)
         jerk = work[SEEN + SEEN_JERK] + work[SEEN + SEEN_ARM_JERK] * length(arm)
+        # Bounds of |y''|, |y'| and |D| over the horizon.
         bend_bound = length(acceleration) + horizon * jerk
         speed_bound = length(velocity) + horizon * bend_bound
         for k in range(num_first):
             between = subtract(point, vector(work, CORNER + 3 * k))
             reach = length(between) + horizon * speed_bound
+            # |f'''| <= J + 3 nu |y''| + 3 nu^2 |y'| + nu^3 |D|.
             rest = jerk + nu * (3.0 * bend_bound + nu * (3.0 * speed_bound + nu * reach))
             gap = dot(normal, between)
             closing = -dot(m, between) - dot(normal, velocity)

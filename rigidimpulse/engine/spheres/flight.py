@@ -78,10 +78,12 @@ def _fly_interval(fixed, motion, table, record, rebounds, clock):
             break
         p = table.queue.order[0]
         time, leaves = table.queue.key[p], table.leaves[p]
+        # Something that is not simple: the loop in Python goes on from here.
         if leaves == AT_ONCE:
             return GO_ON, clock
         if leaves == AT_BOUNDARY:
             return STEP, Clock(clock.step, clock.live, time, clock.end, _next_number(time, clock.number, clock.step), True)
+        # Python makes the buffer larger and calls again, from the same instant.
         if not _has_capacity(record, rebounds):
             return FULL, clock
         clock = Clock(clock.step, clock.live, time, clock.end, _next_number(time, clock.number, clock.step), False)
@@ -91,6 +93,7 @@ def _fly_interval(fixed, motion, table, record, rebounds, clock):
         for i in (a, b):
             if fixed.dynamic[i]:
                 write_path(motion.trajectory, table.paths, i)
+        # Only entries of bodies with a new path are timed again.
         for i in (a, b):
             if fixed.dynamic[i] and not renew(fixed.apart, table, i, clock):
                 return FULL, clock
@@ -117,6 +120,7 @@ def fly(fixed, motion, table, record, rebounds, now, end, at_boundary, interval,
     place_planes(trajectory, table.planes)
     while how == ARRIVED and clock.now < end:
         first = clock.number
+        # A new interval; its length changes the cost and no result.
         if clock.end <= clock.now:
             clock = Clock(fixed.step, live, clock.now, min((first + interval - 1) * fixed.step, end), first, clock.at_boundary)
             if not fill_table(fixed, table, clock):
@@ -124,6 +128,7 @@ def fly(fixed, motion, table, record, rebounds, now, end, at_boundary, interval,
         pairs = table.count[0] - len(table.paths)
         how, clock = _fly_interval(fixed, motion, table, record, rebounds, clock)
         write_frames(trajectory, record, _FIRST, len(table.paths), clock.now)
+        # Long intervals have large boxes, and so many pairs; short ones are filled often.
         if how == ARRIVED and pairs <= FEW * moving:
             interval = min(2 * interval, LONGEST)
         elif how == ARRIVED and pairs > MANY * moving:

@@ -166,6 +166,7 @@ def near_boundary(paths, planes, i, other, plane, near, until, clock):
     balls without relative acceleration come nearer until they are closest, and part after it.
     """
     first, last = clock.number, np.int64(min(until, clock.end) / clock.step)
+    # Round-off of the division may put the last boundary too late.
     while last * clock.step > until or last * clock.step >= clock.end:
         last -= 1
     if first > last:
@@ -173,6 +174,7 @@ def near_boundary(paths, planes, i, other, plane, near, until, clock):
     begin, final = first * clock.step, last * clock.step
     if plane >= 0:
         if dot(_three(planes, plane, NORMAL), _three(paths, i, PULL)) <= 0.0:
+            # The gap over a plane is concave in time, so it is least at an end.
             least = gap_at(paths, planes, i, other, plane, begin)
             if min(least, gap_at(paths, planes, i, other, plane, final)) > near:
                 return inf
@@ -180,6 +182,7 @@ def near_boundary(paths, planes, i, other, plane, near, until, clock):
         x, v, pull = _relative(paths, i, other, begin)
         if dot(pull, pull) == 0.0:
             square = dot(v, v)
+            # Without relative acceleration |x + v s| is least at s = -x.v / v^2.
             closest = min(max(-dot(x, v), 0.0) / square if square > 0.0 else 0.0, final - begin)
             if length(along(x, closest, v)) - paths[i, RADIUS] - paths[other, RADIUS] > near:
                 return inf

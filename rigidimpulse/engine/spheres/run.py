@@ -88,6 +88,7 @@ class EventRun:
         if at_boundary:
             self._step_begin = begin
         how, number, interval_end = FULL, 0, -1.0
+        # A table was full: its contents are handed over, it grows, and the flight goes on where it was.
         while how == FULL:
             how, now, at_boundary, number, self._interval, interval_end = fly(
                 self._fixed, self._motion, self._table, self._record, self._rebounds, now, end, at_boundary, self._interval,
@@ -98,6 +99,7 @@ class EventRun:
                 interval_end = -1.0
         run.state.time = now
         if how == STEP:
+            # A kernel that did not get on is tried again after twice as many steps each time.
             self._pause = 0 if now > begin else min(2 * self._pause + 1, LONGEST_PAUSE)
             self._waits = self._pause
         step = self._fixed.step

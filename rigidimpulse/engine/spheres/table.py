@@ -44,10 +44,12 @@ def meeting(paths, planes, i, other, plane, clock):
     near, at_once = near_gap(paths, i, other), AT_BOUNDARY if clock.at_boundary else AT_ONCE
     if paths[i, MOVES] == 0.0 and paths[other, MOVES] == 0.0:
         return inf, CONTACT
+    # Other shapes have no closed form: only the time until which their bounding spheres are apart.
     if paths[i, KIND] == OTHER or paths[other, KIND] == OTHER:
         time = last_apart(paths, planes, i, other, plane, near, clock)
         return time, at_once if time == clock.now else AT_BOUNDARY
     time = contact_time(paths, planes, i, other, plane, clock.now)
+    # No closed form for this contact (nan): the loop decides.
     if time != time:
         return clock.now, at_once
     if clock.at_boundary:
@@ -148,6 +150,7 @@ def fill_table(fixed, table, clock):
     table.head[:] = -1
     bodies, count = np.empty(n, np.int64), 0
     for i in range(n):
+        # Planes have an entry for each body instead of a box.
         if paths[i, KIND] == PLANE:
             continue
         bodies[count] = i
@@ -162,6 +165,7 @@ def fill_table(fixed, table, clock):
         if paths[i, MOVES] > 0.0:
             table.first[i] = i
             _wait(table, i)
+            # Moving pairs are entered once, by the body of lower index.
             if not _add_pairs(fixed.apart, table, i, _EACH_ONCE):
                 return False
     return True

@@ -139,6 +139,7 @@ class SubsteppedIslands:
         run.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
         self._leave_out_fast(run, member)
         a, b, touch = self._near(run, member, ahead)
+        # A member may touch a sleeping island, whose bodies then touch others.
         while len(woken := self._touched(run, member, a, b)):
             member[woken] = True
             a, b, touch = self._near(run, member, ahead)
@@ -147,6 +148,7 @@ class SubsteppedIslands:
         moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
         refused = refusals(world, root, self.label >= 0, self._jointed, moves, solve_count, a, b, self._auto)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
+        # Tall columns are found from contacts, so only in islands that are not refused yet.
         chosen = self._low(run, pair_events, chosen, root, refused)
         for reason in refused.values():
             self._refused[reason] = self._refused.get(reason, 0) + 1
@@ -206,6 +208,7 @@ class SubsteppedIslands:
         """Label the islands; put to sleep those that have been sleepy for long, and members that are far from moving ones."""
         world, trajectory = run.world, run.state.trajectory
         inner = self.stepper.inner
+        # Islands on moving supports never sleep.
         carried = world.moving[a] | world.moving[b]
         moving = np.unique(root[np.where(world.moving[a], b, a)[carried]])
         restless = chosen.copy()
@@ -223,6 +226,7 @@ class SubsteppedIslands:
         self._put_to_sleep(run, np.flatnonzero(asleep & (trajectory.mode != FIXED)), time)
         alive = np.zeros(len(root), bool)
         alive[root[restless]] = True
+        # Islands whose members all sleep are not stepped.
         chosen &= alive[root]
         self.asleep = asleep & chosen
 
@@ -312,6 +316,7 @@ class SubsteppedIslands:
         if len(island.members):
             stays = np.zeros(world.num_bodies, bool)
             stays[island.members] = True
+            # Bodies that touch the island join it, except jointed ones, and those that are too fast for sub-steps and leave it.
             self._leave_out_fast(run, stays)
             stays[island.members] |= ~self._leaves(run, island)
             near = island.members[stays[island.members] & ~self._jointed[island.members]]
@@ -327,15 +332,18 @@ class SubsteppedIslands:
         self._most = max(self._most, len(members))
         members = members[~self.asleep[members]]
         end = self._end_of(run, pair_events, island.time, members)
+        # In the middle of a step contacts may be kept for longer motion.
         self._set_up(run, members, island.time, end - island.time, self.stepper.kept if island.time > pair_events.begin else 0.0)
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
             self._ends[label] = end
             self._began[label] = island.time, mine, mechanical_energy(run.state.now, world, mine)
+        # Members that are new and too close are moved apart before they are stepped.
         if len(fresh):
             self.stepper.move_apart(run, fresh)
         self._outcome = self.stepper.step(run, island.time, end)
         self._outcome_end = end
+        # The island was not stepped to the end of the step: it is woken there.
         if end < pair_events.end:
             pair_events.wake[members] = end
 

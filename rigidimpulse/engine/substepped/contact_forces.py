@@ -110,6 +110,7 @@ class ContactStepper:
         """
         n = world.num_bodies
         self.world = world
+        # By place, so that the order in which bodies were added changes no bit.
         self.order = np.lexsort(np.column_stack([np.arange(n), world.position[:, ::-1]]).T)
         self.rank = np.argsort(self.order, kind="stable")
         dynamic_shapes = np.zeros(len(world.geometry.shape_first) - 1, bool)
@@ -118,6 +119,7 @@ class ContactStepper:
         self.skin = TOLERANCES.sub_stepping.skin * self.inner
         self.reach = np.where(world.ball, 0.0, world.bound_radius)
         convex = convex_polyhedra(world.geometry)
+        # Soft contacts sink in, and the contact kernels need a gap: smaller shapes for the search.
         inset, depth, self._back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
         self.geometry, factor = shrunk_geometry(inset, dynamic_shapes)
         self.shapes = make_polyhedra(world.geometry, convex)
@@ -149,6 +151,7 @@ class ContactStepper:
         self._least_sub_steps = LEAST_SUB_STEPS / (FINER_SUB_STEP if finer else 1.0)
         self.motion = world.accuracy.substep_motion * (FINER_MOTION if finer else 1.0)
         self.kept = KEPT * self.motion
+        # Balls and moving supports: all contacts are found again in the middle of a step.
         self._all_quick = bool(world.moving.any() or world.ball.any())
         self._special = self._all_quick or bool(world.coefficients[:, :, 0].any())
         self.pressed = np.zeros(n, bool)
@@ -177,6 +180,7 @@ class ContactStepper:
         strength = float(self.world.steady_strength[members].max())
         step, pieces = self.world.accuracy.step, self._least_sub_steps
         if strength > 0.0:
+            # The load of k bodies presses the skin in by k g / w^2, w = 2 pi F / h.
             h = 2.0 * math.pi * FREQUENCY * math.sqrt(PRESSED * float(self.skin[members].min()) / (COLUMN * strength))
             pieces = max(math.ceil(step / h), pieces)
         return step / pieces
@@ -206,6 +210,7 @@ class ContactStepper:
         self._part[supports], self._part[members] = SUPPORT, MEMBER
         load_bodies(self.bodies, self.order, run.state.now, run.acceleration, self.world.inv_mass, self._part)
         motion = most_motion(self.bodies, self.table.pairs, ahead)
+        # Fast bodies are looked at more often, with enough sub-steps between the looks.
         needed = math.ceil(motion / COARSEST)
         self._sub_steps = max(math.ceil(ahead / self.sub_step(members) - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
         most = max(self._sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
@@ -229,6 +234,7 @@ class ContactStepper:
                 )
                 for share in range(shares)
             ])  # fmt: skip
+            # A share whose points were too few says so; all shares are searched again with more.
             if min(waiting for _, waiting in outcome) >= 0:
                 break
             table.grow(POINTS)
@@ -236,6 +242,7 @@ class ContactStepper:
         begins = [share_of(number, share, shares) for share in range(shares)]
         waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
         if len(waits):
+            # In order of the pairs, however many shares there are.
             waits = waits[np.argsort(self._places[waits])]
             self._look_at_general(run, self._places[waits], self._margins[waits])
 
@@ -295,6 +302,7 @@ class ContactStepper:
         if all_quick:
             bodies.quick[:] = True
         self._look(run, self.kept)
+        # All batches are made again: what has drifted counts from here.
         if all_quick:
             bodies.drift[:] = 0.0
             self._steady = _NO_STEADY
@@ -351,6 +359,7 @@ class ContactStepper:
             work += self._advance(some, h)
             done += some
         note_pressed(bodies, self.order, self.pressed)
+        # Sub-steps must not make energy beyond what moving supports gave.
         self._take_off(before + work)
         at = self.rank[members]
         return Outcome(members, bodies.position[at], bodies.orientation[at], bodies.velocity.reshape(-1, ROW)[at, :6])
@@ -378,12 +387,14 @@ class ContactStepper:
                 width, solve, self._steady[0], self._count, self.world.coefficients, strength, lists, target
             )
         special = SpecialPatches(lists[0, :balls], lists[1, :rebounds], lists[2, :supports], target)
+        # Few batches are solved faster by one core.
         shares = min(self._shares, MOST_SOLVERS) if number * sub_steps > WORTHWHILE_BATCHES else 1
         self._work_queue[:] = empty_work_queue()
         work, *_ = advance.together([
             (self.simd, solve, special, sub_steps, h, self._work_queue, share, shares) for share in range(shares)
         ])  # fmt: skip
         keep_impulses(self.simd, self._batches, number, table.lines)
+        # The first part of a step has all contacts in its batches: they are the steady ones of later parts.
         if not steady:
             bodies.quick[:] = False
             self._steady = self._count, self._edges
