@@ -63,6 +63,7 @@ def write_point(bodies, pairs, p, source, coefficients, points, r):
     a, b, carrier, contact_margin = pairs.first[p], pairs.second[p], pairs.carrier[p], pairs.contact_margin[p]
     nx, ny, nz = real[c, 6], real[c, 7], real[c, 8]
     dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
+    # Points of the shrunk shapes belong to p / f of the true ones; rounded surfaces keep their skeleton's point.
     ax, ay, az = real[c, 0] / factor_a - round_a * nx, real[c, 1] / factor_a - round_a * ny, real[c, 2] / factor_a - round_a * nz
     bx, by, bz = (real[c, 3] - dx) / factor_b, (real[c, 4] - dy) / factor_b, (real[c, 5] - dz) / factor_b
     bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz

@@ -88,6 +88,7 @@ def _in_curved(kind, frame, radius, vertex, first, last, point):
         x, y, z = x - frame[0], y - frame[1], z - frame[2]
         dx, dy, dz = frame[3], frame[4], frame[5]
         along = x * dx + y * dy + z * dz
+        # Beyond a cap; between the caps the distance from the axis decides.
         if abs(along) > frame[6]:
             return False
     else:
@@ -224,6 +225,7 @@ def space_orientation(a, b, c, p, terms):
     bc, cb, ca, ac, ab, ba = by * cz, bz * cy, cy * az, cz * ay, ay * bz, az * by
     determinant = ax * (bc - cb) + bx * (ca - ac) + cx * (ab - ba)
     size = abs(ax) * (abs(bc) + abs(cb)) + abs(bx) * (abs(ca) + abs(ac)) + abs(cx) * (abs(ab) + abs(ba))
+    # The error bound decides most cases; only the others need exact products.
     if determinant > _SPACE_BOUND * size:
         return 1
     if determinant < -_SPACE_BOUND * size:

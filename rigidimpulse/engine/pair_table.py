@@ -120,6 +120,7 @@ def live_contacts(pairs, place, gap, time):
             last += 1
         zone = pairs.impact_margin[p] * (1.0 + NEAR) + 2.0 * pairs.tolerance[p]
         if pairs.time[p] <= time:
+            # A pair that just came to contact has one live contact at least, its nearest.
             zone = max(zone, nearest * (1.0 + NEAR))
         for c in range(first, last):
             live[c] = gap[c] <= zone + ROUND_OFF * pairs.contact_margin[p]
@@ -146,6 +147,7 @@ def renew_pairs(trajectory, body, time, end, radius, margin, movable, dynamic, i
             continue
         known[a] = known[b] = True
         sweep_pair_again(pairs, p, time, dynamic, inside)
+        # A new trajectory: the pair has no past any more.
         pairs.impact_margin[p] = pairs.least_impact_margin[p]
         pairs.tries[p] = 0
     reached = overlapping_with(body, box_min, box_max, movable, fresh)

@@ -94,6 +94,7 @@ def support_levels(bodies, pairs, rows, tall):
         if bodies.part[i] == SUPPORT:
             level[i] = 0
     changed = True
+    # Levels fall until no contact lowers one any more.
     while changed:
         changed = False
         for p in range(pairs.first.shape[0]):
@@ -144,6 +145,7 @@ def refusals(
     was_substepped[root[members[substepped_before[members]]]] = True
     for r in np.unique(root[members[joined[members]]]).tolist():
         out[r] = "joints"
+    # The island of each pair: that of a body of it that is in one.
     owner = np.where(root[a] >= 0, root[a], root[b])
     if not auto:
         alone = np.setdiff1d(np.flatnonzero(size), owner)
@@ -155,6 +157,7 @@ def refusals(
     least = np.where(was_substepped, KEPT, np.where(lively_enough, FEW, MANY))
     for r in np.flatnonzero((size > 0) & (size < least)).tolist():
         out[r] = "few bodies"
+    # The rest holds only where an island begins: a body that comes near later is taken in.
     begins = ~was_substepped[owner]
     if not begins.any():
         return out

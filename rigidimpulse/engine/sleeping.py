@@ -32,6 +32,7 @@ def may_sleep(run: Run, island: Island, h: float) -> bool:
     limit = TOLERANCES.contact.rest * world.steady_strength[i] * h
     force, torque = run.wrench[i, :3], run.wrench[i, 3:]
     spin = run.angular_acceleration[i] + np.einsum("ijk,ik->ij", now.inv_inertia[i], torque)
+    # The speed that forces and loads together would give: none where the load is carried.
     gained = h * (run.acceleration[i] + world.inv_mass[i, None] * force)
     size = np.minimum(world.bound_radius[i], world.size[i])[:, None]
     slow = (
@@ -105,6 +106,7 @@ def advance_sleep_timers(members, position, orientation, velocity, strength, inn
             continue
         sleep_timer[i] = 0.0
         for c in range(3):
+            # It has moved: the time counts from here, and from this place.
             stood[i, c] = position[k, c]
         for c in range(4):
             stood[i, 3 + c] = orientation[k, c]

@@ -105,6 +105,7 @@ class RunningSoftBodies:
         for i in range(n):
             state_at(trajectory, i, time, x[i], q[i], v[i], w[i])
             path = trajectory
+            # The soft bodies' own force is taken off: a = a(t) - F(t) / m.
             if held[i].any():
                 path = self._scratch
                 self._let_go(run, i, time, held[i], (x[i], q[i], v[i], w[i]))

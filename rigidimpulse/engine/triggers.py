@@ -128,6 +128,7 @@ class Triggers:
         if not np.isfinite(watched.reach):
             return i.tolist()
         speed, pull = np.linalg.norm(trajectory.velocity[i], axis=1), np.linalg.norm(trajectory.acceleration[i], axis=1)
+        # Bound of the speed of the centre in the step.
         way = speed + pull * (end - trajectory.start[i])
         centre, _ = self._pose(watched, end)
         own = watched.body
@@ -135,6 +136,7 @@ class Triggers:
             away = np.linalg.norm(centre - self._body(own, end)[0])
             own_speed, own_pull = np.linalg.norm(trajectory.velocity[own]), np.linalg.norm(trajectory.acceleration[own])
             own_way = own_speed + own_pull * (end - trajectory.start[own])
+            # The trigger moves with its body, and turns about its centre.
             way = way + own_way + 2.0 * away * np.linalg.norm(trajectory.angular_velocity[own])
         place = np.array([self._body(k, end)[0] for k in i.tolist()]).reshape(-1, 3)
         near = np.linalg.norm(place - centre, axis=1) <= watched.reach + world.bound_radius[i] + way * (end - begin)

@@ -224,6 +224,7 @@ def closest_on_triangle(a, b, c, radius, half):
         pair = closest_on_curve(along(u, t, d), d if 0.0 < t < 1.0 else ZERO, radius, half)
         if pair[0] < best[0]:
             best = pair
+        # n . p over the triangle less that over the cylinder is a lower bound: the side with the best one gives the normal.
         reach = min(dot(pair[3], a), dot(pair[3], b), dot(pair[3], c)) - cylinder_support(AXIS, half, radius, pair[3])
         if reach > bound:
             n, bound = pair[3], reach
@@ -329,6 +330,7 @@ def _closest_on_circle(centre, u, v, rim_radius, thorough, radius, half):
             )
     else:
         angle, least = 0.0, inf
+        # The distance along a circle has several minima: Newton's method starts at the best sample.
         for k in range(_NUM_SAMPLES):
             q = on_circle(centre, u, v, rim_radius, 2.0 * pi / _NUM_SAMPLES * k)
             pair = closest_on_curve(q, ZERO, radius, half)
@@ -355,6 +357,7 @@ def _refine_on_circle(centre, u, v, rim_radius, angle, radius, half):
         q = along(centre, 1.0, out)
         slope, curvature = slope_along(q, tangent, along(ZERO, -1.0, out), radius, half)
         step = pi / _NUM_SAMPLES
+        # Downhill where the distance is not convex.
         step = min(step, max(-step, -slope / curvature)) if curvature > 0.0 else -copysign(step, slope)
         if abs(step) <= 4.0 * _EPSILON or slope == 0.0:
             break

@@ -95,11 +95,13 @@ def _add_corner(polytope, corners, faces):
     edges, f = 0, 0
     while f < faces:
         height = plane[f, 0] * w[corners, 0] + plane[f, 1] * w[corners, 1] + plane[f, 2] * w[corners, 2] - plane[f, 3]
+        # The corner does not see this face: it stays.
         if not height > 0.0:
             f += 1
             continue
         for k in range(3):
             i, j = face[f, k], face[f, (k + 1) % 3]
+            # Edges of two faces that go cancel out; the rim of what goes is left.
             edges = _toggle(rim, edges, min(i, j), max(i, j))
         faces -= 1
         for k in range(3):

@@ -157,6 +157,7 @@ class Narrowphase:
         for skeleton_a in self._solid(a).skeletons:
             for skeleton_b in self._solid(b).skeletons:
                 first, second = skeleton_a.objects[0], skeleton_b.objects[1]
+                # Only b moves: the query is in a's frame, scaled so that no triangle is small.
                 second.setTransform(placed)
                 result = fcl.DistanceResult()
                 distance = max(0.0, fcl.distance(first, second, self._request, result) / self._scale)

@@ -137,6 +137,7 @@ def reduce_simplex(simplex, count):
         return np.int64(5)
     kept = np.int64(0)
     for n in range(count):
+        # Corners that do not bear the nearest point are dropped.
         if weight[n] > 0.0:
             for m in range(3):
                 w[kept, m] = w[n, m]

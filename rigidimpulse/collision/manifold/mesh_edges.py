@@ -75,6 +75,7 @@ def _crossing(p, d, q, e, skeleton):
     point_a = along(p, s, d)
     point_b = along(q, t, e)
     distance = dot(subtract(point_b, point_a), c) / sqrt(c_squared)
+    # The normal points from a to b.
     if distance < 0.0:
         distance = -distance
         c = (-c[0], -c[1], -c[2])

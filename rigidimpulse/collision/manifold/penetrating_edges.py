@@ -111,6 +111,7 @@ def drop_deep_edges(points, first, edges, end):
     limit = 0.0
     for c in range(first, edges):
         limit = max(limit, real[c, 6])
+    # Without corners the least deep edge sets the limit.
     if first == edges:
         limit = inf
         for c in range(edges, end):

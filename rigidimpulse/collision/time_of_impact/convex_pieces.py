@@ -156,6 +156,7 @@ def _with_thinned(cylinders, work, index, normal, threshold, horizon):
             is_side = is_side and abs(dot(normal, axis)) < _ON_SIDE
             put(work, CORNER + 9 * side, along(centre, -half_height, axis))
             put(work, CORNER + 9 * side + 3, along(centre, half_height, axis))
+            # A cylinder touched at its side takes part as its axis, an edge grown by its radius.
             threshold += radius
     if not is_side:
         return 0.0
@@ -165,6 +166,7 @@ def _with_thinned(cylinders, work, index, normal, threshold, horizon):
     s = 0.0
     if edges >= 0:
         s = _with_edges(work, index, edges, vector(work, THINNED + NORMAL), threshold, horizon)
+    # The pieces are as they were.
     index[COUNT], index[COUNT + 1] = first, second
     return s
 
@@ -182,6 +184,7 @@ def _closest_to_cylinder(cylinders, scratch):
     else:
         corners = work[CORNER : CORNER + 9].reshape((3, 3))
         cylinder_triangle_distance(centre, axis, half_height, radius, corners, points)
+    # The kernels give the cylinder first; here it is the second piece.
     on_cylinder, normal = vector(work, CLOSEST), scaled(vector(work, CLOSEST + NORMAL), -1.0)
     put(work, CLOSEST + POINT_FIRST, vector(work, CLOSEST + POINT_SECOND))
     put(work, CLOSEST + POINT_SECOND, on_cylinder)

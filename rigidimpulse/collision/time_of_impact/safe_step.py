@@ -200,10 +200,12 @@ def _solid_pair(geometry, first, second, scratch, threshold, horizon):
             for k in range(LIMIT_SIZE):
                 work[LIMIT + k] = work[CLOSEST + k]
         return s
+    # Skeletons are bounded; their radii are part of the threshold.
     threshold += grown_first + grown_second
     s = trees_safe_until(geometry, root_first, root_second, scratch, threshold, horizon)
     if s < horizon:
         normal = vector(work, LIMIT + NORMAL)
+        # From the skeletons to the surfaces.
         work[LIMIT + GAP] -= grown_first + grown_second
         put(work, LIMIT + POINT_FIRST, along(vector(work, LIMIT + POINT_FIRST), grown_first, normal))
         put(work, LIMIT + POINT_SECOND, along(vector(work, LIMIT + POINT_SECOND), -grown_second, normal))

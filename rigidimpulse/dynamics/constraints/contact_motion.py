@@ -237,10 +237,12 @@ def _between_skeletons(first, second, n, distance, place, normal_rate):
         return
     across = dot(vb, n) - dot(va, n)
     for k in range(3):
+        # Two points: n turns with the part of their relative velocity across it.
         normal_rate[k] = (vb[k] - va[k] - across * n[k]) / distance
     if skeleton_a == LINE or skeleton_b == LINE:
         e = ea if skeleton_a == LINE else eb
         _cross(wa if skeleton_a == LINE else wb, e, x)
+        # A line stays across n: n'.e = -n.(w x e).
         change = -dot(n, x) - dot(normal_rate, e)
         for k in range(3):
             normal_rate[k] += change * e[k]

@@ -74,6 +74,7 @@ def joint_weights(joints, which, rows, start, weight):
         held, count = 0, joints.first[j + 1] - joints.first[j]
         for i in range(count):
             k, line = joints.first[j] + i, rows.jacobian[start + first + i]
+            # An orthonormal basis of the hard rows: soft rows and limits act on what these leave free.
             if joints.stiffness[k] == np.inf and limit_side(joints, k) == 0.0 and held < 6:
                 square = _remainder(line, basis, held, out)
                 if square > LEAST_WEIGHT * np.sum(line * line):

@@ -163,6 +163,7 @@ def fill_closing_rows(island, rows, start):
             rows.bias[r], rows.lower[r], rows.upper[r] = value[i], joints.lower[k], joints.upper[k]
             if joints.stiffness[k] < np.inf:
                 rows.kind[r] = BOUNDED
+                # Springs are not closed by position.
                 rows.lower[r] = rows.upper[r] = 0.0
             elif joints.lower[k] < 0.0 and (joints.upper[k] > 0.0 or value[i] > 0.0):
                 worst = max(worst, abs(value[i]))
@@ -332,6 +333,7 @@ def _violation(joints, which, memory, value, impulse):
             if not np.isfinite(x):
                 worst = np.inf
             if joints.stiffness[k] < np.inf or memory.slack[k]:
+                # Soft rows have no place to be at; limits that were slack belong to `next_switch`.
                 x = 0.0
             if joints.lower[k] < 0.0 < joints.upper[k] or impulse[i] != 0.0:
                 worst = max(worst, abs(x))

@@ -259,6 +259,7 @@ def _stiffness(world: World, pairs: np.ndarray) -> np.ndarray:
     strength = np.maximum(world.steady_strength[a], world.steady_strength[b])
     at_rest = strength * heavier / (REST_DEPTH * size)
     in_impact = mass * ((speed[a] + speed[b]) / (IMPACT_DEPTH * size)) ** 2
+    # The stiffer of both laws of the head; without weight and speed a contact of two steps.
     known = np.maximum(at_rest, in_impact)
     stiffness[a, b] = np.where(known > 0.0, known, mass * (0.5 * np.pi / accuracy.step) ** 2)
     return stiffness

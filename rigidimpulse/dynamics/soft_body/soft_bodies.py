@@ -192,6 +192,7 @@ class Flexibles:
             speeds = np.linalg.norm(self.velocity - rigid.velocity[b], axis=1) + spin
             speed = float(speeds.max(initial=0.0))
             apart = np.maximum(0.0, np.maximum(low - rigid.position[b], rigid.position[b] - high))
+            # Bodies that are too far away to come near `within` s set no limit.
             if speed > 0.0 and float(np.linalg.norm(apart)) - radius <= within * speed:
                 limit = min(limit, self._edge / speed)
         return limit

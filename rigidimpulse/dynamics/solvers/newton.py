@@ -57,6 +57,7 @@ def natural_residual(rows, u, p, weight):
     worst = 0.0
     for i in range(p.shape[0]):
         kind, w = rows.kind[i], weight[i]
+        # The natural map: p less a step against u, projected on the bounds, is p itself at a solution.
         x = p[i] - (u[i] + rows.softness[i] * p[i]) / w
         if kind == DISC:
             z = p[i + 1] - (u[i + 1] + rows.softness[i + 1] * p[i + 1]) / w

@@ -96,6 +96,7 @@ def _factor_block(blocks, s, pivots, body):
         if pivot != k:
             for j in range(SIZE):
                 blocks[s, k, j], blocks[s, pivot, j] = blocks[s, pivot, j], blocks[s, k, j]
+        # A singular block must not divide by zero.
         if blocks[s, k, k] == 0.0:
             blocks[s, k, k] = TINY
         head = blocks[s, k, k]

@@ -161,11 +161,13 @@ class _Search:
         at = self.terms(z)
         promised = -float(self.at.gradient @ step + 0.5 * step @ (self.at.hessian @ step))
         gained = self.at.value - at.value
+        # Where rounding hides the fall of the value, the gradient must fall instead.
         blind = promised <= ROUND_OFF * (self.at.magnitude + at.magnitude) + self.noise
         gradient_fell = bool(np.linalg.norm(at.gradient) < GRADIENT_FALL * np.linalg.norm(self.at.gradient))
         if not (gained >= 1e-4 * promised or (blind and gradient_fell)):
             self.shift = max(8.0 * self.shift, 1e-6 * self.scale)
             return None if blind else False
+        # The model was good: less shift, so that steps become Newton's.
         if blind or gained > 0.75 * promised:
             self.shift *= 0.1
         elif gained < 0.25 * promised:

@@ -234,9 +234,11 @@ def _press(simd, record, g, speed, gap, relaxing, per_h, spring_of):
     zero = spread(simd, 0.0)
     mass, old = load(simd, record, g + MASS * w), load(simd, record, g + PRESS * w)
     if relaxing:
+        # Relax: k = 1, i = 0, c = max(s, 0) / h.
         new = fma(-mass, fma(where_greater(gap, zero, gap, zero), per_h, speed), old)
     else:
         spring = where_greater(stiff * gap, -deepest, stiff * gap, -deepest)
+        # s > 0: free to close the gap, no further; s <= 0: spring and damper.
         bias = where_greater(gap, zero, gap * per_h, spring)
         share = where_greater(gap, zero, spread(simd, 1.0), hard)
         kept = where_greater(gap, zero, zero, soft)

@@ -358,6 +358,7 @@ def _lead(simd, solve, h, work_queue, is_shared, number):
     """Work on a round until it is done."""
     phase, colour = _round(number, solve.edges.shape[0] - 1)
     begin, end, each, pieces = _extent(solve.bodies, solve.edges, phase, colour)
+    # A round of one piece is not worth the wait for a helper.
     if not is_shared or pieces < 2:
         _work_on(simd, solve, h, phase, colour, begin, end)
         return
