@@ -244,10 +244,12 @@ class _Search:
         moved = self.position - self.world.position
         first, second = (self.cluster[[getattr(d, side) for d in given]] for side in "ab")
         n = np.array([d.direction for d in given]).reshape(-1, 3)
+        # Ways are left from the present positions, displacements count from the given ones.
         asked = np.array([d.way + d.direction @ (moved[d.b] - moved[d.a]) for d in given])
         root = np.sqrt(self.inv_mass)
         rows = make_rows(len(given))
         rows.first[:], rows.second[:] = np.where(root[first] > 0.0, first, -1), np.where(root[second] > 0.0, second, -1)
+        # In coordinates scaled by the root of the mass: sum of m |D|^2 / 2 is least.
         rows.jacobian[:, :3], rows.jacobian[:, 6:9] = -root[first, None] * n, root[second, None] * n
         rows.kind[:], rows.lower[:], rows.bias[:] = BOUNDED, 0.0, -asked
         rows.softness[:] = SOFTNESS * (self.inv_mass[first] + self.inv_mass[second])

@@ -41,6 +41,7 @@ def path_box(trajectory, i, begin, end, radius, box_min, box_max):
         last = x[k] + v * h + 0.5 * a * h * h + jerk * h * h * h / 6.0
         low, high = min(x[k], last), max(x[k], last)
         if jerk != 0.0:
+            # Where a coordinate of the path turns between begin and end, it is farthest.
             for turn in turning_points(v, a, jerk):
                 if 0.0 < turn < h:
                     apex = x[k] + turn * (v + turn * (0.5 * a + turn * jerk / 6.0))

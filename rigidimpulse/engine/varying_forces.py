@@ -145,15 +145,18 @@ class VaryingForces:
                 return self._evaluate(time + h * min(share, 1.0 - ASIDE), todo, bodies, rotation)
 
             rows, sums = nystroem(evaluate, self._workspace, first, todo, h, now, self._world.steady_acceleration)
+            # A break within the step: it ends there, so that the steps keep their order.
             share = 1.0 if cut else self._share_until_break(rows)
             if share < 1.0:
                 cut, h[todo] = True, np.maximum(share * h[todo], shortest)
                 continue
             error = self._errors(now, todo, sums.off, h[todo], 1.0 / 12.0) / self._in_flight
             error = self._together(todo, error, np.maximum)
+            # The error inside the step is of order 4, and chooses h.
             grow = np.clip(SAFETY * np.maximum(error, 1e-30) ** -0.25, LEAST_CHANGE, MOST_CHANGE)
             done = (error <= 1.0) | (h[todo] <= shortest)
             if self._switching and done.all() and switches < MOST_SWITCHES:
+                # Other forces act from some place on: the step ends where they begin or end.
                 part, switches = self._switch(time, todo, now, sums, h), switches + 1
                 if part < 1.0:
                     h[todo] *= part

@@ -142,6 +142,7 @@ def _start_series(c, series, w, e, u):
     growth = c[_TORQUE_RATE]
     if growth != 0.0:
         rate += (growth / min(i1, i2, i3)) ** (1.0 / 3.0)
+    # Times are scaled by a power of two, so that the scaling itself rounds nothing.
     scale = math.ldexp(1.0, math.frexp(rate)[1])
     c[_TIME_SCALE] = scale
     series[0], series[1], series[2] = wx / scale, wy / scale, wz / scale
@@ -245,6 +246,7 @@ def _last_segment(constants, coefficients, t):
     """Constants and series of the segment that holds the time t, and the time since its start (NaN: too many segments)."""
     c, series = constants.copy(), coefficients.copy()
     for _ in range(_MOST_SEGMENTS):
+        # Segments depend on the start alone, never on the time asked for, so the path is one smooth function of time.
         if not t > c[SEGMENT]:
             return c, series, t
         h = c[SEGMENT]

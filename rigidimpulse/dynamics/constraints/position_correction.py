@@ -42,6 +42,7 @@ def correct_positions(
     for body, end, half in ((contacts.body_a, rows.first, slice(6)), (contacts.body_b, rows.second, slice(6, 12))):
         stands = ~np.isin(body, members)
         end[stands], rows.jacobian[stands, half] = -1, 0.0
+    # Held contacts go to the contact margin; no other one may sink below a part of it.
     target = np.where(held, contact_margin, np.minimum(contacts.gap, KEPT * contact_margin))
     rows.bias[:] = contacts.gap - target
     solve_newton(rows, len(members), SOLVE_TOLERANCE * float(contact_margin.max()))

@@ -52,6 +52,7 @@ def _curve_places(low, high, bodies, code):
     for i in bodies:
         for k in range(3):
             middle = 0.5 * (low[i, k] + high[i, k])
+            # Endless boxes have no middle; they come first.
             if isfinite(middle):
                 least[k], most[k] = min(least[k], middle), max(most[k], middle)
     for at in range(len(bodies)):

@@ -117,6 +117,7 @@ class SubsteppedIslands:
         ended = trajectory.mode == LINEAR
         self._end_trajectories(run, np.flatnonzero(ended), time)
         chosen = self._choose(run, pair_events, ended, solve_count) if pair_events.end > time else np.zeros_like(ended)
+        # Members that are in no island any more fly freely.
         left = np.flatnonzero(ended & ~chosen & (trajectory.mode == LINEAR))
         let_fly(trajectory, left, world.steady_acceleration)
         self.sleep_timer[left] = 0.0
@@ -183,6 +184,7 @@ class SubsteppedIslands:
         touched = np.unique(buffer.integer[:count, :2])
         touched = touched[resting[touched]]
         labels = self.label[touched]
+        # Sleeping islands wake as a whole.
         mates = np.flatnonzero(resting & np.isin(self.label, labels[labels >= 0]))
         return np.union1d(touched, mates)
 
@@ -288,6 +290,7 @@ class SubsteppedIslands:
             self._bring_in(run, bare, members)
             return [*islands, bare]
         for island in hit:
+            # An island that is hit is stepped again, with all of its members.
             labels = self.label[island.members]
             members = np.union1d(members, np.flatnonzero(np.isin(self.label, labels[labels >= 0])))
             self._bring_in(run, island, members)
