@@ -240,6 +240,7 @@ def scaled_wrench(bodies, i, y, wrench):
     factor = np.empty((3, 3))
     root = sqrt(bodies.inv_mass[i])
     cholesky_3(bodies.inv_inertia[i], factor)
+    # C^-T by back substitution: the angular part of C is a Cholesky factor.
     z = y[5] / factor[2, 2]
     x1 = (y[4] - factor[2, 1] * z) / factor[1, 1]
     x0 = (y[3] - factor[1, 0] * x1 - factor[2, 0] * z) / factor[0, 0]
@@ -311,6 +312,7 @@ def let_slip(rows, n, first_row, dynamic_friction, slow):
         i = first_row[c] + 1
         if rows_of(rows, first_row[c]) < 3 or rows.coefficient[i] == dynamic_friction[c]:
             continue
+        # The velocity of the tangents after the impulses.
         if abs(rows.bias[i] + after[i]) + abs(rows.bias[i + 1] + after[i + 1]) > slow:
             rows.coefficient[i] = rows.coefficient[i + 1] = dynamic_friction[c]
             changed = True
