@@ -196,7 +196,7 @@ class Narrowphase:
             return _NOTHING
         out = np.zeros(7)
         farthest = float(np.linalg.norm(R @ solid_b.centre + t - solid_a.centre)) + solid_a.reach + solid_b.reach
-        # A limit that no gap can exceed: the kernel then always measures it.
+        # No gap is larger than `farthest`: the limit is finite.
         gap = pair_gap(self.geometry, Posed(a, np.zeros(3), np.eye(3)), Posed(b, t, R), min(limit, farthest), out)
         if gap >= limit:
             return _NOTHING
