@@ -74,8 +74,7 @@ OLD_WORDS = (
     ), "the lanes of a SIMD vector are its elements"),
     OldWord("core", "skeleton of a rounded shape; inset surface", (
         "rigidimpulse.core", "rigidimpulse/core", "numba.core", '"core.', "'core.", "`core`", "`core/", "`core.", "| core |", "core <-",
-        "core/", "usd-core", "Cores and SIMD",
-        "usd_core",
+        "core/", "usd-core", "usd_core", "Cores and SIMD",
         "physical core", "processor core", "one core", "two cores", "four cores", "all cores", "many cores", "more cores", "shared cores",
         "number_of_cores", "MOST_CORES", "most_cores", "several cores", "other cores", "number of cores", "each core works", "['cores']",
         '["cores"]', '"cores"', "{cores}", "cores=", "test_cores", "s} cores", "]} cores",
@@ -93,8 +92,7 @@ OLD_WORDS = (
     OldWord("stir", "wake"),
     OldWord("room", "capacity, workspace", ("room.glb", "room_moving.glb", "room_again.glb", "a room of yours", '"room"'), (
         *FOLDERS_OF_REAL_THINGS, *PICTURES, "docs/reference/gltf.md",
-    ),
-            "rooms of scenes, room on a page"),
+    ), "rooms of scenes, room on a page"),
     OldWord("wish", "accuracy target"),
     OldWord("desk", "report", (), FOLDERS_OF_REAL_THINGS, "furniture"),
     OldWord("deck", "work queue", (), FOLDERS_OF_REAL_THINGS, "a deck of cards"),
@@ -109,8 +107,9 @@ OLD_WORDS = (
         *FOLDERS_OF_REAL_THINGS, "rigidimpulse/studies/*", "docs/results/*", "docs/guide/gallery.md", "docs/guide/recipes/blender.md",
         "docs/reference/gltf.md", "README.md",
     ), "walls of bricks, thin walls, pits with walls; time on the wall's clock"),
-    OldWord("net", "soft body, cloth", ("net force", "net impulse", "net torque", "net momentum", "https://", ".net/",
-                    "cloth, a net or jelly"), FOLDERS_OF_REAL_THINGS, "sums, and the nets of scenes"),
+    OldWord("net", "soft body, cloth", (
+        "net force", "net impulse", "net torque", "net momentum", "https://", ".net/", "cloth, a net or jelly",
+    ), FOLDERS_OF_REAL_THINGS, "sums, and the nets of scenes"),
     OldWord("arrival", "velocity projection"),
     OldWord("anew", "again"),
     OldWord("so many", "that number of"),

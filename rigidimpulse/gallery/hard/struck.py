@@ -4,8 +4,8 @@ No closed form is known for the whole motion, but laws hold: energy never grows,
 since friction acts whenever anything slides and restitution is below 1.
 
 Ball at 5 m/s on five resting boxes of the same mass, e = 0.5: the rebound of compliant spheres-and-springs references is
-1.8 to 2.7 m/s, whatever their stiffness. A solver that treats the contacts of the pile one after the other, the load of
-the pile left out, eats up all of it and gives 0.
+1.8 to 2.7 m/s, whatever their stiffness. A solver that treats the contacts of the pile one after the other, without
+the load of the pile, loses all of it and gives 0.
 """
 
 from __future__ import annotations
