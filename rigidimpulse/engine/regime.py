@@ -145,7 +145,7 @@ def refusals(
     was_substepped[root[members[substepped_before[members]]]] = True
     for r in np.unique(root[members[joined[members]]]).tolist():
         out[r] = "joints"
-    # The island of each pair: that of a body of it that is in one.
+    # The island of each pair: that of whichever body is in one.
     owner = np.where(root[a] >= 0, root[a], root[b])
     if not auto:
         alone = np.setdiff1d(np.flatnonzero(size), owner)

@@ -145,7 +145,7 @@ class VaryingForces:
                 return self._evaluate(time + h * min(share, 1.0 - ASIDE), todo, bodies, rotation)
 
             rows, sums = nystroem(evaluate, self._workspace, first, todo, h, now, self._world.steady_acceleration)
-            # A break within the step: it ends there, so that the steps keep their order.
+            # A force that gives way within the step: the step ends there.
             share = 1.0 if cut else self._share_until_break(rows)
             if share < 1.0:
                 cut, h[todo] = True, np.maximum(share * h[todo], shortest)

@@ -117,7 +117,7 @@ def rims_on_plane(solid, found, count, m, corners, bound, other):
         least = level * m[2] - radius * flat - dot(m, a)
         if least > margin:
             continue
-        # A rim that lies flat on the plane has fixed points as well: its lowest one wanders.
+        # A rim that is near all around has fixed points beside its lowest one.
         all_around = least + 2.0 * radius * flat <= margin
         for k in range(RIM_POINTS + 1 if all_around else 1):
             if k == 0:

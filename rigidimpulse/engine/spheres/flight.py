@@ -128,7 +128,7 @@ def fly(fixed, motion, table, record, rebounds, now, end, at_boundary, interval,
         pairs = table.count[0] - len(table.paths)
         how, clock = _fly_interval(fixed, motion, table, record, rebounds, clock)
         write_frames(trajectory, record, _FIRST, len(table.paths), clock.now)
-        # Long intervals have large boxes, and so many pairs; short ones are filled often.
+        # Long intervals have large boxes, and therefore many pairs; short ones are filled often.
         if how == ARRIVED and pairs <= FEW * moving:
             interval = min(2 * interval, LONGEST)
         elif how == ARRIVED and pairs > MANY * moving:
