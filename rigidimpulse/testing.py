@@ -42,7 +42,8 @@ def assert_energy_never_grows(run: Recording, tolerance: float = PULLED) -> None
 
     Args:
         run: with a ledger, of bodies that gravity and constant forces move, without motors, thrusters or moving supports.
-        tolerance: allowed rise, of the energy that moves. What lifts bodies out of contact gaps (1e-6 of a size each) is allowed besides.
+        tolerance: allowed rise, of the energy that moves. The energy that raises bodies to their contact
+            margins (1e-6 of a size each) is allowed, too.
 
     """
     ledger = run.ledger

@@ -175,22 +175,6 @@ def test_the_readme_is_short() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 80
 
 
-OLD_WORDS = (
-    r"heaps?", r"guard(?:s|ed|ing)?", r"(?<!of )courses?", r"foresight", r"toil", r"partings?", r"stirred", r"wish(?:es|ed)?", r"anew",
-    r"so many", r"but for", r"nets", r"dear(?:er|est)?", r"rattles",
-)  # fmt: skip
-"""Words that the field has other words for."""
-WORDS_OF_CODE = [DOCS / "results" / f"{name}.md" for name in ("validation", "accuracy", "hard_cases")]
-"""Generated pages whose words are those of checks and of tests."""
-
-
-@pytest.mark.parametrize("page", [page for page in PAGES if page not in WORDS_OF_CODE], ids=named)
-def test_pages_use_the_words_of_the_field(page: Path) -> None:
-    text = page.read_text(encoding="utf-8")
-    text = re.sub(r"`[^`\n]*`|\]\([^)]*\)", "", text)
-    assert not re.findall(rf"\b(?:{'|'.join(OLD_WORDS)})\b", text, re.I)
-
-
 def test_pictures_are_small() -> None:
     """1.5 MB in all, so that a clone stays quick; the pictures that are there take half of it."""
     pictures = [path for path in DOCS.rglob("*") if path.suffix in (".png", ".jpg") and "_build" not in path.parts]

@@ -66,7 +66,7 @@ def test_the_frame_rate_changes_nothing_that_happens(name):
         assert np.array_equal(getattr(slow, field), getattr(fast, field)[::10]), field
 
 
-def test_every_scene_is_made_anew_each_time():
+def test_every_scene_is_made_again_each_time():
     for name in gallery.names():
         entry = gallery.load(name)
         assert entry.name == name and "\n" not in entry.description

@@ -91,7 +91,7 @@ ASKED_FOR = (
     "rigidimpulse.dynamics.forces.", "rigidimpulse.dynamics.soft_body", "rigidimpulse.io", "rigidimpulse.engine.triggers",
     "rigidimpulse.engine.varying_forces", "rigidimpulse.engine.soft_bodies",
 )  # fmt: skip
-"""Modules that are imported where a scene asks for them only, but for those of forces that do not vary."""
+"""Modules that are imported only where a scene asks for them; those of forces that do not vary are in ALWAYS."""
 ALWAYS = {"rigidimpulse.dynamics.forces.constant", "rigidimpulse.io", "rigidimpulse.io.registration"}
 OPTIONAL = {"clarabel", "defusedxml", "meshcat", "mujoco", "pybullet", "dask", "h5py", "pxr", "matplotlib", "playwright"}
 

@@ -67,6 +67,7 @@ def _sorted_order(box_min, axis):
             middle = right
             end = min(start + 2 * width, n)
             for place in range(start, end):
+                # <= keeps bodies with equal keys in order of their index.
                 if left < middle and (right >= end or key[left] <= key[right]):
                     merged[place], merged_key[place] = order[left], key[left]
                     left += 1
@@ -190,14 +191,17 @@ def _sweep(box_min, box_max, movable, strips, pairs_out):
         for at in range(first[strip], first[strip + 1]):
             num_candidates = 0
             for other in range(at + 1, first[strip + 1]):
+                # Low ends ascend: no later body of the strip can overlap.
                 if low[other] > high[at]:
                     break
                 candidate[num_candidates] = members[other]
                 beside = (low_u[other] <= high_u[at]) & (low_u[at] <= high_u[other])
+                # No branch: the candidate counts or is overwritten by the next.
                 num_candidates += beside & (low_v[other] <= high_v[at]) & (low_v[at] <= high_v[other])
             i = members[at]
             for k in range(num_candidates):
                 j = candidate[k]
+                # Each pair is reported once, in the first strip that both reach.
                 if (movable[i] or movable[j]) and strip == max(reach[i, 0], reach[j, 0]):
                     count = _keep(pairs_out, count, i, j)
     return count

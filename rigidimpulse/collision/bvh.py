@@ -25,6 +25,7 @@ def box_distance_squared(low_a, high_a, low_b, high_b, R, t, limit):
     for k in range(3):
         reach = abs(R[k, 0]) * reach_b[0] + abs(R[k, 1]) * reach_b[1] + abs(R[k, 2]) * reach_b[2]
         in_a += max(0.0, abs(between[k]) - reach_a[k] - reach) ** 2
+    # The second direction can only raise the bound, and the caller has what it needs.
     if in_a >= limit:
         return in_a
     in_b = 0.0
@@ -64,6 +65,7 @@ def gather_leaf_pairs(node_min, node_max, node_child, R, t, skeleton, pairs, dep
             pairs[end, 1] = b
             end += 1
             continue
+        # The longer box is split, so that both boxes shrink alike.
         split_first = child_b < 0 or (child_a >= 0 and splits_first(low_a, high_a, low_b, high_b))
         for side in range(2):
             pairs[depth, 0] = child_a + 1 - side if split_first else a

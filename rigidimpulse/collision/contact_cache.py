@@ -174,6 +174,7 @@ def review(bodies, pairs, share, limits):
             size = min(inner[a], inner[b])
             general = pairs.kind[p] == GENERAL
             speed = closing_speed(position, velocity, reach, a, b, is_second)
+            # Contacts that may close until the next look are found before they do (speculative contacts).
             margin = min(skin[a], skin[b]) + min(max(speed * ahead, (AHEAD_GENERAL if general else AHEAD) * size), FARTHEST * size)
             far = radius[a] + radius[b] + margin
             dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
@@ -185,6 +186,7 @@ def review(bodies, pairs, share, limits):
                 carrier, other = (b, a) if is_second else (a, b)
                 place, turn = _relative_pose(position, orientation, rotation, carrier, other)
                 motion = _motion(seen, p, pairs.round[p], reach[other], place, turn)
+                # A pair that was s apart is still at least s - m apart.
                 if count[p] == 0 and apart[p] - motion > margin:
                     continue
                 still = max(same, SAME_GENERAL) if general else same

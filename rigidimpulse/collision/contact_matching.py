@@ -63,6 +63,7 @@ def write_point(bodies, pairs, p, source, coefficients, points, r):
     a, b, carrier, contact_margin = pairs.first[p], pairs.second[p], pairs.carrier[p], pairs.contact_margin[p]
     nx, ny, nz = real[c, 6], real[c, 7], real[c, 8]
     dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
+    # Points of the shrunk shapes belong to p / f of the true ones; rounded surfaces keep their skeleton's point.
     ax, ay, az = real[c, 0] / factor_a - round_a * nx, real[c, 1] / factor_a - round_a * ny, real[c, 2] / factor_a - round_a * nz
     bx, by, bz = (real[c, 3] - dx) / factor_b, (real[c, 4] - dy) / factor_b, (real[c, 5] - dz) / factor_b
     bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz
@@ -101,6 +102,7 @@ def match_contacts(old, new, near):
     """
     old_points, old_ids, old_begin, old_end = old
     points, ids, new_begin, new_end = new
+    # First by features; what is left then by place.
     for nearby in range(2):
         for c in range(new_begin, new_end):
             if points[c, IMPULSE] > 0.0:
@@ -116,6 +118,7 @@ def match_contacts(old, new, near):
                     same = x * x + y * y + z * z < near * near
                 if not same or cosine < 0.9:
                     continue
+                # The old point is emptied, so that its impulse is given once.
                 points[c, IMPULSE], old_points[o, IMPULSE] = old_points[o, IMPULSE], 0.0
                 for k in range(FRICTION, FRICTION + 3):
                     points[c, k] = old_points[o, k]

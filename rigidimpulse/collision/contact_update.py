@@ -137,6 +137,7 @@ def store_contacts(smaller, bodies, table, searched, found, count, order, coeffi
         if pairs.count[p] == 0:
             pairs.contact_margin[p] = min(bodies.skin[a], bodies.skin[b])
         deep_count = 0
+        # Bodies deeper inside each other than the shrunk shapes allow: contacts from the true ones.
         if convex[a] and convex[b] and factor[a] * factor[b] < 1.0 and not _is_sound(smaller, bodies, a, b, real, first, last):
             deep_count = overlap_contacts(smaller.solids, bodies, a, b, size, scratch, Found(deep, deep_ids))
         for s in range(deep_count if deep_count > 0 else last - first):
@@ -148,8 +149,10 @@ def store_contacts(smaller, bodies, table, searched, found, count, order, coeffi
                 contact = (real, first + s, factor[a], factor[b])
                 separation = _write(geometry, bodies, pairs, p, contact, coefficients, points, used)
                 ids[used] = integer[first + s, 2:]
+            # Each point is written before it is known to be kept; the next one then takes its place.
             if separation <= searched.margins[k]:
                 used += 1
+        # No contact although an old one is closed, or a normal turned round: the pair keeps the contacts it had.
         if deep_count == 0 and _contradicts(bodies, pairs, p, points, new, used):
             used = new
         else:
@@ -158,6 +161,7 @@ def store_contacts(smaller, bodies, table, searched, found, count, order, coeffi
             old = pairs.start[p]
             match_contacts(Points(points, ids, old, old + pairs.count[p]), Points(points, ids, new, used), NEAR * size)
             pairs.start[p], pairs.count[p], pairs.capacity[p] = new, used - new, used - new
+        # Nothing was found within this distance; the cache may skip the pair until it has moved that much.
         pairs.apart[p] = searched.far[k] if pairs.count[p] == 0 and deep_count == 0 and last == first else 0.0
         note_seen(bodies, pairs, p)
     free[0, 0] = used

@@ -6,7 +6,7 @@ Convex solid (animation notes: point in convex polyhedron): p is inside where or
 
 Any solid (point in concave polyhedron): a ray from p along +x leaves the surface as often as it enters it, plus the
 winding number of p, so p is inside where the signed count of crossings is not zero. For one clean surface this is ray
-parity; it also holds where parts of a mesh overlap. A ray through an edge or a vertex is moved, in thought, by (0,
+parity; it also holds where parts of a mesh overlap. A ray through an edge or a vertex counts as moved by (0,
 e^2, e) with e > 0 infinitely small (Edelsbrunner & Mücke 1990, simulation of simplicity): then it meets no edge, and
 every crossing belongs to one face.
 
@@ -88,6 +88,7 @@ def _in_curved(kind, frame, radius, vertex, first, last, point):
         x, y, z = x - frame[0], y - frame[1], z - frame[2]
         dx, dy, dz = frame[3], frame[4], frame[5]
         along = x * dx + y * dy + z * dz
+        # Beyond a cap; between the caps the distance from the axis decides.
         if abs(along) > frame[6]:
             return False
     else:
@@ -125,6 +126,7 @@ def point_in_mesh(geometry, primitive, point):
         node = stack[depth]
         low, high = geometry.node_min[node], geometry.node_max[node]
         beside = point[1] < low[1] or point[1] > high[1] or point[2] < low[2] or point[2] > high[2]
+        # The ray runs along +x: boxes beside it or behind its start are not met.
         if beside or point[0] > high[0]:
             continue
         child = geometry.node_child[node]
@@ -223,6 +225,7 @@ def space_orientation(a, b, c, p, terms):
     bc, cb, ca, ac, ab, ba = by * cz, bz * cy, cy * az, cz * ay, ay * bz, az * by
     determinant = ax * (bc - cb) + bx * (ca - ac) + cx * (ab - ba)
     size = abs(ax) * (abs(bc) + abs(cb)) + abs(bx) * (abs(ca) + abs(ac)) + abs(cx) * (abs(ab) + abs(ba))
+    # The error bound decides most cases; only the others need exact products.
     if determinant > _SPACE_BOUND * size:
         return 1
     if determinant < -_SPACE_BOUND * size:

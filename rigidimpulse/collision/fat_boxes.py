@@ -142,12 +142,14 @@ def _near_pairs(bounds, pairs, now, acceleration, ahead, member, other, out):
             for k in range(3):
                 path[i] += now.velocity[i, k] ** 2
                 spin += now.angular_velocity[i, k] ** 2
+            # How far any point of the body moves, in inner radii.
             path[i] = ahead * (sqrt(path[i]) + radius[i] * sqrt(spin)) / bounds.inner[i]
     for p in range(pairs.first.shape[0]):
         i, j = order[pairs.first[p]], order[pairs.second[p]]
         if not ((member[i] and (member[j] or other[j])) or (member[j] and other[i])):
             continue
         apart = False
+        # Moving bodies by their spheres, immovable ones by the box of their shape.
         if moves[i] and moves[j]:
             dx, dy, dz = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], x[i, 2] - x[j, 2]
             apart = dx * dx + dy * dy + dz * dz > (reach[i] + reach[j]) ** 2

@@ -232,10 +232,12 @@ def _surface(primitive: Primitive) -> _Surface:
     area_vector = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     triangle_normal = _directions(area_vector)
     edge, edge_normal, edge_kind, triangle_edge, edge_owner, balanced = _edges(vertex, triangle, triangle_normal)
+    # Each vertex and edge is owned by one triangle, so that a pair of features is visited once.
     _, vertex_owner = np.unique(triangle.ravel(), return_index=True)
     owns = np.zeros((len(triangle), 6), dtype=np.int64)
     owns[vertex_owner // 3, vertex_owner % 3] = 1
     owns[edge_owner // 3, 3 + edge_owner % 3] = 1
+    # A closed surface has a positive volume; turned inside out it encloses nothing.
     volume = float(np.sum((corners[:, 0] - vertex[0]) * area_vector))
     return _Surface(
         closed=balanced and volume > 0.0,
@@ -260,6 +262,7 @@ def _curved_surface(primitive: Primitive) -> _Surface:
     """Return the arrays of a sphere (1 vertex), a capsule (2), or a half space or cylinder (none)."""
     vertex = np.ascontiguousarray(primitive.vertices, dtype=np.float64).reshape(-1, 3)
     num_vertices = len(vertex)
+    # A point or a segment is stored as one triangle without area: the kernels need no other case.
     num_triangles = min(num_vertices, 1)
     num_edges = max(num_vertices - 1, 0)
     last = num_vertices - 1

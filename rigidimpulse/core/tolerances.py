@@ -426,7 +426,7 @@ class Energies:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """The groups."""
+    """All tolerances, by the part of the library that owns them."""
 
     arithmetic: Arithmetic = Arithmetic()
     surface: Surfaces = Surfaces()

@@ -1,4 +1,4 @@
-"""What stands in for a participant that a scene does not call for: it has nothing to say, so the loop need not ask whether it is there."""
+"""Stand-ins for participants that a scene does not call for. They do nothing, so the loop need not ask whether a participant is there."""
 
 from __future__ import annotations
 

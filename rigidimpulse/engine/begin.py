@@ -1,4 +1,4 @@
-"""The beginning of a run: its plan, its participants, the first trajectories, and no overlap."""
+"""The start of a run: plan, participants and first trajectories are made, and overlap is removed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from rigidimpulse.recording.recorder import Recorder
 
 
 def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
-    """Bind every effect there is to the world; the plan keeps those that the scene calls for, and obeys what was chosen by name."""
+    """Bind all effects to the world; the plan keeps those that the scene calls for, and follows the caller's choice by name."""
     return Plan(world, all_effects(world), chosen)
 
 

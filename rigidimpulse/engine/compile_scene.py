@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out: frozenset[str] = frozenset()) -> World:
-    """Check a scene and compile it, but for the effects of the names that are left out.
+    """Check a scene and compile it, without the effects whose names are in `left_out`.
 
     Raises:
         SceneError: naming the body, the value and the remedy.
@@ -234,7 +234,7 @@ def _world_boxes(geometry, shape_of_body, position, orientation) -> tuple[np.nda
 
 
 def _plane_box(frame: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Box of a half space; it ends at the plane if that lies across an axis of the world, or every body would be paired with every wall."""
+    """Box of a half space. Normal to an axis of the world it ends at the plane; else every body would be paired with every half space."""
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     normal = rotate(orientation, frame[:3])
     if np.count_nonzero(normal) == 1 and np.abs(normal).max() == 1.0:

@@ -1,6 +1,6 @@
-"""Every effect of a run: why it is in or out, and the verbs of a step that it takes part in.
+"""All effects of a run: when a scene calls for each of them, and in which verbs of a step it takes part.
 
-The functions stand in the modules of their stage; here is only when they are called for. `all_effects` gives them in the order of the loop.
+The functions that do the work are in the modules of the verbs. `all_effects` gives the effects in the order of the loop.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class BroadPhase:
     name: str = "contact detection"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where a dynamic body may meet another."""
+        """Included where a dynamic body may meet another."""
         if not world.can_collide:
             springs = world.accuracy.response == "penalty"
             return Skip(world.why_no_impacts if springs else "a dynamic body and another are needed for contact")
@@ -57,7 +57,7 @@ class ImpactResponse:
     name: str = "impulses"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where something can collide."""
+        """Included where something can collide."""
         if not world.can_collide:
             return Skip(world.why_no_impacts)
         method = world.accuracy.response
@@ -72,7 +72,7 @@ class Gravity:
     name: str = "gravity"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where a dynamic body feels it."""
+        """Included where a dynamic body feels it."""
         if not np.any(world.gravity):
             return Skip("no gravity, or no body feels it")
         return Bound(f"{np.linalg.norm(world.scene.gravity):.6g} m/s2")
@@ -86,7 +86,7 @@ class ConstantForces:
     name: str = "constant forces"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where a force that is not zero acts."""
+        """Included where a force that is not zero acts."""
         if not np.any(world.push):
             return Skip("no constant force acts")
         pushed = [world.names[i] for i in np.flatnonzero(world.push.any(axis=1))]
@@ -102,7 +102,7 @@ class KindOfForce:
     stage: str = "forces"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where the scene has one."""
+        """Included where the scene has one."""
         for table in world.force_tables:
             if table.kind == self.name:
                 return Bound(table.reason)
@@ -117,7 +117,7 @@ class SteadyLoad:
     name: str = "steady load"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where something may add."""
+        """Included where something may add."""
         if not (world.can_collide or world.joints_of_scene or world.force_tables):
             return Skip("nothing can collide, no joints, no force varies")
         return Bound("what contacts, joints and other forces work against", {"loads": set_steady_load})
@@ -131,7 +131,7 @@ class FreeRotation:
     name: str = "gyroscopic term"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where contacts or joints may act on bodies whose moments of inertia differ."""
+        """Included where contacts or joints may act on bodies whose moments of inertia differ."""
         verbs: dict[str, Callable[..., Any]] = {"loads": add_gyroscopic_term}
         if not world.can_collide and not world.joints_of_scene:
             return Skip(f"{world.why_no_impacts}; free rotation is in closed form", verbs)
@@ -149,7 +149,7 @@ class VaryingLoad:
     name: str = "varying load"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where a force varies."""
+        """Included where a force varies."""
         if not world.force_tables:
             return Skip("no force varies")
         return Bound("where contacts or joints hold bodies it is constant over a sub-step", {"loads": keep_steady_load})
@@ -163,7 +163,7 @@ class JointRows:
     name: str = "joints"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where the scene has joints."""
+        """Included where the scene has joints."""
         if not world.joints_of_scene:
             return Skip("the scene has none")
         return Bound(", ".join(dict.fromkeys(type(joint).__name__ for joint in world.joints_of_scene)))
@@ -177,7 +177,7 @@ class Friction:
     name: str = "friction"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where a pair of materials that may meet has a coefficient."""
+        """Included where a pair of materials that may meet has a coefficient."""
         if not world.can_collide:
             return Skip("nothing can collide")
         greatest = float(world.coefficients[:, :, 1:3].max())
@@ -192,7 +192,7 @@ class RollingFriction:
     name: str = "rolling friction"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where a pair of materials has a length."""
+        """Included where a pair of materials has a length."""
         if world.rolling is None or not world.can_collide:
             return Skip("no material asks for it")
         return Bound(f"lengths up to {float(np.max(world.rolling)):g} m")
@@ -206,7 +206,7 @@ class ContactForces:
     name: str = "contact forces"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where something can press bodies together."""
+        """Included where something can press bodies together."""
         how, verbs = f"{world.accuracy.contact_solver}: ", {"exact.contact_forces": hold}
         if world.joints_of_scene:
             return Bound(f"{how}{len(world.joints_of_scene)} joints", verbs)
@@ -235,7 +235,7 @@ class SubsteppedContact:
     name: str = "sub-stepped islands"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where such islands are possible; what they did is told when the run is over."""
+        """Included where such islands are possible; the plan's line says at the end of the run what they did."""
         reason = why_not_substepped(world)
         if reason:
             return Skip(reason)
@@ -252,7 +252,7 @@ class ImpactTime:
     name: str = "impact time"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where something can collide."""
+        """Included where something can collide."""
         if not world.can_collide:
             return Skip(world.why_no_impacts)
         method = world.accuracy.impact_time
@@ -261,13 +261,13 @@ class ImpactTime:
 
 @dataclass(frozen=True)
 class EventKernel:
-    """Flight of balls from impact to impact in one kernel; it changes nothing but the time that a run takes."""
+    """Flight of balls from impact to impact in one kernel; it saves time and changes no result."""
 
     stage: str = "sweep"
     name: str = "event kernel"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where a ball may collide and nothing in the scene needs every step."""
+        """Included where a ball may collide and nothing in the scene needs every step."""
         reason = why_not(world)
         if reason:
             return Skip(reason)
@@ -283,7 +283,7 @@ class ExactFlight:
     name: str = "exact flight"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where no force varies: it is what moves bodies."""
+        """Included where no force varies."""
         if world.force_tables:
             return Skip("forces vary")
         return Bound("paths between impacts are exact", {"trajectories": begin_trajectories})
@@ -297,7 +297,7 @@ class ForcedFlight:
     name: str = "forced flight"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where a force varies."""
+        """Included where a force varies."""
         if not world.force_tables:
             return Skip("no force varies")
         verbs = {"trajectories": begin_trajectories}
@@ -320,7 +320,7 @@ class TriggerVolumes:
     name: str = "triggers"
 
     def bind(self, world: World) -> Bound | Skip:
-        """In where the scene has one."""
+        """Included where the scene has one."""
         number = len(world.triggers)
         return Bound(f"{number} looked at after every step", {"observe": look_at_triggers}) if number else Skip("the scene has none")
 

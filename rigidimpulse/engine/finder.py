@@ -27,7 +27,7 @@ class Finder:
         buffers = self.buffer.contacts
         self.found = Found(buffers, np.empty(len(buffers.real), np.int64), *self._marks)
 
-    def make_room(self, needed: int) -> None:
-        """Room for so many contacts."""
+    def grow(self, needed: int) -> None:
+        """Make space for `needed` contacts."""
         self.buffer.grow(needed)
         self._take()

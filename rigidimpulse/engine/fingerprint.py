@@ -1,4 +1,4 @@
-"""A short text that is the same for the same scene and the same library, and another for any other: what kept results are known by."""
+"""A fingerprint of a scene and the library: a short text, equal for equal ones, else different. Kept results are found by it."""
 
 from __future__ import annotations
 

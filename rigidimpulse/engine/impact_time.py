@@ -1,4 +1,4 @@
-"""The stage sweep: the time of impact of every pair whose trajectory is new."""
+"""The time of impact, found for every pair of which a body has a new trajectory."""
 
 from __future__ import annotations
 

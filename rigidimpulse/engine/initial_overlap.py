@@ -1,19 +1,18 @@
-"""Overlap at the start: found with FCL before the first frame, reported, and taken out by position alone.
+"""Overlap at the start: found with FCL before the first frame, reported, and removed by moving bodies apart.
 
-Bodies that merely touch are no overlap. FCL's yes-or-no answer counts touching, so a pair is an overlap only if it
-stays one when a body is moved by DEPTH of its size along each axis: whoever only touches, along whatever normal, is
-free in one of the six directions.
+Bodies that merely touch do not overlap, but FCL's yes-or-no answer counts touching. Therefore a pair overlaps only if FCL says so, too,
+when one body is moved by DEPTH of its size along each axis. Bodies that only touch are free in one of the six directions.
 
-The depth of a pair is the least way s along a direction n by which b, come from outside, stands at the gap of lasting
-contacts. Directions tried: that of the centres, the principal axes of both bodies, and, from the best of them, the
-normal where the bodies touch, as long as it is better (the descent of expanding polytopes, van den Bergen 2001). If
-several are as good the one nearest to that of the centres is taken, else the first axis of a. Then
+The depth of a pair is the least displacement s of b along a direction n after which the gap is that of lasting contacts. These
+directions are tried: the line of the centres and the principal axes of both bodies. From the best of them the search descends: it takes
+the normal where the bodies then touch, as long as that is better (expanding polytopes, van den Bergen 2001). Of equally good directions
+the one nearest to the line of the centres is taken, else the first axis of a. Then
 
-    min sum of m |D|^2 / 2    with    n.(D_b - D_a) >= s   for all pairs that overlap or came to on the way
+    min sum of m |D|^2 / 2    with    n.(D_b - D_a) >= s   for all pairs that overlap, or did so after an earlier round
 
-gives the displacements D of all bodies together, again and again until no pair overlaps. Bodies do not turn, so what
-joints join moves as one. Velocities stay; the potential energy is accounted for as "overlap". Pairs for which there is no room
-are reported, and do not touch each other in that run.
+gives the displacements D of all bodies. This is repeated until no pair overlaps. Bodies do not turn, so jointed bodies move together.
+Velocities stay. The change of potential energy is in the ledger as "overlap". Pairs for which there is no space are reported and do not
+collide in that run.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ EQUAL = TOLERANCES.initial_overlap.equal_ways
 SOFTNESS = TOLERANCES.initial_overlap.softness
 SURE = 1.0 + TOLERANCES.initial_overlap.surely_apart
 STALLED = 5
-"""Rounds without a lesser overlap after which there is no room."""
+"""Rounds without a smaller overlap after which the search gives up."""
 
 
 @dataclass
@@ -66,7 +65,7 @@ def resolve_overlaps(run: Run) -> None:
     for demand in demands.values():
         run.log.report(
             0.0, "overlap at the start", (world.names[demand.a], world.names[demand.b]),
-            f"the bodies are inside each other by {demand.way:.4g} m; as far as there is room they are moved apart before the "
+            f"the bodies are inside each other by {demand.way:.4g} m; where there is space they are moved apart before the "
             "first step, without a change of velocity: move them apart in the scene to see no jump",
         )
     _take_apart(search, demands)
@@ -74,14 +73,15 @@ def resolve_overlaps(run: Run) -> None:
     for a, b in stuck:
         run.log.report(
             0.0, "overlap not resolved", (world.names[a], world.names[b]),
-            "there is no room to move the bodies apart, or joints hold them: in this run they do not touch each other; make room",
+            "there is no space to move the bodies apart, or joints hold them: in this run they do not touch each other; "
+            "give them space",
         )
     if stuck:
         keys = np.array([a * world.num_bodies + b for a, b in stuck])
         run.world = replace(world, apart=np.union1d(world.apart, keys))
     moved = search.position - world.position
     gained = -float(np.sum(np.where(world.dynamic, world.mass, 0.0)[:, None] * world.steady_acceleration * moved))
-    # Frame 0 is the state as given: the books change right after it.
+    # Frame 0 is the state as given: the ledger changes right after it.
     run.log.account(float(np.nextafter(0.0, 1.0)), "overlap", gained)
 
 
@@ -168,7 +168,7 @@ class _Search:
         return {pair: self._demand(*pair) for pair in sorted(self.overlapping() - set(known))}
 
     def measure(self, demand: _Demand) -> None:
-        """Bring the way of a demand up to date; negative if there is room, inf if none can be told."""
+        """Bring the way of a demand up to date; negative if the bodies are apart, inf if it cannot be found."""
         a, b = demand.a, demand.b
         if self._is_endless(a, b):
             found = self.separation(a, b, np.zeros(3))
@@ -218,7 +218,7 @@ class _Search:
         return directions
 
     def _way(self, a: int, b: int, n: np.ndarray) -> float:
-        """How far b has to move along n to stand off a, coming from outside; inf where that cannot be told."""
+        """How far b has to move along n from where it is until it is apart from a; inf where that cannot be found."""
         reach = float(self.world.bound_radius[a] + self.world.bound_radius[b])
         way, gap = reach - float(n @ (self.position[b] - self.position[a])), self._contact_margin(a, b)
         free, careful = np.inf, False
@@ -245,10 +245,12 @@ class _Search:
         moved = self.position - self.world.position
         first, second = (self.cluster[[getattr(d, side) for d in given]] for side in "ab")
         n = np.array([d.direction for d in given]).reshape(-1, 3)
+        # Ways are left from the present positions, displacements count from the given ones.
         asked = np.array([d.way + d.direction @ (moved[d.b] - moved[d.a]) for d in given])
         root = np.sqrt(self.inv_mass)
         rows = make_rows(len(given))
         rows.first[:], rows.second[:] = np.where(root[first] > 0.0, first, -1), np.where(root[second] > 0.0, second, -1)
+        # In coordinates scaled by the root of the mass: sum of m |D|^2 / 2 is least.
         rows.jacobian[:, :3], rows.jacobian[:, 6:9] = -root[first, None] * n, root[second, None] * n
         rows.kind[:], rows.lower[:], rows.bias[:] = BOUNDED, 0.0, -asked
         rows.softness[:] = SOFTNESS * (self.inv_mass[first] + self.inv_mass[second])

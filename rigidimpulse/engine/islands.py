@@ -42,7 +42,7 @@ def touching_islands(run: Run, pair_events: PairEvents, time: float, bodies: np.
         finder.found.reached[bodies] = True
         count = find_touching(world.compiled_shapes, world.constants, run.motion, pair_events.table, shared, finder.found, time)
         if count < 0:
-            finder.make_room(-count)
+            finder.grow(-count)
     run.forces.weigh(np.flatnonzero(finder.found.brought), time)
     reached = finder.found.reached.copy()
     return _islands(run, pair_events, time, reached, count), reached.nonzero()[0]
@@ -123,7 +123,7 @@ def look_again(run: Run, pair_events: PairEvents, island: Island) -> Island:
 
 
 def _collect(run: Run, pair_events: PairEvents, pairs: np.ndarray, time: float, margin: float) -> int:
-    """Write the contacts of pairs at the present poses within so many contact margins into the buffers; returns their number."""
+    """Write the contacts of pairs at the present poses within `margin` contact margins into the buffers; returns their number."""
     world, finder, table = run.world, run.finder, pair_events.table
     while True:
         count = contacts_at(world.compiled_shapes, run.motion, table, pairs, margin, finder.found, 0)
@@ -131,7 +131,7 @@ def _collect(run: Run, pair_events: PairEvents, pairs: np.ndarray, time: float, 
             count = witness_contacts(table, pairs, time, finder.found, 0, count)
         if count >= 0:
             return count
-        finder.make_room(-count)
+        finder.grow(-count)
 
 
 def near_contacts(run: Run, pair_events: PairEvents, members: np.ndarray, time: float) -> tuple[Contacts, np.ndarray, Touching]:

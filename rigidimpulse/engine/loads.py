@@ -1,4 +1,4 @@
-"""What accelerates the bodies of an island before contacts and joints answer: gravity, constant forces, and the gyroscopic term.
+"""Loads: accelerations of the bodies of an island without contacts and joints, by gravity, constant forces and the gyroscopic term.
 
     a = factor g + sum F / m,    alpha = -I^-1 (w x I w)
 

@@ -1,6 +1,6 @@
 """From step to step: steps end on the grid of the accuracy's step, at keyframes, and where soft bodies ask for it.
 
-The kernel of balls (`spheres/`) takes all steps in one in which nothing but simple impacts happens.
+The kernel of balls (`spheres/`) takes many steps at once, as long as only simple impacts of balls happen in them.
 """
 
 from __future__ import annotations

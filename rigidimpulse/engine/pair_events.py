@@ -36,7 +36,7 @@ from rigidimpulse.model.contact_memory import place_of
 from rigidimpulse.motion.trajectory import FIXED
 
 INSTANT = TOLERANCES.events.instant
-SQUEEZED_REMEDY = "no motion keeps the body apart from all that presses on it; make room, or let the pressing bodies move freely"
+SQUEEZED_REMEDY = "no motion keeps the body apart from all that presses on it; give it space, or let the pressing bodies move freely"
 NOT_RESOLVED_REMEDY = "the pair is left alone until the end of the step; use a smaller step"
 
 
@@ -127,19 +127,19 @@ class PairEvents:
         append_pairs(self._bodies, self.run.world.margins, self.table, first, second, start)
 
     def _grow(self, needed: int) -> None:
-        """Room for so many more pairs."""
+        """Make space for `needed` more pairs."""
         used, capacity = int(self.table.number[USED]), len(self.table.pairs)
         if used + needed > capacity:
             larger = make_pairs(max(used + needed, 2 * capacity))
             larger[:used] = self.table.pairs[:used]
             self.table = self.table._replace(pairs=larger)
 
-    def make_room(self, time: float) -> None:
-        """Make the table larger if a body has found no room for a pair since `time`, and add those pairs."""
+    def add_missing_pairs(self, time: float) -> None:
+        """Make the table larger if a body has found no space for a pair since `time`, and add those pairs."""
         table = self.table
         while table.number[SHORT]:
-            bodies = np.flatnonzero(table.without_room)
-            table.number[SHORT], table.without_room[:] = 0, False
+            bodies = np.flatnonzero(table.without_space)
+            table.number[SHORT], table.without_space[:] = 0, False
             self._grow(len(table.pairs))
             table = self.table
             for body in bodies.tolist():
@@ -148,7 +148,7 @@ class PairEvents:
     def trajectory_changed(self, body: int, time: float) -> None:
         """The body has a new trajectory from `time` on: sweep its pairs again, and add those it may now reach."""
         renew_pairs(self._bodies, self.run.world.margins, self.table, self.run.state.trajectory, body, (time, self.end))
-        self.make_room(time)
+        self.add_missing_pairs(time)
 
     def trajectories_changed(self, bodies: np.ndarray, time: float) -> None:
         """The same for the members of sub-stepped islands, all at once."""

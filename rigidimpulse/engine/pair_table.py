@@ -4,8 +4,8 @@ A pair is swept again when a body of it takes a new trajectory. The gap at which
 for a pair without a past; it is lowered where a pair has just been in contact, so that leaving pairs are not in contact again, and
 raised where a contact is held, so that the other features of the pair stay guarded.
 
-The table has free rows at its end. A kernel that finds no room for a pair of a body says so by `short`: `PairEvents.make_room` makes the
-table larger and looks again whom the body may reach.
+The table has free rows at its end. A kernel that finds no space for a pair of a body says so, and
+`PairEvents.add_missing_pairs` makes the table larger and looks again whom the body may reach.
 """
 
 from __future__ import annotations
@@ -65,14 +65,14 @@ class PairTable(NamedTuple):
     """The pairs of a step, and what is known of n bodies in it."""
 
     pairs: np.ndarray  # (c,) PAIR
-    number: np.ndarray  # (2,) rows in use; whether a body has found no room for a pair
+    number: np.ndarray  # (2,) rows in use; whether a body has found no space for a pair
     box_min: np.ndarray  # (n, 3) m, box of the path of each body until the end of the step
     box_max: np.ndarray  # (n, 3) m
     movable: np.ndarray  # (n,) bool, bodies that move or may begin to
     wake: np.ndarray  # (n,) s, when bodies must be looked at again though nothing meets them
     inside: np.ndarray  # (n,) bool, members of sub-stepped islands
     asleep: np.ndarray  # (n,) bool, sleeping members of such islands, and bodies that never move
-    without_room: np.ndarray  # (n,) bool, bodies that found no room for a pair
+    without_space: np.ndarray  # (n,) bool, bodies that found no space for a pair
     looked_around: np.ndarray  # (n,) s, when a position correction called each body last
 
 
@@ -97,6 +97,7 @@ def path_box(trajectory, i, begin, end, radius, box_min, box_max):
         last = x[k] + v * h + 0.5 * a * h * h + jerk * h * h * h / 6.0
         low, high = min(x[k], last), max(x[k], last)
         if jerk != 0.0:
+            # Where a coordinate of the path turns between begin and end, it is farthest.
             for turn in turning_points(v, a, jerk):
                 if 0.0 < turn < h:
                     apex = x[k] + turn * (v + turn * (0.5 * a + turn * jerk / 6.0))
@@ -139,7 +140,7 @@ def is_swept(table, dynamic, a, b):
 def append_pairs(bodies, margins, table, first, second, start):
     """Add pairs (k,) that may meet, without a past, to be swept from `start` [s] on; bodies: `PairBodies`, margins: `Margins`.
 
-    A pair for which there is no room is left out, and its second body marked.
+    A pair for which there is no space is left out, and its second body marked.
     """
     constants, dynamic = bodies.constants, bodies.constants.dynamic
     for k in range(first.shape[0]):
@@ -149,7 +150,7 @@ def append_pairs(bodies, margins, table, first, second, start):
             continue
         if table.number[USED] == len(table.pairs):
             table.number[SHORT] = 1
-            table.without_room[first[k]] = True
+            table.without_space[first[k]] = True
             continue
         pair = table.pairs[table.number[USED]]
         table.number[USED] += 1
@@ -246,7 +247,7 @@ def renew_pairs(bodies, margins, table, trajectory, body, interval):
 
 @jit_making_arrays
 def add_reached(bodies, margins, table, body, known, time):
-    """Add the pairs of a body with those whose boxes overlap its own, but for the known (n,) bool."""
+    """Add the pairs of a body with those whose boxes overlap its own; known (n,) bool are left out."""
     fresh = np.empty(known.shape[0], np.int64)
     reached = overlapping_with(body, table.box_min, table.box_max, table.movable, fresh)
     count = 0
@@ -262,7 +263,7 @@ def add_reached(bodies, margins, table, body, known, time):
 
 @jit_making_arrays
 def add_missing(bodies, margins, table, body, time):
-    """Add those pairs of a body that it found no room for; nothing else changes."""
+    """Add those pairs of a body that it found no space for; nothing else changes."""
     known = np.zeros(bodies.constants.dynamic.shape[0], np.bool_)
     known[body] = True
     for p in range(table.number[USED]):

@@ -1,4 +1,4 @@
-"""The end of a run: what is under way ends, and frames, impacts and ledger become a recording."""
+"""The end of a run: sub-steps and trajectories end, and frames, impacts and ledger become a recording."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def finish_run(run: Run, duration: float) -> Recording:
-    """End what is under way at the end, and return the recording."""
+    """End the sub-steps and trajectories that last beyond the end, and return the recording."""
     finish_sub_steps(run, run.state.time)
     run.substepped.finish(run)
     run.recorder.finish(run.state.trajectory)

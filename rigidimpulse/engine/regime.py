@@ -1,6 +1,6 @@
 """Which islands are sub-stepped, of the islands of bodies that may touch in a step.
 
-The exact regime is the better one wherever it can be afforded. "auto" sub-steps an island only where all of this holds:
+The exact regime is more accurate, so it is used wherever it can be afforded. "auto" sub-steps an island only where all of this holds:
 
     many        at least MANY movable bodies, or FEW that move (faster than the sleep speed, see `sleeping.py`) in a scene of MANY;
                 KEPT for an island that is sub-stepped already
@@ -84,7 +84,7 @@ def island_roots(number: int, first: np.ndarray, second: np.ndarray, movable: np
 
 @jit_making_arrays
 def support_levels(bodies, pairs, rows, tall):
-    """How many bodies each one is above what cannot be moved, by closed contacts, (n+1,): at most tall + 1; 0 for immovable ones.
+    """Level (n+1,) of each body above the supports, counted in bodies along closed contacts: at most tall + 1; 0 for immovable bodies.
 
     Bodies without support, and those that play no part, have tall + 2.
     """
@@ -94,6 +94,7 @@ def support_levels(bodies, pairs, rows, tall):
         if bodies.part[i] == SUPPORT:
             level[i] = 0
     changed = True
+    # Levels fall until no contact lowers one any more.
     while changed:
         changed = False
         for p in range(pairs.first.shape[0]):
@@ -113,7 +114,7 @@ def support_levels(bodies, pairs, rows, tall):
 
 
 def lively(now: BodyState, strength: np.ndarray, inner: np.ndarray) -> np.ndarray:
-    """Which bodies (n,) bool are faster than what is calm; strength (n,) m/s2 of what pulls them, inner (n,) m."""
+    """Which bodies (n,) bool are faster than the sleep speed; strength (n,) m/s2 of what pulls them, inner (n,) m."""
     radius = np.where(np.isfinite(inner), inner, 0.0)
     v, w = now.velocity, now.angular_velocity
     speed = np.sqrt(np.einsum("ij,ij->i", v, v)) + radius * np.sqrt(np.einsum("ij,ij->i", w, w))
@@ -126,13 +127,13 @@ def refusals(
     b: np.ndarray,
     auto: bool,
 ) -> dict[int, str]:  # fmt: skip
-    """Why islands are not sub-stepped, by their root; what holds of contacts (`low`) is not looked at here.
+    """Why islands are not sub-stepped, by their root; the condition `low` is not tested here.
 
     Args:
         world: the compiled scene.
         root: (n,) of every body; -1 for those in no island.
         substepped_before: (n,) bool, members of sub-stepped islands. joined, moves: (n,) bool.
-        toil: (n,) how often the exact solver dealt with each body in the last step.
+        solve_count: (n,) how often the exact solver dealt with each body in the last step.
         a: (k,) bodies of the pairs that may touch in the step; likewise b.
         auto: False where every island without joints is taken.
 
@@ -144,17 +145,19 @@ def refusals(
     was_substepped[root[members[substepped_before[members]]]] = True
     for r in np.unique(root[members[joined[members]]]).tolist():
         out[r] = "joints"
+    # The island of each pair: that of whichever body is in one.
     owner = np.where(root[a] >= 0, root[a], root[b])
     if not auto:
         alone = np.setdiff1d(np.flatnonzero(size), owner)
         out.update(dict.fromkeys(alone.tolist(), "alone"))
         return out
-    stir = np.bincount(root[members[moves[members]]], minlength=len(root))
+    moving_count = np.bincount(root[members[moves[members]]], minlength=len(root))
     expensive = np.bincount(root[members], weights=solve_count[members], minlength=len(root)) > EXPENSIVE_SOLVES * size
-    lively_enough = expensive if only_expensive(world) else expensive | (stir >= FEW)
+    lively_enough = expensive if only_expensive(world) else expensive | (moving_count >= FEW)
     least = np.where(was_substepped, KEPT, np.where(lively_enough, FEW, MANY))
     for r in np.flatnonzero((size > 0) & (size < least)).tolist():
         out[r] = "few bodies"
+    # The rest holds only where an island begins: a body that comes near later is taken in.
     begins = ~was_substepped[owner]
     if not begins.any():
         return out

@@ -1,4 +1,4 @@
-"""Run a scene: compile it, plan it, step it, and hand back what was recorded."""
+"""Run a scene: compile it, plan it, step it, and return the recording."""
 
 from __future__ import annotations
 
@@ -49,18 +49,18 @@ def simulate(
         duration: s, >= 0.
         fps: frames per second; changes what is recorded, never what happens.
         accuracy: "preview", "standard", "exact" or an `Accuracy`; or an accuracy target, `Within` or `InTime`: it chooses one by measuring.
-        effects: effects, by their names in `run.plan.explain()`, that are to be in (True) or out (False) whatever the scene calls for. The
-            status says where one is out that the scene calls for.
-        progress: called with the simulated time in s after every step, or after many in which nothing but impacts of balls happened.
-        cache: an .h5 file that is written while the run goes on, with a checkpoint every few seconds; see `Cache`. Where the file is there
-            already the run goes on from its last checkpoint, and ends with the same bits; a finished one is read. Needs the extra `cache`.
+        effects: effects to enable (True) or to leave out (False), by their names in `run.plan.explain()`. The status names an effect that
+            is left out although the scene calls for it.
+        progress: called with the simulated time in s after every step, or once for many steps in which only impacts of balls happened.
+        cache: an .h5 file that is written while the run goes on, with a checkpoint every few seconds; see `Cache`. If the file exists, the
+            run continues from its last checkpoint and ends with the same bits; a finished run is read. Needs the extra `cache`.
 
     Returns:
         The recording, with round(duration * fps) + 1 frames; the first is the initial state.
 
     Raises:
-        SceneError: the scene cannot be simulated as it is; names the body, the value and the remedy. Or an effect is unknown, cannot be in
-            or cannot be out. Or the cache is of another scene, of other settings or of another version.
+        SceneError: the scene cannot be simulated as it is; names the body, the value and the remedy. Or an effect is unknown, cannot be
+            enabled or cannot be left out. Or the cache is of another scene, of other settings or of another version.
 
     """
     if isinstance(accuracy, str | Accuracy):
@@ -126,7 +126,7 @@ def frame_times(duration: float, fps: float) -> np.ndarray:
 
 
 def chosen_out(scene: Scene, accuracy: str | Accuracy, effects: Mapping[str, bool] | None) -> dict[str, str]:
-    """Names of effects that are to be out though the scene calls for them, and why it does."""
+    """Names of the effects that the caller leaves out although the scene calls for them, and why it does."""
     if not effects:
         return {}
     lines = {line.name: line for line in make_plan(compile_scene(scene, accuracy)).lines}

@@ -1,4 +1,4 @@
-"""Sleeping: when bodies stand still for good until something touches them.
+"""Sleeping: when bodies stand still until something touches them.
 
 An exact island falls asleep as a whole (`may_sleep`). In a sub-stepped island each body has a sleep timer; see `substepped/advance.py`
 for what wakes it.
@@ -62,10 +62,10 @@ def stands_still(problem, constants, contacts, wrench, h):
 
 @jit_making_arrays
 def wake_by_contact(first, second, member, restless, bodies, mass, strength, inner):
-    """Mark (n,) the members that are awake, and sleepers that such a one may move, over pairs (k,) that may touch.
+    """Mark (n,) the members that are awake, and the sleepers that a moving member may wake over pairs (k,) that may touch.
 
     A moving body of mass m and speed v wakes sleepers up to k contacts away, k = max(1, m v / (m_0 u)), m_0: the least mass of a member,
-    u = SLEEP_SPEED sqrt(g r). Shared by more bodies than that, the impact cannot move any of them faster than the sleep speed u.
+    u = SLEEP_SPEED sqrt(g r). An impact that is shared by more bodies than that cannot move any of them faster than the sleep speed u.
     """
     reach, least = np.zeros(member.shape[0]), np.inf
     for i in range(member.shape[0]):
@@ -122,6 +122,7 @@ def advance_sleep_timers(members, position, orientation, velocity, strength, inn
             continue
         sleep_timer[i] = 0.0
         for c in range(3):
+            # It has moved: the time counts from here, and from this place.
             stood[i, c] = position[k, c]
         for c in range(4):
             stood[i, 3 + c] = orientation[k, c]

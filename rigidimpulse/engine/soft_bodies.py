@@ -1,13 +1,13 @@
-"""Soft bodies in a run: they are stepped first; rigid bodies then follow under what they gave them.
+"""Soft bodies in a run: they are stepped first, and rigid bodies then move under their forces.
 
-At the beginning of each step of the run the soft bodies are stepped over it, from where the rigid bodies are and where they would be at
-its end without them: under all that accelerates them now except the soft bodies' own force,
+At the start of each step of the run the soft bodies are stepped over it. This takes the poses of the rigid bodies at the start, and those
+that they would have at the end without the soft bodies' force:
 
     a = a(t) - F(t) / m,    tau = tau(t) - T(t)    constant over the step
 
-What the soft bodies gave comes back as a force like others (`dynamics/soft_body/forces.py`): trajectories follow it exactly, impacts and
-contacts on the way meet it. Bodies that no soft body touches keep their trajectories. Between the ends of steps vertices are on straight
-lines, and sums of energy and momentum change evenly.
+The impulses of the soft bodies act on the rigid ones as a force like others (`dynamics/soft_body/forces.py`): trajectories follow it
+exactly, and impacts and contacts in the step include it. Bodies that no soft body touches keep their trajectories. Between the ends of
+steps vertices are on straight lines, and sums of energy and momentum change evenly.
 """
 
 from __future__ import annotations
@@ -105,6 +105,7 @@ class RunningSoftBodies:
         for i in range(n):
             state_at(trajectory, i, time, x[i], q[i], v[i], w[i])
             path = trajectory
+            # The soft bodies' own force is taken off: a = a(t) - F(t) / m.
             if held[i].any():
                 path = self._scratch
                 self._let_go(run, i, time, held[i], (x[i], q[i], v[i], w[i]))

@@ -100,9 +100,9 @@ def near_pairs(trajectory, time, table, radius, bodies, seen, near):
 
 @jit_making_arrays
 def contacts_at(shapes, motion, table, places, margin, found, count):
-    """Append the contacts of the pairs at these places, within so many contact margins, at the present poses.
+    """Append the contacts of the pairs at these places, within `margin` contact margins, at the present poses.
 
-    Returns the new count, or minus the number of contacts that there must be room for.
+    Returns the new count, or minus the number of contacts that there must be space for.
     """
     a, b, reach = np.empty(1, np.int64), np.empty(1, np.int64), np.empty(1)
     buffers = found.buffers
@@ -166,7 +166,7 @@ def _mark_ties(shared, frontier, mark):
 def find_touching(shapes, constants, motion, table, shared, found, time):
     """Write the contacts of all bodies that hang together with those marked in `found.reached` at `time`; returns their number.
 
-    Minus the number of contacts that there must be room for, if there is too little: then call it again with larger buffers.
+    Minus the number of contacts that there must be space for, if there is too little: then call it again with larger buffers.
     `found.reached` gets all bodies that were looked at, `found.brought` those that were brought to `time`.
     """
     n, used = constants.dynamic.shape[0], table.number[USED]

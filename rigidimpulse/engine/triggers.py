@@ -1,9 +1,9 @@
 """Triggers: volumes that report which bodies overlap them, and never push.
 
-What is inside is looked at where each step ends, at the start of the run, and in between on the courses that the bodies
-have at the end of the step: often enough that neither side moves by more than half the thickness of both in between. Where
-the answer changes, the time is found by bisection on these courses to `SHARPNESS`; it is late by at most a step where a
-body was in an impact since.
+Overlap is tested at the start of the run, at the end of each step, and at times inside the step. Inside the step bodies are taken on the
+trajectories that they have at its end. The tests are so close in time that neither side moves by more than half the thickness of both
+between two of them. Where the answer changes, bisection on these trajectories finds the time to `SHARPNESS`. The time is late by at
+most a step if the body had an impact in that step.
 """
 
 from __future__ import annotations
@@ -128,6 +128,7 @@ class Triggers:
         if not np.isfinite(watched.reach):
             return i.tolist()
         speed, pull = np.linalg.norm(trajectory.velocity[i], axis=1), np.linalg.norm(trajectory.acceleration[i], axis=1)
+        # Bound of the speed of the centre in the step.
         way = speed + pull * (end - trajectory.start[i])
         centre, _ = self._pose(watched, end)
         own = watched.body
@@ -135,6 +136,7 @@ class Triggers:
             away = np.linalg.norm(centre - self._body(own, end)[0])
             own_speed, own_pull = np.linalg.norm(trajectory.velocity[own]), np.linalg.norm(trajectory.acceleration[own])
             own_way = own_speed + own_pull * (end - trajectory.start[own])
+            # The trigger moves with its body, and turns about its centre.
             way = way + own_way + 2.0 * away * np.linalg.norm(trajectory.angular_velocity[own])
         place = np.array([self._body(k, end)[0] for k in i.tolist()]).reshape(-1, 3)
         near = np.linalg.norm(place - centre, axis=1) <= watched.reach + world.bound_radius[i] + way * (end - begin)
@@ -181,7 +183,7 @@ class Triggers:
         return bool(self._narrowphase.overlap(watched.shape, self._pose(watched, time), shape, self._body(i, time)))
 
     def _speed(self, i: int, low: float, high: float, reach: float | None = None) -> float:
-        """Bound of the speed of any point of a body on its course, m/s."""
+        """Bound of the speed of any point of a body on its trajectory, m/s."""
         trajectory = self._run.state.trajectory
         if i < 0 or trajectory.mode[i] == FIXED:
             return 0.0

@@ -1,18 +1,18 @@
 """Bodies under forces that vary.
 
-Where bodies touch nothing and no joint holds them, a step under their forces is one of Nystroem's (`integrate.force_step`), as long as its
-error allows. Where contacts or joints hold them, forces are constant over a sub-step of length h, that of its middle:
+Bodies that no contact and no joint holds take steps of Nystroem's method (`motion.force_step`), as long as its error allows. For bodies
+that are held the force is constant over a sub-step of length h, and is the one at its middle:
 
-    F = F(t + h/2, x(h/2), v(h/2)),    x, v: flown under what accelerated the body last, contacts included
+    F = F(t + h/2, x(h/2), v(h/2)),    x, v: after h/2 under the last accelerations of the body, contacts included
 
-which is of second order in h as contact forces are, and leaves a body that stands still where it is. The sub-step is so short that the
-path is off by no more than is allowed,  |F(h/2) - F| h^2 / (6 m),  F at both ends.
+This is of second order in h, as contact forces are, and a body at rest stays at rest. The sub-step is so short that the error of the path,
+|F(h/2) - F| h^2 / (6 m)  with F at both ends, is within the tolerance.
 
-Where forces begin and end with places (`ForceTable.switches`), a step is flown with those that act at its start and ends, to round-off of
-time, where others do, looked for by bisection along its trajectory: so the steps stay of their order. Steps of one length
-(`Accuracy.integrator`) do nothing of the kind.
+Some forces act in a part of space only (`ForceTable.switches`). A step then uses the forces that act at its start. It ends where the set of
+acting forces changes; that time is found by bisection along the trajectory, to round-off. So the steps keep their order. Steps of fixed
+length (`Accuracy.integrator`) do not end early.
 
-What each force did, impulse, angular impulse about the world's origin and work, is the integral of its line along the very trajectory.
+The impulse, the angular impulse about the world's origin and the work of each force are integrals of its line along the trajectory.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ class VaryingForces:
         self.acts = self._always | bodies
 
     def present(self, table: ForceTable, time: float) -> np.ndarray:
-        """Wrenches (k, 6) of the rows of a table as courses have them at `time`, which lies in all of them."""
+        """Wrenches (k, 6) of the rows of a table at `time`, which lies within the present trajectory of every body."""
         first = self._first[self._tables.index(table)]
         return self.log.wrench(np.arange(first, first + len(table.body)), table.body, time)
 
@@ -141,15 +141,18 @@ class VaryingForces:
                 return self._evaluate(time + h * min(share, 1.0 - ASIDE), todo, bodies, rotation)
 
             rows, sums = nystroem(evaluate, self._workspace, first, todo, h, now, self._world.steady_acceleration)
+            # A force that gives way within the step: the step ends there.
             share = 1.0 if cut else self._share_until_break(rows)
             if share < 1.0:
                 cut, h[todo] = True, np.maximum(share * h[todo], shortest)
                 continue
             error = self._errors(now, todo, sums.off, h[todo], 1.0 / 12.0) / self._in_flight
             error = self._together(todo, error, np.maximum)
+            # The error inside the step is of order 4, and chooses h.
             grow = np.clip(SAFETY * np.maximum(error, 1e-30) ** -0.25, LEAST_CHANGE, MOST_CHANGE)
             done = (error <= 1.0) | (h[todo] <= shortest)
             if self._switching and done.all() and switches < MOST_SWITCHES:
+                # Other forces act from some place on: the step ends where they begin or end.
                 part, switches = self._switch(time, todo, now, sums, h), switches + 1
                 if part < 1.0:
                     h[todo] *= part

@@ -34,7 +34,7 @@ NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 2}
 
 
 def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> None:
-    """Say so and compile on several cores what a run needs, where this machine has never run these sources."""
+    """Compile the kernels that a run needs on several cores, and say so, where this machine has never run these sources."""
     missing = kernels_to_compile(world, with_events, with_substepped)
     if missing:
         kinds, seconds = ", ".join(missing), SECONDS_OF_A_KIND * len(missing)

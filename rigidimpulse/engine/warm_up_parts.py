@@ -1,4 +1,4 @@
-"""What is compiled ahead for each kind of kernels, in parts that take about as long and share little; see `warm_up.py`.
+"""Kernels of each kind that are compiled ahead, in parts of about equal time that share little; see `warm_up.py`.
 
 As a program it compiles one part, in a process of its own: `python -m rigidimpulse.engine.warm_up_parts KIND PART [cylinders]`.
 """
@@ -112,7 +112,7 @@ def _record(run: Run, contacts: Contacts, members: np.ndarray) -> None:
 
 
 def _move_and_sweep(run) -> None:
-    """Rows of contacts, courses, frames and the sweep."""
+    """Rows of contacts, trajectories, frames and the sweep."""
     _fill_rows(run)
     _move(run)
 
@@ -143,7 +143,7 @@ def _move(run) -> None:
 
 
 def _find_substepped_contacts(run) -> None:
-    """What comes before the solver of heaps: pairs and their contacts."""
+    """Pairs and contacts of sub-stepped islands, before they are solved."""
     world, state, member = run.world, run.state, np.array([False, True])
     state.now.inv_inertia[1] = np.eye(3)
     stepper = ContactStepper(world, world.dynamic, finer=False)
@@ -157,7 +157,7 @@ def _find_substepped_contacts(run) -> None:
 
 
 def _step_substepped(run) -> None:
-    """The solver of heaps, and what brings bodies from step to step."""
+    """The sub-stepped solver, and the trajectories between its steps."""
     state, now, members = run.state, run.state.now, np.array([1])
     stepper = ContactStepper(run.world, run.world.dynamic, finer=False)
     stepper.members = members

@@ -77,7 +77,7 @@ _HARD_MODULES = {name: family for family, (_, cases) in FAMILIES.items() for nam
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all scenes but the hard cases."""
+    """Return the names of all scenes without the hard cases."""
     return tuple(_MODULES)
 
 

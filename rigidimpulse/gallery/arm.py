@@ -1,6 +1,6 @@
 """An arm of two parts falls: a shoulder in a cone, with a soft stop of its twist, and an elbow that does not bend backwards.
 
-Both joints are of six axes (see `constrain.six_axis`). The shoulder is a ball joint, its axis within CONE of that of the
+Both joints are of six axes (see `scene.joint_six_axis`). The shoulder is a ball joint, its axis within CONE of that of the
 socket, its twist stopped by a spring and damper; the elbow is a hinge between bounds. Limits are bounds, to the error at
 which joints are closed, and only take energy: kinetic and potential energy together do not rise, except by what the soft
 stop gives back, which is little.

@@ -1,7 +1,7 @@
 """A square of cloth falls on a ball and hangs over it.
 
-Laws: until it touches, its centre follows the parabola; nothing ever gets into the ball or the floor; energy is only taken; at the end the
-cloth hangs still and its momentum is gone.
+Laws. Until the cloth touches, its centre follows the parabola. No part of it ever gets into the ball or the floor. Energy never grows. At
+the end the cloth hangs still and has no momentum.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """A crowd of bodies collides in flight on the Moon: internal forces cancel (B4).
 
-Impacts, friction, joints and contacts act in pairs, equal and opposite, along one line. What changes the whole is gravity alone, and that
-exactly: with M the mass and X0, V0 place and velocity of the common centre of mass at the start,
+Impacts, friction, joints and contacts act in pairs, equal and opposite, along one line. Gravity alone changes the total momentum. With M
+the mass, and X0, V0 place and velocity of the common centre of mass at the start,
 
     p(t) = p0 + M g t,    X(t) = X0 + V0 t + g t^2 / 2,    L(t) = L0 + M (X0 t + V0 t^2 / 2) x g    about the origin
 
 Momentum is a sum of rounding: some hundred impacts of 1e-16 of the momentum that moves, sum m |v|; 1e-12 is the bound. Where bodies stay
 in touch or joined they are moved by some 1e-6 of their size to keep their gap: two of COUNT that pass each other have another angular
-momentum then, 2e-8 / COUNT of the whole each time, so its bound is 1e-8. Energy: impacts only take; joints are of second order, a
+momentum then, 2e-8 / COUNT of the whole each time, so its bound is 1e-8. Energy: impacts only lose it; joints are of second order, a
 relative spin of 4 rad/s turns by 0.07 rad in a step, 0.07^2 / 12 = 4e-4 of the pairs' spinning, some hundredth of all: 1e-5. Friction
 that acts on one of two bodies, or an impulse at two points a millimetre apart, is off by 1e-3.
 """

@@ -1,9 +1,9 @@
 """An arm that controllers hold up is hit by a ball and comes back to its pose (A15).
 
 Each part is pulled to its place and turn by a proportional-derivative controller; hinges hold the parts together and to the world. Under
-gravity it sags a little, to where springs and weight balance; after the hit it swings back there. Controllers store nothing in the
-ledger: what they and the impact took is what is missing. Where it comes to rest does not depend on the length of steps: the preview's are
-enough.
+gravity it sags a little, to where springs and weight balance. After the hit it swings back there. Controllers store no energy in the
+ledger: the energy that they and the impact took is missing there. The pose at rest does not depend on the length of steps, so those of
+"preview" are enough.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def scene() -> Scene:
 
 
 def check(run: Recording) -> list[Check]:
-    """Compare the pose at the end with that of the balance, which statics tells."""
+    """Compare the pose at the end with the balance of forces, known from statics."""
     found = np.array([run.position(name)[-1, 2] - run.position(name)[0, 2] for name in PARTS])
     low = min(float((run.position(name)[:, 2] - run.position(name)[0, 2]).min()) for name in PARTS)
     speed = max(float(np.linalg.norm(run.velocity(name)[-1])) for name in PARTS)

@@ -1,7 +1,7 @@
 """A cube of jelly falls down stairs.
 
-Laws: until it touches, its centre follows the parabola; nothing of it ever gets into the stairs; energy is only taken; its struts keep its
-volume to a share; it comes to rest.
+Laws. Until the cube touches, its centre follows the parabola. No part of it ever gets into the stairs. Energy never grows. The struts keep
+most of its volume. It comes to rest.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """A pile: boxes fall into a walled pit and pile up; the sub-stepped solver takes over where they touch.
 
-How they lie in the end follows from no formula, but all of them stay in the pit, none is inside another, energy only goes
-down, except for what the skins of the contacts give back, and friction and dull impacts bring them to rest: exactly, not a bit
-moves any more. Walls and boxes are those of the pile in the comparison of engines (side 0.5 m, mu = 0.5, e = 0), of a lighter
-material and fewer of them.
+No formula says how they lie in the end. But all of them stay in the pit, and none is inside another. Energy only falls, except by the
+energy that the skins of the contacts give back. Friction and impacts without rebound bring them to rest, and then no bit changes. Walls and
+boxes are those of the pile in the comparison of engines (side 0.5 m, mu = 0.5, e = 0), of a lighter material and fewer of them.
 """
 
 from __future__ import annotations

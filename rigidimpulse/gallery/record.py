@@ -1,4 +1,4 @@
-"""What a gallery scene is: a scene, how long to run it, and checks of the result against laws."""
+"""The record of a gallery scene: the scene, how long to run it, and checks of the result against laws."""
 
 from __future__ import annotations
 
@@ -67,12 +67,12 @@ def figure(value: float | None) -> str:
 
 @dataclass(frozen=True)
 class Exact:
-    """The exact motion of a scene at f times, as far as its law tells it; or a measured one.
+    """The exact motion of a scene at f times, as far as its law says; or a measured one.
 
     Attributes:
-        position: (f, 3) m of the origin, by body. orientation: (f, 4) wxyz, by body. Bodies that are not named are not told.
-        energy: (f,) J, change of the mechanical energy since the start; None where it is not told.
-        impacts: (k,) s, times of all impacts until the last of the times; None where they are not told.
+        position: (f, 3) m of the origin, by body. orientation: (f, 4) wxyz, by body. Bodies that are not named are not known.
+        energy: (f,) J, change of the mechanical energy since the start; None where it is not known.
+        impacts: (k,) s, times of all impacts until the last of the times; None where they are not known.
         noise: m, how far a measured motion may be off itself; 0 for a closed form.
 
     """

@@ -1,4 +1,4 @@
-"""A pile of parts settles into a table and a stool, which then stand: beside them the same pile falls down as it was.
+"""A pile of parts settles into a table and a stool, which then stand. Beside them the same pile falls down unsettled.
 
 Legs are pinned to tops by three points each, so each piece is one rigid thing where its energy is 0: `PinPoints` meet exactly.
 `RestoreShape` keeps stool and books at their places by the table, `NoOverlap` with a gap keeps everything apart and above the floor,

@@ -1,7 +1,7 @@
 """Spot the cow is thrown at a torus that lies on the floor: concave against concave, 5,856 against 4,096 triangles.
 
-There is no closed form for the motion, but laws hold at every impact: no impact makes energy, friction stays in its
-cone, the cow never enters floor or torus, and the energy it has lost is what the ledger says was taken.
+There is no closed form for the motion, but laws hold at every impact. No impact makes energy, and friction stays in its cone. The cow
+never enters floor or torus. The energy it has lost is the one that the ledger has as dissipated.
 """
 
 from __future__ import annotations

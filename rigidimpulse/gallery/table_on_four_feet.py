@@ -56,7 +56,7 @@ def scene() -> Scene:
 
 
 def check(run: Recording) -> list[Check]:
-    """Check sums and moments of the forces, storey by storey, and that nothing stirs."""
+    """Check sums and moments of the forces, storey by storey, and that nothing moves."""
     names = ["floor", "table", *STACK]
     masses = [TABLE_MASS, *(mass for _, mass in STACK.values())]
     total = GRAVITY * sum(masses)
@@ -72,13 +72,13 @@ def check(run: Recording) -> list[Check]:
     stack = total - GRAVITY * TABLE_MASS
     moment = np.cross(feet["point"], up).sum(axis=0) - np.cross([*PLACE, 0.0], [0.0, 0.0, stack])
     rest = run.positions[-1] - run.positions[1]
-    stirs = int(np.count_nonzero(rest) + np.count_nonzero(run.velocities[1:]) + np.count_nonzero(run.angular_velocities[1:]))
+    changed = int(np.count_nonzero(rest) + np.count_nonzero(run.velocities[1:]) + np.count_nonzero(run.angular_velocities[1:]))
     return [
         *checks,
         equal("points that bear the table", len(feet), 4, "four feet"),
-        at_most("moment of the feet but for the weights', of m g l", np.abs(moment[:2]).max() / total, BOUND, "statics; l = 1 m"),
+        at_most("moment of the feet less that of the weights, of m g l", np.abs(moment[:2]).max() / total, BOUND, "statics; l = 1 m"),
         at_least("least force of a foot, N", float(up[:, 2].min()) if len(feet) else -np.inf, 0.0, "feet push, they do not pull"),
-        equal("numbers that change after the first frame", stirs, 0, "bodies at rest stay at rest"),
+        equal("numbers that change after the first frame", changed, 0, "bodies at rest stay at rest"),
         at_most("moved from the drawing, m", np.abs(run.positions[-1] - run.positions[0]).max(), LIFT, "contact margins"),
     ]
 

@@ -1,7 +1,7 @@
 """Spot the cow bounces on a trampoline, a sheet whose rim is pinned.
 
-Laws: free fall until the sheet is touched; the cow's momentum is what gravity and the sheet gave it; energy is only taken, and some of it
-comes back: the cow bounces; it never passes the sheet.
+Laws. The cow falls freely until it touches the sheet. Its momentum is the sum of the impulses of gravity and of the sheet. Energy never
+grows, and some of it comes back: the cow bounces. It never passes through the sheet.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ A solution replaces all entries of its pairs, so what is remembered is always on
 A contact is recognised by what touches: a vertex that slides over a tiled face stays the same contact, so the face does not count.
 An entry counts as long as neither body has taken a new trajectory since: the forces ended there.
 
-Kernels need free places: `has_room` says whether there are some, `ContactMemory.grow` makes them.
+Kernels need free places: `has_capacity` says whether there are some, `ContactMemory.grow` makes them.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ FORCE = np.dtype(
 """A held contact: what touches, its force in (n, t1, t2) [N], since when [s], and whether it slipped then."""
 FIRST_PAIRS, FIRST_HELD, FIRST_FORCES = 256, 64, 256
 LEAST_STRETCH = 4
-"""Entries that a held pair has room for at first."""
+"""Entries that a held pair has space for at first."""
 PAIRS, HELD_PAIRS, FORCES = np.arange(3)
 """Places in `ContactMemory.used`."""
 
@@ -64,7 +64,7 @@ class ContactMemory(NamedTuple):
 
 
 def make_memory(pairs: int = FIRST_PAIRS, held: int = FIRST_HELD, forces: int = FIRST_FORCES) -> ContactMemory:
-    """An empty memory with so many places; pairs: a power of two."""
+    """An empty memory with these numbers of places; pairs: a power of two."""
     integers = np.full((2, pairs), -1, np.int64)
     return ContactMemory(
         integers[0], np.full(pairs, -np.inf), np.zeros(pairs), np.zeros(pairs, np.int64), integers[1], np.zeros(held, HELD),
@@ -100,8 +100,8 @@ def remember_rebound(memory, key, time, speed, count):
 
 
 @jit
-def has_room(memory, contacts):
-    """Whether so many contacts of so many new pairs can be remembered."""
+def has_capacity(memory, contacts):
+    """Whether a number of contacts, each of a new pair, can be remembered."""
     used = memory.used
     return (
         2 * (used[PAIRS] + contacts) < len(memory.key)
@@ -263,7 +263,7 @@ def any_short_rebound(memory, number, rows):
 
 
 def grown(memory: ContactMemory, contacts: int) -> ContactMemory:
-    """A memory of the same contents that has room for so many more contacts; stretches that were given up are dropped."""
+    """A memory of the same contents with space for `contacts` more; stretches that were given up are dropped."""
     pairs, held, forces = len(memory.key), len(memory.held), len(memory.force)
     while 2 * (int(memory.used[PAIRS]) + contacts) >= pairs:
         pairs *= 2

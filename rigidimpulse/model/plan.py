@@ -26,11 +26,13 @@ def _as_chosen(bound: Bound | Skip, name: str, wanted: bool | None) -> Bound | S
     """What `bind` said, or what the caller wants."""
     if wanted is False and isinstance(bound, Bound):
         if name in NEEDED:
-            raise SceneError(f"effects: {name!r} cannot be out: {bound.reason}", "leave out 'contact detection', or what it works for")
+            raise SceneError(
+                f"effects: {name!r} cannot be left out: {bound.reason}", "leave out 'contact detection', or the effects that need this one"
+            )
         return Skip(f"left out by the caller; {bound.reason}")
     if wanted is True and isinstance(bound, Skip):
         if bound.verbs is None:
-            raise SceneError(f"effects: {name!r} cannot be in: {bound.reason}", "give the scene what it needs, or leave it out")
+            raise SceneError(f"effects: {name!r} cannot be enabled: {bound.reason}", "add what it needs to the scene, or do not enable it")
         return Bound(f"wanted by the caller; {bound.reason}", bound.verbs)
     return bound
 
@@ -56,10 +58,10 @@ class Plan:
     """
 
     def __init__(self, world: World, effects: Sequence[Effect], chosen: Mapping[str, bool] | None = None) -> None:
-        """Bind the effects to a world; chosen: names of effects that are to be in or out whatever the scene calls for.
+        """Bind the effects to a world; chosen: names of effects that the caller enables (True) or leaves out (False).
 
         Raises:
-            SceneError: an effect that is to be in has nothing to work on, or one that is to be out cannot be spared.
+            SceneError: an effect cannot be enabled because the scene has nothing for it, or cannot be left out because the run needs it.
 
         """
         chosen = chosen or {}

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.model.contact_memory import grown, has_room, make_memory
+from rigidimpulse.model.contact_memory import grown, has_capacity, make_memory
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.trajectory import Trajectories, make_trajectories
@@ -88,6 +88,6 @@ class State:
         self.under_contact, self.sharing, self.correction = self.limiter.under_contact, self.limiter.sharing, self.limiter.correction
 
     def remember(self, contacts: int) -> None:
-        """Have room for so many more contacts in the memory."""
-        if not has_room(self.memory, contacts):
+        """Make space for `contacts` more in the memory."""
+        if not has_capacity(self.memory, contacts):
             self.memory = grown(self.memory, contacts)

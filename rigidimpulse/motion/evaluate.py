@@ -47,6 +47,7 @@ def bring(trajectory, i, time, bodies, rotation, acceleration, angular_accelerat
         acceleration[i, k] = 0.0
         angular_acceleration[i, k] = 0.0
     if bodies.inv_mass[i] > 0.0 and trajectory.mode[i] != FIXED:
+        # The accelerations of the trajectory's load at this instant, with the gyroscopic term.
         s = time - trajectory.start[i]
         acceleration[i, 0], acceleration[i, 1], acceleration[i, 2] = row_at(trajectory.acceleration, i, rate_of(trajectory, i, JERK), s)
         torque = row_at(trajectory.torque, i, rate_of(trajectory, i, TORQUE_RATE), s)

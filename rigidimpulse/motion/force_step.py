@@ -15,7 +15,7 @@ Inside the step it leaves the true path by
 
     error = |d| h^2 / (12 m),    d = F_4 - L(h) = (F_1 - F_2 - F_3 + F_4) / 3,
 
-of order 4 and larger than the error at the end, which is of order 5: it chooses h.
+of order 4 and larger than the error at the end, which is of order 5. This error chooses h.
 
 In steps of one length the semi-implicit rule of Euler, v' = v + F h / m, x' = x + v' h, has the moments  M0 = h F, M1 = h^2 F  and so
 the line
@@ -137,6 +137,7 @@ def nystroem(
     half = 0.5 * h
     workspace.fly(members, half, bodies, steady, first[1])
     second = evaluate(0.5, workspace.bodies, workspace.rotation)
+    # Stage 3 has the pose of stage 2: only velocities are flown again.
     workspace.fly_speeds(members, half, bodies, steady, second[1])
     third = evaluate(0.5, workspace.bodies, workspace.rotation)
     workspace.fly(members, h, bodies, steady, third[1])

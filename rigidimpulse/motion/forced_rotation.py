@@ -142,6 +142,7 @@ def _start_series(c, series, w, e, u):
     growth = c[_TORQUE_RATE]
     if growth != 0.0:
         rate += (growth / min(i1, i2, i3)) ** (1.0 / 3.0)
+    # Times are scaled by a power of two, so that the scaling itself rounds nothing.
     scale = math.ldexp(1.0, math.frexp(rate)[1])
     c[_TIME_SCALE] = scale
     series[0], series[1], series[2] = wx / scale, wy / scale, wz / scale
@@ -199,7 +200,7 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out, series_out)
     """Write constants (FORCED_ROTATION_SIZE,) and series (SERIES_SIZE,) of the motion from orientation q (4,) and spin (3,), rad/s.
 
     `w_world`, `torque` (3,), N m, and `torque_rate` (3,), N m/s, are in the world; `inertia` (3,): principal moments,
-    kg m^2, all > 0. Returns False and writes nothing if torque and rate are none: then the body rotates freely.
+    kg m^2, all > 0. Returns False and writes nothing if torque and rate are 0: then the body rotates freely.
     """
     c = constants_out
     i1, i2, i3 = inertia[0], inertia[1], inertia[2]
@@ -224,6 +225,7 @@ def prepare(inertia, q, w_world, torque, torque_rate, constants_out, series_out)
     vx, vy, vz = w_world[0], w_world[1], w_world[2]
     wx, wy, wz = rotated(q0, -q1, -q2, -q3, vx, vy, vz)
     ax, ay, az = magnitude * ex / i1, magnitude * ey / i2, magnitude * ez / i3
+    # Torque, its rate and spin along one principal axis: that axis is kept, in closed form.
     if _parallel(ex, ey, ez, ax, ay, az) and _parallel(ex, ey, ez, wx, wy, wz) and _parallel(ex, ey, ez, bx, by, bz):
         c[KIND] = FORCED_AXIS
         ax, ay, az = rotated(q0, q1, q2, q3, ax, ay, az)
@@ -244,6 +246,7 @@ def _last_segment(constants, coefficients, t):
     """Constants and series of the segment that holds the time t, and the time since its start (NaN: too many segments)."""
     c, series = constants.copy(), coefficients.copy()
     for _ in range(_MOST_SEGMENTS):
+        # Segments depend on the start alone, never on the time asked for, so the path is one smooth function of time.
         if not t > c[SEGMENT]:
             return c, series, t
         h = c[SEGMENT]

@@ -190,6 +190,7 @@ def _asymmetric_frame(c, t):
 @jit
 def _store_phase(c, start_rate, speed, sigma, y, t_ratio):
     """Coefficients of the theta function and lambda, given arg(A)' at z = 0, z', sigma, |y| and T."""
+    # Near the separatrix Jacobi's imaginary transformation makes the series short.
     near = t_ratio < _NOME_SWITCH
     turn = y / t_ratio
     slope, total = 0.0, 0.0
@@ -211,6 +212,7 @@ def _store_phase(c, start_rate, speed, sigma, y, t_ratio):
     c[_NEAR] = 1.0 if near else 0.0
     c[_NOME_SCALE] = 1.0 / t_ratio
     c[_PHASE_SLOPE] = 2.0 * sigma * turn / math.pi if near else 0.0
+    # lambda follows from arg(A)' at z = 0.
     c[_PHASE_RATE] = start_rate - speed * (c[_PHASE_SLOPE] + slope / total)
 
 
@@ -379,6 +381,7 @@ def rotation(constants, t):
         q0, q1, q2, q3 = product(e0, e1, e2, e3, q0, q1, q2, q3)
         if c[KIND] == FIXED_AXIS:
             return q0, q1, q2, q3, wx, wy, wz
+        # Symmetric: q = exp(L t / I) q0 exp((1 - I_a / I) w_a t e).
         wx, wy, wz = c[_START_RATE], c[_START_RATE + 1], c[_START_RATE + 2]
         wx, wy, wz = rotated(e0, e1, e2, e3, wx, wy, wz)
         x, y, z = c[_SPIN], c[_SPIN + 1], c[_SPIN + 2]

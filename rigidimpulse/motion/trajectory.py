@@ -6,7 +6,7 @@
       PRESCRIBED   q(t) = exp(w0 s) q0, constant velocity and world angular velocity (its acceleration must be 0)
       FREE         no torque: closed form (free_rotation)
       FORCED       world torque tau0 + tau1 s: power series (forced_rotation)
-      LINEAR       as PRESCRIBED, with a constant acceleration: the way to a pose that the sub-stepped solver found; the body's own
+      LINEAR       as PRESCRIBED, with a constant acceleration: the path to a pose that the sub-stepped solver found; the body's own
                    velocities run from those at the start to those at the end of the step
 
 The search for impacts and the motion both read the path here, so the impact time and the motion cannot disagree. A row is set
@@ -59,7 +59,7 @@ class Trajectories(NamedTuple):
     mode: np.ndarray
     """(n,) int64: FIXED, PRESCRIBED, FREE, FORCED, LINEAR"""
     inertia: np.ndarray
-    """(n, 3) kg m^2, principal moments; read in modes FREE and FORCED"""
+    """(n, 3) kg m^2, principal moments; read where the mode is FREE or FORCED, to rotate the body"""
     top: np.ndarray
     """(n, TOP_SIZE) constants of the rotation, written by `begin`, and from SPEEDS on those of mode LINEAR, then jerk and torque rate
     (arrays of their own would cost every kernel that gets trajectories some 3 % of its time)"""
@@ -116,6 +116,7 @@ def begin(trajectory, i):
         for k in range(TORQUE_RATE if mode == FREE else JERK, TOP_SIZE):
             trajectory.top[i, k] = 0.0
     inertia, q, w, top = trajectory.inertia[i], trajectory.orientation[i], trajectory.angular_velocity[i], trajectory.top[i]
+    # A torque of round-off is none: the body then rotates freely.
     if mode == FORCED and forced_rotation.prepare(inertia, q, w, trajectory.torque[i], top[TORQUE_RATE:], top, trajectory.series[i]):
         return
     if mode == FREE or mode == FORCED:
@@ -238,6 +239,7 @@ def stepped_at(trajectory, i, t):
     """
     s = t - trajectory.start[i]
     top = trajectory.top
+    # The body's own velocities change evenly over the step, while the path runs straight to the pose.
     share = min(s / top[i, LENGTH], 1.0)
     x = (
         _moved(trajectory.position[i, 0], trajectory.velocity[i, 0], trajectory.acceleration[i, 0], 0.0, s),

@@ -1,4 +1,4 @@
-"""How the accuracy of a run was chosen, where it was asked for by an accuracy target."""
+"""How the accuracy of a run was chosen to meet an accuracy target."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ FIRST_ROWS = 4096
 
 
 class ContactBuffers(NamedTuple):
-    """What kernels write; `ContactLog.grow` makes room in it."""
+    """What kernels write; `ContactLog.grow` makes it larger."""
 
     times: np.ndarray  # (f,) s of the frames
     rows: np.ndarray  # (k,) ROW_DTYPE, end inf while a contact lasts
@@ -35,8 +35,8 @@ class ContactBuffers(NamedTuple):
 
 
 @jit
-def has_contact_room(buffers, rows):
-    """Whether so many more contacts fit in; if not, `ContactLog.grow` makes room for them."""
+def has_contact_capacity(buffers, rows):
+    """Whether `rows` more contacts fit in; if not, `ContactLog.grow` makes the buffers larger."""
     buffers.counts[2] = rows
     return buffers.counts[0] + rows <= buffers.rows.shape[0]
 
@@ -87,7 +87,7 @@ def close_contacts(buffers, bodies, time):
 
 @jit_making_arrays
 def replace_contacts(buffers, bodies, time, contacts, position, force):
-    """The contacts of the bodies (k,) are these from `time` [s] on; there must be room.
+    """The contacts of the bodies (k,) are these from `time` [s] on; there must be space.
 
     position (n, 3) m: centres of mass of all bodies; force (m, 3) N in (n, t1, t2). Contacts that do not press are left out.
     """
@@ -128,12 +128,15 @@ class ContactLog:
 
     def replace(self, bodies: np.ndarray, time: float, contacts: Contacts, position: np.ndarray, force: np.ndarray) -> None:
         """See `replace_contacts`."""
-        if not has_contact_room.py_func(self.buffers, len(force)):
+        if not has_contact_capacity.py_func(self.buffers, len(force)):
             self.grow()
         replace_contacts(self.buffers, bodies, time, contacts, position, force)
 
     def grow(self) -> None:
-        """Make room for the contacts that `has_contact_room` was last asked about: those that have ended go; if many last, rows double."""
+        """Make space for the contacts that `has_contact_capacity` was last asked about.
+
+        Those that have ended go; if many last, the rows double.
+        """
         self._take_out_ended()
         rows, (used, _, more) = self.buffers.rows, self.buffers.counts.tolist()
         size = len(rows)
@@ -177,11 +180,11 @@ class ContactLog:
         """Account for the impulses of contacts that carried their forces until `end` (k,); forces of a pair in a stretch act together."""
         order = np.lexsort((rows["place"], rows["body_b"], rows["body_a"]))
         rows, end = rows[order], end[order]
-        group = np.zeros(len(rows), np.int64)
+        of_pair = np.zeros(len(rows), np.int64)
         for name in ("body_a", "body_b", "place"):
-            group[1:] |= np.diff(rows[name]) != 0
-        first, group = np.flatnonzero(np.append(1, group[1:])[: len(rows)]), np.cumsum(group)
-        force = np.stack([np.bincount(group, rows["force"][:, k], len(first)) for k in range(3)], axis=1)
+            of_pair[1:] |= np.diff(rows[name]) != 0
+        first, of_pair = np.flatnonzero(np.append(1, of_pair[1:])[: len(rows)]), np.cumsum(of_pair)
+        force = np.stack([np.bincount(of_pair, rows["force"][:, k], len(first)) for k in range(3)], axis=1)
         rows = rows[first]
         self._accounts.add_many("contact with", rows["body_a"], rows["body_b"], rows["start"], end[first], force)
 

@@ -1,7 +1,7 @@
 """Contact forces of a run, as stretches of time over which each is constant.
 
-A force that a lasting contact carries is constant from one sub-step to the next, and where bodies rest from the moment
-they came to rest on. So it is kept once, with its first and last instant, however many frames there are.
+The force of a lasting contact is constant over a sub-step, and over all the time that bodies rest. So it is kept once, with its first and
+last instant, however many frames there are.
 """
 
 from __future__ import annotations

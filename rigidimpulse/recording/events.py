@@ -1,4 +1,4 @@
-"""Events of a run: the impacts table, and what else happened and when."""
+"""Events of a run: the impacts table, energy changes by cause, and reports with their times."""
 
 from __future__ import annotations
 
@@ -67,8 +67,8 @@ def write_impacts(time, contacts, position, log, count, rows, first):
 
 
 @jit
-def has_room(buffers, energy, stretches, impacts):
-    """Whether so many more rows of each kind fit in; if not, `EventLog.grow` makes room for them."""
+def has_capacity(buffers, energy, stretches, impacts):
+    """Whether these numbers of rows fit in; if not, `EventLog.grow` makes the buffers larger."""
     counts = buffers.counts
     counts[3], counts[4], counts[5] = energy, stretches, impacts
     return (
@@ -80,7 +80,7 @@ def has_room(buffers, energy, stretches, impacts):
 
 @jit
 def log_energy(buffers, time, cause, change):
-    """Append a change of mechanical energy [J], unless it is 0; there must be room."""
+    """Append a change of mechanical energy [J], unless it is 0; there must be space."""
     if change != 0.0:
         row = buffers.energy[buffers.counts[0]]
         row.time, row.cause, row.change = time, cause, change
@@ -89,7 +89,7 @@ def log_energy(buffers, time, cause, change):
 
 @jit
 def log_stretch(buffers, start, end, body, energy, work):
-    """Append a trajectory under contact forces (see `STRETCH_DTYPE`); there must be room."""
+    """Append a trajectory under contact forces (see `STRETCH_DTYPE`); there must be space."""
     row = buffers.stretches[buffers.counts[1]]
     row.start, row.end, row.body, row.energy, row.work = start, end, body, energy, work
     buffers.counts[1] += 1
@@ -97,7 +97,7 @@ def log_stretch(buffers, start, end, body, energy, work):
 
 @jit
 def log_impacts(buffers, time, contacts, position, log, count):
-    """Append the impacts that `write_impacts` describes; there must be room."""
+    """Append the impacts that `write_impacts` describes; there must be space."""
     write_impacts(time, contacts, position, log, count, buffers.impacts, buffers.counts[2])
     buffers.counts[2] += count
 
@@ -130,7 +130,7 @@ def _first_buffers() -> LogBuffers:
 
 
 def _doubled(rows: np.ndarray, least: int) -> np.ndarray:
-    """Rows that double until there are so many."""
+    """Rows that double until there are enough."""
     while len(rows) < least:
         rows = np.concatenate([rows, np.zeros_like(rows)])
     return rows
@@ -164,33 +164,33 @@ class EventLog:
         return self.buffers.impacts[: self.buffers.counts[2]]
 
     def grow(self) -> None:
-        """Make room for the rows that `has_room` was last asked about: buffers that are too small double."""
+        """Make space for the rows that `has_capacity` was last asked about: buffers that are too small double."""
         energy, stretches, impacts, counts = self.buffers
         least = (counts[:3] + counts[3:]).tolist()
         self.buffers = LogBuffers(_doubled(energy, least[0]), _doubled(stretches, least[1]), _doubled(impacts, least[2]), counts)
 
-    def _make_room(self, energy: int = 0, stretches: int = 0, impacts: int = 0) -> None:
-        if not has_room.py_func(self.buffers, energy, stretches, impacts):
+    def _reserve(self, energy: int = 0, stretches: int = 0, impacts: int = 0) -> None:
+        if not has_capacity.py_func(self.buffers, energy, stretches, impacts):
             self.grow()
 
     def account(self, time: float, cause: str, change: float) -> None:
         """Keep a change of mechanical energy [J] by one of the `CAUSES`; negative is dissipated."""
-        self._make_room(energy=1)
+        self._reserve(energy=1)
         log_energy(self.buffers, time, CAUSES.index(cause), change)
 
     def add_stretch(self, start: float, end: float, body: int, energy: float, work: float) -> None:
         """Keep a trajectory under contact forces from start to end [s]: energy at the start and work of the forces [J]."""
-        self._make_room(stretches=1)
+        self._reserve(stretches=1)
         log_stretch(self.buffers, start, end, body, energy, work)
 
     def add_impacts(self, time: float, contacts: Contacts, position: np.ndarray, log: np.ndarray, count: int) -> None:
         """Keep the impacts that `write_impacts` describes."""
-        self._make_room(impacts=count)
+        self._reserve(impacts=count)
         log_impacts(self.buffers, time, contacts, position, log, count)
 
     def extend_impacts(self, rows: np.ndarray, change: np.ndarray) -> None:
         """Keep impacts (k, ROW_LENGTH) that are written already, and the changes of energy (k,) J by them."""
-        self._make_room(energy=len(rows), impacts=len(rows))
+        self._reserve(energy=len(rows), impacts=len(rows))
         buffers, counts, changed = self.buffers, self.buffers.counts, change != 0.0
         buffers.impacts[counts[2] : counts[2] + len(rows)] = rows
         energy = buffers.energy[counts[0] : counts[0] + np.count_nonzero(changed)]

@@ -1,9 +1,9 @@
-"""Who gave a body its momentum.
+"""Impulses on a body by their causes.
 
     m v(t) - m v(0) = sum over causes of the integral of F ds + sum of impulses
 
-Causes: gravity, constant forces, each force that varies, each joint, each body touched (lasting contact and impacts apart), and what is
-left: "corrections". These are the changes of velocity at the end of sub-steps (of second order in their length), the impulses by which
+Causes: gravity, constant forces, each force that varies, each joint, each body touched (lasting contact and impacts apart), and the
+rest: "corrections". These are the changes of velocity at the end of sub-steps (of second order in their length), the impulses by which
 contacts stick, and what bodies of sub-stepped islands exchange. Of a body that loses mass the left side is the integral of m v'.
 """
 

@@ -30,7 +30,7 @@ class Profile:
 
     Attributes:
         seconds: all of `simulate`.
-        stages: by stage; "all else" is compiling the scene, going round the loop, and making the recording.
+        stages: by stage; "all else" is compiling the scene, the loop itself, and making the recording.
         kernels: by name, the longest first.
         preparing: first calls of kernels, which are compiled or loaded from the cache then; not in `kernels`.
 

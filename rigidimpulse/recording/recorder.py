@@ -1,8 +1,7 @@
 """The recorder: samples every body's exact path at the frame times, whatever the frame rate, without touching the motion.
 
-A body's path is fixed from one change of its trajectory to the next. Before a trajectory changes at time t, the body's frames
-before t are written; a frame at the very time of an impact shows the state after it, but frame 0 is the state as
-given.
+A body's path is known from one change of its trajectory to the next. Before a trajectory changes at time t, the body's frames before t are
+written. A frame at exactly the time of an impact shows the state after it. Frame 0 is the state as given.
 """
 
 from __future__ import annotations

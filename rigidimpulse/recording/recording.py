@@ -1,4 +1,4 @@
-"""What a run leaves: frames, impacts, ledger, status; and the files it can be written to."""
+"""The result of a run: frames, impacts, ledger and status; and the files it can be written to."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Status:
 
 
 class RunSettings(NamedTuple):
-    """What `simulate` was asked for besides the scene: see there."""
+    """Arguments of `simulate`, without the scene."""
 
     duration: float
     fps: float
@@ -72,12 +72,12 @@ class Recording:
         positions: (f, n, 3) m, body origins. orientations: (f, n, 4) wxyz, body to world.
         velocities: (f, n, 3) m/s, centres of mass. angular_velocities: (f, n, 3) rad/s, world axes.
         centers: (f, n, 3) m, centres of mass.
-        impacts: structured array, one row an impulse at a contact point (see observe.events.IMPACT_DTYPE).
+        impacts: structured array, one row an impulse at a contact point (see recording.events.IMPACT_DTYPE).
         ledger: energy and momentum per frame. status: how the run went. plan: what was simulated and why.
         scene: the scene as it was written; None in a recording loaded from a file without one.
         reactions: (f, 3) N by joint, see `reaction`.
         contacts: structured array, one row a stretch of time over which a lasting contact carries the same force (see
-            observe.contacts.CONTACT_DTYPE); stretches that no frame sees are left out. `contacts_at`, `contact_force` by frame.
+            recording.contacts.CONTACT_DTYPE); stretches that no frame sees are left out. `contacts_at`, `contact_force` by frame.
         by_cause: impulses by body and cause, see `impulses`; None in a loaded recording.
         soft_bodies: frames of flexible bodies, see `soft_body`.
         profile: where the time of the run went, by stage and by kernel; `profile.table()` for people.
@@ -190,7 +190,7 @@ class Recording:
 
         """
         if self.by_cause is None:
-            raise SceneError("a loaded recording knows no causes", "ask the run that simulate() returned")
+            raise SceneError("a loaded recording has no impulses by cause", "ask the run that simulate() returned")
         return self.by_cause.of(name)
 
     def contacts_at(self, frame: int) -> np.ndarray:

@@ -107,7 +107,7 @@ class Body:
             if number(self.release_time, "release_time", "s") <= 0.0:
                 raise SceneError(f"release_time is {self.release_time} s", "give a time > 0, or use motion='dynamic'")
         if self.becomes_dynamic and any(part.shape.kind == "half_space" for part in self.shape.parts_flat()):
-            raise SceneError("a half space is infinite and can not be dynamic", "use motion='static', or Shape.box")
+            raise SceneError("a half space is infinite and cannot be dynamic", "use motion='static', or Shape.box")
 
     def _check_state(self) -> None:
         """Check pose, velocities and gravity factor."""

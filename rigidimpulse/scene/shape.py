@@ -61,7 +61,7 @@ class Shape:
 
     @staticmethod
     def half_space(normal: ArrayLike = (0.0, 0.0, 1.0), offset: float = 0.0) -> Shape:
-        """Everything below a plane: solid where normal . x <= offset. It can not be dynamic.
+        """Everything below a plane: solid where normal . x <= offset. It cannot be dynamic.
 
         Args:
             normal: (3,) points out of the solid; its length counts in the rule above.

@@ -51,7 +51,7 @@ def contact_rows(
     """Return the contacts (k, 8) that a frame sees, sorted by their first frame; see `CONTACT_ROW`.
 
     Args:
-        contacts: structured array of a recording, see `observe.contacts.CONTACT_DTYPE`.
+        contacts: structured array of a recording, see `recording.contacts.CONTACT_DTYPE`.
         times: (f,) s, of the frames.
         dynamic: for each body whether it can be pushed.
         up: (3,) unit vector.

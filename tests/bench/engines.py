@@ -42,7 +42,7 @@ class EngineRun(NamedTuple):
 
 
 def use_cores(number: int) -> None:
-    """Let the kernels here have so many cores, as NUMBA_NUM_THREADS does."""
+    """Let the kernels here use `number` cores, as NUMBA_NUM_THREADS does."""
     vars(config)["NUMBA_NUM_THREADS"] = number
 
 

@@ -30,7 +30,7 @@ class Case:
 
     Attributes:
         name: of the case. path: the file. run: the recording. bodies: names of nodes or prims by names of bodies.
-        stretch: (3, 3) by name of body, what is left of the world matrix at rest but for the rotation.
+        stretch: (3, 3) by name of body, the world matrix at rest without its rotation.
         start_frame: number of the first frame. tolerance: m, what keys that were left out may take.
         cameras: bodies that are cameras, which look along another axis in Blender.
 

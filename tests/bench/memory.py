@@ -1,4 +1,4 @@
-"""Memory that runs take: `python tests/bench/memory.py [COUNT]`, of a gas of so many balls and of so many boxes that heap up.
+"""Memory that runs take: `python tests/bench/memory.py [COUNT]`, of a gas of COUNT balls and a pile of COUNT boxes.
 
 Resident memory of a process at its peak, beyond that of a run of FEW bodies of the same kind and of the big scene before it runs: compiled
 scene, state, contacts and one frame a second. Arrays that are there but never touched take none. Each scene has a process of its own.

@@ -3,7 +3,7 @@
     python tests/bench/open_pages.py [BODIES FRAMES ...]
 
 Boxes, balls, capsules and cylinders that all move and turn, in a window of 1280 x 720. "moving" is the time from navigation to the end of
-the first picture whose time is not the start; heap is JavaScript's after collection, without arrays; seek is the mean of twenty.
+the first picture whose time is not the start; MB heap: the heap of JavaScript after collection, without arrays; seek is the mean of twenty.
 """
 
 from __future__ import annotations

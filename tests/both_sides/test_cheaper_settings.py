@@ -47,7 +47,7 @@ SUBSTEPPED, AFTER, LINEAR = ("contact_solver", "substepped"), ("impact_time", "a
         # All impacts of a row at once push every ball; a reflected speed knows no spin.
         ("cradle_one", ("response", "simultaneous"), "error of positions"),
         ("superball", ("response", "kinematic"), "error of the change of v"),
-        # Soft contacts of heaps give way: loads pass on a part at a time, friction creeps, what rocks over an edge loses energy.
+        # Soft contacts give way in sub-steps: loads pass on a part at a time, friction creeps, what rocks over an edge loses energy.
         ("heavy_dropped_1e3", SUBSTEPPED, "heavy one sinks into the light one"),
         ("incline", SUBSTEPPED, "0.1 degrees below: creep along the slope"),
         ("stopping", SUBSTEPPED, "stopping distance"),

@@ -24,7 +24,7 @@ from rigidimpulse.view.page import render_page
 pytestmark = pytest.mark.browser
 
 WIDTH, HEIGHT = 900, 440
-PIXELS = 2.0 / 480.0  # s: two pixels of a time line of at least so many, of 1 s
+PIXELS = 2.0 / 480.0  # s: two pixels of a time line of 1 s with at least 480 pixels
 OFFSET = np.array([0.1, -0.05, 0.2])  # m, of the centre of mass in the frame of the box
 CONTACT_FRAMES = (20, 40)
 POSE = 1e-5

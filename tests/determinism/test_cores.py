@@ -1,4 +1,4 @@
-"""Heaps on several cores: the same bits as on one, whatever is dealt out to whom, and however their memory grows."""
+"""Sub-stepped islands on several cores: the same bits as on one core, however the work is shared and however memory grows."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_contacts_that_find_no_space_are_found_again() -> None:
 
 @pytest.mark.parametrize("shares", [1, 2, 3])
 @pytest.mark.parametrize("number", [0, 1, BLOCK - 1, BLOCK, 5 * BLOCK + 3, 1000])
-def test_every_share_has_room_for_its_pairs(number: int, shares: int) -> None:
+def test_every_share_has_capacity_for_its_pairs(number: int, shares: int) -> None:
     dealt = [sum(len(range(b, min(b + BLOCK, number))) for b in range(s * BLOCK, number, shares * BLOCK)) for s in range(shares)]
     begins = [share_of(number, share, shares) for share in range(shares + 1)]
     assert sum(dealt) == number

@@ -6,8 +6,8 @@
     energy       E' = sum m |v - V|^2 / 2 + rotation - sum m a . (x - V t), seen from the supports, which all have the velocity V and so do
                  no work, never grows: by no more than ENERGY of the energy moved, and the contact gaps
     momentum     p(t) = p(0) + sum m a t + impulse of the supports, which are the impacts' where nothing presses bodies on them, zero where
-                 there is no support; with one floor it pushes only, and drags by no more than the greatest friction times that (but for
-                 the capture of contacts that leave slowly under load, which the ledger books)
+                 there is no support; with one floor it pushes only, and drags by no more than the greatest friction times that
+                 (except by contact capture of contacts that leave slowly under load, which is in the ledger)
     angular      L(t) = L(0) + (x0 t + v0 t^2 / 2) x sum m a about the origin, where all bodies have the same a and nothing supports them
 """
 
@@ -111,7 +111,7 @@ def _momentum(plan: ScenePlan, run: ri.Recording, mass, acceleration) -> list[st
 
 
 def _captured(run: ri.Recording, mass, moves: bool) -> float:
-    """N s that captures may have pulled: k of them that take E off the motion of m pull by sqrt(2 m E k) at most (Cauchy and Schwarz).
+    """Pull of contact captures, N s: k of them that take E off the motion of m pull by sqrt(2 m E k) at most (Cauchy and Schwarz).
 
     Where the floor moves, its work is part of what the ledger has, which then may be of either sign.
     """

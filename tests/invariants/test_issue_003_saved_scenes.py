@@ -32,7 +32,7 @@ def saved(name: str) -> ScenePlan:
         "seed_30098",  # a linkage of 5 g at its full reach swings 592 kg: positions that are no numbers
         "seed_30148",  # a rim that rolls faster and faster, its body in a slider: one force for half a step made 28 J
         "seed_80478",  # a light body whips between 28 and 496 kg: more than 256 sub-steps in a step, or energy rises by 1e-3
-        "seed_90492",  # without gravity: a body lifted off the floor was left inside the one above, which its group did not know of
+        "seed_90492",  # without gravity: a body lifted off the floor was left inside the one above, which its island did not know of
     ],
 )
 def test_laws_hold(name: str) -> None:

@@ -103,7 +103,7 @@ def test_bodies_come_back(tmp_path: Path) -> None:
         assert np.allclose(one, two, rtol=0, atol=2e-6)
 
 
-def test_psimd_lanes_come_back(tmp_path: Path) -> None:
+def test_planes_come_back(tmp_path: Path) -> None:
     scene = ri.Scene(bodies=bodies(), gravity=(0, -1, 0))
     back = ri.load_scene(scene.export(tmp_path / "scene.glb"))
     for name in ("floor", "ramp"):

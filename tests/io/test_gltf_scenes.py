@@ -1,4 +1,4 @@
-"""Scenes from glTF files: what is in the file is in the scene. Figures are exact but for single precision in meshes."""
+"""Scenes from glTF files: what is in the file is in the scene. Figures are exact, up to single precision in meshes."""
 
 from __future__ import annotations
 

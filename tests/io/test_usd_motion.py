@@ -35,7 +35,7 @@ def world(stage: Usd.Stage, path: str, code: float) -> np.ndarray:
 
 
 def off(stage: Usd.Stage, path: str, run: Any, name: str, start: float = 0.0, stretch: Any = 1.0) -> float:
-    """How far the matrix of a prim is from the pose of a body, over all frames; `stretch`: what is left of it but for the rotation."""
+    """How far the matrix of a prim is from the pose of a body, over all frames; `stretch`: the matrix without its rotation."""
     worst = 0.0
     for k, (x, q) in enumerate(zip(run.position(name), run.orientation(name), strict=True)):
         now = world(stage, path, start + k)

@@ -100,7 +100,7 @@ def test_meshes_that_change_are_as_at_the_start(tmp_path: Path) -> None:
     assert abs(scene["mesh"].shape.solid().volume - 8) < 1e-6 and "changes its shape" in scene.report[0]
 
 
-def test_psimd_lanes_and_static_colliders(tmp_path: Path) -> None:
+def test_planes_and_static_colliders(tmp_path: Path) -> None:
     """A plane stands where its prim stands, its normal is its axis; a box falls on it and rests there."""
     file = File("Y", unit=0.01)
     file.collider("/ground", "Plane", axis="Y", at=(0, 100, 0))

@@ -1,4 +1,4 @@
-"""Heaps of bodies of any shape in a pit, and which of them are inside each other."""
+"""Piles of bodies of any shape in a pit, and which of them are inside each other."""
 
 from __future__ import annotations
 

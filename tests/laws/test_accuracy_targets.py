@@ -1,4 +1,4 @@
-"""Accuracy by wish: what `Within` promises is kept, and its estimates are honest, on scenes whose motion is known in closed form.
+"""Accuracy targets: what `Within` promises is kept, and its estimates are honest, on scenes whose motion is known in closed form.
 
 An estimate is good if the true error is below it in at least 95 % of the cases, and not over 20 times smaller in the median. One that is
 the difference of two runs alone would be below the true error in most scenes of lasting contact (the gap at which contacts are held is
@@ -21,12 +21,12 @@ DURATIONS = {
     "coupled_springs": 0.5, "stack_10": 1.0, "incline": 1.0, "stopping": 1.5, "sliding_to_rolling": 1.0,
 }  # fmt: skip
 EXPENSIVE = ("driven_oscillator", "coupled_springs")
-"""Forces that vary: the tightest wish takes a minute there."""
+"""Forces that vary: the tightest target takes a minute there."""
 
 
 @cache
 def measured(name: str, position: float) -> tuple[ri.Recording, float]:
-    """A run by wish, and its true error, m."""
+    """A run with an accuracy target, and its true error, m."""
     entry = gallery.load(name)
     run = ri.simulate(entry.scene(), DURATIONS[name], accuracy=ri.Within(position=position))
     assert entry.exact is not None
@@ -55,7 +55,7 @@ def test_accuracy_targets_that_are_said_to_be_met_are_met() -> None:
     assert all(error <= target for target, error in met)
 
 
-def test_a_wish_that_cannot_be_met_is_reported() -> None:
+def test_a_target_that_cannot_be_met_is_reported() -> None:
     # Contacts are held at 1e-6 of a block's size: 1e-10 m is beyond what any step gives.
     run, _ = measured("incline", 1e-10)
     assert run.choice is not None and not run.choice.met
@@ -79,7 +79,7 @@ def test_time_is_kept_and_more_of_it_is_not_less_accurate() -> None:
     assert hasty is not None and not hasty.met and not runs[0].status.ok
     assert patient is not None and patient.met and runs[1].status.ok
     assert patient.accuracy.step < hasty.accuracy.step
-    # The chosen run was among those that were timed, within the wish.
+    # The chosen run was among those that were timed, within the target.
     chosen = next(each for each in patient.tries if each.accuracy == patient.accuracy)
     assert chosen.seconds <= 10.0 * len(runs[1].times)
 

@@ -54,7 +54,7 @@ def velocity_at(bodies: BodyState, contacts: Contacts, c: int) -> np.ndarray:
     return v[b] + np.cross(w[b], contacts.arm_b[c]) - v[a] - np.cross(w[a], contacts.arm_a[c])
 
 
-def random_group(rng: np.random.Generator, friction: float):
+def random_island(rng: np.random.Generator, friction: float):
     """One to three bodies on a fixed one, each on one to four points of another."""
     count = int(rng.integers(1, 4))
     masses, inertias, rows = [np.inf, *np.exp(rng.normal(size=count))], [np.eye(3)], []
@@ -75,10 +75,10 @@ def random_group(rng: np.random.Generator, friction: float):
 
 @pytest.mark.parametrize("friction", [0.0, 0.1, 0.5, 1.0])
 @pytest.mark.parametrize("law", LAWS)
-def test_random_groups_obey_energy_cone_and_sides(law: str, friction: float) -> None:
+def test_random_islands_obey_energy_cone_and_sides(law: str, friction: float) -> None:
     rng, bounced = np.random.default_rng(5), 0
     for _ in range(100):
-        masses, inertias, v, w, contacts = random_group(rng, friction)
+        masses, inertias, v, w, contacts = random_island(rng, friction)
         bodies = state(masses, inertias, v, w)
         before = energy(bodies, masses, inertias)
         log = respond(bodies, contacts, law)

@@ -90,7 +90,7 @@ def test_a_gun_recoils_with_the_momentum_of_its_shot(mass: float, shot: float, s
 
 @pytest.mark.parametrize(("mass_a", "mass_b", "speed", "friction"), [(800.0, 2400.0, 25.0, 0.5), (9000.0, 1000.0, 11.0, 0.9)])
 def test_skid_marks_tell_the_speed_of_a_rear_end_crash(mass_a: float, mass_b: float, speed: float, friction: float) -> None:
-    """Two boxes, the struck one rough; level with their centres the blow tips nothing. The held gap is 1e-6 of a box (B12)."""
+    """Two boxes, the struck one rough; level with their centres the blow tips nothing. The contact margin is 1e-6 of a box (B12)."""
     g, box = 9.81, ri.Shape.box((2.0, 1.0, 1.0))
     scene = ri.Scene(gravity=(0, 0, -g), bodies=[ri.Body("road", ri.Shape.half_space(), motion="static")])
     for name, x, v, mass, mu in (("a", 0.0, speed, mass_a, 0.0), ("b", 3.0, 0.0, mass_b, friction)):
@@ -105,7 +105,7 @@ def test_skid_marks_tell_the_speed_of_a_rear_end_crash(mass_a: float, mass_b: fl
 
 @pytest.mark.parametrize("seed", range(3))
 def test_internal_forces_cancel(seed: int) -> None:
-    """Rough bodies of all shapes collide under an oblique gravity: p = p0 + M g t to rounding; angular momentum to the held gap (B4)."""
+    """Rough bodies of all shapes collide under an oblique gravity: p = p0 + M g t to rounding, angular momentum to the margin (B4)."""
     rng = np.random.default_rng(seed)
     g, scene = np.array([0.5, -1.0, 2.0]), ri.Scene(gravity=(0.5, -1.0, 2.0))
     shapes = [ri.Shape.sphere(0.3), ri.Shape.box((0.5, 0.4, 0.3)), ri.Shape.capsule(0.2, 0.4), ri.Shape.cylinder(0.3, 0.3)]

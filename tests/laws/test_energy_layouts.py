@@ -1,12 +1,12 @@
 """Energies of layouts: their gradients, and the minima that closed forms tell.
 
-Laws. A gradient is the derivative of its value: central differences with a step of 1e-6 leave 1e-12 of the third derivative and 1e-10
-of rounding, so 1e-8 relative is asked; a wrong factor or a left-out rotation shows as 1e-1. Internal energies neither push nor turn a
-free group: force and torque sum to 0. Exact pins close to 1e-12 of the size. Chains of n rods of mass m and length l hang as static
-equilibrium says: straight down, rod i of soft pins lower by sum of (n - j) m g / k; between two hooks at equal height rod i rises by
-tan t_i = (i - (n + 1) / 2) m g / H, where H follows from the span, sum of l cos t_i. The best common motion of a group is Kabsch's, here
-by scipy on six points for each body. Bodies that overlap by s: balls k s^2 / 4, boxes face to face 8 k (s / 2)^2 / 2; n corners sink
-under F by F / (n k). Poses at a minimum of curvature c are exact to the rounding of forces over c: bounds 1e-9.
+Laws. A gradient is the derivative of its value: central differences with a step of 1e-6 leave 1e-12 of the third derivative and 1e-10 of
+rounding, so 1e-8 relative is asked; a wrong factor or a left-out rotation shows as 1e-1. Internal energies neither push nor turn free
+bodies as a whole: force and torque sum to 0. Exact pins close to 1e-12 of the size. Chains of n rods of mass m and length l hang as static
+equilibrium says: straight down, rod i of soft pins lower by sum of (n - j) m g / k; between two hooks at equal height rod i rises by tan
+t_i = (i - (n + 1) / 2) m g / H, where H follows from the span, sum of l cos t_i. The best common motion of bodies is Kabsch's, here by
+scipy on six points for each body. Bodies that overlap by s: balls k s^2 / 4, boxes face to face 8 k (s / 2)^2 / 2; n corners sink under F
+by F / (n k). Poses at a minimum of curvature c are exact to the rounding of forces over c: bounds 1e-9.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ SHAPES = {
 NAMES = list(SHAPES)
 
 
-def heap(seed: int = 0, order: tuple[int, ...] = (0, 1, 2, 3, 4)) -> ri.Scene:
+def disorder(seed: int = 0, order: tuple[int, ...] = (0, 1, 2, 3, 4)) -> ri.Scene:
     """Bodies of all kinds inside each other, a floor and a static box."""
     random = np.random.default_rng(seed)
     places = [(random.normal(0.0, 0.35, 3) + (0, 0, 0.3), random.normal(size=4)) for _ in SHAPES]
@@ -69,7 +69,7 @@ TERMS = {
 @pytest.mark.parametrize("name", TERMS)
 def test_the_gradient_is_the_derivative_of_the_value(name: str, seed: int) -> None:
     random = np.random.default_rng(seed)
-    world = ri.compile_scene(heap(seed))
+    world = ri.compile_scene(disorder(seed))
     compiled = compile_energies(world, [TERMS[name]])
     turn = quaternion_from_rotation_vector(random.normal(0.0, 0.3, (world.num_bodies, 3)))
     x, q = world.position + random.normal(0.0, 0.02, world.position.shape), multiply(turn, world.orientation)
@@ -91,7 +91,7 @@ def test_the_gradient_is_the_derivative_of_the_value(name: str, seed: int) -> No
 
 @pytest.mark.parametrize("name", ["pin", "shape", "surface of a cylinder", "no overlap, gap"])
 def test_bodies_do_not_push_themselves(name: str) -> None:
-    world = ri.compile_scene(heap())
+    world = ri.compile_scene(disorder())
     gradient = expanded(compile_energies(world, [TERMS[name]]), poses(world.position, world.orientation)).gradient
     force, torque = gradient[:, :3], gradient[:, 3:]
     size = np.abs(gradient).max()
@@ -109,7 +109,7 @@ def point(scene: ri.Scene, settled: ri.Scene, name: str, anchor: tuple[float, fl
 
 @pytest.mark.parametrize("weight", [1e-3, 1.0, np.inf])
 def test_pinned_points_of_free_bodies_meet(weight: float) -> None:
-    scene = heap()
+    scene = disorder()
     ends = [("box", "ball", (0, 1, 0), (1, 0, 0)), ("ball", "capsule", (1, 2, 0), (0, 0, 2)), (None, "capsule", (3, 3, 3), (0, 0, 0))]
     settled, report = ri.settle(scene, [ri.PinPoints(*end, weight) for end in ends])
     assert report.ok, report.message
@@ -173,7 +173,7 @@ def test_a_chain_hangs_between_two_hooks(number: int, span: float) -> None:
     np.testing.assert_allclose(report.value, MASS * G * middle[:, 2].sum(), rtol=1e-12)
 
 
-def group(random: np.random.Generator, motions: str) -> tuple[list[ri.Body], np.ndarray, np.ndarray]:
+def four_bodies(random: np.random.Generator, motions: str) -> tuple[list[ri.Body], np.ndarray, np.ndarray]:
     """Four bodies in disorder, and the layout wanted."""
     x, q = random.normal(0.0, 1.0, (4, 3)), random.normal(size=(4, 4))
     bodies = [
@@ -202,15 +202,15 @@ def kabsch(bodies: list[ri.Body], world, x: np.ndarray, q: np.ndarray) -> tuple[
 
 def test_shape_matching_has_the_value_of_kabsch() -> None:
     for seed in range(5):
-        bodies, x, q = group(np.random.default_rng(seed), "dddd")
+        bodies, x, q = four_bodies(np.random.default_rng(seed), "dddd")
         world = ri.compile_scene(ri.Scene(bodies=bodies))
         term = ri.RestoreShape([body.name for body in bodies], 3.0, x, q)
         value = expanded(compile_energies(world, [term]), poses(world.position, world.orientation)).value
         np.testing.assert_allclose(value, 1.5 * kabsch(bodies, world, x, q)[2], rtol=1e-12)
 
 
-def test_shape_matching_restores_a_group_and_leaves_a_moved_one_alone() -> None:
-    bodies, x, q = group(np.random.default_rng(1), "dddd")
+def test_shape_matching_restores_a_layout_and_leaves_a_moved_one_alone() -> None:
+    bodies, x, q = four_bodies(np.random.default_rng(1), "dddd")
     names = [body.name for body in bodies]
     settled, report = ri.settle(ri.Scene(bodies=bodies), [ri.RestoreShape(names, 2.0, x, q)])
     assert report.ok and report.value < 1e-20, report
@@ -223,7 +223,7 @@ def test_shape_matching_restores_a_group_and_leaves_a_moved_one_alone() -> None:
 
 def test_a_free_body_joins_the_layout_of_fixed_ones_where_kabsch_says() -> None:
     """Its own square can be 0, so the common motion is the best one of the three that do not move."""
-    bodies, x, q = group(np.random.default_rng(2), "sssd")
+    bodies, x, q = four_bodies(np.random.default_rng(2), "sssd")
     settled, report = ri.settle(ri.Scene(bodies=bodies), [ri.RestoreShape([body.name for body in bodies], 2.0, x, q)])
     assert report.ok, report.message
     rotation, shift, left = kabsch(bodies[:3], ri.compile_scene(settled), x[:3], q[:3])
@@ -245,7 +245,7 @@ def overlapping(scene: ri.Scene) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_bodies_inside_each_other_come_apart(seed: int) -> None:
-    scene = heap(seed)
+    scene = disorder(seed)
     assert len(overlapping(scene)) > 2
     settled, report = ri.settle(scene, [ri.NoOverlap(gap=1e-3)])
     assert report.ok and report.value < 1e-12, report
@@ -334,8 +334,8 @@ def test_the_order_of_energies_and_bodies_plays_no_part() -> None:
         ri.NoOverlap(500.0, bodies=["cylinder", "compound", "floor"]),
         ri.RestoreShape(["cylinder", "compound"], 40.0), ri.PinPoints("cylinder", None, (0, 0, 0.5), (0.2, 0.3, 0.5), 80.0),
     ]  # fmt: skip
-    one, report = ri.settle(heap(), energies)
-    other, again = ri.settle(heap(order=(3, 0, 4, 2, 1)), energies[::-1])
+    one, report = ri.settle(disorder(), energies)
+    other, again = ri.settle(disorder(order=(3, 0, 4, 2, 1)), energies[::-1])
     assert report.ok and again.ok
     np.testing.assert_allclose(again.value, report.value, rtol=1e-11)
     for name in NAMES:
@@ -343,7 +343,7 @@ def test_the_order_of_energies_and_bodies_plays_no_part() -> None:
 
 
 def test_what_is_not_asked_for_stays() -> None:
-    scene = heap()
+    scene = disorder()
     scene.add(ri.ConstantForce("box", (0, 0, 1)))
     before = [(body.name, np.array(body.position)) for body in scene.bodies]
     settled, report = ri.settle(scene, [ri.PinPoints(None, "box", (0, 0, 3), (0, 0, 0))])

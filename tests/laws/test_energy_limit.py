@@ -1,4 +1,4 @@
-"""The guard of energy: what constant contact forces gave too much is taken off, and nothing else changes.
+"""The energy limiter takes off the energy that constant contact forces gave too much, and changes nothing else.
 
 Laws. From bodies that only touch each other, energy E is taken off their motion against each other: their momentum sum m v and angular
 momentum sum (x x m v + I w) stay, their kinetic energy falls by E, and never below that of the rigid body they would be. Where what stands
@@ -7,8 +7,8 @@ their parts; 1e-12 is asked. A common spin left out of the motion (W = 0) moves 
 found without the parts m r^2 of the inertia.
 
 In a run the energy of two bodies that roll on each other, pressed together by steady forces, never grows from step to step but by rounding:
-the guard leaves alone what is below 1e-11 of the kinetic energy in a sub-step, and there are some hundred sub-steps: 1e-9. Without the
-guard it grows by 3e-7 of it and more here. A group taken for a grounded one would lose its common motion.
+the limiter leaves alone what is below 1e-11 of the kinetic energy in a sub-step, and there are some hundred sub-steps: 1e-9. Without the
+limiter it grows by 3e-7 of it and more here. An island taken for a grounded one would lose its common motion.
 """
 
 from __future__ import annotations

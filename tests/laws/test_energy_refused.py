@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_energy_layouts import heap
+from test_energy_layouts import disorder
 
 import rigidimpulse as ri
 
@@ -35,15 +35,15 @@ import rigidimpulse as ri
 )
 def test_bad_energies_are_refused(energies: list, words: str) -> None:
     with pytest.raises(ri.SceneError, match=words):
-        ri.settle(heap(), energies)
+        ri.settle(disorder(), energies)
 
 
 def test_scenes_that_cannot_be_settled_are_refused() -> None:
-    scene = heap()
+    scene = disorder()
     scene.add(ri.BallJoint("box", "ball", (0, 0, 0)))
     with pytest.raises(ri.SceneError, match="settle the bodies first"):
         ri.settle(scene, [ri.NoOverlap()])
     with pytest.raises(ri.SceneError, match="no dynamic body"):
         ri.settle(ri.Scene(bodies=[ri.Body("floor", ri.Shape.half_space(), motion="static")]), [ri.NoOverlap()])
     with pytest.raises(ri.SceneError, match="cannot be added to a scene"):
-        heap().add(ri.NoOverlap())
+        disorder().add(ri.NoOverlap())

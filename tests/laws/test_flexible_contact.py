@@ -1,6 +1,6 @@
-"""Nets in contact with rigid bodies, against statics, Coulomb's law and the balances of momentum.
+"""Soft bodies in contact with rigid bodies, against statics, Coulomb's law and the balances of momentum.
 
-Balances hold to round-off whatever the solver's tolerance: what a body gets is what the net's contacts gave. Angular momentum is that of
+Balances hold to round-off whatever the solver's tolerance: a body gets what the soft body's contacts gave. Angular momentum is that of
 the ramp of forces (impulse J, way h J / m), which `flexible_scene.Run` follows.
 """
 

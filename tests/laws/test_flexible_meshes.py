@@ -1,8 +1,8 @@
-"""Nets without contact against closed forms and conservation laws.
+"""Soft bodies without contact against closed forms and conservation laws.
 
 Chain of N masses between fixed ends: w_j = 2 sqrt(k / m) sin(j pi / 2 (N + 1)). Implicit Euler's period is too long by (w h)^2 / 3 and its
 amplitude falls by pi w h a period, the midpoint rule's period by (w h)^2 / 12: 200 steps a period are within 0.1 % for both. Energy: K + E
-never grows, but for round-off of the sum (1e-12 of it): an explicit step at k h^2 / m = 1e6 multiplies it by 1e12.
+never grows by more than round-off of the sum (1e-12 of it): an explicit step at k h^2 / m = 1e6 multiplies it by 1e12.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Flexible bodies in runs, through the public surface: momentum and energy between nets and rigid bodies, rest, files, pages."""
+"""Flexible bodies in runs, through the public surface: momentum and energy between soft and rigid bodies, rest, files, pages."""
 
 from __future__ import annotations
 

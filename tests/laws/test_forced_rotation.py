@@ -132,7 +132,7 @@ def test_a_rate_that_is_none_changes_no_bit():
                 assert one.tobytes() == other.tobytes()
 
 
-def test_vanishing_torque_is_the_free_top():
+def test_vanishing_torque_is_free_rotation():
     """Two methods that share nothing: series over 127 segments, and elliptic functions."""
     inertia, w_start = np.array([3.0, 2.0, 1.0]), np.array([0.5, 0.6, -0.6])
     top = Top(inertia, TILTED, w_start, (1e-30, 0.0, 0.0))
@@ -145,7 +145,7 @@ def test_vanishing_torque_is_the_free_top():
         assert w_now == pytest.approx(w_free, abs=ROUND_OFF * EPS * (1.0 + time))
 
 
-def test_no_torque_is_left_to_the_free_top():
+def test_no_torque_is_left_to_free_rotation():
     constants, series = np.full(forced_rotation.FORCED_ROTATION_SIZE, 7.0), np.full(forced_rotation.SERIES_SIZE, 7.0)
     assert not forced_rotation.prepare(np.ones(3), UPRIGHT, np.ones(3), np.zeros(3), np.zeros(3), constants, series)
     assert (constants == 7.0).all() and (series == 7.0).all()

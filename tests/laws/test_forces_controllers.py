@@ -134,7 +134,7 @@ def test_a_pin_is_a_spring_without_length_and_stores_energy() -> None:
     np.testing.assert_allclose(run.ledger.total, 0.5 * k * aim @ aim, rtol=0, atol=k * PATH)
 
 
-def group(*forces: object, duration: float = 3.0) -> ri.Recording:
+def three_boxes(*forces: object, duration: float = 3.0) -> ri.Recording:
     """Three boxes that fly apart and tumble."""
     random = np.random.default_rng(5)
     scene = ri.Scene(gravity=(0, 0, 0))
@@ -151,7 +151,7 @@ def group(*forces: object, duration: float = 3.0) -> ri.Recording:
 
 
 def test_a_shape_that_is_restored_keeps_momentum_and_energy() -> None:
-    run = group(ri.EnergyForce(ri.RestoreShape(["a", "b", "c"], 40.0), name="shape"))
+    run = three_boxes(ri.EnergyForce(ri.RestoreShape(["a", "b", "c"], 40.0), name="shape"))
     assert run.status.ok and not len(run.impacts)
     for kept, bound in ((run.ledger.momentum, 1e-12), (run.ledger.angular_momentum, 10.0 * PATH)):
         np.testing.assert_allclose(kept, np.broadcast_to(kept[0], kept.shape), rtol=0, atol=bound)

@@ -34,7 +34,7 @@ UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 class Top:
-    """A free top, ready to be evaluated."""
+    """A body that rotates freely, ready to be evaluated."""
 
     def __init__(self, inertia, q, w_world):
         self.inertia, self.q, self.w = (np.asarray(value, dtype=float) for value in (inertia, q, w_world))

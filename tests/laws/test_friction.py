@@ -4,9 +4,9 @@
     a block on an incline holds if mu > tan t and slides with g (sin t - mu cos t) otherwise
     a ball with the slip u slides until 2 |u| / (7 mu g) along a parabola, and rolls on with v - (2/7) u
 
-Forces are constant over each stretch, so paths are polynomials: rounding and the equations' 1e-12, and the held gap of 1e-6 of the size
-that a body is lifted by. 1e-9 relative; a slide that ends on a grid of 1/60 s is off by 1e-3, friction along each axis on its own by up
-to 40 %.
+Forces are constant over each stretch, so paths are polynomials: rounding and the equations' 1e-12, and the contact margin of 1e-6 of the
+size by which a body is raised. 1e-9 relative; a slide that ends on a grid of 1/60 s is off by 1e-3, friction along each axis on its own by
+up to 40 %.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ def random_pairs(seed: int, friction: bool) -> list[tuple[ri.Body, ri.Body]]:
     pairs = []
     for k in range(PAIRS_PER_SCENE):
         mu = float(rng.uniform(0.0, 1.0)) if friction else 0.0
-        # A rebound that rises less than the held gap is none: spins press by some 10 m/s2, so e u_n must exceed some mm/s.
+        # A rebound that rises less than the contact margin is none: spins press by some 10 m/s2, so e u_n must exceed some mm/s.
         material = ri.Material(restitution=float(rng.uniform(0.02, 1.0)), static_friction=mu, dynamic_friction=0.8 * mu)
         centre = np.array([SPACING * k, 0.0, 0.0])
         away = rng.normal(size=3)

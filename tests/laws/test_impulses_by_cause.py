@@ -110,5 +110,5 @@ def test_loaded_recording_says_that_it_knows_no_causes(tmp_path) -> None:
     with pytest.raises(ri.SceneError, match="unknown body 'bal'"):
         run.impulses("bal")
     loaded = ri.load_recording(run.export(tmp_path / "run.npz"))
-    with pytest.raises(ri.SceneError, match="knows no causes"):
+    with pytest.raises(ri.SceneError, match="has no impulses by cause"):
         loaded.impulses("ball")

@@ -1,4 +1,4 @@
-"""Regression: planks of a heap that passed into each other."""
+"""Regression: planks of a pile that passed into each other."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_planks_lie_crosswise_on_each_other_and_do_not_pass_through(shape: ri.Sh
     """100 planks, 30 mm thick, fall at up to 5 m/s and spin at some 10 rad/s; they come by 5 thicknesses in a step.
 
     They had half as many sub-steps as they need to see each other coming, and one contact where two edges were nearest: planks that lay
-    crosswise rocked about it, and were up to 20 mm deep in each other ("preview": 38 mm, and 31 mm at rest). Of 13 heaps of boxes the
+    crosswise rocked about it, and were up to 20 mm deep in each other ("preview": 38 mm, and 31 mm at rest). Of 13 piles of boxes the
     deepest is now at 1.0 mm (0.7), of 4 of prisms at 0.2 (0.5).
     """
     random = np.random.default_rng(2)

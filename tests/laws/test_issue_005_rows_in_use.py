@@ -1,4 +1,4 @@
-"""Regression: pairs of a heap whose contacts were kept in the same rows."""
+"""Regression: pairs of a pile whose contacts were kept in the same rows."""
 
 from __future__ import annotations
 

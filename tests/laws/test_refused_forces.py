@@ -1,7 +1,7 @@
 """Contact forces that are no solution: refused where they would make energy, and said in any case.
 
 The solver of rows says how far its impulses are from the laws of contact. Here it is exact, and then its impulses are spoilt: multiplied,
-or no numbers at all, with an honest residual. Law: energy never grows, whatever the solver does, but for contact gaps, 2 delta m g;
+or no numbers at all, with an honest residual. Law: energy never grows by more than contact margins, 2 delta m g, whatever the solver does;
 forces of thirty times what is needed would throw a body of 1 kg up with 29 g h, 11 J in one step.
 """
 

@@ -58,7 +58,7 @@ def test_until_then_nothing_moves_it():
 
 @pytest.mark.parametrize("count", [1, 8])
 def test_what_rests_on_it_wakes(count):
-    # Boxes sleep on a tray; when it is let go all fall with g: after 0.2 s by 0.196 m. Eight times eight boxes are a heap.
+    # Boxes sleep on a tray; when it is let go all fall with g: after 0.2 s by 0.196 m. Eight times eight boxes are sub-stepped.
     scene = ri.Scene(bodies=[ri.Body("tray", ri.Shape.box((5, 5, 0.1)), motion="kinematic", position=(0, 0, 2), release_time=0.5)])
     for k in range(count):
         for j in range(count):

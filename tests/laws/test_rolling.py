@@ -52,7 +52,7 @@ def test_spinning_ball_stops_on_the_spot() -> None:
     q = run.orientation("ball")
     turned = np.unwrap(2 * np.arctan2(q[:, 3], q[:, 0]))[-1]
     assert turned == pytest.approx(spin**2 / (2 * slow), rel=1e-6)
-    np.testing.assert_allclose(run.position("ball"), [(0, 0, R)] * len(run.times), atol=1.1e-6 * 2 * R)  # the held gap
+    np.testing.assert_allclose(run.position("ball"), [(0, 0, R)] * len(run.times), atol=1.1e-6 * 2 * R)  # the contact margin
 
 
 @pytest.mark.parametrize("share", [0.99, 1.01])

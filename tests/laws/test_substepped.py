@@ -1,4 +1,4 @@
-"""Laws of the sub-stepped solver of heaps (`contact_solver="substepped"`), and where "auto" takes it."""
+"""Laws of the sub-stepped solver (`contact_solver="substepped"`), and where "auto" takes it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def step_accuracy(step: float) -> ri.Accuracy:
 
 @pytest.mark.parametrize("degrees", [-0.1, 0.1])
 def test_block_holds_below_and_slides_above_the_critical_angle(degrees):
-    # Below, the block stays but for the play of the spring: less than its skin. Above, s = g (sin a - mu cos a) t^2 / 2; the first
+    # Below, the block moves no more than the spring gives: less than its skin. Above, s = g (sin a - mu cos a) t^2 / 2; the first
     # sub-steps have no friction yet, which loses g sin a h t < 1 cm in 2 s; a friction off by 1 % would move it by 9 cm.
     angle = math.atan(0.5) + math.radians(degrees)
     run = ri.simulate(block_on_plane(angle), 2.0, accuracy=SUBSTEPPED)
@@ -144,8 +144,9 @@ def test_a_substepped_island_that_must_not_stand_still_comes_to_rest_by_itself()
 
 
 def test_momentum_is_kept_and_energy_only_lost():
-    # Impulses are equal and opposite at one point, so momenta hold to round-off (3e-11 of 240 N s), but for the guard of energy, which
-    # takes what the rule for rotation gains (1e-11 of it a step) off all speeds: 1e-8. Arms to each own surface would give 0.5.
+    # Impulses are equal and opposite at one point, so momenta hold to round-off (3e-11 of 240 N s). Only the energy limiter
+    # changes them: it takes what the rule for rotation gains (1e-11 of it a step) off all speeds: 1e-8. Arms to each own surface
+    # would give 0.5.
     run = ri.simulate(cloud(), 1.5, accuracy=SUBSTEPPED)
     assert run.ledger is not None
     ledger = run.ledger
@@ -194,7 +195,7 @@ def mixed_run() -> ri.Recording:
 
 
 def test_same_bits_again_renamed_and_in_another_order():
-    # Bodies and pairs are worked through in an order of places, so not a bit may differ; in any other order the heap, which
+    # Bodies and pairs are worked through in an order of places, so not a bit may differ; in any other order the pile, which
     # amplifies round-off tenfold with every impact, would lie differently by centimetres.
     first = mixed_run()
     for reordered, prefix in ((False, ""), (True, ""), (False, "z")):
@@ -221,7 +222,7 @@ def test_bullet_hits_resting_substepped_island_at_the_exact_time():
 
 @pytest.mark.parametrize("tall", [False, True])
 def test_auto_leaves_tall_columns_to_newton(tall):
-    # 64 boxes beside each other in low stacks are a heap; in stacks of 16 they are not: the exact solver keeps them, at 1e-6 of their size.
+    # 64 boxes beside each other in low stacks are sub-stepped; in stacks of 16 the exact solver keeps them, at 1e-6 of their size.
     height = 16 if tall else 4
     scene = ri.Scene(gravity=(0.0, 0.0, -GRAVITY))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
@@ -284,7 +285,7 @@ def thrown(seed: int) -> ri.Scene:
 
 
 def depths_of_thrown(seeds: int, accuracy: str) -> tuple[list[float], list[float]]:
-    """Largest depth on the way, and at the end, of the first heaps, m."""
+    """Largest depth on the way, and at the end, of the first piles, m."""
     on_the_way, at_the_end = [], []
     for seed in range(seeds):
         run = ri.simulate(thrown(seed), 2.0, accuracy=accuracy)
@@ -296,8 +297,8 @@ def depths_of_thrown(seeds: int, accuracy: str) -> tuple[list[float], list[float
 
 
 def test_boxes_hardly_sink_into_each_other_on_the_way():
-    # A fall at up to 7 m/s, 10 rad/s. Of 32 heaps three quarters keep within their skins (2 mm) all the way, the worst is at 2.5 mm; which
-    # of them these five are like depends on round-off, so on the compiler. Looked at once a step, 16 ms, most heaps have boxes 15 mm and
+    # A fall at up to 7 m/s, 10 rad/s. Of 32 piles three quarters keep within their skins (2 mm) all the way, the worst is at 2.5 mm; which
+    # of them these five are like depends on round-off, so on the compiler. Looked at once a step, 16 ms, most piles have boxes 15 mm and
     # more inside each other; with one contact where two edges are nearest half are at 1.9 mm, the worst at 5.6; without contacts ahead of
     # time 0.1 m.
     depths, _ = depths_of_thrown(5, "standard")
@@ -307,7 +308,7 @@ def test_boxes_hardly_sink_into_each_other_on_the_way():
 
 def test_preview_looks_at_substepped_islands_less_often_and_is_deeper_on_the_way():
     # The other side of `substep_motion` and `step`: over 0.3 inner radii, 75 mm, boxes come at each other with other edges and corners, in
-    # half of 32 heaps 2.3 to 4.3 mm deep, in the worst 10. At the end all lie in their skins.
+    # half of 32 piles 2.3 to 4.3 mm deep, in the worst 10. At the end all lie in their skins.
     depths, last = depths_of_thrown(5, "preview")
     assert 1.5e-3 < np.median(depths) < 8e-3
     assert max(depths) < 2e-2
@@ -324,8 +325,8 @@ def row_of_boxes(number: int, *others: ri.Body) -> ri.Scene:
     return scene
 
 
-def test_calm_part_of_a_substepped_island_stands_still_while_a_ball_rolls_on_it():
-    # The ball rolls on at 0.04 m/s and is never calm; boxes that it cannot stir keep their bits and have no speed at all. Stepped with
+def test_sleeping_part_of_a_substepped_island_stands_still_while_a_ball_rolls_on_it():
+    # The ball rolls on at 0.04 m/s and never sleeps; boxes that it cannot wake keep their bits and have no speed at all. Stepped with
     # it they would sway by some 1e-7 m.
     ball = ri.Body(
         "ball", ri.Shape.sphere(0.1), position=(0.0, 0.0, 0.606), velocity=(0.04, 0, 0), angular_velocity=(0, 0.4, 0), material=ROUGH
@@ -337,10 +338,10 @@ def test_calm_part_of_a_substepped_island_stands_still_while_a_ball_rolls_on_it(
     np.testing.assert_array_equal(run.velocities[90:, far], 0.0)
 
 
-def test_calm_boxes_are_no_wall_to_one_that_slides_into_them():
-    # A ball rolls on the far end, so that the row is a heap of which the near part stands still. A pusher of five boxes' mass slides 11 m
+def test_sleeping_boxes_are_pushed_by_one_that_slides_into_them():
+    # A ball rolls on the far end, so that the row is a sub-stepped island whose near part sleeps. A pusher of five boxes' mass slides 11 m
     # and comes at 1.2 s with v = sqrt(144 - 2 mu g 11) = 6 m/s; without rebound it goes on with all twelve at u = 5 v / 17, for
-    # u^2 / (2 mu g) = 0.32 m. The blow runs through the gaps of the row and takes some of it. Were calm boxes held,
+    # u^2 / (2 mu g) = 0.32 m. The blow runs through the gaps of the row and takes some of it. Were sleeping boxes held,
     # the sixth would not move.
     spin, places = (0, 0.4, 0), ((5.2, 0.0, 0.606), (-11.5, 0.0, 0.252))
     ball = ri.Body("ball", ri.Shape.sphere(0.1), position=places[0], velocity=(0.04, 0, 0), angular_velocity=spin, material=ROUGH)

@@ -1,4 +1,4 @@
-"""Cylinders in a heap stay apart, among themselves and among other shapes."""
+"""Cylinders in a pile stay apart, among themselves and among other shapes."""
 
 from __future__ import annotations
 

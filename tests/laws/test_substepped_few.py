@@ -1,4 +1,4 @@
-"""Islands of 12 to 59 bodies: exact while that is cheap, sub-stepped finely once it is dear."""
+"""Islands of 12 to 59 bodies: exact while that is cheap, sub-stepped finely once it is expensive."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_a_fall_of_some_dozen_bodies_is_stepped_finely(kind: str, seed: int, num
     """Solved exactly 40 boxes take more than a minute for these 2 s. Here bodies stay apart, too, and energy never grows.
 
     Contacts that were exact ones are held at a fifth of the skin (0.8 % of 3 to 5 cm, 0.06 mm) and more: not one pair of the seven runs
-    with which this was tried was inside another by 1e-7 m at these frames. Stepped as coarsely as heaps of thousands, two pairs of the
+    with which this was tried was inside another by 1e-7 m at these frames. Stepped as coarsely as piles of thousands, two pairs of the
     boxes and one of the mix are inside each other by 0.1 mm, and the boxes gain 4e-6 of their energy. Here it is 2e-9: what lifts take is
     taken off the speeds, to second order.
     """
@@ -65,7 +65,7 @@ def test_what_is_cheap_stays_exact(number: int) -> None:
 
 
 def test_bodies_that_all_rebound_are_no_substepped_island() -> None:
-    """Heaps do not begin where every pair rebounds by more than 0.5: the plan says so, and keeps the kernel of impacts."""
+    """No island is sub-stepped where every pair rebounds by more than 0.5: the plan says so, and keeps the kernel of impacts."""
     scene = ri.Scene(gravity=(0.0, 0.0, -9.81))
     rubber = ri.Material(density=900, restitution=0.8)
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=rubber))
@@ -77,7 +77,7 @@ def test_bodies_that_all_rebound_are_no_substepped_island() -> None:
 
 
 def test_a_body_that_is_let_go_joins_the_substepped_island() -> None:
-    """A lid that is carried above a fall of boxes, and let go when they have long been a heap, comes to rest on them."""
+    """A lid that is carried above a fall of boxes, and let go when they have long been a pile, comes to rest on them."""
     scene = part_of_pit(STONES["boxes"], 12, 24)
     lid = ri.Body("lid", ri.Shape.box((0.5, 0.5, 0.05)), position=(0, 0, 1.0), motion="kinematic", release_time=0.8, material=STONE)
     scene.add(lid)
@@ -90,7 +90,7 @@ def test_a_body_that_is_let_go_joins_the_substepped_island() -> None:
 
 
 def test_substepped_islands_can_be_left_out() -> None:
-    """A row of boxes on the floor is a heap; without heaps it is solved exactly, to the bit as "newton" does, and the status says so."""
+    """A row of boxes is sub-stepped; without that effect it is solved exactly, to the bit as by "newton", and the status says so."""
     stone = ri.Material(density=900, static_friction=0.4, dynamic_friction=0.4)
     scene = ri.Scene(gravity=(0.0, 0.0, -9.81))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=stone))

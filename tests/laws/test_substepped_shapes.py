@@ -1,4 +1,4 @@
-"""Bodies of a heap stay apart: thin ones, hollow and branched ones, tiny ones."""
+"""Bodies of a pile stay apart: thin ones, hollow and branched ones, tiny ones."""
 
 from __future__ import annotations
 
@@ -65,14 +65,14 @@ def test_thin_bodies_do_not_pass_through_each_other(shape: ri.Shape, seed: int) 
 def test_bodies_that_are_not_convex_do_not_sink_into_each_other(shapes: list[ri.Shape], seed: int) -> None:
     """Of 96 rings, angles, dumb-bells or crosses in a pit many ended deep inside others, half of them with "contact not resolved".
 
-    Now their contacts are found from cores (`heap_cores`): in twenty such runs the worst was below 0.2 mm on the way, 0.1 mm at the end.
+    Now their contacts are found from inset surfaces: in twenty such runs the worst was below 0.2 mm on the way, 0.1 mm at the end.
     """
     check(pit(shapes, seed), "preview", 2.5, 1e-3, 2e-4)
 
 
 @pytest.mark.parametrize("accuracy", ["standard", "preview"])
 def test_tiny_bodies_are_stepped_as_large_ones_are(accuracy: str) -> None:
-    """A heap of bodies of 1 to 2 mm is stepped for at most sqrt(r / g) at once.
+    """A pile of bodies of 1 to 2 mm is stepped for at most sqrt(r / g) at once.
 
     In steps of 1/30 s, in which they fall several times their size, 80 such bodies ended with 60 pairs inside each other.
     """
@@ -82,8 +82,8 @@ def test_tiny_bodies_are_stepped_as_large_ones_are(accuracy: str) -> None:
     check(pit(shapes, 11, size), accuracy, 0.3, 0.02 * size, 2e-3 * size)
 
 
-def test_a_hundred_boxes_that_still_meet_in_small_groups_are_a_substepped_island() -> None:
-    """Boxes on their way down meet in groups of 2 to 20; solved exactly these took thirty times as long as the heap they become."""
+def test_a_hundred_boxes_that_still_meet_in_small_islands_are_substepped() -> None:
+    """Boxes on their way down meet in islands of 2 to 20; solved exactly these took thirty times as long as the pile they become."""
     box = ri.Shape.box((0.1, 0.08, 0.06))
     run = ri.simulate(pit([box], 3), 0.6)
     assert run.plan.line("sub-stepped islands").counts["steps"] >= 20

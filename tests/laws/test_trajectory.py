@@ -170,7 +170,7 @@ GROWING = {"jerk": (1.0, -2.0, 0.5), "torque_rate": (-0.04, 0.01, 0.05)}
     ("mode", "duration", "rates"), [(PRESCRIBED, 100.0, STEADY), (FREE, 100.0, STEADY), (FORCED, 10.0, STEADY), (FORCED, 10.0, GROWING)]
 )
 def test_new_trajectory_every_frame_is_the_same_trajectory(mode, duration, rates):
-    """Begun anew every 1/60 s. Required: 1e-9 after 100 s.
+    """Begun again every 1/60 s. Required: 1e-9 after 100 s.
 
     Each of n starts rounds orientation and spin by eps, and an error of the spin turns the body ever further: by
     eps |w| t sqrt(n), 3e-12 after 164 rad in 6000 steps, times the roundings of one. The midpoint rule is off by 7e-3.

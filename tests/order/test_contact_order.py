@@ -13,7 +13,7 @@ show the step itself. Laws, for places and for velocities:
               share, nor the reference enters. A force that is held over the step and left at that gives slope 1.
     error     the shortest step is within 1e-6 m of the equation, two gaps, and within 1e-5 rad/s; half of that is the gap in the place of
               contact.
-    inside    the error of the spin in the middle of a sub-step, but for the mean of those at its ends, is what frames inside add.
+    inside    the error of the spin in the middle of a sub-step, less the mean of those at its ends, is what frames inside add.
               Contacts: of third order, as forces are right at the start and the change at the end goes with the square of the time.
               Joints: of second order, spin'' h^2 / 12 at most, as forces close the joints at the end. Without that change both are of
               second order, six times as much and more.
@@ -127,7 +127,7 @@ def test_second_order_at_every_frame(scene: Callable, fps: float) -> None:
 
 
 def error_inside(scene: Callable, step: float) -> tuple[float, float]:
-    """Error of the spin [rad/s] in the middle of steps, but for the mean of those at their ends; largest change of its rate [rad/s^3].
+    """Error of the spin [rad/s] in the middle of steps, less the mean of those at their ends; largest change of its rate [rad/s^3].
 
     The first step is left out: it lifts bodies drawn touching to the gap. So is what follows 0.15 s: there the curvature of the error
     itself, of second order, is no longer small beside it.

@@ -20,7 +20,7 @@ STEPS = (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 960)
 
 
 def batons() -> ri.Scene:
-    """Capsules over a floor, each in a lane of its own."""
+    """Capsules over a floor, each on a track of its own."""
     random = np.random.default_rng(4)
     scene = ri.Scene(gravity=(0, 0, -9.81))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static"))

@@ -94,8 +94,8 @@ def test_a_cylinder_that_is_drawn_flush_on_a_box_stands_on_it(box, radius: float
     np.testing.assert_allclose(run.position("drum"), [drum["position"]] * len(run.times), atol=gaps)
 
 
-def test_bodies_that_sink_in_a_substepped_island_have_room_for_their_contacts() -> None:
-    """Contacts of sunk bodies were written beyond the end of the heap's table: the process died ("free(): invalid next size").
+def test_bodies_that_sink_in_a_substepped_island_have_capacity_for_their_contacts() -> None:
+    """Contacts of sunk bodies were written beyond the end of the contact table: the process died ("free(): invalid next size").
 
     A cube of 1,000 t on one of 1 kg is not for soft contacts: it sinks in, and both are looked at again and again.
     """

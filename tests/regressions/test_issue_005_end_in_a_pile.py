@@ -1,4 +1,4 @@
-"""Issue 5: a run that ends while a body of a heap touches another."""
+"""Issue 5: a run that ends while a body of a pile touches another."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import rigidimpulse as ri
 
 
 def test_a_run_ends_where_a_member_of_a_substepped_island_touches_the_floor() -> None:
-    """Hulls in a pit: one had turned on the floor by itself before it came to the heap, and touched the floor at the end.
+    """Hulls in a pit: one had turned on the floor by itself before it came to the pile, and touched the floor at the end.
 
-    What was remembered of its own contact made it end a sub-step once more, and the heap was stepped over a time of 0: division by zero.
+    What was remembered of its own contact made it end a sub-step once more, and the island was stepped over a time of 0: division by zero.
     """
     random = np.random.default_rng(3)
     stone = ri.Material(density=900, restitution=0.1, static_friction=0.4, dynamic_friction=0.4)

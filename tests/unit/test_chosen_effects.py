@@ -63,9 +63,9 @@ def test_effect_had_in_is_in() -> None:
     ("choice", "words"),
     [
         ({"fricton": False}, "unknown effect 'fricton'; did you mean 'friction'"),
-        ({"springs": True}, "'springs' cannot be in: the scene has none"),
-        ({"contact forces": False}, "'contact forces' cannot be out"),
-        ({"forced flight": False}, "'forced flight' cannot be out"),
+        ({"springs": True}, "'springs' cannot be enabled: the scene has none"),
+        ({"contact forces": False}, "'contact forces' cannot be left out"),
+        ({"forced flight": False}, "'forced flight' cannot be left out"),
     ],
 )
 def test_nonsense_is_refused(choice: dict[str, bool], words: str) -> None:

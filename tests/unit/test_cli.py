@@ -99,7 +99,7 @@ def test_simulate_runs_a_scene_file(scene_file, tmp_path):
     assert result.exit_code == 0, result.output
     assert "sweep" in result.stdout and "loading or compiling kernels" in result.stdout
     recording = ri.load_recording(out)
-    # Free fall until the first impact at sqrt(2 h / g) = 0.319 s, h = 0.5 m: z = 1 - g t^2 / 2 but for rounding.
+    # Free fall until the first impact at sqrt(2 h / g) = 0.319 s, h = 0.5 m: z = 1 - g t^2 / 2 up to rounding.
     early = recording.times < 0.3
     fall = 1.0 - 0.5 * 9.81 * recording.times[early] ** 2
     assert np.abs(recording.position("ball")[early, 2] - fall).max() < 1e-14
@@ -193,7 +193,7 @@ def test_study_wants_one_thing():
         assert result.exit_code == BAD_SCENE and "SCENE, or --scaling" in result.stderr
 
 
-def test_accuracy_by_wish_on_the_command_line(scene_file, tmp_path):
+def test_accuracy_targets_on_the_command_line(scene_file, tmp_path):
     result = call("simulate", scene_file, "--duration", 0.5, "--within", 1e-3, "-o", tmp_path / "run.npz")
     assert result.exit_code == 0, result.output
     assert "chose step" in result.stdout and "estimated error" in result.stdout

@@ -10,7 +10,7 @@ from rigidimpulse.model.contact_memory import (
     bodies_in_sub_steps,
     forget_forces,
     grown,
-    has_room,
+    has_capacity,
     held_row,
     keep_forces,
     keep_wrenches,
@@ -25,7 +25,7 @@ NUMBER = 40
 
 
 def random_contacts(rng: np.random.Generator, pairs: int) -> tuple[Contacts, Touching]:
-    """Contacts of so many pairs of bodies, 1 to 9 of each, no two alike."""
+    """Contacts of random pairs of bodies, 1 to 9 of each, no two alike."""
     bodies = sorted({tuple(sorted(rng.choice(NUMBER, 2, replace=False).tolist())) for _ in range(pairs)})
     kinds = [rng.choice([VERTEX_FACE, FACE_VERTEX, EDGE_EDGE], rng.integers(1, 10)) for _ in bodies]
     rows = [(a, b, kind, k, 3 * k) for (a, b), mine in zip(bodies, kinds, strict=True) for k, kind in enumerate(mine)]
@@ -43,7 +43,7 @@ def test_forces_are_those_kept_last():
     for time in np.arange(1.0, 60.0):
         contacts, touching = random_contacts(rng, 5)
         m = len(contacts.gap)
-        if not has_room(memory, m):
+        if not has_capacity(memory, m):
             memory = grown(memory, m)
         force = rng.normal(size=(m, 3))
         keep_forces(memory, NUMBER, time, contacts, touching, force)
@@ -111,7 +111,7 @@ def test_rebounds_survive_growth():
     memory = make_memory(16, 4, 8)
     keys = np.random.default_rng(3).permutation(10_000)
     for key in keys.tolist():
-        if not has_room(memory, 1):
+        if not has_capacity(memory, 1):
             memory = grown(memory, 1)
         remember_rebound(memory, key, float(key), 2.0 * key, key % 7)
     at = np.array([place_of(memory, key) for key in keys.tolist()])

@@ -152,7 +152,7 @@ def test_vertices_and_exact_midpoints_lie_on_the_surface():
     assert points_inside(geometry, 0, 0.5 * (vertices[edges[:, 0]] + vertices[edges[:, 1]])).all()
 
 
-def test_convex_hull_behind_all_psimd_lanes():
+def test_convex_hull_behind_all_planes():
     rng = np.random.default_rng(5)
     hull = trimesh.convex.convex_hull(rng.normal(size=(40, 3)))
     geometry = geometry_of(mesh_primitive(hull))

@@ -5,8 +5,8 @@ import pytest
 
 from rigidimpulse.model.island import empty_contacts
 from rigidimpulse.recording import contact_log
-from rigidimpulse.recording.contact_log import ContactLog, close_contacts, has_contact_room, replace_contacts
-from rigidimpulse.recording.events import CAUSES, FIRST_ROWS, IMPACT, EventLog, has_room, log_energy, log_stretch
+from rigidimpulse.recording.contact_log import ContactLog, close_contacts, has_contact_capacity, replace_contacts
+from rigidimpulse.recording.events import CAUSES, FIRST_ROWS, IMPACT, EventLog, has_capacity, log_energy, log_stretch
 from rigidimpulse.recording.impulses import ImpulseAccounts
 
 TIMES = np.linspace(0.0, 1.0, 11)
@@ -16,13 +16,13 @@ BODIES = 6
 def test_a_full_log_says_so_and_keeps_its_rows_when_it_grows() -> None:
     log = EventLog()
     for k in range(FIRST_ROWS):
-        assert has_room(log.buffers, 1, 0, 0)
+        assert has_capacity(log.buffers, 1, 0, 0)
         log_energy(log.buffers, float(k), IMPACT, -1.0 - k)
     log_stretch(log.buffers, 0.0, 1.0, 3, 2.0, -1.0)
-    assert has_room(log.buffers, 0, FIRST_ROWS - 1, FIRST_ROWS)
-    assert not has_room(log.buffers, 1, FIRST_ROWS, 5 * FIRST_ROWS)
+    assert has_capacity(log.buffers, 0, FIRST_ROWS - 1, FIRST_ROWS)
+    assert not has_capacity(log.buffers, 1, FIRST_ROWS, 5 * FIRST_ROWS)
     log.grow()
-    assert has_room(log.buffers, 1, FIRST_ROWS, 5 * FIRST_ROWS)
+    assert has_capacity(log.buffers, 1, FIRST_ROWS, 5 * FIRST_ROWS)
     log.account(99.0, "let go", 0.5)
     log.account(99.0, "let go", 0.0)  # nothing changed: no row
     assert log.energy["change"].tolist() == [*(-1.0 - np.arange(FIRST_ROWS)), 0.5]
@@ -76,7 +76,7 @@ def test_of_a_stretch_only_the_contacts_of_bodies_that_leave_end() -> None:
     log = ContactLog(TIMES, 4, accounts)
     contacts = contacts_between(np.random.default_rng(0), np.array([1, 2, 3]), 3)
     contacts.body_a[:], contacts.body_b[:] = (0, 1, 0), (1, 2, 3)
-    assert has_contact_room(log.buffers, 3)
+    assert has_contact_capacity(log.buffers, 3)
     replace_contacts(log.buffers, np.array([1, 2, 3]), 0.0, contacts, np.zeros((4, 3)), np.full((3, 3), (2.0, 0.0, 0.0)))
     close_contacts(log.buffers, np.array([1]), 0.0)  # they begin now
     assert np.isinf(log.buffers.rows["end"][:3]).all()

@@ -52,7 +52,7 @@ def test_bounce_on_a_lifted_tilted_plane(peer: str, restitution: float) -> None:
     ours, (theirs, _) = ri.simulate(scene, 1.2), run_peer(peer, scene, 1.2, FPS, STEPS)
     assert len(ours.impacts) == 1
     assert ours.impacts["time"][0] < 1.0
-    # MuJoCo rebounds with 0.507 for 0.5 (see its adapter), the others with what is asked for; each but for a step of gravity.
+    # MuJoCo rebounds with 0.507 for 0.5 (see its adapter), the others with what is asked for; each up to a step of gravity.
     off = 0.015 if peer == "mujoco" else 1e-3
     assert np.abs(theirs.velocities[-1, 1] - ours.velocities[-1, 1]).max() < off * np.linalg.norm(ours.velocities[-1, 1]) + 2.0 * G * STEP
     assert np.abs(theirs.positions[-1, 1] - ours.positions[-1, 1]).max() < 0.1

@@ -121,7 +121,7 @@ def test_penetration_of_boxes_is_the_way_out(depth: float) -> None:
     assert penetration(world, run)[0] == pytest.approx(depth, rel=2e-3)
 
 
-def test_penetration_of_balls_and_psimd_lanes() -> None:
+def test_penetration_of_balls_and_planes() -> None:
     scene = ri.Scene(gravity=(0, 0, 0))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static"))
     scene.add(ri.Body("ball", ri.Shape.sphere(0.5), position=(0, 0, 0.6), velocity=(0, 0, -1)))

@@ -1,4 +1,4 @@
-"""Which contacts of a heap the solver sees in the course of a step."""
+"""Which contacts of a sub-stepped island the solver sees within a step."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def pile(number: int) -> ri.Scene:
 
 
 def test_every_contact_is_in_one_element_with_the_motion_since_it_was_put_there() -> None:
-    """In the middle of a step only contacts of quick bodies are put anew; none may be lost or doubled by it.
+    """In the middle of a step only contacts of quick bodies are written again; none may be lost or doubled by it.
 
     And what a body has drifted is how far it has come since the steady batches were made, to round-off of places of 1 m.
     """

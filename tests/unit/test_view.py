@@ -175,7 +175,7 @@ class TestDisplayGeometry:
         if smooth:
             assert np.allclose(mesh.normals, np.where(vertices[:, :1] == 0.0, [0, 0, 1], mesh.normals), atol=1e-12)
 
-    def test_half_spaces_are_psimd_lanes(self) -> None:
+    def test_half_spaces_are_planes(self) -> None:
         assert display_mesh(Shape.half_space()) is None
         shape = Shape.compound([(Shape.half_space((0, 0, 2), 2), (0, 0, 1), QUARTER_TURN), (Shape.box(1), (0, 0, 0),
                                 (1, 0, 0, 0))])  # fmt: skip

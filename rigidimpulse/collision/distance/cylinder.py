@@ -7,7 +7,7 @@
     out = point on the first cylinder, point on the second shape, unit normal from first to second. Where they overlap
     the distance is 0, both points are a common one, and the normal is 0.
 
-The normal n is worth as much as the distance: n . p over the second shape less n . p over the first is a lower bound
+The normal n certifies the distance: n . p over the second shape less n . p over the first is a lower bound
 of the distance, and equals it up to round-off (`least n . p`, that is min_B n . p - n . centre_a - s_a(n), certifies
 the answer).
 
@@ -224,6 +224,7 @@ def closest_on_triangle(a, b, c, radius, half):
         pair = closest_on_curve(along(u, t, d), d if 0.0 < t < 1.0 else ZERO, radius, half)
         if pair[0] < best[0]:
             best = pair
+        # n . p over the triangle less that over the cylinder is a lower bound: the side with the best one gives the normal.
         reach = min(dot(pair[3], a), dot(pair[3], b), dot(pair[3], c)) - cylinder_support(AXIS, half, radius, pair[3])
         if reach > bound:
             n, bound = pair[3], reach
@@ -329,6 +330,7 @@ def _closest_on_circle(centre, u, v, rim_radius, thorough, radius, half):
             )
     else:
         angle, least = 0.0, inf
+        # The distance along a circle has several minima: Newton's method starts at the best sample.
         for k in range(_NUM_SAMPLES):
             q = on_circle(centre, u, v, rim_radius, 2.0 * pi / _NUM_SAMPLES * k)
             pair = closest_on_curve(q, ZERO, radius, half)
@@ -355,6 +357,7 @@ def _refine_on_circle(centre, u, v, rim_radius, angle, radius, half):
         q = along(centre, 1.0, out)
         slope, curvature = slope_along(q, tangent, along(ZERO, -1.0, out), radius, half)
         step = pi / _NUM_SAMPLES
+        # Downhill where the distance is not convex.
         step = min(step, max(-step, -slope / curvature)) if curvature > 0.0 else -copysign(step, slope)
         if abs(step) <= 4.0 * _EPSILON or slope == 0.0:
             break
@@ -383,6 +386,7 @@ def _closest_on_disc(centre, u, v, rim_radius, radius, half):
         q = along(start, t, chord)
         inner = 0.0 < t < 1.0
         slope, _ = slope_along(q, u, ZERO, radius, half)
+        # At the rim the chord's end moves with the angle, so the slope along the chord counts, too.
         if not inner:
             angle = 0.5 * pi - middle if t > 0.5 else middle - 0.5 * pi
             slope_chord, _ = slope_along(q, v, ZERO, radius, half)

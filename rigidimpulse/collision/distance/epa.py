@@ -1,4 +1,4 @@
-"""How deep two convex polyhedra are inside each other: the expanding polytope algorithm (van den Bergen 2001).
+"""Penetration depth of two convex polyhedra: the expanding polytope algorithm (van den Bergen 2001).
 
 With X_a, X_b the corners of the bodies, 0 is inside the hull of all w = y - x. The shortest displacement to its surface separates the
 bodies. A polytope inside that hull, at first the tetrahedron about 0 that the algorithm of Gilbert, Johnson and Keerthi found, has a face
@@ -95,11 +95,13 @@ def _add_corner(polytope, corners, faces):
     edges, f = 0, 0
     while f < faces:
         height = plane[f, 0] * w[corners, 0] + plane[f, 1] * w[corners, 1] + plane[f, 2] * w[corners, 2] - plane[f, 3]
+        # The corner does not see this face: it stays.
         if not height > 0.0:
             f += 1
             continue
         for k in range(3):
             i, j = face[f, k], face[f, (k + 1) % 3]
+            # Edges of two faces that go cancel out; the rim of what goes is left.
             edges = _toggle(rim, edges, min(i, j), max(i, j))
         faces -= 1
         for k in range(3):
@@ -143,6 +145,7 @@ def least_deep(shapes, s, t, pose, small, exact, simplex, polytope):
         i, high, j, low = farthest_of_both(corner, (a0, a1), (b0, b1), c, x, y, z)
         middle = d[0] * x + d[1] * y + d[2] * z
         gap = middle - low - high
+        # No corner of the hull lies beyond the face: n.w = h, its normal is the axis.
         if corners == MOST_CORNERS or -(middle - small * (low + high)) <= polytope.plane[f, 3] + exact:
             break
         for m in range(3):
@@ -155,5 +158,6 @@ def least_deep(shapes, s, t, pose, small, exact, simplex, polytope):
         for m in range(3):
             simplex.w[n, m] = w[k, m]
         simplex.corner[n, 0], simplex.corner[n, 1] = polytope.corner[k, 0], polytope.corner[k, 1]
+    # The corners of the face that bear the point nearest to 0.
     count = reduce_simplex(simplex, 3)
     return -polytope.plane[f, 0], -polytope.plane[f, 1], -polytope.plane[f, 2], gap, count

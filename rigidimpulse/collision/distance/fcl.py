@@ -5,10 +5,10 @@ grown by a radius. Skeletons go to FCL as trees of triangles, for which its dist
 distance of the skeletons less both radii. Half spaces have closed forms and cylinders exact kernels of their own
 (`manifold.pair_gap`).
 
-Nothing that aborts, hangs or lies is in reach: FCL sees only unsigned distance and yes-or-no collision of non-empty
-trees, with indices in range, finite poses, and coordinates scaled so that no triangle is small (its normal, squared,
-is compared with 1e-15). Trees are hollow: if surfaces are apart, a point of each connected part of one body is looked
-for inside the other (`inside`).
+Some calls of FCL abort, hang or give wrong answers. They are avoided: FCL is asked only for unsigned distance and yes-or-no collision of
+non-empty trees, with indices in range and finite poses. Coordinates are scaled so that no triangle is small (FCL compares the square of
+its normal with 1e-15). Trees are hollow: if surfaces are apart, a point of each connected part of one body is looked
+for inside the other (`containment`).
 """
 
 from __future__ import annotations
@@ -110,6 +110,7 @@ class Narrowphase:
         R, t = R_a.T @ R_b, R_a.T @ (x_b - x_a)  # from the frame of b into that of a
         best = self._skeleton_separation(a, b, R, t)
         best = min(best, self._cylinder_separation(a, b, R, t, best.gap), key=_gap)
+        # Trees are hollow: surfaces that are apart may be one inside the other.
         if best.gap < np.inf and self._contained(a, b, R, t):
             best = _overlapping(0.0)
         best = min(best, self._plane_separation(a, b, R, t), key=_gap)
@@ -157,12 +158,14 @@ class Narrowphase:
         for skeleton_a in self._solid(a).skeletons:
             for skeleton_b in self._solid(b).skeletons:
                 first, second = skeleton_a.objects[0], skeleton_b.objects[1]
+                # Only b moves: the query is in a's frame, scaled so that no triangle is small.
                 second.setTransform(placed)
                 result = fcl.DistanceResult()
                 distance = max(0.0, fcl.distance(first, second, self._request, result) / self._scale)
                 gap = distance - skeleton_a.radius - skeleton_b.radius
                 if not gap < best.gap:
                     continue
+                # Skeletons that touch give no normal.
                 best = _overlapping(gap)
                 p, q = (np.array(point) / self._scale for point in result.nearest_points)
                 length = float(np.linalg.norm(q - p))
@@ -178,6 +181,7 @@ class Narrowphase:
                 first, second = skeleton_a.objects[0], skeleton_b.objects[1]
                 second.setTransform(placed)
                 radius = skeleton_a.radius + skeleton_b.radius
+                # Yes-or-no collision is exact for sharp surfaces; rounded ones meet where their skeletons are near.
                 if radius == 0.0:
                     if fcl.collide(first, second, fcl.CollisionRequest(), fcl.CollisionResult()) > 0:
                         return True
@@ -192,6 +196,7 @@ class Narrowphase:
             return _NOTHING
         out = np.zeros(7)
         farthest = float(np.linalg.norm(R @ solid_b.centre + t - solid_a.centre)) + solid_a.reach + solid_b.reach
+        # No gap is larger than `farthest`: the limit is finite.
         gap = pair_gap(self.geometry, Posed(a, np.zeros(3), np.eye(3)), Posed(b, t, R), min(limit, farthest), out)
         if gap >= limit:
             return _NOTHING
@@ -205,6 +210,7 @@ class Narrowphase:
         """Tell whether a connected part of one shape lies inside the other, given that surfaces are apart."""
         solid_a, solid_b = self._solid(a), self._solid(b)
         apart = float(np.linalg.norm(R @ solid_b.centre + t - solid_a.centre))
+        # Only a body whose centre lies within the other's sphere can be inside it.
         if not (len(solid_a.parts) and len(solid_b.parts)) or apart >= max(solid_a.reach, solid_b.reach):
             return False
         return bool(
@@ -309,6 +315,7 @@ def _scale(shapes: list[CompiledShape]) -> float:
         extent = float(np.ptp(primitive.vertices, axis=0).max())
         sizes += [float(part.min()) for part in (size[size > TOLERANCES.surface.weld * extent],) if len(part)]
         sizes += [extent] if extent > 0.0 else []
+    # A power of two: scaling there and back rounds nothing.
     return float(2.0 ** np.ceil(-np.log2(min(sizes))))
 
 

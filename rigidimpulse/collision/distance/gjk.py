@@ -1,9 +1,9 @@
-"""How far apart two convex polyhedra are: the algorithm of Gilbert, Johnson and Keerthi (1988).
+"""Distance of two convex polyhedra: the algorithm of Gilbert, Johnson and Keerthi (1988).
 
 With X_a the points of body a less their centre c_a, the gap of the bodies is the least |v| of v = y - x, x in X_a + c_a, y in X_b + c_b,
-and v / |v| the axis of largest gap. From simplices of corners, w = argmin over y - x of v.w is added until |v|^2 - v.w is round-off,
-and corners that do not bear v are dropped. Where faces or edges are parallel, w may lie in the plane of the simplex: its tetrahedron
-is flat then, and which side of a face 0 is on is round-off. So it ends where |v| does not get less, with the simplex of before.
+and v / |v| the axis of largest gap. From simplices of corners, w = argmin over y - x of v.w is added until |v|^2 - v.w is round-off, and
+corners that do not bear v are dropped. Where faces or edges are parallel, w may lie in the plane of the simplex: its tetrahedron is flat
+then, and which side of a face 0 is on is round-off. Therefore the search also ends where |v| does not decrease, with the previous simplex.
 """
 
 from __future__ import annotations
@@ -137,6 +137,7 @@ def reduce_simplex(simplex, count):
         return np.int64(5)
     kept = np.int64(0)
     for n in range(count):
+        # Corners that do not bear the nearest point are dropped.
         if weight[n] > 0.0:
             for m in range(3):
                 w[kept, m] = w[n, m]
@@ -210,12 +211,14 @@ def closest(shapes, s, t, d, c, small, margin, simplex):
             return x, y, z, 0.0, np.int64(5)
         middle = d[0] * x + d[1] * y + d[2] * z
         gap = (middle - low - high) / length
+        # The gap along any axis is a lower bound of the distance: this is far enough.
         if gap > margin:
             return x / length, y / length, z / length, gap, np.int64(0)
         short = square - (middle - small * (low + high))
         known = False
         for n in range(count):
             known = known or (simplex.corner[n, 0] == i and simplex.corner[n, 1] == j)
+        # No corner gets nearer to 0 by more than round-off.
         if count > 0 and (known or short <= CLOSE * square + ROUND * greatest):
             break
         for m in range(3):
@@ -231,6 +234,7 @@ def closest(shapes, s, t, d, c, small, margin, simplex):
         nx, ny, nz = 0.0, 0.0, 0.0
         for n in range(count):
             nx, ny, nz = nx + simplex.weight[n] * w[n, 0], ny + simplex.weight[n] * w[n, 1], nz + simplex.weight[n] * w[n, 2]
+        # Parallel faces make flat tetrahedra, where the side of 0 is round-off: the previous simplex is the answer.
         if before > 0 and nx * nx + ny * ny + nz * nz >= square:
             count = _take_back(simplex, before)
             break

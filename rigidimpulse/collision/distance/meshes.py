@@ -69,6 +69,7 @@ def _triangle_distance(owns_a, owns_b, face_a, face_b, may_cross, best):
             continue
         p = corners_a[k]
         d = subtract(corners_a[k + 1], p)
+        # An edge through a face: the surfaces cross, the distance is 0.
         if may_cross and pierces_triangle(p, corners_a[k + 1], face_b[0], face_b[1], face_b[2], face_b[3]):
             best = _closer(best, p, p)
         for m in range(3):

@@ -113,6 +113,7 @@ def _nearest_triangle(geometry, primitive, p, limit, stack):
             continue
         child = geometry.node_child[node]
         if child >= 0:
+            # The nearer box is walked first, so that the farther one can be left out.
             left = _box_squared(p, row(geometry.node_min, child), row(geometry.node_max, child))
             right = _box_squared(p, row(geometry.node_min, child + 1), row(geometry.node_max, child + 1))
             stack[depth] = child + 1 if left <= right else child
@@ -167,10 +168,12 @@ def signed_distance(geometry, shape, p, limit, stack):
                 a = row(geometry.vertex, first)
                 e = subtract(row(geometry.vertex, first + count - 1), a)
                 squared = dot(e, e)
+                # A sphere or capsule: the axis, a point or a segment, and the radius around it.
                 s = min(1.0, max(0.0, dot(subtract(p, a), e) / squared)) if squared > 0.0 else 0.0
                 d, n = _away(p, along(a, s, e), geometry.radius[k])
             else:
                 d, n = _mesh(geometry, k, p, max(abs(best), 0.0), stack)
+        # Of primitives that overlap the least distance counts.
         if d < best:
             best, normal = d, n
     return best, normal
@@ -205,6 +208,7 @@ def first_contact_with_triangle(p, way_p, corners, ways, radius, gap):
     p, way_p: centre and its way over the step; corners, ways: three of each; weights: barycentric, of the place touched; normal: unit,
     from the ball to the triangle; distance: between their surfaces then. time is inf where it does not come so near within the step.
     """
+    # No point of the triangle comes nearer to the ball faster than its fastest corner does.
     fastest = 0.0
     for k in range(3):
         d = subtract(way_p, ways[k])
@@ -220,9 +224,11 @@ def first_contact_with_triangle(p, way_p, corners, ways, radius, gap):
         length = sqrt(dot(d, d))
         if length > 0.0:
             normal = (d[0] / length, d[1] / length, d[2] / length)
+        # Advances come to the gap from above, ever more slowly: 2 % above it counts as there.
         if length - radius <= 1.02 * gap:
             return s, weights, normal, length - radius
         if (length - radius - gap) > (1.0 - s) * fastest:
             return inf, weights, normal, length - radius
+        # Conservative advancement: no contact comes before this.
         s = min(1.0, s + (length - radius - gap) / fastest)
     return s, weights, normal, length - radius

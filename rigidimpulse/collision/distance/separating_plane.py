@@ -1,11 +1,11 @@
-"""The plane that parts two convex bodies best, where none parts them.
+"""The plane that comes closest to separating two convex bodies, where none separates them.
 
-Bodies are points y grown by a radius. A plane n.y = d parts a (below) from b (above) but for the depths
+Bodies are points y grown by a radius. A plane n.y = d has a below and b above it, up to the depths
 
     r = max(0, n.y + r_a - d)  of the points of a,    r = max(0, d + r_b - n.y)  of those of b,    E(n, d) = sum of r^2 / 2
 
-The least E is 0 exactly if the bodies are apart, and it is smooth in their poses. The forces r that act on the plane balance, so that
-they act within what of the two bodies lies face to face, as contact forces do.
+The least E is 0 exactly if the bodies are apart, and it is smooth in their poses. The forces r on the plane balance. Therefore they act
+within the area where the two bodies face each other, as contact forces do.
 
 With u, v normal to n and n(a, b) = n + a u + b v - (a^2 + b^2) n / 2 the minimum is found by Newton's method with a shift. It starts at the
 best of the separating axes (normals of faces, products of edges; Gottschalk, Lin and Manocha 1996) and of the line of the centres.
@@ -51,6 +51,7 @@ def _side(points, radius, sign, plane, g, H):
         x, y, z = points[k, 0], points[k, 1], points[k, 2]
         height = n[0] * x + n[1] * y + n[2] * z
         r = sign * (height - d) + radius
+        # Points on their own side of the plane have no energy.
         if r <= 0.0:
             continue
         along_u = sign * (u[0] * x + u[1] * y + u[2] * z)
@@ -114,6 +115,7 @@ def best_plane(a, radius_a, b, radius_b, n, d):
     for _ in range(ROUNDS):
         least = LEAST_SHIFT * (abs(H[0, 0]) + abs(H[1, 1]) + H[2, 2])
         shift = max(shift, least)
+        # The bodies are apart: any plane between them will do.
         if energy == 0.0:
             break
         while not _solve(H, shift, g, s):
@@ -126,6 +128,7 @@ def best_plane(a, radius_a, b, radius_b, n, d):
         trial /= sqrt(trial[0] * trial[0] + trial[1] * trial[1] + trial[2] * trial[2])
         trial_energy = _expand(a, radius_a, b, radius_b, (trial, u, v, d + s[2]), trial_g, other)
         lower = trial_energy < energy
+        # Near the minimum rounding hides the fall of E; the gradient shows it longer.
         if lower or (size <= 1e-9 and np.abs(trial_g).sum() < np.abs(g).sum()):
             energy = trial_energy
             copy_vector(trial, n)
@@ -136,6 +139,8 @@ def best_plane(a, radius_a, b, radius_b, n, d):
         else:
             if size <= CONVERGED * 10.0:
                 break
+            # The trial has changed u and v; g and H belong to those of n.
             tangents(n, u, v)
+            # A larger shift shortens the step.
             shift *= 8.0
     return d, energy

@@ -57,12 +57,14 @@ def box_axis(half, pair, between, far, c):
         gap = abs(d[i]) - h[i] - (abs(c[i, 0]) * k[0] + abs(c[i, 1]) * k[1] + abs(c[i, 2]) * k[2])
         if gap > best:
             best, axis = gap, i
+    # A gap above `far` along any axis is enough to leave the pair out.
     if best > far:
         return best, axis
     size = min(h[0], h[1], h[2], k[0], k[1], k[2])
     for j in range(3):
         along = abs(c[0, j] * d[0] + c[1, j] * d[1] + c[2, j] * d[2])
         gap = along - k[j] - (abs(c[0, j]) * h[0] + abs(c[1, j]) * h[1] + abs(c[2, j]) * h[2])
+        # A tie keeps the face of a.
         if gap > best + SECOND_WINS * size:
             best, axis = gap, 3 + j
     if best > far:
@@ -72,6 +74,7 @@ def box_axis(half, pair, between, far, c):
         i1, i2 = (i + 1) % 3, (i + 2) % 3
         for j in range(3):
             square = 1.0 - c[i, j] * c[i, j]
+            # Parallel edges have no common normal; a face has the gap then.
             if square < PARALLEL:
                 continue
             j1, j2 = (j + 1) % 3, (j + 2) % 3
@@ -79,6 +82,7 @@ def box_axis(half, pair, between, far, c):
             gap = (abs(d[i2] * c[i1, j] - d[i1] * c[i2, j]) - reach) / sqrt(square)
             if gap > edge:
                 edge, edges = gap, 6 + 3 * i + j
+    # Edges must win clearly: faces give more points.
     if edges >= 0 and (edge > far or edge > best + EDGE_WINS * size):
         return edge, edges
     return best, axis
@@ -103,6 +107,7 @@ def _cut_side(polygon, ids, base, count, axis, sign, limit, side):
             t = before / (before - after)
             for m in range(3):
                 polygon[kept, m] = polygon[j, m] + t * (polygon[k, m] - polygon[j, m])
+            # The id of a new corner names the side that cuts and the corner that it cuts off.
             ids[kept] = FROM_EDGE * (side + 1) + (ids[j] if before > 0.0 else ids[k]) % FROM_EDGE
             kept += 1
         if after <= 0.0:
@@ -202,6 +207,7 @@ def face_contacts(half, pair, axis, query, scratch, points):
     code = _write_facing(half, other, scratch.axes, face, polygon)
     for k in range(4):
         ids[k] = k
+    # Sides are moved outwards by what may come over the face in `ahead` s.
     paths[0, 0], paths[1, 0], paths[2, 0], paths[3, 0] = _reach(pair, face, query.ahead, polygon)
     base, count = np.int64(0), np.int64(4)
     for side in range(4):
@@ -216,6 +222,7 @@ def face_contacts(half, pair, axis, query, scratch, points):
             kept += 1
     if kept == 0:
         return kept
+    # Four points can carry the load of all.
     number = four_of(polygon, height, kept, chosen)
     at_own, at_other = (3, 0) if of_b else (0, 3)
     for n in range(number):

@@ -47,6 +47,7 @@ def _cut(polygon, count, plane, side):
         if (before > 0.0) != (after > 0.0) and kept < MOST_CORNERS:
             t = before / (before - after)
             spare[kept, 0], spare[kept, 1], spare[kept, 2] = x0 + t * (x1 - x0), y0 + t * (y1 - y0), z0 + t * (z1 - z0)
+            # The id of a new corner names the side that cuts and the corner that it cuts off.
             spare_ids[kept] = FROM_EDGE * (side + 1) + (ids[j] if before > 0.0 else ids[k]) % FROM_EDGE
             kept += 1
         if after <= 0.0 and kept < MOST_CORNERS:
@@ -99,6 +100,7 @@ def clip_faces(shapes, pair, own, other, query, polygon, points):
         bx, by, bz = turned_by(r, i, shapes.corner[w, 0], shapes.corner[w, 1], shapes.corner[w, 2])
         ex, ey, ez = bx - ax, by - ay, bz - az
         px, py, pz = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
+        # The side is moved outwards by what may come over it in `ahead` s.
         offset, nearer = px * ax + py * ay + pz * az, 0.0
         for c in range(corners):
             nearer = max(nearer, -(px * paths[c, 0] + py * paths[c, 1] + pz * paths[c, 2]))
@@ -112,6 +114,7 @@ def clip_faces(shapes, pair, own, other, query, polygon, points):
             kept += 1
     if kept == 0:
         return np.int64(0)
+    # Four points can carry the load of all.
     number = four_of(corner, height, kept, chosen)
     at_a, at_b = (3, 0) if sign < 0.0 else (0, 3)
     for c in range(number):

@@ -99,6 +99,7 @@ def hull_contacts(shapes, pair, query, scratch, points):
     polygon, simplex, _, _, c, between, origin = scratch
     d = seen_from(rotation, a, b, between, c)
     nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0, margin, simplex)
+    # They overlap: the axis is searched for with both shrunk about their centres, then by the least depth.
     if count == 5:
         nx, ny, nz, gap, count = closest(shapes, s, t, d, c, 1.0 - SHRINK, margin, simplex)
     if count == 5:

@@ -117,9 +117,11 @@ def rims_on_plane(solid, found, count, m, corners, bound, other):
         least = level * m[2] - radius * flat - dot(m, a)
         if least > margin:
             continue
+        # A rim that is near all around has fixed points beside its lowest one.
         all_around = least + 2.0 * radius * flat <= margin
         for k in range(RIM_POINTS + 1 if all_around else 1):
             if k == 0:
+                # A level rim has no lowest point.
                 if flat <= _LEVEL:
                     continue
                 p = (-radius * m[0] / flat, -radius * m[1] / flat, level)
@@ -189,6 +191,7 @@ def ring_contact(q, tangent, curvature, solid, level, skeleton):
     up = copysign(1.0, level)
     across = cross(tangent, (-out[1], out[0], 0.0))
     size = sqrt(dot(across, across))
+    # The normal from the tangents is exact for close curves, that from the two points for distant ones.
     if size * solid.radius > distance * sqrt(squared):
         n = along(ZERO, 1.0 / copysign(size, dot(across, out) + up * across[2]), across)
         distance = dot(n, between)

@@ -179,6 +179,7 @@ def _to_world(contacts, start, end, first, swapped):
             point_a, point_b = point_b, point_a
             normal = (-normal[0], -normal[1], -normal[2])
             feature_a, feature_b = feature_b, feature_a
+            # A vertex on a face, seen from the other body, is a face on a vertex.
             if kind == VERTEX_FACE or kind == FACE_VERTEX:
                 kind = VERTEX_FACE + FACE_VERTEX - kind
         write_contact(real, integer, i, Contact(point_a, point_b, normal, gap, kind, feature_a, feature_b))
@@ -261,6 +262,7 @@ def pair_contacts(shapes, a, b, margin, contacts, count):
             if _out_of_reach(geometry, p, q, pose, margin):
                 continue
             start = count
+            # The table has the higher kind first.
             swapped = kind[q] > kind[p]
             i, j = (q, p) if swapped else (p, q)
             count = _primitive_contacts(shapes, i, j, back if swapped else pose, margin, contacts, count)
@@ -283,6 +285,7 @@ def contacts_of_pairs(shapes, bodies, rotation, query, contacts):
         posed_a = Posed(shapes.of_body[a], bodies.position[a], rotation[a])
         posed_b = Posed(shapes.of_body[b], bodies.position[b], rotation[b])
         count = pair_contacts(shapes, posed_a, posed_b, query.margin[k], contacts, count)
+        # The caller makes the buffers as large as needed and calls again.
         if count < 0:
             return count
         count = reduce_contacts(real, integer, first, count, MAX_PER_NORMAL)
@@ -311,6 +314,7 @@ def pair_gap(geometry, a, b, limit, out):
             i, j = (q, p) if swapped else (p, q)
             gap = _primitive_gap(geometry, i, j, back if swapped else pose, limit, stack, points)
             if gap < limit:
+                # The next primitives must be nearer than this.
                 limit = gap
                 R_first, x_first = (b.rotation, b.position) if swapped else (a.rotation, a.position)
                 first = moved(R_first, x_first, (points[0], points[1], points[2]))

@@ -55,6 +55,7 @@ def inset_surfaces(
             continue
         first, last = int(geometry.shape_first[s]), int(geometry.shape_first[s + 1])
         reach = np.linalg.norm(geometry.bound_centre[first:last], axis=1) + geometry.bound_radius[first:last]
+        # A ball, capsule or cylinder can give up only a part of its radius, which limits the depth of all.
         d = min([DEPTH * float(reach.max()), *(THIN * _radius(p) for p in primitives if not len(p.faces))])
         out[s], depth[s] = CompiledShape(tuple(_inset(p, d) for p in primitives)), d
     back = np.zeros((len(geometry.vertex), 4))

@@ -75,6 +75,7 @@ def _crossing(p, d, q, e, skeleton):
     point_a = along(p, s, d)
     point_b = along(q, t, e)
     distance = dot(subtract(point_b, point_a), c) / sqrt(c_squared)
+    # The normal points from a to b.
     if distance < 0.0:
         distance = -distance
         c = (-c[0], -c[1], -c[2])
@@ -171,6 +172,7 @@ def edge_contacts(geometry, view, pairs, end, found, count):
         start_b, count_b = geometry.node_start[b], geometry.node_count[b]
         for j in range(3 * start_b, 3 * (start_b + count_b)):
             edge_b = triangle_edge[j // 3, j % 3]
+            # Flat and concave edges touch no other edge; each edge is visited by its owner only.
             if not owns[j // 3] >> (3 + j % 3) & 1 or kind[edge_b] == EDGE_HIDDEN:
                 continue
             q = moved(view.R, view.t, row(vertex, edge[edge_b, 0]))
@@ -193,6 +195,7 @@ def edge_contacts(geometry, view, pairs, end, found, count):
                 edges = _Edges(edge_a, edge_b, p, d, q, e)
                 if sine_squared > CROSSING * CROSSING:
                     count = _crossing_contact(geometry, view, found, count, edges)
+                # Nearly parallel edges of meshes have both ends of their overlap.
                 if meshes and sine_squared < NEARLY_PARALLEL * NEARLY_PARALLEL:
                     count = _parallel_contacts(geometry, view, found, count, edges)
     return count

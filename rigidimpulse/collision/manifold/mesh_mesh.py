@@ -145,6 +145,7 @@ def _face_contacts(geometry, view, pairs, end, found, count):
                     a = row(vertex, triangle[face, 0])
                     normal = row(geometry.triangle_normal, face)
                     height = dot(subtract(p, a), normal)
+                    # A triangle with two equal corners is a segment or a point and has no face.
                     if abs(height) > view.skeleton or triangle[face, 1] == triangle[face, 2]:
                         continue
                     count = _face_contact(geometry, view, found, count, corner, p, face, height)
@@ -161,10 +162,12 @@ def _corner_contact(geometry, view, found, count, corner, p, touched):
     foot, feature, size = touched
     between = subtract(foot, p)
     distance = sqrt(dot(between, between))
+    # Points that coincide give no normal.
     if distance <= ROUND_OFF * size:
         return count
     normal = (between[0] / distance, between[1] / distance, between[2] / distance)
     outward = (-normal[0], -normal[1], -normal[2])
+    # The normal is a difference of two close points: its error is round-off over their distance.
     tolerance = STRICT + view.leeway + ROUND_OFF * (size + abs(p[0]) + abs(p[1]) + abs(p[2])) / distance
     other = feature // 2
     if feature % 2 == 1:
@@ -215,6 +218,7 @@ def _corner_contacts(geometry, view, pairs, end, found, count):
                             size = sqrt(length_squared)
                             count = _corner_contact(geometry, view, found, count, corner, p, (foot, 2 * e + 1, size))
                     v = triangle[face, m]
+                    # Two corners are compared once, from the side of the first body.
                     if not view.flipped and owns[face] >> m & 1 and geometry.vertex_corner[v]:
                         foot = row(vertex, v)
                         off = subtract(foot, p)

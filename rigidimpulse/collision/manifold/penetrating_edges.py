@@ -81,11 +81,13 @@ def crossing_edges(geometry, first, second, bodies, poses, points, count):
             s, t = closest_on_segments(p0, p_way, q0, q_way)
             n = cross(p_way, q_way)
             length = sqrt(dot(n, n))
+            # Edges whose ends are nearest, and parallel ones, do not cross.
             if not (0.0 < s < 1.0 and 0.0 < t < 1.0) or length == 0.0:
                 continue
             p, q = along(p0, s, p_way), along(q0, t, q_way)
             n = (n[0] / length, n[1] / length, n[2] / length)
             depth = dot(subtract(p, q), n)
+            # The normal leads out: the depth along it is positive.
             if depth < 0.0:
                 n, depth = (-n[0], -n[1], -n[2]), -depth
             back = (-n[0], -n[1], -n[2])
@@ -109,6 +111,7 @@ def drop_deep_edges(points, first, edges, end):
     limit = 0.0
     for c in range(first, edges):
         limit = max(limit, real[c, 6])
+    # Without corners the least deep edge sets the limit.
     if first == edges:
         limit = inf
         for c in range(edges, end):

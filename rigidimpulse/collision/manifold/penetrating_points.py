@@ -10,9 +10,9 @@ capsule the two ends of its axis, and where a corner of a surface comes at the m
 and both bodies are pushed along the same line.
 
 The nearest surface point of a corner is looked for on faces that push it back into its own body (n.m > 0, m the mean direction of its
-edges): the corners of a box that stands flush on another would else leave by its side. Whether a point is inside is asked a little way,
-NUDGE of the edges' length, inside of its own body: flush corners do not come and go. Edges much deeper than the corners of the pair, or
-than its least deep edges, are no way out and left away.
+edges): otherwise the corners of a box that stands flush on another would be pushed out through its side. The test whether a point is inside
+uses a place NUDGE of the edges' length inside its own body, so that flush corners do not come and go. Edges much deeper than the corners of
+the pair, or than its least deep edges, are no way out and are dropped.
 
 Sources: P. Moore, J. Wilhelms, Collision detection and response for computer animation, SIGGRAPH 1988 (a spring from each point that is
 inside to the nearest point of the surface); Ericson, Real-Time Collision Detection, 2005, section 5.1.5 (nearest point of a triangle).
@@ -81,11 +81,13 @@ def _points_in_surface(solids, surface, other, bodies, poses, points, count):
         p = turned_back(rotation[a], subtract(world, row(position, a)))
         if box_squared(geometry, root, p) > radius * radius:
             continue
+        # Asked a little inside its own body, so that flush corners do not come and go.
         axis = turned_back(rotation[a], turned(rotation[b], row(axes, v)))
         inside = geometry.closed[surface] and point_in_mesh(geometry, surface, along(p, NUDGE * sizes[v], axis))
         if radius == 0.0 and not inside:
             continue
         squared, q, t = nearest_on_surface(geometry, surface, p, axis)
+        # No face pushes the corner back into its body: the nearest one counts.
         if t < 0:
             squared, q, t = nearest_on_surface(geometry, surface, p, (0.0, 0.0, 0.0))
         distance = sqrt(squared)
@@ -94,6 +96,7 @@ def _points_in_surface(solids, surface, other, bodies, poses, points, count):
         out = subtract(q, p) if inside else subtract(p, q)
         face = row(geometry.triangle_normal, t)
         normal = face
+        # On a face its normal is exact, however small the distance; elsewhere it is the way to the nearest point.
         if dot(out, face) < (1.0 - ON_FACE) * distance:
             normal = (out[0] / distance, out[1] / distance, out[2] / distance)
         depth = radius + (dot(out, normal) if inside else -distance)

@@ -46,7 +46,7 @@ def _prism(cylinder: Primitive) -> Primitive:
 
 
 class Solids(NamedTuple):
-    """The shapes of a scene as the penalty method asks them."""
+    """The shapes of a scene as the penalty method reads them."""
 
     geometry: Geometry
     axes: np.ndarray  # (V, 3) and
@@ -141,6 +141,7 @@ def nearest_on_surface(geometry, primitive, p, axis):
             continue
         child = geometry.node_child[node]
         if child >= 0:
+            # The nearer box is walked first, so that the farther one can be left out.
             first_is_nearer = box_squared(geometry, child, p) <= box_squared(geometry, child + 1, p)
             stack[depth] = child + 1 if first_is_nearer else child
             stack[depth + 1] = child if first_is_nearer else child + 1

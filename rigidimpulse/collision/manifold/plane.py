@@ -59,6 +59,7 @@ def round_half_space_contacts(geometry, round_, half_space, pose, margin, contac
             continue
         for slot in range(3 * node_start[node], 3 * (node_start[node] + node_count[node])):
             vertex = triangle[slot // 3, slot % 3]
+            # Corners only: a flat face gives its corners and nothing else; each is visited by its owner.
             if not (owns[slot // 3] >> (slot % 3) & 1 and corner[vertex]):
                 continue
             p = row(geometry.vertex, vertex)
@@ -98,6 +99,7 @@ def round_half_space_gap(geometry, round_, half_space, pose, limit, stack, out):
             continue
         height_left = _least_height(row(node_min, left), row(node_max, left), normal, offset)
         height_right = _least_height(row(node_min, left + 1), row(node_max, left + 1), normal, offset)
+        # The lower box is walked first, so that the higher one can be left out.
         left_first = height_left <= height_right
         stack[depth, 0] = left + 1 if left_first else left
         stack[depth + 1, 0] = left if left_first else left + 1

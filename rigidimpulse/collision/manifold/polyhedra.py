@@ -2,7 +2,7 @@
 
 The gap of two convex bodies along a unit normal n from a to b is  s(n) = min_b n.x - max_a n.x.  Its largest value over the normals
 of faces and the cross products of edges (the separating axes; Gottschalk, Lin and Manocha 1996) is the gap where a face or two edges
-are nearest, at most the gap elsewhere, and minus the depth of bodies inside each other. Where a face has it, the polygon of
+are nearest, a lower bound of the gap elsewhere, and minus the depth of bodies inside each other. Where a face has it, the polygon of
 the other body that faces it most squarely is cut by its sides (Sutherland and Hodgman 1974), and of the points within
 the margin four stay: the deepest, the one farthest from it, and the ones farthest from their line on either side. Where two
 edges have it by more than EDGE_WINS of the smaller inner radius, their closest points are the contact. There is one exception: if the
@@ -138,6 +138,7 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | No
                 loops.append([before + v for v in loop])
             corners.append(vertex)
             size = vertex.max(0)
+            # Eight corners at +- the same lengths: a box along the principal axes, which has kernels of its own.
             if len(vertex) == 8 and np.allclose(np.abs(vertex), size, rtol=1e-12, atol=0.0):
                 half[s] = size
         for first, number in zip(firsts, (sum(map(len, corners)), len(planes)), strict=True):
@@ -243,6 +244,7 @@ def half_space_contacts(shapes, s, rotation, j, plane, margin, polygon, points):
             count += 1
     if count == 0:
         return np.int64(0), least
+    # Four points can carry the load of all.
     number = four_of(corner, height, count, chosen)
     on_plane, on_shape = (0, 3) if sign > 0.0 else (3, 0)
     for c in range(number):

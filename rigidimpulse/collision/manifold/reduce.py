@@ -87,6 +87,7 @@ def reduce_contacts(real, integer, first, count, max_per_normal=MAX_PER_NORMAL):
                 patch[i] = label
                 kept[i] = True
                 members += 1
+        # The extreme contacts in some directions stand for the corners of the hull, which carry any load of the patch.
         if members > max_per_normal:
             for i in range(len(patch)):
                 kept[i] = kept[i] and patch[i] != label

@@ -79,6 +79,7 @@ def shrunk_geometry(geometry: Geometry, dynamic_shapes: np.ndarray) -> tuple[Geo
         factor[s] = 1.0 - SHRINK
         vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]] *= factor[s]
         nodes = slice(int(geometry.node_first[p]), int(geometry.node_first[p + 1]))
+        # The box tree and the bounding sphere shrink about the centre of mass like the vertices.
         low[nodes] *= factor[s]
         high[nodes] *= factor[s]
         centre[p] *= factor[s]

@@ -87,6 +87,7 @@ def _boxes_safe_until(low, high, box, work, carrier, threshold, horizon):
     for trial in range(7):
         k, side = (trial - 1) % 3, 0
         if trial == 0:
+            # What limits the safe time so far is the best guess for the next boxes.
             axis, side = vector(work, LIMIT + DIRECTION), carrier
             if dot(axis, axis) == 0.0:
                 continue
@@ -110,6 +111,7 @@ def _boxes_safe_until(low, high, box, work, carrier, threshold, horizon):
                 s = viewed_safe_until(work, seen, view, sign, (middle, far_first, reach_first), gap, horizon)
             else:
                 s = viewed_safe_until(work, seen, view, sign, (arm, far, reach), gap, horizon)
+            # Each direction gives a safe time of its own; the longest counts.
             best = max(best, s)
             if best >= horizon:
                 return horizon
@@ -175,12 +177,14 @@ def trees_safe_until(geometry, first, second, scratch, threshold, horizon):
     while depth > 0 and horizon > 0.0:
         depth -= 1
         a, b = index[STACK + 2 * depth], index[STACK + 2 * depth + 1]
+        # A shorter safe time was found since: these boxes cannot lower it.
         if work[STACK_TIME + depth] >= horizon:
             continue
         index[BASE] = depth
         open_a = b == NO_NODE or child[b] < 0
         if child[a] >= 0 or not open_a:
             if child[a] >= 0 and not open_a:
+                # The larger box is opened, so that both shrink alike.
                 open_a = _is_larger(node_min, node_max, a, b)
             for k in range(2):
                 next_a, next_b = child[a] + k if open_a else a, b if open_a else child[b] + k
@@ -223,6 +227,7 @@ def half_space_safe_until(geometry, root, normal, level, scratch, horizon):
         half, middle = scaled(subtract(high, low), 0.5), scaled(along(low, 1.0, high), 0.5)
         gap = dot(back, middle) - (abs(back[0]) * half[0] + abs(back[1]) * half[1] + abs(back[2]) * half[2]) - level
         arm = turned(work, ROTATION, middle)
+        # Boxes that stay above the level for the whole horizon need not be opened.
         if gap > 0.0 and viewed_safe_until(work, SEEN, OTHER_VIEW, 1.0, (arm, length(arm), length(half)), gap, horizon) >= horizon:
             continue
         if child[node] >= 0:

@@ -79,6 +79,7 @@ def closest_simplices(work, index, closest):
         for k in range(index[COUNT + 1 - side]):
             p = vector(work, others + 3 * k)
             height = dot(subtract(p, a), normal)
+            # A vertex over a face: the normal of the face is exact however small the height is.
             if abs(height) < best and over_triangle(
                 p, a, vector(work, corners + 3), vector(work, corners + 6), normal, 0.0, 0.0, 0.0
             ):
@@ -96,6 +97,7 @@ def closest_simplices(work, index, closest):
             on_first, on_second = along(p, s, d), along(q, t, e)
             between = subtract(on_second, on_first)
             distance = length(between)
+            # A tie keeps the vertex over a face, whose normal is exact.
             if distance < best * (1.0 - _ROUND_OFF):
                 best = distance
                 normal, crossing = _direction_of_edges(d, e, between, s, t)

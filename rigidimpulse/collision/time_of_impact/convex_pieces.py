@@ -116,6 +116,7 @@ def _with_edges(work, index, edges, normal, threshold, horizon):
     edge_first = subtract(vector(work, CORNER + 3 * ((k + 1) % num_first)), vector(work, CORNER + 3 * k))
     edge_second = subtract(vector(work, CORNER + 9 + 3 * ((j + 1) % num_second)), vector(work, CORNER + 9 + 3 * j))
     m = cross(normal, edge_first)
+    # m = f (n x e_a): see the head of the file; parallel edges have none.
     wanted, available = -dot(normal, cross(vector(work, SEEN + SEEN_SPIN), edge_second)), dot(m, edge_second)
     if available == 0.0:
         return 0.0
@@ -128,11 +129,13 @@ def _with_edges(work, index, edges, normal, threshold, horizon):
         arm = subtract(point, vector(work, ORIGIN + 3))
         velocity, acceleration = seen_motion(work, SEEN, arm)
         jerk = work[SEEN + SEEN_JERK] + work[SEEN + SEEN_ARM_JERK] * length(arm)
+        # Bounds of |y''|, |y'| and |D| over the horizon.
         bend_bound = length(acceleration) + horizon * jerk
         speed_bound = length(velocity) + horizon * bend_bound
         for k in range(num_first):
             between = subtract(point, vector(work, CORNER + 3 * k))
             reach = length(between) + horizon * speed_bound
+            # |f'''| <= J + 3 nu |y''| + 3 nu^2 |y'| + nu^3 |D|.
             rest = jerk + nu * (3.0 * bend_bound + nu * (3.0 * speed_bound + nu * reach))
             gap = dot(normal, between)
             closing = -dot(m, between) - dot(normal, velocity)
@@ -153,6 +156,7 @@ def _with_thinned(cylinders, work, index, normal, threshold, horizon):
             is_side = is_side and abs(dot(normal, axis)) < _ON_SIDE
             put(work, CORNER + 9 * side, along(centre, -half_height, axis))
             put(work, CORNER + 9 * side + 3, along(centre, half_height, axis))
+            # A cylinder touched at its side takes part as its axis, an edge grown by its radius.
             threshold += radius
     if not is_side:
         return 0.0
@@ -162,6 +166,7 @@ def _with_thinned(cylinders, work, index, normal, threshold, horizon):
     s = 0.0
     if edges >= 0:
         s = _with_edges(work, index, edges, vector(work, THINNED + NORMAL), threshold, horizon)
+    # The pieces are as they were.
     index[COUNT], index[COUNT + 1] = first, second
     return s
 
@@ -179,6 +184,7 @@ def _closest_to_cylinder(cylinders, scratch):
     else:
         corners = work[CORNER : CORNER + 9].reshape((3, 3))
         cylinder_triangle_distance(centre, axis, half_height, radius, corners, points)
+    # The kernels give the cylinder first; here it is the second piece.
     on_cylinder, normal = vector(work, CLOSEST), scaled(vector(work, CLOSEST + NORMAL), -1.0)
     put(work, CLOSEST + POINT_FIRST, vector(work, CLOSEST + POINT_SECOND))
     put(work, CLOSEST + POINT_SECOND, on_cylinder)

@@ -104,6 +104,7 @@ def _first_contact(first, second, impact_margin, tolerance, work, index, speeds)
         for i in range(corners_a.shape[0]):
             for j in range(corners_b.shape[0]):
                 gap = dot(normal, subtract(vector(work, CORNER + 9 + 3 * j), vector(work, CORNER + 3 * i))) - impact_margin
+                # Each pair of corners has its own offset, speed and bend along n.
                 closing = -dot(normal, subtract(vector(speeds, 9 + 3 * j), vector(speeds, 3 * i)))
                 safe = safe_until(gap, closing, _bend(corners_a, path_a, i) + _bend(corners_b, path_b, j), safe)
         if tau + safe >= 1.0:

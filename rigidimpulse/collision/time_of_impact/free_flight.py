@@ -68,6 +68,7 @@ def spheres_safe_until(x, v, a, jerk, reach, exact, horizon):
             return s
         normal = scaled(between, -1.0 / distance if distance > 0.0 else 0.0)
         speed, pull = along(v, s, along(a, 0.5 * s, jerk)), along(a, s, jerk)
+        # Along the fixed line of centres the distance is at least a cubic: its root is a safe step.
         step = cubic_safe_until(distance - reach, dot(normal, speed), dot(normal, pull), dot(normal, jerk), horizon - s)
         if s + step >= horizon:
             return horizon

@@ -41,6 +41,7 @@ def measure(geometry, trajectory, shape_of_body, a, b, t, witness):
     gap = pair_gap(geometry, posed_a, posed_b, inf, points)
     point_a, point_b = (points[0], points[1], points[2]), (points[3], points[4], points[5])
     between = scaled(subtract(point_b, point_a), 1.0 if gap >= 0.0 else -1.0)
+    # Surfaces that coincide have no normal of their own.
     if dot(between, between) == 0.0:
         between = subtract(row(x, SECOND), row(x, FIRST))
     size = length(between)

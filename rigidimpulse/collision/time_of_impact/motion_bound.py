@@ -131,12 +131,15 @@ def _write_spin_bounds(moments, torque_world, torque_rate, horizon, record):
     least = min(i, j, k)
     kappa = max(abs(i - j) / k, abs(j - k) / i, abs(k - i) / j)
     torque_size, spin_now, rate_now = length(torque), length(spin), length(rate)
+    # |tau| is the greater one of both ends.
     torque_size = max(torque_size, length(turned_back(record, AXES, along(torque_world, horizon, torque_rate))))
     kick, kick_rate = torque_size / least, length(torque_rate) / least
+    # Energy and angular momentum change no faster than the torque lets them.
     energy = (sqrt(dot(spin, momentum)) + horizon * torque_size / sqrt(least)) ** 2
     spin_bound = max(_fastest_spin(moments, energy, max(length(momentum) - horizon * torque_size, 0.0) ** 2), spin_now)
     rate_bound = 0.0
     jerk_bound = 0.0
+    # Each bound tightens the others: X <- min(X, |X(0)| + h X').
     for _ in range(_TIGHTENINGS):
         rate_bound = kick + kappa * spin_bound * spin_bound / sqrt(3.0)
         jerk_bound = spin_bound * kick + 2.0 / sqrt(3.0) * kappa * spin_bound * rate_bound + kick_rate
@@ -163,6 +166,7 @@ def motion_bound(trajectory, i, t, horizon, record):
     put(record, ACCELERATION, none if mode == FIXED else row_at(trajectory.acceleration, i, growth, s))
     put(record, CENTRE_JERK, none if mode == FIXED else growth)
     if mode == FIXED or mode == PRESCRIBED or mode == LINEAR:
+        # The spin is constant in the world.
         put(record, SPIN_RATE, none)
         record[SPIN_BOUND] = length(vector(record, SPIN))
         record[SPIN_RATE_BOUND] = 0.0
@@ -193,6 +197,7 @@ def _centre_jerk(turning, seen, pulls, horizon):
     spin, rate, jerk = turning
     distance, speed, velocity, acceleration = seen
     pull, pull_rate = pulls
+    # A frame that does not turn adds nothing.
     if spin == 0.0 and rate == 0.0:
         return pull_rate * _WIDEN
     far = distance + horizon * speed
@@ -205,6 +210,7 @@ def _centre_jerk(turning, seen, pulls, horizon):
             spin * pull + 3.0 * rate * fast + 2.0 * spin * bend + (jerk + 2.0 * rate * spin) * far + spin * spin * fast
         )
         result += pull_rate
+        # Tightened by X <- min(X, |X(0)| + h X').
         bend = max(acceleration, min(bend, acceleration + horizon * result))
         fast = max(velocity, min(fast, velocity + horizon * bend))
     return result * _WIDEN

@@ -93,6 +93,7 @@ def make_scratch(geometry: Geometry) -> SweepScratch:
             plane[shape] = first
         if last - first == 1 and geometry.kind[first] == ROUND:
             vertices = geometry.vertex[geometry.vertex_first[first] : geometry.vertex_first[first + 1]]
+            # A ball about the centre of mass: its rotation moves nothing.
             ball[shape] = len(vertices) == 1 and not vertices.any()
             if ball[shape]:
                 reach[shape] = geometry.radius[first]
@@ -137,6 +138,7 @@ def _bounds_safe_until(bound_centre, bound_radius, first, second, work, threshol
     arm = turned(work, ROTATION, row(bound_centre, second))
     between = subtract(along(arm, 1.0, vector(work, ORIGIN + 3)), row(bound_centre, first))
     distance = length(between)
+    # Without a gap the spheres say nothing.
     if distance <= reach:
         return 0.0
     return point_safe_until(work, SEEN, scaled(between, 1.0 / distance), arm, 0.0, distance - reach, horizon)
@@ -200,10 +202,12 @@ def _solid_pair(geometry, first, second, scratch, threshold, horizon):
             for k in range(LIMIT_SIZE):
                 work[LIMIT + k] = work[CLOSEST + k]
         return s
+    # Skeletons are bounded; their radii are part of the threshold.
     threshold += grown_first + grown_second
     s = trees_safe_until(geometry, root_first, root_second, scratch, threshold, horizon)
     if s < horizon:
         normal = vector(work, LIMIT + NORMAL)
+        # From the skeletons to the surfaces.
         work[LIMIT + GAP] -= grown_first + grown_second
         put(work, LIMIT + POINT_FIRST, along(vector(work, LIMIT + POINT_FIRST), grown_first, normal))
         put(work, LIMIT + POINT_SECOND, along(vector(work, LIMIT + POINT_SECOND), -grown_second, normal))
@@ -251,6 +255,7 @@ def safe_time(geometry, shape_a, shape_b, scratch, threshold, horizon):
     work, index, view = scratch.work, scratch.index, -1
     for p in range(geometry.shape_first[shape_a], geometry.shape_first[shape_a + 1]):
         for q in range(geometry.shape_first[shape_b], geometry.shape_first[shape_b + 1]):
+            # A half space carries the frame before a ROUND primitive, that before a cylinder.
             swapped = geometry.kind[q] < geometry.kind[p]
             motion = MOTION + MOTION_SIZE if swapped else MOTION
             if view != motion:
@@ -260,6 +265,7 @@ def safe_time(geometry, shape_a, shape_b, scratch, threshold, horizon):
             s = _bounds_safe_until(
                 geometry.bound_centre, geometry.bound_radius, first, second, work, threshold, horizon
             )
+            # The bounding spheres alone are apart for long enough.
             if s >= horizon or geometry.kind[second] == HALF_SPACE:
                 continue
             if geometry.kind[first] == HALF_SPACE:

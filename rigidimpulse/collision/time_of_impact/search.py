@@ -50,6 +50,7 @@ def _flight_safe_until(frame, trajectory, scratch, pair, t, threshold, horizon):
     if plane_a >= 0 or plane_b >= 0:
         i, plane, other = a if plane_a >= 0 else b, max(plane_a, plane_b), shape_b if plane_a >= 0 else shape_a
         if trajectory.mode[i] != FIXED and length(row(trajectory.angular_velocity, i)) > 0.0:
+            # A plane that turns has no closed form.
             return 0.0, False
         sign, ball = 1.0 if plane_a >= 0 else -1.0, scratch.ball[other]
         n0, n1, n2 = sign * frame[plane, 0], sign * frame[plane, 1], sign * frame[plane, 2]
@@ -58,6 +59,7 @@ def _flight_safe_until(frame, trajectory, scratch, pair, t, threshold, horizon):
     reach = scratch.reach[shape_a] + scratch.reach[shape_b] + threshold
     if reach == inf:
         return 0.0, False
+    # For two balls the bounding spheres are the shapes.
     exact = scratch.ball[shape_a] and scratch.ball[shape_b]
     return spheres_safe_until(x, v, acceleration, jerk, reach, exact, horizon), exact
 
@@ -124,6 +126,7 @@ def first_contacts(geometry, trajectory, scratch, shape_of_body, pairs, end, eff
             horizon = rest if is_let_go else min(rest, trial)
             queries += 1
             s, exact = _flight_safe_until(geometry.frame, trajectory, scratch, pair, t, floor, horizon)
+            # The bounding spheres alone may allow a long step; only else the shapes are asked.
             is_free = s >= horizon or (not exact and s > _WORTHWHILE * horizon)
             if not is_free:
                 span = _bring_motions(trajectory, scratch, pair, t, horizon)
@@ -139,10 +142,12 @@ def first_contacts(geometry, trajectory, scratch, shape_of_body, pairs, end, eff
                 continue
             gap, closing = work[WITNESS + GAP], closing_speed(work)
             near = gap <= impact_margin[k] + above
+            # In contact: features at the margin that approach by more than rounding.
             if near and closing * (end - t) > slack:
                 status = TOUCHING if t == start[k] and gap <= impact_margin[k] else IMPACT
                 break
             if near and not is_let_go:
+                # They hover, slide or leave: they may come closer by the slack for rounding.
                 floor, is_let_go, target = min(gap, impact_margin[k]) - slack, True, end
                 continue
             if near and closing < 0.0:
@@ -152,6 +157,7 @@ def first_contacts(geometry, trajectory, scratch, shape_of_body, pairs, end, eff
                 status = IMPACT
                 break
             trial, floor, is_let_go = 2.0 * s, impact_margin[k], False
+            # Look ahead for the root of the limiting features; safe steps then only confirm that nothing is earlier.
             probe = min(target, t + ahead * s)
             if probe > t and not exact:
                 root, used = witness_root(geometry, trajectory, pair_scratch, a, b, (t, probe), impact_margin[k], above)

@@ -68,6 +68,7 @@ def safe_until(gap, closing, bend, horizon):
     if square < 0.0 or (bend <= 0.0 and closing <= 0.0):
         return horizon
     if closing > 0.0:
+        # The form of the root without cancellation.
         return min(horizon, 2.0 * gap / (closing + sqrt(square)))
     return min(horizon, (sqrt(square) - closing) / bend)
 

@@ -9,7 +9,7 @@ trajectories hold, and s = t - t0:
 
 The distance of closest approach x + v s_c is small where it matters, so s has no cancellation. A pair that touches and
 leaves needs no gap of its own: the root at which it came is not the one at which g falls again. So the time depends on
-the trajectories and on nothing else, in particular not on when it is asked for.
+the trajectories alone, and not on the instant at which it is computed.
 """
 
 from __future__ import annotations
@@ -111,8 +111,10 @@ def ball_time(frame, trajectory, scratch, pair, start):
     frame (p, 7): that of the geometry; trajectory: paths of all bodies, since before `start` [s]; scratch: `SweepScratch`; pair: `Pair`.
     """
     a, b, shape_a, shape_b = pair
+    # From the instant since which both trajectories hold: the time then does not depend on when it is computed.
     since = max(trajectory.start[a], trajectory.start[b])
     x, v, acceleration, jerk = relative_flight(trajectory, a, b, since)
+    # Paths with jerk have no closed form.
     if jerk[0] != 0.0 or jerk[1] != 0.0 or jerk[2] != 0.0:
         return nan
     size = length(row(trajectory.position, a)) + length(row(trajectory.position, b))

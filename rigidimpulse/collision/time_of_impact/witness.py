@@ -118,6 +118,7 @@ def witness_root(geometry, trajectory, scratch, a, b, interval, impact_margin, t
             high, below = t, gap
         else:
             low, above = t, gap
+        # No sign change between the ends: no root is bracketed.
         if above < 0.0 or (trial == 1 and below >= 0.0):
             return inf, trial + 1
         if trial > 0 and (above <= tolerance or high - low <= 2.0 * least):

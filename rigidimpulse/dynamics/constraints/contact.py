@@ -104,12 +104,14 @@ def fill_contact_bias(problem, excess, h, of_contacts):
         contact_velocity(contacts, c, frames[c], problem.acceleration, problem.angular_acceleration, a[c])
         for k in range(3):
             for j in range(3):
+                # What the moving place of contact and the turning normal add: see the head of the file.
                 a[c, k] += turning[c, j] * frames[c, k, j]
             scale = max(scale, abs(a[c, k]) * h)
     for c in range(m):
         contact_velocity(contacts, c, frames[c], bodies.velocity, bodies.angular_velocity, u[c])
         for k in range(rows_of(rows, first_row[c])):
             rows.bias[first_row[c] + k] = u[c, k] + h * a[c, k]
+        # 2 (g - d) / h brings the gap to the contact margin, limited to a part of what presses the contact.
         most = CLOSING * h * max(-a[c, 0], 0.0)
         rows.bias[first_row[c]] += min(max(2.0 * excess[c] / h, -most), most)
     return scale, u

@@ -124,6 +124,7 @@ def _skeleton_of(geometry, p, kind, feature, is_a, rotation, normal, direction):
         return geometry.radius[_owner(geometry.vertex_first, feature)], POINT
     if not line:
         return geometry.radius[_owner(geometry.triangle_first, feature)], FACE
+    # What is left is an edge: its direction in the world is needed for n'.e = -n.(w x e).
     _edge_direction(geometry, feature, rotation, direction)
     return geometry.radius[_owner(geometry.edge_first, feature)], LINE
 
@@ -142,6 +143,7 @@ def _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, w, out):
         along += (arm[i] - centre[i]) * k[i]
     z = dot(outward, k)
     s2 = 1.0 - z * z
+    # With the normal along the axis a whole cap touches, and no single point of the rim.
     if s2 < LEAST_LEAN * LEAST_LEAN:
         return False
     s, off = sqrt(s2), 0.0
@@ -149,6 +151,7 @@ def _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, w, out):
     for i in range(3):
         c[i] += along * k[i]
         off += (arm[i] - c[i] + radius * (outward[i] - z * k[i]) / s) ** 2
+    # The contact found must be the point of the rim that the formula describes.
     if off > (NEAR * radius) ** 2:
         return False
     k_rate = np.empty(3)
@@ -156,6 +159,7 @@ def _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, w, out):
     _cross(w, c, out)
     z_rate = dot(outward_rate, k) + dot(outward, k_rate)
     for i in range(3):
+        # Derivative of e = (n - z k) / s.
         e_rate = (outward_rate[i] - z_rate * k[i] - z * k_rate[i]) / s + (outward[i] - z * k[i]) * z * z_rate / (s * s2)
         out[i] -= radius * e_rate
     return True
@@ -233,10 +237,12 @@ def _between_skeletons(first, second, n, distance, place, normal_rate):
         return
     across = dot(vb, n) - dot(va, n)
     for k in range(3):
+        # Two points: n turns with the part of their relative velocity across it.
         normal_rate[k] = (vb[k] - va[k] - across * n[k]) / distance
     if skeleton_a == LINE or skeleton_b == LINE:
         e = ea if skeleton_a == LINE else eb
         _cross(wa if skeleton_a == LINE else wb, e, x)
+        # A line stays across n: n'.e = -n.(w x e).
         change = -dot(n, x) - dot(normal_rate, e)
         for k in range(3):
             normal_rate[k] += change * e[k]
@@ -308,6 +314,7 @@ def contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, f
             arm_rate = rate_b[c] if side else rate_a[c]
             sign, w = 2.0 * side - 1.0, bodies.angular_velocity[i]
             for k in range(3):
+                # r' = p' - v.
                 arm_rate[k] = place[k] - bodies.velocity[i, k]
             _cross(w, arm_rate, x)
             for k in range(3):
@@ -316,7 +323,9 @@ def contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, f
             for k in range(3):
                 u[k] += sign * (bodies.velocity[i, k] + x[k])
             if bodies.inv_mass[i] > 0.0:
+                # Forces change the motion of movable bodies only, so only their arms limit how long a force stays right.
                 fastest = max(fastest, sqrt(dot(arm_rate, arm_rate) / max(dot(r, r), 1e-300)))
+        # The part of the gap's second derivative from the turning normal: n (u.n').
         along = dot(u, normal_rate[c])
         for k in range(3):
             turning[c, k] += along * n[k]

@@ -159,10 +159,12 @@ def _angular(code, e, f, near, direction):
         across = np.zeros(3)
         across[after], across[last] = -turn[last, k], turn[after, k]
         return atan2(_along_axes(e, across[0], across[1], across[2], direction), turn[k, k])
+    # TWIST: torque along (e_k + f_k) / (1 + e_k . f_k), which grows without bound as f_k turns to -e_k.
     share = 1.0 / max(1.0 + turn[k, k], TINY)
     for r in range(3):
         direction[r] = share * (e[r, k] + f[r, k])
     angle = atan2(turn[last, after] - turn[after, last], turn[after, after] + turn[last, last])
+    # Counted through full turns.
     return angle + 2.0 * pi * np.rint((near - angle) / (2.0 * pi))
 
 

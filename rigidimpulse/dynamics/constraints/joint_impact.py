@@ -44,10 +44,12 @@ def impact_rows(island, moment):
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
             joint[i] = j
+            # Torques apply no force at the anchors.
             if not is_linear(joints.coordinate[k]):
                 direction[i] = 0.0
             if rows.kind[i] == BOUNDED or joints.stiffness[k] < np.inf:
                 rows.kind[i] = BOUNDED
+                # Springs cannot act in an impact; a limit acts only where it is reached.
                 holds = joints.stiffness[k] == np.inf and (memory.active[k] or is_reached(joints, k, value[i], island.allowed))
                 rows.lower[i] = -np.inf if holds and joints.lower[k] < 0.0 else 0.0
                 rows.upper[i] = np.inf if holds and joints.upper[k] > 0.0 else 0.0

@@ -52,6 +52,7 @@ def is_reached(joints, k, value, allowed):
 def _remainder(line, basis, held, out):
     """The part of line (12,) across the first `held` vectors of basis, into out; returns its square."""
     copy_vector(line, out)
+    # Twice, since one pass leaves the round-off of what it takes away.
     for _ in range(2):
         for b in range(held):
             along = 0.0
@@ -74,6 +75,7 @@ def joint_weights(joints, which, rows, start, weight):
         held, count = 0, joints.first[j + 1] - joints.first[j]
         for i in range(count):
             k, line = joints.first[j] + i, rows.jacobian[start + first + i]
+            # An orthonormal basis of the hard rows: soft rows and limits act on what these leave free.
             if joints.stiffness[k] == np.inf and limit_side(joints, k) == 0.0 and held < 6:
                 square = _remainder(line, basis, held, out)
                 if square > LEAST_WEIGHT * np.sum(line * line):
@@ -96,6 +98,7 @@ def spring_of(joints, k, weight):
 def _reach_time(gap, rate, end, h, overrun):
     """First root of the parabola of g over (0, h), h if there is none."""
     linear, bend = rate * h, end - gap - rate * h
+    # The gap may close and open again within the sub-step.
     dips = bend > 0.0 and 0.0 < -linear < 2.0 * bend and gap - 0.25 * linear * linear / bend < -overrun
     if end >= -overrun and not dips:
         return h
@@ -120,6 +123,7 @@ def _release_time(k, c, weight, x, u, end, pressed, h):
     square = k * weight
     total, first, _ = response(square, c * weight, h)
     a = (end - (1.0 - square * total) * x - first * u) / total if pressed else 2.0 * (end - x - u * h) / (h * h)
+    # A fast oscillator may let go and push again within h: the first sign change is looked for.
     count = min(ceil(h * sqrt(square) / SCAN) + 1, MOST_SCANS)
     late = 0.0
     for n in range(1, count + 1):

@@ -78,6 +78,7 @@ def stop_rows(island, elapsed):
         for k in range(joints.first[j], joints.first[j + 1]):
             rows.bias[i] = u[i]
             hard = joints.stiffness[k] == np.inf
+            # Limits that were not reached carry nothing; a spring needs time to give an impulse.
             if not memory.active[k] or (not hard and elapsed[j] <= 0.0):
                 rows.kind[i] = BOUNDED
                 rows.lower[i] = rows.upper[i] = 0.0
@@ -85,6 +86,7 @@ def stop_rows(island, elapsed):
                 rows.kind[i] = BOUNDED
                 rows.lower[i], rows.upper[i], rate = _spring_impulse(joints, j, k, weight[i], value[i], memory, elapsed[j])
                 rows.bias[i] -= rate
+            # The impulse has the signs that the force may have; its size is not bounded.
             elif rows.kind[i] == BOUNDED:
                 rows.lower[i] = -np.inf if joints.lower[k] < 0.0 else 0.0
                 rows.upper[i] = np.inf if joints.upper[k] > 0.0 else 0.0
@@ -160,6 +162,7 @@ def fill_closing_rows(island, rows, start):
             rows.bias[r], rows.lower[r], rows.upper[r] = value[i], joints.lower[k], joints.upper[k]
             if joints.stiffness[k] < np.inf:
                 rows.kind[r] = BOUNDED
+                # Springs are not closed by position.
                 rows.lower[r] = rows.upper[r] = 0.0
             elif joints.lower[k] < 0.0 and (joints.upper[k] > 0.0 or value[i] > 0.0):
                 worst = max(worst, abs(value[i]))
@@ -277,6 +280,7 @@ def start_joint_rows(island, h, rows, start):
         for k in range(joints.first[j], joints.first[j + 1]):
             r = start + i
             rows.lower[r], rows.upper[r], rows.impulse[r] = joints.lower[k] * h, joints.upper[k] * h, memory.force[k] * h
+            # The end of the sub-step compares its coordinates with these.
             memory.start_value[k], memory.start_rate[k], memory.weight[k] = value[i], u[i], weight[i]
             memory.steepness[k] = np.sqrt(np.sum(direction[i] ** 2))
             memory.slack[k] = limit_side(joints, k) != 0.0 and not is_reached(joints, k, value[i], island.allowed)
@@ -328,6 +332,7 @@ def _violation(joints, which, memory, value, impulse):
             if not np.isfinite(x):
                 worst = np.inf
             if joints.stiffness[k] < np.inf or memory.slack[k]:
+                # Soft rows have no place to be at; limits that were slack belong to `next_switch`.
                 x = 0.0
             if joints.lower[k] < 0.0 < joints.upper[k] or impulse[i] != 0.0:
                 worst = max(worst, abs(x))

@@ -80,6 +80,7 @@ def fill_rolling_rows(problem, rolling, h, of_contacts, start):
             if not bound > 0.0:
                 continue
             a, b = contacts.body_a[c], contacts.body_b[c]
+            # The row holds L t, so that its velocity L w is comparable with the speeds of points.
             x, y, z = lever * frames[c, k, 0], lever * frames[c, k, 1], lever * frames[c, k, 2]
             if bodies.inv_mass[a] > 0.0:
                 rows.first[i] = number[a]
@@ -88,6 +89,7 @@ def fill_rolling_rows(problem, rolling, h, of_contacts, start):
                 rows.second[i] = number[b]
                 write_body(bodies, b, rows.jacobian[i, 6:], (0.0, 0.0, 0.0), (x, y, z))
             rows.kind[i] = SEGMENT if k == 0 else (DISC if k == 1 else DISC_SECOND)
+            # The bound b N in units of the scaled row is (b / L) times the normal impulse.
             rows.master[i], rows.coefficient[i] = first_row[c], bound / lever
             w, alpha = bodies.angular_velocity, problem.angular_acceleration
             rows.bias[i] = (

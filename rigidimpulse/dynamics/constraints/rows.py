@@ -125,6 +125,7 @@ def contact_rows(bodies, contacts, members, number, extra):
     r = np.int64(0)
     for c in range(m):
         first_row[c] = r
+        # Smooth contacts need no tangents: fewer rows to solve.
         r += 3 if contacts.static_friction[c] > 0.0 else 1
     rows = make_rows(r + extra)
     for c in range(m):
@@ -237,6 +238,7 @@ def scaled_wrench(bodies, i, y, wrench):
     factor = np.empty((3, 3))
     root = sqrt(bodies.inv_mass[i])
     cholesky_3(bodies.inv_inertia[i], factor)
+    # C^-T by back substitution: the angular part of C is a Cholesky factor.
     z = y[5] / factor[2, 2]
     x1 = (y[4] - factor[2, 1] * z) / factor[1, 1]
     x0 = (y[3] - factor[1, 0] * x1 - factor[2, 0] * z) / factor[0, 0]

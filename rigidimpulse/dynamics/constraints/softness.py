@@ -34,6 +34,7 @@ SLOW = 1.0
 @jit
 def response(square, twice_s, h):
     """R(h), B(h) and q(h); square: w^2 [1/s^2], twice_s: 2 s [1/s]."""
+    # The closed forms lose digits for slow oscillators.
     if square * h * h < SERIES and twice_s * h < SERIES:
         before, term = 0.0, 0.5 * h * h
         total, rate, lack = term, h, 0.0
@@ -58,6 +59,7 @@ def response(square, twice_s, h):
         total = (1.0 - decay * (cos(w * h) + s / w * sin(w * h))) / square
     else:
         root = sqrt(inside)
+        # The slow root as a quotient: the difference would cancel.
         fast, slow = -s - root, -square / (s + root)
         rate = (exp(slow * h) - exp(fast * h)) / (2.0 * root)
         rising = expm1(slow * h) / slow if slow < 0.0 else h

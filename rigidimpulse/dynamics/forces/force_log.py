@@ -29,6 +29,7 @@ def add_line_integrals(trajectory, i, times, rows, value, rate, total):
     begin, start, end = times
     h = end - start
     x, q, v, w = np.empty(3), np.empty(4), np.empty(3), np.empty(3)
+    # Gauss's quadrature of three points for H and W; J has the closed form of the line.
     for node in range(3):
         time = start + NODES[node] * h
         part = WEIGHTS[node] * h

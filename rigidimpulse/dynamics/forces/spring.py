@@ -124,6 +124,7 @@ def _pull(rows, end_of_row, springs, carried, bodies, rotation, out):
                 p[end, k] = bodies.position[i, k] + r[k]
                 v[end, k] = bodies.velocity[i, k] + w[m] * r[n] - w[n] * r[m]
         length = math.sqrt((p[1, 0] - p[0, 0]) ** 2 + (p[1, 1] - p[0, 1]) ** 2 + (p[1, 2] - p[0, 2]) ** 2)
+        # A spring of length 0 has no direction, and pulls nothing.
         share = 1.0 / length if length > 0.0 else 0.0
         rate = 0.0
         for k in range(3):
@@ -132,6 +133,7 @@ def _pull(rows, end_of_row, springs, carried, bodies, rotation, out):
         sign = -share * pull if mine == 1 else share * pull
         for k in range(3):
             out[row, k] = sign * (p[1, k] - p[0, k])
+        # The torque about the centre of mass.
         r = arm[mine]
         for k in range(3):
             m, n = (k + 1) % 3, (k + 2) % 3

@@ -108,15 +108,18 @@ def _process(law, e, mu, mu_s, k, start, q):
         q[i] = 0.0
     q[UN], q[S1], q[COMPRESSED] = start[0], start[1], 1.0
     if start[1] > 0.0:
+        # First the part in which the slip turns (`slip_direction`); it hands back where the slip is straight.
         if mu > 0.0 and turn(law, e, k, start, mu, q):
             return SLIDES
         slip = hypot(q[S1], q[S2])
         d1, d2 = q[S1] / slip, q[S2] / slip
         rate = d1 * k.n1 + d2 * k.n2 - mu * (d1 * d1 * k.t11 + 2.0 * d1 * d2 * k.t12 + d2 * d2 * k.t22)
+        # The normal impulse after which the slip has stopped.
         limit = -slip / rate if rate < 0.0 and mu > 0.0 else np.inf
         if go_straight(law, e, k, start, -mu * d1, -mu * d2, limit, q):
             return SLIDES
         q[S1] = q[S2] = 0.0
+    # The slip has stopped: it sticks if -K_t^-1 k_t is within the static cone, else it slips on in the direction d of the head.
     f1, f2 = _sticking(k)
     if f1 * f1 + f2 * f2 <= mu_s * mu_s:
         return STICKS if go_straight(law, e, k, start, f1, f2, np.inf, q) else UNFINISHED

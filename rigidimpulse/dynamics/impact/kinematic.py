@@ -35,6 +35,7 @@ def respond_kinematic(bodies, contacts, rule, together, number, joints, log):
         if e * -fastest <= rule.rest_speed[best]:
             e = 0.0
         change = -(1.0 + e) * fastest
+        # Of two movable bodies each takes half of the change, whatever their masses.
         share_a = 0.0 if bodies.inv_mass[a] == 0.0 else (1.0 if bodies.inv_mass[b] == 0.0 else 0.5)
         share_b = 0.0 if bodies.inv_mass[b] == 0.0 else 1.0 - share_a
         for k in range(3):

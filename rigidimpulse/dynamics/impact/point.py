@@ -89,6 +89,7 @@ def resolve_contact(bodies, contacts, c, restitution, law, log, count):
     t1, t2, impulse = np.empty(3), np.empty(3), np.empty(3)
     approach = relative_velocity(bodies, contacts, c, u)
     inverse_effective_mass(bodies, contacts, c, k)
+    # Without rebound nothing is reversed along the surface either.
     e_t = contacts.tangential_restitution[c] if restitution > 0.0 else 0.0
     mu_s, mu_k = contacts.static_friction[c], contacts.dynamic_friction[c]
     contact_impulse(k, contacts.normal[c], u, PairLaw(law, restitution, e_t, mu_s, mu_k), t1, t2, impulse)

@@ -101,6 +101,7 @@ def _left_of_restitution(law, e, k, start, f, g, q):
         left = max((-e * start[0] - q[UN]) / g_n, 0.0) if g_n > 0.0 else inf
         if e > 1.0:
             return left
+        # Newton's law ends early where all kinetic energy lost has come back.
         lost = min(energy_change(k, start, q[JN], q[J1], q[J2]), 0.0)
         return min(left, _positive_root(lost, q[UN] + f1 * q[S1] + f2 * q[S2], g_n + f1 * g_1 + f2 * g_2))
     return _positive_root(min(q[WR] - e * e * q[WC], 0.0), q[UN], g_n)
@@ -141,6 +142,7 @@ def go_straight(law, e, k, start, f1, f2, limit, q):
         else:
             q[PR] += step
             q[WR] += work
+        # At the turn u_n is 0 exactly, not to rounding.
         q[UN] = q[UN] + g_n * step if step < turn else 0.0
         q[S1] += g_1 * step
         q[S2] += g_2 * step

@@ -54,6 +54,7 @@ def resolve_singles(bodies, contacts, rule, rebound, cap, log, count):
         if best < 0:
             break
         for d in range(contacts.gap.shape[0]):
+            # A pair with several points is one block and not this function's.
             if d != best and contacts.body_a[d] == contacts.body_a[best] and contacts.body_b[d] == contacts.body_b[best]:
                 return count, made, best
         e = rebound * rebound_of(contacts, best, relative_velocity(bodies, contacts, best, u), rest_speed)

@@ -63,6 +63,7 @@ def _expand(k, mu, scale, slip, q, c):
     c[ROW_S1, 0], c[ROW_S2, 0], c[ROW_SLIP, 0], c[ROW_UN, 0] = q[S1], q[S2], slip, q[UN]
     c[ROW_P, 0] = c[ROW_J1, 0] = c[ROW_J2, 0] = c[ROW_W, 0] = 0.0
     for i in range(ORDER):
+        # Recurrences of the equations of the head, divided by F (here `scale`).
         s1, s2, r = c[ROW_S1, i], c[ROW_S2, i], c[ROW_SLIP, i]
         share = 1.0 / (i + 1)
         c[ROW_S1, i + 1] = share * (k1 * r - m * (k.t11 * s1 + k.t12 * s2))
@@ -72,14 +73,17 @@ def _expand(k, mu, scale, slip, q, c):
         c[ROW_J1, i + 1] = -share * m * s1
         c[ROW_J2, i + 1] = -share * m * s2
         work = square = 0.0
+        # W' = u_n p' is a Cauchy product.
         for j in range(i + 1):
             work += c[ROW_UN, j] * c[ROW_SLIP, i - j]
         c[ROW_W, i + 1] = share * work / scale
+        # The series of |s| follows from |s|^2 = s.s.
         for j in range(i + 2):
             square += c[ROW_S1, j] * c[ROW_S1, i + 1 - j] + c[ROW_S2, j] * c[ROW_S2, i + 1 - j]
         for j in range(1, i + 1):
             square -= c[ROW_SLIP, j] * c[ROW_SLIP, i + 1 - j]
         c[ROW_SLIP, i + 1] = 0.5 * square / slip
+    # Jorba and Zou: the step at which the last two terms are round-off.
     longest = 1.0 / LONGEST_STEP
     for i in range(ORDER - 1, ORDER + 1):
         size = max(hypot(c[ROW_S1, i], c[ROW_S2, i]), abs(c[ROW_SLIP, i]))

@@ -107,12 +107,14 @@ def push(points, count, asked, bodies, springs, material_of_body, out, pushes):
             v_b = bodies.velocity[b, k] + bodies.angular_velocity[b, m] * r[1, p] - bodies.angular_velocity[b, p] * r[1, m]
             u[k] = v_b - v_a
             normal_speed += u[k] * n[k]
+        # 1 / m = n.K n, for the damping of this point.
         mass = 1.0 / (
             _inverse_mass(bodies.inv_mass, bodies.inv_inertia, a, r[0], n) + _inverse_mass(bodies.inv_mass, bodies.inv_inertia, b, r[1], n)
         )
         first, second = material_of_body[a], material_of_body[b]
         critical = 2.0 * math.sqrt(stiffness[a, b] * mass)
         force = stiffness[a, b] * depth - (damping if damping >= 0.0 else ratio[first, second] * critical) * normal_speed
+        # Springs push only; a pull of the damper is left out.
         pushes[c] = force > 0.0
         if not (pushes[c] and asked[c]):
             continue
@@ -121,6 +123,7 @@ def push(points, count, asked, bodies, springs, material_of_body, out, pushes):
             u[k] -= normal_speed * n[k]
             slip += u[k] * u[k]
         bound, sticking = friction[first, second] * force, critical * math.sqrt(slip)
+        # Regularised friction: mu N against the slip, a damper below a slip of about mu N / c_t.
         drag = bound * critical / math.sqrt(sticking * sticking + bound * bound) if bound > 0.0 else 0.0
         for k in range(3):
             f[k] = force * n[k] - drag * u[k]
@@ -157,6 +160,7 @@ class PenaltyForces(ForceTable):
         self.links = np.array([(dynamic[0], i) for i in dynamic[1:]], np.int64).reshape(-1, 2)
         self.is_steady = not world.moving.any()
         self._world, self._carried = world, np.flatnonzero(~world.dynamic)
+        # Cylinders take part as prisms: the method needs corners and faces.
         geometry = solid_geometry(world.shapes) if world.cylinders is not None else world.geometry
         self._solids = Solids(geometry, *inward_axes(geometry))
         self._pairs = pairs
@@ -255,6 +259,7 @@ def _stiffness(world: World, pairs: np.ndarray) -> np.ndarray:
     strength = np.maximum(world.steady_strength[a], world.steady_strength[b])
     at_rest = strength * heavier / (REST_DEPTH * size)
     in_impact = mass * ((speed[a] + speed[b]) / (IMPACT_DEPTH * size)) ** 2
+    # The stiffer of both laws of the head; without weight and speed a contact of two steps.
     known = np.maximum(at_rest, in_impact)
     stiffness[a, b] = np.where(known > 0.0, known, mass * (0.5 * np.pi / accuracy.step) ** 2)
     return stiffness

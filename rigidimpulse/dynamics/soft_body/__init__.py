@@ -1,4 +1,4 @@
-"""Flexible bodies: nets of springs and dampers, implicit steps, contact with rigid bodies. See docs/guide/flexible_bodies.md."""
+"""Flexible bodies: point masses with springs and dampers, implicit steps, contact with rigid bodies. See docs/guide/flexible_bodies.md."""
 
 from rigidimpulse.dynamics.soft_body.body import FlexibleBody
 from rigidimpulse.dynamics.soft_body.contact_planes import RigidMotion

@@ -49,6 +49,7 @@ def apply_matrix(system, z, out):
             for q in range(6):
                 total += rigid[b, p, q] * z[n + 2 * b + q // 3, q % 3]
             out[n + 2 * b + p // 3, p % 3] = total
+    # J^T D J of the contacts, which join vertices and bodies.
     for c in range(D.shape[0]):
         u = miss(z, n, no_aim, c)
         v = (

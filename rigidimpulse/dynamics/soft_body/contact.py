@@ -85,6 +85,7 @@ def vertices_on_bodies(bodies, poses, start, end, gap, skip, out_int, out_real):
     count = 0
     for b in range(x0.shape[0]):
         for i in range(start.shape[0]):
+            # Seen from the body its surface stands still, and the vertex goes straight.
             y0 = _into_frame(R0[b], x0[b], row(start, i))
             y1 = _into_frame(R1[b], x1[b], row(end, i))
             way = subtract(y1, y0)
@@ -98,6 +99,7 @@ def vertices_on_bodies(bodies, poses, start, end, gap, skip, out_int, out_real):
                 out_int[count, 0], out_int[count, 1] = i, b
                 for k in range(3):
                     out_real[count, k] = normal[k]
+                    # The place of the surface that the vertex comes near, not the vertex.
                     out_real[count, 3 + k] = place[k] - distance * normal[k]
                 out_real[count, 6], out_real[count, 7] = distance, time
             count += 1
@@ -147,6 +149,7 @@ def samples_on_faces(faces, samples, gap, out_int, out_real):
         while depth > 0:
             depth -= 1
             node = stack[depth]
+            # The box of the sample's way against the box of the faces' ways.
             apart = False
             for k in range(3):
                 reach = radius[s] + gap * 1.02
@@ -161,6 +164,7 @@ def samples_on_faces(faces, samples, gap, out_int, out_real):
             from_ = geometry.node_start[node]
             for t in range(from_, from_ + geometry.node_count[node]):
                 i, j, m = geometry.triangle[t, 0], geometry.triangle[t, 1], geometry.triangle[t, 2]
+                # A face is left out only where all of its corners are.
                 if skip[i, body[s]] and skip[j, body[s]] and skip[m, body[s]]:
                     continue
                 corners = (row(start, i), row(start, j), row(start, m))
@@ -173,6 +177,7 @@ def samples_on_faces(faces, samples, gap, out_int, out_real):
                 if every[s]:
                     _write_sample(count, s, t, (w, n, away, time), out_int, out_real)
                     count += 1
+                # The face that is met first gives the plane; of faces met at once the nearest.
                 elif time < first or (time == first and away < nearest):
                     first, hit, weights, normal, nearest = time, t, w, n, away
         if hit >= 0:

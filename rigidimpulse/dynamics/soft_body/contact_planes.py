@@ -47,7 +47,7 @@ class RigidMotion(NamedTuple):
 
 
 class FoundContacts(NamedTuple):
-    """Places found by `Surfaces.find`: what `SoftContacts` needs but for the solver's own numbers."""
+    """Places found by `Surfaces.find`: what `SoftContacts` needs, without the solver's own numbers."""
 
     key: np.ndarray  # (m,)
     node: np.ndarray  # (m, 3)
@@ -151,6 +151,7 @@ class Surfaces:
                 MovingFaces(self.faces, low, high, start, end, self.skip),
                 MovingSamples(p0, p1, self.sample_radius, body, every & self.is_slim), gap, which, real,
             )  # fmt: skip
+            # The kernel says how many there are; the buffer grows until all fit.
             if count <= capacity:
                 break
             capacity = 2 * count
@@ -158,9 +159,11 @@ class Surfaces:
         node, weight, normal, distance, time = self.faces.triangle[face], real[:, :3], real[:, 3:6], real[:, 6], real[:, 7]
         key = self.skip.size + sample
         side = np.einsum("ij,ij->i", normal, _face_normals(start[node]))
+        # A sample on the other side than before did not pass: round-off put it there, and it is sent back.
         wrong = np.array([sides.get(int(k), s) * s < 0.0 for k, s in zip(key, side, strict=True)], bool) & (time == 0.0)
         normal = np.where(wrong[:, None], -normal, normal)
         distance = np.where(wrong, -distance - 2.0 * self.sample_radius[sample], distance)
+        # What is nearer than the gap from the start keeps its distance.
         target = np.where(time == 0.0, np.minimum(distance, gap), gap)
         b = body[sample]
         turned = np.einsum("sji,sj->si", frame[b], normal)
@@ -221,6 +224,7 @@ def make_contacts(
     normal = np.einsum("mij,mj->mi", rigid.end_rotation[b], touches.normal)
     place = rigid.position[b] + np.einsum("mij,mj->mi", rigid.rotation[b], touches.place)
     point = np.einsum("mk,mkj->mj", touches.weight, start[touches.node])
+    # Without slip the point stays where it was beside the place, carried by the body.
     before = np.einsum("mij,mkj,mk->mi", rigid.end_rotation[b], rigid.rotation[b], point - place)
     before -= normal * np.einsum("ij,ij->i", before, normal)[:, None]
     aim = rigid.end_position[b] + arm + before + touches.target[:, None] * normal
@@ -228,6 +232,7 @@ def make_contacts(
     slip -= cross_arrays(rigid.angular_velocity[b], place - rigid.position[b])
     slip -= normal * np.einsum("ij,ij->i", slip, normal)[:, None]
     pair = friction[touches.node[:, 0], b]
+    # Static friction counts below the speed `slow` of slip, dynamic friction above it.
     grip = np.where(np.linalg.norm(slip, axis=1) > slow, pair[:, 1], pair[:, 0])
     return SoftContacts(
         touches.node, touches.weight, b, unknown[b], arm, normal, aim, grip, np.ones(m), np.zeros((m, 3)), np.zeros(m),

@@ -68,6 +68,7 @@ def force_of(contacts, c, u):
     normal = row(contacts.normal, c)
     pressing = dot(trial, normal)
     tangent = along(trial, -pressing, normal)
+    # Contacts push only.
     pressing = max(0.0, pressing)
     energy = 0.5 * pressing * pressing / rho
     length, radius = sqrt(dot(tangent, tangent)), contacts.radius[c]
@@ -75,6 +76,7 @@ def force_of(contacts, c, u):
         energy += 0.5 * length * length / rho
         share = 1.0
     else:
+        # Slip: the force is on the cone, and the energy grows in proportion to the way.
         energy += (radius * length - 0.5 * radius * radius) / rho
         share = radius / length
     force = (pressing * normal[0], pressing * normal[1], pressing * normal[2])
@@ -136,6 +138,7 @@ def contact_stiffness(z, num_nodes, contacts, D):
         tangent = along(trial, -pressing, normal)
         length, radius = sqrt(dot(tangent, tangent)), contacts.radius[c]
         along_normal = rho if pressing > 0.0 else 0.0
+        # On the cone the force turns with the slip but does not grow.
         across = rho if length <= radius else rho * radius / length
         slip = 0.0 if length <= radius else across / (length * length)
         for p in range(3):

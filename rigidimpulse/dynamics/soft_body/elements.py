@@ -65,6 +65,7 @@ def add_spring_hessian(x, spring, rest, stiffness, least, slot, block):
     for s in range(spring.shape[0]):
         d = subtract(row(x, spring[s, 1]), row(x, spring[s, 0]))
         length = sqrt(dot(d, d))
+        # Compressed springs would make H indefinite: the part across them is left out.
         across = stiffness[s] * max(least, 1.0 - rest[s] / length) if length > 0.0 else stiffness[s]
         both = (stiffness[s] - across) / (length * length) if length > 0.0 else 0.0
         for p in range(3):
@@ -110,6 +111,7 @@ def hinge_slope(x, hinge, h, slope):
     normal_c, normal_d = cross(subtract(a, c), subtract(b, c)), cross(subtract(b, d), subtract(a, d))
     area_c, area_d = dot(normal_c, normal_c), dot(normal_d, normal_d)
     slope[:] = 0.0
+    # A face without area has no normal.
     if area_c == 0.0 or area_d == 0.0:
         return
     a_c, a_d = dot(subtract(c, b), e) / (length * area_c), dot(subtract(d, b), e) / (length * area_d)

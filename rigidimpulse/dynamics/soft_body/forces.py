@@ -56,7 +56,7 @@ class SoftBodyForces(ForceTable):
         return self._end if time < self._end else np.inf
 
     def potential(self, times: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-        """All energy of the nets, (f, 1) J: their motion, springs and weight."""
+        """All energy of the soft bodies, (f, 1) J: their motion, springs and weight."""
         del position, orientation
         return self.sums_at(times)[:, :2].sum(axis=1, keepdims=True)
 

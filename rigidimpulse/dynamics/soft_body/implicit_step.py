@@ -191,6 +191,7 @@ def _search(
         new = value_of(p, contacts, trial)
         if new <= value - 1e-4 * share * slope:
             return trial, new
+        # The promised fall is below the round-off of Phi.
         if share * slope <= 1e-13 * abs(value):
             return None, value
         share *= 0.5

@@ -113,13 +113,16 @@ class SpringMesh:
         return block
 
     def damped(self, x: np.ndarray, h: float) -> SpringMesh:
-        """Net whose energy, but for a constant, is E + c (l - l(x))^2 / 2 h + ...: dampers over an implicit step h from x (n, 3).
+        """Springs that act as springs and dampers do over an implicit step h from x (n, 3).
+
+        Up to a constant their energy is E + c (l - l(x))^2 / 2 h + ...
 
         A spring and a damper of rate (l - l(x)) / h add up to one spring of stiffness k + c / h with another rest length.
         """
         if not (np.any(self.spring_damping) or np.any(self.hinge_damping)):
             return self
         stiffness = self.spring_stiffness + self.spring_damping / h
+        # A spring and a damper of rate (l - l(x)) / h are one spring of stiffness k + c / h with another rest length.
         share = np.divide(self.spring_damping / h, stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0)
         bending = self.hinge_stiffness + self.hinge_damping / h
         hinge_share = np.divide(self.hinge_damping / h, bending, out=np.zeros_like(bending), where=bending > 0.0)
@@ -136,7 +139,7 @@ class SpringMesh:
 def sheet(
     position: np.ndarray, face: np.ndarray, mass: float, stiffness: float, bending: float, inner: float, damping: float
 ) -> SpringMesh:
-    """Net of a triangle mesh.
+    """Springs along the edges of a triangle mesh, hinges across them, and struts inside.
 
     Args:
         position: (n, 3) m, at rest.
@@ -155,11 +158,14 @@ def sheet(
     spring = np.column_stack([face.ravel()[edges.first], np.roll(face, -1, axis=1).ravel()[edges.first]])
     edge_area = np.bincount(edges.triangle_edge.ravel(), np.repeat(area, 3), len(spring))
     length = np.linalg.norm(x[spring[:, 1]] - x[spring[:, 0]], axis=1)
+    # k = E_s A / L^2.
     spring_stiffness = stiffness * edge_area / length**2
+    # A boundary edge has no second face to bend against.
     two = np.flatnonzero((edges.count == 2) & (bending > 0.0))
     left, right = edges.first[two], edges.last[two]
     opposite = np.roll(face, -2, axis=1).ravel()
     hinge = np.column_stack([spring[two], opposite[left], opposite[right]])
+    # kappa = 3 B L^2 / A.
     hinge_stiffness = 3.0 * bending * length[two] ** 2 / edge_area[two]
     if inner > 0.0:
         strut, strut_stiffness = inner_struts(x, face, inner)

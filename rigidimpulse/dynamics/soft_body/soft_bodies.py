@@ -47,7 +47,7 @@ ROUNDS = 10
 MIDPOINT_EXCESS = TOLERANCES.soft_body.midpoint_excess
 MIDPOINT_MADE = TOLERANCES.soft_body.midpoint_energy
 ALIKE = 0.95
-"""Cosine of the angle between two normals above which one plane guards both places."""
+"""Cosine of the angle between two normals above which one plane keeps both places apart."""
 AT_ONCE = 0.05
 """Share of the step in which faces that a sample point meets count as met at once: what it meets later depends on what these do to it."""
 SCHEMES = ("euler", "midpoint")
@@ -80,7 +80,7 @@ class Flexibles:
 
     Attributes:
         bodies: the flexible bodies, in the order they were added. first: (k + 1,) vertices of each.
-        net: all of them as one net.
+        soft_body: all of them as one `SpringMesh`.
         position: (v, 3) m. velocity: (v, 3) m/s.
         energy_taken: J so far.
 
@@ -192,6 +192,7 @@ class Flexibles:
             speeds = np.linalg.norm(self.velocity - rigid.velocity[b], axis=1) + spin
             speed = float(speeds.max(initial=0.0))
             apart = np.maximum(0.0, np.maximum(low - rigid.position[b], rigid.position[b] - high))
+            # Bodies that are too far away to come near `within` s set no limit.
             if speed > 0.0 and float(np.linalg.norm(apart)) - radius <= within * speed:
                 limit = min(limit, self._edge / speed)
         return limit
@@ -207,18 +208,21 @@ class Flexibles:
         del time
         start = self.position
         flight = start + h * self.velocity + h * h * self._gravity
+        # The part of the impulse that bears the steady load moves a body by half of h J / m: see the head of the file.
         rigid = rigid._replace(end_position=rigid.end_position - 0.5 * h * h * rigid.inv_mass[:, None] * self._load)
         target = start.copy()
         self._place_held(rigid, target)
         way = np.where(self._free[:, None], flight, target)
         touches = self._surfaces.find(start, way, rigid, self._sides, self._surfaces.gap, rigid.end_rotation, False)
         correction = self._move_out(touches, rigid, start)
+        # Steps in which anything is touched are Euler's: see `scheme`.
         midpoint = self.scheme == "midpoint" and len(touches.key) == 0 and len(self._joined[0]) == 0
         rounds, unresolved = 0, 0
         while True:
             solved = self._solve(touches, rigid, h, flight + correction, target, start + correction, midpoint)
             solution, n = solved.solution, len(start)
             end = solution.z[:n] if not midpoint else 2.0 * solution.z[:n] - start
+            # Contacts on the way solved for may be new; then the step is solved again with them.
             new = self._missing(touches, end, start + correction, rigid, self._moved(rigid, solution, solved.slots))
             rounds += 1
             unresolved = len(new.key)
@@ -279,6 +283,7 @@ class Flexibles:
         speed = float(np.sqrt(mass @ speeds / mass.sum()))
         problem = Problem(self.soft_body.damped(start, span), span, goal, self._free, M / span**2, speed)
         set_penalties(problem, contacts, z[: len(start)])
+        # The better of two starts: where vertices are, and where their velocities take them.
         onward = z.copy()
         onward[: len(start)][self._free] += span * self.velocity[self._free]
         if value_of(problem, contacts, onward) < value_of(problem, contacts, z):
@@ -311,7 +316,7 @@ class Flexibles:
     def _missing(self, known: FoundContacts, end: np.ndarray, start: np.ndarray, rigid: RigidMotion, moved: RigidMotion) -> FoundContacts:
         """Contacts on the way solved for, on which bodies are `moved`, that no plane covers yet; of a sample point the earliest ones.
 
-        They are looked for at half the gap: nearer than planes let anything come, but for what had less than that from the start.
+        They are looked for at half the gap. Planes let nothing come that near, except what was nearer from the start.
         """
         found = self._surfaces.find(start, end, moved, self._sides, 0.5 * self._surfaces.gap, rigid.end_rotation, True)
         covered: dict[tuple[int, ...], list[np.ndarray]] = {}
@@ -333,6 +338,7 @@ class Flexibles:
         n, soft_body, free = len(start), self.soft_body, self._free
         before, x0 = self.velocity.copy(), self.position
         way = end - start
+        # The midpoint rule knows the mean of both velocities.
         velocity = 2.0 * way / h - before if midpoint else way / h
         velocity[~free] = way[~free] / h
         impulse = h * solution.force
@@ -341,6 +347,7 @@ class Flexibles:
         acting = np.zeros_like(elastic)
         np.add.at(acting, contacts.node.ravel(), (contacts.weight[:, :, None] * solution.force[:, None, :]).reshape(-1, 3))
         acting += soft_body.mass[:, None] * self._gravity
+        # The force that keeps held vertices where they are; its work counts, too.
         hold = np.where(free[:, None], 0.0, soft_body.mass[:, None] * (velocity - before) / h + elastic - acting)
         work = float(np.sum((acting + hold) * way))
         kinetic = 0.5 * float(soft_body.mass @ (np.einsum("ij,ij->i", velocity, velocity) - np.einsum("ij,ij->i", before, before)))
@@ -360,6 +367,7 @@ class Flexibles:
         self._sides = sides_of(touches, end, rigid.end_rotation, self._surfaces.skip.size)
         given = self._given(contacts, impulse, rigid, hold * h, end)
         load = np.concatenate([self._load, np.zeros_like(self._load)], axis=1)
+        # F(s) = 4 J / h - 3 L + (6 L - 6 J / h) s / h: see the head of the file.
         ramp = np.stack([4.0 * given / h - 3.0 * load, 6.0 * load / h - 6.0 * given / h**2])
         self._bear(given[:, :3] / h, rigid, h)
         return FlexibleStep(given, ramp, taken, made, len(contacts.key), solution.converged, unresolved)

@@ -40,6 +40,7 @@ def first_hits(x, face, start, direction, hit, weight):
                 continue
             a = row(x, i)
             e1, e2, s = subtract(row(x, j), a), subtract(row(x, k), a), subtract(p, a)
+            # Ray against triangle by Cramer's rule; a slack at the sides, so that no ray slips through between two faces.
             across = cross(d, e2)
             determinant = dot(e1, across)
             if determinant == 0.0:
@@ -65,6 +66,7 @@ def inner_struts(x: np.ndarray, face: np.ndarray, modulus: float) -> tuple[np.nd
     normal = np.column_stack([np.bincount(face.ravel(), np.repeat(area_vector[:, k], 3), len(x)) for k in range(3)])
     length = np.linalg.norm(normal, axis=1)
     inward = -normal / np.where(length > 0.0, length, 1.0)[:, None]
+    # Four rays tilted by 45 degrees brace the inside against shear.
     across = np.cross(inward, np.eye(3)[np.argmin(np.abs(inward), axis=1)])
     across /= np.where(length > 0.0, np.linalg.norm(across, axis=1), 1.0)[:, None]
     beside = np.cross(inward, across)
@@ -79,6 +81,7 @@ def inner_struts(x: np.ndarray, face: np.ndarray, modulus: float) -> tuple[np.nd
     stiffness = 0.5 * modulus * np.repeat(vertex_area[start[met]] * share[met], 3) * weight[met].ravel()
     kept = weight[met].ravel() >= LEAST_WEIGHT
     ends, stiffness = np.sort(ends[kept], axis=1), stiffness[kept]
+    # Columns met from both ends, and by several rays, are one strut.
     strut, index = np.unique(ends, axis=0, return_inverse=True)
     total = np.bincount(index.ravel(), stiffness, len(strut))
     return strut, total / np.linalg.norm(x[strut[:, 1]] - x[strut[:, 0]], axis=1)

@@ -57,6 +57,7 @@ def natural_residual(rows, u, p, weight):
     worst = 0.0
     for i in range(p.shape[0]):
         kind, w = rows.kind[i], weight[i]
+        # The natural map: p less a step against u, projected on the bounds, is p itself at a solution.
         x = p[i] - (u[i] + rows.softness[i] * p[i]) / w
         if kind == DISC:
             z = p[i + 1] - (u[i + 1] + rows.softness[i + 1] * p[i + 1]) / w
@@ -81,6 +82,7 @@ def _impulse_law(rows, u, q, r, frozen, p, slope):
     """
     for i in range(p.shape[0]):
         kind = rows.kind[i]
+        # The second row of a disc is done with its first.
         if kind == DISC_SECOND:
             continue
         stiffness = 1.0 / (r[i] + rows.softness[i])
@@ -88,6 +90,7 @@ def _impulse_law(rows, u, q, r, frozen, p, slope):
         slope[i, 0], slope[i, 1], slope[i, 2] = stiffness, 0.0, 0.0
         if kind == FREE or kind == BOUNDED:
             p[i] = min(max(x, rows.lower[i]), rows.upper[i])
+            # At a bound the impulse no longer depends on the velocity.
             if p[i] != x:
                 slope[i, 0] = 0.0
             continue
@@ -100,6 +103,7 @@ def _impulse_law(rows, u, q, r, frozen, p, slope):
             z = (r[i] * q[i + 1] - u[i + 1]) * stiffness
             slope[i + 1, 0], slope[i + 1, 1], slope[i + 1, 2] = stiffness, 0.0, 0.0
         length = sqrt(x * x + z * z)
+        # Slip: the impulse is on the cone, whose radius moves with the normal impulse of the master.
         if length > radius:
             k = stiffness * radius / length
             x, z = x / length, z / length
@@ -142,11 +146,13 @@ def _assemble(rows, slope, slot, blocks, n):
             blocks[place, k, k] = 1.0
     for i in range(slope.shape[0]):
         here, partner, master = slope[i, 0], slope[i, 1], slope[i, 2]
+        # Rows at a bound add nothing to F'.
         if here == 0.0 and partner == 0.0 and master == 0.0:
             continue
         other = i + 1 if kinds[i] == DISC else (i - 1 if kinds[i] == DISC_SECOND else i)
         above = masters[i]
         for k in range(12):
+            # A row of (-dp/du) Jh: the row itself, its partner in the disc, and its master.
             right[k] = here * jacobian[i, k] + partner * jacobian[other, k] + master * jacobian[above, k]
         a, b = rows.first[i], rows.second[i]
         if a >= 0:
@@ -285,9 +291,11 @@ def solve_newton(rows, n, target):
         if best <= max(target, rounding_floor(rows, weight, rows.impulse)) or stagnant > 4:
             break
         for i in range(count):
+            # With frozen radii the problem is convex: the last resort.
             frozen[i] = rows.coefficient[i] * max(q[rows.master[i]], 0.0) if convex else -1.0
             r[i] = weight[i] * (min(k, free_k) if rows.kind[i] == FREE else k)
         solved = _newton(rows, elimination, RegularisedLaw(u, q, r, frozen), trial, 0.05 * target)
+        # The line search failed: more regularisation, and at last a step with frozen radii.
         if not solved and not convex:
             failures += 1
             convex = k >= 0.5
@@ -298,6 +306,7 @@ def solve_newton(rows, n, target):
         _velocities(rows, q, y, u)
         reached = natural_residual(rows, u, q, weight)
         now = _largest(q)
+        # Larger impulses are accepted only with a residual smaller in proportion: rows that contradict each other have none.
         if reached < best and (largest == 0.0 or reached * now <= best * largest):
             best, largest = reached, now
             copy_vector(q, rows.impulse)

@@ -71,6 +71,7 @@ def solve_qp(rows: Rows, n: int, target: float) -> float:
             rows.impulse[:] = p
         if best <= target or not len(discs) or stagnant == MOST_STAGNANT:
             break
+        # The fixed point c = k |u_t| takes back the opening by slip.
         slip = np.where(rows.kind[discs] == DISC, np.hypot(u[discs], u[np.minimum(discs + 1, count - 1)]), np.abs(u[discs]))
         opening[:] = 0.0
         opening[rows.master[discs]] = rows.coefficient[discs] * slip
@@ -95,6 +96,7 @@ def _convex_step(rows: Rows, effective: sparse.csc_matrix, bias: np.ndarray, dis
 
     clarabel: Any = library
     mass, speed = float(effective.diagonal().max()), max(float(np.abs(bias).max()), np.finfo(float).tiny)
+    # Clarabel's tolerances are absolute, so the problem is scaled to 1.
     unit = speed / mass
     lines: list[tuple[list[int], list[float]]] = []
     limits: list[float] = []
@@ -107,6 +109,7 @@ def _convex_step(rows: Rows, effective: sparse.csc_matrix, bias: np.ndarray, dis
         cones.append(clarabel.NonnegativeConeT(len(lines)))
     for i in discs.tolist():
         others = [i, i + 1] if rows.kind[i] == DISC else [i]
+        # k p_master >= |p_t| as a second-order cone.
         lines += [([int(rows.master[i])], [-float(rows.coefficient[i])]), *(([j], [-1.0]) for j in others)]
         limits += [0.0] * (1 + len(others))
         cones.append(clarabel.SecondOrderConeT(1 + len(others)))

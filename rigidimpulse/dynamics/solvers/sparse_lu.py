@@ -51,6 +51,7 @@ def plan_elimination(first, second, n):
     gone = np.zeros(n, np.bool_)
     count = np.int64(0)
     for k in range(n):
+        # Least degree first; ties go to the lower index, so that the order is the same in every run.
         pick = np.int64(-1)
         for i in range(n):
             if not gone[i] and (pick < 0 or degree[i] < degree[pick]):
@@ -75,6 +76,7 @@ def plan_elimination(first, second, n):
         for x in range(start[k], size):
             for y in range(x + 1, size):
                 i, j = later[x], later[y]
+                # Fill-in: two neighbours of an eliminated body become neighbours.
                 if not joined[i, j]:
                     joined[i, j] = joined[j, i] = True
                     degree[i] += 1
@@ -94,6 +96,7 @@ def _factor_block(blocks, s, pivots, body):
         if pivot != k:
             for j in range(SIZE):
                 blocks[s, k, j], blocks[s, pivot, j] = blocks[s, pivot, j], blocks[s, k, j]
+        # A singular block must not divide by zero.
         if blocks[s, k, k] == 0.0:
             blocks[s, k, k] = TINY
         head = blocks[s, k, k]

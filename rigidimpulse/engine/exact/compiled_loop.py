@@ -19,7 +19,7 @@ from rigidimpulse.engine.exact.event_loop import (
     HOLD,
     LOAD,
     MOVE,
-    NO_ROOM,
+    NO_CAPACITY,
     NOT_FINITE,
     NOT_RECORDED,
     NOT_RESOLVED,
@@ -91,7 +91,7 @@ TABLE, MEMORY, LIMITER, LOG, CONTACT_LOG, SOLVE_COUNT, REPORTS = (
 
 
 def _make_reports(number: int) -> Reports:
-    """Room for the problems of an event of so many bodies, twice."""
+    """Space for twice the problems that an event of `number` bodies may have."""
     most = 2 * ENERGIES * (number + 1)
     return Reports(np.zeros(most, REPORT), np.empty(most, np.int64), np.zeros(2, np.int64))
 
@@ -128,7 +128,7 @@ class CompiledLoop:
         """
         if not pair_events.substepped_begun and pair_events.inside.any():
             return time, bodies
-        mark, is_given, how = np.zeros(run.world.num_bodies, bool), True, NO_ROOM
+        mark, is_given, how = np.zeros(run.world.num_bodies, bool), True, NO_CAPACITY
         mark[bodies] = True
         self._elsewhere[:] = run.substepped.label >= 0
         while how not in (AT_END, AT_EVENT):
@@ -136,10 +136,10 @@ class CompiledLoop:
             how, time, is_given = run_events(self._words(run, pair_events), mark, is_given, time, pair_events.end, self._scratch)
             self._account(run, perf_counter() - start, before)
             self._tell(run)
-            if how == NO_ROOM:
-                self._make_room(run)
+            if how == NO_CAPACITY:
+                self._grow(run)
             elif how == SHORT_OF_PAIRS:
-                pair_events.make_room(time)
+                pair_events.add_missing_pairs(time)
         if how == AT_EVENT and not is_given:
             pair_events.count_contacts(time)
         return float(time), mark.nonzero()[0] if how == AT_EVENT else NONE
@@ -156,8 +156,8 @@ class CompiledLoop:
         packed.replace(REPORTS, self._reports)
         return packed.words
 
-    def _make_room(self, run: Run) -> None:
-        """Make room for what the kernel has asked for."""
+    def _grow(self, run: Run) -> None:
+        """Make larger what had no space for an event."""
         run.log.grow()
         run.contact_log.grow()
         run.state.remember(int(run.contact_log.buffers.counts[2]))

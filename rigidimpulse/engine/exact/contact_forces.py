@@ -171,8 +171,8 @@ def _energy_after(problem, constants, wrench, h):
 def _correct_positions(run: Run, pair_events: PairEvents, island: Island) -> None:
     """Bring sunken contacts back to their gap and look at the island's contacts again.
 
-    A light body turns far to make room for a heavy one: what it may come near is looked for farther away, and what does not belong to the
-    island stands meanwhile.
+    A light body may turn far to get out of the way of a heavy one, so its neighbours are looked for within a larger distance. Bodies
+    outside the island do not move.
     """
     state, now, members, constants = run.state, run.state.now, island.members, run.world.constants
     place, turn = now.position[members].copy(), now.orientation[members].copy()

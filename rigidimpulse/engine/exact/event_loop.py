@@ -4,7 +4,7 @@ From event to event it calls the kernels that the loop in Python calls, in the s
 Python at the end of the step, and before an event
 
     that reaches a body which the loop in Python must look after (`Fixed.elsewhere`),
-    for which there is no room in what is remembered of contacts or recorded.
+    for which there is no space in the memory of contacts or in what is recorded.
 
 `compiled_loop` calls it.
 """
@@ -74,7 +74,7 @@ from rigidimpulse.engine.touching import (
     split_islands,
     witness_contacts,
 )
-from rigidimpulse.model.contact_memory import ContactMemory, forget_forces, has_room, keep_forces, keep_wrenches, read_forces
+from rigidimpulse.model.contact_memory import ContactMemory, forget_forces, has_capacity, keep_forces, keep_wrenches, read_forces
 from rigidimpulse.model.contacts import Contacts, Touching, select
 from rigidimpulse.model.island import slow_speed
 from rigidimpulse.model.state import EnergyLimiter
@@ -82,7 +82,7 @@ from rigidimpulse.model.world import Margins
 from rigidimpulse.motion.evaluate import bring_gyroscopic, refresh_pose
 from rigidimpulse.motion.trajectory import FIXED, pose_at
 from rigidimpulse.recording.contact_log import ContactBuffers as ContactLogBuffers
-from rigidimpulse.recording.contact_log import close_contacts, has_contact_room, replace_contacts
+from rigidimpulse.recording.contact_log import close_contacts, has_contact_capacity, replace_contacts
 from rigidimpulse.recording.events import (
     ENERGY_CORRECTION,
     IMPACT,
@@ -93,21 +93,21 @@ from rigidimpulse.recording.events import (
     log_impacts,
     log_stretch,
 )
-from rigidimpulse.recording.events import has_room as has_log_room
+from rigidimpulse.recording.events import has_capacity as has_log_capacity
 from rigidimpulse.recording.recorder import Frames, flush_frames
 
-AT_END, AT_EVENT, NO_ROOM, SHORT_OF_PAIRS = np.arange(4)
-"""How the loop ends: at the end of the step; before an event that Python looks after; before one for which there is no room; after one
-that found no room for a pair."""
+AT_END, AT_EVENT, NO_CAPACITY, SHORT_OF_PAIRS = np.arange(4)
+"""How the loop ends: at the end of the step; before an event that Python looks after; before one for which there is no space; after one
+that found no space for a pair."""
 SWEEP, RESPOND, LOAD, HOLD, MOVE, VERBS = np.arange(6)
 """Places in `Work.cycles` and `Work.calls`."""
 ENERGIES = 6
 """Changes of energy, or problems, at an instant of a body, at most."""
 FIRST_CONTACTS, NONE, NO_ROWS = np.int64(256), np.int64(-1), np.int64(0)
 MORE_CONTACTS, MOST_NEW = 4, 256
-"""An island may have so many times more contacts after a position correction, and so many more on top."""
+"""How many times more contacts an island may have after a position correction, and how many more on top."""
 IMPULSES = 256
-"""Impulses of a contact at an instant that there is room for."""
+"""Impulses of a contact at an instant that there is space for."""
 
 REPORT = np.dtype([("kind", np.int64), ("time", np.float64), ("value", np.float64), ("first", np.int64), ("count", np.int64)])
 """A problem: what it is, when [s], a number that goes with it, and its stretch of `Work.reported`."""
@@ -211,7 +211,7 @@ class Touch(NamedTuple):
 
 @jit
 def report(reports, kind, time, value, bodies):
-    """Keep a problem of some bodies; there is room."""
+    """Keep a problem of some bodies; there is space."""
     used = reports.used
     row = reports.rows[used[ROWS]]
     row.kind, row.time, row.value, row.first, row.count = kind, time, value, used[BODIES], bodies.shape[0]
@@ -262,7 +262,7 @@ def _sweep_stale(loop, end):
 
 @jit_making_arrays
 def make_found(capacity, number, scratch):
-    """Buffers for contacts of so many bodies."""
+    """Buffers for `capacity` contacts, and marks of `number` bodies."""
     buffers = ContactBuffers(np.empty((capacity, 10)), np.empty((capacity, 5), np.int64), scratch)
     return Found(buffers, np.empty(capacity, np.int64), np.zeros(number, np.bool_), np.zeros(number, np.bool_))
 
@@ -297,8 +297,8 @@ def run_events(loop, bodies, is_given, time, end, scratch):
                 found = make_found(-2 * count, number, scratch)
         if _is_elsewhere(elsewhere_of(loop), found.brought, bodies):
             return AT_EVENT, time, is_given
-        if not _has_room(loop, count):
-            return NO_ROOM, time, is_given
+        if not _has_capacity(loop, count):
+            return NO_CAPACITY, time, is_given
         if not is_given:
             _count_contacts(table, reports_of(loop), time, settings_of(loop).instant)
         is_given = False
@@ -320,14 +320,14 @@ def _is_elsewhere(elsewhere, brought, bodies):
 
 
 @jit
-def _has_room(loop, count):
-    """Whether an event of so many contacts can be remembered and recorded, whatever becomes of it."""
+def _has_capacity(loop, count):
+    """Whether an event of `count` contacts can be remembered and recorded, whatever it does."""
     number, reports, log, contacts = len(elsewhere_of(loop)), reports_of(loop), log_of(loop), MORE_CONTACTS * count + MOST_NEW
     most = ENERGIES * number
-    fits = has_log_room(log, most, number, len(impacts_of(loop)) + IMPULSES * count)
-    fits = has_contact_room(contact_log_of(loop), contacts) and fits
+    fits = has_log_capacity(log, most, number, len(impacts_of(loop)) + IMPULSES * count)
+    fits = has_contact_capacity(contact_log_of(loop), contacts) and fits
     fits = fits and reports.used[ROWS] + most <= len(reports.rows) and reports.used[BODIES] + most <= len(reports.bodies)
-    return fits and has_room(memory_of(loop), contacts)
+    return fits and has_capacity(memory_of(loop), contacts)
 
 
 @jit_making_arrays
@@ -569,7 +569,7 @@ def _respond(loop, island, touch, members):
     read_forces(memory, motion.trajectory.start, contacts, touch.touching, force)
     response = Response(SEQUENTIAL, live.collapse or bear_each_other(contacts, constants.dynamic, force))
     done = resolve_impacts(now, constants, members, live, response, number_of(loop), None, impacts_of(loop))
-    if has_log_room(log, ENERGIES, NO_ROWS, done.count):
+    if has_log_capacity(log, ENERGIES, NO_ROWS, done.count):
         log_impacts(log, island.time, contacts, now.position, done.log, done.count)
     else:
         report(reports_of(loop), NOT_RECORDED, island.time, float(done.count), members)
@@ -621,7 +621,7 @@ def _hold(loop, island, touch, members):
                 forces.force[c, k] = 0.0
     note_hold(limiter_of(loop), now, constants, contacts, members, np.empty(0, np.int64), True)
     lasts = contacts.gap.shape[0]
-    if has_contact_room(contact_log, lasts) and has_room(memory, lasts):
+    if has_contact_capacity(contact_log, lasts) and has_capacity(memory, lasts):
         replace_contacts(contact_log, members, time, contacts, now.position, forces.force)
         keep_forces(memory, number, time, contacts, touching, forces.force)
         if turns(moves, step) and not failed:
@@ -711,7 +711,7 @@ def _contacts_near(loop, members, time):
 
 @jit_making_arrays
 def _contacts_of(loop, places, margin, time):
-    """The contacts of the pairs at these places within so many contact margins, at the present poses, sorted by pair."""
+    """The contacts of the pairs at these places within `margin` contact margins, at the present poses, sorted by pair."""
     table, motion, shapes, count = table_of(loop), motion_of(loop), shapes_of(loop), NONE
     found = make_found(FIRST_CONTACTS, np.int64(0), np.empty((SCRATCH_ROWS, 2), np.int64))
     while count < 0:
@@ -761,10 +761,10 @@ def _begin_trajectory(loop, i, interval, wrench, rests):
     for k in range(6):
         limiter.correction[i, k] = 0.0
     close_contacts(contact_log, one, time)
-    arrival, begun = limiter.end_energy[i], limiter.energy_at_start[i]
-    if arrival == arrival:
+    end_energy, begun = limiter.end_energy[i], limiter.energy_at_start[i]
+    if end_energy == end_energy:
         limiter.end_energy[i] = np.nan
-        log_stretch(log, trajectory.start[i], time, i, begun, arrival - begun)
+        log_stretch(log, trajectory.start[i], time, i, begun, end_energy - begun)
     pressed = take_steady_load(motion, constants, i, time, wrench, rests)
     limiter.under_contact[i] = pressed
     if pressed:

@@ -33,7 +33,7 @@ WITHOUT_REBOUND_REMEDY = "too many impacts at one instant; try response='simulta
 # Approach speed that counts as none, relative to the speed of the island, and to the speed below which contacts are held.
 APPROACH = TOLERANCES.contact.approach
 SLOW = TOLERANCES.contact.slow_approach
-# Calls with a full log before a group is given up.
+# Calls with a full log before an island is given up.
 MAX_CALLS = 1000
 # Impacts in a row, without a gap worth the name between them, after which a pair no longer rebounds.
 COLLAPSE_REBOUNDS = 8
@@ -130,7 +130,7 @@ def resolve_impacts(bodies, constants, members, live, response, number, joints, 
     # Each call gets a log of this size, and is repeated where it fills it.
     size, count, capped = max(log.shape[0], 2 * m), 0, False
     for _ in range(MAX_CALLS):
-        log = _with_room(log, count, size)
+        log = _with_capacity(log, count, size)
         made, stopped = _respond(bodies, live, response, number, joints, log[count : count + size])
         count += made
         capped = capped or stopped
@@ -155,8 +155,8 @@ def _respond(bodies, live, response, number, joints, log):
 
 
 @jit_making_arrays
-def _with_room(log, count, size):
-    """A log of the same first rows with room for `size` more; the same one where it has the room."""
+def _with_capacity(log, count, size):
+    """A log of the same first rows with space for `size` more; the same one where it has the space."""
     if count + size <= log.shape[0]:
         return log
     longer = np.empty((2 * count + size, log.shape[1]))
@@ -177,12 +177,12 @@ def bear_each_other(contacts, dynamic, force):
 
 @jit_making_arrays
 def find_collapsing(memory, number, contacts):
-    """Contacts (m,) of pairs that came back COLLAPSE_REBOUNDS times in a row without ever having been farther apart than the held gap.
+    """Contacts (m,) of pairs that came back COLLAPSE_REBOUNDS times in a row without ever having been farther apart than the contact margin.
 
     Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
-    a bouncing ball they are replaced by one inelastic impact, of all that rattle together: pair after pair, a light body would stop
+    a bouncing ball they are replaced by one inelastic impact, of all that collapse together: pair after pair, a light body would stop
     heavy ones in as many impacts as their masses' ratio, and each impact would be followed by the next. A body between two others hits
-    them in turn, so pairs on their way rattle as soon as one does.
+    them in turn, so pairs on their way collapse as soon as one does.
 
     memory: the `ContactMemory`; number: of bodies.
     """
@@ -202,9 +202,9 @@ def find_collapsing(memory, number, contacts):
 
 @jit
 def remember_rebounds(memory, number, time, contacts, contact_margin, log):
-    """Count for each pair how often in a row it came back after less than its held gap.
+    """Count for each pair how often in a row it came back after less than its contact margin.
 
-    memory: the `ContactMemory`, which must have room; number: of bodies; contact_margin (m,) m; log (k, 7): of impacts at `time`.
+    memory: the `ContactMemory`, which must have space; number: of bodies; contact_margin (m,) m; log (k, 7): of impacts at `time`.
     """
     for row in range(log.shape[0]):
         c = np.int64(log[row, 0])

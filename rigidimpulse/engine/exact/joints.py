@@ -147,7 +147,7 @@ class JointState:
             refresh_pose(members, now, state.rotation, state.trajectory.inertia)
             island.moved = True
         stop_joints(jointed, elapsed, self.moment)
-        self._book(run, which, island.time)
+        self._record_impulses(run, which, island.time)
         state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
         if self._limited:
             # An impact at this instant: what came before goes on unchanged.
@@ -165,7 +165,7 @@ class JointState:
         if len(which) and np.all(begun == begun[0]) and kinetic > 0.0:
             self.drift[which] = abs(energy - begun[0]) / kinetic
 
-    def _book(self, run: Run, which: np.ndarray, time: float) -> None:
+    def _record_impulses(self, run: Run, which: np.ndarray, time: float) -> None:
         """Impulses on b of the sub-steps that end: half of what their forces were, and what stopped the joints."""
         for j in which.tolist():
             a, b, cause = int(self.table.body_a[j]), int(self.table.body_b[j]), f"joint {self.names[j]}"

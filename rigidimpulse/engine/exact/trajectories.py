@@ -101,10 +101,10 @@ def take_steady_load(motion, constants, i, time, wrench, rests):
 def account_contact_work(run: Run, i: int, time: float) -> None:
     """Work that contact forces did along the trajectory that ends: what its energy changed by."""
     limiter = run.state.limiter
-    begun, arrival = limiter.energy_at_start[i], limiter.end_energy[i]
-    if not isnan(arrival):
+    begun, end_energy = limiter.energy_at_start[i], limiter.end_energy[i]
+    if not isnan(end_energy):
         limiter.end_energy[i] = np.nan
-        run.log.add_stretch(run.state.trajectory.start[i], time, i, begun, arrival - work_of_forces(run, i) - begun)
+        run.log.add_stretch(run.state.trajectory.start[i], time, i, begun, end_energy - work_of_forces(run, i) - begun)
 
 
 def work_of_forces(run: Run, i: int) -> float:

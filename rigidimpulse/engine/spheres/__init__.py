@@ -1,1 +1,1 @@
-"""The event kernel: balls in free flight, from impact to impact, over as many steps as nothing else happens in (see `flight`)."""
+"""The event kernel: balls in free flight, from impact to impact, over all steps in which nothing else happens (see `flight`)."""

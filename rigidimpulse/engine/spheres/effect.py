@@ -1,4 +1,4 @@
-"""Where the event kernel is of use."""
+"""Which scenes the event kernel of balls can advance."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rigidimpulse.model.world import World
 
 ARRIVED, STEP, GO_ON, FULL = 0, 1, 2, 3
 """How a flight of the kernel ends: at its end; at a boundary whose step is not simple; between boundaries, at something that is not
-simple; for want of room in a table."""
+simple; at a table that is full."""
 
 
 def why_not(world: World) -> str:

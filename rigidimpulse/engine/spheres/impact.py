@@ -1,13 +1,13 @@
 """One simple impact: two bodies that touch at one point and nothing else, fast enough to rebound.
 
-The kernels are those of the loop in Python (detect, respond, integrate, observe), called in its order, so the results are
-the same bits. An impact is simple where the loop would do nothing but one impulse. With the approach speed c, restitution
-e, and the speed r below which contacts are held (engine/touching.py),
+The kernels are those of the loop in Python, called in its order, so the results are the same bits. An impact is simple where the loop
+would apply one impulse and do nothing else. With the approach speed c, the speed s at which the bodies part, restitution e, and the speed r
+below which contacts are held (`engine/touching.py`),
 
-    c > 2 r,   e c > 2 r,   and 2 r is exceeded by the speed at which the bodies part.
+    c > 2 r,   e c > 2 r,   s > 2 r.
 
-r is bounded from above by the accelerations alone: what the curvature of balls adds to the gap only lessens r. Bodies
-at rest, and pairs that come back at the same instant or after less than the held gap, are left to the loop.
+The accelerations alone bound r from above, because the curvature of balls only lessens it. Bodies at rest are left to the loop, and so
+are pairs that come back at the same instant or before their gap exceeded the contact margin.
 """
 
 from __future__ import annotations
@@ -61,11 +61,13 @@ def _contact(fixed, motion, contacts, paths, planes, a, b, plane, margin):
         normal = (between[0] / distance, between[1] / distance, between[2] / distance)
         gap = distance - radius - paths[second, RADIUS]
         point_first, point_second = along(centre, radius, normal), along(between, -paths[second, RADIUS], normal)
+    # `not <=`, so that a gap that is no number is no contact.
     if not gap <= margin:
         return False
     x, axes = now.position[first], rotation[first]
     point_a, point_b = moved(axes, x, point_first), moved(axes, x, point_second)
     normal = turned(axes, normal)
+    # Contacts run from a to b.
     if first == b:
         point_a, point_b, normal = point_b, point_a, scaled(normal, -1.0)
     for k in range(3):
@@ -83,7 +85,9 @@ def _slow(fixed, motion, contacts, radius, contact_margin):
     a, b, n = contacts.body_a[0], contacts.body_b[0], contacts.normal[0]
     press = 0.0
     for k in range(3):
+        # What presses the bodies together if both keep their present accelerations.
         press += n[k] * (motion.trajectory.acceleration[a, k] - motion.trajectory.acceleration[b, k])
+    # A contact that the support bears is pressed by the whole steady acceleration at least.
     if not (fixed.dynamic[a] and fixed.dynamic[b]):
         for i in (a, b):
             pull = fixed.steady[i]
@@ -116,7 +120,7 @@ def _members(fixed, record, a, b):
 
 @jit
 def _comes_back(rebounds, key, time, contact_margin, instant):
-    """Whether a pair rebounded so lately, or so often after less than its held gap delta, that the loop counts it."""
+    """Whether a pair rebounded so lately, or so often after less than its contact margin delta, that the loop counts it."""
     last = place_of(rebounds, key)
     if rebounds.key[last] != key:
         return False
@@ -132,9 +136,11 @@ def simple_impact(fixed, motion, record, rebounds, paths, planes, a, b, plane, t
     """
     contact_margin, radius = min(paths[a, GAP], paths[b, GAP]), min(paths[a, RADIUS], paths[b, RADIUS])
     key = a * len(paths) + b
+    # The loop in Python counts rebounds that follow each other closely.
     if _comes_back(rebounds, key, time, contact_margin, INSTANT * fixed.step):
         return False
     for i in (a, b):
+        # Bodies at rest are left to the loop.
         if fixed.dynamic[i] and paths[i, MOVES] == 0.0:
             return False
         bring_ball(motion, i, time)
@@ -145,6 +151,7 @@ def simple_impact(fixed, motion, record, rebounds, paths, planes, a, b, plane, t
     now, contacts, u = motion.now, record.contacts, np.empty(3)
     approach, slow = relative_velocity(now, contacts, _NONE, u), _slow(fixed, motion, contacts, radius, contact_margin)
     e = contacts.restitution[0]
+    # c > 2 r and e c > 2 r: see the head of the file.
     if not (-approach > slow and -e * approach > slow):
         return False
     members = _members(fixed, record, a, b)
@@ -153,9 +160,11 @@ def simple_impact(fixed, motion, record, rebounds, paths, planes, a, b, plane, t
         before[m, :3], before[m, 3:] = now.velocity[members[m]], now.angular_velocity[members[m]]
     energy = kinetic_of(now.velocity, now.angular_velocity, now.orientation, fixed.mass, fixed.inertia, members)
     resolve_contact(now, contacts, _NONE, e, fixed.law, record.log, _NONE)
+    # The bodies part faster than 2 r, or the loop would hold the contact.
     if not record.log[0, 6] > slow:
         return False
     for m in range(len(members)):
+        # The loop keeps the trajectory of a body whose velocity does not change.
         if not _has_changed(now, members[m], before[m]):
             return False
     at = record.count[0]

@@ -47,7 +47,7 @@ class Table(NamedTuple):
     tree: BoxTree
     paths: np.ndarray  # (n, PATH_SIZE), planes (q, PLANE_SIZE), see `paths`
     planes: np.ndarray
-    low: np.ndarray  # (n, 3) m, boxes of the paths to the end of the window
+    low: np.ndarray  # (n, 3) m, boxes of the paths to the end of the interval
     high: np.ndarray
     first: np.ndarray  # (k,) bodies of the entries, first < second for pairs
     second: np.ndarray
@@ -73,7 +73,7 @@ class SphereRecord(NamedTuple):
     orientation: np.ndarray
     velocity: np.ndarray
     angular_velocity: np.ndarray
-    rows: np.ndarray  # (r, ROW_LENGTH) impacts, see `observe.events`
+    rows: np.ndarray  # (r, ROW_LENGTH) impacts, see `recording.events`
     energy: np.ndarray  # (r,) J, change of kinetic energy of each impact
     count: np.ndarray  # (1,) impacts written
     contacts: Contacts  # of one contact

@@ -1,7 +1,7 @@
 """Motion of bodies that turn about a fixed axis, or not at all: balls in free flight, and what stands or is driven evenly.
 
 The operations are those of `motion.trajectory` and `motion.evaluate.bring`, so the results are the same bits, without the
-paths of tops and of bodies under torques, which would have to be compiled into the kernel.
+rotation of asymmetric bodies and of bodies under torques, which would have to be compiled into the kernel.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ def keeps_axis(trajectory, i):
 @inlined
 def _coordinate(trajectory, i, k, s, moves):
     """Coordinate k of the place and of the velocity after s."""
+    # The operations, and their order, are those of `motion.trajectory`: the same bits.
     a, v, x = trajectory.acceleration[i, k], trajectory.velocity[i, k], trajectory.position[i, k]
     displacement = s * (v + 0.5 * s * a)
     return (x + displacement if displacement != 0.0 else x), (v + s * a if moves else 0.0)

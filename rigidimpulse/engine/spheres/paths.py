@@ -1,7 +1,7 @@
 """Free paths as rows of numbers, and how near they bring bodies to each other.
 
-A row has what the kernel asks of a body again and again; arrays of many columns would have to be passed from kernel to
-kernel one by one, which takes longer than to work with them.
+A row holds the numbers of a body that the kernel reads most often. Separate arrays would have to be passed from kernel to kernel one
+by one, which takes longer than the work with them.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from rigidimpulse.engine.spheres.layout import OTHER
 from rigidimpulse.motion.trajectory import FIXED
 
 START, PLACE, VELOCITY, PULL, MOVES, RADIUS, GAP, KIND, DYNAMIC, PATH_SIZE = np.array([0, 1, 4, 7, 10, 11, 12, 13, 14, 15])
-"""Columns of the paths (n, PATH_SIZE): start of the course; place, velocity and acceleration there; 1 where the course moves. From RADIUS
-on constants: bounding radius, held gap of the body alone, kind, 1 for movable bodies."""
+"""Columns of the paths (n, PATH_SIZE): start of the trajectory; place, velocity and acceleration there; 1 where the body moves. From RADIUS
+on constants: bounding radius, contact margin of the body alone, kind, 1 for movable bodies."""
 LEVEL, NORMAL, HEIGHT, BODY, PLANE_SIZE = np.array([3, 4, 7, 8, 9])
 """Columns of the planes (q, PLANE_SIZE): normal in the body's frame, level along it from the body's centre; normal in the world, level
 along it from the origin; the body."""
@@ -32,7 +32,7 @@ _CURVED = TOLERANCES.time_of_impact.curved_path
 
 @jit
 def write_path(trajectory, paths, i):
-    """Write the row of body i from its course, but for its constants."""
+    """Write the row of body i from its trajectory; its constants stay."""
     row = paths[i]
     row[START], row[MOVES] = trajectory.start[i], trajectory.mode[i] != FIXED
     for k in range(3):
@@ -58,7 +58,7 @@ def _three(array, i, column):
 
 @jit
 def _relative(paths, a, b, t):
-    """Position, velocity and acceleration of b less those of a, by the very operations of `guard_flight.relative_flight`."""
+    """Position, velocity and acceleration of b less those of a, by the same operations as `free_flight.relative_flight`."""
     x, v, pull = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for side in range(2):
         i, sign = b if side else a, 1.0 if side else -1.0
@@ -127,8 +127,8 @@ def _fastest(paths, planes, i, other, plane, time, end):
 def is_passing(paths, planes, i, other, plane, time, gap, live):
     """Whether the loop in Python would do nothing for two balls, or a ball and a plane, that are near at `time`.
 
-    That is so where they are farther apart than contacts in action, live (relative to the held gap), and approach or part faster than
-    what would be held: twice sqrt(2 a delta), with more than all accelerations that may press them.
+    That is so where two things hold. Their gap is more than `live` contact margins, so that no contact acts. And they approach or part
+    faster than twice sqrt(2 a delta), the speed of a contact that would be held; a is more than all accelerations that may press them.
     """
     contact_margin = min(paths[i, GAP], paths[other, GAP])
     if paths[i, KIND] == OTHER or paths[other, KIND] == OTHER or not gap > live * contact_margin:
@@ -160,12 +160,13 @@ def _march(paths, planes, i, other, plane, near, number, last, clock):
 
 @jit
 def near_boundary(paths, planes, i, other, plane, near, until, clock):
-    """The first boundary after now, up to the time `until` and before the end of the window, with a gap of at most `near`; else inf.
+    """The first boundary after now, up to the time `until` and before the end of the interval, with a gap of at most `near`; else inf.
 
     Most pairs need no march: over a plane without a pull away from it the least gap is that of the first or of the last boundary; two
     balls without relative acceleration come nearer until they are closest, and part after it.
     """
     first, last = clock.number, np.int64(min(until, clock.end) / clock.step)
+    # Round-off of the division may put the last boundary too late.
     while last * clock.step > until or last * clock.step >= clock.end:
         last -= 1
     if first > last:
@@ -173,6 +174,7 @@ def near_boundary(paths, planes, i, other, plane, near, until, clock):
     begin, final = first * clock.step, last * clock.step
     if plane >= 0:
         if dot(_three(planes, plane, NORMAL), _three(paths, i, PULL)) <= 0.0:
+            # The gap over a plane is concave in time, so it is least at an end.
             least = gap_at(paths, planes, i, other, plane, begin)
             if min(least, gap_at(paths, planes, i, other, plane, final)) > near:
                 return inf
@@ -180,6 +182,7 @@ def near_boundary(paths, planes, i, other, plane, near, until, clock):
         x, v, pull = _relative(paths, i, other, begin)
         if dot(pull, pull) == 0.0:
             square = dot(v, v)
+            # Without relative acceleration |x + v s| is least at s = -x.v / v^2.
             closest = min(max(-dot(x, v), 0.0) / square if square > 0.0 else 0.0, final - begin)
             if length(along(x, closest, v)) - paths[i, RADIUS] - paths[other, RADIUS] > near:
                 return inf
@@ -188,7 +191,7 @@ def near_boundary(paths, planes, i, other, plane, near, until, clock):
 
 @jit
 def last_apart(paths, planes, i, other, plane, near, clock):
-    """The last boundary, or now, before which bounding spheres are surely not near; inf if not until the end of the window."""
+    """The last boundary, or now, before which bounding spheres are surely not near; inf if that is not until the interval ends."""
     fastest = _fastest(paths, planes, i, other, plane, clock.now, clock.end)
     time = clock.now
     while True:
@@ -205,7 +208,7 @@ def last_apart(paths, planes, i, other, plane, near, clock):
 
 @jit
 def swept_box(paths, i, clock, low, high):
-    """Write the box of body i's bounding sphere on its way from now to the end of the window, wide enough for all that is near."""
+    """Write the box of body i's bounding sphere on its way from now to the end of the interval, wide enough for all that is near."""
     x, h = _centre(paths, i, clock.now), clock.end - clock.now
     s, wide = clock.now - paths[i, START], paths[i, RADIUS] + near_gap(paths, i, i)
     for k in range(3):

@@ -52,6 +52,7 @@ def _sift(queue, at, p):
         _put(queue, at, queue.order[parent])
         at = parent
     while True:
+        # Downwards: the earlier child moves up.
         child = 2 * at + 1
         if child >= queue.size[0]:
             break

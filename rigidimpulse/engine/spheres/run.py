@@ -1,4 +1,4 @@
-"""The event kernel in a run: its tables, and what it hands to the loop in Python."""
+"""The event kernel in a run: its tables, and the results that it hands to the loop in Python."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from rigidimpulse.engine.spheres.layout import PLANE, Fixed, Motion, SphereRecor
 from rigidimpulse.engine.spheres.paths import BODY, DYNAMIC, GAP, KIND, LEVEL, PATH_SIZE, PLANE_SIZE, RADIUS
 from rigidimpulse.engine.spheres.queue import make_queue
 from rigidimpulse.engine.spheres.tree import make_tree
-from rigidimpulse.model.contact_memory import any_short_rebound, has_room
+from rigidimpulse.model.contact_memory import any_short_rebound, has_capacity
 from rigidimpulse.model.island import empty_contacts
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.events import ROW_LENGTH
 
 CAPACITY = 256
-"""Impacts, pairs and rebounds that there is room for at first; doubled where it does not do."""
+"""Capacity for impacts, pairs and rebounds at first; it is doubled when it is used up."""
 MOST_ROWS = 2**14
 """Impacts at most that are handed over at once."""
 FIRST_INTERVAL = 16
-"""Steps in the first window."""
+"""Steps in the first interval."""
 LIVE = 2.0
 """How much farther away contacts are left to the loop in Python than it takes them for touching."""
 LONGEST_PAUSE = 16
@@ -45,7 +45,7 @@ class EventRun:
         state = run.state
         self._motion = Motion(state.trajectory, state.now, state.rotation)
         self._pairs, self._rows = CAPACITY + world.num_bodies, CAPACITY
-        self._table, self._book = self._make_table(), self._make_record()
+        self._table, self._record = self._make_table(), self._make_record()
         self._known = 0
         self._step_begin = 0.0
         gap = world.contact_margin
@@ -71,14 +71,14 @@ class EventRun:
         )  # fmt: skip
 
     def may_fly(self) -> bool:
-        """Whether to try the kernel now: not where contacts last, and not at once again where it did not get on."""
+        """Whether to try the kernel now: not while contacts last, and not directly after a step that it could not take."""
         waits, self._waits = self._waits > 0, max(self._waits - 1, 0)
         run = self._run
         idle = run.substepped.is_idle()
         return not waits and idle and not run.state.under_contact.any() and not run.soft_bodies.moves
 
     def fly(self, end: float, at_boundary: bool = True) -> tuple[int, float, float]:
-        """Carry the scene from a boundary of steps, or from the middle of one, towards `end` [s] as far as what happens is simple.
+        """Advance the scene from `state.time` towards `end` [s], until something happens that is not simple.
 
         Returns how the flight ends (see `effect`), and where the step begins and ends in which it does, s.
         """
@@ -88,9 +88,10 @@ class EventRun:
         if at_boundary:
             self._step_begin = begin
         how, number, interval_end = FULL, 0, -1.0
+        # A table was full: its contents are handed over, it grows, and the flight goes on where it was.
         while how == FULL:
             how, now, at_boundary, number, self._interval, interval_end = fly(
-                self._fixed, self._motion, self._table, self._book, run.state.memory, now, end, at_boundary, self._interval,
+                self._fixed, self._motion, self._table, self._record, run.state.memory, now, end, at_boundary, self._interval,
                 self._live, interval_end,
             )
             self._keep_impacts()
@@ -98,6 +99,7 @@ class EventRun:
                 interval_end = -1.0
         run.state.time = now
         if how == STEP:
+            # A kernel that did not get on is tried again after twice as many steps each time.
             self._pause = 0 if now > begin else min(2 * self._pause + 1, LONGEST_PAUSE)
             self._waits = self._pause
         step = self._fixed.step
@@ -113,17 +115,17 @@ class EventRun:
 
     def _keep_impacts(self) -> None:
         """Hand impacts, their energies and rebounds to the run."""
-        run, count = self._run, int(self._book.count[0])
+        run, count = self._run, int(self._record.count[0])
         if not count:
             return
-        rows = self._book.rows[:count]
-        run.log.extend_impacts(rows, self._book.energy[:count])
+        rows = self._record.rows[:count]
+        run.log.extend_impacts(rows, self._record.energy[:count])
         self._known = len(run.log.impacts)
-        self._book.count[0] = 0
+        self._record.count[0] = 0
 
     def _grow(self) -> bool:
         """Make the table that is full larger; returns whether that is the one of events, which then has to be filled again."""
-        if not has_room(self._run.state.memory, 1):
+        if not has_capacity(self._run.state.memory, 1):
             self._run.state.remember(1)
         elif self._table.count[0] >= len(self._table.first):
             self._pairs *= 2
@@ -131,7 +133,7 @@ class EventRun:
             return True
         else:
             self._rows = min(2 * self._rows, MOST_ROWS)
-            self._book = self._make_record()
+            self._record = self._make_record()
         return False
 
 

@@ -1,13 +1,13 @@
 """When bodies meet next: the table of events and how its entries are timed.
 
-Two balls, or a ball and a plane, have the time of their contact in closed form (`sweep.ball_time`). All that may happen
-besides is left to the loop in Python, so an entry may also be a time at which it takes over:
+Two balls, or a ball and a plane, have the time of their contact in closed form (`collision/time_of_impact/spheres.py`). Everything
+else is left to the loop in Python, so an entry may also be a time at which that loop takes over:
 
     AT_BOUNDARY   a boundary of steps at which the pair is within the margin of contacts, where the loop looks at it, or
                   the last one before bounding spheres of other shapes may be within it
-    AT_ONCE       the same, between boundaries, for a pair of which a body has just changed course
+    AT_ONCE       the same, between boundaries, for a pair of which a body has just got a new trajectory
 
-Boundaries at which a pair is near are found by steps that its gap, g > margin, allows for certain: g / (fastest speed).
+Boundaries at which a pair is near are found by safe steps: a pair whose gap is g above the margin is not near before g / (fastest speed).
 """
 
 from __future__ import annotations
@@ -44,10 +44,12 @@ def meeting(paths, planes, i, other, plane, clock):
     near, at_once = near_gap(paths, i, other), AT_BOUNDARY if clock.at_boundary else AT_ONCE
     if paths[i, MOVES] == 0.0 and paths[other, MOVES] == 0.0:
         return inf, CONTACT
+    # Other shapes have no closed form: only the time until which their bounding spheres are apart.
     if paths[i, KIND] == OTHER or paths[other, KIND] == OTHER:
         time = last_apart(paths, planes, i, other, plane, near, clock)
         return time, at_once if time == clock.now else AT_BOUNDARY
     time = contact_time(paths, planes, i, other, plane, clock.now)
+    # No closed form for this contact (nan): the loop decides.
     if time != time:
         return clock.now, at_once
     if clock.at_boundary:
@@ -110,7 +112,7 @@ def _wait(table, p):
 
 @jit
 def _add_pair(table, i, j):
-    """Add an entry for two bodies; returns False if there is no room."""
+    """Add an entry for two bodies; returns False if the table is full."""
     p = table.count[0]
     if p == len(table.first):
         return False
@@ -126,7 +128,7 @@ def _add_pair(table, i, j):
 
 @jit
 def _add_pairs(apart, table, i, which):
-    """Add entries for i, which moves, and whom it may meet: _FRESH, pairs without one, or _EACH_ONCE; False for want of room."""
+    """Add entries for i, which moves, and whom it may meet: _FRESH, pairs without one, or _EACH_ONCE; False if the table is full."""
     paths, n = table.paths, len(table.paths)
     reached = overlapping(table.tree, i, table.low, table.high, table.found)
     for k in range(reached):
@@ -141,13 +143,14 @@ def _add_pairs(apart, table, i, which):
 
 @jit_making_arrays
 def fill_table(fixed, table, clock):
-    """Find who may meet until the end of the window; returns False if there is no room for all pairs."""
+    """Find who may meet until the end of the interval; returns False if the pairs are more than the table holds."""
     paths, n = table.paths, len(table.paths)
     clear(table.queue)
     table.count[0], table.count[2] = n, 0
     table.head[:] = -1
     bodies, count = np.empty(n, np.int64), 0
     for i in range(n):
+        # Planes have an entry for each body instead of a box.
         if paths[i, KIND] == PLANE:
             continue
         bodies[count] = i
@@ -162,6 +165,7 @@ def fill_table(fixed, table, clock):
         if paths[i, MOVES] > 0.0:
             table.first[i] = i
             _wait(table, i)
+            # Moving pairs are entered once, by the body of lower index.
             if not _add_pairs(fixed.apart, table, i, _EACH_ONCE):
                 return False
     return True
@@ -169,7 +173,7 @@ def fill_table(fixed, table, clock):
 
 @jit
 def renew(apart, table, i, clock):
-    """Body i has a new path: let its entries, and those of bodies that it may now meet, wait; returns False if there is no room."""
+    """Body i has a new path: let its entries, and those of bodies that it may now meet, wait; returns False if the table is full."""
     swept_box(table.paths, i, clock, table.low, table.high)
     replace_box(table.tree, i, table.low, table.high)
     table.count[1] += 1

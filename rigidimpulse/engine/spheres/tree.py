@@ -29,7 +29,7 @@ class BoxTree(NamedTuple):
 
 
 def make_tree(num_bodies: int) -> BoxTree:
-    """Make a tree for so many bodies, yet to be built."""
+    """Make a tree with a capacity of `num_bodies`; `build_tree` fills it."""
     leaves = 1 << max(num_bodies - 1, 1).bit_length()
     return BoxTree(
         np.empty((2 * leaves, 3)), np.empty((2 * leaves, 3)), np.empty(leaves, np.int64), np.full(num_bodies, -1, np.int64)
@@ -52,6 +52,7 @@ def _curve_places(low, high, bodies, code):
     for i in bodies:
         for k in range(3):
             middle = 0.5 * (low[i, k] + high[i, k])
+            # Endless boxes have no middle; they come first.
             if isfinite(middle):
                 least[k], most[k] = min(least[k], middle), max(most[k], middle)
     for at in range(len(bodies)):

@@ -1,14 +1,13 @@
 """Sub-stepped islands: which bodies are advanced by sub-steps, how they arrive, and when they sleep.
 
-At the start of a step islands are chosen (`regime.py`). Their bodies get trajectories (mode LINEAR) that end in the poses which the
-solver found
-for the end of the step. Pairs inside such an island are not swept. Pairs of a member and any other body are: at their contact the
-impulse is
-found exactly and the island is stepped again from there, with the other body if it is slow enough. Contacts are held at a gap, the skin.
+Islands are chosen at the start of a step (`regime.py`). Their bodies get trajectories (mode LINEAR) that end in the poses that the solver
+found for the end of the step. Pairs inside such an island are not swept. Pairs of a member and any other body are swept: at their contact
+the impulse is found exactly, and the island is stepped again from there, with the other body if it is slow enough. Contacts are held at a
+gap, the skin.
 
-A member that stays within SLEEP_MOTION skins of one place and below SLEEP_SPEED sqrt(g r) for REST sqrt(r / g) s (r: inner radius) is
-sleepy. Sleepy members that no moving one wakes (`sleeping.wake_by_contact`) stand still, to the bit, and bear the others. An island whose
-members are all asleep stands still until something touches it.
+A member is sleepy if it stays within SLEEP_MOTION skins of one place and below SLEEP_SPEED sqrt(g r) for REST sqrt(r / g) s (r: inner
+radius). Sleepy members that no moving one wakes (`sleeping.wake_by_contact`) sleep: they stay exactly still and bear the others. An island
+whose members are all asleep stands still until something touches it.
 """
 
 from __future__ import annotations
@@ -127,6 +126,7 @@ class SubsteppedIslands:
         ended = trajectory.mode == LINEAR
         self._end_trajectories(run, np.flatnonzero(ended), time)
         chosen = self._choose(run, pair_events, ended, solve_count) if pair_events.end > time else np.zeros_like(ended)
+        # Members that are in no island any more fly freely.
         left = np.flatnonzero(ended & ~chosen & (trajectory.mode == LINEAR))
         let_fly(trajectory, left, world.steady_acceleration)
         self.sleep_timer[left] = 0.0
@@ -149,6 +149,7 @@ class SubsteppedIslands:
         run.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
         self._leave_out_fast(run, member)
         a, b, touch = self._near(run, member, ahead)
+        # A member may touch a sleeping island, whose bodies then touch others.
         while len(woken := self._touched(run, member, a, b)):
             member[woken] = True
             a, b, touch = self._near(run, member, ahead)
@@ -157,6 +158,7 @@ class SubsteppedIslands:
         moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
         refused = refusals(world, root, self.label >= 0, self._jointed, moves, solve_count, a, b, self._auto)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
+        # Tall columns are found from contacts, so only in islands that are not refused yet.
         chosen = self._low(run, pair_events, chosen, root, refused)
         for reason in refused.values():
             self._refused[reason] = self._refused.get(reason, 0) + 1
@@ -191,6 +193,7 @@ class SubsteppedIslands:
         touched = np.unique(buffer.integer[:count, :2])
         touched = touched[resting[touched]]
         labels = self.label[touched]
+        # Sleeping islands wake as a whole.
         mates = np.flatnonzero(resting & np.isin(self.label, labels[labels >= 0]))
         return np.union1d(touched, mates)
 
@@ -216,6 +219,7 @@ class SubsteppedIslands:
         """Label the islands; put to sleep those that have been sleepy for long, and members that are far from moving ones."""
         world, trajectory = run.world, run.state.trajectory
         inner = self.stepper.inner
+        # Islands on moving supports never sleep.
         carried = world.moving[a] | world.moving[b]
         moving = np.unique(root[np.where(world.moving[a], b, a)[carried]])
         restless = chosen.copy()
@@ -233,6 +237,7 @@ class SubsteppedIslands:
         self._put_to_sleep(run, np.flatnonzero(asleep & (trajectory.mode != FIXED)), time)
         alive = np.zeros(len(root), bool)
         alive[root[restless]] = True
+        # Islands whose members all sleep are not stepped.
         chosen &= alive[root]
         self.asleep = asleep & chosen
 
@@ -269,7 +274,7 @@ class SubsteppedIslands:
             run.log.account_over(start, time, "sub-stepping", change)
 
     def finish(self, run: Run) -> None:
-        """Account for what the sub-steps under way take until the end of the run, and tell the plan what was done."""
+        """Account for the energy of sub-steps that last until the end of the run, and tell the plan what was done."""
         refused = {f"refused: {reason}": count for reason, count in self._refused.items()}
         run.plan.tell(NAME, self.summary(), {"steps": self._steps, "largest island": self._most, **refused})
         members, time = np.flatnonzero(run.state.trajectory.mode == LINEAR), run.state.time
@@ -294,6 +299,7 @@ class SubsteppedIslands:
             self._bring_in(run, bare, members)
             return [*islands, bare]
         for island in hit:
+            # An island that is hit is stepped again, with all of its members.
             labels = self.label[island.members]
             members = np.union1d(members, np.flatnonzero(np.isin(self.label, labels[labels >= 0])))
             self._bring_in(run, island, members)
@@ -322,6 +328,7 @@ class SubsteppedIslands:
         if len(island.members):
             stays = np.zeros(world.num_bodies, bool)
             stays[island.members] = True
+            # Bodies that touch the island join it, except jointed ones, and those that are too fast for sub-steps and leave it.
             self._leave_out_fast(run, stays)
             stays[island.members] |= ~self._leaves(run, island)
             near = island.members[stays[island.members] & ~self._jointed[island.members]]
@@ -337,6 +344,7 @@ class SubsteppedIslands:
         self._most = max(self._most, len(members))
         members = members[~self.asleep[members]]
         end = self._end_of(run, pair_events, island.time, members)
+        # In the middle of a step contacts may be kept for longer motion.
         self._set_up(run, members, island.time, end - island.time, self.stepper.kept if island.time > pair_events.begin else 0.0)
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
@@ -346,6 +354,7 @@ class SubsteppedIslands:
             self.stepper.move_apart(run, fresh)
         self._outcome = self.stepper.step(run, island.time, end)
         self._outcome_end = end
+        # The island was not stepped to the end of the step: it is woken there.
         if end < pair_events.end:
             pair_events.wake[members] = end
 

@@ -1,4 +1,4 @@
-"""One step of heaps: bodies put before the kernels, contacts looked at, sub-steps, energy kept in bounds."""
+"""One step of sub-stepped islands: bodies are handed to the kernels, contacts found, sub-steps taken, gained energy taken off."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ SAME, KEPT = 0.02, 0.2
 """Parts of the motion until a look (`Accuracy.substep_motion`) that a pair may make with the contacts it has: at any time, and in the
 middle of a step."""
 QUICK = 0.4
-"""Part of `kept` beyond which a body is quick: its contacts are looked for, and their records made anew, in the middle of a step."""
+"""Part of `kept` beyond which a body is quick: its contacts are looked for, and their records made, again in the middle of a step."""
 MOSTLY = 0.3
 """Part of the bodies that are quick beyond which all count as such."""
 _NO_STEADY = 0, np.zeros(1, np.int64)
@@ -74,7 +74,7 @@ CLEAR = 0.2
 
 @dataclass
 class Outcome:
-    """What a step of heaps gave: bodies (k,) of the scene, in order of the heap, their poses and velocities (k, 6) at its end."""
+    """Result of a step: bodies (k,) of the scene in the solver's order, and their poses and velocities (k, 6) at its end."""
 
     members: np.ndarray
     position: np.ndarray
@@ -114,8 +114,9 @@ class ContactStepper:
         self.skin = TOLERANCES.sub_stepping.skin * self.inner
         self.reach = np.where(world.ball, 0.0, world.bound_radius)
         convex = convex_polyhedra(world.geometry)
-        cored, depth, self._back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
-        self.geometry, factor = shrunk_geometry(cored, dynamic_shapes)
+        # Soft contacts sink in, and the contact kernels need a gap: smaller shapes for the search.
+        inset, depth, self._back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
+        self.geometry, factor = shrunk_geometry(inset, dynamic_shapes)
         self.shapes = make_polyhedra(world.geometry, convex)
         self._solids, drum, self._inset = solids(world.shapes, world.geometry, convex, self.shapes)
         convex |= drum
@@ -145,6 +146,7 @@ class ContactStepper:
         self._least_sub_steps = LEAST_SUB_STEPS / (FINER_SUB_STEP if finer else 1.0)
         self.motion = world.accuracy.substep_motion * (FINER_MOTION if finer else 1.0)
         self.kept = KEPT * self.motion
+        # Balls and moving supports: all contacts are found again in the middle of a step.
         self._all_quick = bool(world.moving.any() or world.ball.any())
         self._special = self._all_quick or bool(world.coefficients[:, :, 0].any())
         self.pressed = np.zeros(n, bool)
@@ -173,6 +175,7 @@ class ContactStepper:
         strength = float(self.world.steady_strength[members].max())
         step, pieces = self.world.accuracy.step, self._least_sub_steps
         if strength > 0.0:
+            # The load of k bodies presses the skin in by k g / w^2, w = 2 pi F / h.
             h = 2.0 * math.pi * FREQUENCY * math.sqrt(PRESSED * float(self.skin[members].min()) / (COLUMN * strength))
             pieces = max(math.ceil(step / h), pieces)
         return step / pieces
@@ -190,7 +193,7 @@ class ContactStepper:
             classify(self.table.pairs, self.bodies, self.shapes)
 
     def near(self, run: Run, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
-        """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `Cover.near`."""
+        """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `FatBoxes.near`."""
         return self.fat_boxes.near(self.table.pairs, run.state.now, run.acceleration, member, other, ahead)
 
     def set_up(self, run: Run, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0) -> None:
@@ -202,6 +205,7 @@ class ContactStepper:
         self._part[supports], self._part[members] = SUPPORT, MEMBER
         load_bodies(self.bodies, self.order, run.state.now, run.acceleration, self.world.inv_mass, self._part)
         motion = most_motion(self.bodies, self.table.pairs, ahead)
+        # Fast bodies are looked at more often, with enough sub-steps between the looks.
         needed = math.ceil(motion / COARSEST)
         self._sub_steps = max(math.ceil(ahead / self.sub_step(members) - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
         most = max(self._sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
@@ -213,9 +217,9 @@ class ContactStepper:
         """Look at the contacts of all pairs in play, on several cores where the last look had much to do; kept: see `review`."""
         table, number = self.table, len(self.table.pairs.first)
         shares = self._shares if self._looked_at > self._sharing.pairs else 1
-        room = share_of(number, shares, shares)
-        if room > len(self._places):
-            self._places, self._margins = reserve((2 * room,), np.int64), reserve((2 * room,), np.float64)
+        capacity = share_of(number, shares, shares)
+        if capacity > len(self._places):
+            self._places, self._margins = reserve((2 * capacity,), np.int64), reserve((2 * capacity,), np.float64)
         while True:
             convex, limits = Convex(self.shapes, self._solids, self._inset), Limits(self.ahead, SAME * self.motion, kept)
             outcome = self._sharing.call(find_contacts, [
@@ -225,6 +229,7 @@ class ContactStepper:
                 )
                 for share in range(shares)
             ])  # fmt: skip
+            # A share whose points were too few says so; all shares are searched again with more.
             if min(waiting for _, waiting in outcome) >= 0:
                 break
             table.grow(POINTS)
@@ -232,18 +237,19 @@ class ContactStepper:
         begins = [share_of(number, share, shares) for share in range(shares)]
         waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
         if len(waits):
+            # In order of the pairs, however many shares there are.
             waits = waits[np.argsort(self._places[waits])]
             self._look_at_general(run, self._places[waits], self._margins[waits])
 
     def _look_at_general(self, run: Run, places: np.ndarray, margin: np.ndarray) -> None:
-        """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `detect`."""
+        """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `collision.manifold`."""
         table, world, pairs = self.table, self.world, self.table.pairs
         first, second = pairs.first[places], pairs.second[places]
-        # A wide margin is dear for meshes.
+        # A wide margin is expensive for meshes.
         far = np.where(self._depth[first] + self._depth[second] > 0.0, margin, FARTHER * margin)
         shown = far + self._taken_off[first] + self._taken_off[second]
         n, now, rotation = world.num_bodies, run.state.now, run.state.rotation.copy()
-        # In the course of a step bodies are elsewhere than at its start.
+        # In the middle of a step bodies are elsewhere than at its start.
         now = now._replace(position=now.position.copy(), orientation=now.orientation.copy())
         mine = self.bodies.part[:n] != OUTSIDE
         at = self.order[mine]
@@ -285,12 +291,13 @@ class ContactStepper:
                 )  # fmt: skip
 
     def _look_again(self, run: Run) -> None:
-        """Look at the contacts of quick bodies in the course of a step; those of all others stay in the steady batches, where they are."""
+        """Find the contacts of quick bodies again in the middle of a step; those of all others stay in the steady batches."""
         bodies, width = self.bodies, self.simd.width
         all_quick = self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY
         if all_quick:
             bodies.quick[:] = True
         self._look(run, self.kept)
+        # All batches are made again: what has drifted counts from here.
         if all_quick:
             bodies.drift[:] = 0.0
             self._steady = _NO_STEADY
@@ -347,6 +354,7 @@ class ContactStepper:
             work += self._advance(some, h)
             done += some
         note_pressed(bodies, self.order, self.pressed)
+        # Sub-steps must not make energy beyond what moving supports gave.
         self._take_off(before + work)
         at = self.rank[members]
         return Outcome(members, bodies.position[at], bodies.orientation[at], bodies.velocity.reshape(-1, ROW)[at, :6])
@@ -380,6 +388,7 @@ class ContactStepper:
             (self.simd, solve, special, sub_steps, h, self._work_queue, share, shares) for share in range(shares)
         ])  # fmt: skip
         keep_impulses(self.simd, self._batches, number, table.lines)
+        # The first part of a step has all contacts in its batches: they are the steady ones of later parts.
         if not steady:
             bodies.quick[:] = False
             self._steady = self._count, self._edges

@@ -17,6 +17,7 @@ def end_trajectories(trajectory, members, time, steady, bodies, rotation, accele
     """End the trajectories of members at `time`, bring them there, and let them go straight on; steady (n, 3) m/s2 is what pulls them."""
     for i in members:
         place, q, v, w = stepped_at(trajectory, i, time)
+        # Inverse inertia in world axes: R diag(1 / I) R^T.
         x, y, z = 1.0 / trajectory.inertia[i, 0], 1.0 / trajectory.inertia[i, 1], 1.0 / trajectory.inertia[i, 2]
         quaternion_to_matrix(q, rotation[i])
         for c in range(3):
@@ -91,6 +92,7 @@ def depart(trajectory, members, time, length, bodies, position, orientation, vel
         i = members[k]
         a0, a1, a2, a3 = bodies.orientation[i, 0], bodies.orientation[i, 1], bodies.orientation[i, 2], bodies.orientation[i, 3]
         q0, q1, q2, q3 = product(orientation[k, 0], orientation[k, 1], orientation[k, 2], orientation[k, 3], a0, -a1, -a2, -a3)
+        # The shorter turn.
         if q0 < 0.0:
             q0, q1, q2, q3 = -q0, -q1, -q2, -q3
         sine = np.sqrt(q1 * q1 + q2 * q2 + q3 * q3)
@@ -98,6 +100,7 @@ def depart(trajectory, members, time, length, bodies, position, orientation, vel
         missed, way = 0.0, 0.0
         for c in range(3):
             first, last = bodies.velocity[i, c], velocity[k, c]
+            # Whether the way agrees with the mean of the velocities: then it is a parabola.
             missed += np.abs(position[k, c] - bodies.position[i, c] - 0.5 * length * (first + last))
             way += 0.5 * length * (np.abs(first) + np.abs(last))
         trajectory.start[i], trajectory.mode[i] = time, LINEAR
@@ -106,6 +109,7 @@ def depart(trajectory, members, time, length, bodies, position, orientation, vel
         trajectory.angular_velocity[i, 2] = factor * q3
         for c in range(3):
             trajectory.position[i, c] = bodies.position[i, c]
+            # Else the path is straight, since contacts moved the body otherwise than its velocities say.
             pull = (velocity[k, c] - bodies.velocity[i, c]) / length if missed <= EVEN * way else 0.0
             trajectory.velocity[i, c] = (position[k, c] - bodies.position[i, c]) / length - 0.5 * length * pull
             trajectory.acceleration[i, c], trajectory.torque[i, c] = pull, 0.0

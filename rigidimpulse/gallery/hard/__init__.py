@@ -1,4 +1,4 @@
-"""The hard-case suite: scenes that engines break on, each with a law or a derived bound. `rigidimpulse hardcases` runs it.
+"""The hard-case suite: scenes in which engines fail, each with a law or a derived bound. `rigidimpulse hardcases` runs it.
 
 A family is a module of this folder; its scenes are imported when one of them is asked for.
 """

@@ -1,6 +1,6 @@
 """Starts and ends that no motion of rigid bodies satisfies: the run must go on, say so, and feed in nothing.
 
-Squeezed: two kinematic walls close on a body until there is no room. No rigid motion is left; the status must name the
+Squeezed: two kinematic walls close on a body until there is no space left. No rigid motion is left; the status must name the
 body, every number must stay finite, and the body must not be shot out: its speed stays within ten times the walls'.
 
 Overlap at the start: bodies drawn inside each other, half way, at the same place, or one inside the other. The status says so
@@ -49,7 +49,7 @@ def check_squeezed(run: Recording) -> list[Check]:
     named = sum("body" in event.bodies for event in run.status.events)
     return [
         finite(run),
-        at_least("events that name the body", named, 1, "the status says that there is no room"),
+        at_least("events that name the body", named, 1, "the status says that there is no space"),
         at_most("speed of the body, m/s", speeds.max(), 10.0 * CLOSING, "it is not shot out"),
     ]
 
@@ -98,7 +98,7 @@ def coincident() -> Scene:
 SCENES = (
     *(
         GalleryScene(
-            f"squeezed_{shape}", f"Two walls close on a {shape} until there is no room", partial(squeezed, shape), check_squeezed, 1.2
+            f"squeezed_{shape}", f"Two walls close on a {shape} until there is no space left", partial(squeezed, shape), check_squeezed, 1.2
         )
         for shape in ("ball", "box")
     ),

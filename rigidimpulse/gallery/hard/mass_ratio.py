@@ -49,11 +49,11 @@ def check(drop: float, run: Recording) -> list[Check]:
         undisturbed(run),
     ]
     if drop:
-        arrival = math.sqrt(2.0 * DROP / GRAVITY)
-        falling = run.times < arrival
+        landing = math.sqrt(2.0 * DROP / GRAVITY)
+        falling = run.times < landing
         fall = run.position("heavy")[falling, 2] - 1.5 - DROP + 0.5 * GRAVITY * run.times[falling] ** 2
         checks.append(at_most("error of the fall, m", np.abs(fall).max(), 1e-14 * 4, "z = h - g t^2 / 2"))
-        late = np.abs(run.impacts["time"][:1] - arrival).max() if len(run.impacts) else math.inf
+        late = np.abs(run.impacts["time"][:1] - landing).max() if len(run.impacts) else math.inf
         # Faces meet at a gap of 1e-10 of the size, passed at 3.1 m/s; the light cube may have been lifted by 1e-6.
         checks.append(at_most("error of the impact's time, s", late, 2e-6, "sqrt(2 h / g), up to the contact margin"))
     return checks

@@ -4,8 +4,8 @@ No closed form is known for the whole motion, but laws hold: energy never grows,
 since friction acts whenever anything slides and restitution is below 1.
 
 Ball at 5 m/s on five resting boxes of the same mass, e = 0.5: the rebound of compliant spheres-and-springs references is
-1.8 to 2.7 m/s, whatever their stiffness. A solver that treats the contacts of the pile one after the other, the load of
-the pile left out, eats up all of it and gives 0.
+1.8 to 2.7 m/s, whatever their stiffness. A solver that treats the contacts of the pile one after the other, without
+the load of the pile, loses all of it and gives 0.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rigidimpulse.scene.shape import Shape
 BOXES = 5
 THROWN = 0.6
 BALL = 0.5
-ARRIVAL = 5.0
+IMPACT_SPEED = 5.0
 """m/s, of the ball."""
 REBOUND = (1.8, 2.7)
 """m/s, of compliant references."""
@@ -59,7 +59,7 @@ def dropped() -> Scene:
     material = dull(0.5, 0.5)
     scene = _stack(material)
     height = BOXES + BALL + 0.01
-    ball = {"position": (0.1, 0.0, height), "velocity": (0.0, 0.0, -math.sqrt(ARRIVAL**2 - 0.02 * GRAVITY)), "mass": 1000.0}
+    ball = {"position": (0.1, 0.0, height), "velocity": (0.0, 0.0, -math.sqrt(IMPACT_SPEED**2 - 0.02 * GRAVITY)), "mass": 1000.0}
     scene.add(Body("ball", Shape.sphere(BALL), material=material, **ball))
     return scene
 

@@ -1,13 +1,13 @@
 """Spikes, a wedge in a crack, tetrahedra in a pit, a cube in a hole of its own size.
 
-What comes to rest where is not known in closed form, but it must come to rest inside, without energy out of nothing,
-without entering anything.
+The places of rest are not known in closed form. But bodies must come to rest inside, energy must not grow, and nothing may enter
+anything else.
 
 Wedge of half angle b in a crack of the same angle: with mu < tan b it slides in until its sides touch, with mu > tan b it would jam.
 Here mu = 0: it goes in as far as the geometry allows, z = z_touch, to the contact gap over sin b.
 
 Cube in a hole: with walls exactly at its sides and no friction, the walls carry nothing, so it falls freely to the bottom:
-it arrives at t = sqrt(2 h / g). Contacts held at a gap of 1e-6 have no room here, which is what makes it hard.
+it arrives at t = sqrt(2 h / g). Contacts held at a gap of 1e-6 do not fit in here, which makes it hard.
 """
 
 from __future__ import annotations
@@ -148,12 +148,12 @@ def hole() -> Scene:
 
 def check_hole(run: Recording) -> list[Check]:
     """Check that it falls freely, lands and stays."""
-    arrival = math.sqrt(2.0 * DROP / GRAVITY)
-    falling = run.times < arrival
+    landing = math.sqrt(2.0 * DROP / GRAVITY)
+    falling = run.times < landing
     path = DROP + 0.5 * HOLE - 0.5 * GRAVITY * run.times[falling] ** 2
     floor = run.index("floor")
     landings = run.impacts["time"][(run.impacts["body_a"] == floor) | (run.impacts["body_b"] == floor)]
-    late = abs(float(landings[0]) - arrival) if len(landings) else math.inf
+    late = abs(float(landings[0]) - landing) if len(landings) else math.inf
     return [
         finite(run),
         at_most("error of the fall, m", np.abs(run.position("cube")[falling, 2] - path).max(), 1e-6, "smooth walls carry nothing"),

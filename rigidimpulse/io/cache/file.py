@@ -5,7 +5,7 @@
     body            offset (n, 3) m and turn (n, 4): centre of mass and principal axes in body frames
     frames          position (f, n, 3) m of centres of mass, orientation (f, n, 4) wxyz of principal axes, velocity and
                     angular_velocity (f, n, 3)
-    impacts         (m, 15), columns as in `observe.events.IMPACT_DTYPE`
+    impacts         (m, 15), columns as in `recording.events.IMPACT_DTYPE`
     checkpoint      two slots of bytes, and commits (2,): number, time, frames, impacts, size and digest of each
     tables          of a finished run: contacts, and vertices and faces of flexible bodies
 

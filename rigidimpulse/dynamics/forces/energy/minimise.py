@@ -25,8 +25,8 @@ LEAST = TOLERANCES.energy.least_shift
 MOST = 1000000000000.0
 """Shift at the start, least and largest one, relative to the largest curvature."""
 ROUND_OFF = TOLERANCES.energy.value_round_off
-CALM = TOLERANCES.energy.gradient_round_off
-CALMER = 0.9
+GRADIENT_ROUND_OFF = TOLERANCES.energy.gradient_round_off
+GRADIENT_FALL = 0.9
 """Factor by which the gradient must fall where rounding hides the value."""
 LONGEST = 0.5
 """Component of a step, relative to `length`, beyond which it is shortened."""
@@ -107,14 +107,14 @@ class _Search:
         return raw._replace(gradient=raw.gradient / self.root, hessian=csc_array(unit @ raw.hessian @ unit))
 
     @property
-    def calm(self) -> float:
+    def gradient_round_off(self) -> float:
         """Gradient that is rounding of the coordinates."""
-        return CALM * self.scale * self.extent * len(self.root) ** 0.5
+        return GRADIENT_ROUND_OFF * self.scale * self.extent * len(self.root) ** 0.5
 
     @property
     def noise(self) -> float:
         """Value that is rounding of the coordinates where all terms are next to nothing."""
-        return self.scale * (CALM * self.extent) ** 2 * len(self.root)
+        return self.scale * (GRADIENT_ROUND_OFF * self.extent) ** 2 * len(self.root)
 
     @property
     def scale(self) -> float:
@@ -161,11 +161,13 @@ class _Search:
         at = self.terms(z)
         promised = -float(self.at.gradient @ step + 0.5 * step @ (self.at.hessian @ step))
         gained = self.at.value - at.value
+        # Where rounding hides the fall of the value, the gradient must fall instead.
         blind = promised <= ROUND_OFF * (self.at.magnitude + at.magnitude) + self.noise
-        calmer = bool(np.linalg.norm(at.gradient) < CALMER * np.linalg.norm(self.at.gradient))
-        if not (gained >= 1e-4 * promised or (blind and calmer)):
+        gradient_fell = bool(np.linalg.norm(at.gradient) < GRADIENT_FALL * np.linalg.norm(self.at.gradient))
+        if not (gained >= 1e-4 * promised or (blind and gradient_fell)):
             self.shift = max(8.0 * self.shift, 1e-6 * self.scale)
             return None if blind else False
+        # The model was good: less shift, so that steps become Newton's.
         if blind or gained > 0.75 * promised:
             self.shift *= 0.1
         elif gained < 0.25 * promised:
@@ -202,8 +204,8 @@ def minimise(
     search = _Search(expand, move, start, metric, (length, extent))
     ok, message, iteration, way, probed = False, MORE.format(max_iterations), 0, 0.0, False
     while iteration < max_iterations:
-        calm = float(np.linalg.norm(search.at.gradient)) <= search.calm
-        if calm and (search.definite() or not search.sidestep()):
+        stationary = float(np.linalg.norm(search.at.gradient)) <= search.gradient_round_off
+        if stationary and (search.definite() or not search.sidestep()):
             ok, message = True, "at a minimum"
             break
         least = least_shift * search.scale

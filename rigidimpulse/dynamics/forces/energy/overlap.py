@@ -139,10 +139,12 @@ class CompiledNoOverlap:
             return
         low, high = (axes @ y[1].T).min(1) - radii[1], (axes @ y[0].T).max(1) + radii[0]
         best = int(np.argmax(low - high))
+        # A separating axis: the pieces are apart and have no energy.
         if low[best] >= high[best]:
             return
         size = float(max(np.abs(y[0]).max(), np.abs(y[1]).max()))
         n = axes[best].copy()
+        # Scaled to the size 1, as `best_plane` asks.
         d, energy = best_plane(y[0] / size, radii[0] / size, y[1] / size, radii[1] / size, n, 0.5 * (low[best] + high[best]) / size)
         if energy > 0.0:
             self._add(arms, y, radii, bodies, n, d * size, total)

@@ -111,6 +111,7 @@ def _position_rows(frames: Frames, weights: Weights, x: np.ndarray, ends: Ends) 
         differences, rows = frames.differences(*(end is not None for end in ends))
         given = np.zeros((frames.number, 3))
         for frame, sign, end in ((0, -1.0, ends[0]), (frames.number - 1, 1.0, ends[1])):
+            # A given velocity at an end stands for v beyond that end.
             if end is not None:
                 given[frame] += sign * end / frames.share[frame]
         blocks.append(differences @ velocities)
@@ -185,6 +186,7 @@ def rotation_terms(frames: Frames, weights: Weights, given: np.ndarray, q: np.nd
             J.append(kron(differences, eye_array(3)) @ slope)
     residual, weight, jacobian = np.concatenate(r), np.concatenate(D), csc_array(vstack(J))
     value = 0.5 * float(np.sum(weight * residual**2))
+    # Gauss and Newton's second derivatives: J^T D J.
     weighted = jacobian.T @ diags_array(weight)
     return Terms(value, value, weighted @ residual, csc_array(weighted @ jacobian))
 

@@ -78,4 +78,5 @@ def load_bodies(bodies, order, now, acceleration, inv_mass, part):
             bodies.mass[8 * k + INVERSE_MASS] = inv_mass[i]
             set_inverse_inertia(bodies, k)
         else:
+            # Supports have no inverse mass: impulses do not move them.
             bodies.mass[8 * k : 8 * k + 8] = 0.0

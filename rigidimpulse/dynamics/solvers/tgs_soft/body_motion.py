@@ -90,6 +90,7 @@ def move(bodies, begin, end, h):
             continue
         o = 8 * i
         member = bodies.part[i] == MEMBER
+        # Velocities that no contact changed to the bit: the body flies on its parabola.
         loose = member
         for k in range(6):
             loose = loose and v[o + k] == before[o + k]
@@ -102,6 +103,7 @@ def move(bodies, begin, end, h):
         wx, wy, wz = v[o + 3], v[o + 4], v[o + 5]
         if wx == 0.0 and wy == 0.0 and wz == 0.0:
             continue
+        # Bodies whose moments differ keep their angular momentum, not their spin.
         if member and not bodies.alike[i]:
             wx, wy, wz = _turn_freely(bodies, i, h)
         for k, turn in ((3, h * wx), (4, h * wy), (5, h * wz)):

@@ -52,6 +52,7 @@ def move_apart(bodies, pairs, rows, fresh):
             if pairs.count[p] == 0 or not (fresh[a] or fresh[b]) or not in_play(bodies.part, a, b):
                 continue
             for r in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
+                # Deep contacts are left to the solver, which pushes them apart with velocities.
                 if rows[r, SEPARATION] < -DEEPEST * rows[r, SKIN]:
                     continue
                 nx, ny, nz = normal_of(bodies.position, bodies.rotation, rows, r, a, b, pairs.carrier[p])
@@ -66,6 +67,7 @@ def move_apart(bodies, pairs, rows, fresh):
                 ax, ay, az, give_a = _turn_for(bodies, a, x, y, z, nx, ny, nz)
                 bx, by, bz, give_b = _turn_for(bodies, b, x - dx, y - dy, z - dz, nx, ny, nz)
                 give_a, give_b = give_a if fresh[a] else 0.0, give_b if fresh[b] else 0.0
+                # The smallest displacement in the metric of mass; only bodies new to the island give way.
                 push = -s / (give_a + give_b)
                 if fresh[a]:
                     _shift(bodies, a, -push, (nx, ny, nz), (ax, ay, az))

@@ -229,8 +229,10 @@ def _couple(simd, record, o, points, masses, arms, axes):
     im = ma[INVERSE_MASS] + mb[INVERSE_MASS]
     turning = (ma[0] + mb[0], ma[1] + mb[1], ma[2] + mb[2], ma[3] + mb[3], ma[4] + mb[4], ma[5] + mb[5])
     at_t, at_u, at_n = times(turning, t), times(turning, u), times(turning, n)
+    # A torque m turns the patch by M m.
     k44, k45, k55 = dot(t, at_t), dot(t, at_u), dot(u, at_u)
     k46, k56, k66 = dot(t, at_n), dot(u, at_n), dot(n, at_n)
+    # Columns of K: impulses along n, t_1 and t_2 at O, and the spins that they make.
     na, nb = cross(arm_a, n), cross(arm_b, n)
     ta, tb = cross(arm_a, t), cross(arm_b, t)
     ua, ub = cross(arm_a, u), cross(arm_b, u)
@@ -247,6 +249,7 @@ def _couple(simd, record, o, points, masses, arms, axes):
     sum_u = add(ia, ib)
     k22 = im + (dot(ua, ia) + dot(ub, ib))
     k24, k25, k26 = dot(t, sum_u), dot(u, sum_u), dot(n, sum_u)
+    # Friction steps by the largest eigenvalue of the tangents' part of K: see `solver`.
     uneven = half * (k11 - k22)
     store(record, o + STEP_T * w, one / (half * (k11 + k22) + root(fma(uneven, uneven, k12 * k12)) + tiny))
     store(record, o + STEP_N * w, one / (k66 + tiny))
@@ -292,7 +295,9 @@ def keep_impulses(simd, batches, number, lines):
             lever = load(simd, record, g + LEVER * w)
             square = fma(lever, lever, square)
             size = size + where_greater(load(simd, record, g + MASS * w), zero, one, zero)
+        # The twist becomes forces across the arms from O, in proportion to their lengths.
         turn = where_greater(square, zero, twist / (square + tiny), zero)
+        # The friction of the patch is shared equally by its points.
         share = one / where_greater(size, zero, size, one)
         f1, f2 = f1 * share, f2 * share
         for c in range(batches.points[k]):

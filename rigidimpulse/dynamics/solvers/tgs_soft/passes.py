@@ -176,6 +176,7 @@ def warm_start(simd, batches, begin, number, velocity, moved, mass):
             p = load(simd, record, g + PRESS * w)
             press = press + p
             turn_1, turn_2 = fma(p, load(simd, record, g + Y * w), turn_1), fma(-p, load(simd, record, g + X * w), turn_2)
+        # Friction without a normal impulse lies outside the cone, so it is not carried over.
         f1 = where_greater(press, zero, load(simd, record, o + PUSH_1 * w), zero)
         f2 = where_greater(press, zero, load(simd, record, o + PUSH_2 * w), zero)
         twist = where_greater(press, zero, load(simd, record, o + TWIST * w), zero)
@@ -204,16 +205,19 @@ def _rub(simd, record, o, points, u1, u2, w3):
         press, lever = press + p, fma(p, load(simd, record, g + LEVER * w), lever)
     static, dynamic = load(simd, record, o + MU_STATIC * w), load(simd, record, o + MU_DYNAMIC * w)
     old = load(simd, record, o + TWIST * w)
+    # The twist first: it is clamped to mu sum p r.
     free = fma(-load(simd, record, o + STEP_N * w), w3, old)
     size = where_greater(free, zero, free, -free)
     new = where_greater(size, static * lever, _clamp(simd, free, dynamic * lever), free)
     store(record, o + TWIST * w, new)
     d3 = new - old
+    # What the twist did to the slip along t_1 and t_2.
     u1 = fma(load(simd, record, o + TWIST_TO_1 * w), d3, u1)
     u2 = fma(load(simd, record, o + TWIST_TO_2 * w), d3, u2)
     old_1, old_2 = load(simd, record, o + PUSH_1 * w), load(simd, record, o + PUSH_2 * w)
     step = load(simd, record, o + STEP_T * w)
     f1, f2 = fma(-step, u1, old_1), fma(-step, u2, old_2)
+    # Beyond the static cone friction is the dynamic one, along the same direction.
     square, most = fma(f1, f1, f2 * f2), static * press
     factor = where_greater(square, most * most, dynamic * press / root(square + spread(simd, TINY * TINY)), one)
     f1, f2 = f1 * factor, f2 * factor
@@ -230,9 +234,11 @@ def _press(simd, record, g, speed, gap, relaxing, per_h, spring_of):
     zero = spread(simd, 0.0)
     mass, old = load(simd, record, g + MASS * w), load(simd, record, g + PRESS * w)
     if relaxing:
+        # Relax: k = 1, i = 0, c = max(s, 0) / h.
         new = fma(-mass, fma(where_greater(gap, zero, gap, zero), per_h, speed), old)
     else:
         spring = where_greater(stiff * gap, -deepest, stiff * gap, -deepest)
+        # s > 0: free to close the gap, no further; s <= 0: spring and damper.
         bias = where_greater(gap, zero, gap * per_h, spring)
         share = where_greater(gap, zero, spread(simd, 1.0), hard)
         kept = where_greater(gap, zero, zero, soft)
@@ -314,6 +320,7 @@ def _press_points(simd, record, o, points, speeds, gaps, relaxing, per_h):
         x, y = load(simd, record, g + X * w), load(simd, record, g + Y * w)
         gap = load(simd, record, g + GAP * w) + (at_o + fma(x, slope_1, y * slope_2))
         speed = fma(y, w1, fma(-x, w2, un))
+        # Gauss-Seidel within the patch: the impulses already found in this pass change the speed of the next point.
         if c == 1:
             speed = fma(load(simd, record, o + BETWEEN * w), p0, speed)
         elif c == 2:

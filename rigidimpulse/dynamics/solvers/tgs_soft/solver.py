@@ -199,6 +199,7 @@ def special_patches(width, solve, begin, count, coefficients, gravity, lists, ta
     for m in range(begin, count):
         p, s = patches.pair[m], patches.slot[m]
         a, b = pairs.first[p], pairs.second[p]
+        # Two balls: the normal turns as they roll, so it is updated in every sub-step.
         if bodies.reach[a] == 0.0 and bodies.reach[b] == 0.0:
             lists[0, balls] = m
             balls += 1
@@ -216,6 +217,7 @@ def special_patches(width, solve, begin, count, coefficients, gravity, lists, ta
             _, _, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
             ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
             speed = -restitution * (ux * nx + uy * ny + uz * nz)
+            # A rebound that would rise less than the skin is none.
             target[m, c] = speed if speed > sqrt(2.0 * gravity * rows[patches.row[m, 0], SKIN]) else 0.0
             some = some or target[m, c] > 0.0
         if some:
@@ -235,6 +237,7 @@ def _turn_balls(width, bodies, pairs, patches, chosen, rows, batches):
         r, share, q = patches.row[m, 0], _field(record, o + SHARE * width), _first_arm(s, width)
         f1, f2 = _field(record, o + PUSH_1 * width), _field(record, o + PUSH_2 * width)
         t, u = _vector(record, o + TANGENT_1 * width, width), _vector(record, o + TANGENT_2 * width, width)
+        # Friction keeps its direction in the world while the tangents turn.
         f = (f1 * t[0] + f2 * u[0], f1 * t[1] + f2 * u[1], f1 * t[2] + f2 * u[2])
         n = normal_of(bodies.position, bodies.rotation, rows, r, a, b, pairs.carrier[p])
         ux, uy, uz, vx, vy, vz = tangents(n[0], n[1], n[2])
@@ -244,6 +247,7 @@ def _turn_balls(width, bodies, pairs, patches, chosen, rows, batches):
         arm, t, u = (x, y, z), (ux, uy, uz), (vx, vy, vz)
         for k in range(3):
             d = bodies.moved[8 * b + k] - bodies.moved[8 * a + k]
+            # Gaps and arms of the record count from the start of the step; the solver adds what has moved since.
             gap -= n[k] * d
             record[o + (NORMAL + k) * width] = n[k]
             record[o + (TANGENT_1 + k) * width], record[o + (TANGENT_2 + k) * width] = t[k], u[k]
@@ -263,6 +267,7 @@ def _rebound(width, bodies, patches, chosen, batches, target):
         n = _vector(record, o + NORMAL * width, width)
         for c in range(patches.size[m]):
             g = o + (POINT + POINT_SIZE * c) * width
+            # Only points that came in fast and did close.
             if target[m, c] == 0.0 or record[g + PRESS * width] == 0.0:
                 continue
             a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
@@ -273,10 +278,12 @@ def _rebound(width, bodies, patches, chosen, batches, target):
             un, step = ux * n[0] + uy * n[1] + uz * n[2], _field(record, o + STEP_T * width)
             x, y, z = -step * (ux - un * n[0]), -step * (uy - un * n[1]), -step * (uz - un * n[2])
             size = sqrt(x * x + y * y + z * z)
+            # Friction of the rebound, in the cone of its impulse.
             if size > _field(record, o + MU_STATIC * width) * p:
                 factor = _field(record, o + MU_DYNAMIC * width) * p / size
                 x, y, z = factor * x, factor * y, factor * z
             work += _push(bodies, b, arm_b, x, y, z) + _push(bodies, a, arm_a, -x, -y, -z)
+            # A rebound happens once, and nothing of it is carried over to the next sub-step.
             target[m, c] = record[g + PRESS * width] = 0.0
             record[o + PUSH_1 * width] = record[o + PUSH_2 * width] = record[o + TWIST * width] = 0.0
     return work
@@ -299,6 +306,7 @@ def _work_of(width, bodies, patches, chosen, batches):
             press = press + p
             turn_1, turn_2 = turn_1 + p * _field(record, g + Y * width), turn_2 - p * _field(record, g + X * width)
         a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, np.int64(-1))
+        # Impulses act on b and their opposites on a: the support works with the impulse on the other body, at its own speed.
         support, sign, arm = (b, -1.0, arm_b) if bodies.mass[8 * b + INVERSE_MASS] == 0.0 else (a, 1.0, arm_a)
         ux, uy, uz = _velocity_at(bodies, support, arm)
         v = bodies.velocity[8 * support + 3 : 8 * support + 6]
@@ -350,6 +358,7 @@ def _lead(simd, solve, h, work_queue, is_shared, number):
     """Work on a round until it is done."""
     phase, colour = _round(number, solve.edges.shape[0] - 1)
     begin, end, each, pieces = _extent(solve.bodies, solve.edges, phase, colour)
+    # A round of one piece is not worth the wait for a helper.
     if not is_shared or pieces < 2:
         _work_on(simd, solve, h, phase, colour, begin, end)
         return
