@@ -1,9 +1,8 @@
 """Islands: which bodies hang together at one instant, found from some of them by following contacts, joints and forces.
 
 Bodies that share the forces of an island come along when one of them is looked at, even if they touch nothing any more: those forces end
-for
-all of them at once, or momentum would not be kept. A finder finds: it brings bodies to the instant and looks at their contacts, and changes
-nothing else.
+for all of them at once, or momentum would not be kept. A finder finds: it brings bodies to the instant and looks at their contacts, and
+changes nothing else.
 """
 
 from __future__ import annotations
@@ -27,6 +26,7 @@ from rigidimpulse.motion.evaluate import bring_all
 if TYPE_CHECKING:
     from rigidimpulse.engine.pair_events import PairEvents
 
+NO_SPEEDS = np.zeros(0)
 FAR_MARGIN = 30.0
 """Contacts that a position correction may close are looked for within this many contact margins."""
 
@@ -151,8 +151,8 @@ def make_island(
         features=integer[rows, 3:5],
         keys=[contact_key(*row) for row in integer[rows].tolist()],
         contact_margin=pair_events.contact_margin[place],
-        approach=np.empty(len(rows)),
-        rest_speed=np.empty(len(rows)),
+        approach=NO_SPEEDS,
+        rest_speed=NO_SPEEDS,
         live=live_contacts(pair_events.pairs, place, contacts.gap, time),
         velocity=state.now.velocity[members],
         angular_velocity=state.now.angular_velocity[members],
@@ -205,9 +205,9 @@ def classify(run: Run, island: Island) -> None:
     least = 0.0
     if not (world.dynamic[contacts.body_a] & world.dynamic[contacts.body_b]).all():
         least = float(world.steady_strength[island.members].max())
-    pressing(
-        world.geometry, world.shape_of_body, state.rotation, state.now, contacts, island.kinds, island.features,
-        run.acceleration, run.angular_acceleration, force, least, world.accuracy.step, island.contact_margin, island.approach,
-        island.rest_speed,
+    touching = (island.kinds, island.features, island.contact_margin, force)
+    accelerations = (run.acceleration, run.angular_acceleration)
+    island.approach, island.rest_speed = pressing(
+        world.geometry, world.shape_of_body, state.rotation, state.now, contacts, touching, accelerations, (least, world.accuracy.step)
     )
     island.live |= np.abs(island.approach) <= island.rest_speed

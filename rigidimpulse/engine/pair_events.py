@@ -125,10 +125,10 @@ class PairEvents:
         """The body has a new trajectory from `time` on: sweep its pairs again, and add those it may now reach."""
         run, world = self.run, self.run.world
         partners = np.empty(world.num_bodies, np.int64)
-        count = renew_pairs(
-            run.state.trajectory, body, time, self.end, world.bound_radius[body], MARGIN * world.largest_contact_margin, self._moves,
-            world.dynamic, self.inside, self.pairs, run.box_min, run.box_max, partners,
-        )
+        reach = (world.bound_radius[body], MARGIN * world.largest_contact_margin)
+        bodies = (self._moves, world.dynamic, self.inside)
+        boxes = (run.box_min, run.box_max)
+        count = renew_pairs(run.state.trajectory, body, (time, self.end), reach, bodies, self.pairs, boxes, partners)
         if count:
             fresh = partners[:count]
             self._append(np.minimum(fresh, body), np.maximum(fresh, body), time)

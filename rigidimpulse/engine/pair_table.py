@@ -128,12 +128,17 @@ def live_contacts(pairs, place, gap, time):
 
 
 @jit_making_arrays
-def renew_pairs(trajectory, body, time, end, radius, margin, movable, dynamic, inside, pairs, box_min, box_max, fresh):
-    """Let the pairs of a body that took a new trajectory at `time` be swept again, and look whom it may now reach until `end`.
+def renew_pairs(trajectory, body, span, reach, bodies, pairs, boxes, fresh):
+    """Let the pairs of a body that took a new trajectory be swept again, and look whom it may reach within `span`, (from, until) [s].
 
-    radius, margin: m, about its centre; movable, dynamic, inside (n,) bool; box_min, box_max (n, 3) m: its row is made anew.
+    reach: radius of the body about its centre, and margin, m. bodies: which are movable, dynamic, and inside sub-stepped islands, each
+    (n,) bool. boxes: their lows and highs, both (n, 3) m; the body's row is made anew.
     Writes the bodies whose boxes overlap its own and that it has no pair with into fresh (n,), in ascending order; returns their number.
     """
+    time, end = span
+    radius, margin = reach
+    movable, dynamic, inside = bodies
+    box_min, box_max = boxes
     path_box(trajectory, body, time, end, radius, box_min, box_max)
     for k in range(3):
         box_min[body, k] -= margin

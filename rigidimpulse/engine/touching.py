@@ -84,20 +84,22 @@ def _point_acceleration(acceleration, angular_acceleration, i, r, n):
 
 
 @jit_making_arrays
-def pressing(
-    geometry, shape_of_body, rotation, bodies, contacts, kinds, features, acceleration, angular_acceleration, normal_force, least,
-    step, contact_margin, approach, rest_speed,
-):
-    """Fill approach (m,) = u.n and rest_speed (m,) = sqrt(2 a delta) [m/s]; a is at least `least`.
+def pressing(geometry, shape_of_body, rotation, bodies, contacts, touching, accelerations, limits):
+    """Approach speeds (m,) u.n [m/s] and rest speeds (m,) sqrt(2 a delta) [m/s] of the contacts.
 
-    What the motion gives counts where it makes more than round-off of delta in a step [s]: bodies that stand still do so by round-off.
-
-    kinds (m,), features (m, 2): what touches; acceleration, angular_acceleration (n, 3); normal_force (m,) N carried; delta (m,) m.
+    touching: kinds (m,) and features (m, 2) of what touches, contact margins delta (m,) [m], and the normal forces (m,) [N] that the
+    contacts carried. accelerations: of the bodies, linear and angular, both (n, 3). limits: the least a that counts [m/s2] and the step
+    [s]. What the motion gives counts where it makes more than round-off of delta in a step: bodies that stand still do so by round-off.
     """
+    kinds, features, contact_margin, normal_force = touching
+    acceleration, angular_acceleration = accelerations
+    least, step = limits
     turning = contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, features).turning
+    m = contacts.gap.shape[0]
+    approach, rest_speed = np.empty(m), np.empty(m)
     u = np.empty(3)
     k = np.empty((3, 3))
-    for c in range(contacts.gap.shape[0]):
+    for c in range(m):
         n = contacts.normal[c]
         approach[c] = relative_velocity(bodies, contacts, c, u)
         a = _point_acceleration(
@@ -112,3 +114,4 @@ def pressing(
                 for j in range(3):
                     a += normal_force[c] * n[i] * k[i, j] * n[j]
         rest_speed[c] = sqrt(2.0 * max(a, least) * contact_margin[c])
+    return approach, rest_speed
