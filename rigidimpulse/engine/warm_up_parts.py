@@ -16,7 +16,7 @@ from rigidimpulse.dynamics.constraints.joint_impact import fill_rates, impact_ro
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, fill_closing_rows, start_joint_rows, stop_rows
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
 from rigidimpulse.dynamics.constraints.position_correction import needs_correction
-from rigidimpulse.dynamics.constraints.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
+from rigidimpulse.dynamics.constraints.rows import Rows, change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
 from rigidimpulse.dynamics.impact.block import log_block
 from rigidimpulse.dynamics.impact.restitution import LAWS, ImpactRule
 from rigidimpulse.dynamics.impact.sequence import respond_sequential
@@ -35,6 +35,7 @@ from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, SUBSTEPPED
+from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.model.island import empty_contacts
 from rigidimpulse.motion.evaluate import bring_all, bring_gyroscopic, refresh_pose
 from rigidimpulse.motion.trajectory import FREE, Load, take
@@ -55,8 +56,8 @@ def _run_of(scene: Scene) -> Run:
     return make_run(world, make_plan(world), Recorder(np.zeros(1), 2), EventLog())
 
 
-def _box_on_floor(with_cylinder: bool, jointed: bool = False):
-    """Context of a scene that has a contact from the start, and a joint if it is to."""
+def _box_on_floor(with_cylinder: bool, jointed: bool = False) -> Run:
+    """A run of a scene that has a contact from the start, and a joint if it is to."""
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static")])
     shape = Shape.cylinder(1, 1) if with_cylinder else Shape.box((1, 1, 1))
     scene.add(Body("body", shape, position=(0, 0, 0.5), velocity=(0, 0, -1)))
@@ -65,7 +66,7 @@ def _box_on_floor(with_cylinder: bool, jointed: bool = False):
     return _run_of(scene)
 
 
-def _contact():
+def _contact() -> Contacts:
     """One contact of the two bodies."""
     contacts = empty_contacts(1)
     for column in contacts:
@@ -75,7 +76,7 @@ def _contact():
     return contacts
 
 
-def _respond_and_detect(run) -> None:
+def _respond_and_detect(run: Run) -> None:
     """Impulses first: by then the other process has rows and what moves bodies in the cache, which these need too."""
     state, world, now, one, contacts = run.state, run.world, run.state.now, np.ones(1), _contact()
     members = np.array([1])
@@ -99,18 +100,18 @@ def _respond_and_detect(run) -> None:
     respond_to_impacts(run, island, respond_sequential, LAWS["auto"])
 
 
-def _leave_unsolved(_rows, _n: int, _target: float) -> float:
+def _leave_unsolved(_rows: Rows, _n: int, _target: float) -> float:
     """In the place of a solver of rows."""
     return 0.0
 
 
-def _move_and_sweep(run) -> None:
+def _move_and_sweep(run: Run) -> None:
     """Rows of contacts, courses, frames and the sweep."""
     _fill_rows(run)
     _move(run)
 
 
-def _fill_rows(run) -> None:
+def _fill_rows(run: Run) -> None:
     now, contacts, members = run.state.now, _contact(), np.array([1])
     now.inv_inertia[1] = np.eye(3)
     rows, first_row, frames = contact_rows(now, contacts, members, run.column, 0)
@@ -121,7 +122,7 @@ def _fill_rows(run) -> None:
     changes_of(now, members, rows)
 
 
-def _move(run) -> None:
+def _move(run: Run) -> None:
     state, now, world = run.state, run.state.now, run.world
     zero = np.zeros(1)
     start_trajectories(run)
@@ -135,7 +136,7 @@ def _move(run) -> None:
     bisection.sweep(run.detector, state.trajectory, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
 
 
-def _find_substepped_contacts(run) -> None:
+def _find_substepped_contacts(run: Run) -> None:
     """What comes before the solver of heaps: pairs and their contacts."""
     world, state, member = run.world, run.state, np.array([False, True])
     state.now.inv_inertia[1] = np.eye(3)
@@ -149,7 +150,7 @@ def _find_substepped_contacts(run) -> None:
     refusals(world, root, member, ~member, member, np.zeros(world.num_bodies), a, b, True)
 
 
-def _step_substepped(run) -> None:
+def _step_substepped(run: Run) -> None:
     """The solver of heaps, and what brings bodies from step to step."""
     state, now, members = run.state, run.state.now, np.array([1])
     stepper = ContactStepper(run.world, run.world.dynamic, finer=False)
@@ -196,7 +197,7 @@ def _close_and_stop_joints(run: Run) -> None:
     stop_rows(island, np.zeros(1))
 
 
-def _fly(_run) -> None:
+def _fly(_run: Run) -> None:
     """The event kernel; it knows balls only."""
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static"), Body("ball", Shape.sphere(1.0), position=(0, 0, 9))])
     run = _run_of(scene)

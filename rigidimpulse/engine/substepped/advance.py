@@ -290,7 +290,7 @@ class SubsteppedIslands:
             self._bring_in(run, island, members)
         return islands
 
-    def _due(self, pair_events, time: float) -> np.ndarray:
+    def _due(self, pair_events: PairEvents, time: float) -> np.ndarray:
         """Members whose trajectories end at `time`."""
         due = [label for label, end in self._ends.items() if end <= time]
         return np.flatnonzero(pair_events.inside & np.isin(self.label, due)) if due else np.zeros(0, np.int64)
