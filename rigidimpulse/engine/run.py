@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,8 @@ from rigidimpulse.collision.geometry import Geometry
 from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch, make_scratch
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.dynamics.solvers.qp import row_solver
-from rigidimpulse.engine.absent import NoFlight, NoForces, NoJoints, NoSoftBodies, NoSubstepping
+from rigidimpulse.engine.absent import NoFlight, NoForces, NoJoints, NoKeyframes, NoSoftBodies, NoSubstepping, NoTriggers
+from rigidimpulse.engine.participants import Flight, GapErrors, Keyframed, Observer, RunForces, RunJoints, RunSoftBodies, Substepping
 from rigidimpulse.model.plan import Plan
 from rigidimpulse.model.state import State
 from rigidimpulse.model.world import World
@@ -39,10 +39,8 @@ class Run:
     """Everything a step needs: world, state, plan, recorder, logs, participants, and buffers that grow when they are too small.
 
     Attributes:
-        joints, forces, substepped, soft_bodies: participants; what the scene does not call for is one of `absent.py`.
-        triggers: None where the scene has none; only the effect "triggers" asks it. keyframes: paths of kinematic bodies. flight: the
-        kernel of
-            balls.
+        joints, forces, substepped, soft_bodies, triggers: participants; what the scene does not call for is one of `absent.py`.
+        keyframes: paths of kinematic bodies. flight: the kernel of balls. error_estimate: of held contacts; `make_run` sets it.
 
     """
 
@@ -66,14 +64,14 @@ class Run:
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
         self.solve_rows = row_solver(world.accuracy.contact_solver)
-        self.error_estimate: Any = None
-        self.joints: Any = NoJoints()
-        self.forces: Any = NoForces(n)
-        self.soft_bodies: Any = NoSoftBodies(n)
-        self.substepped: Any = NoSubstepping()
-        self.triggers: Any = None
-        self.keyframes: Any = None
-        self.flight: Any = NoFlight()
+        self.error_estimate: GapErrors
+        self.joints: RunJoints = NoJoints()
+        self.forces: RunForces = NoForces(n)
+        self.soft_bodies: RunSoftBodies = NoSoftBodies(n)
+        self.substepped: Substepping = NoSubstepping()
+        self.triggers: Observer = NoTriggers()
+        self.keyframes: Keyframed = NoKeyframes()
+        self.flight: Flight = NoFlight()
 
     def pose_matrix(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Position (3,) and rotation matrix (3, 3) of body i at `time` on its present trajectory."""

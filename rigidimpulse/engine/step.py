@@ -1,9 +1,9 @@
 """One step: the whole order of what happens.
 
-Every body has a trajectory: its exact path since something last acted on it. A step goes from contact to contact. At the earliest time
-at which
-a pair of bodies touches, the island of bodies that touch there is brought to that time and advanced from it; bodies elsewhere do not
+Every body has a trajectory: its exact path since something last acted on it. A step goes from contact to contact. At the earliest time at
+which a pair of bodies touches, the island of bodies that touch there is brought to that time and advanced from it; bodies elsewhere do not
 notice.
+
 An island is advanced by one of two regimes, `exact/` from event to event or `substepped/` by sub-steps to the end of the step. Both have
 the same four verbs: arrive, impacts, contact forces, trajectories.
 

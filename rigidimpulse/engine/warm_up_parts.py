@@ -25,6 +25,7 @@ from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
 from rigidimpulse.engine.begin import make_plan, make_run, start_trajectories
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.exact.impacts import respond_to_impacts
+from rigidimpulse.engine.exact.joints import JointState
 from rigidimpulse.engine.exact.trajectories import set_impact_margins
 from rigidimpulse.engine.islands import touching_islands
 from rigidimpulse.engine.pair_events import PairEvents
@@ -147,7 +148,7 @@ def _find_substepped_contacts(run: Run) -> None:
     # Columns of one row only would be another type.
     a, b = np.array([[0, 1], [0, 1]]).T
     root = island_roots(world.num_bodies, a, b, member)
-    refusals(world, root, member, ~member, member, np.zeros(world.num_bodies), a, b, True)
+    refusals(world, root, member, ~member, member, np.zeros(world.num_bodies), (a, b), True)
 
 
 def _step_substepped(run: Run) -> None:
@@ -165,7 +166,7 @@ def _step_substepped(run: Run) -> None:
     mark_slow(now, stepper.inner, 1.0, 1.0, np.array([False, True]))
     most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin, 0.5)
     advance_sleep_timers(
-        members, out.position, out.orientation, out.velocity, run.world.steady_strength, stepper.inner, stepper.skin, STEP,
+        members, (out.position, out.orientation, out.velocity), (run.world.steady_strength, stepper.inner, stepper.skin), STEP,
         np.zeros((2, 7)), np.zeros(2),
     )  # fmt: skip
 
@@ -173,6 +174,7 @@ def _step_substepped(run: Run) -> None:
 def _jointed_box(run: Run) -> JointedIsland:
     """The joint of the box, and the box."""
     state, joints = run.state, run.joints
+    assert isinstance(joints, JointState)
     return JointedIsland(
         joints.table, np.array([0]), state.now, state.rotation, np.array([1]), run.column, joints.memory, 1.0
     )

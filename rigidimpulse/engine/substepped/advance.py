@@ -1,10 +1,9 @@
 """Sub-stepped islands: which bodies are advanced by sub-steps, how they arrive, and when they sleep.
 
-At the start of a step islands are chosen (`regime.py`). Their bodies get trajectories (mode LINEAR) that end in the poses which the
-solver found
-for the end of the step. Pairs inside such an island are not swept. Pairs of a member and any other body are: at their contact the
-impulse is
-found exactly and the island is stepped again from there, with the other body if it is slow enough. Contacts are held at a gap, the skin.
+At the start of a step islands are chosen (`regime.py`). Their bodies get trajectories (mode LINEAR) that end in the poses which the solver
+found for the end of the step. Pairs inside such an island are not swept. Pairs of a member and any other body are: at their contact the
+impulse is found exactly and the island is stepped again from there, with the other body if it is slow enough. Contacts are held at a gap,
+the skin.
 
 A member that stays within SLEEP_MOTION skins of one place and below SLEEP_SPEED sqrt(g r) for REST sqrt(r / g) s (r: inner radius) is
 sleepy. Sleepy members that no moving one wakes (`sleeping.wake_by_contact`) stand still, to the bit, and bear the others. An island whose
@@ -146,7 +145,7 @@ class SubsteppedIslands:
         root = island_roots(world.num_bodies, a, b, member)
         root[~member] = -1
         moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
-        refused = refusals(world, root, self.label >= 0, self._jointed, moves, solve_count, a, b, self._auto)
+        refused = refusals(world, root, self.label >= 0, self._jointed, moves, solve_count, (a, b), self._auto)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         chosen = self._low(run, pair_events, chosen, root, refused)
         for reason in refused.values():
@@ -397,6 +396,6 @@ class SubsteppedIslands:
         """For how long each member has hardly moved from where it was."""
         stepper = self.stepper
         advance_sleep_timers(
-            out.members, out.position, out.orientation, out.velocity, run.world.steady_strength, stepper.inner, stepper.skin, length,
+            out.members, (out.position, out.orientation, out.velocity), (run.world.steady_strength, stepper.inner, stepper.skin), length,
             self._stood, self.sleep_timer,
         )  # fmt: skip
