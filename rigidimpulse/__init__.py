@@ -8,7 +8,9 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-__version__ = "0.1.0"
+from rigidimpulse.core.version import VERSION
+
+__version__ = VERSION
 
 # Public names and their homes: imported when used, so that `import rigidimpulse` and `--help` stay quick.
 _HOMES = {
@@ -60,7 +62,7 @@ _HOMES = {
     "contains": "collision.containment",
     "load_recording": "recording.recording",
     "load_scene": "io.scene_file",
-    "settle": "dynamics.forces.energy.layout",
+    "settle": "engine.settle",
     "simulate": "engine.simulate",
     "smooth_path": "dynamics.forces.energy.path",
     "study": "studies.work_precision",

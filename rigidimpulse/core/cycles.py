@@ -18,13 +18,17 @@ READABLE = platform.machine().lower() in ("x86_64", "amd64")
 
 
 @intrinsic
-def cycles(_typing_context: Any) -> Any:
+def _cycles(_typing: Any) -> Any:
     """Return the counter, an int64."""
 
-    def write(_context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+    def write(_target: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
         word = ir.IntType(64)
         if not READABLE:
             return ir.Constant(word, 0)
         return builder.call(builder.module.declare_intrinsic("llvm.readcyclecounter", (), ir.FunctionType(word, ())), ())
 
     return types.int64(), write
+
+
+cycles: Any = _cycles
+"""The counter, an int64: a function for kernels."""

@@ -160,23 +160,23 @@ class _RememberedTypes:
 
     _known: ClassVar[dict[tuple, tuple]] = {}
 
-    def __init__(self, context: Any, counts: bool) -> None:
+    def __init__(self, typing_context: Any, counts: bool) -> None:
         """counts: whether the kernel counts who holds arrays; what is compiled for such is not for others."""
-        self._context = context
+        self._typing = typing_context
         self._counts = counts
 
     def __getattr__(self, name: str) -> Any:
         """All else is numba's."""
-        return getattr(self._context, name)
+        return getattr(self._typing, name)
 
     def resolve_function_type(self, function: Any, arguments: tuple, keywords: Any) -> Any:
         """Signature of a call."""
-        kind: Any = self._context._lookup_global(function) or function
+        kind: Any = self._typing._lookup_global(function) or function
         if keywords or not isinstance(kind, types.Function) or any(isinstance(argument, types.Callable) for argument in arguments):
-            return self._context.resolve_function_type(function, arguments, keywords)
+            return self._typing.resolve_function_type(function, arguments, keywords)
         key, chosen = (kind, arguments, self._counts), vars(kind)["_impl_keys"]
         if key not in self._known:
-            signature = self._context.resolve_function_type(function, arguments, keywords)
+            signature = self._typing.resolve_function_type(function, arguments, keywords)
             if signature is None:
                 return None
             self._known[key] = signature, chosen.get(signature.args)

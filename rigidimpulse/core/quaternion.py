@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import cross_arrays
 
@@ -92,40 +92,6 @@ def quaternion_to_matrix(q, R_out):
     R_out[2, 0] = 2.0 * (x * z - w * y)
     R_out[2, 1] = 2.0 * (y * z + w * x)
     R_out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
-
-
-@jit_making_arrays
-def matrix_to_quaternion(R):
-    """The unit quaternion (4,), first component >= 0, of a rotation matrix (3, 3)."""
-    q = np.empty(4)
-    q[0], q[1], q[2], q[3] = from_columns(
-        (R[0, 0], R[1, 0], R[2, 0]), (R[0, 1], R[1, 1], R[2, 1]), (R[0, 2], R[1, 2], R[2, 2])
-    )
-    return q
-
-
-@jit
-def quaternion_multiply(a, b, out):
-    """Write the quaternion a b (first b, then a); `out` may be a or b."""
-    out[0], out[1], out[2], out[3] = product(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
-
-
-@jit
-def quaternion_exp(rotation_vector, out):
-    """Write the quaternion (4,) of the rotation by the vector (3,), rad."""
-    out[0], out[1], out[2], out[3] = exponential(rotation_vector[0], rotation_vector[1], rotation_vector[2])
-
-
-@jit
-def quaternion_rotate(q, v, out):
-    """Write the vector v (3,) turned by the unit quaternion q; `out` may be v."""
-    out[0], out[1], out[2] = rotated(q[0], q[1], q[2], q[3], v[0], v[1], v[2])
-
-
-@jit
-def quaternion_rotate_inverse(q, v, out):
-    """Write the vector v (3,) turned back by the unit quaternion q; `out` may be v."""
-    out[0], out[1], out[2] = rotated(q[0], -q[1], -q[2], -q[3], v[0], v[1], v[2])
 
 
 # -- numpy, over leading axes -----------------------------------------------------------------------------------------

@@ -163,8 +163,8 @@ def spread(_typing, simd, x):
     return kind(simd, x), lower
 
 
-def _place(context: Any, builder: Any, kind: types.Type, array: Any, index: Any, vector: ir.Type) -> Any:
-    data = context.make_array(kind)(context, builder, array).data
+def _place(target: Any, builder: Any, kind: types.Type, array: Any, index: Any, vector: ir.Type) -> Any:
+    data = target.make_array(kind)(target, builder, array).data
     return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
 
 
@@ -240,13 +240,13 @@ def _rows(builder: Any, columns: list, w: int) -> list:
     return parts[0]
 
 
-def _row_place(context: Any, builder: Any, array: tuple[types.Type, Any], index: tuple[types.Type, Any], first: Any, element: int) -> Any:
+def _row_place(target: Any, builder: Any, array: tuple[types.Type, Any], index: tuple[types.Type, Any], first: Any, element: int) -> Any:
     array_type, array_value = array
     index_type, index_value = index
-    number = context.make_array(index_type)(context, builder, index_value).data
+    number = target.make_array(index_type)(target, builder, index_value).data
     number = builder.load(builder.gep(number, [builder.add(first, ir.Constant(first.type, element))]))
     start = builder.shl(builder.sext(number, _INDEX), ir.Constant(_INDEX, 3))
-    place = _place(context, builder, array_type, array_value, start, ir.VectorType(_DOUBLE, ROW))
+    place = _place(target, builder, array_type, array_value, start, ir.VectorType(_DOUBLE, ROW))
     return place
 
 

@@ -40,8 +40,8 @@ def empty_work_queue() -> np.ndarray:
     return work_queue
 
 
-def _pointer(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+def _pointer(target: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    data = target.make_array(signature.args[0])(target, builder, arguments[0]).data
     return builder.gep(data, [arguments[1]])
 
 

@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
 from rigidimpulse.model.island import Island
 
+if TYPE_CHECKING:
+    from rigidimpulse.dynamics.constraints.jointed_island import JointMemory
+    from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
+    from rigidimpulse.recording.ledger import Ledger
+
 NONE, NO_LINKS = np.zeros(0, np.int64), np.zeros((0, 2), np.int64)
 
 
+def _ask_nobody(*_asked: Any, **_named: Any) -> NoReturn:
+    """In the place of what only those are asked that are there."""
+    raise AssertionError("a run was asked for what its scene does not have")
+
+
 class NoJoints:
-    """A run without joints."""
+    """A run without joints. `are_closed`, `memory` and `moment` have no value: only islands with joints are asked for them."""
+
+    are_closed: bool
+    memory: JointMemory
+    moment: np.ndarray
 
     def __init__(self) -> None:
         """No force was ever recorded."""
@@ -36,9 +50,14 @@ class NoJoints:
         """No joint moves."""
         return NONE
 
+    movable_end = are_passive = supports_of = project_velocities = impact_block = hold = let_go = log_rest = _ask_nobody
+
 
 class NoForces:
-    """A run in which no force varies."""
+    """A run in which no force varies. `value` and `rate` have no value: only bodies that forces act on are asked for them."""
+
+    value: np.ndarray
+    rate: np.ndarray
 
     def __init__(self, num_bodies: int) -> None:
         """No force acts on any of the bodies."""
@@ -55,6 +74,8 @@ class NoForces:
     def finish(self, *_recorded: Any) -> None:
         """No force did any work."""
 
+    let_act = present = may_rest = fly = load = _ask_nobody
+
 
 class NoSoftBodies:
     """A run without soft bodies."""
@@ -69,11 +90,11 @@ class NoSoftBodies:
         """The step is as long as it was."""
         return end
 
-    def tracks(self) -> list[Any]:
+    def tracks(self) -> list[FlexibleTrack]:
         """No soft body leaves a track."""
         return []
 
-    def add_to(self, _ledger: Any) -> None:
+    def add_to(self, _ledger: Ledger) -> None:
         """Nothing is added to the ledger."""
 
 
@@ -98,6 +119,8 @@ class NoSubstepping:
     def finish(self, _run: Any) -> None:
         """There is nothing to end."""
 
+    contact_forces = begin_trajectories = _ask_nobody
+
 
 class NoCompiledLoop:
     """A run whose events all need the loop in Python."""
@@ -113,6 +136,26 @@ class NoFlight:
     def may_fly(self) -> bool:
         """There is nothing to fly with."""
         return False
+
+    fly = _ask_nobody
+
+
+class NoTriggers:
+    """A run without triggers."""
+
+    def look(self, _begin: float, _end: float) -> None:
+        """Nobody looks."""
+
+
+class NoKeyframes:
+    """A run in which no body has keyframes."""
+
+    def next_key(self, _time: float) -> float:
+        """There is none."""
+        return np.inf
+
+    def start_segments(self, _run: Any, _time: float) -> None:
+        """No body has a path."""
 
 
 class _NoForceLog:

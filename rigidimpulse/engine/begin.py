@@ -12,7 +12,6 @@ from rigidimpulse.engine.effects import EventKernel, SubsteppedContact, TriggerV
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
 from rigidimpulse.engine.exact.compiled_loop import why_not as why_not_compiled
 from rigidimpulse.engine.exact.joints import JointState
-from rigidimpulse.engine.exact.step_size import make_error_estimate
 from rigidimpulse.engine.initial_overlap import resolve_overlaps
 from rigidimpulse.engine.keyframe_paths import KeyframePaths
 from rigidimpulse.engine.regime import only_expensive, why_not_substepped
@@ -58,7 +57,6 @@ def begin_run(world: World, plan: Plan, times: np.ndarray, left_out: Mapping[str
 def make_run(world: World, plan: Plan, recorder: Recorder, log: EventLog) -> Run:
     """A run with the participants that hold contacts and joints."""
     run = Run(world, plan, recorder, log)
-    run.error_estimate = make_error_estimate(world, run.state.rotation)
     if world.joints_of_scene:
         run.joints = JointState(world)
     if not why_not_substepped(world):

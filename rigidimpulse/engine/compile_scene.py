@@ -158,11 +158,11 @@ def _pairs_apart(joints: list[Joint], bodies: list[Body], dynamic: np.ndarray) -
     return np.union1d(joined, pairs_filtered((body.collision_filter for body in bodies), dynamic))
 
 
-def _is_driven(body) -> bool:
+def _is_driven(body: Body) -> bool:
     return body.keyframes is not None or bool(np.any(body.velocity) or np.any(body.angular_velocity))
 
 
-def _compile_shapes(bodies, masses) -> tuple[list[CompiledShape], np.ndarray]:
+def _compile_shapes(bodies: list[Body], masses: list[BodyMass]) -> tuple[list[CompiledShape], np.ndarray]:
     """Compile each shape once for each frame it is used in."""
     shapes: list[CompiledShape] = []
     known: dict[tuple, int] = {}
@@ -216,7 +216,10 @@ def _extents(geometry: Geometry, shape_of_body: np.ndarray) -> tuple[np.ndarray,
     return np.array(size)[shape_of_body], np.array(radius)[shape_of_body]
 
 
-def _world_boxes(geometry, shape_of_body, position, orientation) -> tuple[np.ndarray, np.ndarray]:
+def _world_boxes(
+    geometry: Geometry, shape_of_body: np.ndarray, position: np.ndarray, orientation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lows and highs (n, 3) m of the boxes of all bodies; position (n, 3) m and orientation (n, 4) of their principal frames."""
     low = np.full((len(shape_of_body), 3), np.inf)
     high = -low
     for i, shape in enumerate(shape_of_body):
@@ -255,7 +258,7 @@ def _has_faces(geometry: Geometry, shape_of_body: np.ndarray) -> np.ndarray:
     return np.array(flat, bool)[shape_of_body]
 
 
-def _materials(bodies) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+def _materials(bodies: list[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Index of each body's material, the combined coefficients of all pairs of materials, and their rolling friction."""
     unique = list(dict.fromkeys(body.material for body in bodies))
     index = np.array([unique.index(body.material) for body in bodies], np.int64)

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-import rigidimpulse
 from rigidimpulse.core.kernels import source_digest
+from rigidimpulse.core.version import VERSION
 from rigidimpulse.engine import simulate as simulation
 from rigidimpulse.scene.scene import Scene
 
@@ -24,7 +24,7 @@ def fingerprint(scene: Scene, *more: object) -> str:
     Functions that a scene has count by their code, defaults and enclosed values, not by globals that they use.
     """
     digest = hashlib.sha256()
-    for part in (rigidimpulse.__version__, source_digest(Path(simulation.__file__)), scene.gravity, *scene.bodies, *scene.effects, *more):
+    for part in (VERSION, source_digest(Path(simulation.__file__)), scene.gravity, *scene.bodies, *scene.effects, *more):
         _feed(digest, part)
     return digest.hexdigest()[:16]
 

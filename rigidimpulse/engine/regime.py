@@ -122,10 +122,8 @@ def lively(now: BodyState, strength: np.ndarray, inner: np.ndarray) -> np.ndarra
 
 
 def refusals(
-    world: World, root: np.ndarray, substepped_before: np.ndarray, joined: np.ndarray, moves: np.ndarray, solve_count: np.ndarray, a:
-    np.ndarray,
-    b: np.ndarray,
-    auto: bool,
+    world: World, root: np.ndarray, substepped_before: np.ndarray, joined: np.ndarray, moves: np.ndarray, solve_count: np.ndarray,
+    pairs: tuple[np.ndarray, np.ndarray], auto: bool,
 ) -> dict[int, str]:  # fmt: skip
     """Why islands are not sub-stepped, by their root; the condition `low` is not tested here.
 
@@ -134,11 +132,12 @@ def refusals(
         root: (n,) of every body; -1 for those in no island.
         substepped_before: (n,) bool, members of sub-stepped islands. joined, moves: (n,) bool.
         solve_count: (n,) how often the exact solver dealt with each body in the last step.
-        a: (k,) bodies of the pairs that may touch in the step; likewise b.
+        pairs: bodies a and b, (k,) each, of the pairs that may touch in the step.
         auto: False where every island without joints is taken.
 
     """
     out: dict[int, str] = {}
+    a, b = pairs
     members = np.flatnonzero(root >= 0)
     size = np.bincount(root[members], minlength=len(root))
     was_substepped = np.zeros(len(root), bool)

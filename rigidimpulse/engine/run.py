@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,8 +11,19 @@ from rigidimpulse.collision.geometry import Geometry
 from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch, make_scratch
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.dynamics.solvers.qp import row_solver
-from rigidimpulse.engine.absent import NoCompiledLoop, NoFlight, NoForces, NoJoints, NoSoftBodies, NoSubstepping
+from rigidimpulse.engine.absent import (
+    NoCompiledLoop,
+    NoFlight,
+    NoForces,
+    NoJoints,
+    NoKeyframes,
+    NoSoftBodies,
+    NoSubstepping,
+    NoTriggers,
+)
+from rigidimpulse.engine.exact.step_size import ErrorEstimate, make_error_estimate
 from rigidimpulse.engine.finder import Finder
+from rigidimpulse.engine.participants import Compiled, Flight, Keyframed, Observer, RunForces, RunJoints, RunSoftBodies, Substepping
 from rigidimpulse.engine.touching import Motion
 from rigidimpulse.model.plan import Plan
 from rigidimpulse.model.state import State
@@ -42,9 +52,8 @@ class Run:
     """Everything a step needs: world, state, plan, recorder, logs, participants, and buffers that grow when they are too small.
 
     Attributes:
-        joints, forces, substepped, soft_bodies: participants; what the scene does not call for is one of `absent.py`.
-        triggers: None where the scene has none; only the effect "triggers" asks it. keyframes: paths of kinematic bodies.
-        flight: the kernel of balls.
+        joints, forces, substepped, soft_bodies, triggers: participants; what the scene does not call for is one of `absent.py`.
+        keyframes: paths of kinematic bodies. flight: the kernel of balls. compiled: the compiled order of events.
         solve_rows: the solver of contacts and joints, None for `newton.solve_newton`.
 
     """
@@ -71,15 +80,15 @@ class Run:
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))
         self.solve_rows = row_solver(world.accuracy.contact_solver)
-        self.error_estimate: Any = None
-        self.joints: Any = NoJoints()
-        self.forces: Any = NoForces(n)
-        self.soft_bodies: Any = NoSoftBodies(n)
-        self.substepped: Any = NoSubstepping(n)
-        self.triggers: Any = None
-        self.keyframes: Any = None
-        self.flight: Any = NoFlight()
-        self.compiled: Any = NoCompiledLoop()
+        self.error_estimate: ErrorEstimate = make_error_estimate(world, self.state.rotation)
+        self.joints: RunJoints = NoJoints()
+        self.forces: RunForces = NoForces(n)
+        self.soft_bodies: RunSoftBodies = NoSoftBodies(n)
+        self.substepped: Substepping = NoSubstepping(n)
+        self.triggers: Observer = NoTriggers()
+        self.keyframes: Keyframed = NoKeyframes()
+        self.flight: Flight = NoFlight()
+        self.compiled: Compiled = NoCompiledLoop()
 
     def pose_matrix(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Position (3,) and rotation matrix (3, 3) of body i at `time` on its present trajectory."""

@@ -101,8 +101,14 @@ def wake_by_contact(first, second, member, restless, bodies, mass, strength, inn
 
 
 @jit
-def advance_sleep_timers(members, position, orientation, velocity, strength, inner, skin, length, stood, sleep_timer):
-    """Add `length` s to the sleep timers of members (k,) that have hardly moved from where they stood (n, 7); reset those of others."""
+def advance_sleep_timers(members, reached, bodies, length, stood, sleep_timer):
+    """Add `length` s to the sleep timers of members (k,) that have hardly moved from where they stood (n, 7); reset those of others.
+
+    reached: position (k, 3), orientation (k, 4) and velocity (k, 6) of the members. bodies: strength [m/s2] of what pulls them, inner
+    radius and skin [m], each (n,).
+    """
+    position, orientation, velocity = reached
+    strength, inner, skin = bodies
     for k in range(members.shape[0]):
         i = members[k]
         moved, turned, speed, spin = 0.0, 0.0, 0.0, 0.0

@@ -20,10 +20,10 @@ from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.run import Run
-from rigidimpulse.model.effect import Skip
 from rigidimpulse.motion.trajectory import FIXED, pose_at
 from rigidimpulse.scene.body import vector
 from rigidimpulse.scene.collision_filter import CollisionFilter, may_meet
+from rigidimpulse.scene.effect import SceneEffect
 from rigidimpulse.scene.shape import Shape, check_orientation, normalized_quaternion
 
 SHARPNESS = TOLERANCES.time_of_impact.trigger
@@ -34,7 +34,7 @@ BEGINS, ENDS = "overlap begins", "overlap ends"
 
 
 @dataclass(frozen=True, eq=False)
-class Trigger:
+class Trigger(SceneEffect):
     """A volume that reports overlap: `run.status.events` has "overlap begins" and "overlap ends" with trigger and body.
 
     Attributes:
@@ -58,10 +58,6 @@ class Trigger:
     orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
     collision_filter: CollisionFilter | None = None
     stage: ClassVar[str] = "observe"
-
-    def bind(self, _world) -> Skip:
-        """Triggers are looked at all together."""
-        return Skip("a trigger; see triggers")
 
     def check(self, names: list[str]) -> None:
         """Raise a `SceneError` for what makes no sense."""

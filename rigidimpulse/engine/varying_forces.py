@@ -28,10 +28,13 @@ from rigidimpulse.dynamics.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.dynamics.forces.mass_flow import BurningForces, MassFlow
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.island import Island
+from rigidimpulse.model.state import State
 from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.evaluate import refresh_pose
-from rigidimpulse.motion.force_step import Lines, Workspace, nystroem, semi_implicit
+from rigidimpulse.motion.force_step import Lines, Stage, Workspace, nystroem, semi_implicit
 from rigidimpulse.motion.trajectory import Trajectories
+from rigidimpulse.recording.recorder import Recorder
 
 IN_FLIGHT, IN_CONTACT = 0.03, 3.0
 """How far a path may be off, relative to the size, or in rad of turn: in roots of the accuracy's tolerance, inside a step of bodies that
@@ -137,7 +140,7 @@ class VaryingForces:
         while len(todo):
             first = self._start(run, time, h, todo)
 
-            def evaluate(share: float, bodies, rotation, todo=todo):
+            def evaluate(share: float, bodies: BodyState, rotation: np.ndarray, todo: np.ndarray = todo) -> Stage:
                 return self._evaluate(time + h * min(share, 1.0 - ASIDE), todo, bodies, rotation)
 
             rows, sums = nystroem(evaluate, self._workspace, first, todo, h, now, self._world.steady_acceleration)
@@ -169,12 +172,12 @@ class VaryingForces:
         self._cut = float(h[members[0]]) if switches > 1 else 0.0
         return h[members]
 
-    def _fly_one_length(self, members: np.ndarray, time: float, length: float, state) -> np.ndarray:
+    def _fly_one_length(self, members: np.ndarray, time: float, length: float, state: State) -> np.ndarray:
         """The same in one step of a length, s, whatever its error."""
         h = np.zeros(len(self.acts))
         h[members] = length
 
-        def evaluate(share: float, bodies, rotation):
+        def evaluate(share: float, bodies: BodyState, rotation: np.ndarray) -> Stage:
             return self._evaluate(time + h * min(max(share, ASIDE), 1.0 - ASIDE), members, bodies, rotation)
 
         first = evaluate(0.0, state.now, state.rotation)
@@ -185,7 +188,7 @@ class VaryingForces:
         self._keep(members, time, rows, sums, h)
         return h[members]
 
-    def _switch(self, time: float, members: np.ndarray, now, sums: Lines, h: np.ndarray) -> float:
+    def _switch(self, time: float, members: np.ndarray, now: BodyState, sums: Lines, h: np.ndarray) -> float:
         """Part of a step of h (n,) s, the same for all members, after which other forces act; 1 if that is its end, or never."""
         workspace, length = self._workspace, float(h[members[0]])
         workspace.follow(members, now, self._world.steady_acceleration, sums.value, sums.change / length)
@@ -279,7 +282,7 @@ class VaryingForces:
         parts = zip(self._tables, self._first[:-1], self._first[1:], strict=True)
         return min(table.share_until_break(rows.value[i:j], rows.change[i:j]) for table, i, j in parts)
 
-    def _evaluate(self, time: np.ndarray, members: np.ndarray, bodies, rotation) -> tuple[np.ndarray, np.ndarray]:
+    def _evaluate(self, time: np.ndarray, members: np.ndarray, bodies: BodyState, rotation: np.ndarray) -> Stage:
         """Forces of all rows (k, 6), 0 for those of other bodies, and their sums (n, 6) on bodies of the mass of now; time (n,) s."""
         value, asked = np.zeros((len(self._body), 6)), np.zeros(len(self.acts), bool)
         asked[members] = True
@@ -293,14 +296,14 @@ class VaryingForces:
         np.add.at(total, self._body, value)
         return value, total if self.flow is None else total * self.flow.since_weighed(time)[:, None]
 
-    def _errors(self, bodies, members: np.ndarray, off: np.ndarray, h: np.ndarray, part: float) -> np.ndarray:
+    def _errors(self, bodies: BodyState, members: np.ndarray, off: np.ndarray, h: np.ndarray, part: float) -> np.ndarray:
         """Errors (m,) of the members' poses by wrenches that are off by (n, 6) over h (m,) s, relative to the size."""
         square = part * h**2
         moved = square * bodies.inv_mass[members] * np.linalg.norm(off[members, :3], axis=1) / self._size[members]
         turned = square * np.linalg.norm(np.einsum("ijk,ik->ij", bodies.inv_inertia[members], off[members, 3:]), axis=1)
         return np.maximum(moved, turned)
 
-    def _together(self, members: np.ndarray, values: np.ndarray, best) -> np.ndarray:
+    def _together(self, members: np.ndarray, values: np.ndarray, best: np.ufunc) -> np.ndarray:
         """The least or the largest (best) of the values (m,) of all members that forces tie, for each of them."""
         _, first, label = np.unique(self._component[members], return_index=True, return_inverse=True)
         common = values[first].copy()
@@ -313,7 +316,7 @@ class VaryingForces:
         self.rate[members] = sums.change[members] / h[members, None]
         self.log.begin(members, time, rows.value, rows.change, h)
 
-    def finish(self, world, times: np.ndarray, recorder) -> ForceWork:
+    def finish(self, world: World, times: np.ndarray, recorder: Recorder) -> ForceWork:
         """What the forces did until the frames, and their potential energy there."""
         self.log.finish()
         starts = np.cumsum([0, *(len(table.names) for table in self._tables)])[:-1]
@@ -334,7 +337,7 @@ class VaryingForces:
             )
 
 
-def _pieces(rest: float, h):
+def _pieces(rest: float, h: np.ndarray) -> np.ndarray:
     """Lengths of equal pieces of the rest that are not longer than h, so that nothing short is left at the end."""
     return rest / np.maximum(np.ceil(rest / h * (1.0 - 1e-9)), 1.0)
 

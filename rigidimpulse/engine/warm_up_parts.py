@@ -23,6 +23,7 @@ from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
 from rigidimpulse.engine.begin import make_plan, make_run, start_trajectories
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.exact.impacts import respond
+from rigidimpulse.engine.exact.joints import JointState
 from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, hold_turning, turns
 from rigidimpulse.engine.exact.trajectories import set_impact_margins
 from rigidimpulse.engine.islands import touching_islands
@@ -54,8 +55,8 @@ def _run_of(scene: Scene) -> Run:
     return make_run(world, make_plan(world), Recorder(np.zeros(1), 2), EventLog())
 
 
-def _box_on_floor(with_cylinder: bool, jointed: bool = False):
-    """Context of a scene that has a contact from the start, and a joint if it is to."""
+def _box_on_floor(with_cylinder: bool, jointed: bool = False) -> Run:
+    """A run of a scene that has a contact from the start, and a joint if it is to."""
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static")])
     shape = Shape.cylinder(1, 1) if with_cylinder else Shape.box((1, 1, 1))
     scene.add(Body("body", shape, position=(0, 0, 0.5), velocity=(0, 0, -1)))
@@ -64,7 +65,7 @@ def _box_on_floor(with_cylinder: bool, jointed: bool = False):
     return _run_of(scene)
 
 
-def _contact():
+def _contact() -> Contacts:
     """One contact of the two bodies."""
     contacts = empty_contacts(1)
     for column in contacts:
@@ -74,7 +75,7 @@ def _contact():
     return contacts
 
 
-def _respond_and_detect(run) -> None:
+def _respond_and_detect(run: Run) -> None:
     """Impulses first: by then the other process has rows and what moves bodies in the cache, which these need too."""
     state, world, now, one, contacts = run.state, run.world, run.state.now, np.ones(1), _contact()
     members = np.array([1])
@@ -117,7 +118,7 @@ def _move_and_sweep(run) -> None:
     _move(run)
 
 
-def _fill_rows(run) -> None:
+def _fill_rows(run: Run) -> None:
     now, contacts, members = run.state.now, _contact(), np.array([1])
     now.inv_inertia[1] = np.eye(3)
     rows, first_row, frames = contact_rows(now, contacts, members, run.column, 0)
@@ -127,7 +128,7 @@ def _fill_rows(run) -> None:
     changes_of(now, members, rows)
 
 
-def _move(run) -> None:
+def _move(run: Run) -> None:
     state, now, world = run.state, run.state.now, run.world
     zero = np.zeros(1)
     start_trajectories(run)
@@ -153,7 +154,7 @@ def _find_substepped_contacts(run) -> None:
     # Columns of one row only would be another type.
     a, b = np.array([[0, 1], [0, 1]]).T
     root = island_roots(world.num_bodies, a, b, member)
-    refusals(world, root, member, ~member, member, np.zeros(world.num_bodies), a, b, True)
+    refusals(world, root, member, ~member, member, np.zeros(world.num_bodies), (a, b), True)
 
 
 def _step_substepped(run) -> None:
@@ -171,7 +172,7 @@ def _step_substepped(run) -> None:
     mark_slow(now, stepper.inner, 1.0, 1.0, np.array([False, True]))
     most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin, 0.5)
     advance_sleep_timers(
-        members, out.position, out.orientation, out.velocity, run.world.steady_strength, stepper.inner, stepper.skin, STEP,
+        members, (out.position, out.orientation, out.velocity), (run.world.steady_strength, stepper.inner, stepper.skin), STEP,
         np.zeros((2, 7)), np.zeros(2),
     )  # fmt: skip
 
@@ -179,6 +180,7 @@ def _step_substepped(run) -> None:
 def _jointed_box(run: Run) -> JointedIsland:
     """The joint of the box, and the box."""
     state, joints = run.state, run.joints
+    assert isinstance(joints, JointState)
     return JointedIsland(
         joints.table, np.array([0]), state.now, state.rotation, np.array([1]), run.column, joints.memory, 1.0
     )
@@ -203,7 +205,7 @@ def _close_and_stop_joints(run: Run) -> None:
     stop_rows(island, np.zeros(1))
 
 
-def _fly(_run) -> None:
+def _fly(_run: Run) -> None:
     """The event kernel; it knows balls only."""
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static"), Body("ball", Shape.sphere(1.0), position=(0, 0, 9))])
     run = _run_of(scene)

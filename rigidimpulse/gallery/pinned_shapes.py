@@ -67,8 +67,8 @@ def scene() -> Scene:
 
 def hanging() -> dict[str, np.ndarray]:
     """Return the places of the bars at the minimum of their energies."""
-    from rigidimpulse.dynamics.forces.energy.layout import settle
     from rigidimpulse.dynamics.forces.energy.potential import GravityPotential
+    from rigidimpulse.engine.settle import settle
 
     scene = Scene(gravity=(0.0, 0.0, -GRAVITY))
     settled = settle(scene, [*chain(scene), GravityPotential()]).scene

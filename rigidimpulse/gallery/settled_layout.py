@@ -64,10 +64,10 @@ def pile() -> Scene:
 
 def settled() -> tuple[Scene, float]:
     """Return the pile settled, and the largest distance of pinned points, m."""
-    from rigidimpulse.dynamics.forces.energy.layout import settle
     from rigidimpulse.dynamics.forces.energy.overlap import NoOverlap
     from rigidimpulse.dynamics.forces.energy.potential import GravityPotential
     from rigidimpulse.dynamics.forces.energy.restore import RestoreShape
+    from rigidimpulse.engine.settle import settle
 
     flat, legs = [*FURNITURE, *BOOKS], [name for name in parts() if "leg" in name]
     layout, upright = [(*PLACES[name], _height(name)) for name in flat], [(1.0, 0.0, 0.0, 0.0)] * len(flat)
@@ -115,8 +115,8 @@ def _there(body: Body, point: np.ndarray) -> np.ndarray:
 
 def scene() -> Scene:
     """Return the settled pieces, each glued to one body, and beside them the pile, moved out of itself."""
-    from rigidimpulse.dynamics.forces.energy.layout import settle
     from rigidimpulse.dynamics.forces.energy.overlap import NoOverlap
+    from rigidimpulse.engine.settle import settle
 
     parted, _ = settled()
     scene = Scene(parted.gravity, [parted["floor"], *(parted[name] for name in BOOKS)])

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.scene.body import vector
+from rigidimpulse.scene.effect import SceneEffect
 from rigidimpulse.scene.joint_coordinates import ABOUT, ACROSS, ALONG, DISTANCE, SWING, TWIST
 
 HARD = math.inf
@@ -106,7 +107,7 @@ def bounds(coordinate: int, lower: float | None, upper: float | None, stiffness:
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
+class Joint(SceneEffect):
     """Base of all joints: `a` and `b` are names of bodies, None is the world.
 
     Attributes:

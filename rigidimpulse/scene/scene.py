@@ -13,6 +13,7 @@ from rigidimpulse.core.conventions import STANDARD_GRAVITY
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.providers import provider
 from rigidimpulse.scene.body import Body, vector
+from rigidimpulse.scene.effect import SceneEffect
 from rigidimpulse.scene.mass import masses_of
 
 if TYPE_CHECKING:
@@ -37,13 +38,13 @@ class Scene:
         """
         self.gravity = gravity
         self._bodies: dict[str, Body] = {}
-        self._effects: list[Any] = []
+        self._effects: list[SceneEffect] = []
         self.origin: FileOrigin | None = None
         for body in bodies:
             self.add(body)
 
     def add(self, thing: Any) -> Any:
-        """Add a body, or an effect (anything with a `stage`: forces, joints, triggers, soft bodies), and return it.
+        """Add a body, or an effect (a `SceneEffect`: forces, joints, triggers, soft bodies), and return it.
 
         Raises:
             SceneError: the name is taken, or it is neither.
@@ -55,7 +56,7 @@ class Scene:
             if thing.name in self._bodies:
                 raise SceneError("the scene has a body of this name already", "give it another", f"body {thing.name!r}")
             self._bodies[thing.name] = thing
-        elif not isinstance(thing, type) and isinstance(getattr(thing, "stage", None), str):
+        elif isinstance(thing, SceneEffect):
             self._effects.append(thing)
         else:
             what = f"the class {thing.__name__}" if isinstance(thing, type) else f"a {type(thing).__name__}"

@@ -153,7 +153,7 @@ class Comparison:
 
     def _page(self) -> str:
         self.run_a._need_scene("the page of a comparison")
-        from rigidimpulse.view.comparison import render_comparison
+        from rigidimpulse.studies.comparison_page import render_comparison
 
         return render_comparison(self)
 

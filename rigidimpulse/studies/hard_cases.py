@@ -20,8 +20,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import rigidimpulse
 from rigidimpulse import gallery
+from rigidimpulse.core.version import VERSION
 from rigidimpulse.gallery.hard import FAMILIES
 from rigidimpulse.gallery.record import Check, GalleryScene
 
@@ -223,7 +223,7 @@ def machine() -> dict[str, str | int | None]:
         "python": platform.python_version(),
         "numpy": version("numpy"),
         "numba": version("numba"),
-        "rigidimpulse": rigidimpulse.__version__,
+        "rigidimpulse": VERSION,
     }
 
 

@@ -10,8 +10,8 @@ import tokenize
 from collections.abc import Sequence
 from pathlib import Path
 
-import rigidimpulse
 from rigidimpulse import gallery
+from rigidimpulse.core.version import VERSION
 from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.studies.hard_cases import CaseResult
 from rigidimpulse.studies.hard_page import checks_table
@@ -27,7 +27,7 @@ def index_page(results: Sequence[CaseResult], folder: Path) -> str:
     head = f"""<header><h1>rigidimpulse <span>gallery</span></h1>
 <p class="lead">Rigid bodies that collide exactly. Every scene is checked against a law of mechanics; open one to play it.</p>
 <p class="tally"><b>{passed}</b> of {len(results)} scenes pass all their checks <i></i> <b>{motion:,.0f} s</b> of motion computed in
-<b>{seconds:,.0f} s</b> <i></i> version {_text(rigidimpulse.__version__)}</p></header>"""
+<b>{seconds:,.0f} s</b> <i></i> version {_text(VERSION)}</p></header>"""
     return _document("Gallery", f'{head}\n<div class="cards">\n{cards}\n</div>')
 
 

@@ -24,7 +24,7 @@ from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
 from rigidimpulse.engine.simulate import frame_times
 from rigidimpulse.recording.events import IMPACT_DTYPE
 from rigidimpulse.studies.compare import frames_of, labels_of
-from rigidimpulse.view.comparison import COMPARISON_SCRIPTS, render_comparison
+from rigidimpulse.studies.comparison_page import COMPARISON_SCRIPTS, render_comparison
 from rigidimpulse.view.page import SCRIPTS, render_page
 
 FPS = 24.0

@@ -7,6 +7,7 @@ import pytest
 
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.effect import SceneEffect
 from rigidimpulse.scene.keyframes import Keyframes
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene, validate
@@ -16,13 +17,10 @@ BALL = Shape.sphere(0.5)
 BOX = Shape.box(1).surface()
 
 
-class Wind:
+class Wind(SceneEffect):
     """An effect, as far as a scene can tell."""
 
     stage = "forces"
-
-    def bind(self, world):
-        return None
 
 
 def test_bodies_keep_their_order_and_are_found_by_name():

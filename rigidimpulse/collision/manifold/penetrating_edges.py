@@ -14,9 +14,9 @@ import numpy as np
 from rigidimpulse.collision.containment import point_in_mesh
 from rigidimpulse.collision.distance.simplices import closest_on_segments, edge_normals, in_edge_arc
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
-from rigidimpulse.collision.manifold.penetrating_surface import NUDGE, add_point, turned_back
+from rigidimpulse.collision.manifold.penetrating_surface import NUDGE, add_point
 from rigidimpulse.core.kernels import jit, jit_making_arrays
-from rigidimpulse.core.vector import along, cross, dot, moved, row, subtract, turned
+from rigidimpulse.core.vector import along, cross, dot, moved, row, subtract, turned, turned_back
 
 MOST_DEPTH = 2.0
 """How much deeper than the corners of the pair, or than its least deep edges, edges may be."""

@@ -28,9 +28,9 @@ from rigidimpulse.collision.containment import point_in_mesh
 from rigidimpulse.collision.distance.simplices import closest_on_segments
 from rigidimpulse.collision.geometry import HALF_SPACE, ROUND
 from rigidimpulse.collision.manifold.penetrating_edges import crossing_edges, drop_deep_edges
-from rigidimpulse.collision.manifold.penetrating_surface import NUDGE, ON_FACE, add_point, box_squared, nearest_on_surface, turned_back
+from rigidimpulse.collision.manifold.penetrating_surface import NUDGE, ON_FACE, add_point, box_squared, nearest_on_surface
 from rigidimpulse.core.kernels import jit
-from rigidimpulse.core.vector import along, dot, moved, row, subtract, turned
+from rigidimpulse.core.vector import along, dot, moved, row, subtract, turned, turned_back
 
 
 @jit

@@ -161,16 +161,6 @@ def nearest_on_surface(geometry, primitive, p, axis):
 
 
 @jit
-def turned_back(R, v):
-    """R^T v."""
-    return (
-        R[0, 0] * v[0] + R[1, 0] * v[1] + R[2, 0] * v[2],
-        R[0, 1] * v[0] + R[1, 1] * v[1] + R[2, 1] * v[2],
-        R[0, 2] * v[0] + R[1, 2] * v[1] + R[2, 2] * v[2],
-    )
-
-
-@jit
 def add_point(points, count, bodies, features, point, normal, depth):
     """Write a point if the buffer has space; bodies (a, b), normal from a to b; swapped where a is the larger. Returns count + 1."""
     real, integer = points

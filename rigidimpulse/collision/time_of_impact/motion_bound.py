@@ -1,9 +1,9 @@
 """How two bodies move past each other in the next instants, and how far the motion can stray from that.
 
-Each body flies with an acceleration that changes at a constant rate (jerk) and turns freely, under a world torque tau that does
-the same (tau'), or at a constant rate.
-One instant of a body is a record of floats (the offsets `POSITION` ... `CENTRE_JERK` below), written by
-`motion_bound`:
+Each body flies with an acceleration that changes at a constant rate (jerk) and turns freely, under a world torque tau that does the same
+(tau'), or at a constant rate.
+
+One instant of a body is a record of floats (the offsets `POSITION` ... `CENTRE_JERK` below), written by `motion_bound`:
 
     x, v, acc, jerk   of the centre of mass      w, alpha   spin and its rate of change, world
     W >= |w|      A >= |alpha|      K >= rate of alpha in the body's own axes                   bounds over [t, t + h]

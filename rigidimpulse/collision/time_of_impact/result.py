@@ -56,10 +56,25 @@ class SearchEffort(NamedTuple):
 class SweepDetector(Protocol):
     """What a sweep needs to know of the scene."""
 
-    geometry: Geometry
-    shape_of_body: np.ndarray  # (n,) int64
-    sweep_scratch: SweepScratch
-    max_queries: int  # gap evaluations that a pair may use in an interval
+    @property
+    def geometry(self) -> Geometry:
+        """The shapes."""
+        ...
+
+    @property
+    def shape_of_body(self) -> np.ndarray:
+        """(n,) int64."""
+        ...
+
+    @property
+    def sweep_scratch(self) -> SweepScratch:
+        """Working memory."""
+        ...
+
+    @property
+    def max_queries(self) -> int:
+        """Gap evaluations that a pair may use in an interval."""
+        ...
 
 
 def no_impacts(num_pairs: int) -> ImpactTimes:

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError, unknown_name
-from rigidimpulse.model.effect import Skip
 from rigidimpulse.scene.body import vector
+from rigidimpulse.scene.effect import SceneEffect
 
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force import ForceTable
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class ConstantForce:
+class ConstantForce(SceneEffect):
     """A force that keeps its strength and its direction in the world and acts on a dynamic body.
 
     `Scene.add` takes it; it is checked when the scene is compiled: a `SceneError` names the body where it is unknown or not
@@ -46,10 +46,6 @@ class ConstantForce:
     point: ArrayLike | None = None
     stage: ClassVar[str] = "forces"
     kind: ClassVar[str] = "forces at points"
-
-    def bind(self, _world: World) -> Skip:
-        """Constant forces are one line of the plan, not one each."""
-        return Skip("a constant force; see constant forces")
 
     @classmethod
     def compile(cls, forces: Sequence[Self], world: World) -> ForceTable:

@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.quaternion import rotate, rotate_inverse
 from rigidimpulse.core.vector import cross_arrays
-from rigidimpulse.model.effect import Skip
 from rigidimpulse.motion.trajectory import Trajectories, pose_at, state_at
 from rigidimpulse.scene.body import number, vector
+from rigidimpulse.scene.effect import SceneEffect
 from rigidimpulse.scene.shape import normalized_quaternion
 
 if TYPE_CHECKING:
@@ -108,16 +108,10 @@ class ForceTable(ABC):
         return np.zeros((len(times), len(self.names)))
 
 
-class Force(ABC):
+class Force(SceneEffect, ABC):
     """A force as people write it: a frozen dataclass derived from this. `Scene.add` takes it; the compiled scene checks it."""
 
     stage: ClassVar[str] = "forces"
-    kind: ClassVar[str]
-    """What `explain` calls all forces of the class."""
-
-    def bind(self, _world: World) -> Skip:
-        """Forces of one class are one line of the plan, not one each."""
-        return Skip(f"one of the {self.kind}")
 
     @classmethod
     @abstractmethod

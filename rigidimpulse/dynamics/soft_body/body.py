@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.triangles import unique_edges
 from rigidimpulse.dynamics.soft_body.mass_spring import SpringMesh, sheet
-from rigidimpulse.model.effect import Skip
 from rigidimpulse.scene.body import DEFAULT_MATERIAL, number, vector
+from rigidimpulse.scene.effect import SceneEffect
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.shape import Shape, check_orientation, rotation_matrix
 from rigidimpulse.scene.surface import check_triangles
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class FlexibleBody:
+class FlexibleBody(SceneEffect):
     """A body of point masses, springs and dampers made from a triangle mesh, open (cloth) or closed (jelly).
 
     It is at rest in the shape in which it is given. Values are checked when the scene is compiled; errors name the body.
@@ -68,10 +68,6 @@ class FlexibleBody:
     gravity_factor: float = 1.0
     stage: ClassVar[str] = "forces"
     kind: ClassVar[str] = "flexible bodies"
-
-    def bind(self, _world: World) -> Skip:
-        """Soft bodies are moved by `Flexibles`, all together, not by a stage of their own."""
-        return Skip("a flexible body; see flexible bodies")
 
     @classmethod
     def compile(cls, _bodies: Sequence[Self], world: World) -> ForceTable:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.distance.point import STACK, first_contact, first_contact_with_triangle, signed_distance
+from rigidimpulse.collision.distance.point import STACK, first_contact, first_contact_with_triangle
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, Geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.vector import dot, row, subtract
@@ -195,22 +195,6 @@ def _write_sample(c, s, face, found, out_int, out_real):
         for k in range(3):
             out_real[c, k], out_real[c, 3 + k] = weights[k], normal[k]
         out_real[c, 6], out_real[c, 7] = distance, time
-
-
-@jit
-def distances_at(bodies, poses, body, place, limit, stack, distance, normal):
-    """Write signed distances (k,) of places (k, 3) from one body each, and the outward normals (k, 3) there, in the world.
-
-    bodies: `BodyShapes`; poses: positions (n, 3) and rotations (n, 3, 3).
-    """
-    geometry, shape_of_body, (x1, R1) = bodies.geometry, bodies.shape_of_body, poses
-    for c in range(body.shape[0]):
-        b = body[c]
-        p = _into_frame(R1[b], x1[b], row(place, c))
-        d, n = signed_distance(geometry, shape_of_body[b], p, limit, stack)
-        distance[c] = d
-        for k in range(3):
-            normal[c, k] = R1[b, k, 0] * n[0] + R1[b, k, 1] * n[1] + R1[b, k, 2] * n[2]
 
 
 def sample_points(geometry: Geometry, shape: int) -> tuple[np.ndarray, np.ndarray]:

@@ -21,8 +21,8 @@ from rigidimpulse.core.quaternion import quaternion_from_rotation_vector, to_mat
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.union_find import roots
 from rigidimpulse.core.vector import cross_arrays
+from rigidimpulse.dynamics.forces import KINDS
 from rigidimpulse.dynamics.soft_body.balance import lever_place, set_momenta, take_energy
-from rigidimpulse.dynamics.soft_body.body import FlexibleBody
 from rigidimpulse.dynamics.soft_body.contact import BodyShapes
 from rigidimpulse.dynamics.soft_body.contact_planes import (
     CORRECTION,
@@ -101,7 +101,7 @@ class Flexibles:
         """
         if scheme not in SCHEMES:
             raise SceneError(f"scheme is {scheme!r}", f"give one of {', '.join(map(repr, SCHEMES))}", "flexible bodies")
-        self.bodies = [effect for effect in world.scene.effects if isinstance(effect, FlexibleBody)]
+        self.bodies = [effect for effect in world.scene.effects if effect.kind == KINDS["FlexibleBody"]]
         names = [*world.names, *(body.name for body in self.bodies)]
         for name in {name for name in names if names.count(name) > 1}:
             raise SceneError("the scene has a body of this name already", "give it another", f"flexible body {name!r}")

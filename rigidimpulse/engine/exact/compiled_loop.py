@@ -77,8 +77,6 @@ def why_not(world: World, plan: Plan) -> str:
         return f"the response is {accuracy.response!r}"
     if accuracy.impact_time not in ("bisection", "conservative"):
         return f"the time of impact is found by {accuracy.impact_time!r}"
-    if accuracy.contact_solver == "qp":
-        return "the solver of contact forces is a library"
     if world.joints_of_scene or world.force_tables:
         return "there are joints, or forces vary"
     missing = [name for name in NEEDED if not plan.includes(name)]
@@ -126,7 +124,7 @@ class CompiledLoop:
 
         Returns the time and the bodies of that event.
         """
-        if not pair_events.substepped_begun and pair_events.inside.any():
+        if run.solve_rows is not None or (not pair_events.substepped_begun and pair_events.inside.any()):
             return time, bodies
         mark, is_given, how = np.zeros(run.world.num_bodies, bool), True, NO_CAPACITY
         mark[bodies] = True

@@ -177,7 +177,7 @@ def bear_each_other(contacts, dynamic, force):
 
 @jit_making_arrays
 def find_collapsing(memory, number, contacts):
-    """Contacts (m,) of pairs that came back COLLAPSE_REBOUNDS times in a row without ever having been farther apart than the contact margin.
+    """Contacts (m,) of pairs that came back COLLAPSE_REBOUNDS times in a row and were never farther apart than the contact margin.
 
     Bodies caught between others collapse in infinitely many ever smaller impacts (McNamara and Young 1992) wherever e < 1; like the tail of
     a bouncing ball they are replaced by one inelastic impact, of all that collapse together: pair after pair, a light body would stop

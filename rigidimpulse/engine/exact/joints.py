@@ -16,8 +16,8 @@ from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, make_memory
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.engine.absent import NoJoints
 from rigidimpulse.engine.loads import load_over
+from rigidimpulse.engine.participants import RunJoints
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.model.island import Island
@@ -344,7 +344,7 @@ def _slide_rate(now: BodyState, a: int, b: int, step: float) -> float:
     return math.sqrt(turn * min(turn, slide / distance)) if distance > 0.0 else turn
 
 
-def reaction_table(joints: JointState | NoJoints, times: np.ndarray) -> dict[str, np.ndarray]:
+def reaction_table(joints: RunJoints, times: np.ndarray) -> dict[str, np.ndarray]:
     """Forces on b by joint name, (f, 3) N at the frame times."""
     table = {}
     for j, name in enumerate(joints.names):

@@ -156,7 +156,7 @@ class SubsteppedIslands:
         root = island_roots(world.num_bodies, a, b, member)
         root[~member] = -1
         moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
-        refused = refusals(world, root, self.label >= 0, self._jointed, moves, solve_count, a, b, self._auto)
+        refused = refusals(world, root, self.label >= 0, self._jointed, moves, solve_count, (a, b), self._auto)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         # Tall columns are found from contacts, so only in islands that are not refused yet.
         chosen = self._low(run, pair_events, chosen, root, refused)
@@ -305,7 +305,7 @@ class SubsteppedIslands:
             self._bring_in(run, island, members)
         return islands
 
-    def _due(self, pair_events, time: float) -> np.ndarray:
+    def _due(self, pair_events: PairEvents, time: float) -> np.ndarray:
         """Members whose trajectories end at `time`."""
         due = [label for label, end in self._ends.items() if end <= time]
         return np.flatnonzero(pair_events.inside & np.isin(self.label, due)) if due else np.zeros(0, np.int64)
@@ -415,6 +415,6 @@ class SubsteppedIslands:
         """For how long each member has hardly moved from where it was."""
         stepper = self.stepper
         advance_sleep_timers(
-            out.members, out.position, out.orientation, out.velocity, run.world.steady_strength, stepper.inner, stepper.skin, length,
+            out.members, (out.position, out.orientation, out.velocity), (run.world.steady_strength, stepper.inner, stepper.skin), length,
             self._stood, self.sleep_timer,
         )  # fmt: skip

@@ -157,7 +157,7 @@ class ContactStepper:
         """Rows of all bodies by rank, and one of none."""
         world, n = self.world, self.world.num_bodies
 
-        def by_rank(column: np.ndarray, none) -> np.ndarray:
+        def by_rank(column: np.ndarray, none: float) -> np.ndarray:
             return np.concatenate([column[self.order], np.full((1, *column.shape[1:]), none, column.dtype)])
 
         unlike = world.inertia.max(axis=1) > world.inertia.min(axis=1)

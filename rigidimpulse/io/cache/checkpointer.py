@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import rigidimpulse
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.version import VERSION
 from rigidimpulse.engine.fingerprint import fingerprint
 from rigidimpulse.io.cache.file import FRAMES, SUFFIXES, CacheFile, Content, Header, read
 from rigidimpulse.io.cache.freeze import Constants, freeze, thaw
@@ -56,7 +56,7 @@ class Checkpointer:
         world, recorder = run.world, run.recorder
         duration, fps, accuracy, effects = settings
         mark = fingerprint(world.scene, duration, fps, accuracy, effects)
-        header = Header(mark, rigidimpulse.__version__, duration, fps, list(world.names), recorder.times, world.offset, world.turn)
+        header = Header(mark, VERSION, duration, fps, list(world.names), recorder.times, world.offset, world.turn)
         stored = self._look_up(header)
         self._frames = self._impacts = 0
         self._state = b""

@@ -1,0 +1,3 @@
+"""The version of the library, for whatever writes it down."""
+
+VERSION = "0.1.0"

@@ -1,0 +1,249 @@
+"""What the loop asks of the participants of a run. Those that a scene does not call for are in `absent.py`, with the same answers.
+
+A run and its pair events are `Any` here: their types are made of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from rigidimpulse.dynamics.constraints.joint_impact import JointBlock
+    from rigidimpulse.dynamics.constraints.jointed_island import JointMemory
+    from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
+    from rigidimpulse.dynamics.forces.force import ForceTable
+    from rigidimpulse.dynamics.forces.force_log import ForceWork
+    from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
+    from rigidimpulse.model.contacts import Contacts
+    from rigidimpulse.model.island import Island
+    from rigidimpulse.model.world import World
+    from rigidimpulse.recording.ledger import Ledger
+    from rigidimpulse.recording.recorder import Recorder
+
+
+class RunJoints(Protocol):
+    """The joints of a run: `JointState`, or `NoJoints`. What follows `moving_bodies` is asked for islands that have joints."""
+
+    names: list[str]
+    reactions: list[tuple[float, int, np.ndarray]]
+
+    def at(self, bodies: Sequence[int] | np.ndarray, /) -> np.ndarray:
+        """Whole joints at any of the given dynamic bodies, in order."""
+        ...
+
+    def bodies_of(self, joints: np.ndarray, /) -> np.ndarray:
+        """Bodies of the joints, without the world."""
+        ...
+
+    def moving_bodies(self, run: Any, /) -> np.ndarray:
+        """Dynamic bodies with joints that do not rest."""
+        ...
+
+    def movable_end(self, joint: int, /) -> int:
+        """A dynamic body of a joint."""
+        ...
+
+    def are_passive(self, which: np.ndarray, /) -> bool:
+        """Whether joints are neither driven nor springs."""
+        ...
+
+    def supports_of(self, which: np.ndarray, /) -> np.ndarray:
+        """What stands at the joints: bodies that are not dynamic, -1 for the world."""
+        ...
+
+    def links(self) -> np.ndarray:
+        """Bodies (l, 2) that whole joints join."""
+        ...
+
+    def project_velocities(self, run: Any, island: Island, /) -> None:
+        """End the sub-step of an island's joints: velocities are projected."""
+        ...
+
+    def impact_block(self, run: Any, island: Island, /) -> JointBlock:
+        """Rows of an island's joints at an impact."""
+        ...
+
+    def hold(
+        self, run: Any, island: Island, contacts: Contacts, turning: np.ndarray, force: np.ndarray, rest: float, rolling: Rolling | None, /
+    ) -> tuple[float, float]:
+        """Forces into run.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
+        ...
+
+    def let_go(self, island: Island, /) -> None:
+        """Forget the forces of the island's joints, which are not to be used."""
+        ...
+
+    def log_rest(self, island: Island, /) -> None:
+        """Forces on b from here on, while the island sleeps."""
+        ...
+
+    @property
+    def are_closed(self) -> bool:
+        """Whether the forces found last close the joints."""
+        ...
+
+    @property
+    def memory(self) -> JointMemory:
+        """What joints keep from one sub-step to the next."""
+        ...
+
+    @property
+    def moment(self) -> np.ndarray:
+        """(j, 3) N s on b in the first half of the sub-step."""
+        ...
+
+
+class RunForceLog(Protocol):
+    """What forces did to bodies."""
+
+    work: np.ndarray
+
+    def end(self, i: int, time: float, /) -> None:
+        """The lines that act on body i end at `time`, if there are any."""
+        ...
+
+
+class RunForces(Protocol):
+    """The varying forces of a run: `VaryingForces`, or `NoForces`. What follows `finish` is asked for bodies that they act on."""
+
+    acts: np.ndarray
+
+    @property
+    def log(self) -> RunForceLog:
+        """What each force did."""
+        ...
+
+    def weigh(self, bodies: np.ndarray, time: float, /) -> None:
+        """Let bodies whose mass changes have that of `time` [s]."""
+        ...
+
+    def links(self) -> np.ndarray:
+        """Bodies (l, 2) that forces tie together."""
+        ...
+
+    def finish(self, world: World, times: np.ndarray, recorder: Recorder, /) -> ForceWork | None:
+        """What the forces did until the frames; None where there are none."""
+        ...
+
+    @property
+    def value(self) -> np.ndarray:
+        """(n, 6) force and torque on bodies at the start of their trajectories."""
+        ...
+
+    @property
+    def rate(self) -> np.ndarray:
+        """(n, 6) how they change a second."""
+        ...
+
+    def let_act(self, bodies: np.ndarray, /) -> None:
+        """From now on forces that come and go act on these bodies, (n,) bool, and on no others."""
+        ...
+
+    def present(self, table: ForceTable, time: float, /) -> np.ndarray:
+        """Wrenches (k, 6) of the rows of a table at `time`."""
+        ...
+
+    def may_rest(self, bodies: np.ndarray, /) -> bool:
+        """Whether the forces on bodies at rest stay as they are."""
+        ...
+
+    def fly(self, run: Any, members: np.ndarray, time: float, end: float, /) -> np.ndarray:
+        """Forces on members that nothing holds; returns for how long, (m,) s."""
+        ...
+
+    def load(self, run: Any, island: Island, h: float, /) -> float:
+        """Forces on an island that contacts or joints hold, over h s at most; returns for how long."""
+        ...
+
+
+class RunSoftBodies(Protocol):
+    """The soft bodies of a run: `RunningSoftBodies`, or `NoSoftBodies`."""
+
+    moves: bool
+    pressed: np.ndarray
+
+    def advance(self, run: Any, end: float, /) -> float:
+        """Step the soft bodies to `end` [s] or less far; returns how far."""
+        ...
+
+    def tracks(self) -> list[FlexibleTrack]:
+        """Frames of each flexible body."""
+        ...
+
+    def add_to(self, ledger: Ledger, /) -> None:
+        """Give the ledger their energy and momenta."""
+        ...
+
+
+class Substepping(Protocol):
+    """The sub-stepped islands of a run: `SubsteppedIslands`, or `NoSubstepping`. What follows `finish` is asked for such islands."""
+
+    label: np.ndarray
+    solve_count: np.ndarray
+
+    def choose(self, run: Any, pair_events: Any, /) -> None:
+        """Choose the islands of the step."""
+        ...
+
+    def join(self, run: Any, pair_events: Any, time: float, islands: list[Island], /) -> list[Island]:
+        """The islands at `time` with the sub-stepped ones that they touch."""
+        ...
+
+    def is_idle(self) -> bool:
+        """Whether no island is sub-stepped and none may begin to be."""
+        ...
+
+    def finish(self, run: Any, /) -> None:
+        """Account for what the sub-steps under way take until the end of the run."""
+        ...
+
+    def contact_forces(self, run: Any, pair_events: Any, island: Island, /) -> None:
+        """Step an island from its time to the end of the step."""
+        ...
+
+    def begin_trajectories(self, run: Any, pair_events: Any, island: Island, /) -> None:
+        """Trajectories of its members to where the solver found them."""
+        ...
+
+
+class Flight(Protocol):
+    """The kernel of balls: `EventRun`, or `NoFlight`. It is asked to fly where it says that it may."""
+
+    def may_fly(self) -> bool:
+        """Whether balls may be flown from here."""
+        ...
+
+    def fly(self, end: float, /, at_boundary: bool = True) -> tuple[int, float, float]:
+        """Fly towards `end` [s]; returns how that ended, and the step that is under way."""
+        ...
+
+
+class Observer(Protocol):
+    """The triggers of a run: `Triggers`, or `NoTriggers`."""
+
+    def look(self, begin: float, end: float, /) -> None:
+        """Look at what happened in the step from `begin` to `end` [s]."""
+        ...
+
+
+class Keyframed(Protocol):
+    """The paths of kinematic bodies: `KeyframePaths`, or `NoKeyframes`."""
+
+    def next_key(self, time: float, /) -> float:
+        """The first key time after `time`, inf if there is none."""
+        ...
+
+    def start_segments(self, run: Any, time: float, /) -> None:
+        """Put bodies whose key is at or before `time` on their new trajectory."""
+        ...
+
+
+class Compiled(Protocol):
+    """The compiled order of events: `CompiledLoop`, or `NoCompiledLoop`."""
+
+    def advance(self, run: Any, pair_events: Any, time: float, bodies: np.ndarray, /) -> tuple[float, np.ndarray]:
+        """Deal with events from that of these bodies at `time` on; returns the first event for the loop in Python."""
+        ...
