@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
-from rigidimpulse.core.quaternion import quaternion_exp, quaternion_multiply
+from rigidimpulse.core.quaternion import exponential, product
 from rigidimpulse.core.vector import tangents
 
 FREE, BOUNDED, DISC, DISC_SECOND, SEGMENT = np.arange(5)
@@ -285,13 +285,13 @@ def change_velocities(bodies, members, rows):
 @jit_making_arrays
 def move_bodies(bodies, members, rows):
     """Move bodies by what the rows' impulses make of a displacement (the metric of mass)."""
-    change, turn = changes_of(bodies, members, rows), np.empty(4)
+    change = changes_of(bodies, members, rows)
     for k in range(members.shape[0]):
         i = members[k]
         for j in range(3):
             bodies.position[i, j] += change[k, j]
-        quaternion_exp(change[k, 3:], turn)
-        quaternion_multiply(turn, bodies.orientation[i], bodies.orientation[i])
+        q, (t0, t1, t2, t3) = bodies.orientation[i], exponential(change[k, 3], change[k, 4], change[k, 5])
+        q[0], q[1], q[2], q[3] = product(t0, t1, t2, t3, q[0], q[1], q[2], q[3])
 
 
 @jit_making_arrays
