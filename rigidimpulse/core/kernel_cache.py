@@ -22,6 +22,7 @@ from typing import Any
 
 import numba
 
+_numba: Any = numba
 _PACKAGE = Path(__file__).parent.parent
 _IMPORT = re.compile(rb"^\s*from rigidimpulse\.?([\w.]*) import (?:\(|([\w, ]+))", re.MULTILINE)
 _NAMED_TUPLE = re.compile(rb"^class \w+\(NamedTuple\):\n(?:[ \t].*\n|\n)*", re.MULTILINE)
@@ -97,15 +98,15 @@ def _folder(path: Path, chosen: str) -> Path:
 def jit_with_cache(function: Callable[..., Any], **options: Any) -> Any:
     """Make numba's dispatcher of a function, which keeps what it compiles in the function's folder; options: of numba."""
     with _configuration:
-        chosen = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(_folder(Path(function.__code__.co_filename), chosen))
+        chosen = _numba.config.CACHE_DIR
+        _numba.config.CACHE_DIR = str(_folder(Path(function.__code__.co_filename), chosen))
         try:
-            return numba.njit(cache=True, **options)(function)
+            return _numba.njit(cache=True, **options)(function)
         finally:
-            numba.config.CACHE_DIR = chosen
+            _numba.config.CACHE_DIR = chosen
 
 
 def is_in_cache(function: Callable[..., Any]) -> bool:
     """Whether a kernel of these sources lies in the cache on disk, for whatever types: numba keeps an index (`.nbi`) of each."""
     path = Path(function.__code__.co_filename)
-    return any(_folder(path, numba.config.CACHE_DIR).rglob(f"{path.stem}.{function.__qualname__}-*.nbi"))
+    return any(_folder(path, _numba.config.CACHE_DIR).rglob(f"{path.stem}.{function.__qualname__}-*.nbi"))

@@ -17,6 +17,8 @@ from numba.extending import typeof_impl
 from rigidimpulse.core.kernel_cache import is_in_cache, jit_with_cache
 from rigidimpulse.core.numba_private import KernelCompiler, PartCompiler, options_of
 
+_numba: Any = numba
+_njit: Any = numba.njit
 MOST_CORES = 4
 """Cores on which a kernel is worth calling at once."""
 KERNELS: list[Kernel] = []
@@ -47,7 +49,7 @@ class Kernel:
         self.calls, self.seconds, self.preparing = 0, 0.0, 0.0
         KERNELS.append(self)
         self._makes_arrays = makes_arrays
-        self.part: Any = numba.njit(**options_of(PartCompiler, makes_arrays), **options)(function)
+        self.part = _njit(**options_of(PartCompiler, makes_arrays), **options)(function)
 
     @cached_property
     def entry(self) -> Any:
@@ -81,7 +83,7 @@ class Kernel:
 
 def number_of_cores() -> int:
     """Cores that kernels may use: those that numba may (NUMBA_NUM_THREADS, else all of the process), one in a process of a pool."""
-    return 1 if multiprocessing.parent_process() else min(int(vars(numba.config)["NUMBA_NUM_THREADS"]), MOST_CORES)
+    return 1 if multiprocessing.parent_process() else min(int(_numba.config.NUMBA_NUM_THREADS), MOST_CORES)
 
 
 @cache
