@@ -20,8 +20,6 @@ import llvmlite.binding
 import numpy as np
 from llvmlite import ir
 from numba import extending, types
-from numba.core import cgutils
-from numba.core.imputils import lower_constant
 from numba.extending import NativeValue, lower_builtin, models, register_model, type_callable, typeof_impl, unbox
 
 from rigidimpulse.core.memory import reserve
@@ -86,11 +84,6 @@ def _unbox_simd(_type: types.Type, _object: Any, context: Any) -> NativeValue:
     return NativeValue(context.context.get_dummy_value())
 
 
-@lower_constant(_SimdType)
-def _constant_simd(context: Any, _builder: Any, _type: types.Type, _value: Simd) -> Any:
-    return context.get_dummy_value()
-
-
 def _define_operator(python: Any, instruction: str) -> None:
     @type_callable(python)
     def type_of(_context: Any) -> Any:
@@ -115,10 +108,15 @@ def _lower_negated(_context: Any, builder: Any, _signature: Any, arguments: Any)
     return builder.fneg(arguments[0])
 
 
+def machine_function(module: ir.Module, kind: ir.FunctionType, name: str) -> ir.Function:
+    """LLVM's function of a name in a module, which may know it already."""
+    return module.globals.get(name) or ir.Function(module, kind, name)
+
+
 def _by_machine(builder: Any, name: str, kind: _VectorType, arguments: Any) -> Any:
     vector = ir.VectorType(_DOUBLE, kind.width)
     function = ir.FunctionType(vector, [vector] * len(arguments))
-    return builder.call(cgutils.get_or_insert_function(builder.module, function, f"llvm.{name}.v{kind.width}f64"), arguments)
+    return builder.call(machine_function(builder.module, function, f"llvm.{name}.v{kind.width}f64"), arguments)
 
 
 @intrinsic
@@ -273,7 +271,7 @@ def scatter(_typing, array, index, first, columns):
 
     def lower(context, builder, signature, arguments):
         array_type, index_type, _, kind = signature.args
-        vectors = cgutils.unpack_tuple(builder, arguments[3], ROW)
+        vectors = [builder.extract_value(arguments[3], column) for column in range(ROW)]
         for element, row in enumerate(_rows(builder, vectors, kind.dtype.width)):
             place = _row_place(context, builder, (array_type, arguments[0]), (index_type, arguments[1]), arguments[2], element)
             builder.store(row, place).align = LINE

@@ -17,9 +17,9 @@ import llvmlite.binding
 import numpy as np
 from llvmlite import ir
 from numba import extending, types
-from numba.core import cgutils
 
 from rigidimpulse.core.kernels import inlined, jit
+from rigidimpulse.core.simd import machine_function
 
 intrinsic: Any = extending.intrinsic
 TICKET, DONE, PLACES = 0, 8, 16
@@ -83,7 +83,7 @@ def pause(_typing):
     def lower(context, builder, _signature, _arguments):
         if _IS_X86:
             kind = ir.FunctionType(ir.VoidType(), [])
-            builder.call(cgutils.get_or_insert_function(builder.module, kind, "llvm.x86.sse2.pause"), [])
+            builder.call(machine_function(builder.module, kind, "llvm.x86.sse2.pause"), [])
         return context.get_dummy_value()
 
     return types.void(), lower
