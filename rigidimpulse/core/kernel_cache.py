@@ -110,3 +110,8 @@ def is_in_cache(function: Callable[..., Any]) -> bool:
     """Whether a kernel of these sources lies in the cache on disk, for whatever types: numba keeps an index (`.nbi`) of each."""
     path = Path(function.__code__.co_filename)
     return any(_folder(path, _numba.config.CACHE_DIR).rglob(f"{path.stem}.{function.__qualname__}-*.nbi"))
+
+
+def note_beside(function: Callable[..., Any], name: str) -> Path:
+    """A file in the folder of a kernel of these sources, for what is to be known of it by other processes."""
+    return _folder(Path(function.__code__.co_filename), _numba.config.CACHE_DIR) / name

@@ -17,7 +17,7 @@ from rigidimpulse.engine.keyframe_paths import KeyframePaths
 from rigidimpulse.engine.regime import only_expensive, why_not_substepped
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.substepped.advance import SubsteppedIslands
-from rigidimpulse.engine.warm_up import prepare_kernels
+from rigidimpulse.engine.warm_up import compile_loop_in_background, prepare_kernels
 from rigidimpulse.model.plan import Plan
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import FIXED, FREE, PRESCRIBED, begin
@@ -51,6 +51,7 @@ def begin_run(world: World, plan: Plan, times: np.ndarray, left_out: Mapping[str
     run.recorder.start(run.state.trajectory)
     resolve_overlaps(run)
     _bind_observers(run)
+    _bind_compiled_loop(run)
     return run
 
 
@@ -61,9 +62,18 @@ def make_run(world: World, plan: Plan, recorder: Recorder, log: EventLog) -> Run
         run.joints = JointState(world)
     if not why_not_substepped(world):
         run.substepped = SubsteppedIslands(world)
-    if not why_not_compiled(world, plan):
-        run.compiled = CompiledLoop(run)
     return run
+
+
+def _bind_compiled_loop(run: Run) -> None:
+    """Give a run the compiled order of events if it is in the cache; if not, have it compiled for the runs to come."""
+    if why_not_compiled(run.world, run.plan):
+        return
+    compiled = CompiledLoop(run)
+    if compiled.is_compiled():
+        run.compiled = compiled
+    elif compiled.begin_compiling():
+        compile_loop_in_background(run.world)
 
 
 def _bind_forces(run: Run, times: np.ndarray) -> None:

@@ -3,6 +3,9 @@
 Numba compiles one kernel at a time in a process. So the kernels of each kind that a run needs and that are not in the cache on disk are
 compiled in parts (`warm_up_parts.py`): the first in this process, each of the others in one of its own, which puts them into the cache.
 Parts of one kind take about as long, and share little that would be compiled twice.
+
+The order of events of exact contact (`exact/event_loop.py`) takes about a minute to compile, and runs without it give the same bits. So
+nobody waits for it: a process of its own compiles it beside the first runs and after them, and puts it into the cache.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from rigidimpulse.model.world import World
 logger = logging.getLogger("rigidimpulse")
 SECONDS_OF_A_KIND = 20
 """s that compiling one kind of kernels takes, about."""
+LOOP, ROLLING = "order of events", "rolling"
 CYLINDERS, CONTACTS, EVENTS, SUBSTEPPED, JOINTS = "cylinders", "contacts", "impacts of balls", "sub-stepped islands", "joints"
 LAST = {
     CONTACTS: ("engine.touching", "find_touching"),
@@ -65,7 +69,13 @@ def compile_kernels(world: World, kinds: list[str]) -> None:
         for kind, part in others:
             processes.enter_context(_process(kind, str(part), *cylinders))
         with _without_garbage_collection():
-            import_module(PARTS_MODULE).compile_part(*mine, bool(cylinders))
+            import_module(PARTS_MODULE).compile_part(*mine, cylinders)
+
+
+def compile_loop_in_background(world: World) -> None:
+    """Start a process that compiles the order of events for worlds like this one; it goes on by itself."""
+    rolling = [] if world.rolling is None else [ROLLING]
+    _process(LOOP, "0", *([CYLINDERS] if world.cylinders is not None else []), *rolling)
 
 
 def _process(*arguments: str) -> subprocess.Popen:

@@ -1,11 +1,13 @@
 """Kernels of each kind that are compiled ahead, in parts of about equal time that share little; see `warm_up.py`.
 
-As a program it compiles one part, in a process of its own: `python -m rigidimpulse.engine.warm_up_parts KIND PART [cylinders]`.
+As a program it compiles one part, in a process of its own: `python -m rigidimpulse.engine.warm_up_parts KIND PART [cylinders] [rolling]`.
 """
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Collection
 
 import numpy as np
 
@@ -22,6 +24,7 @@ from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
 from rigidimpulse.engine.begin import make_plan, make_run, start_trajectories
 from rigidimpulse.engine.compile_scene import compile_scene
+from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
 from rigidimpulse.engine.exact.impacts import respond
 from rigidimpulse.engine.exact.joints import JointState
 from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, hold_turning, turns
@@ -34,7 +37,7 @@ from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still
 from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
-from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, SUBSTEPPED
+from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, LOOP, ROLLING, SUBSTEPPED
 from rigidimpulse.model.contacts import Contacts, Touching
 from rigidimpulse.model.island import empty_contacts
 from rigidimpulse.motion.evaluate import bring_all, bring_gyroscopic, refresh_pose
@@ -43,6 +46,7 @@ from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.joint import HingeJoint
+from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
@@ -55,11 +59,12 @@ def _run_of(scene: Scene) -> Run:
     return make_run(world, make_plan(world), Recorder(np.zeros(1), 2), EventLog())
 
 
-def _box_on_floor(with_cylinder: bool, jointed: bool = False) -> Run:
-    """A run of a scene that has a contact from the start, and a joint if it is to."""
+def _box_on_floor(with_cylinder: bool, jointed: bool, rolls: bool) -> Run:
+    """A run of a scene that has a contact from the start, and a joint and rolling friction if it is to."""
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static")])
     shape = Shape.cylinder(1, 1) if with_cylinder else Shape.box((1, 1, 1))
-    scene.add(Body("body", shape, position=(0, 0, 0.5), velocity=(0, 0, -1)))
+    material = Material(rolling_friction=0.01) if rolls else Material()
+    scene.add(Body("body", shape, position=(0, 0, 0.5), velocity=(0, 0, -1), material=material))
     if jointed:
         scene.add(HingeJoint("body", None, (0, 0, 1), (1, 0, 0)))
     return _run_of(scene)
@@ -213,19 +218,31 @@ def _fly(_run: Run) -> None:
     EventRun(run).fly(1.0)
 
 
+def _go_from_event_to_event(run: Run) -> None:
+    """The compiled order of events, at low priority: nobody waits for it."""
+    if hasattr(os, "nice"):
+        os.nice(10)
+    start_trajectories(run)
+    loop, pair_events = CompiledLoop(run), PairEvents(run, STEP)
+    pair_events.find_pairs()
+    loop.advance(run, pair_events, 0.0, pair_events.active_bodies())
+    loop.say_compiled()
+
+
 PARTS = {
     CONTACTS: (_respond_and_detect, _move_and_sweep),
     EVENTS: (_fly,),
     SUBSTEPPED: (_find_substepped_contacts, _step_substepped),
     JOINTS: (_start_joints, _close_and_stop_joints),
+    LOOP: (_go_from_event_to_event,),
 }
 """What is compiled at once, by kind; each gets a run."""
 
 
-def compile_part(kind: str, part: int, with_cylinder: bool) -> None:
-    """Compile one part."""
-    PARTS[kind][part](_box_on_floor(with_cylinder, kind == JOINTS))
+def compile_part(kind: str, part: int, features: Collection[str]) -> None:
+    """Compile one part, for scenes with these features: CYLINDERS, ROLLING."""
+    PARTS[kind][part](_box_on_floor(CYLINDERS in features, kind == JOINTS, ROLLING in features))
 
 
 if __name__ == "__main__":
-    compile_part(sys.argv[1], int(sys.argv[2]), CYLINDERS in sys.argv[3:])
+    compile_part(sys.argv[1], int(sys.argv[2]), sys.argv[3:])

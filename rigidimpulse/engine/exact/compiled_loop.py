@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from time import perf_counter
+from pathlib import Path
+from time import perf_counter, time
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS
 from rigidimpulse.collision.time_of_impact.bisection import LOOK_AHEAD
-from rigidimpulse.core.packed import Packed
+from rigidimpulse.core.kernel_cache import note_beside
+from rigidimpulse.core.record import Record
 from rigidimpulse.dynamics.impact.restitution import LAWS
 from rigidimpulse.engine.exact.contact_forces import NOT_SOLVED_REMEDY
 from rigidimpulse.engine.exact.event_loop import (
@@ -49,6 +51,8 @@ if TYPE_CHECKING:
     from rigidimpulse.model.plan import Plan
 
 NONE = np.zeros(0, np.int64)
+PATIENCE = 600.0
+"""s, after which a process that said it would compile the kernel is not waited for any more."""
 EFFECTS = {
     SWEEP: ("impact time",),
     RESPOND: ("impulses",),
@@ -110,7 +114,7 @@ class CompiledLoop:
         self._scratch = np.empty((SCRATCH_ROWS, 2), np.int64)
         self._reports = _make_reports(n)
         state = run.state
-        self._packed = Packed(
+        self._record = Record(
             Loop(
                 settings, world.compiled_shapes, pair_bodies(world), world.margins, world.coefficients, world.rolling, self._elsewhere,
                 run.motion, PairEvents(run, state.time).table, state.memory, state.limiter, run.log.buffers, run.contact_log.buffers,
@@ -118,6 +122,25 @@ class CompiledLoop:
                 run.column, state.sub_step, run.substepped.solve_count, run.impact_log, self._cycles, self._calls,
             )
         )  # fmt: skip
+
+    def is_compiled(self) -> bool:
+        """Whether the kernel is in the cache for records of this layout."""
+        return self._note().exists()
+
+    def begin_compiling(self) -> bool:
+        """Say that the kernel is being compiled; returns False if somebody has said so a short while ago."""
+        begun = self._note(".begun")
+        if begun.exists() and time() - begun.stat().st_mtime < PATIENCE:
+            return False
+        begun.touch()
+        return True
+
+    def say_compiled(self) -> None:
+        """Say that the kernel is in the cache."""
+        self._note().touch()
+
+    def _note(self, ending: str = "") -> Path:
+        return note_beside(run_events.py_func, f"{self._record.layout_name}{ending}")
 
     def advance(self, run: Run, pair_events: PairEvents, time: float, bodies: np.ndarray) -> tuple[float, np.ndarray]:
         """Go on from the event of these bodies at `time` to the end of the step [s], or to an event for the loop in Python.
@@ -131,7 +154,7 @@ class CompiledLoop:
         self._elsewhere[:] = run.substepped.label >= 0
         while how not in (AT_END, AT_EVENT):
             start, before = perf_counter(), self._cycles.copy()
-            how, time, is_given = run_events(self._words(run, pair_events), mark, is_given, time, pair_events.end, self._scratch)
+            how, time, is_given = run_events(self._updated(run, pair_events), mark, is_given, time, pair_events.end, self._scratch)
             self._account(run, perf_counter() - start, before)
             self._tell(run)
             if how == NO_CAPACITY:
@@ -142,17 +165,17 @@ class CompiledLoop:
             pair_events.count_contacts(time)
         return float(time), mark.nonzero()[0] if how == AT_EVENT else NONE
 
-    def _words(self, run: Run, pair_events: PairEvents) -> np.ndarray:
+    def _updated(self, run: Run, pair_events: PairEvents) -> Record:
         """What the kernel gets: the record, with what may have grown or is another in each step."""
-        packed, state = self._packed, run.state
-        packed.replace(TABLE, pair_events.table)
-        packed.replace(MEMORY, state.memory)
-        packed.replace(LIMITER, state.limiter)
-        packed.replace(LOG, run.log.buffers)
-        packed.replace(CONTACT_LOG, run.contact_log.buffers)
-        packed.replace(SOLVE_COUNT, run.substepped.solve_count)
-        packed.replace(REPORTS, self._reports)
-        return packed.words
+        record, state = self._record, run.state
+        record.replace(TABLE, pair_events.table)
+        record.replace(MEMORY, state.memory)
+        record.replace(LIMITER, state.limiter)
+        record.replace(LOG, run.log.buffers)
+        record.replace(CONTACT_LOG, run.contact_log.buffers)
+        record.replace(SOLVE_COUNT, run.substepped.solve_count)
+        record.replace(REPORTS, self._reports)
+        return record
 
     def _grow(self, run: Run) -> None:
         """Make larger what had no space for an event."""

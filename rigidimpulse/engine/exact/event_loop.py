@@ -22,7 +22,6 @@ from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch
 from rigidimpulse.collision.time_of_impact.search import first_contacts
 from rigidimpulse.core.cycles import cycles
 from rigidimpulse.core.kernels import jit, jit_making_arrays
-from rigidimpulse.core.packed import field
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
@@ -136,7 +135,7 @@ class Reports(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """Everything the loop needs; kernels get it packed (`core.packed`), and its fields by the functions below."""
+    """Everything the loop needs; kernels get it as a `Record`."""
 
     settings: Settings
     shapes: Shapes
@@ -163,15 +162,6 @@ class Loop(NamedTuple):
     impacts: np.ndarray  # (k, 7) working memory, see `point.log_impact`
     cycles: np.ndarray  # (VERBS,) processor cycles of each verb
     calls: np.ndarray  # (VERBS,)
-
-
-settings_of, shapes_of, bodies_of, margins_of = field("settings"), field("shapes"), field("bodies"), field("margins")
-coefficients_of, rolling_coefficients_of, elsewhere_of = field("coefficients"), field("rolling"), field("elsewhere")
-motion_of, table_of, memory_of, limiter_of = field("motion"), field("table"), field("memory"), field("limiter")
-log_of, contact_log_of, frames_of, written_of = field("log"), field("contact_log"), field("frames"), field("written")
-reports_of, estimate_of, sweep_of, wrench_of = field("reports"), field("estimate"), field("sweep"), field("wrench")
-number_of, sub_step_of, solve_count_of = field("number"), field("sub_step"), field("solve_count")
-impacts_of, cycles_of, calls_of = field("impacts"), field("cycles"), field("calls")
 
 
 ISLAND = np.dtype(
@@ -234,7 +224,7 @@ def _report_pairs(reports, kind, time, table, places):
 @jit_making_arrays
 def _sweep_stale(loop, end):
     """Sweep the pairs that ask for it until `end` [s], and note when they come to contact."""
-    table, shapes, settings, count = table_of(loop), shapes_of(loop), settings_of(loop), np.int64(0)
+    table, shapes, settings, count = loop.table, loop.shapes, loop.settings, np.int64(0)
     for p in range(table.number[USED]):
         start = table.pairs[p].start
         count += start == start
@@ -250,14 +240,14 @@ def _sweep_stale(loop, end):
             asked.impact_margin[k], asked.tolerance[k] = pair.impact_margin, pair.tolerance
             k += 1
     effort = SearchEffort(settings.ahead, settings.queries)
-    first_contacts(shapes.geometry, motion_of(loop).trajectory, sweep_of(loop), shapes.of_body, asked, end, effort, found)
+    first_contacts(shapes.geometry, loop.motion.trajectory, loop.sweep, shapes.of_body, asked, end, effort, found)
     for k in range(count):
         pair = table.pairs[places[k]]
         pair.time, pair.start = found.time[k], np.nan
         for j in range(10):
             pair.witness[j] = found.witness[k, j]
         if found.status[k] == STALLED:
-            _report_pairs(reports_of(loop), SWEEP_STALLED, found.time[k], table, places[k : k + 1])
+            _report_pairs(loop.reports, SWEEP_STALLED, found.time[k], table, places[k : k + 1])
 
 
 @jit_making_arrays
@@ -274,8 +264,8 @@ def run_events(loop, bodies, is_given, time, end, scratch):
     bodies (n,) bool: of the event at `time` if `is_given`, else after that; and then those of the event before which it ends. scratch: see
     `manifold.contact_points`. Returns how it ends, when, and whether that is the event that was given.
     """
-    motion, table, shapes, constants = motion_of(loop), table_of(loop), shapes_of(loop), bodies_of(loop).constants
-    number, limiter, used_cycles, calls = len(bodies), limiter_of(loop), cycles_of(loop), calls_of(loop)
+    motion, table, shapes, constants = loop.motion, loop.table, loop.shapes, loop.bodies.constants
+    number, limiter, used_cycles, calls = len(bodies), loop.limiter, loop.cycles, loop.calls
     shared = Shared(limiter.under_contact, limiter.sharing, np.empty((0, 2), np.int64))
     found = make_found(FIRST_CONTACTS, number, scratch)
     while True:
@@ -295,12 +285,12 @@ def run_events(loop, bodies, is_given, time, end, scratch):
             count = find_touching(shapes, constants, motion, table, shared, found, time)
             if count < 0:
                 found = make_found(-2 * count, number, scratch)
-        if _is_elsewhere(elsewhere_of(loop), found.brought, bodies):
+        if _is_elsewhere(loop.elsewhere, found.brought, bodies):
             return AT_EVENT, time, is_given
         if not _has_capacity(loop, count):
             return NO_CAPACITY, time, is_given
         if not is_given:
-            _count_contacts(table, reports_of(loop), time, settings_of(loop).instant)
+            _count_contacts(table, loop.reports, time, loop.settings.instant)
         is_given = False
         for i in range(number):
             if bodies[i]:
@@ -322,12 +312,12 @@ def _is_elsewhere(elsewhere, brought, bodies):
 @jit
 def _has_capacity(loop, count):
     """Whether an event of `count` contacts can be remembered and recorded, whatever it does."""
-    number, reports, log, contacts = len(elsewhere_of(loop)), reports_of(loop), log_of(loop), MORE_CONTACTS * count + MOST_NEW
+    number, reports, log, contacts = len(loop.elsewhere), loop.reports, loop.log, MORE_CONTACTS * count + MOST_NEW
     most = ENERGIES * number
-    fits = has_log_capacity(log, most, number, len(impacts_of(loop)) + IMPULSES * count)
-    fits = has_contact_capacity(contact_log_of(loop), contacts) and fits
+    fits = has_log_capacity(log, most, number, len(loop.impacts) + IMPULSES * count)
+    fits = has_contact_capacity(loop.contact_log, contacts) and fits
     fits = fits and reports.used[ROWS] + most <= len(reports.rows) and reports.used[BODIES] + most <= len(reports.bodies)
-    return fits and has_capacity(memory_of(loop), contacts)
+    return fits and has_capacity(loop.memory, contacts)
 
 
 @jit_making_arrays
@@ -341,13 +331,13 @@ def _count_contacts(table, reports, time, instant):
 @jit_making_arrays
 def _react(loop, found, count, time, end):
     """Everything that happens at `time` to the islands of the contacts found, and to the bodies reached."""
-    motion, table, dynamic, number = motion_of(loop), table_of(loop), bodies_of(loop).constants.dynamic, len(found.reached)
+    motion, table, dynamic, number = loop.motion, loop.table, loop.bodies.constants.dynamic, len(found.reached)
     root, order = np.empty(number, np.int64), np.empty(count, np.int64)
     split_islands(dynamic, np.empty((0, 2), np.int64), found, count, root, order)
     touch = _touch(loop, found, order, time)
     islands = _islands(motion.now, root, touch.contacts, dynamic, time, end)
     _arrive(loop, islands, touch, found.reached, time)
-    solve_count = solve_count_of(loop)
+    solve_count = loop.solve_count
     for i in islands.member:
         solve_count[i] += 1.0
     _let_go(loop, islands.member, found.reached, time, end)
@@ -359,15 +349,15 @@ def _react(loop, found, count, time, end):
         )  # fmt: skip
     given_up = np.empty(table.number[USED], np.int64)
     stuck = settle_pairs(table, time, dynamic, given_up)
-    _report_pairs(reports_of(loop), NOT_RESOLVED, time, table, given_up[:stuck])
+    _report_pairs(loop.reports, NOT_RESOLVED, time, table, given_up[:stuck])
 
 
 @jit_making_arrays
 def _touch(loop, found, order, time):
     """The contacts found, in this order (m,)."""
-    m, buffers, table, material = len(order), found.buffers, table_of(loop), bodies_of(loop).constants.material
+    m, buffers, table, material = len(order), found.buffers, loop.table, loop.bodies.constants.material
     contacts = make_contacts(m)
-    fill_contacts(motion_of(loop).now, buffers.real, buffers.integer, order, material, coefficients_of(loop), contacts)
+    fill_contacts(loop.motion.now, buffers.real, buffers.integer, order, material, loop.coefficients, contacts)
     touching = Touching(np.empty(m, np.int64), np.empty((m, 2), np.int64))
     place, contact_margin, live = np.empty(m, np.int64), np.empty(m), np.empty(m, np.bool_)
     for c in range(m):
@@ -441,7 +431,7 @@ def _islands(bodies, root, contacts, dynamic, time, end):
 @jit_making_arrays
 def _classify(loop, touch, members):
     """Measure approach speeds and what presses each contact; slow approaches within the margin are live (see `islands.classify`)."""
-    constants, contacts = bodies_of(loop).constants, touch.contacts
+    constants, contacts = loop.bodies.constants, touch.contacts
     m, least, supported = contacts.gap.shape[0], 0.0, False
     for c in range(m):
         supported = supported or not (constants.dynamic[contacts.body_a[c]] and constants.dynamic[contacts.body_b[c]])
@@ -449,11 +439,11 @@ def _classify(loop, touch, members):
         for i in members:
             least = max(least, constants.steady_strength[i])
     force, normal_force = np.empty((m, 3)), np.empty(m)
-    read_forces(memory_of(loop), motion_of(loop).trajectory.start, contacts, touch.touching, force)
+    read_forces(loop.memory, loop.motion.trajectory.start, contacts, touch.touching, force)
     for c in range(m):
         normal_force[c] = force[c, 0]
-    pressing = Pressing(least, settings_of(loop).step)
-    press(shapes_of(loop), motion_of(loop), contacts, touch.touching, normal_force, pressing, touch.contact_margin, touch.speeds)
+    pressing = Pressing(least, loop.settings.step)
+    press(loop.shapes, loop.motion, contacts, touch.touching, normal_force, pressing, touch.contact_margin, touch.speeds)
     for c in range(m):
         touch.live[c] = touch.live[c] or abs(touch.speeds[0, c]) <= touch.speeds[1, c]
 
@@ -470,8 +460,8 @@ def _slow(island, speeds):
 @jit_making_arrays
 def _arrive(loop, islands, touch, reached, time):
     """End the sub-steps of all bodies reached (n,) bool, and measure the islands' contacts (see `exact.advance.arrive`)."""
-    motion, memory, limiter, constants = motion_of(loop), memory_of(loop), limiter_of(loop), bodies_of(loop).constants
-    scratch = ProjectionScratch(number_of(loop), limiter.correction)
+    motion, memory, limiter, constants = loop.motion, loop.memory, loop.limiter, loop.bodies.constants
+    scratch = ProjectionScratch(loop.number, limiter.correction)
     for k in range(len(islands.record)):
         members = islands.member[islands.member_first[k] : islands.member_first[k + 1]]
         mine = _part(touch, islands.contact_first[k], islands.contact_first[k + 1])
@@ -490,7 +480,7 @@ def _arrive(loop, islands, touch, reached, time):
     slowed, changes = np.zeros(len(reached), np.bool_), np.empty(count)
     done = limit_energy(limiter, motion.now, constants, motion.trajectory, bodies, time, slowed, changes)
     for s in range(done):
-        log_energy(log_of(loop), time, ENERGY_CORRECTION, changes[s])
+        log_energy(loop.log, time, ENERGY_CORRECTION, changes[s])
     if done == 0:
         return
     for k in range(len(islands.record)):
@@ -525,15 +515,15 @@ def _let_go(loop, member, reached, time, end):
     for i in member:
         in_island[i] = True
     for i in range(len(reached)):
-        left = reached[i] and not in_island[i] and limiter_of(loop).under_contact[i]
-        if left and motion_of(loop).trajectory.start[i] < time:
+        left = reached[i] and not in_island[i] and loop.limiter.under_contact[i]
+        if left and loop.motion.trajectory.start[i] < time:
             _begin_trajectory(loop, i, (time, end), no_wrench, False)
 
 
 @jit_making_arrays
 def _advance(loop, island, touch, members, velocity):
     """Advance an island from its instant: impacts, loads, contact forces, trajectories; island (1,) ISLAND."""
-    motion, constants, used_cycles, calls = motion_of(loop), bodies_of(loop).constants, cycles_of(loop), calls_of(loop)
+    motion, constants, used_cycles, calls = loop.motion, loop.bodies.constants, loop.cycles, loop.calls
     start = cycles()
     _respond(loop, island[0], touch, members)
     responded = cycles()
@@ -541,13 +531,13 @@ def _advance(loop, island, touch, members, velocity):
         for k in range(3):
             motion.acceleration[i, k] = constants.steady_acceleration[i, k]
             motion.angular_acceleration[i, k] = 0.0
-    if settings_of(loop).gyroscopic == 1:
+    if loop.settings.gyroscopic == 1:
         bring_gyroscopic(members, motion.now, motion.rotation, motion.trajectory.inertia, motion.angular_acceleration)
     loaded = cycles()
     touch, held = _hold(loop, island[0], touch, members)
     holding = cycles()
     _begin_trajectories(loop, island[0], members, velocity)
-    set_impact_margins(table_of(loop), touch.place, touch.contacts.gap, held, island[0].time, constants.dynamic)
+    set_impact_margins(loop.table, touch.place, touch.contacts.gap, held, island[0].time, constants.dynamic)
     used_cycles[RESPOND] += responded - start
     used_cycles[LOAD] += loaded - responded
     used_cycles[HOLD] += holding - loaded
@@ -559,23 +549,23 @@ def _advance(loop, island, touch, members, velocity):
 @jit_making_arrays
 def _respond(loop, island, touch, members):
     """Impulses at the contacts that approach (see `exact.impacts`)."""
-    motion, memory, log, contacts, number = motion_of(loop), memory_of(loop), log_of(loop), touch.contacts, len(elsewhere_of(loop))
+    motion, memory, log, contacts, number = loop.motion, loop.memory, loop.log, touch.contacts, len(loop.elsewhere)
     now, collapses = motion.now, find_collapsing(memory, number, contacts)
-    live = find_live(now, contacts, touch.live, touch.speeds, collapses, settings_of(loop).law)
+    live = find_live(now, contacts, touch.live, touch.speeds, collapses, loop.settings.law)
     island.zero_speed, island.scale = live.rule.tolerance, live.rule.scale
     if not live.approach:
         return
-    force, constants = np.empty((contacts.gap.shape[0], 3)), bodies_of(loop).constants
+    force, constants = np.empty((contacts.gap.shape[0], 3)), loop.bodies.constants
     read_forces(memory, motion.trajectory.start, contacts, touch.touching, force)
     response = Response(SEQUENTIAL, live.collapse or bear_each_other(contacts, constants.dynamic, force))
-    done = resolve_impacts(now, constants, members, live, response, number_of(loop), None, impacts_of(loop))
+    done = resolve_impacts(now, constants, members, live, response, loop.number, None, loop.impacts)
     if has_log_capacity(log, ENERGIES, NO_ROWS, done.count):
         log_impacts(log, island.time, contacts, now.position, done.log, done.count)
     else:
-        report(reports_of(loop), NOT_RECORDED, island.time, float(done.count), members)
+        report(loop.reports, NOT_RECORDED, island.time, float(done.count), members)
     remember_rebounds(memory, number, island.time, contacts, touch.contact_margin, done.log[: done.count])
     if done.capped:
-        report(reports_of(loop), WITHOUT_REBOUND, island.time, 0.0, members)
+        report(loop.reports, WITHOUT_REBOUND, island.time, 0.0, members)
     log_energy(log, island.time, IMPACT, done.energy)
     _classify(loop, touch, members)
 
@@ -583,8 +573,8 @@ def _respond(loop, island, touch, members):
 @jit_making_arrays
 def _hold(loop, island, touch, members):
     """Find the lasting contacts of an island, and their forces; returns the contacts and which of them last (see `contact_forces.hold`)."""
-    motion, wrench, memory, constants = motion_of(loop), wrench_of(loop), memory_of(loop), bodies_of(loop).constants
-    time, number, now, contact_log = island.time, len(constants.dynamic), motion.now, contact_log_of(loop)
+    motion, wrench, memory, constants = loop.motion, loop.wrench, loop.memory, loop.bodies.constants
+    time, number, now, contact_log = island.time, len(constants.dynamic), motion.now, loop.contact_log
     close_contacts(contact_log, members, time)
     for i in members:
         for k in range(6):
@@ -600,17 +590,17 @@ def _hold(loop, island, touch, members):
             return touch, held
     lasting = _chosen(touch, _places(held))
     contacts, touching = lasting.contacts, lasting.touching
-    shapes = shapes_of(loop)
+    shapes = loop.shapes
     moves = contact_motion(shapes.geometry, shapes.of_body, motion.rotation, now, contacts, touching.kind, touching.feature)
     turning = Turning(moves, touching, lasting.contact_margin)
-    problem = ContactProblem(now, contacts, members, number_of(loop), moves.turning, motion.acceleration, motion.angular_acceleration)
+    problem = ContactProblem(now, contacts, members, loop.number, moves.turning, motion.acceleration, motion.angular_acceleration)
     forces = Forces(np.empty((contacts.gap.shape[0], 3)), wrench)
     read_forces(memory, motion.trajectory.start, contacts, touching, forces.force)
-    before, rest, step = kinetic_energy(now, constants, members), island.end - time, settings_of(loop).step
-    limits = StepLimits(rest, step, sub_step_of(loop), limiter_of(loop).under_contact)
-    rolling = rolling_of(rolling_coefficients_of(loop), constants.material, now, contacts)
-    solution = hold_turning(None, None, problem, turning, estimate_of(loop), limits, forces, rolling)
-    log_energy(log_of(loop), time, STICK, kinetic_energy(now, constants, members) - before)
+    before, rest, step = kinetic_energy(now, constants, members), island.end - time, loop.settings.step
+    limits = StepLimits(rest, step, loop.sub_step, loop.limiter.under_contact)
+    rolling = rolling_of(loop.rolling, constants.material, now, contacts)
+    solution = hold_turning(None, None, problem, turning, loop.estimate, limits, forces, rolling)
+    log_energy(loop.log, time, STICK, kinetic_energy(now, constants, members) - before)
     failed = solution.residual > UNSOLVED and makes_energy(problem, constants, wrench, None, solution.length)
     if failed:
         for i in members:
@@ -619,7 +609,7 @@ def _hold(loop, island, touch, members):
         for c in range(contacts.gap.shape[0]):
             for k in range(3):
                 forces.force[c, k] = 0.0
-    note_hold(limiter_of(loop), now, constants, contacts, members, np.empty(0, np.int64), True)
+    note_hold(loop.limiter, now, constants, contacts, members, np.empty(0, np.int64), True)
     lasts = contacts.gap.shape[0]
     if has_contact_capacity(contact_log, lasts) and has_capacity(memory, lasts):
         replace_contacts(contact_log, members, time, contacts, now.position, forces.force)
@@ -627,16 +617,16 @@ def _hold(loop, island, touch, members):
         if turns(moves, step) and not failed:
             keep_wrenches(memory, number, time, contacts, solution.force, solution.slides)
     else:
-        report(reports_of(loop), NOT_RECORDED, time, float(lasts), members)
+        report(loop.reports, NOT_RECORDED, time, float(lasts), members)
     if solution.residual > UNSOLVED:
-        report(reports_of(loop), NOT_SOLVED, time, solution.residual, members)
+        report(loop.reports, NOT_SOLVED, time, solution.residual, members)
     island.rests = stands_still(problem, constants, touch.contacts, wrench, solution.length)
     if solution.length < rest and not island.rests:
-        wake = table_of(loop).wake
+        wake = loop.table.wake
         for i in members:
             wake[i] = time + solution.length
     if island.shift > 0.0:
-        look_around(table_of(loop), members, time, island.shift)
+        look_around(loop.table, members, time, island.shift)
     return touch, held
 
 
@@ -662,7 +652,7 @@ def _places(which):
 @jit_making_arrays
 def _correct_positions(loop, island, touch, held, members):
     """Bring sunken contacts back to their gap and look at the island's contacts again (see `contact_forces`)."""
-    motion, constants, time = motion_of(loop), bodies_of(loop).constants, island.time
+    motion, constants, time = loop.motion, loop.bodies.constants, island.time
     now, k = motion.now, len(members)
     place, turn, way = np.empty((k, 3)), np.empty((k, 4)), np.empty((k, 3))
     for s in range(k):
@@ -674,16 +664,16 @@ def _correct_positions(loop, island, touch, held, members):
     around = _contacts_near(loop, members, time)
     lifted, depth = np.zeros(len(around.live), np.bool_), 0.0
     mark_same(touch.contacts, touch.touching, held, around.contacts, around.touching, lifted)
-    correct_positions(now, around.contacts, lifted, around.contact_margin, members, number_of(loop))
+    correct_positions(now, around.contacts, lifted, around.contact_margin, members, loop.number)
     refresh_pose(members, now, motion.rotation, motion.trajectory.inertia)
-    log_energy(log_of(loop), time, POSITION_CORRECTION, mechanical_energy(now, constants, members) - before)
+    log_energy(loop.log, time, POSITION_CORRECTION, mechanical_energy(now, constants, members) - before)
     for s in range(k):
         for j in range(3):
             way[s, j] = now.position[members[s], j] - place[s, j]
     for c in range(len(around.live)):
         depth = max(depth, around.contact_margin[c])
     change = limit_correction_energy(now, constants, around.contacts, members, np.empty(0, np.int64), way, depth)
-    log_energy(log_of(loop), time, ENERGY_CORRECTION, change)
+    log_energy(loop.log, time, ENERGY_CORRECTION, change)
     island.moved = True
     island.shift = shift_of(now, constants.bound_radius, members, place, turn)
     pairs = np.empty(len(touch.place), np.int64)
@@ -700,19 +690,19 @@ def _correct_positions(loop, island, touch, held, members):
 @jit_making_arrays
 def _contacts_near(loop, members, time):
     """What a position correction of the members may close: contacts with all that is near."""
-    used, asked = table_of(loop).number[USED], np.zeros(motion_of(loop).rotation.shape[0], np.bool_)
+    used, asked = loop.table.number[USED], np.zeros(loop.motion.rotation.shape[0], np.bool_)
     for i in members:
         asked[i] = True
     near = np.empty(used, np.int64)
-    radius = bodies_of(loop).constants.bound_radius
-    count = near_pairs(motion_of(loop).trajectory, time, table_of(loop), radius, asked, np.zeros(used, np.bool_), near)
+    radius = loop.bodies.constants.bound_radius
+    count = near_pairs(loop.motion.trajectory, time, loop.table, radius, asked, np.zeros(used, np.bool_), near)
     return _contacts_of(loop, near[:count], FAR_MARGIN, time)
 
 
 @jit_making_arrays
 def _contacts_of(loop, places, margin, time):
     """The contacts of the pairs at these places within `margin` contact margins, at the present poses, sorted by pair."""
-    table, motion, shapes, count = table_of(loop), motion_of(loop), shapes_of(loop), NONE
+    table, motion, shapes, count = loop.table, loop.motion, loop.shapes, NONE
     found = make_found(FIRST_CONTACTS, np.int64(0), np.empty((SCRATCH_ROWS, 2), np.int64))
     while count < 0:
         count = contacts_at(shapes, motion, table, places, margin, found, np.int64(0))
@@ -730,7 +720,7 @@ def _contacts_of(loop, places, margin, time):
 @jit
 def _begin_trajectories(loop, island, members, velocity):
     """New trajectories for members whose velocity, pose or wrench changed (see `exact.trajectories`); velocity (k, 6): before."""
-    now, mode, wrench, under_contact = motion_of(loop).now, motion_of(loop).trajectory.mode, wrench_of(loop), limiter_of(loop).under_contact
+    now, mode, wrench, under_contact = loop.motion.now, loop.motion.trajectory.mode, loop.wrench, loop.limiter.under_contact
     for s in range(members.shape[0]):
         i = members[s]
         if island.rests and mode[i] == FIXED and not island.moved:
@@ -747,17 +737,17 @@ def _begin_trajectories(loop, island, members, velocity):
 @jit_making_arrays
 def _begin_trajectory(loop, i, interval, wrench, rests):
     """Body i gets a new trajectory, from its present state, with a constant wrench (6,); interval: from when to the end of the step, s."""
-    motion, limiter, log, contact_log, time = motion_of(loop), limiter_of(loop), log_of(loop), contact_log_of(loop), interval[0]
-    constants = bodies_of(loop).constants
+    motion, limiter, log, contact_log, time = loop.motion, loop.limiter, loop.log, loop.contact_log, interval[0]
+    constants = loop.bodies.constants
     now, trajectory, one = motion.now, motion.trajectory, np.empty(1, np.int64)
     one[0], total = i, 0.0
     for k in range(3):
         total += now.velocity[i, k] + now.angular_velocity[i, k]
     if not isfinite(total):
         pose_at(trajectory, i, time, now.position[i], now.orientation[i])
-        report(reports_of(loop), NOT_FINITE, time, 0.0, one)
+        report(loop.reports, NOT_FINITE, time, 0.0, one)
         rests = True
-    flush_frames(trajectory, i, time, limiter.correction[i], written_of(loop), frames_of(loop))
+    flush_frames(trajectory, i, time, limiter.correction[i], loop.written, loop.frames)
     for k in range(6):
         limiter.correction[i, k] = 0.0
     close_contacts(contact_log, one, time)
@@ -769,4 +759,4 @@ def _begin_trajectory(loop, i, interval, wrench, rests):
     limiter.under_contact[i] = pressed
     if pressed:
         limiter.energy_at_start[i] = mechanical_energy(now, constants, one)
-    renew_pairs(bodies_of(loop), margins_of(loop), table_of(loop), trajectory, i, interval)
+    renew_pairs(loop.bodies, loop.margins, loop.table, trajectory, i, interval)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
-from rigidimpulse.core.packed import Packed, field
+from rigidimpulse.core.record import Record
 
 
 class Inner(NamedTuple):
@@ -25,7 +25,6 @@ class Outer(NamedTuple):
 
 
 ROW = np.dtype([("a", np.float64), ("b", np.float64, (3,)), ("c", np.bool_)])
-count_of, inner_of, rows_of = field("count"), field("inner"), field("rows")
 
 
 @jit
@@ -37,10 +36,10 @@ def first_of(optional):
 
 
 @jit_making_arrays
-def read_and_write(words, out):
+def read_and_write(record, out):
     """Numbers of all fields into out, and a change of each array."""
-    inner, rows = inner_of(words), rows_of(words)
-    out[0], out[1] = count_of(words), inner.number
+    inner, rows = record.inner, record.rows
+    out[0], out[1] = record.count, inner.number
     out[2], out[3] = inner.matrix[1, 2], rows[1].b[2]
     out[4] = 1.0 if inner.flags[1] else 0.0
     out[5] = first_of(inner.optional)
@@ -49,8 +48,8 @@ def read_and_write(words, out):
 
 
 @jit
-def through(words, out):
-    return read_and_write(words, out)
+def through(record, out):
+    return read_and_write(record, out)
 
 
 def make(optional: np.ndarray | None, matrix: np.ndarray) -> Outer:
@@ -67,7 +66,8 @@ def test_kernels_read_and_write_what_the_tuple_holds(optional: np.ndarray | None
     matrix = np.arange(24.0).reshape(4, 6)[::2, ::2] if is_view else np.arange(6.0).reshape(2, 3)
     record, out = make(optional, matrix), np.zeros(6)
     expected = matrix[1, 2]
-    assert through(Packed(record).words, out) == 23
+    assert through(Record(record), out) == 23
+    assert through(record, np.zeros(6)) == 23
     np.testing.assert_array_equal(out, [3, 0.25, expected, 7.0, 1.0, 0.0 if optional is None else 9.0])
     assert matrix[0, 0] == -1.0
     assert record.rows["a"][0] == -2.0
@@ -76,15 +76,15 @@ def test_kernels_read_and_write_what_the_tuple_holds(optional: np.ndarray | None
 def test_a_part_can_be_replaced():
     """Buffers grow: the words then hold the new ones."""
     record, out = make(None, np.zeros((2, 3))), np.zeros(6)
-    packed = Packed(record)
+    packed = Record(record)
     larger = np.zeros(5, ROW).view(np.recarray)
     larger["b"][1, 2] = 5.0
     packed.replace(2, larger)
-    through(packed.words, out)
+    through(packed, out)
     assert out[3] == 5.0
 
 
 def test_other_things_are_refused():
     """A bool has a size of its own, so the layout would not be what Python writes."""
     with pytest.raises(TypeError, match="not bool"):
-        Packed(Outer(True, make(None, np.zeros((2, 3))).inner, np.zeros(1, ROW)))
+        Record(Outer(True, make(None, np.zeros((2, 3))).inner, np.zeros(1, ROW)))
