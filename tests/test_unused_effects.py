@@ -73,7 +73,7 @@ EFFECTS = {
     ),
     "contact forces": (
         "balls", 'scene.gravity = (0, 0, -1)\nscene.add(ri.Body("floor", ri.Shape.half_space(offset=-0.1), motion="static"))',
-        ["dynamics.solvers.newton"],
+        ["engine.exact.step_size", "engine.exact.event_loop"],
     ),
     "contact detection": (
         "flight", 'scene.add(ri.Body("b", ri.Shape.box(1), position=(0, 0, -9)))', ["collision.broad_phase", "collision.time_of_impact"]
@@ -85,7 +85,7 @@ EFFECTS = {
     "gyroscopic term": ("balls", 'scene.add(ri.Body("d", ri.Shape.box((1, 2, 3)), position=(9, 9, 9)))', []),
 }
 """Name in the plan: the plain scene, what calls for the effect, modules of the package whose kernels are the effect's."""
-KERNELS = {"springs", "joints", "rolling friction", "sub-stepped islands", "contact forces", "contact detection", "event kernel"}
+KERNELS = {"springs", "joints", "sub-stepped islands", "contact forces", "contact detection", "event kernel"}
 """Effects with kernels of their own."""
 ASKED_FOR = (
     "rigidimpulse.dynamics.forces.", "rigidimpulse.dynamics.soft_body", "rigidimpulse.io", "rigidimpulse.engine.triggers",

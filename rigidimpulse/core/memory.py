@@ -1,6 +1,6 @@
-"""Arrays of zeros of which only the pages that are touched take memory.
+"""Arrays of zeros: rows of records for kernels, and arrays of which only the pages that are touched take memory.
 
-Those of numpy nearly do that, too. But of large ones it asks for pages of 2 MB, of which a few scattered rows fill many.
+Those of numpy nearly do the latter, too. But of large ones it asks for pages of 2 MB, of which a few scattered rows fill many.
 """
 
 from __future__ import annotations
@@ -10,6 +10,24 @@ from mmap import ACCESS_COPY, mmap
 
 import numpy as np
 from numpy.typing import DTypeLike
+
+from rigidimpulse.core.kernels import INTERPRETED
+
+
+def rows_of(count: int, dtype: np.dtype) -> np.ndarray:
+    """Return zeroed rows (count,) of a structured dtype for kernels, which write row.field.
+
+    Where kernels run as the Python they are written in, numpy must understand that, too.
+    """
+    rows = np.zeros(count, dtype)
+    return rows.view(np.recarray) if INTERPRETED else rows
+
+
+def longer(rows: np.ndarray, count: int) -> np.ndarray:
+    """Return the same rows with `count` zeroed ones behind them."""
+    out = rows_of(len(rows) + count, rows.dtype)
+    out[: len(rows)] = rows
+    return out
 
 
 def reserve(shape: tuple[int, ...], dtype: DTypeLike) -> np.ndarray:

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from rigidimpulse.core.kernels import INTERPRETED
 from rigidimpulse.dynamics.forces import KINDS
 from rigidimpulse.engine.effects import EventKernel, SubsteppedContact, TriggerVolumes, all_effects
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
@@ -67,7 +68,7 @@ def make_run(world: World, plan: Plan, recorder: Recorder, log: EventLog) -> Run
 
 def _bind_compiled_loop(run: Run) -> None:
     """Give a run the compiled order of events if it is in the cache; if not, have it compiled for the runs to come."""
-    if why_not_compiled(run.world, run.plan):
+    if INTERPRETED or why_not_compiled(run.world, run.plan):
         return
     compiled = CompiledLoop(run)
     if compiled.is_compiled():

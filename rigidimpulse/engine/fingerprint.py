@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.core.kernels import source_digest
+from rigidimpulse.core.kernel_cache import source_digest
 from rigidimpulse.core.version import VERSION
 from rigidimpulse.engine import simulate as simulation
 from rigidimpulse.scene.scene import Scene

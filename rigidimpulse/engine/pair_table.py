@@ -16,6 +16,7 @@ import numpy as np
 
 from rigidimpulse.collision.broad_phase import overlapping_with
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.memory import rows_of
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.model.world import BodyConstants, World
 from rigidimpulse.motion.trajectory import FIXED, FREE, JERK, place_at, rate_of, row_at, turning_points
@@ -78,7 +79,7 @@ class PairTable(NamedTuple):
 
 def make_pairs(capacity: int) -> np.ndarray:
     """Rows (c,) PAIR of a table."""
-    return np.zeros(capacity, PAIR).view(np.recarray)
+    return rows_of(capacity, PAIR)
 
 
 @jit_making_arrays

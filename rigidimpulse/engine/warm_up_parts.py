@@ -38,6 +38,7 @@ from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, LOOP, ROLLING, SUBSTEPPED
+from rigidimpulse.model.contact_memory import grown, make_memory
 from rigidimpulse.model.contacts import Contacts, Touching
 from rigidimpulse.model.island import empty_contacts
 from rigidimpulse.motion.evaluate import bring_all, bring_gyroscopic, refresh_pose
@@ -144,6 +145,7 @@ def _move(run: Run) -> None:
     pair_events = PairEvents(run, 1.0 / 60.0)
     pair_events.find_pairs()
     pair_events.trajectory_changed(1, 0.0)
+    grown(make_memory(), 1)
     set_impact_margins(pair_events.table, np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool), 0.0, world.dynamic)
     bisection.sweep(run.detector, state.trajectory, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
 

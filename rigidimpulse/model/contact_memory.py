@@ -18,6 +18,7 @@ import numpy as np
 
 from rigidimpulse.collision.distance.simplices import FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.memory import rows_of
 
 HELD = np.dtype(
     [
@@ -67,8 +68,8 @@ def make_memory(pairs: int = FIRST_PAIRS, held: int = FIRST_HELD, forces: int = 
     """An empty memory with these numbers of places; pairs: a power of two."""
     integers = np.full((2, pairs), -1, np.int64)
     return ContactMemory(
-        integers[0], np.full(pairs, -np.inf), np.zeros(pairs), np.zeros(pairs, np.int64), integers[1], np.zeros(held, HELD),
-        np.zeros(forces, FORCE), np.zeros(3, np.int64),
+        integers[0], np.full(pairs, -np.inf), np.zeros(pairs), np.zeros(pairs, np.int64), integers[1], rows_of(held, HELD),
+        rows_of(forces, FORCE), np.zeros(3, np.int64),
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.memory import longer, rows_of
 from rigidimpulse.core.vector import tangents
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.impulses import ImpulseAccounts
@@ -118,7 +119,7 @@ class ContactLog:
     def __init__(self, times: np.ndarray, num_bodies: int, accounts: ImpulseAccounts) -> None:
         """times (f,) s, of the frames; accounts: where impulses go."""
         stretch, marked = np.full(num_bodies, -1), np.zeros(num_bodies, bool)
-        self.buffers = ContactBuffers(times, np.zeros(FIRST_ROWS, ROW_DTYPE), stretch, marked, np.zeros(3, np.int64))
+        self.buffers = ContactBuffers(times, rows_of(FIRST_ROWS, ROW_DTYPE), stretch, marked, np.zeros(3, np.int64))
         self._accounts = accounts
         self._done: list[np.ndarray] = []
 
@@ -142,7 +143,7 @@ class ContactLog:
         size = len(rows)
         while used + more > size or 2 * used > size:
             size *= 2
-        self.buffers = self.buffers._replace(rows=np.concatenate([rows, np.zeros(size - len(rows), ROW_DTYPE)]))
+        self.buffers = self.buffers._replace(rows=longer(rows, size - len(rows)))
 
     def table(self) -> np.ndarray:
         """All contacts that a frame sees, in order of their start. Those that last carry their forces to the last frame."""

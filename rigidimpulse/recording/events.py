@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.memory import rows_of
 
 if TYPE_CHECKING:
     from rigidimpulse.model.contacts import Contacts
@@ -126,13 +127,13 @@ class Event:
 def _first_buffers() -> LogBuffers:
     """Empty ones."""
     impacts = np.zeros((FIRST_ROWS, ROW_LENGTH))
-    return LogBuffers(np.zeros(FIRST_ROWS, ENERGY_DTYPE), np.zeros(FIRST_ROWS, STRETCH_DTYPE), impacts, np.zeros(6, np.int64))
+    return LogBuffers(rows_of(FIRST_ROWS, ENERGY_DTYPE), rows_of(FIRST_ROWS, STRETCH_DTYPE), impacts, np.zeros(6, np.int64))
 
 
 def _doubled(rows: np.ndarray, least: int) -> np.ndarray:
     """Rows that double until there are enough."""
     while len(rows) < least:
-        rows = np.concatenate([rows, np.zeros_like(rows)])
+        rows = longer(rows, len(rows)) if rows.dtype.names else np.concatenate([rows, np.zeros_like(rows)])
     return rows
 
 

@@ -94,8 +94,8 @@ MUTATIONS = (
     Mutation(
         "position correction: towards the contact margin",
         "dynamics/constraints/position_correction.py",
-        "rows.bias[:] = contacts.gap - target",
-        "rows.bias[:] = target - contacts.gap",
+        "rows.bias[c] = contacts.gap[c] - target",
+        "rows.bias[c] = target - contacts.gap[c]",
         ("laws/test_position_correction.py",),
     ),
     Mutation(

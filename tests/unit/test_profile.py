@@ -13,6 +13,10 @@ def falling_box() -> ri.Scene:
     return scene
 
 
+EVENTS = ("collision.time_of_impact.search.first_contacts", "engine.exact.event_loop.run_events")
+"""Kernels that find impacts: the compiled order of events is used as soon as it lies in the cache."""
+
+
 def test_stages_add_up_to_the_time_of_the_run() -> None:
     ri.simulate(falling_box(), 0.5)
     start = time.perf_counter()
@@ -30,7 +34,7 @@ def test_kernels_are_those_of_this_run() -> None:
     run, again = ri.simulate(falling_box(), 0.5), ri.simulate(falling_box(), 0.5)
     assert run.profile is not None
     assert again.profile is not None
-    sweeps = [p.kernels["collision.time_of_impact.search.first_contacts"].calls for p in (run.profile, again.profile)]
+    sweeps = [sum(p.kernels[name].calls for name in EVENTS if name in p.kernels) for p in (run.profile, again.profile)]
     assert sweeps[0] - sweeps[1] in (0, -1)  # the very first call may have loaded it, which counts elsewhere
     assert again.profile.preparing == 0.0
     times = [kernel.seconds for kernel in again.profile.kernels.values()]
@@ -48,5 +52,5 @@ def test_the_table_names_stages_and_kernels() -> None:
     assert profile is not None
     lines = profile.table().splitlines()
     assert lines[0].split() == ["stage", "s", "share"]
-    assert any(line.startswith("collision.time_of_impact.search.first_contacts") for line in lines)
+    assert any(line.startswith(EVENTS) for line in lines)
     assert lines[-1].startswith("loading or compiling kernels") and "0.000" in lines[-1]

@@ -12,16 +12,21 @@ from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.gallery import load
 
 PROGRAM = """
+import numpy as np
 import rigidimpulse as ri
+from rigidimpulse.engine.absent import NoCompiledLoop
+from rigidimpulse.engine.simulate import complete, prepare
 from rigidimpulse.engine import warm_up_parts
 from rigidimpulse.core.kernels import KERNELS
 from rigidimpulse.gallery import load
 
 for half in (warm_up_parts.{first}, warm_up_parts.{second}):
-    half(warm_up_parts._box_on_floor(False, {jointed}))
+    half(warm_up_parts._box_on_floor(False, {jointed}, False))
 ahead = {{kernel.name: set(kernel.entry.overloads) for kernel in KERNELS if kernel.entry.overloads}}
 entry = load("{scene}")
-ri.simulate(entry.scene(), 0.3, accuracy=entry.accuracy)
+run = prepare(entry.scene(), np.arange(19) / 60.0, entry.accuracy)
+run.compiled = NoCompiledLoop()
+complete(run, 0.3)
 for kernel in KERNELS:
     if kernel.name in ahead and set(kernel.entry.overloads) - ahead[kernel.name]:
         print(kernel.name)
@@ -47,7 +52,10 @@ def test_runs_call_what_was_compiled_ahead(first, second, jointed, scene):
 
 
 FIRST_RUN = """
+import numpy as np
 import rigidimpulse as ri
+from rigidimpulse.engine.absent import NoCompiledLoop
+from rigidimpulse.engine.simulate import complete, prepare
 from rigidimpulse.engine import warm_up_parts
 from rigidimpulse.core.kernels import KERNELS
 
@@ -55,10 +63,12 @@ def used():
     return {kernel.name for kernel in KERNELS if kernel.calls or kernel.preparing}
 
 for half in (warm_up_parts._respond_and_detect, warm_up_parts._move_and_sweep):
-    half(warm_up_parts._box_on_floor(False))
+    half(warm_up_parts._box_on_floor(False, False, False))
 ahead = used()
 floor = ri.Body("floor", ri.Shape.half_space(), motion="static")
-run = ri.simulate(ri.Scene(bodies=[floor, ri.Body("box", ri.Shape.box(0.2), position=(0, 0, 1))]), 1.0)
+prepared = prepare(ri.Scene(bodies=[floor, ri.Body("box", ri.Shape.box(0.2), position=(0, 0, 1))]), np.arange(61) / 60.0)
+prepared.compiled = NoCompiledLoop()
+run = complete(prepared, 1.0)
 assert len(run.impacts) > 1 and len(run.contacts) > 0
 print(*sorted(used() - ahead))
 """

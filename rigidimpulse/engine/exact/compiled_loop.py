@@ -11,6 +11,7 @@ import numpy as np
 from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS
 from rigidimpulse.collision.time_of_impact.bisection import LOOK_AHEAD
 from rigidimpulse.core.kernel_cache import note_beside
+from rigidimpulse.core.memory import rows_of
 from rigidimpulse.core.record import Record
 from rigidimpulse.dynamics.impact.restitution import LAWS
 from rigidimpulse.engine.exact.contact_forces import NOT_SOLVED_REMEDY
@@ -95,7 +96,7 @@ TABLE, MEMORY, LIMITER, LOG, CONTACT_LOG, SOLVE_COUNT, REPORTS = (
 def _make_reports(number: int) -> Reports:
     """Space for twice the problems that an event of `number` bodies may have."""
     most = 2 * ENERGIES * (number + 1)
-    return Reports(np.zeros(most, REPORT), np.empty(most, np.int64), np.zeros(2, np.int64))
+    return Reports(rows_of(most, REPORT), np.empty(most, np.int64), np.zeros(2, np.int64))
 
 
 class CompiledLoop:

@@ -129,7 +129,9 @@ def _hold_jointed(
 
 
 def _rolling(run: Run, problem: ContactProblem) -> Rolling | None:
-    """Rolling friction of the contacts."""
+    """Rolling friction of the contacts, None where no material asks for any."""
+    if run.world.rolling is None:
+        return None
     return rolling_of(run.world.rolling, run.world.material_of_body, problem.bodies, problem.contacts)
 
 
