@@ -9,6 +9,7 @@ bound of numba's version, and `tests/unit/test_numba_private.py` says which line
 | `_NoArraysMade` | refuses such a kernel where it would have to count | memory that is never freed |
 | `_PartLibrary`, `_EntryLibrary` | kernels that only kernels call are optimised once, in what Python calls | LLVM takes more of the time |
 | `_RememberedTypes`, `_KernelFlags` | the types of `a + b` and the flags of kernels are looked up but once | more of it goes to types |
+| `AttributeTemplate` | types of the fields of records (`record.py`); `infer_getattr`, which is public, asks for one | no records |
 | `_NEEDLESS` | leaves out passes for what kernels do not do | the same |
 
 That a compiler and its passes can be replaced (`pipeline_class`, `CompilerBase`, `define_pipelines`, `register_pass`) stands in numba's
@@ -25,6 +26,7 @@ from numba.core.compiler import Compiler, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.errors import NumbaError
 from numba.core.typed_passes import InlineOverloads, NopythonRewrites, NopythonTypeInference
+from numba.core.typing.templates import AttributeTemplate as AttributeTemplate
 from numba.core.untyped_passes import InlineClosureLikes, InlineInlinables, LiteralPropagationSubPipelinePass, LiteralUnroll, WithLifting
 
 _NEEDLESS = {

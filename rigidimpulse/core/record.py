@@ -19,8 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from llvmlite import ir
 from numba import typeof, types
-from numba.core.typing.templates import AttributeTemplate
 from numba.extending import NativeValue, infer_getattr, lower_getattr_generic, models, register_model, typeof_impl, unbox
+
+from rigidimpulse.core.numba_private import AttributeTemplate
 
 
 class Record:

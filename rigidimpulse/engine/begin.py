@@ -52,7 +52,7 @@ def begin_run(world: World, plan: Plan, times: np.ndarray, left_out: Mapping[str
     run.recorder.start(run.state.trajectory)
     resolve_overlaps(run)
     _bind_observers(run)
-    _bind_compiled_loop(run)
+    bind_compiled_loop(run)
     return run
 
 
@@ -66,7 +66,7 @@ def make_run(world: World, plan: Plan, recorder: Recorder, log: EventLog) -> Run
     return run
 
 
-def _bind_compiled_loop(run: Run) -> None:
+def bind_compiled_loop(run: Run) -> None:
     """Give a run the compiled order of events if it is in the cache; if not, have it compiled for the runs to come."""
     if INTERPRETED or why_not_compiled(run.world, run.plan):
         return

@@ -33,6 +33,8 @@ LAST = {
     JOINTS: ("dynamics.constraints.joint_sub_step", "close_at_end"),
 }
 """The kernel of each kind that is compiled last."""
+_BACKGROUND: list[subprocess.Popen] = []
+"""Processes that nobody waits for."""
 PARTS_MODULE = "rigidimpulse.engine.warm_up_parts"
 NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 2}
 
@@ -75,7 +77,7 @@ def compile_kernels(world: World, kinds: list[str]) -> None:
 def compile_loop_in_background(world: World) -> None:
     """Start a process that compiles the order of events for worlds like this one; it goes on by itself."""
     rolling = [] if world.rolling is None else [ROLLING]
-    _process(LOOP, "0", *([CYLINDERS] if world.cylinders is not None else []), *rolling)
+    _BACKGROUND.append(_process(LOOP, "0", *([CYLINDERS] if world.cylinders is not None else []), *rolling))
 
 
 def _process(*arguments: str) -> subprocess.Popen:

@@ -116,10 +116,10 @@ def replace_contacts(buffers, bodies, time, contacts, position, force):
 class ContactLog:
     """Collects contact forces while a run goes on; those that no frame sees are dropped."""
 
-    def __init__(self, times: np.ndarray, num_bodies: int, accounts: ImpulseAccounts) -> None:
-        """times (f,) s, of the frames; accounts: where impulses go."""
+    def __init__(self, times: np.ndarray, num_bodies: int, accounts: ImpulseAccounts, first_rows: int = FIRST_ROWS) -> None:
+        """times (f,) s, of the frames; accounts: where impulses go; first_rows: contacts that there is space for at first."""
         stretch, marked = np.full(num_bodies, -1), np.zeros(num_bodies, bool)
-        self.buffers = ContactBuffers(times, rows_of(FIRST_ROWS, ROW_DTYPE), stretch, marked, np.zeros(3, np.int64))
+        self.buffers = ContactBuffers(times, rows_of(first_rows, ROW_DTYPE), stretch, marked, np.zeros(3, np.int64))
         self._accounts = accounts
         self._done: list[np.ndarray] = []
 

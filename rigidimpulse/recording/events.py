@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import jit
-from rigidimpulse.core.memory import rows_of
+from rigidimpulse.core.memory import longer, rows_of
 
 if TYPE_CHECKING:
     from rigidimpulse.model.contacts import Contacts

@@ -17,6 +17,7 @@ import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.version import VERSION
+from rigidimpulse.engine.begin import bind_compiled_loop
 from rigidimpulse.engine.fingerprint import fingerprint
 from rigidimpulse.io.cache.file import FRAMES, SUFFIXES, CacheFile, Content, Header, read
 from rigidimpulse.io.cache.freeze import Constants, freeze, thaw
@@ -84,7 +85,9 @@ class Checkpointer:
             getattr(recorder, name)[: len(frames)] = frames
         log.buffers = log.buffers._replace(impacts=np.concatenate([stored.impacts, log.buffers.impacts]))
         self._frames, self._impacts = len(stored.frames["position"]), len(stored.impacts)
-        return thaw(stored.state or b"", _constants(run))
+        known = thaw(stored.state or b"", _constants(run))
+        bind_compiled_loop(known)
+        return known
 
     def look(self, time: float, more: Callable[[float], None] | None = None) -> None:
         """Write a checkpoint if it is time to; call `more` with the time of the run [s]."""

@@ -36,6 +36,7 @@ LINE = 64
 HOMES = (
     "core.quaternion", "core.simd", "core.workers", "scene.accuracy", "scene.mass", "scene.joint", "scene.joint_six_axis",
     "collision", "motion", "model", "dynamics", "engine.exact", "engine.substepped", "engine.spheres", "engine.absent", "engine.islands",
+    "engine.finder", "engine.touching",
     "engine.keyframe_paths", "engine.pair_events", "engine.pair_table", "engine.regime", "engine.run", "engine.soft_bodies",
     "engine.triggers", "engine.varying_forces", "recording.contact_log", "recording.contacts", "recording.events", "recording.impulses",
     "recording.recorder", "io.cache.freeze",
