@@ -124,6 +124,8 @@ class PairEvents:
     def _append(self, first: np.ndarray, second: np.ndarray, start: float) -> None:
         """Add pairs whose bodies may meet and that are not there yet."""
         self._grow(len(first))
+        # Rows of a transposed array are another type to kernels.
+        first, second = np.ascontiguousarray(first), np.ascontiguousarray(second)
         append_pairs(self._bodies, self.run.world.margins, self.table, first, second, start)
 
     def _grow(self, needed: int) -> None:

@@ -35,6 +35,7 @@ from rigidimpulse.engine.regime import TALL, island_roots, refusals, support_lev
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still
 from rigidimpulse.engine.spheres.run import EventRun
+from rigidimpulse.engine.step import step
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, LOOP, ROLLING, SUBSTEPPED
@@ -108,6 +109,12 @@ def _respond_and_detect(run: Run) -> None:
     islands, _ = touching_islands(run, pair_events, 0.0, members)
     island = islands[0]
     respond(run, pair_events, island)
+    pair_events.bodies_at(0.0)
+    pair_events.count_contacts(0.0)
+    # What is left is what the steps of a body that falls and rests call.
+    run.recorder.start(run.state.trajectory)
+    for number in range(1, 4):
+        step(run, number * STEP)
 
 
 def _record(run: Run, contacts: Contacts, members: np.ndarray) -> None:
