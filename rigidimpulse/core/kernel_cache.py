@@ -30,6 +30,8 @@ _DIGITS = 16
 """Of a digest that are in the name of a folder."""
 _KEPT = 4
 """Folders of a module that are kept: one for each of its latest states."""
+OF_THIS_PROCESS = "rigidimpulse_kernels_"
+"""Begins the name of a folder that other processes do not know of."""
 _configuration = threading.Lock()
 
 
@@ -79,7 +81,7 @@ def _root(chosen: str) -> Path:
         except OSError:
             continue
         return root
-    return Path(tempfile.mkdtemp(prefix="rigidimpulse_kernels"))  # Of this process only.
+    return Path(tempfile.mkdtemp(prefix=OF_THIS_PROCESS))
 
 
 @cache
@@ -115,3 +117,8 @@ def is_in_cache(function: Callable[..., Any]) -> bool:
 def note_beside(function: Callable[..., Any], name: str) -> Path:
     """A file in the folder of a kernel of these sources, for what is to be known of it by other processes."""
     return _folder(Path(function.__code__.co_filename), _numba.config.CACHE_DIR) / name
+
+
+def is_kept() -> bool:
+    """Whether other processes will find what this one compiles."""
+    return not _root(_numba.config.CACHE_DIR).name.startswith(OF_THIS_PROCESS)

@@ -17,6 +17,7 @@ import numpy as np
 from rigidimpulse.collision.broad_phase import overlapping_with
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.memory import rows_of
+from rigidimpulse.core.sorted_values import is_among
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.model.world import BodyConstants, World
 from rigidimpulse.motion.trajectory import FIXED, FREE, JERK, place_at, rate_of, row_at, turning_points
@@ -118,19 +119,6 @@ def path_boxes(trajectory, members, begin, end, radius, box_min, box_max):
 
 
 @jit
-def _stays_apart(apart, key):
-    """Whether a pair is one of those (p,), ascending, that do not touch each other by order."""
-    low, high = 0, len(apart)
-    while low < high:
-        middle = (low + high) // 2
-        if apart[middle] < key:
-            low = middle + 1
-        else:
-            high = middle
-    return low < len(apart) and apart[low] == key
-
-
-@jit
 def is_swept(table, dynamic, a, b):
     """Whether a pair is swept: the sub-stepped regime looks after those of its members, and nothing moves those that sleep."""
     free = (dynamic[a] and not table.inside[a]) or (dynamic[b] and not table.inside[b])
@@ -147,7 +135,7 @@ def append_pairs(bodies, margins, table, first, second, start):
     for k in range(first.shape[0]):
         a, b = min(first[k], second[k]), max(first[k], second[k])
         collides = bodies.can_collide == 1 and (dynamic[a] or dynamic[b])
-        if not (collides and is_swept(table, dynamic, a, b)) or _stays_apart(bodies.apart, a * len(dynamic) + b):
+        if not (collides and is_swept(table, dynamic, a, b)) or is_among(bodies.apart, a * len(dynamic) + b):
             continue
         if table.number[USED] == len(table.pairs):
             table.number[SHORT] = 1

@@ -17,7 +17,7 @@ import numpy as np
 
 from rigidimpulse.core.errors import unknown_name
 from rigidimpulse.core.kernels import jit
-from rigidimpulse.recording.recorder import first_frame
+from rigidimpulse.core.sorted_values import place_in
 
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force_log import ForceWork
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 def add_forces(times, start, end, force, gain):
     """Add what constant forces (m, 3) N give from start to end (m,) s to the gains since the frame before (f + 1, 3) N s, one by one."""
     for r in range(force.shape[0]):
-        begin, last = start[r], first_frame(times, end[r])
-        for f in range(first_frame(times, begin), last + 1):
+        begin, last = start[r], place_in(times, end[r])
+        for f in range(place_in(times, begin), last + 1):
             until = times[f] if f < last else end[r]
             for k in range(3):
                 gain[f, k] += (until - begin) * force[r, k]

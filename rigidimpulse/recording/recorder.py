@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import inlined, jit
+from rigidimpulse.core.sorted_values import place_in
 from rigidimpulse.motion.trajectory import FIXED, LINEAR, Trajectories, motion_at, stepped_at
 
 
@@ -51,19 +52,6 @@ def _write_fixed(trajectory, i, f, frames):
 
 
 @jit
-def first_frame(times, time):
-    """Number of the first frame at or after `time` [s]; times (f,) s, increasing."""
-    low, high = np.int64(0), np.int64(times.shape[0])
-    while low < high:
-        middle = (low + high) // 2
-        if times[middle] < time:
-            low = middle + 1
-        else:
-            high = middle
-    return low
-
-
-@jit
 def sample_path(trajectory, i, last, written, frames):
     """Write the frames of body i from written[i] to last - 1, on its present trajectory, and say so in `written` (n,)."""
     times, position, orientation = frames.times, frames.position, frames.orientation
@@ -92,7 +80,7 @@ def flush_frames(trajectory, i, time, correction, written, frames):
     correction (6,): change of velocity [m/s] and spin [rad/s] that it got at the end of its trajectory, for the error of
     the trajectory, which grew with the square of the time.
     """
-    first, last = written[i], first_frame(frames.times, time)
+    first, last = written[i], place_in(frames.times, time)
     if last <= first:
         return
     sample_path(trajectory, i, last, written, frames)

@@ -74,7 +74,7 @@ OLD_WORDS = (
     ), "the lanes of a SIMD vector are its elements"),
     OldWord("core", "skeleton of a rounded shape; inset surface", (
         "rigidimpulse.core", "rigidimpulse/core", "numba.core", '"core.', "'core.", "`core`", "`core/", "`core.", "| core |", "core <-",
-        "core/", "usd-core", "usd_core", "Cores and SIMD",
+        "core/", "\"core\"", "(core|np", "usd-core", "usd_core", "Cores and SIMD",
         "physical core", "processor core", "one core", "two cores", "four cores", "all cores", "many cores", "more cores", "shared cores",
         "number_of_cores", "MOST_CORES", "most_cores", "several cores", "other cores", "number of cores", "each core works", "['cores']",
         '["cores"]', '"cores"', "{cores}", "cores=", "test_cores", "s} cores", "]} cores",

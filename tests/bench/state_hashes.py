@@ -3,6 +3,7 @@
     python tests/bench/state_hashes.py > after.txt                 all of them, one line each: name, hash, processor seconds
     python tests/bench/state_hashes.py --against before.txt        the same, and which differ from a file that was written before
     python tests/bench/state_hashes.py spot pile --seeds 0 20      some
+    python tests/bench/state_hashes.py --loop compiled             with the compiled order of events, or with the loop in `python`
 
 A hash depends on the processor, on numpy and on numba, so two files are compared only where both were written on one machine.
 A scene without a hash (an error, or the limit of time) is counted apart: it is not compared, even where both trees say the same.
@@ -23,37 +24,43 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "invariants"))
 
 from scene_plans import Dice, make_plan, make_scene
 
-import rigidimpulse as ri
 from rigidimpulse import gallery
+from rigidimpulse.engine.absent import NoCompiledLoop
+from rigidimpulse.engine.exact.compiled_loop import CompiledLoop, why_not
+from rigidimpulse.engine.simulate import complete, frame_times, prepare
 
 SEED = "seed_"
 LENGTH = 16
 """Characters of a hash that are printed."""
 
 
-def hash_of(name: str) -> tuple[str, str, float]:
-    """Name, state hash or error, and processor seconds of one scene."""
+def hash_of(name: str, loop: str = "") -> tuple[str, str, float]:
+    """Name, state hash or error, and processor seconds of one scene; loop: "compiled" or "python", "" for what a user gets."""
     start = process_time()
     try:
         if name.startswith(SEED):
             plan = make_plan(Dice(int(name.removeprefix(SEED))))
-            run = ri.simulate(make_scene(plan), plan.duration)
+            scene, duration, fps, accuracy = make_scene(plan), plan.duration, 60.0, "standard"
         else:
             entry = gallery.load(name)
-            run = ri.simulate(entry.scene(), entry.duration, entry.fps, accuracy=entry.accuracy)
-        result = run.state_hash()[:LENGTH]
+            scene, duration, fps, accuracy = entry.scene(), entry.duration, entry.fps, entry.accuracy
+        run = prepare(scene, frame_times(duration, fps), accuracy)
+        if loop:
+            uses = loop == "compiled" and not why_not(run.world, run.plan)
+            run.compiled = CompiledLoop(run) if uses else NoCompiledLoop()
+        result = complete(run, duration).state_hash()[:LENGTH]
     except Exception as error:
         result = type(error).__name__
     return name, result, process_time() - start
 
 
-def _answer(sender, name: str, limit: int) -> None:
+def _answer(sender, name: str, limit: int, loop: str) -> None:
     """Send the hash of a scene from a process that the system ends after `limit` s of processor time."""
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
-    sender.send(hash_of(name))
+    sender.send(hash_of(name, loop))
 
 
-def hashes(names: list[str], jobs: int, limit: int) -> Iterator[tuple[str, str, float]]:
+def hashes(names: list[str], jobs: int, limit: int, loop: str = "") -> Iterator[tuple[str, str, float]]:
     """The hashes of scenes, each from a process of its own, in the order in which they end."""
     context = multiprocessing.get_context("fork")
     waiting, running = list(names), []
@@ -61,7 +68,7 @@ def hashes(names: list[str], jobs: int, limit: int) -> Iterator[tuple[str, str, 
         while waiting and len(running) < jobs:
             receiver, sender = context.Pipe(duplex=False)
             name = waiting.pop(0)
-            process = context.Process(target=_answer, args=(sender, name, limit))
+            process = context.Process(target=_answer, args=(sender, name, limit, loop))
             process.start()
             sender.close()
             running.append((name, process, receiver))
@@ -89,6 +96,7 @@ def main() -> int:
     parser.add_argument("--against", type=Path, help="a file that was written before")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--limit", type=int, default=300, help="s of processor time that a scene may take")
+    parser.add_argument("--loop", choices=("compiled", "python"), default="", help="which of both loops deals with exact contact")
     options = parser.parse_args()
     names = options.names or ([] if options.seeds else [*gallery.names(), *gallery.hard_names()])
     names = names + [f"{SEED}{seed}" for seed in range(*(options.seeds or (0, 0)))]
@@ -96,7 +104,7 @@ def main() -> int:
     if options.against:
         before = dict(line.split()[:2] for line in options.against.read_text().splitlines())
     differ, without = [], []
-    for name, result, seconds in hashes(names, options.jobs, options.limit):
+    for name, result, seconds in hashes(names, options.jobs, options.limit, options.loop):
         changed = name in before and before[name] != result
         print(f"{name:32} {result:16} {seconds:8.2f}{f'  was {before[name]}' if changed else ''}", flush=True)
         differ += [name] if changed else []

@@ -32,26 +32,26 @@ print(outer(kind(10.0, 3.0)), len(outer.entry.stats.cache_hits))
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
     """What kernels need of the package, where sources can be changed, with a kernel that calls one of another file."""
-    core = tmp_path / "rigidimpulse" / "core"
-    core.mkdir(parents=True)
-    (core.parent / "__init__.py").touch()
-    (core / "__init__.py").touch()
+    folder = tmp_path / "rigidimpulse" / "core"
+    folder.mkdir(parents=True)
+    (folder.parent / "__init__.py").touch()
+    (folder / "__init__.py").touch()
     for name in ("kernels.py", "kernel_cache.py", "numba_private.py"):
-        shutil.copy(Path(rigidimpulse.__file__).parent / "core" / name, core)
-    _write(core, 1, "Pair", "first", "second")
-    (core / "caller.py").write_text(CALLER)
-    return core
+        shutil.copy(Path(rigidimpulse.__file__).parent / "core" / name, folder)
+    _write(folder, 1, "Pair", "first", "second")
+    (folder / "caller.py").write_text(CALLER)
+    return folder
 
 
-def _write(core: Path, number: int, name: str, first: str, second: str) -> None:
-    (core / "callee.py").write_text(CALLEE.format(number=number))
-    (core / "tuples.py").write_text(TUPLES.format(name=name, first=first, second=second))
+def _write(folder: Path, number: int, name: str, first: str, second: str) -> None:
+    (folder / "callee.py").write_text(CALLEE.format(number=number))
+    (folder / "tuples.py").write_text(TUPLES.format(name=name, first=first, second=second))
 
 
-def _result(core: Path) -> tuple[float, int]:
+def _result(folder: Path) -> tuple[float, int]:
     """What the outer kernel returns in a process of its own, and how often it came from the cache."""
-    command = [sys.executable, "-c", PROGRAM]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=core.parent.parent, env={})
+    command = [sys.executable, "-B", "-c", PROGRAM]  # Without bytecode: its date is in seconds, and sources change faster.
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=folder.parent.parent, env={})
     value, hits = done.stdout.split()
     return float(value), int(hits)
 

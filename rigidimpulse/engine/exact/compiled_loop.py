@@ -1,4 +1,4 @@
-"""Where the compiled order of events (`event_loop`) meets the run: who may be dealt with by it, growing buffers, and problems in words."""
+"""Where the compiled order of events (`event_loop`) meets the run: which runs use it, buffers that grow, and problems in words."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import numpy as np
 
 from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS
 from rigidimpulse.collision.time_of_impact.bisection import LOOK_AHEAD
-from rigidimpulse.core.kernel_cache import note_beside
+from rigidimpulse.core.kernel_cache import is_kept, note_beside
 from rigidimpulse.core.memory import rows_of
 from rigidimpulse.core.record import Record
 from rigidimpulse.dynamics.impact.restitution import LAWS
 from rigidimpulse.engine.absent import NoCompiledLoop
 from rigidimpulse.engine.exact.contact_forces import NOT_SOLVED_REMEDY
 from rigidimpulse.engine.exact.event_loop import (
+    ASKED,
     AT_END,
     AT_EVENT,
-    ENERGIES,
+    BODIES,
     HOLD,
     LOAD,
     MOVE,
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     from rigidimpulse.model.plan import Plan
 
 NONE = np.zeros(0, np.int64)
+FIRST_REPORTS = 256
 PATIENCE = 600.0
 """s, after which a process that said it would compile the kernel is not waited for any more."""
 EFFECTS = {
@@ -62,7 +64,7 @@ EFFECTS = {
     HOLD: ("contact forces",),
     MOVE: ("exact flight",),
 }
-"""The effects whose verbs the loop calls, by their place in `Work.cycles`."""
+"""The effects whose verbs the loop calls, by their place in `Loop.cycles`."""
 PROBLEMS = {
     int(SQUEEZED): ("squeezed", SQUEEZED_REMEDY),
     int(NOT_RESOLVED): ("contact not resolved", NOT_RESOLVED_REMEDY),
@@ -94,10 +96,9 @@ TABLE, MEMORY, LIMITER, LOG, CONTACT_LOG, SOLVE_COUNT, REPORTS = (
 )
 
 
-def _make_reports(number: int) -> Reports:
-    """Space for twice the problems that an event of `number` bodies may have."""
-    most = 2 * ENERGIES * (number + 1)
-    return Reports(rows_of(most, REPORT), np.empty(most, np.int64), np.zeros(2, np.int64))
+def _make_reports(most: int) -> Reports:
+    """Space for as many problems, and as many bodies of them."""
+    return Reports(rows_of(most, REPORT), np.empty(most, np.int64), np.zeros(3, np.int64))
 
 
 class CompiledLoop:
@@ -114,7 +115,7 @@ class CompiledLoop:
         self._elsewhere = np.zeros(n, bool)
         self._cycles, self._calls = np.zeros(VERBS, np.int64), np.zeros(VERBS, np.int64)
         self._scratch = np.empty((SCRATCH_ROWS, 2), np.int64)
-        self._reports = _make_reports(n)
+        self._reports = _make_reports(FIRST_REPORTS)
         state = run.state
         self._record = Record(
             Loop(
@@ -134,7 +135,9 @@ class CompiledLoop:
         return self._note().exists()
 
     def begin_compiling(self) -> bool:
-        """Say that the kernel is being compiled; returns False if somebody has said so a short while ago."""
+        """Say that the kernel is being compiled; returns False if somebody has said so a short while ago, or if no cache would keep it."""
+        if not is_kept():
+            return False
         begun = self._note(".begun")
         if begun.exists() and time() - begun.stat().st_mtime < PATIENCE:
             return False
@@ -188,6 +191,8 @@ class CompiledLoop:
         run.log.grow()
         run.contact_log.grow()
         run.state.remember(int(run.contact_log.buffers.counts[2]))
+        if self._reports.used[ASKED] > len(self._reports.rows):
+            self._reports = _make_reports(2 * int(self._reports.used[ASKED]))
 
     def _tell(self, run: Run) -> None:
         """Report the problems that the kernel met, in words."""
@@ -196,7 +201,7 @@ class CompiledLoop:
             bodies = self._reports.bodies[row["first"] : row["first"] + row["count"]]
             names = tuple(run.world.names[i] for i in bodies.tolist())
             run.log.report(float(row["time"]), kind, names, remedy.format(value=float(row["value"])))
-        self._reports.used[:] = 0
+        self._reports.used[[ROWS, BODIES]] = 0
 
     def _account(self, run: Run, seconds: float, before: np.ndarray) -> None:
         """Give the time of the kernel to the effects whose verbs it called, in proportion to the processor's cycles."""

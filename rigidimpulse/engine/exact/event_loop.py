@@ -99,7 +99,7 @@ AT_END, AT_EVENT, NO_CAPACITY, SHORT_OF_PAIRS = np.arange(4)
 """How the loop ends: at the end of the step; before an event that Python looks after; before one for which there is no space; after one
 that found no space for a pair."""
 SWEEP, RESPOND, LOAD, HOLD, MOVE, VERBS = np.arange(6)
-"""Places in `Work.cycles` and `Work.calls`."""
+"""Places in `Loop.cycles` and `Loop.calls`."""
 ENERGIES = 6
 """Changes of energy, or problems, at an instant of a body, at most."""
 FIRST_CONTACTS, NONE, NO_ROWS = np.int64(256), np.int64(-1), np.int64(0)
@@ -109,10 +109,10 @@ IMPULSES = 256
 """Impulses of a contact at an instant that there is space for."""
 
 REPORT = np.dtype([("kind", np.int64), ("time", np.float64), ("value", np.float64), ("first", np.int64), ("count", np.int64)])
-"""A problem: what it is, when [s], a number that goes with it, and its stretch of `Work.reported`."""
+"""A problem: what it is, when [s], a number that goes with it, and its stretch of `Reports.bodies`."""
 SQUEEZED, NOT_RESOLVED, SWEEP_STALLED, WITHOUT_REBOUND, NOT_SOLVED, NOT_FINITE, NOT_RECORDED = np.arange(7)
-ROWS, BODIES = np.arange(2)
-"""Places in `Work.used`."""
+ROWS, BODIES, ASKED = np.arange(3)
+"""Places in `Reports.used`."""
 
 
 class Settings(NamedTuple):
@@ -131,7 +131,7 @@ class Reports(NamedTuple):
 
     rows: np.ndarray  # (r,) REPORT
     bodies: np.ndarray  # (b,) of the reports
-    used: np.ndarray  # (2,) of both
+    used: np.ndarray  # (3,) of both, and how many more were last asked for
 
 
 class Loop(NamedTuple):
@@ -213,12 +213,11 @@ def report(reports, kind, time, value, bodies):
 
 @jit_making_arrays
 def _report_pairs(reports, kind, time, table, places):
-    """Keep a problem of each of the pairs."""
+    """Keep a problem of each of the pairs; there is space."""
     both = np.empty(2, np.int64)
     for p in places:
-        if reports.used[ROWS] < len(reports.rows) and reports.used[BODIES] + 2 <= len(reports.bodies):
-            both[0], both[1] = table.pairs[p].a, table.pairs[p].b
-            report(reports, kind, time, 0.0, both)
+        both[0], both[1] = table.pairs[p].a, table.pairs[p].b
+        report(reports, kind, time, 0.0, both)
 
 
 @jit_making_arrays
@@ -269,6 +268,8 @@ def run_events(loop, bodies, is_given, time, end, scratch):
     shared = Shared(limiter.under_contact, limiter.sharing, np.empty((0, 2), np.int64))
     found = make_found(FIRST_CONTACTS, number, scratch)
     while True:
+        if not _can_report(loop.reports, number, table.number[USED]):
+            return NO_CAPACITY, time, is_given
         if not is_given:
             start = cycles()
             _sweep_stale(loop, end)
@@ -310,13 +311,19 @@ def _is_elsewhere(elsewhere, brought, bodies):
 
 
 @jit
+def _can_report(reports, number, pairs):
+    """Whether all problems can be kept that an event of `number` bodies may have; a pair, of `pairs`, is swept, counted and settled."""
+    rows, bodies = ENERGIES * number + 3 * pairs, ENERGIES * number + 6 * pairs
+    reports.used[ASKED] = max(rows, bodies)
+    return reports.used[ROWS] + rows <= len(reports.rows) and reports.used[BODIES] + bodies <= len(reports.bodies)
+
+
+@jit
 def _has_capacity(loop, count):
     """Whether an event of `count` contacts can be remembered and recorded, whatever it does."""
-    number, reports, log, contacts = len(loop.elsewhere), loop.reports, loop.log, MORE_CONTACTS * count + MOST_NEW
-    most = ENERGIES * number
-    fits = has_log_capacity(log, most, number, len(loop.impacts) + IMPULSES * count)
+    number, contacts = len(loop.elsewhere), MORE_CONTACTS * count + MOST_NEW
+    fits = has_log_capacity(loop.log, ENERGIES * number, number, len(loop.impacts) + IMPULSES * count)
     fits = has_contact_capacity(loop.contact_log, contacts) and fits
-    fits = fits and reports.used[ROWS] + most <= len(reports.rows) and reports.used[BODIES] + most <= len(reports.bodies)
     return fits and has_capacity(loop.memory, contacts)
 
 

@@ -17,6 +17,7 @@ from math import inf
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.sorted_values import is_among
 from rigidimpulse.engine.spheres.layout import AT_BOUNDARY, AT_ONCE, CONTACT, OTHER, PLANE
 from rigidimpulse.engine.spheres.paths import (
     BODY,
@@ -65,17 +66,7 @@ def meeting(paths, planes, i, other, plane, clock):
 @jit
 def _is_apart(apart, num_bodies, i, j):
     """Whether two bodies do not touch each other by order."""
-    if len(apart) == 0:
-        return False
-    key = min(i, j) * num_bodies + max(i, j)
-    low, high = 0, len(apart)
-    while low < high:
-        middle = (low + high) // 2
-        if apart[middle] < key:
-            low = middle + 1
-        else:
-            high = middle
-    return low < len(apart) and apart[low] == key
+    return is_among(apart, min(i, j) * num_bodies + max(i, j))
 
 
 @jit
