@@ -125,7 +125,7 @@ def _record(run: Run, contacts: Contacts, members: np.ndarray) -> None:
     run.log.add_stretch(0.0, 1.0, 1, 0.0, 0.0)
 
 
-def _move_and_sweep(run) -> None:
+def _move_and_sweep(run: Run) -> None:
     """Rows of contacts, trajectories, frames and the sweep."""
     _fill_rows(run)
     _move(run)
@@ -157,7 +157,7 @@ def _move(run: Run) -> None:
     bisection.sweep(run.detector, state.trajectory, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
 
 
-def _find_substepped_contacts(run) -> None:
+def _find_substepped_contacts(run: Run) -> None:
     """Pairs and contacts of sub-stepped islands, before they are solved."""
     world, state, member = run.world, run.state, np.array([False, True])
     state.now.inv_inertia[1] = np.eye(3)
@@ -171,7 +171,7 @@ def _find_substepped_contacts(run) -> None:
     refusals(world, root, member, ~member, member, np.zeros(world.num_bodies), (a, b), True)
 
 
-def _step_substepped(run) -> None:
+def _step_substepped(run: Run) -> None:
     """The sub-stepped solver, and the trajectories between its steps."""
     state, now, members = run.state, run.state.now, np.array([1])
     stepper = ContactStepper(run.world, run.world.dynamic, finer=False)
