@@ -161,6 +161,8 @@ def classify(run: Run, island: Island) -> None:
     support bears, so that is the least that counts.
     """
     world, contacts, least = run.world, island.contacts, 0.0
+    if not len(contacts.gap):
+        return
     if not (world.dynamic[contacts.body_a] & world.dynamic[contacts.body_b]).all():
         least = float(world.steady_strength[island.members].max())
     normal_force = np.ascontiguousarray(forces_of(run, contacts, island.touching)[:, 0])

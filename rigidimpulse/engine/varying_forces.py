@@ -77,8 +77,8 @@ class VaryingForces:
         self._always = np.zeros(n, bool)
         for table in self._tables:
             self._always[table.body] |= not table.comes_and_goes
-        self.acts = self._always.copy()
         self._component = _components(n, np.concatenate([table.links for table in self._tables]))
+        self.let_act(np.zeros(n, bool))
         self._restless = np.zeros(n, bool)
         for table in self._tables:
             self._restless[table.body] |= not table.is_steady
@@ -105,13 +105,14 @@ class VaryingForces:
 
     def links(self) -> np.ndarray:
         """Bodies (l, 2) that forces tie together: each with the first one of those that hang together by forces."""
-        bodies = np.flatnonzero(self.acts)
-        _, first, label = np.unique(self._component[bodies], return_index=True, return_inverse=True)
-        return np.column_stack([bodies[first][label], bodies])
+        return self._links
 
     def let_act(self, bodies: np.ndarray) -> None:
         """From now on forces that come and go act on these bodies, (n,) bool, and on no others."""
         self.acts = self._always | bodies
+        acting = np.flatnonzero(self.acts)
+        _, first, label = np.unique(self._component[acting], return_index=True, return_inverse=True)
+        self._links = np.column_stack([acting[first][label], acting])
 
     def present(self, table: ForceTable, time: float) -> np.ndarray:
         """Wrenches (k, 6) of the rows of a table at `time`, which lies within the present trajectory of every body."""

@@ -58,7 +58,7 @@ STEP = 1.0 / 60.0
 def _run_of(scene: Scene) -> Run:
     """A run of a scene that nothing has happened in yet."""
     world = compile_scene(scene)
-    return make_run(world, make_plan(world), Recorder(np.zeros(1), 2), EventLog())
+    return make_run(world, make_plan(world), Recorder(np.array([0.0, 1.0]), 2), EventLog())
 
 
 def _box_on_floor(with_cylinder: bool, jointed: bool, rolls: bool) -> Run:
@@ -146,7 +146,7 @@ def _move(run: Run) -> None:
     zero = np.zeros(1)
     start_trajectories(run)
     run.recorder.start(state.trajectory)
-    run.recorder.flush(state.trajectory, 1, 0.0, np.zeros(6))
+    run.recorder.flush(state.trajectory, 1, 2.0, np.zeros(6))
     bring_all(state.trajectory, np.array([1]), 0.0, now, state.rotation, run.acceleration, run.angular_acceleration)
     take(state.trajectory, 1, 0.0, now, Load(*np.zeros((4, 3))), FREE)
     pair_events = PairEvents(run, 1.0 / 60.0)

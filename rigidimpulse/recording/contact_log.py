@@ -125,7 +125,8 @@ class ContactLog:
 
     def close(self, bodies: np.ndarray, time: float) -> None:
         """See `close_contacts`."""
-        close_contacts(self.buffers, bodies, time)
+        if (self.buffers.stretch[bodies] >= 0).any():
+            close_contacts(self.buffers, bodies, time)
 
     def replace(self, bodies: np.ndarray, time: float, contacts: Contacts, position: np.ndarray, force: np.ndarray) -> None:
         """See `replace_contacts`."""

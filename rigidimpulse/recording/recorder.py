@@ -126,7 +126,9 @@ class Recorder:
 
     def flush(self, trajectory: Trajectories, i: int, time: float, correction: np.ndarray) -> None:
         """Write the frames of body i before `time` [s], with what it was corrected by (6,) then; see `flush_frames`."""
-        flush_frames(trajectory, i, time, correction, self.written, self.frames)
+        due = self.written[i]
+        if due < len(self.times) and self.times[due] < time:
+            flush_frames(trajectory, i, time, correction, self.written, self.frames)
 
     def flush_all(self, trajectory: Trajectories, bodies: np.ndarray, time: float) -> None:
         """Write the frames of all these bodies before `time`, as `flush` does."""

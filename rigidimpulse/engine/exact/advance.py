@@ -29,13 +29,17 @@ def arrive(run: Run, islands: list[Island], time: float, bodies: np.ndarray) -> 
         if project_velocities(run, island):
             classify(run, island)
     state, constants = run.state, run.world.constants
-    note_end_energy(state.limiter, state.now, constants, bodies)
+    pressed = bodies[state.under_contact[bodies]]
+    if len(pressed):
+        note_end_energy(state.limiter, state.now, constants, pressed)
     for island in islands:
         if len(island.joints):
             run.joints.project_velocities(run, island)
             classify(run, island)
-    slowed, changes = np.zeros(run.world.num_bodies, bool), np.empty(len(bodies))
-    count = limit_energy(state.limiter, state.now, constants, state.trajectory, bodies, time, slowed, changes)
+    if not len(pressed):
+        return
+    slowed, changes = np.zeros(run.world.num_bodies, bool), np.empty(len(pressed))
+    count = limit_energy(state.limiter, state.now, constants, state.trajectory, pressed, time, slowed, changes)
     for change in changes[:count].tolist():
         run.log.account(time, "energy correction", change)
     for island in islands:

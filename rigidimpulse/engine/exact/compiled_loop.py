@@ -75,7 +75,7 @@ PROBLEMS = {
     int(NOT_RECORDED): ("not recorded", "{value:.0f} contacts of one instant had no space in the record; the motion is not affected"),
 }
 """Kind and remedy of the problems."""
-NEEDED = ("contact detection", "impulses", "steady load", "contact forces", "impact time", "exact flight")
+NEEDED = ("contact detection", "impulses", "steady load", "impact time", "exact flight")
 
 
 def why_not(world: World, plan: Plan) -> str:
@@ -110,7 +110,7 @@ class CompiledLoop:
         ahead = LOOK_AHEAD if accuracy.impact_time == "bisection" else 0.0
         settings = Settings(
             accuracy.step, INSTANT * accuracy.step, LAWS[accuracy.restitution], ahead, accuracy.iterations,
-            int(run.plan.includes("gyroscopic term")),
+            int(run.plan.includes("gyroscopic term")), int(run.plan.includes("contact forces")),
         )  # fmt: skip
         self._elsewhere = np.zeros(n, bool)
         self._cycles, self._calls = np.zeros(VERBS, np.int64), np.zeros(VERBS, np.int64)

@@ -124,6 +124,7 @@ class Settings(NamedTuple):
     ahead: float  # see `SearchEffort`
     queries: int  # gap evaluations a pair may use
     gyroscopic: int  # 1 if the gyroscopic term is in, else 0
+    holds: int  # 1 if contact forces are in: something may press bodies together
 
 
 class Reports(NamedTuple):
@@ -540,8 +541,9 @@ def _advance(loop, island, touch, members, velocity):
             motion.angular_acceleration[i, k] = 0.0
     if loop.settings.gyroscopic == 1:
         bring_gyroscopic(members, motion.now, motion.rotation, motion.trajectory.inertia, motion.angular_acceleration)
-    loaded = cycles()
-    touch, held = _hold(loop, island[0], touch, members)
+    loaded, held = cycles(), np.zeros(len(touch.live), np.bool_)
+    if loop.settings.holds == 1:
+        touch, held = _hold(loop, island[0], touch, members)
     holding = cycles()
     _begin_trajectories(loop, island[0], members, velocity)
     set_impact_margins(loop.table, touch.place, touch.contacts.gap, held, island[0].time, constants.dynamic)

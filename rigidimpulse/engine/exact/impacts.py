@@ -68,6 +68,8 @@ class Impacts(NamedTuple):
 def respond(run: Run, _pair_events: PairEvents, island: Island) -> None:
     """Apply the impulses of the island's approaching contacts, by the response and the law of restitution of the run's accuracy."""
     accuracy, state, number, contacts = run.world.accuracy, run.state, run.world.num_bodies, island.contacts
+    if not len(contacts.gap):
+        return
     collapses = find_collapsing(state.memory, number, contacts)
     live = find_live(state.now, contacts, island.live, island.speeds, collapses, LAWS[accuracy.restitution])
     island.zero_speed, island.scale = live.rule.tolerance, live.rule.scale

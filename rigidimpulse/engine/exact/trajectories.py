@@ -114,6 +114,8 @@ def work_of_forces(run: Run, i: int) -> float:
 
 def set_margins(run: Run, pair_events: PairEvents, island: Island) -> None:
     """Gaps at which the island's pairs come to contact next."""
+    if not len(island.place):
+        return
     held = np.zeros(len(island.place), bool) if island.held is None else island.held
     set_impact_margins(pair_events.table, island.place, island.contacts.gap, held, island.time, run.world.dynamic)
 

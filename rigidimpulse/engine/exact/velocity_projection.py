@@ -122,6 +122,8 @@ def project(memory, motion, contacts, touching, held, time, members, scratch):
 
 def project_velocities(run: Run, island: Island) -> bool:
     """End the sub-steps of the island's pairs; returns whether there were any."""
+    if not len(island.place):
+        return False
     return project(
         run.state.memory, run.motion, island.contacts, island.touching, island.slow(), island.time, island.members,
         ProjectionScratch(run.column, run.state.correction),
