@@ -144,8 +144,10 @@ class Manifolds:
     """Sine of the angle by which a normal may miss the arc of an edge or the cone of a vertex."""
     point_round_off: float = 1e-15
     """Error of a point, relative to its coordinates."""
-    depth: float = 1e-9
-    """Depth down to which a contact of faces or edges is still recognised, relative to the edge."""
+    depth: float = 6.0
+    """Depth down to which contacts of bodies that are a little inside each other are found, relative to the margin within which contacts
+    are looked for. Two contact margins of 1e-6 of a size make 1.2e-5 of it: more than rounding to single precision, and more than the depth
+    beyond which bodies are moved apart before the first step (`InitialOverlap.depth`)."""
     merge: float = 1e-9
     """Distance below which two contacts are one, relative to the edge."""
     same_normal: float = 1e-9
@@ -352,6 +354,13 @@ class InitialOverlap:
     """Difference of two ways out, relative to the size of the smaller body, below which they are equal."""
     softness: float = 1e-8
     """Softness of a demand, relative to its inverse mass: demands that contradict each other end in a compromise."""
+    fit_softness: float = 1e-5
+    """The same where bodies are looked for that have no space for their contact margins. Normals that single precision has turned by some
+    1e-7 must not count as wedges, along which a body could get out of the way: those turned by less than its root count as parallel."""
+    fit_residual: float = 1e-3
+    """Residual asked for where bodies are looked for that have no space for their contact margins, relative to the margin."""
+    most_scaled: float = 1e-4
+    """Greatest part of its size by which a body is made smaller where it fills its space exactly: nobody sees that."""
     surely_apart: float = 1e-9
     """Part of their radii by which bounding spheres must be apart for bodies to be apart whatever rounding does."""
 

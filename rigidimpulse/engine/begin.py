@@ -18,6 +18,7 @@ from rigidimpulse.engine.keyframe_paths import KeyframePaths
 from rigidimpulse.engine.regime import only_expensive, why_not_substepped
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.substepped.advance import SubsteppedIslands
+from rigidimpulse.engine.tight_fits import make_space
 from rigidimpulse.engine.warm_up import compile_loop_in_background, prepare_kernels
 from rigidimpulse.model.plan import Plan
 from rigidimpulse.model.world import World
@@ -43,16 +44,25 @@ def begin_run(world: World, plan: Plan, times: np.ndarray, left_out: Mapping[str
     """
     with_substepped = plan.includes(SubsteppedContact.name) and not only_expensive(world)
     prepare_kernels(world, plan.includes(EventKernel.name), with_substepped)
-    run = make_run(world, plan, Recorder(times, world.num_bodies), EventLog())
+    run = _start(world, plan, times)
+    fitting = make_space(run)
+    if fitting is not world:
+        run = _start(fitting, plan, times)
     for name, reason in left_out.items():
         run.log.report(0.0, "effect left out", (name,), f"the scene calls for it: {reason}")
+    resolve_overlaps(run)
+    _bind_observers(run)
+    bind_compiled_loop(run)
+    return run
+
+
+def _start(world: World, plan: Plan, times: np.ndarray) -> Run:
+    """A run whose bodies have their first trajectories; times (f,) s, of the frames."""
+    run = make_run(world, plan, Recorder(times, world.num_bodies), EventLog())
     _bind_forces(run, times)
     run.keyframes = KeyframePaths(world)
     start_trajectories(run)
     run.recorder.start(run.state.trajectory)
-    resolve_overlaps(run)
-    _bind_observers(run)
-    bind_compiled_loop(run)
     return run
 
 

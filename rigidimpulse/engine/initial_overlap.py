@@ -233,7 +233,8 @@ class _Search:
                 continue
             free = way
             rate = float(n @ found.normal)
-            way -= left if careful or rate <= 0.0 else left / rate
+            # Along a surface that is nearly parallel to n the rate tells nothing: steps of 1e10 m came of it.
+            way -= left if careful or abs(left) >= 2.0 * reach * rate else left / rate
             if abs(left) <= 0.1 * gap:
                 break
         return way

@@ -2,10 +2,11 @@
 
 Every body has a trajectory: its exact path since something last acted on it. A step goes from contact to contact. At the earliest time at
 which a pair of bodies touches, the island of bodies that touch there is brought to that time and advanced from it; bodies elsewhere do not
-notice. An island is advanced by one of two regimes, `exact/` from event to event or `substepped/` by sub-steps to the end of the step. Both
-have the same four verbs: arrive, impacts, contact forces, trajectories.
+notice. An island is advanced by one of two regimes, `exact/` from event to event or `substepped/` by sub-steps to the end of the step.
+After `arrive` both have the same four verbs: impacts, loads, contact forces, trajectories.
 
-What takes part in a verb stands in a list of the plan: an effect that the scene does not call for is in none.
+What takes part in a verb stands in a list of the plan: an effect that the scene does not call for is in none. `effects.py` says which
+functions it binds. Keyframes, soft bodies and the kernel of balls act before a step (`loop.py`).
 
 The same order stands once more in `exact/event_loop.py`, compiled, for events that need nothing but exact contact. `run.compiled` deals
 with those, and hands over the first event that this loop must look after. The results are the same bits.
@@ -25,7 +26,7 @@ from rigidimpulse.model.island import Island
 def step(run: Run, end: float) -> None:
     """Advance all trajectories to `end` [s]."""
     begin, pair_events = run.state.time, PairEvents(run, end)
-    run.plan.perform(run.plan.pairs, run, pair_events)  # islands that are sub-stepped; broad phase over swept boxes
+    run.plan.perform(run.plan.pairs, run, pair_events)  # sub-stepped islands, which of them sleep; broad phase
     time, bodies = begin, pair_events.active_bodies()  # load: resting, jointed, pushed, sub-stepped
     while time < end:
         time, bodies = run.compiled.advance(run, pair_events, time, bodies)  # as far as events need nothing but exact contact
@@ -57,7 +58,7 @@ def go_on(run: Run, begin: float, end: float, may_leave: bool) -> None:
 def next_event(run: Run, pair_events: PairEvents) -> tuple[float, np.ndarray]:
     """Time of the next event, that of the step's end if there is none, and the bodies to which it happens."""
     run.plan.perform(run.plan.time_of_impact, run, pair_events)  # of pairs of which a body has a new trajectory
-    time = pair_events.next_time()
+    time = pair_events.next_time()  # an impact, or the end of a sub-step
     if time >= pair_events.end:
         return pair_events.end, np.zeros(0, np.int64)
     bodies = pair_events.bodies_at(time)
@@ -70,7 +71,7 @@ def react(run: Run, pair_events: PairEvents, time: float, bodies: np.ndarray) ->
     pair_events.wake[bodies] = np.inf
     islands, reached = touching_islands(run, pair_events, time, bodies)  # the contact graph at that instant
     arrive(run, islands, time, reached)  # sub-steps end: velocities are projected, joints closed, energy limited
-    islands = run.substepped.join(run, pair_events, time, islands)  # with the sub-stepped islands that they touch
+    islands = run.substepped.join(run, pair_events, time, islands)  # with sub-stepped islands that they touch; says which regime
     let_go(run, pair_events, islands, time, reached)  # bodies that have left what they touched
     for island in islands:
         advance(run, pair_events, island)
@@ -83,5 +84,5 @@ def advance(run: Run, pair_events: PairEvents, island: Island) -> None:
     regime = plan.exact if island.is_exact else plan.substepped
     plan.perform(regime.impacts, run, pair_events, island)  # restitution, friction impulses
     plan.perform(regime.loads, run, pair_events, island)  # gravity, constant and varying forces, gyroscopic terms
-    plan.perform(regime.contact_forces, run, pair_events, island)  # rows of contacts, joints and motors, solved; sleeping
+    plan.perform(regime.contact_forces, run, pair_events, island)  # sub-step size; rows of contacts, joints, motors; sleep
     plan.perform(regime.trajectories, run, pair_events, island)  # along which path, until when; its pairs are swept again

@@ -17,7 +17,7 @@ from rigidimpulse.core.tolerances import TOLERANCES
 INSIDE = TOLERANCES.manifold.inside
 STRICT = TOLERANCES.manifold.arc
 ROUND_OFF = TOLERANCES.manifold.point_round_off
-PENETRATION = TOLERANCES.manifold.depth
+DEPTH = TOLERANCES.manifold.depth
 TILT = 0.02
 """Greatest sine of the angle by which a contact within the margin may miss being locally closest."""
 ANY = 2.0
@@ -39,7 +39,9 @@ class View(NamedTuple):
     radius_v: float
     radius_t: float
     margin: float
+    depth: float  # how far the surfaces may be inside each other, m
     skeleton: float  # greatest distance of the skeletons: margin and radii
+    reach: float  # how far apart features are looked at: the larger of both, m
     slack: float  # how far a capsule may miss being locally closest, m
     leeway: float  # added to the sine by which a normal may miss an arc or a cone
     two_sided: bool  # the triangles bound no solid: their back is outside too

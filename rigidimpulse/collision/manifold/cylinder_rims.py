@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidimpulse.collision.distance.cylinder import ZERO, basis, from_axes, on_circle
 from rigidimpulse.collision.distance.simplices import inner, over_triangle
-from rigidimpulse.collision.manifold.contact_points import PENETRATION, STRICT, TILT, Contact, append_contact
+from rigidimpulse.collision.manifold.contact_points import DEPTH, STRICT, TILT, Contact, append_contact
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import along, cross, dot, moved, row, subtract, turned
 
@@ -110,7 +110,7 @@ def rims_on_plane(solid, found, count, m, corners, bound, other):
     a, b, c = corners
     radius, half, margin = solid.radius, solid.half, solid.margin
     border = BORDER * (radius + half)
-    deepest = -inf if bound == WHOLE_PLANE else -PENETRATION * (radius + half)
+    deepest = -inf if bound == WHOLE_PLANE else -DEPTH * margin
     flat = hypot(m[0], m[1])
     for bottom in range(2):
         level = half - 2.0 * half * bottom
@@ -198,7 +198,7 @@ def ring_contact(q, tangent, curvature, solid, level, skeleton):
     else:
         n = along(ZERO, 1.0 / distance, between)
     in_arc = dot(n, out) >= -solid.tilt and up * n[2] >= -solid.tilt
-    return in_arc and distance >= skeleton - PENETRATION * solid.radius, p, n, distance
+    return in_arc and distance >= skeleton - DEPTH * solid.margin, p, n, distance
 
 
 @inner
@@ -235,7 +235,7 @@ def circle_contacts(solid, found, count, circle, bottom, other):
                 n = (q[0] / rho, q[1] / rho, 0.0)
                 gap = rho - radius
                 p = (radius * n[0], radius * n[1], q[2])
-                met = abs(q[2]) <= half * (1.0 + BORDER) and -PENETRATION * radius <= gap <= margin
+                met = abs(q[2]) <= half * (1.0 + BORDER) and -DEPTH * margin <= gap <= margin
                 feature, going_out = SIDE, dot(cross(outward, q), (0.0, 0.0, 1.0)) > 0.0
             else:
                 met, p, n, gap = ring_contact(q, tangent, bend, solid, level, 0.0)

@@ -7,9 +7,9 @@ its contacts and the one that measures its least gap. Two dispatching kernels as
 
 - `convex_contacts`: pairs of the kinds BOX and POLYHEDRON, and of a POLYHEDRON and a half space, for gaps of EITHER sign. The sub-stepped
   regime finds the contacts of such pairs with it (`contact_cache`).
-- `pair_contacts`, and `pair_gap` for the least gap: any two shapes, primitive by primitive. Bodies are taken to be apart; overlap keeps its
-  meaning (gap < 0, the right normal) for half spaces, and for spheres and capsules until an axis is touched. The exact regime uses them for
-  all pairs, the sub-stepped regime for the pairs that are left, with smaller shapes (`contact_update`).
+- `pair_contacts`, and `pair_gap` for the least gap: any two shapes, primitive by primitive. Bodies are apart, or inside each other by a few
+  margins at most; deeper overlap keeps its meaning for half spaces, and for spheres and capsules until an axis is touched. The exact regime
+  uses them for all pairs, the sub-stepped regime for the pairs that are left, with smaller shapes (`contact_update`).
 
 Numba cannot call a function by a number that it knows only at run time. So each dispatching kernel has one chain of tests, in the order
 of the table, and takes its kernels from there.
@@ -77,7 +77,11 @@ TABLE = {
     (CYLINDER, ROUND): PairKernels(cylinder_round_contacts, cylinder_round_gap),
     (CYLINDER, CYLINDER): PairKernels(cylinder_cylinder_contacts, cylinder_cylinder_gap),
 }
-"""The kernels of every pair of kinds. A BOX is a POLYHEDRON, a POLYHEDRON and a BALL are ROUND: the first pair that fits counts."""
+"""The kernels of every pair of kinds. A BOX is a POLYHEDRON, a POLYHEDRON and a BALL are ROUND: the first pair that fits counts.
+
+A mesh is ROUND, with radius 0. So a box on a mesh is a pair (ROUND, ROUND), and one of two POLYHEDRON in the sub-stepped regime if the
+mesh is convex.
+"""
 
 BOXES, PLANE, GENERAL, HULLS = 0, 1, 2, 3
 """Kinds of pairs of bodies: (BOX, BOX), (POLYHEDRON, HALF_SPACE), any other pair, (POLYHEDRON, POLYHEDRON)."""

@@ -11,7 +11,6 @@ from rigidimpulse.collision.geometry import EDGE_HIDDEN
 from rigidimpulse.collision.manifold.contact_points import (
     INSIDE,
     MERGE,
-    PENETRATION,
     ROUND_OFF,
     STRICT,
     TILT,
@@ -62,10 +61,10 @@ def _arcs_miss(geometry, view, edges, normal):
 
 
 @inner
-def _crossing(p, d, q, e, skeleton):
+def _crossing(p, d, q, e, reach):
     """Return (near, point_a, point_b, c, distance) for the common normal c of two edges p + s d, q + t e.
 
-    `near`: both closest points lie on the edges and are at most `skeleton` apart; c points from a to b.
+    `near`: both closest points lie on the edges and are at most `reach` apart; c points from a to b.
     """
     c = cross(d, e)
     c_squared = dot(c, c)
@@ -80,14 +79,14 @@ def _crossing(p, d, q, e, skeleton):
         distance = -distance
         c = (-c[0], -c[1], -c[2])
     inside = -INSIDE <= s <= 1.0 + INSIDE and -INSIDE <= t <= 1.0 + INSIDE
-    return inside and distance <= skeleton, point_a, point_b, c, distance
+    return inside and distance <= reach, point_a, point_b, c, distance
 
 
 @inner
 def _crossing_contact(geometry, view, found, count, edges):
     """Append the contact of two edges if they cross (frame of the first body)."""
     p, d, q, e = edges.p, edges.d, edges.q, edges.e
-    near, point_a, point_b, c, distance = _crossing(p, d, q, e, view.skeleton)
+    near, point_a, point_b, c, distance = _crossing(p, d, q, e, view.reach)
     if not near:
         return count
     c_length = sqrt(dot(c, c))
@@ -95,12 +94,12 @@ def _crossing_contact(geometry, view, found, count, edges):
     size = sqrt(min(dot(d, d), dot(e, e)))
     tolerance = STRICT + ROUND_OFF * spread + min(TILT, view.margin * spread / size)
     sense = 1.0
-    # At a distance within round-off its sign tells nothing, and both senses of the normal are tried.
-    for _ in range(2 if distance <= PENETRATION * size else 1):
+    # Near each other the points do not tell which body is on which side, since bodies may be a little inside each other: the arcs do.
+    for _ in range(2 if distance <= view.depth else 1):
         scale = sense / c_length
         normal = (c[0] * scale, c[1] * scale, c[2] * scale)
         miss, end = _arcs_miss(geometry, view, edges, normal)
-        if miss <= tolerance + view.leeway:
+        if miss <= tolerance + view.leeway and sense * distance <= view.skeleton:
             if 0.0 < miss <= tolerance:
                 normal = end
             surface_a = along(point_a, view.radius_t, normal)
@@ -138,7 +137,10 @@ def _parallel_contacts(geometry, view, found, count, edges):
     if high - low <= MERGE * length or distance > view.skeleton or distance <= ROUND_OFF * length:
         return count
     normal = (between[0] / distance, between[1] / distance, between[2] / distance)
-    tolerance = STRICT + view.leeway + ROUND_OFF * (length + abs(p[0]) + abs(p[1]) + abs(p[2])) / distance
+    error = ROUND_OFF * (length + abs(p[0]) + abs(p[1]) + abs(p[2])) / distance
+    if error > TILT and view.leeway == 0.0:
+        return count
+    tolerance = STRICT + view.leeway + error
     if _arcs_miss(geometry, view, edges, normal)[0] > tolerance:
         return count
     for end in range(2):
@@ -177,7 +179,7 @@ def edge_contacts(geometry, view, pairs, end, found, count):
                 continue
             q = moved(view.R, view.t, row(vertex, edge[edge_b, 0]))
             q_end = moved(view.R, view.t, row(vertex, edge[edge_b, 1]))
-            if outside_box(q, q_end, low, high, view.skeleton):
+            if outside_box(q, q_end, low, high, view.reach):
                 continue
             e = subtract(q_end, q)
             for i in range(3 * start_a, 3 * (start_a + count_a)):
@@ -187,7 +189,7 @@ def edge_contacts(geometry, view, pairs, end, found, count):
                 p, p_end = row(vertex, edge[edge_a, 0]), row(vertex, edge[edge_a, 1])
                 least = (min(p[0], p_end[0]), min(p[1], p_end[1]), min(p[2], p_end[2]))
                 most = (max(p[0], p_end[0]), max(p[1], p_end[1]), max(p[2], p_end[2]))
-                if outside_box(q, q_end, least, most, view.skeleton):
+                if outside_box(q, q_end, least, most, view.reach):
                     continue
                 d = subtract(p_end, p)
                 c = cross(d, e)

@@ -1,11 +1,11 @@
-"""Contacts of two ROUND primitives: triangles, a segment or a point, grown by a radius.
+"""Contacts of two surfaces of triangles (mesh on mesh, box on mesh, capsule on mesh): ROUND primitives, grown by a radius.
 
 The features of two skeletons at distance d <= margin + r_a + r_b that are locally closest make the contacts; the radii are
 then taken off along the normal: gap = d - r_a - r_b.
 - vertex - face: the vertex projects into the face, and no edge that leaves it dives below by more than the margin
   (else the vertex of a box that stands flush on another one would meet its side). All corners within the margin
   count: a flat contact gives its corners.
-- edge - edge (see `edges`): the common normal meets both edges and lies in the Gauss arcs of both. Nearly parallel
+- edge - edge (see `mesh_edges`): the common normal meets both edges and lies in the Gauss arcs of both. Nearly parallel
   edges have both ends of their overlap, with the normal at its middle.
 - vertex - edge, vertex - vertex: the normal n runs between the points; it must lie in the arc of the edge and in the
   cone of each vertex: u . n <= 0 for every edge u that leaves it (n away from its body).
@@ -32,9 +32,9 @@ from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTE
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
 from rigidimpulse.collision.manifold.contact_points import (
     ANY,
+    DEPTH,
     INSIDE,
     MERGE,
-    PENETRATION,
     ROUND_OFF,
     STRICT,
     TILT,
@@ -106,21 +106,18 @@ def _face_contact(geometry, view, found, count, vertex, p, triangle, height):
     slack_ab = INSIDE * size + (crease if hidden[0] else 0.0)
     slack_bc = INSIDE * size + (crease if hidden[1] else 0.0)
     slack_ca = INSIDE * size + (crease if hidden[2] else 0.0)
-    behind = height < 0.0
-    if (behind and not view.two_sided and height < -PENETRATION * size) or not over_triangle(
-        p, a, b, c, normal, slack_ab, slack_bc, slack_ca
-    ):
+    if (height < -view.depth and not view.two_sided) or not over_triangle(p, a, b, c, normal, slack_ab, slack_bc, slack_ca):
         return count
     foot = along(p, -height, normal)
-    if behind and view.two_sided:
-        height = -height
-    else:
-        normal = (-normal[0], -normal[1], -normal[2])
-    if not _in_vertex_cone(geometry, vertex, turned(view.R_back, normal), view.skeleton, TILT):
-        return count
-    kind = FACE_VERTEX if view.flipped else VERTEX_FACE
-    merge = MERGE * size + 2.0 * crease
-    return _append_vertex(view, found, count, Contact(p, foot, normal, height, kind, vertex, triangle), merge)
+    sense = 1.0 if height < 0.0 and view.two_sided else -1.0
+    # Near an open surface the height does not tell on which side the body is, since it may be a little inside: its corner does.
+    for _ in range(2 if view.two_sided and abs(height) <= view.depth else 1):
+        outward = (sense * normal[0], sense * normal[1], sense * normal[2])
+        if _in_vertex_cone(geometry, vertex, turned(view.R_back, outward), view.skeleton, TILT):
+            contact = Contact(p, foot, outward, -sense * height, FACE_VERTEX if view.flipped else VERTEX_FACE, vertex, triangle)
+            return _append_vertex(view, found, count, contact, MERGE * size + 2.0 * crease)
+        sense = -sense
+    return count
 
 
 @inner
@@ -139,14 +136,14 @@ def _face_contacts(geometry, view, pairs, end, found, count):
                 if not (owns[owner] >> k & 1 and geometry.vertex_corner[corner]):
                     continue
                 p = moved(view.R, view.t, row(vertex, corner))
-                if outside_box(p, p, low, high, view.skeleton):
+                if outside_box(p, p, low, high, view.reach):
                     continue
                 for face in range(start_t, start_t + count_t):
                     a = row(vertex, triangle[face, 0])
                     normal = row(geometry.triangle_normal, face)
                     height = dot(subtract(p, a), normal)
                     # A triangle with two equal corners is a segment or a point and has no face.
-                    if abs(height) > view.skeleton or triangle[face, 1] == triangle[face, 2]:
+                    if height > view.skeleton or height < -view.reach or triangle[face, 1] == triangle[face, 2]:
                         continue
                     count = _face_contact(geometry, view, found, count, corner, p, face, height)
     return count
@@ -168,7 +165,11 @@ def _corner_contact(geometry, view, found, count, corner, p, touched):
     normal = (between[0] / distance, between[1] / distance, between[2] / distance)
     outward = (-normal[0], -normal[1], -normal[2])
     # The normal is a difference of two close points: its error is round-off over their distance.
-    tolerance = STRICT + view.leeway + ROUND_OFF * (size + abs(p[0]) + abs(p[1]) + abs(p[2])) / distance
+    error = ROUND_OFF * (size + abs(p[0]) + abs(p[1]) + abs(p[2])) / distance
+    # A normal that may point anywhere once pushed bricks into each other, whose corners were 1e-16 of their size apart.
+    if error > TILT and view.leeway == 0.0:
+        return count
+    tolerance = STRICT + view.leeway + error
     other = feature // 2
     if feature % 2 == 1:
         direction = subtract(row(vertex, edge[other, 1]), row(vertex, edge[other, 0]))
@@ -265,21 +266,22 @@ def round_round_contacts(geometry, first, second, pose, margin, contacts, count)
     R, t, pairs = pose.R, pose.t, contacts.scratch
     R_back, t_back = _pose_back(R, t)
     radius_a, radius_b = geometry.radius[first], geometry.radius[second]
-    skeleton = margin + radius_a + radius_b
+    skeleton, depth = margin + radius_a + radius_b, DEPTH * margin
+    reach = max(skeleton, depth)
     edges_a = geometry.edge_first[first + 1] - geometry.edge_first[first]
     edges_b = geometry.edge_first[second + 1] - geometry.edge_first[second]
     slack = margin if edges_a > 0 and edges_b > 0 and radius_a + radius_b > 0.0 else 0.0
     open_a, open_b = not geometry.closed[first], not geometry.closed[second]
     found = Found(contacts.real, contacts.integer, count)
     for leeway in (0.0, ANY):
-        of_a = View(False, R_back, t_back, R, t, radius_a, radius_b, margin, skeleton, slack, leeway, open_b)
-        of_b = View(True, R, t, R_back, t_back, radius_b, radius_a, margin, skeleton, slack, leeway, open_a)
+        of_a = View(False, R_back, t_back, R, t, radius_a, radius_b, margin, depth, skeleton, reach, slack, leeway, open_b)
+        of_b = View(True, R, t, R_back, t_back, radius_b, radius_a, margin, depth, skeleton, reach, slack, leeway, open_a)
         pairs[0, 0] = geometry.node_first[first]
         pairs[0, 1] = geometry.node_first[second]
-        depth = np.int64(1)  # (a literal would compile the walk twice)
-        while depth > 0:
-            depth, end = gather_leaf_pairs(
-                geometry.node_min, geometry.node_max, geometry.node_child, R, t, skeleton, pairs, depth
+        stacked = np.int64(1)  # (a literal would compile the walk twice)
+        while stacked > 0:
+            stacked, end = gather_leaf_pairs(
+                geometry.node_min, geometry.node_max, geometry.node_child, R, t, reach, pairs, stacked
             )
             count = edge_contacts(geometry, of_b, pairs, end, found, count)
             for view in (of_a, of_b):

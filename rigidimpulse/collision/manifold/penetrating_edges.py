@@ -1,4 +1,4 @@
-"""Edges of two surfaces that cross, as points of the penalty method: see `points`.
+"""Edges of two surfaces that cross, as points of the penalty method: see `penetrating_points`.
 
     edges of a and b with ways e_a, e_b, p and q where their lines are nearest,  n = +- e_a x e_b / |e_a x e_b|,  d = (p - q).n > 0
 

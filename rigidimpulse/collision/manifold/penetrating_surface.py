@@ -1,4 +1,4 @@
-"""Surfaces of triangles as the penalty method sees them: prisms for cylinders, axes of corners, nearest points. See `penalty_points`.
+"""Surfaces of triangles as the penalty method sees them: prisms for cylinders, axes of corners, nearest points. See `penetrating_points`.
 
 Source: Ericson, Real-Time Collision Detection, 2005, section 5.1.5 (nearest point of a triangle).
 """

@@ -22,7 +22,7 @@ T' is concave; it is not positive at the end of compression, hence T(p_c + x) <=
 make energy (Kane and Levinson 1985), hence its second end.
 
 This file has what holds along a straight stretch, on which f does not change: u_n is linear and u_n dp quadratic in
-p, all ends in closed form.
+p, all ends in closed form. `sequence` and `block` apply it; inside sub-stepped islands see `_rebound` in `solvers/tgs_soft/solver.py`.
 """
 
 from math import inf, sqrt

@@ -1,6 +1,7 @@
 """The penalty method: bodies go into each other, and springs push them out.
 
-At every point that is inside (see `points`), of depth d, with u the velocity of b less that of a there and n the normal from a to b,
+At every point that is inside (see `penetrating_points`), of depth d, with u the velocity of b less that of a there and n the normal from
+a to b,
 
     N = k d - c u.n,  none where that would pull,        force on b:  N n + F_t,  on a the opposite, on the same line
     F_t = -mu N c_t u_t / sqrt((c_t |u_t|)^2 + (mu N)^2),    u_t = u - (u.n) n,    c_t = 2 sqrt(k m),    1 / m = n.K n
