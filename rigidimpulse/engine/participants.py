@@ -50,6 +50,10 @@ class RunJoints(Protocol):
         """Whether joints are neither driven nor springs."""
         ...
 
+    def will_let_go(self, which: np.ndarray, /) -> bool:
+        """Whether a joint has a time at which it lets go."""
+        ...
+
     def supports_of(self, which: np.ndarray, /) -> np.ndarray:
         """What stands at the joints: bodies that are not dynamic, -1 for the world."""
         ...

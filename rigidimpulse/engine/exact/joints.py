@@ -129,6 +129,10 @@ class JointState:
         bodies = np.array(sorted(self._of_body), np.int64)
         return bodies[run.state.trajectory.mode[bodies] != FIXED]
 
+    def will_let_go(self, which: np.ndarray) -> bool:
+        """Whether a joint has a time at which it lets go."""
+        return bool(np.isfinite(self.release_time[which]).any())
+
     def project_velocities(self, run: Run, island: Island) -> None:
         """End the island's sub-steps: take half of the forces back, close what drifted, stop the joints."""
         state, now, memory = run.state, run.state.now, self.memory
@@ -139,7 +143,8 @@ class JointState:
         before = mechanical_energy(now, run.world.constants, members)
         arrived = np.hstack([now.velocity[members], now.angular_velocity[members]])
         for i in members:
-            held = memory.wrench[i] * max(elapsed[j] for j in self.at([i])) if int(i) in self._of_body else np.zeros(6)
+            # A body whose only joint let go in the last sub-step has none any more.
+            held = memory.wrench[i] * elapsed[self.at([i])].max(initial=0.0)
             now.velocity[i] -= now.inv_mass[i] * held[:3]
             now.angular_velocity[i] -= now.inv_inertia[i] @ held[3:]
         jointed = self._jointed(run, island)
