@@ -1,7 +1,7 @@
 """Bodies that fill their space exactly: they are made smaller by a few contact margins, so that there is space for these margins.
 
-Lasting contacts are held at a gap d, the contact margin. Cubes that fill a box have no space for it: where four cubes stand in a row and fill
-it, five gaps ask for 5 d. Files rounded to single precision even lack some 1e-7 of the size. Such demands contradict
+Lasting contacts are held at a gap d, the contact margin. Cubes that fill a box have no space for it: where four cubes in a row fill it,
+five gaps ask for 5 d. Files rounded to single precision even lack some 1e-7 of the size. Such demands contradict
 each other. Displacements D of the bodies that meet them as well as can be have
 
     min sum of m |D|^2 / 2 + s p^2 / 2    with    0 <= p _|_ g + n.(D_b - D_a) - d + s p >= 0,    s small, for all contacts,
