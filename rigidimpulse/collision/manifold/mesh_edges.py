@@ -95,7 +95,7 @@ def _crossing_contact(geometry, view, found, count, edges):
     tolerance = STRICT + ROUND_OFF * spread + min(TILT, view.margin * spread / size)
     sense = 1.0
     # Near each other the points do not tell which body is on which side, since bodies may be a little inside each other: the arcs do.
-    for _ in range(2 if distance <= view.depth else 1):
+    for _ in range(2 if distance <= view.depth and view.leeway == 0.0 else 1):
         scale = sense / c_length
         normal = (c[0] * scale, c[1] * scale, c[2] * scale)
         miss, end = _arcs_miss(geometry, view, edges, normal)

@@ -1,7 +1,8 @@
 """Safe time of two convex pieces: simplices (points, segments, triangles) and cylinders, grown by the threshold.
 
 Several directions n are tried and the best counts: the normal of either face, carried by its body; the direction of
-the closest features, carried by either body; and, for crossing edges, n turning with both of them. For a carried n
+the closest features, or of a face or an edge where it separates nothing, carried by either body; and, for crossing edges, n turning with both
+of them. For a carried n
 every corner has its own offset and speed (`separating_quadratic`): one offset with the largest speed would stall a body that
 rolls or slides.
 
@@ -18,6 +19,8 @@ is None: numba then removes the rest before it compiles. They are never called t
 """
 
 from __future__ import annotations
+
+from math import inf
 
 from rigidimpulse.collision.distance.cylinder import cylinder_cylinder_distance, cylinder_support, cylinder_triangle_distance
 from rigidimpulse.collision.time_of_impact.closest_direction import NO_EDGES, closest_simplices, farthest
@@ -210,6 +213,41 @@ def _face_direction(work, index, side):
 
 
 @jit
+def _separation(work, index, side, outward):
+    """Separation of two simplices along a unit direction that points out of the piece of one side."""
+    other = 1 - side
+    nearest = -farthest(work, CORNER + 9 * other, index[COUNT + other], scaled(outward, -1.0))
+    return nearest - farthest(work, CORNER + 9 * side, index[COUNT + side], outward)
+
+
+@jit
+def _surface_direction(work, index):
+    """The direction of largest separation among the normals of both faces and those across their edges in their planes.
+
+    The difference of two points at the distance g is off by round-off / g, and may separate nothing. Where faces lie in one plane, as those
+    of bodies in a row do, only an edge tells the direction. Returns (separation, direction from the first piece to the second).
+    """
+    best, direction = -inf, (0.0, 0.0, 0.0)
+    for side in range(2):
+        if index[COUNT + side] < 3:
+            continue
+        face, sign = vector(work, FACE + 3 * side), 1.0 - 2.0 * side
+        for k in range(5):
+            outward = scaled(face, 1.0 if k == 3 else -1.0)
+            if k < 3:
+                corner, following = CORNER + 9 * side + 3 * k, CORNER + 9 * side + 3 * ((k + 1) % 3)
+                outward = cross(subtract(vector(work, following), vector(work, corner)), face)
+            size = length(outward)
+            if size == 0.0:
+                continue
+            outward = scaled(outward, 1.0 / size)
+            separation = _separation(work, index, side, outward)
+            if separation > best:
+                best, direction = separation, scaled(outward, sign)
+    return best, direction
+
+
+@jit
 def pieces_safe_until(scratch, threshold, horizon):
     """Safe time of the two convex pieces at COUNT and CORNER, FACE or CYLINDER.
 
@@ -241,6 +279,11 @@ def pieces_safe_until(scratch, threshold, horizon):
         elif trial == 3:
             separation, edges = _closest(scratch)
             normal = vector(work, CLOSEST + NORMAL)
+            if separation <= threshold and index[COUNT] > 0 and index[COUNT + 1] > 0:
+                surface, direction_of_surface = _surface_direction(work, index)
+                if separation <= 0.0 or surface > threshold:
+                    separation, normal, edges = surface, direction_of_surface, NO_EDGES
+                    put(work, CLOSEST + NORMAL, normal)
             if separation <= 0.0:
                 break
         outward = normal if side == 0 else scaled(normal, -1.0)
