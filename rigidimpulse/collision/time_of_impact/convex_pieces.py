@@ -1,8 +1,8 @@
 """Safe time of two convex pieces: simplices (points, segments, triangles) and cylinders, grown by the threshold.
 
 Several directions n are tried and the best counts: the normal of either face, carried by its body; the direction of
-the closest features, or of a face or an edge where it separates nothing, carried by either body; and, for crossing edges, n turning with both
-of them. For a carried n
+the closest features, or of a face or an edge where it separates nothing, carried by either body; and, for crossing edges, n turning
+with both of them. For a carried n
 every corner has its own offset and speed (`separating_quadratic`): one offset with the largest speed would stall a body that
 rolls or slides.
 
