@@ -11,18 +11,17 @@ which are drives. A link is what the file calls so; those without mass that are 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import multiply, rotate
+from rigidimpulse.io.inertia import with_possible_inertia
 from rigidimpulse.io.pieces import GHOST, Piece, Weight, fill_mass, joined
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.collision_filter import CollisionFilter
 from rigidimpulse.scene.joint_six_axis import Drive, Limit, SixAxisJoint
-from rigidimpulse.scene.mass import body_mass
 
 CREEP = 1e-4
 """rad/s or m/s, speed below which dry friction of joints gives way in proportion."""
@@ -71,7 +70,7 @@ class Link:
             self.name, shape, motion=self.motion, position=self.position, orientation=self.orientation, material=pieces[0].material,
             gravity_factor=self.gravity_factor, collision_filter=filter_, **values,
         )  # fmt: skip
-        return self._checked(made, notes)
+        return with_possible_inertia(made, notes)
 
     def _mass(self, notes: list[str]) -> dict[str, Any]:
         """Return mass properties as far as they are given."""
@@ -82,19 +81,6 @@ class Link:
             return {}
         notes.append(f"link {self.name!r} moves and has neither mass nor shape: it has {LEAST_MASS:g} kg")
         return {"mass": LEAST_MASS, "center_of_mass": np.zeros(3), "inertia": np.full(3, LEAST_MASS * GHOST.shape.radius**2)}
-
-    def _checked(self, made: Body, notes: list[str]) -> Body:
-        """Return the body, with the inertia of its shape where the given one is none of a body."""
-        try:
-            body_mass(made)
-            return made
-        except SceneError as error:
-            other = replace(made, inertia=None)
-            if made.inertia is None or not self.pieces:
-                raise
-            body_mass(other)
-            notes.append(f"link {self.name!r}: {error.problem}; the inertia of its shape is taken")
-            return other
 
 
 def axis_frame(axis: np.ndarray) -> np.ndarray:
@@ -115,9 +101,7 @@ def axis_limits(linear: bool, lower: float | None, upper: float | None) -> list[
     return [*held, Limit("x" if linear else "", "" if linear else "x", lower=lower, upper=upper)]
 
 
-def axis_drives(
-    linear: bool, damping: float, friction: float, stiffness: float = 0.0, rest: float = 0.0, axis: str = "x"
-) -> list[Drive]:
+def axis_drives(linear: bool, damping: float, friction: float, stiffness: float = 0.0, rest: float = 0.0, axis: str = "x") -> list[Drive]:
     """Return spring and damper and dry friction of a joint along or about an axis of its frame.
 
     Args:

@@ -1,10 +1,10 @@
 """Bodies of UsdPhysics: rigid bodies with the colliders below them, and colliders of no body, which are static.
 
-    position, orientation    of the prim, its scale goes to its colliders
-    velocity                 in the space that the prim's own transform is in: that of its parent
-    mass                     that of the body, else of its colliders, else from densities: of the body, of the collider, of its
-                             material, else 1,000 kg/m^3
-    not enabled              static; kinematic along its time samples if it has any
+position, orientation    of the prim, its scale goes to its colliders
+velocity                 in the space that the prim's own transform is in: that of its parent
+mass                     that of the body, else of its colliders, else from densities: of the body, of the collider, of its
+                         material, else 1,000 kg/m^3
+not enabled              static; kinematic along its time samples if it has any
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import from_matrix, multiply
 from rigidimpulse.engine.triggers import Trigger
+from rigidimpulse.io.inertia import with_possible_inertia
 from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, fill_mass, joined, weighed
 from rigidimpulse.io.usd.frames import Frames, snapped
 from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
@@ -125,7 +126,8 @@ class BodyReader:
         material = pieces[0].material
         if values.get("density") is not None:
             material = replace(material, density=values.pop("density"))
-        return Body(name, joined(pieces), material=material, collision_filter=filter_, **values)
+        body = Body(name, joined(pieces), material=material, collision_filter=filter_, **values)
+        return with_possible_inertia(body, self.notes)
 
     def _pieces(self, prim: Prim, owned: list[tuple[SdfPath, Any]]) -> tuple[list[Piece], list[float | None], list[float]]:
         """Return colliders in the rigid frame of a body's prim, their own masses (kg) and densities (kg/m^3)."""
@@ -182,9 +184,7 @@ class BodyReader:
             frame = parent
         return {"velocity": parent @ velocity * self.units.length, "angular_velocity": frame @ np.radians(spin)}
 
-    def _weight(
-        self, prim: Prim, name: str, pieces: list[Piece], masses: Sequence[float | None], densities: list[float]
-    ) -> dict[str, Any]:
+    def _weight(self, prim: Prim, name: str, pieces: list[Piece], masses: Sequence[float | None], densities: list[float]) -> dict[str, Any]:
         """Return mass properties of a dynamic body: those that the shape and one density do not say already."""
         values = given_mass(prim, self.units, self.frames.stretch(prim))
         values.pop("density", None)
