@@ -187,7 +187,7 @@ def test_what_is_not_read_is_told(tmp_path: Path) -> None:
 
 
 def test_inertias_that_are_none(tmp_path: Path) -> None:
-    """A largest moment above the sum of the others is of no body: the nearest possible one is taken. Nothing at all is that of the shape."""
+    """A largest moment above the sum of the others is of no body: the nearest possible one is taken. None at all: the shape's."""
     bad = '<link name="a"><inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="9"/></inertial>' \
           "<collision><geometry><sphere radius='0.5'/></geometry></collision></link>"  # fmt: skip
     scene = ri.load_scene(save(tmp_path, bad))

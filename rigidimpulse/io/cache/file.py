@@ -34,7 +34,9 @@ from rigidimpulse.recording.events import ROW_LENGTH
 FORMAT = "rigidimpulse cache 1"
 SUFFIXES = (".h5", ".hdf5")
 FRAMES = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3}
-COMMIT = np.dtype([("number", "<u8"), ("time", "<f8"), ("frames", "<u8"), ("impacts", "<u8"), ("size", "<u8"), ("digest", "S64")])
+COMMIT = np.dtype(
+    [("number", "<u8"), ("time", "<f8"), ("frames", "<u8"), ("impacts", "<u8"), ("size", "<u8"), ("digest", "S64")]
+)
 SPARE = 2
 """Capacity over what is stored, for impacts and for bytes of a state."""
 LEAST_IMPACTS = 256

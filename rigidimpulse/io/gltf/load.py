@@ -24,6 +24,7 @@ from rigidimpulse.io.gltf.bodies import BodyMaker, Piece
 from rigidimpulse.io.gltf.container import read_file
 from rigidimpulse.io.gltf.geometry import Meshes
 from rigidimpulse.io.gltf.implicit import Shapes, placed_in_body
+from rigidimpulse.io.gltf.instancing import with_instances
 from rigidimpulse.io.gltf.joints import read_joints
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.origin import Origin
@@ -35,18 +36,17 @@ from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
-KNOWN = {schema.RIGID_BODIES, schema.IMPLICIT_SHAPES, "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"}
+KNOWN = {schema.RIGID_BODIES, schema.IMPLICIT_SHAPES, schema.INSTANCING, "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"}
 """Extensions that are read, or that have no say in how bodies move; materials and textures are among those, too."""
 LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "EXT_lights_")
 
 
 def load_gltf(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Scene:
     """Read a .glb or .gltf file; see `rigidimpulse.load_scene`."""
-    file = read_file(path, allow_outside)
     # Numbers are bounded, so what overflows here is no number that a message could miss.
     with np.errstate(all="ignore"):
         try:
-            return _Loader(Hierarchy(file)).scene(gravity)
+            return _Loader(Hierarchy(with_instances(read_file(path, allow_outside)))).scene(gravity)
         except SceneError as error:
             raise error if path.name in str(error) else error.within(repr(path.name)) from None
         except (MemoryError, RecursionError) as error:
@@ -89,7 +89,7 @@ class _Loader:
         joints, lines = read_joints(self.hierarchy, lambda node: maker.name_of.get(self._body_node(node)), bodies)
         for thing in (*joints, *self._triggers(maker.name_of)):
             scene.add(thing)
-        notes = [*self._unknown(), *self.animations.notes, *self.meshes.notes, *self.shapes.notes, *self.notes, *lines]
+        notes = [*self._unknown(), *self.file.notes, *self.animations.notes, *self.meshes.notes, *self.shapes.notes, *self.notes, *lines]
         report = tuple(dict.fromkeys(notes))
         node_of = {name: node for node, name in maker.name_of.items()}
         scene.origin = Origin(report, self.animations, node_of, frozenset(maker.parts))

@@ -101,7 +101,9 @@ def axis_limits(linear: bool, lower: float | None, upper: float | None) -> list[
     return [*held, Limit("x" if linear else "", "" if linear else "x", lower=lower, upper=upper)]
 
 
-def axis_drives(linear: bool, damping: float, friction: float, stiffness: float = 0.0, rest: float = 0.0, axis: str = "x") -> list[Drive]:
+def axis_drives(
+    linear: bool, damping: float, friction: float, stiffness: float = 0.0, rest: float = 0.0, axis: str = "x"
+) -> list[Drive]:
     """Return spring and damper and dry friction of a joint along or about an axis of its frame.
 
     Args:

@@ -236,7 +236,9 @@ class _Reader:
             limits = [Limit("x", lower=0.0, upper=0.0), Limit(rotation="yz", lower=0.0, upper=0.0)]
             return [SixAxisJoint(parent, link.name, limits=limits, **common)]
         linear, dynamics = kind == "prismatic", joint.find("dynamics")
-        damping, friction = (_number("0" if dynamics is None else dynamics.get(key, "0"), key, where) for key in ("damping", "friction"))
+        damping, friction = (
+            _number("0" if dynamics is None else dynamics.get(key, "0"), key, where) for key in ("damping", "friction")
+        )
         limits = axis_limits(linear, *self._bounds(joint, kind, where))
         return [SixAxisJoint(parent, link.name, limits=limits, drives=axis_drives(linear, damping, friction), **common)]
 

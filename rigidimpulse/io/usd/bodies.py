@@ -1,10 +1,10 @@
 """Bodies of UsdPhysics: rigid bodies with the colliders below them, and colliders of no body, which are static.
 
-position, orientation    of the prim, its scale goes to its colliders
-velocity                 in the space that the prim's own transform is in: that of its parent
-mass                     that of the body, else of its colliders, else from densities: of the body, of the collider, of its
-                         material, else 1,000 kg/m^3
-not enabled              static; kinematic along its time samples if it has any
+    position, orientation    of the prim, its scale goes to its colliders
+    velocity                 in the space that the prim's own transform is in: that of its parent
+    mass                     that of the body, else of its colliders, else from densities: of the body, of the collider, of its
+                             material, else 1,000 kg/m^3
+    not enabled              static; kinematic along its time samples if it has any
 """
 
 from __future__ import annotations
@@ -184,7 +184,9 @@ class BodyReader:
             frame = parent
         return {"velocity": parent @ velocity * self.units.length, "angular_velocity": frame @ np.radians(spin)}
 
-    def _weight(self, prim: Prim, name: str, pieces: list[Piece], masses: Sequence[float | None], densities: list[float]) -> dict[str, Any]:
+    def _weight(
+        self, prim: Prim, name: str, pieces: list[Piece], masses: Sequence[float | None], densities: list[float]
+    ) -> dict[str, Any]:
         """Return mass properties of a dynamic body: those that the shape and one density do not say already."""
         values = given_mass(prim, self.units, self.frames.stretch(prim))
         values.pop("density", None)
