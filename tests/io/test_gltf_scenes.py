@@ -341,7 +341,7 @@ def test_plain_file(tmp_path: Path) -> None:
     nodes = [
         {"name": "Floor.001", "mesh": 0, "scale": [10, 0.1, 10]},
         {"name": "crate", "mesh": 0, "translation": [0, 2, 0], "extras": {"mass": 3, "friction": 0.2}, "children": [2]},
-        {"name": "lid", "mesh": 0, "translation": [0, 1.5, 0]},
+        {"name": "lid", "mesh": 0, "translation": [0, 1.5, 0], "extras": {"motion": "dynamic"}},
         {"name": "sail", "mesh": 1},
         {"name": "bowl", "mesh": 2},
         {"name": "camera"},
