@@ -112,13 +112,13 @@ class _Loader:
             return
         drawn = [names[k] for k in self.hierarchy.order if nodes[k].mesh is not None and self._body_node(k) < 0]
         if drawn:
-            self.notes.append(f"{_listed(drawn)} have a mesh and no collider: they are drawn where the file has them, and collide with nothing")
+            self.notes.append(f"{_listed(drawn)}: a mesh and no collider: drawn where the file has it, and collide with nothing")
         for node in self.hierarchy.order:
             collider = nodes[node].physics.collider
             source = None if collider is None else collider.geometry.node
             skin = None if source is None or source >= len(nodes) else nodes[source].skin
             if skin is not None and bones_move(self.hierarchy, self.animations, skin):
-                self.notes.append(f"collider {names[node]!r} has bones that move: it collides as it is at rest, its animation is not collided with")
+                self.notes.append(f"bones of collider {names[node]!r} move: it collides as it is at rest, its animation is not collided with")
 
     def _gravity(self) -> ArrayLike:
         """What a file that we wrote says of gravity, else that of glTF."""

@@ -65,7 +65,8 @@ def plain_pieces(
                 pieces.append(Piece(*placed_in_body((piece.shape, NO_TURN), position, turn), piece.material, None))
         given = None
         if motion != "static":
-            given = Motion(is_kinematic=motion == "kinematic", mass=_figure(hierarchy, _flags(hierarchy, node), "mass", hierarchy.names[node]))
+            mass = _figure(hierarchy, _flags(hierarchy, node), "mass", hierarchy.names[node])
+            given = Motion(is_kinematic=motion == "kinematic", mass=mass)
         yield node, given, pieces
 
 
@@ -91,7 +92,8 @@ def _parts(hierarchy: Hierarchy, animations: Animations, notes: list[str]) -> di
                 "with the extra motion it is a body as it is at rest, and its animation is not collided with"
             )
             continue
-        if motion is None and above >= 0 and release_of(hierarchy, node) is None and not _is_animated_between(hierarchy, animations, node, above):
+        says = motion is not None or release_of(hierarchy, node) is not None
+        if above >= 0 and not says and not _is_animated_between(hierarchy, animations, node, above):
             parts[above].append(node)
             continue
         parts[node] = []

@@ -38,6 +38,7 @@ class BodyReader:
 
     Attributes:
         name_of: body of each prim that is one, by path. bodies: by name. triggers: what was made of them.
+        colliders: path and description of each, in the order of the file.
         notes: lines of the report.
 
     """
@@ -52,10 +53,10 @@ class BodyReader:
         self.triggers: list[Trigger] = []
         self._materials: dict[SdfPath, tuple[Material, float]] = {}
         self._rigid = dict(parsed.get("RigidBody", []))
-        self._colliders = [entry for kind, entries in parsed.items() if kind.endswith("Shape") for entry in entries]
+        self.colliders = [entry for kind, entries in parsed.items() if kind.endswith("Shape") for entry in entries]
         # In the order of the file, whatever their kind.
         place = {prim.GetPath(): k for k, prim in enumerate(frames.prims())}
-        self._colliders.sort(key=lambda entry: place.get(entry[0], 0))
+        self.colliders.sort(key=lambda entry: place.get(entry[0], 0))
         self._names = _Names()
         self._make(place)
 
@@ -65,7 +66,7 @@ class BodyReader:
         apart: dict[SdfPath, list[SdfPath]] = {}
         groups: dict[SdfPath, list[SdfPath]] = {}
         later = []
-        for path, desc in self._colliders:
+        for path, desc in self.colliders:
             prim = self.stage.GetPrimAtPath(path)
             if TRIGGER in prim.GetPrimTypeInfo().GetAppliedAPISchemas():
                 later.append((path, desc))

@@ -43,7 +43,7 @@ def plain_bodies(frames: Frames) -> Plain:
     found = Plain({"RigidBody": [], "MeshShape": []}, frozenset(), ["the file has no physics: every prim with a surface is a body"])
     shapes, hulls = Shapes(frames.start), set()
     for prim in frames.prims():
-        if str(prim.GetTypeName()) not in KINDS or not _is_seen(prim):
+        if str(prim.GetTypeName()) not in KINDS or not is_seen(prim):
             continue
         body = _body_of(prim)
         motion = _motion(frames, body)
@@ -63,7 +63,8 @@ def plain_bodies(frames: Frames) -> Plain:
     return found._replace(hulls=frozenset(hulls))
 
 
-def _is_seen(prim: Prim) -> bool:
+def is_seen(prim: Prim) -> bool:
+    """Return whether a prim is there to be looked at."""
     image = UsdGeom.Imageable(prim)
     return image.ComputeVisibility() != UsdGeom.Tokens.invisible and str(image.ComputePurpose()) in SEEN
 
