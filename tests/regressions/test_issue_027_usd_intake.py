@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("pxr")
-from pxr import Gf, Usd, UsdGeom, UsdPhysics
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdSkel
 
 import rigidimpulse as ri
 
@@ -109,6 +109,57 @@ def test_colliders_of_an_instancer_below_a_body_are_its_shape(tmp_path: Path) ->
     file.collider("/rack/rods/rod", "Cube", size=1.0)
     scene = file.load(tmp_path)
     assert scene.names == ("rack",) and scene["rack"].shape.solid().volume == pytest.approx(10.0)
+
+
+def crate(file: File, path: str, at: tuple[float, float, float], **more: str) -> None:
+    """An object as Blender writes it: an Xform with the transform, and a mesh in it."""
+    prim = file.prim(path, at=at)
+    for name, value in more.items():
+        prim.CreateAttribute(f"userProperties:{name}", Sdf.ValueTypeNames.String).Set(value)
+    file.collider(f"{path}/mesh", "Mesh").RemoveAPI(UsdPhysics.CollisionAPI)
+
+
+def test_an_object_below_another_is_part_of_it(tmp_path: Path) -> None:
+    """A crate on a crate came apart. It is one body now, unless it says that it moves by itself."""
+    file = File()
+    file.prim("/World", "Xform")
+    crate(file, "/World/low", (0.0, 0.0, 5.0))
+    crate(file, "/World/low/high", (0.0, 0.0, 1.0))
+    crate(file, "/World/low/high/top", (0.0, 0.0, 1.0))
+    crate(file, "/World/low/loose", (0.0, 3.0, 0.0), motion="dynamic")
+    crate(file, "/World/beside", (5.0, 0.0, 5.0))
+    scene = file.load(tmp_path)
+    assert sorted(scene.names) == ["beside", "loose", "low"]
+    assert scene["low"].shape.solid().volume == pytest.approx(3.0) and scene["low"].shape.solid().centroid[2] == pytest.approx(1.0)
+    for path in ("/World/low/high/mesh", "/World/low/high/top/mesh"):
+        assert any(f"{path} is part of body /World/low" in line for line in scene.report)
+
+
+@pytest.mark.parametrize("moving", [True, False])
+def test_a_mesh_whose_bones_move_is_drawn_and_no_lump(moving: bool, tmp_path: Path) -> None:
+    file = File()
+    file.prim("/floor", "Cube", scale=(50.0, 50.0, 0.5), at=(0.0, 0.0, -0.5))
+    UsdSkel.Root.Define(file.stage, "/hero")
+    crate(file, "/hero/skin", (0.0, 0.0, 2.0))
+    skeleton = UsdSkel.Skeleton.Define(file.stage, "/hero/bones")
+    skeleton.GetJointsAttr().Set(["a"])
+    for attribute in (skeleton.GetBindTransformsAttr(), skeleton.GetRestTransformsAttr()):
+        attribute.Set([Gf.Matrix4d(1.0)])
+    animation = UsdSkel.Animation.Define(file.stage, "/hero/walk")
+    animation.GetJointsAttr().Set(["a"])
+    animation.GetRotationsAttr().Set([Gf.Quatf(1.0)])
+    animation.GetScalesAttr().Set([Gf.Vec3h(1.0)])
+    for code in (0.0, 24.0) if moving else (0.0,):
+        animation.GetTranslationsAttr().Set([Gf.Vec3f(0.0, code, 0.0)], code)
+    mesh = file.stage.GetPrimAtPath("/hero/skin/mesh")
+    UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets(["/hero/walk"])
+    binding = UsdSkel.BindingAPI.Apply(mesh)
+    binding.CreateSkeletonRel().SetTargets(["/hero/bones"])
+    binding.CreateJointIndicesPrimvar(False, 1).Set([0] * 8)
+    binding.CreateJointWeightsPrimvar(False, 1).Set([1.0] * 8)
+    scene = file.load(tmp_path)
+    assert ("skin" in scene.names) is not moving
+    assert any("bones" in line and "/hero/skin/mesh" in line and "collides with nothing" in line for line in scene.report) is moving
 
 
 def test_every_prim_is_simulated_drawn_or_reported(tmp_path: Path) -> None:
