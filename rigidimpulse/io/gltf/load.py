@@ -36,7 +36,9 @@ from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
-KNOWN = {schema.RIGID_BODIES, schema.IMPLICIT_SHAPES, schema.INSTANCING, "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"}
+KNOWN = {schema.RIGID_BODIES, schema.IMPLICIT_SHAPES, schema.INSTANCING} | {
+    "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"
+}
 """Extensions that are read, or that have no say in how bodies move; materials and textures are among those, too."""
 LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "EXT_lights_")
 
@@ -118,7 +120,8 @@ class _Loader:
             source = None if collider is None else collider.geometry.node
             skin = None if source is None or source >= len(nodes) else nodes[source].skin
             if skin is not None and bones_move(self.hierarchy, self.animations, skin):
-                self.notes.append(f"bones of collider {names[node]!r} move: it collides as it is at rest, its animation is not collided with")
+                what = "it collides as it is at rest, its animation is not collided with"
+                self.notes.append(f"bones of collider {names[node]!r} move: {what}")
 
     def _gravity(self) -> ArrayLike:
         """What a file that we wrote says of gravity, else that of glTF."""

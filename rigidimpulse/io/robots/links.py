@@ -83,6 +83,12 @@ class Link:
         return {"mass": LEAST_MASS, "center_of_mass": np.zeros(3), "inertia": np.full(3, LEAST_MASS * GHOST.shape.radius**2)}
 
 
+def carried(carrier: Mapping[str, str | None]) -> list[str]:
+    """Return lines about links that are no bodies; carrier: the body of each link by name, None for the world."""
+    lines = [f"link {name!r} is part of {other!r}, to which it is fixed" for name, other in carrier.items() if other not in (name, None)]
+    return lines + [f"link {name!r} stands and has no shape: it is no body" for name, other in carrier.items() if other is None]
+
+
 def axis_frame(axis: np.ndarray) -> np.ndarray:
     """Return a right-handed frame (3, 3), in rows, whose x is along a unit vector (3,)."""
     second = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])

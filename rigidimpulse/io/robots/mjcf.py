@@ -23,7 +23,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.io.inertia import nearest_inertia
 from rigidimpulse.io.pieces import Piece, Weight, sphere_points
-from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, filters, fixed
+from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, carried, filters, fixed
 from rigidimpulse.io.robots.xml import read_xml
 from rigidimpulse.scene.joint import BallJoint
 from rigidimpulse.scene.joint_six_axis import AXES, Drive, Limit, SixAxisJoint
@@ -118,6 +118,7 @@ class _Reader:
         self._used: set[str] = set()
         self._meshes: dict[int, Shape] = {}
         self._chained: list[tuple[str, str]] = []
+        self._only_seen: list[str] = []
         self.names = [self._name("body", k, model.body(k).name) if k else "world" for k in range(model.nbody)]
         for key, what in COUNTED.items():
             if getattr(model, key, 0):
@@ -158,6 +159,9 @@ class _Reader:
                 joints += self._chain(parent, link, own, between)
         kept = [link for k, link in links.items() if carrier[k] == link.name]
         made = [*self._grounds(), *kept, *between]
+        self.notes += carried({link.name: carrier[k] for k, link in links.items()})
+        if self._only_seen:
+            self.notes.append(f"geoms that collide with nothing are not read: {', '.join(dict.fromkeys(self._only_seen))}")
         apart = filters([link.name for link in made], self._apart(made))
         scene = Scene(np.array(model.opt.gravity) if gravity is None else gravity)
         for link in made:
@@ -202,6 +206,7 @@ class _Reader:
     def _piece(self, g: int, position: np.ndarray, orientation: np.ndarray) -> Piece | None:
         """Return a geom that collides as a piece, None for one that does not, or is not read."""
         if self._bits(g) == (0, 0):
+            self._only_seen.append(repr(self.model.geom(g).name or f"geom{g}"))
             return None
         shape = self._shape(g)
         if shape is None:

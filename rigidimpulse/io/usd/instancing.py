@@ -27,7 +27,7 @@ OPERATION = "xformOp:transform:instance"
 
 
 def expand_instancers(stage: Stage, code: float) -> list[str]:
-    """Put prims in the place of instances that are bodies or colliders, or of all where the file has no physics; return lines of the report.
+    """Put prims in the place of instances with physics, or of all where the file has none; return lines of the report.
 
     Args:
         stage: it gets opinions in its session layer. code: time code of the scene.
@@ -47,7 +47,7 @@ def expand_instancers(stage: Stage, code: float) -> list[str]:
                 continue
             done.add(prim.GetPath())
             if not is_plain and not _makes_bodies(prim):
-                notes.append(f"instancer {prim.GetPath()}: its prototypes have no physics: its instances are drawn, and collide with nothing")
+                notes.append(f"instancer {prim.GetPath()}: no prototype has physics: its instances are drawn, and collide with nothing")
             elif prim.IsInstanceProxy():
                 notes.append(f"instancer {prim.GetPath()} stands in an instance: its instances are drawn, and are no bodies")
             else:
@@ -64,7 +64,7 @@ def _has_physics(prim: Prim) -> bool:
 
 
 def _makes_bodies(prim: Prim) -> bool:
-    """Whether there is a body or a collider in a prototype of an instancer, or it is a body with colliders there."""
+    """Whether there is a body or a collider in a prototype of an instancer."""
     stage = prim.GetStage()
     roots = [stage.GetPrimAtPath(path) for path in UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()]
     return any(_has_physics(inner) for root in roots if root for inner in Usd.PrimRange(root, Usd.PrimAllPrimsPredicate))

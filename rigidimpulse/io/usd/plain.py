@@ -80,7 +80,7 @@ def is_seen(prim: Prim) -> bool:
 
 
 def _surfaces(frames: Frames, notes: list[str]) -> list[tuple[Prim, Prim, bool]]:
-    """Return prims with a surface, the prim of the body of each, and whether it is a part of a body above; those that are not come first."""
+    """Return prims with a surface, the prim of the body of each, and whether it is part of a body above; parts come last."""
     bent = moved_by_bones(frames.stage)
     own: dict[SdfPath, Prim] = {}
     for prim in frames.prims():
