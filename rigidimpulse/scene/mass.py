@@ -135,16 +135,23 @@ def _given_inertia(inertia: np.ndarray) -> np.ndarray:
     return 0.5 * (inertia + inertia.T)
 
 
+def is_possible(moments: np.ndarray) -> bool:
+    """Return whether a body can have principal moments of inertia (3,), within the rounding of given figures."""
+    small, middle, large = sorted(float(moment) for moment in moments)
+    return small > TOLERANCES.inertia.least_moment * large and small + middle >= large * (1.0 - TOLERANCES.inertia.realizable)
+
+
 def _check_moments(moments: np.ndarray) -> None:
     """Raise a `SceneError` for moments that no body has."""
-    small, middle, large = sorted(float(moment) for moment in moments)
+    if is_possible(moments):
+        return
+    small, large = float(min(moments)), float(max(moments))
     if small <= TOLERANCES.inertia.least_moment * large:
         raise SceneError(f"principal moments of inertia are {moments.tolist()} kg m^2", "all must be > 0")
-    if small + middle < large * (1.0 - TOLERANCES.inertia.realizable):
-        raise SceneError(
-            f"principal moments of inertia are {moments.tolist()} kg m^2",
-            "no body has one above the sum of the other two: check inertia=, which is about the centre of mass",
-        )
+    raise SceneError(
+        f"principal moments of inertia are {moments.tolist()} kg m^2",
+        "no body has one above the sum of the other two: check inertia=, which is about the centre of mass",
+    )
 
 
 def _off_diagonal(tensor: np.ndarray) -> float:

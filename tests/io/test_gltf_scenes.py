@@ -341,7 +341,7 @@ def test_plain_file(tmp_path: Path) -> None:
     nodes = [
         {"name": "Floor.001", "mesh": 0, "scale": [10, 0.1, 10]},
         {"name": "crate", "mesh": 0, "translation": [0, 2, 0], "extras": {"mass": 3, "friction": 0.2}, "children": [2]},
-        {"name": "lid", "mesh": 0, "translation": [0, 1.5, 0]},
+        {"name": "lid", "mesh": 0, "translation": [0, 1.5, 0], "extras": {"motion": "dynamic"}},
         {"name": "sail", "mesh": 1},
         {"name": "bowl", "mesh": 2},
         {"name": "camera"},
@@ -366,10 +366,10 @@ def test_plain_file(tmp_path: Path) -> None:
 
 def test_report_of_what_is_not_read(tmp_path: Path) -> None:
     file = with_physics([{"name": "it", "extensions": physics({"mass": 1}, shaped())}], [BOX])
-    file.tree["extensionsUsed"] += ["EXT_mesh_gpu_instancing", "KHR_materials_unlit"]
+    file.tree["extensionsUsed"] += ["MSFT_lod", "KHR_materials_unlit"]
     file.animate(0, "translation", [0, 1], [[0, 0, 0], [1, 0, 0]])
     report = load(file, tmp_path).report
-    assert any("EXT_mesh_gpu_instancing" in line for line in report) and not any("unlit" in line for line in report)
+    assert any("MSFT_lod" in line for line in report) and not any("unlit" in line for line in report)
     assert any("'it'" in line and "animation is not read" in line for line in report)
 
 

@@ -187,11 +187,14 @@ def test_what_is_not_read_is_told(tmp_path: Path) -> None:
 
 
 def test_inertias_that_are_none(tmp_path: Path) -> None:
-    """A largest moment above the sum of the others is of no body: that of the shape is taken, with the mass that is given."""
+    """A largest moment above the sum of the others is of no body: the nearest possible one is taken. None at all: the shape's."""
     bad = '<link name="a"><inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="9"/></inertial>' \
           "<collision><geometry><sphere radius='0.5'/></geometry></collision></link>"  # fmt: skip
     scene = ri.load_scene(save(tmp_path, bad))
-    assert np.allclose(body_mass(scene["a"]).inertia, 0.4 * 2 * 0.25 * np.eye(3)) and "inertia of its shape" in scene.report[0]
+    nearest = np.diag([1, 1, 9]) + 7 / 3 * np.diag([1, 1, -1])
+    assert np.allclose(body_mass(scene["a"]).inertia, nearest, rtol=1e-7) and "the nearest that one has" in scene.report[0]
+    scene = ri.load_scene(save(tmp_path, bad.replace('"1"', '"0"').replace('"9"', '"0"')))
+    assert np.allclose(body_mass(scene["a"]).inertia, 0.4 * 2 * 0.25 * np.eye(3)) and "that of its shape" in scene.report[0]
 
 
 LOOP = link("a") + link("b") + joint("continuous", "a", "b") + joint("continuous", "b", "a", name="back")

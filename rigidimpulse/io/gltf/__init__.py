@@ -8,4 +8,5 @@ plain       bodies of files without physics       origin          what is kept o
 draw        bodies without a file, as meshes      animate         motion into a file
 write, write_joints    a scene as a file with physics, its joints
 own_materials          what only our files say of materials
+instancing  a node for each instance               extensions      what a written file uses and requires
 """

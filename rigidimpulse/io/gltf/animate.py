@@ -25,6 +25,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import angle_between, conjugate, from_matrix, multiply, quaternion_continuity, to_matrix
 from rigidimpulse.io.gltf.container import Builder
 from rigidimpulse.io.gltf.draw import Drawing, new_file, node_pose, stage
+from rigidimpulse.io.gltf.extensions import state_extensions
 from rigidimpulse.io.gltf.morph import add_soft_bodies
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.origin import Origin
@@ -90,6 +91,7 @@ def write_gltf(run: Recording, target: ExportTarget) -> None:
     if origin:
         _drop_channels(builder.tree, set(writer.nodes))
         writer.take_over(origin)
+        state_extensions(builder.tree)
     writer.close()
     _say_warnings(builder.tree, run.status)
     builder.write(target.path)

@@ -88,7 +88,7 @@ class Animations:
                 file.entry(file.document.nodes, node, "node")
                 name = hierarchy.names[node]
                 if path not in PATHS:
-                    self.notes.append(f"animation of {path} of node {name!r} is not read: geometry stays as it is at rest")
+                    self.notes.append(f"animation of {path} of node {name!r} is not collided with: as a collider it stays as it is at rest")
                 elif (node, path) in self.tracks:
                     self.notes.append(f"animation {animation.name or number} moves {path} of node {name!r}, as another does: left out")
                 else:

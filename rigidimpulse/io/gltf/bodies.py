@@ -11,6 +11,7 @@ from rigidimpulse.core.quaternion import rotate, to_matrix
 from rigidimpulse.io.gltf.animation import Animations
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.schema import LARGEST, Motion
+from rigidimpulse.io.inertia import with_possible_inertia
 from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, fill_mass, joined
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.collision_filter import CollisionFilter
@@ -57,7 +58,8 @@ class BodyMaker:
     def _add(self, name: str, shape: Shape, pieces: list[Piece], filter_: CollisionFilter | None, values: dict[str, Any]) -> None:
         if any(piece.material != pieces[0].material for piece in pieces):
             self.notes.append(f"body {name!r} has colliders of several materials: that of the first counts")
-        self.bodies.append(Body(name, shape, material=pieces[0].material, collision_filter=filter_, **values))
+        body = Body(name, shape, material=pieces[0].material, collision_filter=filter_, **values)
+        self.bodies.append(with_possible_inertia(body, self.notes))
 
     def _part_name(self, name: str, number: int) -> str:
         title = f"{name} part {number + 1}"

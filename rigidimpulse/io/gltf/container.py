@@ -39,6 +39,7 @@ class GltfFile:
     Attributes:
         path: where from. raw: its JSON as it is. document: the parts that are read, checked.
         binary: the bytes inside a .glb file. outside: whether its buffers and images may lie outside its folder.
+        notes: lines of the report about what was made of it before it became a scene.
 
     """
 
@@ -48,6 +49,7 @@ class GltfFile:
     binary: bytes | None
     outside: bool
     loaded: dict[int, bytes] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
     def bytes_at(self, uri: str, what: str) -> bytes:
         """Return what a URI stands for: base64 data, or a file beside this one.

@@ -24,29 +24,34 @@ from rigidimpulse.io.gltf.bodies import BodyMaker, Piece
 from rigidimpulse.io.gltf.container import read_file
 from rigidimpulse.io.gltf.geometry import Meshes
 from rigidimpulse.io.gltf.implicit import Shapes, placed_in_body
+from rigidimpulse.io.gltf.instancing import with_instances
 from rigidimpulse.io.gltf.joints import read_joints
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.origin import Origin
 from rigidimpulse.io.gltf.own_materials import NOTE, STATIC, own_figures
-from rigidimpulse.io.gltf.plain import plain_pieces
+from rigidimpulse.io.gltf.plain import bones_move, plain_pieces
 from rigidimpulse.io.scene_file import GLTF_GRAVITY
 from rigidimpulse.scene.collision_filter import CollisionFilter
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
-KNOWN = {schema.RIGID_BODIES, schema.IMPLICIT_SHAPES, "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"}
+KNOWN = {schema.RIGID_BODIES, schema.IMPLICIT_SHAPES, schema.INSTANCING} | {
+    "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"
+}
 """Extensions that are read, or that have no say in how bodies move; materials and textures are among those, too."""
 LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "EXT_lights_")
+
+MOST_NAMES = 8
+"""Names of nodes at most in a line of the report."""
 
 
 def load_gltf(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Scene:
     """Read a .glb or .gltf file; see `rigidimpulse.load_scene`."""
-    file = read_file(path, allow_outside)
     # Numbers are bounded, so what overflows here is no number that a message could miss.
     with np.errstate(all="ignore"):
         try:
-            return _Loader(Hierarchy(file)).scene(gravity)
+            return _Loader(Hierarchy(with_instances(read_file(path, allow_outside)))).scene(gravity)
         except SceneError as error:
             raise error if path.name in str(error) else error.within(repr(path.name)) from None
         except (MemoryError, RecursionError) as error:
@@ -80,20 +85,43 @@ class _Loader:
                 maker.add(node, self.hierarchy.nodes[node].physics.motion, pieces)
         else:
             self.notes.append("the file has no physics: every node with a mesh is a body")
-            for node, motion, piece in plain_pieces(self.hierarchy, self.meshes, self.animations, self.notes):
+            for node, motion, pieces in plain_pieces(self.hierarchy, self.meshes, self.animations, self.notes):
                 self.owner[node] = node
-                maker.add(node, motion, [piece])
+                maker.add(node, motion, pieces)
         for thing in (*maker.bodies, *maker.joints):
             scene.add(thing)
         bodies = {body.name: body for body in maker.bodies}
         joints, lines = read_joints(self.hierarchy, lambda node: maker.name_of.get(self._body_node(node)), bodies)
         for thing in (*joints, *self._triggers(maker.name_of)):
             scene.add(thing)
-        notes = [*self._unknown(), *self.animations.notes, *self.meshes.notes, *self.shapes.notes, *self.notes, *lines]
+        self._report_rest(has_physics)
+        notes = [*self._unknown(), *self.file.notes, *self.animations.notes, *self.meshes.notes, *self.shapes.notes, *self.notes, *lines]
         report = tuple(dict.fromkeys(notes))
         node_of = {name: node for node, name in maker.name_of.items()}
         scene.origin = Origin(report, self.animations, node_of, frozenset(maker.parts))
         return scene
+
+    def _report_rest(self, has_physics: bool) -> None:
+        """Report the nodes that are neither in the scene nor drawn with a body, and colliders whose surface moves in itself."""
+        nodes, names = self.hierarchy.nodes, self.hierarchy.names
+        shapes = [part.geometry for node in nodes for part in (node.physics.collider, node.physics.trigger) if part is not None]
+        lent = {geometry.node for geometry in shapes if geometry is not None}
+        shown = set(self.hierarchy.order)
+        lost = [names[k] for k, node in enumerate(nodes) if k not in shown | lent and (node.mesh is not None or node.extensions.physics)]
+        if lost:
+            self.notes.append(f"not in the scene that the file shows: {_listed(lost)} are left out")
+        if not has_physics:
+            return
+        drawn = [names[k] for k in self.hierarchy.order if nodes[k].mesh is not None and self._body_node(k) < 0]
+        if drawn:
+            self.notes.append(f"{_listed(drawn)}: a mesh and no collider: drawn where the file has it, and collide with nothing")
+        for node in self.hierarchy.order:
+            collider = nodes[node].physics.collider
+            source = None if collider is None else collider.geometry.node
+            skin = None if source is None or source >= len(nodes) else nodes[source].skin
+            if skin is not None and bones_move(self.hierarchy, self.animations, skin):
+                what = "it collides as it is at rest, its animation is not collided with"
+                self.notes.append(f"bones of collider {names[node]!r} move: {what}")
 
     def _gravity(self) -> ArrayLike:
         """What a file that we wrote says of gravity, else that of glTF."""
@@ -213,6 +241,12 @@ def _is_group(node: schema.Node) -> bool:
     """Whether a node without motion is a static body of the colliders below it, in a file that we wrote."""
     said = node.extras.get(NOTE) if isinstance(node.extras, dict) else None
     return isinstance(said, dict) and said.get(STATIC) is True
+
+
+def _listed(names: list[str]) -> str:
+    """The first of some names of nodes, and how many more there are."""
+    more = len(names) - MOST_NAMES
+    return "nodes " + ", ".join(map(repr, names[:MOST_NAMES])) + (f" and {more} more" if more > 0 else "")
 
 
 def _one_shape(parts: list[tuple[Shape, np.ndarray, np.ndarray]]) -> Shape:

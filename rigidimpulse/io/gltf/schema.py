@@ -26,6 +26,7 @@ Axes = Annotated[list[Annotated[int, Field(ge=0, le=2)]], Field(min_length=1, ma
 Combine = Literal["average", "minimum", "maximum", "multiply"]
 
 RIGID_BODIES, IMPLICIT_SHAPES = "KHR_physics_rigid_bodies", "KHR_implicit_shapes"
+INSTANCING = "EXT_mesh_gpu_instancing"
 
 
 class Part(BaseModel):
@@ -88,10 +89,17 @@ class NodePhysics(Part):
     joint: NodeJoint | None = None
 
 
+class Instancing(Part):
+    """Where a node draws its mesh: accessors of TRANSLATION, ROTATION, SCALE."""
+
+    attributes: dict[str, Index] = {}
+
+
 class NodeExtensions(Part):
     """Extensions of a node that are read."""
 
     physics: NodePhysics | None = Field(default=None, alias=RIGID_BODIES)
+    instancing: Instancing | None = Field(default=None, alias=INSTANCING)
 
 
 class Node(Part):

@@ -11,18 +11,17 @@ which are drives. A link is what the file calls so; those without mass that are 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import multiply, rotate
+from rigidimpulse.io.inertia import with_possible_inertia
 from rigidimpulse.io.pieces import GHOST, Piece, Weight, fill_mass, joined
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.collision_filter import CollisionFilter
 from rigidimpulse.scene.joint_six_axis import Drive, Limit, SixAxisJoint
-from rigidimpulse.scene.mass import body_mass
 
 CREEP = 1e-4
 """rad/s or m/s, speed below which dry friction of joints gives way in proportion."""
@@ -71,7 +70,7 @@ class Link:
             self.name, shape, motion=self.motion, position=self.position, orientation=self.orientation, material=pieces[0].material,
             gravity_factor=self.gravity_factor, collision_filter=filter_, **values,
         )  # fmt: skip
-        return self._checked(made, notes)
+        return with_possible_inertia(made, notes)
 
     def _mass(self, notes: list[str]) -> dict[str, Any]:
         """Return mass properties as far as they are given."""
@@ -83,18 +82,11 @@ class Link:
         notes.append(f"link {self.name!r} moves and has neither mass nor shape: it has {LEAST_MASS:g} kg")
         return {"mass": LEAST_MASS, "center_of_mass": np.zeros(3), "inertia": np.full(3, LEAST_MASS * GHOST.shape.radius**2)}
 
-    def _checked(self, made: Body, notes: list[str]) -> Body:
-        """Return the body, with the inertia of its shape where the given one is none of a body."""
-        try:
-            body_mass(made)
-            return made
-        except SceneError as error:
-            other = replace(made, inertia=None)
-            if made.inertia is None or not self.pieces:
-                raise
-            body_mass(other)
-            notes.append(f"link {self.name!r}: {error.problem}; the inertia of its shape is taken")
-            return other
+
+def carried(carrier: Mapping[str, str | None]) -> list[str]:
+    """Return lines about links that are no bodies; carrier: the body of each link by name, None for the world."""
+    lines = [f"link {name!r} is part of {other!r}, to which it is fixed" for name, other in carrier.items() if other not in (name, None)]
+    return lines + [f"link {name!r} stands and has no shape: it is no body" for name, other in carrier.items() if other is None]
 
 
 def axis_frame(axis: np.ndarray) -> np.ndarray:

@@ -21,8 +21,9 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.io.inertia import nearest_inertia
 from rigidimpulse.io.pieces import Piece, Weight, sphere_points
-from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, filters, fixed
+from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, carried, filters, fixed
 from rigidimpulse.io.robots.xml import read_xml
 from rigidimpulse.scene.joint import BallJoint
 from rigidimpulse.scene.joint_six_axis import AXES, Drive, Limit, SixAxisJoint
@@ -52,16 +53,41 @@ def load_mjcf(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Sce
         import mujoco
     except ImportError as error:
         raise SceneError(f"MJCF files need the package mujoco ({error})", "pip install 'rigidimpulse[robot]'", where) from None
+    notes: list[str] = []
     try:
         model = mujoco.MjModel.from_xml_path(str(path))  # pyright: ignore[reportAttributeAccessIssue]
     except ValueError as error:
-        raise SceneError(f"MuJoCo does not compile it: {error}", "correct it at that line", where) from None
+        model = _with_possible_inertias(mujoco, path, notes)
+        if model is None:
+            raise SceneError(f"MuJoCo does not compile it: {error}", "correct it at that line", where) from None
     data = mujoco.MjData(model)  # pyright: ignore[reportAttributeAccessIssue]
     mujoco.mj_kinematics(model, data)  # pyright: ignore[reportAttributeAccessIssue]
     try:
-        return _Reader(model, data).scene(gravity)
+        return _Reader(model, data, notes).scene(gravity)
     except SceneError as error:
         raise error.within(where) from None
+
+
+def _with_possible_inertias(mujoco: Any, path: Path, notes: list[str]) -> Any:
+    """Return the model of a file whose given inertias are brought to possible ones, None where that is not what it lacks."""
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        for body in spec.bodies:
+            if not body.explicitinertial:
+                continue
+            xx, yy, zz, xy, xz, yz = body.fullinertia
+            full = bool(np.isfinite(xx))
+            tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) if full else np.diag(body.inertia)
+            found = nearest_inertia(body.name, tensor, notes)
+            if found is None or found is tensor:
+                continue
+            if full:
+                body.fullinertia = [*np.diag(found), found[0, 1], found[0, 2], found[1, 2]]
+            else:
+                body.inertia = np.diag(found)
+        return spec.compile() if notes else None
+    except ValueError:
+        return None
 
 
 def _stay_inside(root: Any, folder: Path, where: str) -> None:
@@ -86,12 +112,13 @@ class _Joint(NamedTuple):
 class _Reader:
     """A compiled model on its way to a scene."""
 
-    def __init__(self, model: Any, data: Any) -> None:
-        self.model, self.data = model, data
-        self.notes: list[str] = []
+    def __init__(self, model: Any, data: Any, notes: list[str]) -> None:
+        """notes: lines of the report so far."""
+        self.model, self.data, self.notes = model, data, notes
         self._used: set[str] = set()
         self._meshes: dict[int, Shape] = {}
         self._chained: list[tuple[str, str]] = []
+        self._only_seen: list[str] = []
         self.names = [self._name("body", k, model.body(k).name) if k else "world" for k in range(model.nbody)]
         for key, what in COUNTED.items():
             if getattr(model, key, 0):
@@ -132,6 +159,9 @@ class _Reader:
                 joints += self._chain(parent, link, own, between)
         kept = [link for k, link in links.items() if carrier[k] == link.name]
         made = [*self._grounds(), *kept, *between]
+        self.notes += carried({link.name: carrier[k] for k, link in links.items()})
+        if self._only_seen:
+            self.notes.append(f"geoms that collide with nothing are not read: {', '.join(dict.fromkeys(self._only_seen))}")
         apart = filters([link.name for link in made], self._apart(made))
         scene = Scene(np.array(model.opt.gravity) if gravity is None else gravity)
         for link in made:
@@ -176,6 +206,7 @@ class _Reader:
     def _piece(self, g: int, position: np.ndarray, orientation: np.ndarray) -> Piece | None:
         """Return a geom that collides as a piece, None for one that does not, or is not read."""
         if self._bits(g) == (0, 0):
+            self._only_seen.append(repr(self.model.geom(g).name or f"geom{g}"))
             return None
         shape = self._shape(g)
         if shape is None:

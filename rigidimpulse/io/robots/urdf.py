@@ -22,7 +22,7 @@ from rigidimpulse.core.conventions import STANDARD_GRAVITY
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import multiply, quaternion_from_rotation_vector, rotate, to_matrix
 from rigidimpulse.io.pieces import Piece, Weight, joined
-from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, filters, fixed
+from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, carried, filters, fixed
 from rigidimpulse.io.robots.xml import file_inside, read_xml
 from rigidimpulse.scene.joint_six_axis import Limit, SixAxisJoint
 from rigidimpulse.scene.material import Material
@@ -102,6 +102,10 @@ class _Reader:
             made[name] = self._link(name, made)
         joints, carrier = self._join(made, self._is_fixed(made) if fixed_base is None else fixed_base)
         kept = [name for name in self.order if carrier[name] == name]
+        self.notes += carried({name: other for name, other in carrier.items() if name != WORLD or other is not None})
+        seen = [name for name, entry in self.links.items() if entry.find("visual") is not None and entry.find("collision") is not None]
+        if seen:
+            self.notes.append(f"<visual> of links {', '.join(map(repr, seen))} is not read: what is drawn is their collision")
         apart = self._overlaps([made[name] for name in kept], joints)
         barred = filters(kept, apart)
         scene = Scene(gravity)

@@ -6,4 +6,5 @@ materials  materials, masses, collision groups    bodies     bodies of them
 joints     joints                                 load       a scene from a file
 origin     what is kept of the file               draw       bodies without a file, as prims
 animate    motion into a file                     plain      bodies of files without physics
+instancing point instancers as prims              skinning   meshes whose bones move
 """

@@ -18,6 +18,7 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import from_matrix, multiply
 from rigidimpulse.engine.triggers import Trigger
+from rigidimpulse.io.inertia import with_possible_inertia
 from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, fill_mass, joined, weighed
 from rigidimpulse.io.usd.frames import Frames, snapped
 from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
@@ -37,6 +38,7 @@ class BodyReader:
 
     Attributes:
         name_of: body of each prim that is one, by path. bodies: by name. triggers: what was made of them.
+        colliders: path and description of each, in the order of the file.
         notes: lines of the report.
 
     """
@@ -51,10 +53,10 @@ class BodyReader:
         self.triggers: list[Trigger] = []
         self._materials: dict[SdfPath, tuple[Material, float]] = {}
         self._rigid = dict(parsed.get("RigidBody", []))
-        self._colliders = [entry for kind, entries in parsed.items() if kind.endswith("Shape") for entry in entries]
+        self.colliders = [entry for kind, entries in parsed.items() if kind.endswith("Shape") for entry in entries]
         # In the order of the file, whatever their kind.
         place = {prim.GetPath(): k for k, prim in enumerate(frames.prims())}
-        self._colliders.sort(key=lambda entry: place.get(entry[0], 0))
+        self.colliders.sort(key=lambda entry: place.get(entry[0], 0))
         self._names = _Names()
         self._make(place)
 
@@ -64,7 +66,7 @@ class BodyReader:
         apart: dict[SdfPath, list[SdfPath]] = {}
         groups: dict[SdfPath, list[SdfPath]] = {}
         later = []
-        for path, desc in self._colliders:
+        for path, desc in self.colliders:
             prim = self.stage.GetPrimAtPath(path)
             if TRIGGER in prim.GetPrimTypeInfo().GetAppliedAPISchemas():
                 later.append((path, desc))
@@ -125,7 +127,8 @@ class BodyReader:
         material = pieces[0].material
         if values.get("density") is not None:
             material = replace(material, density=values.pop("density"))
-        return Body(name, joined(pieces), material=material, collision_filter=filter_, **values)
+        body = Body(name, joined(pieces), material=material, collision_filter=filter_, **values)
+        return with_possible_inertia(body, self.notes)
 
     def _pieces(self, prim: Prim, owned: list[tuple[SdfPath, Any]]) -> tuple[list[Piece], list[float | None], list[float]]:
         """Return colliders in the rigid frame of a body's prim, their own masses (kg) and densities (kg/m^3)."""

@@ -25,7 +25,10 @@ def valid_name(name: str, used: set[str]) -> str:
 
 
 def define(layer: Layer, path: SdfPath, kind: str = "Xform", over: bool = False) -> PrimSpec:
-    """Return a new prim of a type, or an opinion on one that is there."""
+    """Return a new prim of a type, or (`over`) an opinion on one that is there, in this layer or below."""
+    known = layer.GetPrimAtPath(path)
+    if over and known is not None:
+        return known
     prim = Sdf.CreatePrimInLayer(layer, path)
     prim.specifier = Sdf.SpecifierOver if over else Sdf.SpecifierDef
     if not over:

@@ -14,6 +14,7 @@ try:
     from pxr import UsdGeom as _UsdGeom
     from pxr import UsdPhysics as _UsdPhysics
     from pxr import UsdShade as _UsdShade
+    from pxr import UsdSkel as _UsdSkel
     from pxr import UsdUtils as _UsdUtils
     from pxr import Vt as _Vt
 except ImportError as error:
@@ -26,6 +27,7 @@ Usd: Any = _Usd
 UsdGeom: Any = _UsdGeom
 UsdPhysics: Any = _UsdPhysics
 UsdShade: Any = _UsdShade
+UsdSkel: Any = _UsdSkel
 UsdUtils: Any = _UsdUtils
 Vt: Any = _Vt
 

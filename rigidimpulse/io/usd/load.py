@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.io.usd.bodies import TRIGGER, BodyReader
 from rigidimpulse.io.usd.frames import Frames
+from rigidimpulse.io.usd.instancing import expand_instancers
 from rigidimpulse.io.usd.joints import JointReader
 from rigidimpulse.io.usd.library import SdfPath, Stage, Tf, Usd, UsdGeom, UsdPhysics
 from rigidimpulse.io.usd.origin import UsdOrigin
-from rigidimpulse.io.usd.plain import plain_bodies
+from rigidimpulse.io.usd.plain import is_seen, plain_bodies
 from rigidimpulse.scene.scene import Scene
 
 EARTH = 9.81
@@ -27,6 +28,8 @@ EARTH = 9.81
 FOREIGN = ("Physx", "Newton", "Mjc", "Isaac")
 """Schemas of physics that are not those of UsdPhysics begin so."""
 READ = {TRIGGER, "PhysxMaterialAPI"}
+MOST_PATHS = 8
+"""Paths of prims at most in a line of the report."""
 
 
 def load_usd(path: Path, gravity: ArrayLike | None) -> Scene:
@@ -53,12 +56,13 @@ def load_usd(path: Path, gravity: ArrayLike | None) -> Scene:
 
 
 def _scene(stage: Stage, gravity: ArrayLike | None) -> Scene:
-    parsed = _parsed(stage)
     frames = Frames(stage)
     if not (np.isfinite(frames.meters_per_unit) and frames.meters_per_unit > 0.0):
         raise SceneError(f"metersPerUnit is {frames.meters_per_unit}", "give a length > 0")
+    notes = expand_instancers(stage, frames.start)
+    parsed = _parsed(stage)
     reader = BodyReader(frames, parsed)
-    notes = _unresolved(stage) + _unknown(frames)
+    notes += _unresolved(stage) + _unknown(frames)
     if not reader.bodies:
         plain = plain_bodies(frames)
         reader = BodyReader(frames, plain.parsed, plain.hulls)
@@ -69,7 +73,7 @@ def _scene(stage: Stage, gravity: ArrayLike | None) -> Scene:
     scene = Scene(_gravity(stage, parsed, frames.meters_per_unit, notes) if gravity is None else gravity)
     for thing in (*reader.bodies.values(), *joints.read(parsed), *reader.triggers):
         scene.add(thing)
-    report = tuple(dict.fromkeys([*notes, *reader.shapes.notes, *reader.notes, *joints.notes]))
+    report = tuple(dict.fromkeys([*notes, *reader.shapes.notes, *reader.notes, *joints.notes, *_drawn_only(reader, frames)]))
     scene.origin = UsdOrigin(report, frames, {name: path for path, name in reader.name_of.items()})
     return scene
 
@@ -109,6 +113,24 @@ def _unknown(frames: Frames) -> list[str]:
         names = [str(name).split(":")[0] for name in prim.GetPrimTypeInfo().GetAppliedAPISchemas()]
         count.update(name for name in {*names, str(prim.GetTypeName())} if name.startswith(FOREIGN) and name not in READ)
     return [f"{name} of {number} {'prim' if number == 1 else 'prims'} is not read" for name, number in sorted(count.items())]
+
+
+def _drawn_only(reader: BodyReader, frames: Frames) -> list[str]:
+    """Return lines about surfaces that are no body and belong to none."""
+    taken = {path for path, _ in reader.colliders}
+    drawn: list[str] = []
+    unseen: list[str] = []
+    for prim in frames.prims():
+        if prim.IsA(UsdGeom.Gprim) and prim.GetPath() not in taken and reader.owner(prim) is None:
+            (drawn if is_seen(prim) else unseen).append(str(prim.GetPath()))
+    lines = [f"{_listed(drawn)}: drawn where the file has it, and collides with nothing"] if drawn else []
+    return lines + ([f"{_listed(unseen)}: invisible, a guide or a proxy, left out"] if unseen else [])
+
+
+def _listed(paths: list[str]) -> str:
+    """The first of some paths, and how many more there are."""
+    more = len(paths) - MOST_PATHS
+    return ("prims " if len(paths) > 1 else "prim ") + ", ".join(paths[:MOST_PATHS]) + (f" and {more} more" if more > 0 else "")
 
 
 def _first(error: Exception) -> str:

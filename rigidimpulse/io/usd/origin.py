@@ -61,6 +61,9 @@ class UsdOrigin(FileOrigin):
         offset = start_frame - self.frames.start * fps / source.GetTimeCodesPerSecond()
         if offset != 0.0:
             layer.subLayerOffsets[0] = Sdf.LayerOffset(offset)
+        # Prims that stand for instances are said in the session layer.
+        for prim in source.GetSessionLayer().rootPrims:
+            Sdf.CopySpec(source.GetSessionLayer(), prim.path, layer, prim.path)
         for key in STAGE:
             if root.pseudoRoot.HasInfo(key):
                 layer.pseudoRoot.SetInfo(key, root.pseudoRoot.GetInfo(key))
