@@ -235,8 +235,6 @@ class ContactForces:
     """Residual, relative to the speed gained in the sub-step, with which a solution is still used."""
     no_slip: float = 1e-9
     """Slip that counts as none, relative to the speed gained in the sub-step."""
-    brief: float = 1e-6
-    """Part of the sub-step over which forces are found that last until a contact stops."""
     cylinder_lean: float = 1e-3
     """Sine of the angle of a normal and a cylinder's axis below which no point of the cylinder is nearest to a face."""
     aligned: float = 1e-9

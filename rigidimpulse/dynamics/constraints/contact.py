@@ -15,7 +15,7 @@ A contact that carries load but leaves slowly (it would rise less than the conta
 velocity is set to zero in the metric of mass, which only dissipates. Otherwise the force would do work on it and it
 would hover for ever.
 
-A contact that slips stops at t = |u_t| / |a_t + W_t f|, and its friction changes there, also where it slips back: the sub-step ends at the
+A contact that slips may stop within the sub-step, and its friction changes there, also where it slips back: the sub-step ends at the
 first such time (see `stop_split`). The same holds for rolling and spinning friction (see `rolling_friction`).
 """
 
@@ -36,8 +36,8 @@ from rigidimpulse.dynamics.constraints.rows import (
     rows_of,
     take_rows,
 )
-from rigidimpulse.dynamics.constraints.slip import solve_rows, solve_with_slip
-from rigidimpulse.dynamics.constraints.stop_split import any_stops, find_slips, first_stop
+from rigidimpulse.dynamics.constraints.slip import set_friction, solve_rows, solve_until_slip, solve_with_slip
+from rigidimpulse.dynamics.constraints.stop_split import any_stops, end_slides, find_slips, first_stop, start_slides
 from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.motion.body_state import BodyState
 
@@ -49,8 +49,6 @@ SLIP = TOLERANCES.contact_forces.no_slip
 TINY = TOLERANCES.arithmetic.least_divisor
 # Part of the pressing acceleration that brings a gap back.
 CLOSING = 0.25
-# Length, as a part of the sub-step, over which forces are found that last until a contact stops.
-BRIEF = TOLERANCES.contact_forces.brief
 
 
 class Held(NamedTuple):
@@ -137,7 +135,7 @@ def hold_contacts(solve, problem, sub_step, force, wrench, rolling):
         found = attempt(solve, problem, of_contacts, sub_step.excess, h, rolling)
     slips, residual = find_slips(problem, of_contacts, found.slides, found.velocity, rolling, SLIP * found.scale), found.residual
     if slips.first.shape[0] > 0 and residual <= POOR and any_stops(rows, problem.members.shape[0], slips, SLIP * found.scale):
-        residual, h = end_at_stop(solve, problem, sub_step, of_contacts, slips, residual, rolling)
+        residual, h = end_at_stop(problem, sub_step, of_contacts, slips, found)
     world_force = add_contact_wrench(contacts, rows, first_row, frames, h, force, wrench)
     if rolling is not None:
         add_rolling_wrench(contacts, rolling, rows, frames, h, rows.bias.shape[0] - extra, wrench)
@@ -167,28 +165,27 @@ def attempt(solve, problem, of_contacts, excess, h, rolling):
     return Attempt(residual / scale, scale, u, slides)
 
 
-@jit_with_callbacks
-def end_at_stop(solve, problem, sub_step, of_contacts, slips, residual, rolling):
-    """Split the sub-step where the first slip stops; returns the residual and the length that are kept."""
-    rows, n, h = of_contacts.rows, problem.members.shape[0], sub_step.length
-    whole, brief = rows.impulse.copy(), BRIEF * h
-    scale_impulses(rows, BRIEF)
-    attempt(solve, problem, of_contacts, sub_step.excess, brief, rolling)
-    stop = first_stop(rows, n, slips, brief)
-    if sub_step.shortest < stop < h:
-        scale_impulses(rows, stop / brief)
-        stopped = attempt(solve, problem, of_contacts, sub_step.excess, stop, rolling)
-        if stopped.residual <= max(residual, POOR):
-            return stopped.residual, stop
+@jit_making_arrays
+def end_at_stop(problem, sub_step, of_contacts, slips, found):
+    """End the sub-step where the first of the slips stops, under forces that last until then, see `stop_split`.
+
+    found: the `Attempt` over the whole sub-step, whose bias the rows have. Returns the residual and the length that are kept.
+    """
+    rows, contacts, n, h = of_contacts.rows, problem.contacts, problem.members.shape[0], sub_step.length
+    whole, slow = rows.impulse.copy(), SLIP * found.scale
+    set_friction(of_contacts, contacts, found.slides)
+    kinds = start_slides(of_contacts, slips, found.velocity, slow)
+    # Among equal loads the solver takes those next to where it starts: from none on, the least.
+    rows.impulse[:] = 0.0
+    residual = solve_until_slip(None, of_contacts, n, contacts, SOLVE_TOLERANCE * found.scale, slow) / found.scale
+    end_slides(of_contacts, kinds)
+    stop = first_stop(rows, n, slips, h)
+    if residual <= max(found.residual, POOR) and sub_step.shortest < stop < h:
+        for i in range(whole.shape[0]):
+            rows.impulse[i] *= stop / h
+        return residual, stop
     copy_vector(whole, rows.impulse)
-    return residual, h
-
-
-@jit
-def scale_impulses(rows, factor):
-    """Multiply all impulses by a factor."""
-    for i in range(rows.impulse.shape[0]):
-        rows.impulse[i] *= factor
+    return found.residual, h
 
 
 @jit_with_callbacks

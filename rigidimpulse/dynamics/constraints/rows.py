@@ -10,6 +10,7 @@ C Jh^T p. The law of a row, s its softness:
     BOUNDED    lower <= p <= upper:  u + s p = 0 between the bounds, >= 0 at the lower one, <= 0 at the upper one
     DISC       this row and the next: |p| <= k p_master, against their velocity where it is not zero (Coulomb)
     SEGMENT    the same for a single row
+    SLIDE      p = k p_master: friction of what slips in a known direction; k has a sign
 
 The normal of a contact is BOUNDED with lower = 0; it is the master of its two rows of friction. Bodies of an island
 are numbered from 0 on in order of their index; immovable ones have the number -1.
@@ -24,7 +25,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import exponential, product
 from rigidimpulse.core.vector import tangents
 
-FREE, BOUNDED, DISC, DISC_SECOND, SEGMENT = np.arange(5)
+FREE, BOUNDED, DISC, DISC_SECOND, SEGMENT, SLIDE = np.arange(6)
 """Kinds of rows."""
 
 
@@ -36,8 +37,8 @@ class Rows(NamedTuple):
     jacobian: np.ndarray  # (r, 12) Jh: six columns of a, six of b
     bias: np.ndarray  # (r,) b, m/s or rad/s
     kind: np.ndarray  # (r,)
-    master: np.ndarray  # (r,) row whose impulse bounds a DISC or SEGMENT: an earlier row
-    coefficient: np.ndarray  # (r,) k of a DISC or SEGMENT
+    master: np.ndarray  # (r,) row whose impulse bounds a DISC or SEGMENT, or makes a SLIDE: an earlier row
+    coefficient: np.ndarray  # (r,) k of a DISC, SEGMENT or SLIDE
     lower: np.ndarray  # (r,) N s or N m s
     upper: np.ndarray  # (r,)
     softness: np.ndarray  # (r,) s, velocity per impulse

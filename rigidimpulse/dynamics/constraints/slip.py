@@ -64,8 +64,14 @@ def solve_with_slip(solve, of_contacts, n, contacts, slides, target, slow):
     residual asked for, m/s; slow: slip that is none, m/s. Returns the residual, m/s: inf where there is no finite answer, and then no
     impulse.
     """
-    rows, first_row = of_contacts.rows, of_contacts.first_row
     set_friction(of_contacts, contacts, slides)
+    return solve_until_slip(solve, of_contacts, n, contacts, target, slow)
+
+
+@jit_with_callbacks
+def solve_until_slip(solve, of_contacts, n, contacts, target, slow):
+    """The same with the friction that the rows have: what comes to slip is given its dynamic friction, and all is solved again."""
+    rows, first_row = of_contacts.rows, of_contacts.first_row
     warm, residual = _has_impulse(rows), 0.0
     for _ in range(SLIP_PASSES):
         residual = solve_rows(solve, rows, n, target)

@@ -1,18 +1,29 @@
 """Stop split: a sub-step ends where the first slip stops, as friction changes there.
 
-A slip is a velocity s (2,) along a pair of rows: the slip of a contact, its roll, or its spin (one row). With s' its change over a brief
-time it stops at
+A slip is a velocity s (2,) along a pair of rows: the slip of a contact, its roll, or its spin (one row). What slips now goes on to slip
+until it stops, so that its friction is known but for the load N: with d = s / |s| its direction now
+
+    f_t = -k d N.
+
+Rows of the kind SLIDE say so. All others keep their laws, but contacts that leave carry nothing. With u_n = 0 where contacts press and
+no velocity where they stick, the forces f of these rows do not depend on the length h over which they are asked for: they are those
+that act from now on, and no solve over a tiny time, whose speeds drown in round-off, is needed. Under them a slip changes at the rate
+s' = a_t + W_t f and is smallest at
 
     t = -s.s' / |s'|^2    where s.s' < 0.
+
+The same forces are held until the first such time. Where several points share a load in many ways each way has its own friction and its
+own stop: the solver, from no impulse on, takes loads of least norm, which change smoothly with the state.
 """
 
+from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.constraints.rolling_friction import add_rolling_slips
-from rigidimpulse.dynamics.constraints.rows import response_to
+from rigidimpulse.dynamics.constraints.rows import SLIDE, response_to
 
 
 class Slips(NamedTuple):
@@ -65,11 +76,41 @@ def any_stops(rows, n, slips, none):
 
 
 @jit_making_arrays
-def first_stop(rows, n, slips, brief):
-    """When the first of the slips stops [s], inf if none does, if it goes on to change as it does over a brief time under the impulses."""
+def start_slides(of_contacts, slips, velocity, slow):
+    """Make the rows of the slips SLIDE rows, and let contacts that leave faster than `slow` [m/s] carry nothing.
+
+    of_contacts: `ContactRows` with their friction set; velocity: as in `find_slips`. Returns the kinds (r,) that the rows had.
+    """
+    rows, first_row = of_contacts.rows, of_contacts.first_row
+    kinds = rows.kind.copy()
+    for k in range(slips.first.shape[0]):
+        i, j, x, y = slips.first[k], slips.second[k], slips.velocity[k, 0], slips.velocity[k, 1]
+        share = -rows.coefficient[i] / sqrt(x * x + y * y)
+        rows.kind[i] = rows.kind[j] = SLIDE
+        rows.coefficient[j] = share * y
+        rows.coefficient[i] = share * x
+    for c in range(first_row.shape[0]):
+        if velocity[c, 0] > slow:
+            rows.upper[first_row[c]] = 0.0
+    return kinds
+
+
+@jit
+def end_slides(of_contacts, kinds):
+    """Give the rows the kinds (r,) that they had before `start_slides`, and bounds again; their coefficients are to be set."""
+    rows, first_row = of_contacts.rows, of_contacts.first_row
+    for i in range(kinds.shape[0]):
+        rows.kind[i] = kinds[i]
+    for c in range(first_row.shape[0]):
+        rows.upper[first_row[c]] = inf
+
+
+@jit_making_arrays
+def first_stop(rows, n, slips, h):
+    """When the first of the slips stops [s], inf if none does, under the rows' impulses over h as forces that last."""
     start, end, stop = slips.velocity, end_slips(rows, n, slips), np.inf
     for k in range(end.shape[0]):
-        x, y = (end[k, 0] - start[k, 0]) / brief, (end[k, 1] - start[k, 1]) / brief
+        x, y = (end[k, 0] - start[k, 0]) / h, (end[k, 1] - start[k, 1]) / h
         along = start[k, 0] * x + start[k, 1] * y
         if along < 0.0:
             stop = min(stop, -along / (x * x + y * y))

@@ -6,7 +6,8 @@ Method. Outside a proximal method of multipliers (Rockafellar 1976) with regular
 from 1e-3 to 1e-12 (at most 1e-9 for FREE rows), which makes redundant rows harmless; inside a semi-smooth Newton method
 (Alart & Curnier 1991) on y = Jh^T p:
 
-    p(u) = projection of (R q - u) / (R + s) on the bounds, with the radius of discs from the current p_master,
+    p(u) = projection of (R q - u) / (R + s) on the bounds, with the radius of discs from the current p_master
+           (k p_master itself where the row is a SLIDE),
     F = (y - Jh^T q) - Jh^T (p(b + Jh y) - q) = 0,        F' = I + Jh^T (-dp/du) Jh,
 
 with a halving line search on |F|. It is written in the changes of y and p since q: as u goes to 0 the round-off of u / R
@@ -25,7 +26,7 @@ import numpy as np
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import copy_matrix, copy_vector
-from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMENT, multiply, multiply_transposed
+from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMENT, SLIDE, multiply, multiply_transposed
 from rigidimpulse.dynamics.solvers.sparse_lu import factor, plan_elimination, solve_factored
 
 MAX_OUTER = 60
@@ -69,6 +70,8 @@ def natural_residual(rows, u, p, weight):
         elif kind == SEGMENT:
             radius = rows.coefficient[i] * max(p[rows.master[i]], 0.0)
             worst = max(worst, abs(p[i] - min(max(x, -radius), radius)) * w)
+        elif kind == SLIDE:
+            worst = max(worst, abs(p[i] - rows.coefficient[i] * p[rows.master[i]]) * w)
         elif kind == BOUNDED or kind == FREE:
             worst = max(worst, abs(p[i] - min(max(x, rows.lower[i]), rows.upper[i])) * w)
     return worst
@@ -84,6 +87,10 @@ def _impulse_law(rows, u, q, r, frozen, p, slope):
         kind = rows.kind[i]
         # The second row of a disc is done with its first.
         if kind == DISC_SECOND:
+            continue
+        if kind == SLIDE:
+            p[i] = rows.coefficient[i] * p[rows.master[i]]
+            slope[i, 0], slope[i, 1], slope[i, 2] = 0.0, 0.0, rows.coefficient[i] * slope[rows.master[i], 0]
             continue
         stiffness = 1.0 / (r[i] + rows.softness[i])
         x = (r[i] * q[i] - u[i]) * stiffness
