@@ -37,7 +37,9 @@ from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
 KNOWN = {schema.RIGID_BODIES, schema.IMPLICIT_SHAPES, schema.INSTANCING} | {
-    "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"
+    "KHR_mesh_quantization",
+    "KHR_lights_punctual",
+    "KHR_texture_transform",
 }
 """Extensions that are read, or that have no say in how bodies move; materials and textures are among those, too."""
 LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "EXT_lights_")
