@@ -114,9 +114,10 @@ class _Loader:
             self.notes.append(f"not in the scene that the file shows: {_listed(lost)} are left out")
         if not has_physics:
             return
-        drawn = [names[k] for k in self.hierarchy.order if nodes[k].mesh is not None and self._body_node(k) < 0]
+        free = [k for k in self.hierarchy.order if nodes[k].mesh is not None and self._body_node(k) < 0]
+        drawn = [names[k] for k in free if nodes[k].physics.trigger is None]
         if drawn:
-            self.notes.append(f"{_listed(drawn)}: a mesh and no collider: drawn where the file has it, and collide with nothing")
+            self.notes.append(f"{_listed(drawn)}: a mesh and no collider: drawn where the file has it, and collides with nothing")
         for node in self.hierarchy.order:
             collider = nodes[node].physics.collider
             source = None if collider is None else collider.geometry.node
