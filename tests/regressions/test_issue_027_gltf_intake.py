@@ -73,7 +73,7 @@ def test_instances_below_motion_are_drawn_with_their_body_and_collide_as_the_fil
     parts = scene["rack"].shape.parts_flat()
     assert np.allclose([part.position for part in parts], PLACES) and scene["rack"].shape.solid().volume == pytest.approx(3.0)
     assert scene["sled"].shape.kind == "box" and np.allclose(scene["copy"].shape.surface().vertices.max(axis=0), 0.5)
-    assert any("'bush 1'" in line and "collide with nothing" in line for line in scene.report)
+    assert any("'bush 1'" in line and "collides with nothing" in line for line in scene.report)
 
 
 def test_a_mesh_below_the_node_of_a_body_is_part_of_it(tmp_path: Path) -> None:

@@ -88,13 +88,13 @@ def test_an_instancer_of_a_file_without_physics(tmp_path: Path) -> None:
     """Every prim with a surface is a body there, and so is every instance; instancers inside instances, too."""
     file = File()
     file.prim("/floor", "Cube", scale=(50.0, 50.0, 0.5), at=(0.0, 0.0, -0.5))
-    instancer(file, "/outer", "/outer/group")
-    file.prim("/outer/group", "Xform")
-    inner = UsdGeom.PointInstancer.Define(file.stage, "/outer/group/inner")
-    inner.GetPrototypesRel().SetTargets(["/outer/group/inner/ball"])
+    instancer(file, "/outer", "/outer/cluster")
+    file.prim("/outer/cluster", "Xform")
+    inner = UsdGeom.PointInstancer.Define(file.stage, "/outer/cluster/inner")
+    inner.GetPrototypesRel().SetTargets(["/outer/cluster/inner/ball"])
     inner.GetPositionsAttr().Set([Gf.Vec3f(0.0, 10.0, 0.0), Gf.Vec3f(0.0, 20.0, 0.0)])
     inner.GetProtoIndicesAttr().Set([0, 0])
-    file.prim("/outer/group/inner/ball", "Sphere", radius=0.5)
+    file.prim("/outer/cluster/inner/ball", "Sphere", radius=0.5)
     scene = file.load(tmp_path)
     places = sorted(tuple(np.round(body.position, 6).tolist()) for body in scene.bodies if body.name != "floor")
     wanted = [place + [0.0, far * (2 if k == 2 else 1), 0.0] for k, place in enumerate(PLACES) for far in (10.0, 20.0)]

@@ -13,6 +13,8 @@ from rigidimpulse.io.gltf.schema import IMPLICIT_SHAPES, RIGID_BODIES
 QUANTIZATION = "KHR_mesh_quantization"
 """An extension without an object of its own: it lets vertices be integers."""
 FLOAT = 5126
+WHOLE = ("COLOR_", "JOINTS_", "WEIGHTS_")
+"""Attributes that may be integers without it."""
 
 
 def state_extensions(tree: dict[str, Any]) -> None:
@@ -43,12 +45,11 @@ def _named(tree: dict[str, Any]) -> set[str]:
 
 
 def _is_quantized(tree: dict[str, Any]) -> bool:
-    """Whether positions, normals or tangents of a mesh are integers."""
-    accessors = tree.get("accessors", [])
+    """Whether an attribute of a mesh is of integers where glTF itself has floats only."""
+    whole = {k for k, accessor in enumerate(tree.get("accessors", [])) if accessor["componentType"] != FLOAT}
     for mesh in tree.get("meshes", []):
         for primitive in mesh["primitives"]:
             for attributes in (primitive["attributes"], *primitive.get("targets", [])):
-                for name, index in attributes.items():
-                    if not name.startswith(("COLOR_", "JOINTS_", "WEIGHTS_")) and accessors[index]["componentType"] != FLOAT:
-                        return True
+                if any(index in whole for name, index in attributes.items() if not name.startswith(WHOLE)):
+                    return True
     return False

@@ -78,6 +78,7 @@ def _expand(entries: list[dict[str, Any]], index: int, name: str, values: dict[s
     physics = node["extensions"].get(RIGID_BODIES) or {}
     collider = physics.get("collider")
     is_own = collider is not None and collider.get("geometry", {}).get("node") == index
+    own_collider = json.dumps(collider) if is_own else ""
     if is_own:
         del physics["collider"]
     if node["extensions"].get(RIGID_BODIES) == {}:
@@ -88,7 +89,7 @@ def _expand(entries: list[dict[str, Any]], index: int, name: str, values: dict[s
         entry: dict[str, Any] = {"name": f"{name} {k + 1}", **copy.deepcopy(shared)}
         entry |= {key: array[k].tolist() for key, array in values.items()}
         if is_own:
-            own = copy.deepcopy(collider)
+            own = json.loads(own_collider)
             own["geometry"]["node"] = len(entries)
             entry["extensions"] = {RIGID_BODIES: {"collider": own}}
         node.setdefault("children", []).append(len(entries))

@@ -37,7 +37,9 @@ from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
 KNOWN = {schema.RIGID_BODIES, schema.IMPLICIT_SHAPES, schema.INSTANCING} | {
-    "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"
+    "KHR_mesh_quantization",
+    "KHR_lights_punctual",
+    "KHR_texture_transform",
 }
 """Extensions that are read, or that have no say in how bodies move; materials and textures are among those, too."""
 LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "EXT_lights_")
@@ -112,9 +114,10 @@ class _Loader:
             self.notes.append(f"not in the scene that the file shows: {_listed(lost)} are left out")
         if not has_physics:
             return
-        drawn = [names[k] for k in self.hierarchy.order if nodes[k].mesh is not None and self._body_node(k) < 0]
+        free = [k for k in self.hierarchy.order if nodes[k].mesh is not None and self._body_node(k) < 0]
+        drawn = [names[k] for k in free if nodes[k].physics.trigger is None]
         if drawn:
-            self.notes.append(f"{_listed(drawn)}: a mesh and no collider: drawn where the file has it, and collide with nothing")
+            self.notes.append(f"{_listed(drawn)}: a mesh and no collider: drawn where the file has it, and collides with nothing")
         for node in self.hierarchy.order:
             collider = nodes[node].physics.collider
             source = None if collider is None else collider.geometry.node
