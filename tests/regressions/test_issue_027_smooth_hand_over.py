@@ -37,6 +37,19 @@ def departure(size, e, mu, tilt=0.0):
     return float(np.abs(poses - lines @ np.linalg.lstsq(lines, poses, rcond=None)[0]).max())
 
 
-@pytest.mark.parametrize(("e", "mu"), [(0.2, 0.5), (0.0, 0.5), (0.5, 0.5), (0.2, 0.0), (0.2, 0.1), (0.2, 1.0)])
-def test_poses_of_close_launches_lie_on_a_line(e, mu):
-    assert departure(CUBE, e, mu) <= MOST
+@pytest.mark.parametrize(
+    ("size", "e", "mu", "tilt"),
+    [
+        (CUBE, 0.2, 0.5, 0.0),
+        (CUBE, 0.0, 0.5, 0.0),
+        (CUBE, 0.5, 0.5, 0.0),
+        (CUBE, 0.2, 0.1, 0.0),
+        (CUBE, 0.0, 1.0, 0.0),
+        (CUBE, 0.2, 0.0, 0.0),
+        (CUBE, 0.0, 0.5, 0.2),
+        (BRICK, 0.2, 0.5, 0.0),
+        (BRICK, 0.0, 0.5, 0.0),
+    ],
+)
+def test_poses_of_close_launches_lie_on_a_line(size, e, mu, tilt):
+    assert departure(size, e, mu, tilt) <= MOST

@@ -1,7 +1,7 @@
 """Stop split: a sub-step ends where the first slip stops, as friction changes there.
 
 A slip is a velocity s (2,) along a pair of rows: the slip of a contact, its roll, or its spin (one row). What slips now goes on to slip
-until it stops, so that its friction is known but for the load N: with d = s / |s| its direction now
+until it stops, so that only the load N of its friction is unknown: with d = s / |s| its direction now
 
     f_t = -k d N.
 
