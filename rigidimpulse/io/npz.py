@@ -12,7 +12,6 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.dynamics.soft_body.track import tracks_in
 from rigidimpulse.recording.exporters import ExportTarget
 from rigidimpulse.recording.recording import Recording
-from rigidimpulse.recording.status import Status
 
 
 def write_npz(run: Recording, target: ExportTarget) -> None:
@@ -31,7 +30,6 @@ def write_npz(run: Recording, target: ExportTarget) -> None:
         center_of_mass=run.centers,
         impacts=run.impacts,
         contacts=run.contacts,
-        status=np.array(run.status.as_json()),
         **soft_bodies,
     )
 
@@ -55,7 +53,6 @@ def read_npz(path: Path) -> Recording:
                 centers=data["center_of_mass"],
                 impacts=data["impacts"],
                 contacts=data["contacts"],
-                status=Status.from_json(str(data["status"])),
                 soft_bodies=tracks_in(data),
             )
     except (OSError, KeyError, ValueError) as error:

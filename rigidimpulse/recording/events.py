@@ -9,7 +9,6 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.memory import longer, rows_of
-from rigidimpulse.recording.status import Event
 
 if TYPE_CHECKING:
     from rigidimpulse.model.contacts import Contacts
@@ -112,6 +111,17 @@ def impact_table(rows: np.ndarray) -> np.ndarray:
         table[name] = rows[:, column : column + width].reshape(table[name].shape)
         column += width
     return table
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something a user should know of: `kind`, time in s, names of the bodies, and the text with the remedy."""
+
+    time: float
+    kind: str
+    bodies: tuple[str, ...]
+    message: str
+    is_problem: bool = True
 
 
 def _first_buffers() -> LogBuffers:

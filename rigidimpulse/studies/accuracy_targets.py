@@ -25,8 +25,7 @@ from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.choice import UNKNOWN, Choice, Estimate, Try
 from rigidimpulse.recording.events import Event
-from rigidimpulse.recording.recording import Recording
-from rigidimpulse.recording.status import Status
+from rigidimpulse.recording.recording import Recording, Status
 from rigidimpulse.scene.accuracy_targets import InTime, Within
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.deviation import deviation

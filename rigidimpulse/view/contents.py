@@ -7,7 +7,7 @@ Manifest (JSON)
               frame, centre of mass in the body's frame
     softBodies  name, key in meshcat's tree, surface, and whether it is thin (cloth), of each flexible body
     numShapes, fade (s an arrow is seen), summary (a line of text), contacts (whether
-              there are any), warnings (time, s, what and remedy, of each), ledger (least range of its plot, J; null: none)
+              there are any), ledger (least range of its plot, J; null: none)
 Messages, each with its kind
     shape     a display geometry at /shapes/k, shared by all bodies of that shape
     times     frame times as a property of /impacts        rows      arrows as a property of /impacts
@@ -109,7 +109,6 @@ def page_contents(
         "numShapes": len(meshes),
         "fade": fade_time(float(times[-1] - times[0])),
         "summary": _summary(sum(dynamic) + len(soft_bodies), len(recording.impacts), float(times[-1] - times[0])),
-        "warnings": [warning_entry(event) for event in recording.status.problems],
         "ledger": None if curves is None else {"energySpan": energy_span(recording.ledger)},
         "contacts": len(contacts) > 0,
     }
@@ -315,11 +314,6 @@ def _summary(num_dynamic: int, num_impacts: int, duration: float) -> str:
     bodies = f"{num_dynamic} moving {'body' if num_dynamic == 1 else 'bodies'}"
     impacts = f"{num_impacts:,} {'impact' if num_impacts == 1 else 'impacts'}"
     return f"{bodies}  \u00b7  {impacts}  \u00b7  {duration:.4g} s"
-
-
-def warning_entry(event: Any) -> dict[str, Any]:
-    """Return what a page says of a warning (an `Event`): a time, a line, and what to do."""
-    return {"time": event.time, "what": f"{event.kind} ({', '.join(event.bodies)})", "remedy": event.message}
 
 
 def _shape_message(number: int, mesh: DisplayMesh) -> dict[str, Any]:

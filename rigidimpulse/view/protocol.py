@@ -60,11 +60,6 @@ class RecordingLike(Protocol):
         ...
 
     @property
-    def status(self) -> Any:
-        """How the run went: `problems`, each with `time`, `kind`, `bodies` and `message`."""
-        ...
-
-    @property
     def soft_bodies(self) -> Sequence[SoftBodyLike]:
         """The flexible bodies."""
         ...

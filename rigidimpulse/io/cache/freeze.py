@@ -39,7 +39,7 @@ HOMES = (
     "engine.finder", "engine.touching",
     "engine.keyframe_paths", "engine.pair_events", "engine.pair_table", "engine.regime", "engine.run", "engine.soft_bodies",
     "engine.triggers", "engine.varying_forces", "recording.contact_log", "recording.contacts", "recording.events", "recording.impulses",
-    "recording.status", "recording.recorder", "io.cache.freeze",
+    "recording.recorder", "io.cache.freeze",
 )  # fmt: skip
 """Packages and modules of what a state is made of: nothing in them reads or runs files."""
 NUMPY = ("dtype", "ndarray", "scalar", "_reconstruct", "_frombuffer")

@@ -10,8 +10,7 @@ from rigidimpulse.dynamics.soft_body.track import tracks_in
 from rigidimpulse.io.cache.file import Content, Header, read
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.events import impact_table
-from rigidimpulse.recording.recording import Recording
-from rigidimpulse.recording.status import Status
+from rigidimpulse.recording.recording import Recording, Status
 from rigidimpulse.scene.frames import own_frames
 
 
@@ -36,7 +35,7 @@ def load_cache(path: Path) -> Recording:
         centers=frames["position"],
         impacts=impacts[impacts["time"] <= header.duration],
         contacts=content.tables.get("contacts", np.zeros(0, CONTACT_DTYPE)),
-        status=Status.from_json(str(content.tables["status"])) if content.complete else _unfinished(header, content),
+        status=Status(True, "loaded") if content.complete else _unfinished(header, content),
         soft_bodies=tracks_in(content.tables),
     )
 

@@ -29,7 +29,6 @@ from rigidimpulse.io.gltf.extensions import state_extensions
 from rigidimpulse.io.gltf.morph import add_soft_bodies
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.origin import Origin
-from rigidimpulse.io.gltf.own_materials import NOTE
 from rigidimpulse.io.keys import Keys
 from rigidimpulse.io.keys import Path as BodyPath
 from rigidimpulse.io.motion import Motion
@@ -37,7 +36,6 @@ from rigidimpulse.io.motion import Motion
 if TYPE_CHECKING:
     from rigidimpulse.recording.exporters import ExportTarget
     from rigidimpulse.recording.recording import Recording
-    from rigidimpulse.recording.status import Status
 
 logger = logging.getLogger("rigidimpulse")
 
@@ -93,7 +91,6 @@ def write_gltf(run: Recording, target: ExportTarget) -> None:
         writer.take_over(origin)
         state_extensions(builder.tree)
     writer.close()
-    _say_warnings(builder.tree, run.status)
     builder.write(target.path)
 
 
@@ -277,13 +274,6 @@ class _Channels:
             entry["bufferView"] = view
         animation = {"name": ANIMATION, "channels": self._channels, "samplers": self._samplers}
         self._builder.tree.setdefault("animations", []).insert(0, animation)
-
-
-def _say_warnings(tree: dict[str, Any], status: Status) -> None:
-    """Put the warnings of a run into the file's `extras`, for people and programs that look at its asset."""
-    extras = tree["asset"].get("extras", {})
-    if status.lines and isinstance(extras, dict):
-        tree["asset"]["extras"] = {**extras, NOTE: {**extras.get(NOTE, {}), "warnings": status.lines}}
 
 
 def _use_parts(entry: dict[str, Any]) -> None:

@@ -85,9 +85,6 @@ class _Writer:
         first = self.motion.options.start_frame
         self.layer.timeCodesPerSecond = self.layer.framesPerSecond = self.fps
         self.layer.startTimeCode, self.layer.endTimeCode = first, first + len(self.run.times) - 1
-        if self.run.status.lines:
-            warnings = {"rigidimpulse": {"warnings": "\n".join(self.run.status.lines)}}
-            self.layer.customLayerData = {**self.layer.customLayerData, **warnings}
         if isinstance(origin, UsdOrigin):
             if (self.motion.options.up_axis, self.motion.options.unit) != (None, 1.0):
                 raise SceneError("up_axis or unit for a file that the scene came from", "leave them out: they are those of that file")

@@ -88,32 +88,3 @@ function bindKeys(transport, keys) {
     }
   });
 }
-
-const MOST_WARNINGS = 50;
-
-/* What the status says, below the title: open while there are few. A click goes to the time of a warning. */
-function showWarnings(warnings, transport) {
-  const panel = element("warnings"), list = panel.querySelector("ol");
-  panel.hidden = warnings.length === 0;
-  panel.open = warnings.length <= 3 && window.innerWidth > 820;
-  const kinds = [...new Set(warnings.map(({what}) => what.split(" (")[0]))];
-  panel.querySelector("summary").textContent = `${warnings.length} warning${warnings.length === 1 ? "" : "s"}: ${kinds.join(", ")}`;
-  for (const {time, what, remedy} of warnings.slice(0, MOST_WARNINGS)) {
-    const line = document.createElement("li"), button = document.createElement("button"), advice = document.createElement("span");
-    button.textContent = `${time.toPrecision(4)} s`;
-    button.title = "go to this time";
-    button.addEventListener("click", () => {
-      transport.pause();
-      transport.seek(Math.min(Math.max(time, transport.start), transport.end));
-      button.blur();
-    });
-    advice.textContent = remedy;
-    line.append(button, ` ${what} `, advice);
-    list.append(line);
-  }
-  if (warnings.length > MOST_WARNINGS) {
-    const rest = document.createElement("li");
-    rest.textContent = `and ${warnings.length - MOST_WARNINGS} more, in run.status`;
-    list.append(rest);
-  }
-}
