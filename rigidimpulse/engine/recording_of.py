@@ -15,7 +15,8 @@ from rigidimpulse.model.world import World
 from rigidimpulse.recording.events import impact_table
 from rigidimpulse.recording.impulses import Impulses
 from rigidimpulse.recording.ledger import Masses, make_ledger
-from rigidimpulse.recording.recording import Recording, Status
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.recording.status import Status
 from rigidimpulse.scene.frames import own_frames
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.dynamics.soft_body.track import tracks_in
 from rigidimpulse.recording.exporters import ExportTarget
 from rigidimpulse.recording.recording import Recording
+from rigidimpulse.recording.status import Status, restored
 
 
 def write_npz(run: Recording, target: ExportTarget) -> None:
@@ -30,6 +31,7 @@ def write_npz(run: Recording, target: ExportTarget) -> None:
         center_of_mass=run.centers,
         impacts=run.impacts,
         contacts=run.contacts,
+        status=np.array(run.status.stored()),
         **soft_bodies,
     )
 
@@ -53,7 +55,8 @@ def read_npz(path: Path) -> Recording:
                 centers=data["center_of_mass"],
                 impacts=data["impacts"],
                 contacts=data["contacts"],
+                status=restored(str(data["status"])) if "status" in data else Status(True, "loaded"),
                 soft_bodies=tracks_in(data),
             )
-    except (OSError, KeyError, ValueError) as error:
+    except (OSError, KeyError, TypeError, ValueError) as error:
         raise SceneError(f"{os.fspath(path)} is no recording: {error}", "give an .npz file written by Recording.export") from None

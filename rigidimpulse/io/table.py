@@ -25,6 +25,7 @@ def write_csv(run: Recording, target: ExportTarget) -> None:
     """Write a .csv file of a run: UTF-8, with the head `COLUMNS`, frames in order, within a frame bodies in the order of `run.names`."""
     figures = np.concatenate([run.positions, run.orientations, run.velocities, run.angular_velocities], axis=2).tolist()
     with target.path.open("w", newline="", encoding="utf-8") as file:
+        file.writelines(f"# {warning}\r\n" for warning in run.status.warnings)
         rows = csv.writer(file)
         rows.writerow(COLUMNS)
         for frame, (time, bodies) in enumerate(zip(run.times.tolist(), figures, strict=True)):

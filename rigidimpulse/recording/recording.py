@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,42 +15,17 @@ from rigidimpulse.core.files import write_renamed
 from rigidimpulse.core.providers import provider
 from rigidimpulse.recording.contacts import CONTACT_DTYPE, forces_on
 from rigidimpulse.recording.exporters import ExportOptions, ExportTarget, export_suffixes, find_exporter, find_reader
+from rigidimpulse.recording.status import Status
 
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
     from rigidimpulse.model.plan import Plan
     from rigidimpulse.recording.choice import Choice
-    from rigidimpulse.recording.events import Event
     from rigidimpulse.recording.impulses import Impulses
     from rigidimpulse.recording.ledger import Ledger
     from rigidimpulse.recording.profile import Profile
     from rigidimpulse.scene.accuracy import Accuracy
     from rigidimpulse.scene.scene import Scene
-
-
-@dataclass(frozen=True)
-class Status:
-    """How a run went.
-
-    Attributes:
-        ok: nothing happened that a user should know of.
-        message: what happened and what to change.
-        events: all of it, in order of time.
-
-    """
-
-    ok: bool
-    message: str
-    events: tuple[Event, ...] = ()
-
-    @staticmethod
-    def of(events: Sequence[Event]) -> Status:
-        """Return the status that the events of a run add up to."""
-        problems = [e for e in events if e.is_problem]
-        if not problems:
-            return Status(True, "finished", tuple(events))
-        lines = [f"t = {e.time:.6g} s, {e.kind} ({', '.join(e.bodies)}): {e.message}" for e in problems]
-        return Status(False, "\n".join(lines), tuple(events))
 
 
 class RunSettings(NamedTuple):
@@ -95,7 +69,7 @@ class Recording:
     centers: np.ndarray
     impacts: np.ndarray
     ledger: Ledger | None = None
-    status: Status = Status(True, "loaded")
+    status: Status = field(default_factory=lambda: Status(True, "loaded"))
     plan: Plan | None = None
     scene: Scene | None = None
     reactions: dict[str, np.ndarray] = field(default_factory=dict)
@@ -243,7 +217,7 @@ class Recording:
             ledger=None if self.ledger is None else self.ledger.part(here),
             reactions={name: force[here] for name, force in self.reactions.items()},
             soft_bodies=[replace(track, vertices=track.vertices[here]) for track in self.soft_bodies],
-            by_cause=None, settings=None,
+            status=self.status.later(-float(begin)), by_cause=None, settings=None,
         )  # fmt: skip
 
     def state_hash(self) -> str:

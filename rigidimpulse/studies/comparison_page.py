@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigidimpulse.view.contents import finite_poses, page_contents, property_message
+from rigidimpulse.view.contents import finite_poses, page_contents, property_message, warning_entries
 from rigidimpulse.view.page import SCRIPTS, STYLES, assemble
 from rigidimpulse.view.tracks import TypedTrack, animation_message, body_tracks, quaternion_keys
 
@@ -61,6 +61,10 @@ def comparison_contents(comparison: Comparison) -> tuple[dict[str, Any], list[tu
         "horizon": {name: max(time, float(times[0]) - 1.0) for name, time in comparison.horizon.items() if time < np.inf},
     }
     manifest["summary"] = _summary(comparison)
+    manifest["warnings"] = [
+        entry | {"kind": f"{label}: {entry['kind']}"}
+        for label, one in zip(comparison.labels, (comparison.run_a, run), strict=True) for entry in warning_entries(one)
+    ]  # fmt: skip
     manifest["ledger"] = None  # the plot of the two runs is in its place
     messages = [entry for entry in messages if entry[0] != "ledger"]
     for values in ("distance", "angle"):

@@ -7,7 +7,7 @@ Manifest (JSON)
               frame, centre of mass in the body's frame
     softBodies  name, key in meshcat's tree, surface, and whether it is thin (cloth), of each flexible body
     numShapes, fade (s an arrow is seen), summary (a line of text), contacts (whether
-              there are any), ledger (least range of its plot, J; null: none)
+              there are any), ledger (least range of its plot, J; null: none), warnings (time, kind, bodies, message)
 Messages, each with its kind
     shape     a display geometry at /shapes/k, shared by all bodies of that shape
     times     frame times as a property of /impacts        rows      arrows as a property of /impacts
@@ -111,6 +111,7 @@ def page_contents(
         "summary": _summary(sum(dynamic) + len(soft_bodies), len(recording.impacts), float(times[-1] - times[0])),
         "ledger": None if curves is None else {"energySpan": energy_span(recording.ledger)},
         "contacts": len(contacts) > 0,
+        "warnings": warning_entries(recording),
     }
     messages = [("shape", _shape_message(number, mesh)) for number, mesh in enumerate(meshes)]
     for kind, path, name, values in (
@@ -307,6 +308,16 @@ def _plane_entries(body: Any, orientation: np.ndarray, up: np.ndarray) -> list[d
 def _path_key(index: int, name: str) -> str:
     """Return the body's name in meshcat's tree: unique, and without the slash that parts folders."""
     return f"{index} {name.replace('/', chr(0x2215))}"
+
+
+def warning_entries(recording: RecordingLike) -> list[dict[str, Any]]:
+    """Return what the page says of each problem of a run; a status without events has lines only."""
+    status = recording.status
+    if status.ok:
+        return []
+    if not status.problems:
+        return [{"time": None, "kind": warning, "bodies": "", "message": ""} for warning in status.warnings]
+    return [{"time": e.time, "kind": e.kind, "bodies": ", ".join(e.bodies), "message": e.message} for e in status.problems]
 
 
 def _summary(num_dynamic: int, num_impacts: int, duration: float) -> str:

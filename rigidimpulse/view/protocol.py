@@ -45,6 +45,11 @@ class RecordingLike(Protocol):
     """A simulated motion: f frames of every body, and the impacts between them."""
 
     @property
+    def status(self) -> Any:
+        """How the run went, a `Status`."""
+        ...
+
+    @property
     def times(self) -> FloatArray:
         """Frame times (f,), s, rising."""
         ...

@@ -17,7 +17,9 @@ from test_html import FLOAT32_ROUNDING, FPS, STRANGE_NAME, recording
 import rigidimpulse as ri
 from rigidimpulse.core.quaternion import rotate
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
+from rigidimpulse.recording.events import Event
 from rigidimpulse.recording.ledger import Ledger
+from rigidimpulse.recording.status import Status
 from rigidimpulse.view.display import display_mesh
 from rigidimpulse.view.page import render_page
 
@@ -207,3 +209,20 @@ def test_plots_can_be_put_away_and_come_back_where_there_is_room(opened: Opened,
         assert box["x"] >= 0 and box["x"] + box["width"] <= 390
     assert narrow.errors == []
     narrow.page.close()
+
+
+def test_warnings_are_below_the_title_and_lead_to_their_time(browser: Any, tmp_path: Any) -> None:
+    """A run with a problem shows it without a click: kind, bodies and text as plain text; a click on its time goes there."""
+    event = Event(0.5, "overlap", ("<b>ball</b>", "box"), "0.02 m inside each other: take a smaller step")
+    path = tmp_path / "warned.html"
+    path.write_text(render_page(replace(recording(), status=Status.of([event]))), encoding="utf-8")
+    page = open_page(browser, path.as_uri(), WIDTH, 600)
+    shown = page.page.inner_text("#warnings")
+    for text in ("1 warning", "overlap", "<b>ball</b>, box", "0.02 m inside each other: take a smaller step"):
+        assert text in shown
+    page.page.click("#warnings li button")
+    assert page.do("r.time") == pytest.approx(event.time) and not page.do("r.playing") and not page.errors
+
+
+def test_a_run_without_problems_has_no_warnings(opened: Opened) -> None:
+    assert not opened.page.is_visible("#warnings")

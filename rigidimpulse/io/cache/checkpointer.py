@@ -131,7 +131,7 @@ class Checkpointer:
         """Add what only a finished run has, and say that it is complete."""
         if self._file is None:
             return
-        tables: dict[str, Any] = {"contacts": recording.contacts}
+        tables: dict[str, Any] = {"contacts": recording.contacts, "status": np.array(recording.status.stored())}
         for number, track in enumerate(recording.soft_bodies):
             tables.update(track.arrays(number))
         self._file.finish(self._content(len(recording.times), float(recording.times[-1]), self._state, tables))

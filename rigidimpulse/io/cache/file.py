@@ -7,7 +7,7 @@
                     angular_velocity (f, n, 3)
     impacts         (m, 15), columns as in `recording.events.IMPACT_DTYPE`
     checkpoint      two slots of bytes, and commits (2,): number, time, frames, impacts, size and digest of each
-    tables          of a finished run: contacts, and vertices and faces of flexible bodies
+    tables          of a finished run: contacts, status (JSON), and vertices and faces of flexible bodies
 
 All tables lie in the file from its beginning, with spare capacity (holes, on most disks), so that nothing that says where they are is
 ever written again: a process may be killed at any moment. A checkpoint is written into the slot of the older one, then its commit; each is

@@ -10,7 +10,8 @@ from rigidimpulse.dynamics.soft_body.track import tracks_in
 from rigidimpulse.io.cache.file import Content, Header, read
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.events import impact_table
-from rigidimpulse.recording.recording import Recording, Status
+from rigidimpulse.recording.recording import Recording
+from rigidimpulse.recording.status import Status, restored
 from rigidimpulse.scene.frames import own_frames
 
 
@@ -35,11 +36,14 @@ def load_cache(path: Path) -> Recording:
         centers=frames["position"],
         impacts=impacts[impacts["time"] <= header.duration],
         contacts=content.tables.get("contacts", np.zeros(0, CONTACT_DTYPE)),
-        status=Status(True, "loaded") if content.complete else _unfinished(header, content),
+        status=_status(header, content),
         soft_bodies=tracks_in(content.tables),
     )
 
 
-def _unfinished(header: Header, content: Content) -> Status:
+def _status(header: Header, content: Content) -> Status:
+    """That of the finished run; of another, how far it is."""
+    if content.complete:
+        return restored(content.tables["status"]) if "status" in content.tables else Status(True, "loaded")
     so_far = f"{content.time:.6g} s of {header.duration:g} s: the run was stopped, or still goes on"
     return Status(False, f"{so_far}; simulate the scene with this cache again to go on from there")

@@ -46,7 +46,9 @@ ELSEWHERE = 1e-9
 APART = 4.0
 """Units in the last place of single precision between keys, at least."""
 ANIMATION = "rigidimpulse"
-"""Name of the animation."""
+"""Name of the animation, and key of the status in the extras of the asset."""
+WARNINGS = "rigidimpulse warnings"
+"""Key of the warnings in the extras of scenes."""
 
 
 def write_gltf(run: Recording, target: ExportTarget) -> None:
@@ -91,7 +93,23 @@ def write_gltf(run: Recording, target: ExportTarget) -> None:
         writer.take_over(origin)
         state_extensions(builder.tree)
     writer.close()
+    _add_status(builder.tree, run)
     builder.write(target.path)
+
+
+def _add_status(tree: dict[str, Any], run: Recording) -> None:
+    """Write the status into the extras of the asset; Blender shows those of the scene, so warnings are there, too."""
+    asset = tree["asset"]
+    asset["extras"] = _flags(asset) | {ANIMATION: run.status.data()}
+    if not run.status.ok:
+        for scene in tree.get("scenes", []):
+            scene["extras"] = _flags(scene) | {WARNINGS: list(run.status.warnings)}
+
+
+def _flags(entry: dict[str, Any]) -> dict[str, Any]:
+    """The extras of an entry; those that are no table cannot have another key."""
+    extras = entry.get("extras")
+    return extras if isinstance(extras, dict) else {}
 
 
 class _Locals:

@@ -22,7 +22,7 @@ from rigidimpulse.io.keys import Keys
 from rigidimpulse.io.motion import Motion
 from rigidimpulse.io.usd.draw import Drawing, draw_soft_body
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place, quaternions, sample, valid_name, vectors
-from rigidimpulse.io.usd.library import Gf, Layer, PrimSpec, Sdf, SdfPath, UsdUtils
+from rigidimpulse.io.usd.library import Gf, Layer, PrimSpec, Sdf, SdfPath, UsdUtils, Vt
 from rigidimpulse.io.usd.origin import UsdOrigin
 from rigidimpulse.view.camera import stage_rotation, up_axis
 from rigidimpulse.view.materials import color
@@ -81,7 +81,9 @@ class _Writer:
 
     def write(self) -> None:
         """Write everything."""
-        origin = self.motion.scene.origin
+        status, origin = self.run.status, self.motion.scene.origin
+        told = {"ok": status.ok, "message": status.message, "warnings": Vt.StringArray(list(status.warnings)), "status": status.stored()}
+        self.layer.customLayerData = {"rigidimpulse": told}
         first = self.motion.options.start_frame
         self.layer.timeCodesPerSecond = self.layer.framesPerSecond = self.fps
         self.layer.startTimeCode, self.layer.endTimeCode = first, first + len(self.run.times) - 1

@@ -19,6 +19,26 @@ function makeSwitch(button, set, on) {
   return flip;
 }
 
+/* The problems of the run, below its title; a click on one goes to its time. */
+function showWarnings(warnings, transport) {
+  if (warnings.length === 0) { return; }
+  const box = element("warnings"), head = document.createElement("summary"), list = document.createElement("ol");
+  head.textContent = `${warnings.length} ${warnings.length === 1 ? "warning" : "warnings"}: look before you use this run`;
+  for (const {time, kind, bodies, message} of warnings) {
+    const item = document.createElement("li"), go = document.createElement("button");
+    const parts = [["b", kind], ["span", bodies], ["p", message]].filter(([, text]) => text);
+    go.textContent = time === null ? "" : `${Number(time.toPrecision(4))} s`;
+    go.hidden = time === null;
+    go.title = "go there";
+    go.addEventListener("click", () => { transport.pause(); transport.seek(Math.min(Math.max(time, transport.start), transport.end)); go.blur(); });
+    item.append(go, ...parts.map(([tag, text]) => Object.assign(document.createElement(tag), {textContent: text})));
+    list.append(item);
+  }
+  box.append(head, list);
+  box.open = window.innerWidth > 820 && window.innerHeight > 500;
+  box.hidden = false;
+}
+
 function makeLayers(layers) {
   const keys = {};
   for (const {label, key, set, on} of layers) {

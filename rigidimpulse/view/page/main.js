@@ -78,6 +78,7 @@ async function main() {
   startViewing(viewer, stage, transport, bar, parts);
   expose(viewer, stage, transport, parts);
   element("summary").textContent = manifest.summary;
+  showWarnings(manifest.warnings, transport);
   transport.seek(transport.start);
   transport.play();
 }
