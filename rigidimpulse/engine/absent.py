@@ -50,7 +50,7 @@ class NoJoints:
         """No joint moves."""
         return NONE
 
-    movable_end = are_passive = supports_of = project_velocities = impact_block = hold = let_go = log_rest = _ask_nobody
+    movable_end = are_passive = supports_of = project_velocities = impact_block = hold = let_go = let_go_after = log_rest = _ask_nobody
 
 
 class NoForces:

@@ -76,6 +76,10 @@ class RunJoints(Protocol):
         """Forget the forces of the island's joints, which are not to be used."""
         ...
 
+    def let_go_after(self, island: Island, /) -> bool:
+        """Whether a joint of the island has a release time that is still to come."""
+        ...
+
     def log_rest(self, island: Island, /) -> None:
         """Forces on b from here on, while the island sleeps."""
         ...

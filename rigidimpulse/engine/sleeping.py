@@ -26,7 +26,7 @@ def may_sleep(run: Run, island: Island, problem: ContactProblem, h: float) -> bo
 
     problem: its lasting contacts and loads; h: s, length of the sub-step.
     """
-    if len(island.joints) and run.world.moving[run.joints.bodies_of(island.joints)].any():
+    if len(island.joints) and (run.joints.let_go_after(island) or run.world.moving[run.joints.bodies_of(island.joints)].any()):
         return False
     if island.loaded and not run.forces.may_rest(island.members):
         return False

@@ -124,6 +124,10 @@ class JointState:
         ends = np.unique(np.concatenate([self.table.body_a[which], self.table.body_b[which]]))
         return ends[(ends < 0) | ~self._dynamic[ends]]
 
+    def let_go_after(self, island: Island) -> bool:
+        """Whether a joint of the island lets go later, at its release time: nothing else would wake the island then."""
+        return bool(np.isfinite(self.release_time[island.joints]).any())
+
     def moving_bodies(self, run: Run) -> np.ndarray:
         """Dynamic bodies with joints that do not rest."""
         bodies = np.array(sorted(self._of_body), np.int64)
@@ -139,7 +143,8 @@ class JointState:
         before = mechanical_energy(now, run.world.constants, members)
         arrived = np.hstack([now.velocity[members], now.angular_velocity[members]])
         for i in members:
-            held = memory.wrench[i] * max(elapsed[j] for j in self.at([i])) if int(i) in self._of_body else np.zeros(6)
+            # A body whose joints have all let go carries none of their forces.
+            held = memory.wrench[i] * elapsed[self.at([i])].max(initial=0.0)
             now.velocity[i] -= now.inv_mass[i] * held[:3]
             now.angular_velocity[i] -= now.inv_inertia[i] @ held[3:]
         jointed = self._jointed(run, island)
