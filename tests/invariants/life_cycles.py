@@ -10,11 +10,16 @@ import numpy as np
 from scene_plans import Dice
 
 import rigidimpulse as ri
+from rigidimpulse.core.quaternion import rotate
 
 ENERGY = 1e-2
 """Of the energy moved, that a run may gain: joints are of second order, and these scenes are short."""
-OPEN = 1e-3
-"""m, how far the ends of a whole joint may be apart."""
+OPEN = 1e-4
+"""m, how far the ends of a whole ball joint, hinge or fixed joint may be apart."""
+LATE = 1e-9
+"""s, how late a joint may let go."""
+CLOSED = (ri.BallJoint, ri.HingeJoint, ri.FixedJoint)
+JOINTS = (*CLOSED, ri.SliderJoint, ri.DistanceJoint)
 
 
 def make_life_cycle(seed: int) -> ri.Scene:
@@ -94,4 +99,24 @@ def broken_promises(run: ri.Recording) -> list[str]:
     lowest = run.positions[:, 1:, 2].min()
     if lowest < 0.01:
         lines.append(f"a body is in the floor: {lowest:.3f} m")
+    ended = {e.message.split(":")[0]: e.time for e in run.status.events if e.kind in ("joint let go", "joint broke")}
+    joints = [effect for effect in run.scene.effects if isinstance(effect, JOINTS)]
+    for j, joint in enumerate(joints):
+        end = ended.get(f"joint{j}", np.inf)
+        if joint.release_time < run.times[-1] and end > joint.release_time + LATE:
+            lines.append(f"joint{j} lets go at {end:.4f} s, not at {joint.release_time:.4f} s")
+        if isinstance(joint, CLOSED) and getattr(joint, "anchor", None) is not None:
+            anchor = np.asarray(joint.anchor, float)
+            apart = np.linalg.norm(_carried(run, joint.a, anchor) - _carried(run, joint.b, anchor), axis=1)[run.times < end]
+            if len(apart) and apart.max() > OPEN:
+                lines.append(f"joint{j} is open by {apart.max():.1e} m")
     return lines
+
+
+def _carried(run: ri.Recording, name: str | None, point: np.ndarray) -> np.ndarray:
+    """Where a point (3,) of the world at the start, fixed to a body, is at all frames (f, 3), m."""
+    if name is None:
+        return np.tile(point, (len(run.times), 1))
+    turns, places = run.orientation(name), run.position(name)
+    inverse = turns[0] * [1.0, -1.0, -1.0, -1.0]
+    return places + rotate(turns, np.tile(rotate(inverse[None], (point - places[0])[None])[0], (len(places), 1)))

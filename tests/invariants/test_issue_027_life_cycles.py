@@ -7,7 +7,7 @@ from life_cycles import broken_promises, make_life_cycle
 
 import rigidimpulse as ri
 
-SEEDS = range(8)
+SEEDS = range(12)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -208,7 +208,7 @@ def pinata():
 def drawbridge():
     """A bridge falls to the limit of its hinge, and stays there."""
     stage = Stage()
-    stage.box("bridge", (0.1, 1.0, 2.0), (0.0, 0.0, 1.0), angular_velocity=(0.0, 0.6, 0.0), material=WOOD)
+    stage.box("bridge", (0.1, 1.0, 2.0), (0.0, 0.0, 1.0), velocity=(0.6, 0.0, 0.0), angular_velocity=(0.0, 0.6, 0.0), material=WOOD)
     stage.join(ri.HingeJoint(None, "bridge", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), lower=-0.1, upper=0.5))
     return stage, lambda run: must((abs(tilt(run, "bridge") - 0.5) < 0.02, f"it is at {tilt(run, 'bridge'):.3f} rad"))
 

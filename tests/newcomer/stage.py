@@ -135,11 +135,19 @@ class Seen:
     run: ri.Recording | None = field(default=None, repr=False)
 
 
-def look(case: Newcomer) -> Seen:
-    """Run a scene at defaults and look at it."""
+def look(case: Newcomer, most: float = np.inf) -> Seen:
+    """Run a scene at defaults and look at it; one that takes more than `most` s of processor time is given up at the end of a step."""
     stage, see = case.make()
     begin = time.process_time()
-    run = ri.simulate(stage.scene, case.duration)
+
+    def give_up(reached: float) -> None:
+        if time.process_time() - begin > most:
+            raise TimeoutError(f"more than {most} s, at {reached:.3f} s of {case.duration} s")
+
+    try:
+        run = ri.simulate(stage.scene, case.duration, progress=None if np.isinf(most) else give_up)
+    except TimeoutError as error:
+        return Seen([str(error)], str(error), most / case.duration, np.nan)
     cost = (time.process_time() - begin) / case.duration
     depth, where = deepest_overlap(stage, run)
     missed = see(run)

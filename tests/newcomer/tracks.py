@@ -177,7 +177,7 @@ def box_on_ramp():
     """A box slides down a ramp of 15 degrees at 0.1 of friction, and another one with 0.5 stays."""
     stage = Stage()
     ice = ri.Material(static_friction=0.1, dynamic_friction=0.1, friction_combine="minimum", restitution=0.0)
-    grip = ri.Material(static_friction=0.5, dynamic_friction=0.5, restitution=0.0)
+    grip = ri.Material(static_friction=0.5, dynamic_friction=0.5, friction_combine="minimum", restitution=0.0)
     lean = np.radians(15.0)
     _ramp(stage, "ramp", (2.0, 1.0, 0.1), (0.0, 0.0, 0.0), lean, grip)
     up, down = np.array([np.sin(lean), 0.0, np.cos(lean)]), np.array([np.cos(lean), 0.0, -np.sin(lean)])
