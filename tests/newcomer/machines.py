@@ -113,7 +113,7 @@ def ragdoll_on_stairs():
     stage.floor(material=STONE)
     for k in range(3):
         stage.box(f"step {k}", (0.4, 1.5, 0.2 * (3 - k)), (0.4 * k, 0.0, 0.1 * (3 - k)), motion="static", material=STONE)
-    at = np.array([0.0, 0.0, 1.2])
+    at = np.array([0.0, 0.0, 1.31])
     stage.box("trunk", (0.16, 0.3, 0.5), at, velocity=(1.0, 0.0, 0.0), material=PAPER)
     stage.ball("head", 0.11, at + [0.0, 0.0, 0.38], velocity=(1.0, 0.0, 0.0), material=PAPER)
     stage.join(ri.BallJoint("trunk", "head", at + [0.0, 0.0, 0.26]))
