@@ -23,7 +23,7 @@ NOT_YET: dict[str, str] = {
     "cubes_on_table": FLUSH,
     "see_saw": FLUSH,
     "desk": FLUSH,
-    "lift_platform": FLUSH,
+    "rising_platform": FLUSH,
     "wrecking_ball": COST,
     "newtons_cradle": COST,
     "trebuchet": COST,

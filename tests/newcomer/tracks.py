@@ -242,7 +242,7 @@ def conveyor():
 
 
 @newcomer(1.0)
-def lift_platform():
+def rising_platform():
     """A platform raises a crate and a ball on it."""
     stage = Stage()
     stage.box("platform", (1.0, 1.0, 0.1), (0.0, 0.0, 0.0), motion="kinematic", velocity=(0.0, 0.0, 0.5), material=WOOD)
