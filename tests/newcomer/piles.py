@@ -50,10 +50,10 @@ def domino_row():
 
 @newcomer(1.5)
 def domino_ball():
-    """A ball runs into dominoes; all fall."""
+    """A ball is thrown at the first of some dominoes; all fall."""
     stage = Stage()
     stage.floor(material=WOOD)
-    stage.ball("ball", 0.015, (-0.08, 0.0, 0.015), velocity=(1.2, 0.0, 0.0), material=STEEL)
+    stage.ball("ball", 0.015, (-0.06, 0.0, 0.045), velocity=(1.2, 0.0, 0.0), material=STEEL)
     for k in range(8):
         stage.box(f"domino {k}", (0.01, 0.03, 0.06), (0.035 * k, 0.0, 0.03), material=WOOD)
     return stage, lambda run: must(*((tilt(run, f"domino {k}") > 0.8, f"domino {k} stands") for k in range(8)))
@@ -151,7 +151,7 @@ def brick_wall():
 def _bricks(stage: Stage, rows: int = 4) -> list[str]:
     names = []
     for row in range(rows):
-        for k in range(4):
+        for k in range(4 - row % 2):
             name = f"brick {row} {k}"
             stage.box(name, (0.24, 0.115, 0.071), (0.25 * k + 0.125 * (row % 2), 0.0, 0.071 * row + 0.0355), material=STONE)
             names.append(name)
