@@ -22,8 +22,6 @@ from rigidimpulse.core.kernels import Kernel, is_cached
 from rigidimpulse.model.world import World
 
 logger = logging.getLogger("rigidimpulse")
-SECONDS_OF_A_KIND = 20
-"""s that compiling one kind of kernels takes, about."""
 LOOP, ROLLING = "order of events", "rolling"
 CYLINDERS, CONTACTS, EVENTS, SUBSTEPPED, JOINTS = "cylinders", "contacts", "impacts of balls", "sub-stepped islands", "joints"
 LAST = {
@@ -36,6 +34,8 @@ LAST = {
 _BACKGROUND: list[subprocess.Popen] = []
 """Processes that nobody waits for."""
 PARTS_MODULE = "rigidimpulse.engine.warm_up_parts"
+SECONDS = {CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 35, JOINTS: 30}
+"""s that compiling each kind takes, about, on two threads of one core."""
 NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 2}
 
 
@@ -43,7 +43,7 @@ def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> N
     """Compile the kernels that a run needs on several cores, and say so, where this machine has never run these sources."""
     missing = kernels_to_compile(world, with_events, with_substepped)
     if missing:
-        kinds, seconds = ", ".join(missing), SECONDS_OF_A_KIND * len(missing)
+        kinds, seconds = ", ".join(missing), sum(SECONDS[kind] for kind in missing)
         logger.warning(f"compiling kernels ({kinds}) for the first run on this machine, once: this takes about {seconds} s")
         compile_kernels(world, missing)
 
