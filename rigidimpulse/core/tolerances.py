@@ -338,6 +338,8 @@ class SubStepping:
     """1 less the cosine of the angle of normals that are one and share their friction."""
     crossed: float = 1e-6
     """Depth, in inner radii, from which the surfaces of two inset surfaces cross."""
+    taken_reported: float = 0.05
+    """Part of its kinetic energy from which what the balance of energy takes off a body is reported, if it also raises it by a skin."""
     even_path: float = 1e-6
     """Part of its way by which a body may miss where an even acceleration would have brought it, for its path to be a parabola."""
 
