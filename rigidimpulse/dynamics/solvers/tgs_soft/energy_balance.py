@@ -8,7 +8,7 @@ before it, the work G of moving supports and the kinetic energy T, its speeds ar
 
 A member without any contact flies, and is left as it is. A position correction that moves bodies by dx costs -m g.dx each. A body pays
 for its own rise first, from its own speed. What it cannot pay is paid by those that were moved apart from it, and from each other: by
-one factor in each such set. No other body pays. Sets at rest cannot pay: they are raised, by a skin at most.
+one factor in each such set; what is owed still, by their clusters at the end of the step. Clusters at rest cannot pay.
 """
 
 from __future__ import annotations
@@ -42,13 +42,14 @@ class Balance(NamedTuple):
     before: np.ndarray  # (n+1,) J, energy of the body at the start
     given: np.ndarray  # (n+1,) J, work of moving supports on the body
     taken: np.ndarray  # (n+1,) J, taken off its speed at the end
+    owed: np.ndarray  # (n+1,) J, of position corrections: what is to be paid at the end of the step
     slowed: np.ndarray  # (n+1,) bool, lost a part of its motion that is worth a report
 
 
 def make_balance(n: int) -> Balance:
     """Arrays for n bodies."""
-    none, no = np.zeros((3, n + 1)), np.zeros((2, n + 1), bool)
-    return Balance(np.arange(n + 1), no[0], none[0], none[1], none[2], no[1])
+    none, no = np.zeros((4, n + 1)), np.zeros((2, n + 1), bool)
+    return Balance(np.arange(n + 1), no[0], none[0], none[1], none[2], none[3], no[1])
 
 
 @jit
@@ -84,7 +85,8 @@ def begin_balance(balance, bodies, weights):
     clear_balance(balance)
     for i in range(weights.mass.shape[0]):
         if bodies.part[i] == MEMBER:
-            balance.before[i] = _energy(bodies, weights, i)[1]
+            balance.before[i] = _energy(bodies, weights, i)[1] - balance.owed[i]
+        balance.owed[i] = 0.0
 
 
 @jit
@@ -127,7 +129,7 @@ def pay_for_rise(balance, bodies, weights, rise, fresh):
     balance.parent: sets that were moved apart; rise (n, 3) m: how each was moved; fresh (k,): who may have been moved, by rank.
     """
     n = weights.mass.shape[0]
-    owed, left, own, weight = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    owed, left, own, weight = balance.owed, np.zeros(n), np.zeros(n), np.zeros(n)
     for i in fresh:
         cost, pull = 0.0, weights.pull[i]
         for k in range(3):
@@ -145,3 +147,5 @@ def pay_for_rise(balance, bodies, weights, rise, fresh):
         if balance.taken[i] > 0.0:
             _slow_down(bodies, i, sqrt(max(1.0 - balance.taken[i] / own[i], 0.0)))
         balance.slowed[i] = balance.taken[i] > max(REPORTED * own[i], weight[i] * bodies.skin[i])
+    for i in fresh:
+        owed[i] = max(owed[i] - left[i], 0.0)
