@@ -7,7 +7,7 @@ place of contact moves (see `contact_motion`):
     a = a_b + alpha_b x r_b + w_b x r_b' - (a_a + alpha_a x r_a + w_a x r_a') + n (u.n')
 
 The solver finds p >= 0 in Coulomb's cone so that no contact approaches at the end. Positions follow x0 + v0 h + a h^2 / 2,
-so sliding and standing are exact. Where arms or normals turn, velocities are put right at the end (velocity projection, see `rattle`), and
+so sliding and standing are exact. Where arms or normals turn, velocities are put right at the end (see `velocity_projection`), and
 the gap g is brought to the contact margin d by position: with u_n = 0, g + h^2/2 (a_n + W f) = d adds 2 (g - d) / h to
 the bias, limited to a part of the pressing acceleration.
 

@@ -12,7 +12,7 @@ from 1e-3 to 1e-12 (at most 1e-9 for FREE rows), which makes redundant rows harm
 
 with a halving line search on |F|. It is written in the changes of y and p since q: as u goes to 0 the round-off of u / R
 goes with it. F' has a 6 x 6 block wherever two bodies share a row and is solved by sparse block elimination
-(`block_lu`), so that chains and stacks cost in proportion to their length. Where the line search fails k is raised; as
+(`sparse_lu`), so that chains and stacks cost in proportion to their length. Where the line search fails k is raised; as
 the last resort one step is made with the radii frozen, for which the problem is convex. The answer with the least
 residual of the natural map is returned, with that residual; one whose impulses are larger must have a residual that is
 smaller in proportion. Rows that contradict each other have no answer: their impulses would grow without end.
