@@ -148,6 +148,8 @@ class Manifolds:
     """Depth down to which contacts of bodies that are a little inside each other are found, relative to the margin within which contacts
     are looked for. Two contact margins of 1e-6 of a size make 1.2e-5 of it: more than rounding to single precision, and more than the depth
     beyond which bodies are moved apart before the first step (`InitialOverlap.depth`)."""
+    most_depth: float = 1e-4
+    """Greatest such depth, relative to the radius of the smaller primitive: the sub-stepped regime looks within large margins."""
     merge: float = 1e-9
     """Distance below which two contacts are one, relative to the edge."""
     same_normal: float = 1e-9

@@ -17,7 +17,7 @@ from rigidimpulse.core.tolerances import TOLERANCES
 INSIDE = TOLERANCES.manifold.inside
 STRICT = TOLERANCES.manifold.arc
 ROUND_OFF = TOLERANCES.manifold.point_round_off
-DEPTH = TOLERANCES.manifold.depth
+DEPTH, MOST_DEPTH = TOLERANCES.manifold.depth, TOLERANCES.manifold.most_depth
 TILT = 0.02
 """Greatest sine of the angle by which a contact within the margin may miss being locally closest."""
 ANY = 2.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidimpulse.collision.distance.cylinder import ZERO, basis, from_axes, on_circle
 from rigidimpulse.collision.distance.simplices import inner, over_triangle
-from rigidimpulse.collision.manifold.contact_points import DEPTH, STRICT, TILT, Contact, append_contact
+from rigidimpulse.collision.manifold.contact_points import DEPTH, MOST_DEPTH, STRICT, TILT, Contact, append_contact
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import along, cross, dot, moved, row, subtract, turned
 
@@ -52,6 +52,7 @@ class Solid(NamedTuple):
     feature: int  # number of its side; see SIDE and so on
     second: bool  # it is the second of its pair
     margin: float
+    depth: float  # how far another surface may be inside, m
     tilt: float  # sine of the angle by which a contact within the margin may miss being locally closest
 
 
@@ -61,14 +62,15 @@ def solid_of(frame, radius, cylinder, margin):
     u, v, w = basis((frame[cylinder, 3], frame[cylinder, 4], frame[cylinder, 5]))
     origin, half = row(frame, cylinder), frame[cylinder, 6]
     tilt = STRICT + min(TILT, margin / min(radius[cylinder], half))
-    return Solid(origin, u, v, w, radius[cylinder], half, NUM_FEATURES * cylinder, False, margin, tilt)
+    depth = min(DEPTH * margin, MOST_DEPTH * min(radius[cylinder], half))
+    return Solid(origin, u, v, w, radius[cylinder], half, NUM_FEATURES * cylinder, False, margin, depth, tilt)
 
 
 @inner
 def carried(solid, R, t):
     """Return the `Solid` of the second cylinder of a pair, given in its body's frame, in the frame of the first."""
     origin, u, v, w = moved(R, t, solid.origin), turned(R, solid.u), turned(R, solid.v), turned(R, solid.w)
-    return Solid(origin, u, v, w, solid.radius, solid.half, solid.feature, True, solid.margin, solid.tilt)
+    return Solid(origin, u, v, w, solid.radius, solid.half, solid.feature, True, solid.margin, solid.depth, solid.tilt)
 
 
 @inner
@@ -110,7 +112,7 @@ def rims_on_plane(solid, found, count, m, corners, bound, other):
     a, b, c = corners
     radius, half, margin = solid.radius, solid.half, solid.margin
     border = BORDER * (radius + half)
-    deepest = -inf if bound == WHOLE_PLANE else -DEPTH * margin
+    deepest = -inf if bound == WHOLE_PLANE else -solid.depth
     flat = hypot(m[0], m[1])
     for bottom in range(2):
         level = half - 2.0 * half * bottom
@@ -198,7 +200,7 @@ def ring_contact(q, tangent, curvature, solid, level, skeleton):
     else:
         n = along(ZERO, 1.0 / distance, between)
     in_arc = dot(n, out) >= -solid.tilt and up * n[2] >= -solid.tilt
-    return in_arc and distance >= skeleton - DEPTH * solid.margin, p, n, distance
+    return in_arc and distance >= skeleton - solid.depth, p, n, distance
 
 
 @inner
@@ -235,7 +237,7 @@ def circle_contacts(solid, found, count, circle, bottom, other):
                 n = (q[0] / rho, q[1] / rho, 0.0)
                 gap = rho - radius
                 p = (radius * n[0], radius * n[1], q[2])
-                met = abs(q[2]) <= half * (1.0 + BORDER) and -DEPTH * margin <= gap <= margin
+                met = abs(q[2]) <= half * (1.0 + BORDER) and -solid.depth <= gap <= margin
                 feature, going_out = SIDE, dot(cross(outward, q), (0.0, 0.0, 1.0)) > 0.0
             else:
                 met, p, n, gap = ring_contact(q, tangent, bend, solid, level, 0.0)

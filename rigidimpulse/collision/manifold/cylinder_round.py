@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rigidimpulse.collision.distance.cylinder import ZERO, closest_on_curve, closest_on_triangle, from_axes, to_axes
 from rigidimpulse.collision.distance.simplices import edge_normals, in_edge_arc, inner
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
-from rigidimpulse.collision.manifold.contact_points import DEPTH, Found
+from rigidimpulse.collision.manifold.contact_points import Found
 from rigidimpulse.collision.manifold.cylinder_rims import (
     BORDER,
     RIM,
@@ -169,7 +169,7 @@ def _vertex_contact(geometry, solid, view, found, count, vertex, skeleton):
     if solid.radius < rho <= solid.radius + border and abs(q[2]) > solid.half:  # in line with the rim: over the cap
         q = (q[0] * solid.radius / rho, q[1] * solid.radius / rho, q[2])
     distance, p, _, n = closest_on_curve(q, ZERO, solid.radius, solid.half)
-    depth = max(border, DEPTH * solid.margin)
+    depth = max(border, solid.depth)
     if distance == 0.0 and skeleton == 0.0 and solid.half - abs(q[2]) <= min(depth, solid.radius - rho + border):
         # In the very plane of the cap, or a little inside.
         n, distance = (0.0, 0.0, 1.0 if q[2] > 0.0 else -1.0), abs(q[2]) - solid.half
@@ -203,7 +203,7 @@ def _edge_contacts(solid, found, count, edge, other):
     rho = hypot(q[0], q[1])
     if rho > radius + reach:
         return count
-    if 0.0 < nearest < 1.0 and abs(q[2]) <= half and rho >= radius + skeleton - DEPTH * solid.margin:
+    if 0.0 < nearest < 1.0 and abs(q[2]) <= half and rho >= radius + skeleton - solid.depth:
         n = (q[0] / rho, q[1] / rho, 0.0)
         if in_edge_arc((-n[0], -n[1], 0.0), direction, arc[0], arc[1], kind, solid.tilt):
             p = (radius * n[0], radius * n[1], q[2])

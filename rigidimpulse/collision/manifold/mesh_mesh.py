@@ -35,6 +35,7 @@ from rigidimpulse.collision.manifold.contact_points import (
     DEPTH,
     INSIDE,
     MERGE,
+    MOST_DEPTH,
     ROUND_OFF,
     STRICT,
     TILT,
@@ -266,7 +267,8 @@ def round_round_contacts(geometry, first, second, pose, margin, contacts, count)
     R, t, pairs = pose.R, pose.t, contacts.scratch
     R_back, t_back = _pose_back(R, t)
     radius_a, radius_b = geometry.radius[first], geometry.radius[second]
-    skeleton, depth = margin + radius_a + radius_b, DEPTH * margin
+    size = min(geometry.bound_radius[first], geometry.bound_radius[second])
+    skeleton, depth = margin + radius_a + radius_b, min(DEPTH * margin, MOST_DEPTH * size)
     reach = max(skeleton, depth)
     edges_a = geometry.edge_first[first + 1] - geometry.edge_first[first]
     edges_b = geometry.edge_first[second + 1] - geometry.edge_first[second]
