@@ -30,7 +30,13 @@ def substep_counts(run: ri.Recording) -> int:
     return line.counts.get("steps", 0)
 
 
-@pytest.mark.parametrize(("kind", "seed", "number"), [("boxes", 3, 40), ("mixed", 7, 35), ("hulls", 6, 30)])
+NOT_SOLVED = "at 0.23 s three rubbing contacts of a wedge are not solved from the forces before, residual 7e-5; from larger ones they are"
+FALLS = [("boxes", 3, 40), ("mixed", 7, 35), ("hulls", 6, 30)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed", "number"), [*FALLS, pytest.param("mixed", 5, 35, marks=pytest.mark.xfail(strict=True, reason=NOT_SOLVED))]
+)
 def test_a_fall_of_some_dozen_bodies_is_stepped_finely(kind: str, seed: int, number: int) -> None:
     """Solved exactly 40 boxes take more than a minute for these 2 s. Here bodies stay apart, too, and energy never grows.
 
