@@ -24,7 +24,7 @@ import numpy as np
 from rigidimpulse.collision.distance.fcl import Narrowphase, Separation
 from rigidimpulse.core.quaternion import rotate, to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.rows import BOUNDED, make_rows
+from rigidimpulse.dynamics.constraints.rows import BOUNDED, Rows, make_rows
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
@@ -248,16 +248,10 @@ class _Search:
         n = np.array([d.direction for d in given]).reshape(-1, 3)
         # Ways are left from the present positions, displacements count from the given ones.
         asked = np.array([d.way + d.direction @ (moved[d.b] - moved[d.a]) for d in given])
-        root = np.sqrt(self.inv_mass)
-        rows = make_rows(len(given))
-        rows.first[:], rows.second[:] = np.where(root[first] > 0.0, first, -1), np.where(root[second] > 0.0, second, -1)
-        # In coordinates scaled by the root of the mass: sum of m |D|^2 / 2 is least.
-        rows.jacobian[:, :3], rows.jacobian[:, 6:9] = -root[first, None] * n, root[second, None] * n
-        rows.kind[:], rows.lower[:], rows.bias[:] = BOUNDED, 0.0, -asked
-        rows.softness[:] = SOFTNESS * (self.inv_mass[first] + self.inv_mass[second])
+        rows = displacement_rows(self.inv_mass, (first, second), n, asked, SOFTNESS)
         if len(given):
-            solve_newton(rows, len(root), EQUAL * min(self.size(d.a, d.b) for d in given))
-        shift = np.zeros((len(root), 3))
+            solve_newton(rows, len(self.inv_mass), EQUAL * min(self.size(d.a, d.b) for d in given))
+        shift = np.zeros((len(self.inv_mass), 3))
         np.add.at(shift, first, -rows.impulse[:, None] * n)
         np.add.at(shift, second, rows.impulse[:, None] * n)
         return (self.inv_mass[:, None] * shift)[self.cluster]
@@ -269,6 +263,22 @@ class _Search:
         for i in np.flatnonzero(np.any(trajectory.position != self.position, axis=1)).tolist():
             trajectory.position[i] = self.position[i]
             begin(trajectory, i)
+
+
+def displacement_rows(
+    inv_mass: np.ndarray, pair: tuple[np.ndarray, np.ndarray], n: np.ndarray, asked: np.ndarray, softness: float
+) -> Rows:
+    """Rows of n.(D_b - D_a) >= asked, of which the solution makes the sum of m |D|^2 / 2 least.
+
+    inv_mass (k,) 1/kg, 0 for what cannot move; pair: a and b (r,) of each row; n (r, 3); asked (r,) m; softness: part of the inverse masses.
+    """
+    (first, second), root, rows = pair, np.sqrt(inv_mass), make_rows.py_func(len(asked))
+    rows.first[:], rows.second[:] = np.where(root[first] > 0.0, first, -1), np.where(root[second] > 0.0, second, -1)
+    # In coordinates scaled by the root of the mass.
+    rows.jacobian[:, :3], rows.jacobian[:, 6:9] = -root[first, None] * n, root[second, None] * n
+    rows.kind[:], rows.lower[:], rows.bias[:] = BOUNDED, 0.0, -asked
+    rows.softness[:] = softness * (inv_mass[first] + inv_mass[second])
+    return rows
 
 
 def _clusters(world: World) -> tuple[np.ndarray, np.ndarray]:

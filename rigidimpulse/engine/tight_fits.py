@@ -19,8 +19,8 @@ import numpy as np
 
 from rigidimpulse.collision.geometry import CompiledShape, Primitive, build_geometry
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.rows import BOUNDED, make_rows
 from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.engine.initial_overlap import displacement_rows
 from rigidimpulse.engine.islands import near_contacts
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
@@ -62,15 +62,8 @@ def make_space(run: Run) -> World:
 def lacking(world: World, contacts: Contacts, margin: np.ndarray) -> np.ndarray:
     """What each contact (m,) lacks of its margin (m,) when bodies are displaced as well as can be, m."""
     # Displacements do not depend on the unit of mass.
-    inv_mass = world.inv_mass / world.inv_mass.max()
-    root = np.sqrt(inv_mass)
-    first, second, n = contacts.body_a, contacts.body_b, contacts.normal
-    rows = make_rows.py_func(len(first))
-    rows.first[:], rows.second[:] = np.where(root[first] > 0.0, first, -1), np.where(root[second] > 0.0, second, -1)
-    # In coordinates scaled by the root of the mass: sum of m |D|^2 / 2 is least.
-    rows.jacobian[:, :3], rows.jacobian[:, 6:9] = -root[first, None] * n, root[second, None] * n
-    rows.kind[:], rows.lower[:], rows.bias[:] = BOUNDED, 0.0, contacts.gap - margin
-    rows.softness[:] = SOFTNESS * (inv_mass[first] + inv_mass[second])
+    inv_mass, pair = world.inv_mass / world.inv_mass.max(), (contacts.body_a, contacts.body_b)
+    rows = displacement_rows(inv_mass, pair, contacts.normal, margin - contacts.gap, SOFTNESS)
     solve_newton(rows, world.num_bodies, RESIDUAL * float(margin.min()))
     return rows.softness * rows.impulse
 
