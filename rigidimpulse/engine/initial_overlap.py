@@ -270,7 +270,7 @@ def displacement_rows(
 ) -> Rows:
     """Rows of n.(D_b - D_a) >= asked, of which the solution makes the sum of m |D|^2 / 2 least.
 
-    inv_mass (k,) 1/kg, 0 for what cannot move; pair: a and b (r,) of each row; n (r, 3); asked (r,) m; softness: part of the inverse masses.
+    inv_mass (k,) 1/kg, 0 for what cannot move; pair: a and b (r,) of each row; n (r, 3); asked (r,) m; softness: relative.
     """
     (first, second), root, rows = pair, np.sqrt(inv_mass), make_rows.py_func(len(asked))
     rows.first[:], rows.second[:] = np.where(root[first] > 0.0, first, -1), np.where(root[second] > 0.0, second, -1)
