@@ -331,7 +331,9 @@ def settle_pairs(table, time, dynamic, given_up):
 
 @jit
 def look_around(table, members, time, shift):
-    """Call members that a position correction moved by `shift` [m] once more: others may be near now."""
+    """Call members that a position correction moved by `shift` [m], 0 if it did not, once more: others may be near now."""
+    if not shift > 0.0:
+        return
     least = np.inf
     for p in range(table.number[USED]):
         pair = table.pairs[p]

@@ -9,7 +9,6 @@ from stage import look
 
 COST = "the run takes far more processor time than motion of this kind may"
 NOT_YET: dict[str, str] = {
-    "rising_platform": "a pair that starts 1e-8 m inside each other and leaves is in contact until it is apart: contact not resolved",
     "newtons_cradle": COST,
     "trebuchet": COST,
     "cart": COST,

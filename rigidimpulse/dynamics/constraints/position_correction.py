@@ -5,8 +5,11 @@ the island are moved by the smallest displacement in the metric of mass that bri
 
     dx = M^-1 J_n^T p,    0 <= p _|_ g + J_n dx - target >= 0.
 
-Velocities do not change. The ledger records the change of potential energy.
+So are contacts inside each other that leave: they count as touching until they are apart, and would be met again and again on
+their way out. Velocities do not change. The ledger records the change of potential energy.
 """
+
+import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
@@ -19,18 +22,27 @@ KEPT = 0.75
 SOLVE_TOLERANCE = TOLERANCES.contact_forces.correction_residual
 
 
+@jit_making_arrays
+def to_lift(contacts, held):
+    """Contacts (m,) bool that may need correction: those held, and those inside each other."""
+    lifted = np.empty(held.shape[0], np.bool_)
+    for c in range(held.shape[0]):
+        lifted[c] = held[c] or contacts.gap[c] < 0.0
+    return lifted
+
+
 @jit
-def needs_correction(contacts, held, contact_margin):
-    """Whether a held contact has sunk; held (m,) bool, contact_margin (m,) m."""
+def needs_correction(contacts, lifted, contact_margin):
+    """Whether a contact of those that may be lifted has sunk; lifted (m,) bool, contact_margin (m,) m."""
     for c in range(contacts.gap.shape[0]):
-        if held[c] and contacts.gap[c] < SUNK * contact_margin[c]:
+        if lifted[c] and contacts.gap[c] < SUNK * contact_margin[c]:
             return True
     return False
 
 
 @jit_making_arrays
-def correct_positions(bodies, contacts, held, contact_margin, members, number):
-    """Move the members of the island so that held contacts, held (m,) bool, have their contact margin (m,) again; other bodies do not move.
+def correct_positions(bodies, contacts, lifted, contact_margin, members, number):
+    """Move the members of the island so that contacts, lifted (m,) bool, have their contact margin (m,) again; other bodies do not move.
 
     number (n,): working memory.
     """
@@ -44,7 +56,7 @@ def correct_positions(bodies, contacts, held, contact_margin, members, number):
         if not _is_member(members, number, contacts.body_b[c]):
             rows.second[c] = -1
             rows.jacobian[c, 6:] = 0.0
-        target = contact_margin[c] if held[c] else min(contacts.gap[c], KEPT * contact_margin[c])
+        target = contact_margin[c] if lifted[c] else min(contacts.gap[c], KEPT * contact_margin[c])
         rows.bias[c] = contacts.gap[c] - target
         largest = max(largest, contact_margin[c])
     solve_newton(rows, members.shape[0], SOLVE_TOLERANCE * largest)

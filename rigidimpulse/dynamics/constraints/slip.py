@@ -2,6 +2,11 @@
 
 What slips from the start has its dynamic friction. All others are solved with the static one; those that come to slip are given the
 dynamic one, and all are solved again.
+
+Coulomb's law couples the radius of the friction disc to the normal force, so that Newton's method may go round in circles between two
+branches (one contact sticks, another takes the load). Without friction the problem is convex, and for contacts alone it always has its
+answer. From there the coefficients are raised in equal parts, each solved from the answer of the last one (continuation: Allgower &
+Georg 1990, ch. 1).
 """
 
 from collections.abc import Callable
@@ -9,12 +14,15 @@ from collections.abc import Callable
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays, jit_with_callbacks
+from rigidimpulse.core.vector import copy_vector
 from rigidimpulse.dynamics.constraints.rows import Rows, multiply, multiply_transposed, rows_of
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 
 SLIP_PASSES = 3
 POOR = 1e4
 """A residual that many times what was asked for is poor."""
+FRICTION_PARTS = 8
+"""In how many equal parts friction is raised from none where no other start led to an answer."""
 
 RowSolver = Callable[[Rows, int, float], float]
 """A solver of rows: (rows, number of movable bodies, residual asked for) -> residual."""
@@ -72,19 +80,47 @@ def solve_with_slip(solve, of_contacts, n, contacts, slides, target, slow):
 def solve_until_slip(solve, of_contacts, n, contacts, target, slow):
     """The same with the friction that the rows have: what comes to slip is given its dynamic friction, and all is solved again."""
     rows, first_row = of_contacts.rows, of_contacts.first_row
-    warm, residual = _has_impulse(rows), 0.0
+    residual = 0.0
     for _ in range(SLIP_PASSES):
-        residual = solve_rows(solve, rows, n, target)
-        if residual > POOR * target and warm:
-            # A misleading start: once more from nothing.
-            rows.impulse[:] = 0.0
-            warm = False
-        elif not let_slip(rows, n, first_row, contacts.dynamic_friction, slow):
+        residual = _solve_from_other_starts(solve, rows, n, target)
+        if not let_slip(rows, n, first_row, contacts.dynamic_friction, slow):
             break
     for i in range(rows.impulse.shape[0]):
         if not np.isfinite(rows.impulse[i]):
             rows.impulse[:] = 0.0
             return np.inf
+    return residual
+
+
+@jit_with_callbacks
+def _solve_from_other_starts(solve, rows, n, target):
+    """Solve the rows from their impulses; if the answer is poor from none, and then from less friction. Returns the residual, m/s."""
+    warm = _has_impulse(rows)
+    residual = solve_rows(solve, rows, n, target)
+    if residual > POOR * target and warm:
+        # A misleading start: once more from nothing.
+        rows.impulse[:] = 0.0
+        residual = solve_rows(solve, rows, n, target)
+    if residual > POOR * target:
+        residual = _raise_friction(solve, rows, n, target, residual)
+    return residual
+
+
+@jit_with_callbacks
+def _raise_friction(solve, rows, n, target, residual):
+    """Solve the rows with more and more of their friction, from none on; keeps the poor answer, and its residual, if that finds none."""
+    poor, full = rows.impulse.copy(), rows.coefficient.copy()
+    rows.impulse[:] = 0.0
+    for part in range(FRICTION_PARTS + 1):
+        for i in range(full.shape[0]):
+            rows.coefficient[i] = full[i] * (part / FRICTION_PARTS)
+        found = solve_rows(solve, rows, n, target)
+        if found > POOR * target:
+            break
+    copy_vector(full, rows.coefficient)
+    if found < residual and part == FRICTION_PARTS:
+        return found
+    copy_vector(poor, rows.impulse)
     return residual
 
 

@@ -25,7 +25,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
-from rigidimpulse.dynamics.constraints.position_correction import correct_positions, needs_correction
+from rigidimpulse.dynamics.constraints.position_correction import correct_positions, needs_correction, to_lift
 from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.engine.exact.contact_forces import makes_energy, mark_same, shift_of
@@ -590,13 +590,13 @@ def _hold(loop, island, touch, members):
             wrench[i, k] = 0.0
     forget_forces(memory, number, touch.contacts)
     held = _slow(island, touch.speeds)
-    if not _any(held):
-        return touch, held
-    if needs_correction(touch.contacts, held, touch.contact_margin):
-        touch = _correct_positions(loop, island, touch, held, members)
+    lifted = to_lift(touch.contacts, held)
+    if needs_correction(touch.contacts, lifted, touch.contact_margin):
+        touch = _correct_positions(loop, island, touch, lifted, members)
         held = _slow(island, touch.speeds)
-        if not _any(held):
-            return touch, held
+    if not _any(held):
+        look_around(loop.table, members, time, island.shift)
+        return touch, held
     lasting = _chosen(touch, _places(held))
     contacts, touching = lasting.contacts, lasting.touching
     shapes = loop.shapes
@@ -634,8 +634,7 @@ def _hold(loop, island, touch, members):
         wake = loop.table.wake
         for i in members:
             wake[i] = time + solution.length
-    if island.shift > 0.0:
-        look_around(loop.table, members, time, island.shift)
+    look_around(loop.table, members, time, island.shift)
     return touch, held
 
 
@@ -659,8 +658,8 @@ def _places(which):
 
 
 @jit_making_arrays
-def _correct_positions(loop, island, touch, held, members):
-    """Bring sunken contacts back to their gap and look at the island's contacts again (see `contact_forces`)."""
+def _correct_positions(loop, island, touch, sunk, members):
+    """Bring contacts, sunk (m,) bool, back to their gap and look at the island's contacts again (see `contact_forces`)."""
     motion, constants, time = loop.motion, loop.bodies.constants, island.time
     now, k = motion.now, len(members)
     place, turn, way = np.empty((k, 3)), np.empty((k, 4)), np.empty((k, 3))
@@ -672,7 +671,7 @@ def _correct_positions(loop, island, touch, held, members):
     before = mechanical_energy(now, constants, members)
     around = _contacts_near(loop, members, time)
     lifted, depth = np.zeros(len(around.live), np.bool_), 0.0
-    mark_same(touch.contacts, touch.touching, held, around.contacts, around.touching, lifted)
+    mark_same(touch.contacts, touch.touching, sunk, around.contacts, around.touching, lifted)
     correct_positions(now, around.contacts, lifted, around.contact_margin, members, loop.number)
     refresh_pose(members, now, motion.rotation, motion.trajectory.inertia)
     log_energy(loop.log, time, POSITION_CORRECTION, mechanical_energy(now, constants, members) - before)
