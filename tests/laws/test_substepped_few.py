@@ -35,20 +35,25 @@ FALLS = [("boxes", 3, 40), ("mixed", 7, 35), ("mixed", 5, 35), ("hulls", 6, 30)]
 
 @pytest.mark.parametrize(("kind", "seed", "number"), FALLS)
 def test_a_fall_of_some_dozen_bodies_is_stepped_finely(kind: str, seed: int, number: int) -> None:
-    """Solved exactly 40 boxes take more than a minute for these 2 s. Here bodies stay apart, too, and energy never grows.
+    """Solved exactly 40 boxes take more than a minute for these 2 s. Here bodies stay apart, too, and energy never grows by itself.
 
     Contacts that were exact ones are held at a fifth of the skin (0.8 % of 3 to 5 cm, 0.06 mm) and more: not one pair of the seven runs
     with which this was tried was inside another by 1e-7 m at these frames. Stepped as coarsely as piles of thousands, two pairs of the
     boxes and one of the mix are inside each other by 0.1 mm, and the boxes gain 4e-6 of their energy. Here it is 2e-9: what lifts take is
     taken off the speeds, to second order. In the second mix three rubbing contacts of a wedge come at 0.23 s, which Newton's method solves
     neither from the forces before nor from none (residual 7e-5), but with friction that is raised from none.
+
+    A body that joins the island is lifted by 0.06 mm. If it moves it pays for that; what rests is given the work. Were all given it, that
+    would be 2e-4 of what they have, 0.3 m above the floor.
     """
     scene = part_of_pit(STONES[kind], seed, number)
     run = ri.simulate(scene, 2.0)
     assert run.status.ok and substep_counts(run) > 200
     for frame in range(0, len(run.times), 6):
         assert inside_each_other(scene, run, frame, 1e-6) == []
-    energy = run.ledger.kinetic + run.ledger.potential
+    energy, given = run.ledger.kinetic + run.ledger.potential, -run.ledger.dissipated["position correction"]
+    assert given[-1] < 1e-4 * energy[0]
+    energy -= given
     assert (energy - np.minimum.accumulate(energy)).max() < 1e-8 * energy[0]
     assert energy[-1] < 0.5 * energy[0]
 

@@ -47,6 +47,7 @@ SOLVE_TOLERANCE = TOLERANCES.contact_forces.residual
 POOR = TOLERANCES.contact_forces.poor_residual
 SLIP = TOLERANCES.contact_forces.no_slip
 TINY = TOLERANCES.arithmetic.least_divisor
+ROUND_OFF = TOLERANCES.arithmetic.round_off
 # Part of the pressing acceleration that brings a gap back.
 CLOSING = 0.25
 
@@ -92,12 +93,16 @@ def start_contact_impulses(rows, first_row, force, h):
 def fill_contact_bias(problem, excess, h, of_contacts):
     """Write b = u + h a of the contact rows; excess (m,): g - d to be closed, m.
 
-    Returns the largest speed h a gained [m/s] and the velocities u (m, 3) along the frames.
+    Returns the largest speed h a gained [m/s], or the round-off of the members' speeds if that is larger, and the velocities u (m, 3) along
+    the frames. Bodies that fall freely side by side gain none from each other: their residual is round-off, and means nothing by itself.
     """
     bodies, contacts, turning = problem.bodies, problem.contacts, problem.turning
     rows, first_row, frames = of_contacts.rows, of_contacts.first_row, of_contacts.frames
     m = first_row.shape[0]
     u, a, scale = np.empty((m, 3)), np.empty((m, 3)), TINY
+    for i in problem.members:
+        for k in range(3):
+            scale = max(scale, ROUND_OFF * abs(bodies.velocity[i, k]))
     for c in range(m):
         contact_velocity(contacts, c, frames[c], problem.acceleration, problem.angular_acceleration, a[c])
         for k in range(3):

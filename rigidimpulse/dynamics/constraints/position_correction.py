@@ -5,9 +5,11 @@ the island are moved by the smallest displacement in the metric of mass that bri
 
     dx = M^-1 J_n^T p,    0 <= p _|_ g + J_n dx - target >= 0.
 
-So are contacts inside each other that leave: they count as touching until they are apart, and would be met again and again on
-their way out. Velocities do not change. The ledger records the change of potential energy.
+A contact inside the other surface that leaves is met again and again on its way out. It is brought back to CLEAR d only: what is inside
+by round-off moves by round-off. Velocities do not change. The ledger records the change of potential energy.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,33 +21,43 @@ from rigidimpulse.dynamics.solvers.newton import solve_newton
 SUNK = 0.7
 # Other contacts of the island may not sink below this part of the contact margin.
 KEPT = 0.75
+CLEAR = TOLERANCES.events.contact_margin_round_off
 SOLVE_TOLERANCE = TOLERANCES.contact_forces.correction_residual
 
 
+class Sunk(NamedTuple):
+    """Which of m contacts are moved, and to where."""
+
+    lifted: np.ndarray  # (m,) bool, to the contact margin
+    inside: np.ndarray  # (m,) bool, only just apart
+    contact_margin: np.ndarray  # (m,) m
+
+
 @jit_making_arrays
-def to_lift(contacts, held):
-    """Contacts (m,) bool that may need correction: those held, and those inside each other."""
-    lifted = np.empty(held.shape[0], np.bool_)
+def leaves_from_inside(contacts, held):
+    """Contacts (m,) bool inside each other that do not last; held (m,) bool: those that do."""
+    inside = np.empty(held.shape[0], np.bool_)
     for c in range(held.shape[0]):
-        lifted[c] = held[c] or contacts.gap[c] < 0.0
-    return lifted
+        inside[c] = contacts.gap[c] < 0.0 and not held[c]
+    return inside
 
 
 @jit
-def needs_correction(contacts, lifted, contact_margin):
-    """Whether a contact of those that may be lifted has sunk; lifted (m,) bool, contact_margin (m,) m."""
+def needs_correction(contacts, held, contact_margin):
+    """Whether a held contact has sunk, or another is inside; held (m,) bool, contact_margin (m,) m."""
     for c in range(contacts.gap.shape[0]):
-        if lifted[c] and contacts.gap[c] < SUNK * contact_margin[c]:
+        if contacts.gap[c] < (SUNK * contact_margin[c] if held[c] else 0.0):
             return True
     return False
 
 
 @jit_making_arrays
-def correct_positions(bodies, contacts, lifted, contact_margin, members, number):
-    """Move the members of the island so that contacts, lifted (m,) bool, have their contact margin (m,) again; other bodies do not move.
+def correct_positions(bodies, contacts, sunk, members, number):
+    """Move the members of the island so that contacts which are `Sunk` have their gaps again; other bodies do not move.
 
     number (n,): working memory.
     """
+    contact_margin = sunk.contact_margin
     all_rows, first_row, _ = contact_rows(bodies, contacts, members, number, 0)
     rows, largest = take_rows(all_rows, first_row), 0.0
     for c in range(first_row.shape[0]):
@@ -56,7 +68,11 @@ def correct_positions(bodies, contacts, lifted, contact_margin, members, number)
         if not _is_member(members, number, contacts.body_b[c]):
             rows.second[c] = -1
             rows.jacobian[c, 6:] = 0.0
-        target = contact_margin[c] if lifted[c] else min(contacts.gap[c], KEPT * contact_margin[c])
+        target = min(contacts.gap[c], KEPT * contact_margin[c])
+        if sunk.lifted[c]:
+            target = contact_margin[c]
+        elif sunk.inside[c]:
+            target = CLEAR * contact_margin[c]
         rows.bias[c] = contacts.gap[c] - target
         largest = max(largest, contact_margin[c])
     solve_newton(rows, members.shape[0], SOLVE_TOLERANCE * largest)

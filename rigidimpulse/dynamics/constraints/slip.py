@@ -94,34 +94,47 @@ def solve_until_slip(solve, of_contacts, n, contacts, target, slow):
 
 @jit_with_callbacks
 def _solve_from_other_starts(solve, rows, n, target):
-    """Solve the rows from their impulses; if the answer is poor from none, and then from less friction. Returns the residual, m/s."""
+    """Solve the rows from their impulses; if the answer is poor from none, and then from less friction. Keeps the best answer.
+
+    Returns its residual, m/s.
+    """
     warm = _has_impulse(rows)
     residual = solve_rows(solve, rows, n, target)
+    best = rows.impulse.copy()
     if residual > POOR * target and warm:
         # A misleading start: once more from nothing.
         rows.impulse[:] = 0.0
-        residual = solve_rows(solve, rows, n, target)
+        residual = _keep_better(rows, solve_rows(solve, rows, n, target), best, residual)
     if residual > POOR * target:
-        residual = _raise_friction(solve, rows, n, target, residual)
+        residual = _keep_better(rows, _raise_friction(solve, rows, n, target), best, residual)
+    return residual
+
+
+@jit
+def _keep_better(rows, found, best, residual):
+    """Keep the impulses of the rows as the best ones (r,) if what was found is better, else give them back; returns the residual."""
+    if found < residual:
+        copy_vector(rows.impulse, best)
+        return found
+    copy_vector(best, rows.impulse)
     return residual
 
 
 @jit_with_callbacks
-def _raise_friction(solve, rows, n, target, residual):
-    """Solve the rows with more and more of their friction, from none on; keeps the poor answer, and its residual, if that finds none."""
-    poor, full = rows.impulse.copy(), rows.coefficient.copy()
+def _raise_friction(solve, rows, n, target):
+    """Solve the rows with more and more of their friction, from none on. Returns the residual, m/s: inf if it finds no answer on the way."""
+    full = rows.coefficient.copy()
     rows.impulse[:] = 0.0
+    found = 0.0
     for part in range(FRICTION_PARTS + 1):
         for i in range(full.shape[0]):
             rows.coefficient[i] = full[i] * (part / FRICTION_PARTS)
         found = solve_rows(solve, rows, n, target)
-        if found > POOR * target:
+        if found > POOR * target and part < FRICTION_PARTS:
+            found = np.inf
             break
     copy_vector(full, rows.coefficient)
-    if found < residual and part == FRICTION_PARTS:
-        return found
-    copy_vector(poor, rows.impulse)
-    return residual
+    return found
 
 
 @jit

@@ -13,7 +13,7 @@ from rigidimpulse.core.vector import turned
 from rigidimpulse.dynamics.constraints.contact import ContactProblem, Held
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
-from rigidimpulse.dynamics.constraints.position_correction import correct_positions, needs_correction, to_lift
+from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, leaves_from_inside, needs_correction
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling, rolling_of
 from rigidimpulse.dynamics.energy import kinetic_energy, kinetic_of, mechanical_energy
 from rigidimpulse.engine.exact.energy_limit import limit_correction_energy, note_hold
@@ -40,11 +40,8 @@ def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
     run.wrench[island.members] = 0.0
     forget_forces(state.memory, number, island.contacts)
     island.held = island.slow()
-    lifted = to_lift(island.contacts, island.held)
-    if not lifted.any() and not len(island.joints):
-        return
-    if needs_correction(island.contacts, lifted, island.contact_margin):
-        _correct_positions(run, pair_events, island, lifted)
+    if needs_correction(island.contacts, island.held, island.contact_margin):
+        _correct_positions(run, pair_events, island)
     subset = np.flatnonzero(island.held)
     if not len(subset) and not len(island.joints):
         pair_events.look_around(island.members, island.time, island.shift)
@@ -171,8 +168,8 @@ def _energy_after(problem, constants, wrench, h):
     return energy
 
 
-def _correct_positions(run: Run, pair_events: PairEvents, island: Island, sunk: np.ndarray) -> None:
-    """Bring contacts, sunk (m,) bool, back to their gap and look at the island's contacts again.
+def _correct_positions(run: Run, pair_events: PairEvents, island: Island) -> None:
+    """Bring sunken contacts back to their gap, and contacts inside each other that leave apart, and look at the island's contacts again.
 
     A light body may turn far to get out of the way of a heavy one, so its neighbours are looked for within a larger distance. Bodies
     outside the island do not move.
@@ -181,9 +178,10 @@ def _correct_positions(run: Run, pair_events: PairEvents, island: Island, sunk: 
     place, turn = now.position[members].copy(), now.orientation[members].copy()
     before = mechanical_energy(now, constants, members)
     around, contact_margin, touching = near_contacts(run, pair_events, members, island.time)
-    lifted = np.zeros(len(contact_margin), bool)
-    mark_same(island.contacts, island.touching, sunk, around, touching, lifted)
-    correct_positions(now, around, lifted, contact_margin, members, run.column)
+    lifted, inside = np.zeros((2, len(contact_margin)), bool)
+    mark_same(island.contacts, island.touching, island.held, around, touching, lifted)
+    mark_same(island.contacts, island.touching, leaves_from_inside(island.contacts, island.held), around, touching, inside)
+    correct_positions(now, around, Sunk(lifted, inside, contact_margin), members, run.column)
     refresh_pose(members, now, state.rotation, state.trajectory.inertia)
     run.log.account(island.time, "position correction", mechanical_energy(now, constants, members) - before)
     supports, passive = _other_supports(run, island)

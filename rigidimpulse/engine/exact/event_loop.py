@@ -25,7 +25,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
-from rigidimpulse.dynamics.constraints.position_correction import correct_positions, needs_correction, to_lift
+from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, leaves_from_inside, needs_correction
 from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.engine.exact.contact_forces import makes_energy, mark_same, shift_of
@@ -590,9 +590,8 @@ def _hold(loop, island, touch, members):
             wrench[i, k] = 0.0
     forget_forces(memory, number, touch.contacts)
     held = _slow(island, touch.speeds)
-    lifted = to_lift(touch.contacts, held)
-    if needs_correction(touch.contacts, lifted, touch.contact_margin):
-        touch = _correct_positions(loop, island, touch, lifted, members)
+    if needs_correction(touch.contacts, held, touch.contact_margin):
+        touch = _correct_positions(loop, island, touch, held, members)
         held = _slow(island, touch.speeds)
     if not _any(held):
         look_around(loop.table, members, time, island.shift)
@@ -658,8 +657,8 @@ def _places(which):
 
 
 @jit_making_arrays
-def _correct_positions(loop, island, touch, sunk, members):
-    """Bring contacts, sunk (m,) bool, back to their gap and look at the island's contacts again (see `contact_forces`)."""
+def _correct_positions(loop, island, touch, held, members):
+    """Bring sunken contacts back to their gap, and contacts inside each other that leave apart, and look at the island's contacts again (see `contact_forces`)."""
     motion, constants, time = loop.motion, loop.bodies.constants, island.time
     now, k = motion.now, len(members)
     place, turn, way = np.empty((k, 3)), np.empty((k, 4)), np.empty((k, 3))
@@ -670,9 +669,10 @@ def _correct_positions(loop, island, touch, sunk, members):
             turn[s, j] = now.orientation[members[s], j]
     before = mechanical_energy(now, constants, members)
     around = _contacts_near(loop, members, time)
-    lifted, depth = np.zeros(len(around.live), np.bool_), 0.0
-    mark_same(touch.contacts, touch.touching, sunk, around.contacts, around.touching, lifted)
-    correct_positions(now, around.contacts, lifted, around.contact_margin, members, loop.number)
+    lifted, inside, depth = np.zeros(len(around.live), np.bool_), np.zeros(len(around.live), np.bool_), 0.0
+    mark_same(touch.contacts, touch.touching, held, around.contacts, around.touching, lifted)
+    mark_same(touch.contacts, touch.touching, leaves_from_inside(touch.contacts, held), around.contacts, around.touching, inside)
+    correct_positions(now, around.contacts, Sunk(lifted, inside, around.contact_margin), members, loop.number)
     refresh_pose(members, now, motion.rotation, motion.trajectory.inertia)
     log_energy(loop.log, time, POSITION_CORRECTION, mechanical_energy(now, constants, members) - before)
     for s in range(k):

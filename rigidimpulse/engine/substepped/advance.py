@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,6 +63,16 @@ TOUCHES = 5.0
 """Skins within which a body at rest belongs to the island that comes near it."""
 
 
+class _Began(NamedTuple):
+    """The step that an island is in."""
+
+    time: float  # s, of its start
+    end: float  # s
+    members: np.ndarray  # (k,)
+    energy: float  # J, at its start
+    taken: float  # J that the balance of energy takes off until its end
+
+
 class SubsteppedIslands:
     """The sub-stepped islands of a run.
 
@@ -93,7 +104,7 @@ class SubsteppedIslands:
         self._jointed = jointed(world)
         self.solve_count, self._step_end = np.zeros(world.num_bodies), 0.0
         self._ends: dict[int, float] = {}
-        self._began: dict[int, tuple[float, np.ndarray, float]] = {}
+        self._began: dict[int, _Began] = {}
         self._outcome: Outcome | None = None
         self._outcome_end = 0.0
         self._most = self._steps = 0
@@ -269,9 +280,12 @@ class SubsteppedIslands:
 
     def _account(self, run: Run, label: int, time: float) -> None:
         if label in self._began:
-            start, members, energy = self._began.pop(label)
-            change = mechanical_energy(run.state.now, run.world.constants, members) - energy
-            run.log.account_over(start, time, "sub-stepping", change)
+            began = self._began.pop(label)
+            change = mechanical_energy(run.state.now, run.world.constants, began.members) - began.energy
+            # Trajectories that end early have had their share of it.
+            corrected = -began.taken * (time - began.time) / (began.end - began.time)
+            run.log.account_over(began.time, time, "energy correction", corrected)
+            run.log.account_over(began.time, time, "sub-stepping", change - corrected)
 
     def finish(self, run: Run) -> None:
         """Account for the energy of sub-steps that last until the end of the run, and tell the plan what was done."""
@@ -346,14 +360,19 @@ class SubsteppedIslands:
         end = self._end_of(run, pair_events, island.time, members)
         # In the middle of a step contacts may be kept for longer motion.
         self._set_up(run, members, island.time, end - island.time, self.stepper.kept if island.time > pair_events.begin else 0.0)
+        if len(fresh):
+            before = mechanical_energy(run.state.now, world.constants, fresh)
+            self.stepper.move_apart(run, fresh, island.time)
+            run.log.account(island.time, "position correction", mechanical_energy(run.state.now, world.constants, fresh) - before)
+        self._outcome = out = self.stepper.step(run, island.time, end)
+        self._outcome_end = end
+        taken = np.zeros(world.num_bodies)
+        taken[out.members] = out.taken
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
             self._ends[label] = end
-            self._began[label] = island.time, mine, mechanical_energy(run.state.now, world.constants, mine)
-        if len(fresh):
-            self.stepper.move_apart(run, fresh)
-        self._outcome = self.stepper.step(run, island.time, end)
-        self._outcome_end = end
+            energy = mechanical_energy(run.state.now, world.constants, mine)
+            self._began[label] = _Began(island.time, end, mine, energy, float(taken[mine].sum()))
         # The island was not stepped to the end of the step: it is woken there.
         if end < pair_events.end:
             pair_events.wake[members] = end

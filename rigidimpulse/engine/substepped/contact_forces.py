@@ -1,4 +1,4 @@
-"""One step of sub-stepped islands: bodies are handed to the kernels, contacts found, sub-steps taken, gained energy taken off."""
+"""One step of sub-stepped islands: bodies are handed to the kernels, contacts found, sub-steps taken, energy balanced."""
 
 from __future__ import annotations
 
@@ -25,8 +25,17 @@ from rigidimpulse.core.simd import ROW, aligned
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.workers import empty_work_queue
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import SolverBodies, load_bodies
-from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import energies, mark_quick, note_pressed, slow_down
+from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick, note_pressed
 from rigidimpulse.dynamics.solvers.tgs_soft.depenetration import move_apart
+from rigidimpulse.dynamics.solvers.tgs_soft.energy_balance import (
+    Weights,
+    begin_balance,
+    clear_balance,
+    connect,
+    end_balance,
+    make_balance,
+    pay_for_rise,
+)
 from rigidimpulse.dynamics.solvers.tgs_soft.fill import fill, keep_impulses, place_bodies
 from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     POINTS,
@@ -74,12 +83,16 @@ CLEAR = 0.2
 
 @dataclass
 class Outcome:
-    """Result of a step: bodies (k,) of the scene in the solver's order, and their poses and velocities (k, 6) at its end."""
+    """Result of a step: bodies (k,) of the scene in the solver's order, and their poses and velocities (k, 6) at its end.
+
+    taken: (k,) J that the balance of energy took off their speeds.
+    """
 
     members: np.ndarray
     position: np.ndarray
     orientation: np.ndarray
     velocity: np.ndarray
+    taken: np.ndarray
 
 
 class ContactStepper:
@@ -125,7 +138,8 @@ class ContactStepper:
         bound = np.where(np.isfinite(world.bound_radius), world.bound_radius, 0.0)
         self._taken_off = self._depth + (1.0 - self._factor) * bound[self.order]
         self.bodies = self._make_bodies()
-        self._masses, self._pull = world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order])
+        self._weights = Weights(world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order]))
+        self._balance = make_balance(n)
         self._shares, self._looked_at = self._sharing.most_cores, 0
         self._workspaces = [make_workspace() for _ in range(self._shares)]
         self._more_buffers: list[ContactBuffer] = []
@@ -324,19 +338,20 @@ class ContactStepper:
         fill(self.simd, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
         return number
 
-    def move_apart(self, run: Run, fresh: np.ndarray) -> None:
-        """Move members that are fresh apart from each other and from all else to the gaps that contacts are held at; their speeds pay."""
+    def move_apart(self, run: Run, fresh: np.ndarray, time: float) -> None:
+        """Move members that are fresh apart from each other and from all else to the gaps of contacts; their speeds pay."""
         bodies, now, at = self.bodies, run.state.now, self.rank[fresh]
         mine = np.zeros(len(bodies.part), bool)
         mine[at] = True
-        before = self._energies()[1]
-        if not move_apart(bodies, self.table.pairs, self.table.points, mine):
+        before = bodies.position.copy()
+        clear_balance(self._balance)
+        if not move_apart(bodies, self.table.pairs, self.table.points, mine, self._balance.parent):
             return
-        self._take_off(before)
-        members = self.rank[self.members]
+        pay_for_rise(self._balance, bodies, self._weights, bodies.position - before, at)
+        self._report_slowed(run, time)
         now.position[fresh], now.orientation[fresh] = bodies.position[at], bodies.orientation[at]
-        now.velocity[self.members] = bodies.velocity.reshape(-1, ROW)[members, :3]
-        now.angular_velocity[self.members] = bodies.velocity.reshape(-1, ROW)[members, 3:6]
+        velocity = bodies.velocity.reshape(-1, ROW)[at]
+        now.velocity[fresh], now.angular_velocity[fresh] = velocity[:, :3], velocity[:, 3:6]
         refresh_pose(fresh, now, run.state.rotation, self.world.inertia)
 
     def step(self, run: Run, time: float, end: float) -> Outcome:
@@ -344,35 +359,36 @@ class ContactStepper:
         bodies, members = self.bodies, self.members
         sub_steps = self._sub_steps
         h = (end - time) / sub_steps
-        before = self._energies()[1]
-        work, done = 0.0, 0
+        done = 0
+        begin_balance(self._balance, bodies, self._weights)
         self._steady = _NO_STEADY
         for part in range(self._parts):
             if part:
                 self._look_again(run)
             some = (part + 1) * sub_steps // self._parts - done
-            work += self._advance(some, h)
+            self._advance(some, h)
             done += some
         note_pressed(bodies, self.order, self.pressed)
         # Sub-steps must not make energy beyond what moving supports gave.
-        self._take_off(before + work)
+        end_balance(self._balance, bodies, self._weights)
+        self._report_slowed(run, time)
         at = self.rank[members]
-        return Outcome(members, bodies.position[at], bodies.orientation[at], bodies.velocity.reshape(-1, ROW)[at, :6])
+        velocity = bodies.velocity.reshape(-1, ROW)[at, :6]
+        return Outcome(members, bodies.position[at], bodies.orientation[at], velocity, self._balance.taken[at])
 
-    def _energies(self) -> tuple[float, float]:
-        """Kinetic energy of the members, and all of it, J."""
-        return energies(self.bodies, self._masses, self._pull)
+    def _report_slowed(self, run: Run, time: float) -> None:
+        """Report whose motion the balance of energy took a good part of."""
+        for i in self.order[np.flatnonzero(self._balance.slowed[: len(self.order)])].tolist():
+            run.log.report(
+                time, "motion taken in a sub-stepped island", (self.world.names[i],),
+                "moving bodies apart made energy, which was taken off its motion; contact_solver=\"newton\" solves exactly",
+            )  # fmt: skip
 
-    def _take_off(self, allowed: float) -> None:
-        """Take what members have gained beyond `allowed` J off their speeds."""
-        kinetic, total = self._energies()
-        if total > allowed and kinetic > 0.0:
-            slow_down(self.bodies, math.sqrt(max(1.0 - (total - allowed) / kinetic, 0.0)))
-
-    def _advance(self, sub_steps: int, h: float) -> float:
-        """Sub-steps of h s with the contacts as they are known; returns the work of moving supports, J."""
+    def _advance(self, sub_steps: int, h: float) -> None:
+        """Sub-steps of h s with the contacts as they are known."""
         bodies, table, width = self.bodies, self.table, self.simd.width
         number, steady = self._fill(h), len(self._steady[1]) - 1
+        connect(self._balance, bodies, table.pairs, self._patches, self._count)
         solve = Solve(bodies, table.pairs, self._patches, self._batches, table.points, self._edges, steady)
         lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
         balls = rebounds = supports = 0
@@ -381,10 +397,10 @@ class ContactStepper:
             balls, rebounds, supports = special_patches(
                 width, solve, self._steady[0], self._count, self.world.coefficients, strength, lists, target
             )
-        special = SpecialPatches(lists[0, :balls], lists[1, :rebounds], lists[2, :supports], target)
+        special = SpecialPatches(lists[0, :balls], lists[1, :rebounds], lists[2, :supports], target, self._balance.given)
         shares = min(self._shares, self._sharing.solvers) if number * sub_steps > self._sharing.batches else 1
         self._work_queue[:] = empty_work_queue()
-        work, *_ = self._sharing.call(advance, [
+        self._sharing.call(advance, [
             (self.simd, solve, special, sub_steps, h, self._work_queue, share, shares) for share in range(shares)
         ])  # fmt: skip
         keep_impulses(self.simd, self._batches, number, table.lines)
@@ -392,4 +408,3 @@ class ContactStepper:
         if not steady:
             bodies.quick[:] = False
             self._steady = self._count, self._edges
-        return work

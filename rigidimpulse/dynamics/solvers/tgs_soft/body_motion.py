@@ -151,32 +151,3 @@ def note_pressed(bodies, order, pressed):
             for k in range(8 * i, 8 * i + 6):
                 acted = acted or bodies.velocity[k] != bodies.before[k]
             pressed[order[i]] = acted
-
-
-@jit
-def energies(bodies, masses, pull):
-    """Kinetic energy, and that energy with the potential of a steady pull (n, 3) m/s2, of the members, J; masses (n,) kg."""
-    kinetic, total = 0.0, 0.0
-    for i in range(masses.shape[0]):
-        if bodies.part[i] != MEMBER:
-            continue
-        o = 8 * i
-        v = bodies.velocity
-        x, y, z = turned_back_by(bodies.rotation, i, v[o + 3], v[o + 4], v[o + 5])
-        moments = bodies.inertia[i]
-        own = 0.5 * masses[i] * (v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2])
-        own += 0.5 * (moments[0] * x * x + moments[1] * y * y + moments[2] * z * z)
-        kinetic += own
-        total += own
-        for k in range(3):
-            total -= masses[i] * pull[i, k] * bodies.position[i, k]
-    return kinetic, total
-
-
-@jit
-def slow_down(bodies, factor):
-    """Multiply the speeds of the members."""
-    for i in range(bodies.part.shape[0]):
-        if bodies.part[i] == MEMBER:
-            for k in range(8 * i, 8 * i + 6):
-                bodies.velocity[k] *= factor

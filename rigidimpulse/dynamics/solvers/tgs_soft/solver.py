@@ -100,6 +100,7 @@ class SpecialPatches(NamedTuple):
     rebounds: np.ndarray  # patches with points that rebound
     supports: np.ndarray  # patches on moving supports
     target: np.ndarray  # (m, 4) m/s
+    given: np.ndarray  # (n+1,) J, work of moving supports on each body, added up
 
 
 def softness(h: float) -> np.ndarray:
@@ -258,9 +259,9 @@ def _turn_balls(width, bodies, pairs, patches, chosen, rows, batches):
 
 
 @jit_making_arrays
-def _rebound(width, bodies, patches, chosen, batches, target):
-    """Give points that came in fast and are closed their rebound, with friction; returns the supports' work, J."""
-    record, work = batches.record, 0.0
+def _rebound(width, bodies, patches, chosen, batches, special):
+    """Give points that came in fast and are closed their rebound, with friction; adds up the work of supports."""
+    record, target, given = batches.record, special.target, special.given
     for m in chosen:
         s = patches.slot[m]
         o = (s // width) * FIELDS * width + s % width
@@ -273,7 +274,9 @@ def _rebound(width, bodies, patches, chosen, batches, target):
             a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
             ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
             p = max(_field(record, g + MASS * width) * (target[m, c] - (ux * n[0] + uy * n[1] + uz * n[2])), 0.0)
-            work += _push(bodies, b, arm_b, p * n[0], p * n[1], p * n[2]) + _push(bodies, a, arm_a, -p * n[0], -p * n[1], -p * n[2])
+            # The work of one body's support is done on the other body.
+            given[a] += _push(bodies, b, arm_b, p * n[0], p * n[1], p * n[2])
+            given[b] += _push(bodies, a, arm_a, -p * n[0], -p * n[1], -p * n[2])
             ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
             un, step = ux * n[0] + uy * n[1] + uz * n[2], _field(record, o + STEP_T * width)
             x, y, z = -step * (ux - un * n[0]), -step * (uy - un * n[1]), -step * (uz - un * n[2])
@@ -282,17 +285,17 @@ def _rebound(width, bodies, patches, chosen, batches, target):
             if size > _field(record, o + MU_STATIC * width) * p:
                 factor = _field(record, o + MU_DYNAMIC * width) * p / size
                 x, y, z = factor * x, factor * y, factor * z
-            work += _push(bodies, b, arm_b, x, y, z) + _push(bodies, a, arm_a, -x, -y, -z)
+            given[a] += _push(bodies, b, arm_b, x, y, z)
+            given[b] += _push(bodies, a, arm_a, -x, -y, -z)
             # A rebound happens once, and nothing of it is carried over to the next sub-step.
             target[m, c] = record[g + PRESS * width] = 0.0
             record[o + PUSH_1 * width] = record[o + PUSH_2 * width] = record[o + TWIST * width] = 0.0
-    return work
 
 
 @jit_making_arrays
-def _work_of(width, bodies, patches, chosen, batches):
-    """Work that moving supports did by the impulses of a sub-step, J."""
-    record, work = batches.record, 0.0
+def _add_work(width, bodies, patches, chosen, batches, given):
+    """Add the work that moving supports did by the impulses of a sub-step to what is given (n+1,) J to each body."""
+    record = batches.record
     for m in chosen:
         s = patches.slot[m]
         o = (s // width) * FIELDS * width + s % width
@@ -307,13 +310,12 @@ def _work_of(width, bodies, patches, chosen, batches):
             turn_1, turn_2 = turn_1 + p * _field(record, g + Y * width), turn_2 - p * _field(record, g + X * width)
         a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, np.int64(-1))
         # Impulses act on b and their opposites on a: the support works with the impulse on the other body, at its own speed.
-        support, sign, arm = (b, -1.0, arm_b) if bodies.mass[8 * b + INVERSE_MASS] == 0.0 else (a, 1.0, arm_a)
+        support, other, sign, arm = (b, a, -1.0, arm_b) if bodies.mass[8 * b + INVERSE_MASS] == 0.0 else (a, b, 1.0, arm_a)
         ux, uy, uz = _velocity_at(bodies, support, arm)
         v = bodies.velocity[8 * support + 3 : 8 * support + 6]
         for k in range(3):
             force, torque = press * n[k] + f1 * t[k] + f2 * u[k], turn_1 * t[k] + turn_2 * u[k] + f3 * n[k]
-            work += sign * (force * (ux if k == 0 else (uy if k == 1 else uz)) + torque * v[k])
-    return work
+            given[other] += sign * (force * (ux if k == 0 else (uy if k == 1 else uz)) + torque * v[k])
 
 
 @jit
@@ -401,15 +403,15 @@ def _help(simd, solve, h, work_queue):
 
 @jit
 def advance(simd, solve, special, sub_steps, h, work_queue, share, shares):
-    """Make `sub_steps` sub-steps of length h; returns the work of moving supports, J.
+    """Make `sub_steps` sub-steps of length h; adds up the work of moving supports.
 
     share: 0 for the thread that leads, 1 for the one that helps, if `shares` is 2; see `workers`.
     """
-    width, colours, work = width_of(simd), solve.edges.shape[0] - 1, 0.0
+    width, colours = width_of(simd), solve.edges.shape[0] - 1
     bodies, patches, batches = solve.bodies, solve.patches, solve.batches
     if share > 0:
         _help(simd, solve, h, work_queue)
-        return 0.0
+        return
     for s in range(sub_steps):
         first = s * (3 * colours + 2)
         for k in range(2 * colours + 2):
@@ -418,8 +420,7 @@ def advance(simd, solve, special, sub_steps, h, work_queue, share, shares):
         for k in range(2 * colours + 2, 3 * colours + 2):
             _lead(simd, solve, h, work_queue, shares > 1, first + k)
         # The work is counted first: a rebound sets impulses to zero that have acted already.
-        work += _work_of(width, bodies, patches, special.supports, batches)
-        work += _rebound(width, bodies, patches, special.rebounds, batches, special.target)
+        _add_work(width, bodies, patches, special.supports, batches, special.given)
+        _rebound(width, bodies, patches, special.rebounds, batches, special)
     open_round(work_queue, LAST)
     finish(bodies)
-    return work
