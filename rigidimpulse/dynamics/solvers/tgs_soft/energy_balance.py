@@ -94,7 +94,6 @@ def begin_balance(balance, bodies, weights):
     for i in range(weights.mass.shape[0]):
         if bodies.part[i] == MEMBER:
             balance.before[i] = _energy(bodies, weights, i)[1] - balance.owed[i]
-        balance.owed[i] = 0.0
 
 
 @jit
@@ -109,17 +108,22 @@ def connect(balance, bodies, pairs, patches, count):
 
 @jit_making_arrays
 def end_balance(balance, bodies, weights):
-    """Take what clusters gained off their speeds."""
+    """Take what clusters gained off their speeds.
+
+    What sub-steps made, and lose again, is no motion lost. What is paid for a position correction is.
+    """
     n = weights.mass.shape[0]
-    kinetic, gained, own, weight = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    kinetic, gained, debt, own, weight = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     for i in range(n):
         if bodies.part[i] == MEMBER and balance.touched[i]:
             root = root_of(balance.parent, i)
             own[i], total = _energy(bodies, weights, i)
             kinetic[root] += own[i]
             gained[root] += total - balance.before[i] - balance.given[i]
+            debt[root] += balance.owed[i]
             weight[i] = _weight_times_skin(bodies, weights, i)
     for i in range(n):
+        balance.owed[i] = 0.0
         if bodies.part[i] != MEMBER or not balance.touched[i]:
             continue
         root = root_of(balance.parent, i)
@@ -127,7 +131,8 @@ def end_balance(balance, bodies, weights):
             share = min(gained[root] / kinetic[root], 1.0)
             _slow_down(bodies, i, sqrt(1.0 - share))
             balance.taken[i] = share * own[i]
-            balance.slowed[i] = share > REPORTED and balance.taken[i] > SEEN * weight[i]
+            paid = min(debt[root] / kinetic[root], share)
+            balance.slowed[i] = paid > REPORTED and paid * own[i] > SEEN * weight[i]
 
 
 @jit_making_arrays
