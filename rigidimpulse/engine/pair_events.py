@@ -12,6 +12,7 @@ import numpy as np
 from rigidimpulse.collision.broad_phase import find_overlapping
 from rigidimpulse.collision.time_of_impact.spheres import is_closed_form
 from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.union_find import roots
 from rigidimpulse.engine.pair_table import (
     FIRST_ROWS,
     MARGIN,
@@ -33,7 +34,7 @@ from rigidimpulse.engine.pair_table import (
 )
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.contact_memory import place_of
-from rigidimpulse.motion.trajectory import FIXED
+from rigidimpulse.motion.trajectory import FIXED, PRESCRIBED
 
 INSTANT = TOLERANCES.events.instant
 SQUEEZED_REMEDY = "no motion keeps the body apart from all that presses on it; give it space, or let the pressing bodies move freely"
@@ -195,7 +196,23 @@ class PairEvents:
         """Count contacts at one instant; a pair with too many is left alone until the end of the step, and reported."""
         given_up = np.empty(len(self.pairs), np.int64)
         count = count_contacts(self.table, time, INSTANT * self.run.world.accuracy.step, given_up)
-        self.report(time, "squeezed", given_up[:count], SQUEEZED_REMEDY)
+        for place in given_up[:count].tolist():
+            kind, remedy = self.why_again(self.pairs[place]["a"], self.pairs[place]["b"])
+            self.report(time, kind, given_up[given_up == place], remedy)
+
+    def why_again(self, a: int, b: int) -> tuple[str, str]:
+        """Kind of problem, and remedy, of two bodies that come to contact again and again at one instant.
+
+        They are squeezed only if a body with a path of its own presses on one of them, itself or through others that may touch in the step.
+        """
+        pairs, prescribed = self.pairs, self.run.state.trajectory.mode == PRESCRIBED
+        free, first, second = self._dynamic & ~prescribed, pairs["a"], pairs["b"]
+        joins, presses = free[first] & free[second], prescribed[first] | prescribed[second]
+        root = roots(len(free), first[joins], second[joins])
+        pressed = free & np.isin(root, root[np.concatenate([first[presses], second[presses]])])
+        if np.any(pressed[[a, b]]):
+            return "squeezed", SQUEEZED_REMEDY
+        return "contact not resolved", NOT_RESOLVED_REMEDY
 
     def settle(self, time: float) -> None:
         """Pairs that came to contact without consequence are swept again from here with a smaller gap."""

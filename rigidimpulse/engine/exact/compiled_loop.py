@@ -45,7 +45,7 @@ from rigidimpulse.engine.exact.event_loop import (
 )
 from rigidimpulse.engine.exact.impacts import WITHOUT_REBOUND_REMEDY
 from rigidimpulse.engine.impact_time import STALLED_REMEDY
-from rigidimpulse.engine.pair_events import INSTANT, NOT_RESOLVED_REMEDY, SQUEEZED_REMEDY, PairEvents
+from rigidimpulse.engine.pair_events import INSTANT, NOT_RESOLVED_REMEDY, PairEvents
 from rigidimpulse.engine.pair_table import pair_bodies
 from rigidimpulse.engine.run import NOT_FINITE_REMEDY, Run
 from rigidimpulse.model.world import World
@@ -66,7 +66,6 @@ EFFECTS = {
 }
 """The effects whose verbs the loop calls, by their place in `Loop.cycles`."""
 PROBLEMS = {
-    int(SQUEEZED): ("squeezed", SQUEEZED_REMEDY),
     int(NOT_RESOLVED): ("contact not resolved", NOT_RESOLVED_REMEDY),
     int(SWEEP_STALLED): ("sweep stalled", STALLED_REMEDY),
     int(WITHOUT_REBOUND): ("impacts finished without rebound", WITHOUT_REBOUND_REMEDY),
@@ -165,7 +164,7 @@ class CompiledLoop:
             start, before = perf_counter(), self._cycles.copy()
             how, time, is_given = run_events(self._updated(run, pair_events), mark, is_given, time, pair_events.end, self._scratch)
             self._account(run, perf_counter() - start, before)
-            self._tell(run)
+            self._tell(run, pair_events)
             if how == NO_CAPACITY:
                 self._grow(run)
             elif how == SHORT_OF_PAIRS:
@@ -194,11 +193,11 @@ class CompiledLoop:
         if self._reports.used[ASKED] > len(self._reports.rows):
             self._reports = _make_reports(2 * int(self._reports.used[ASKED]))
 
-    def _tell(self, run: Run) -> None:
+    def _tell(self, run: Run, pair_events: PairEvents) -> None:
         """Report the problems that the kernel met, in words."""
         for row in self._reports.rows[: self._reports.used[ROWS]]:
-            kind, remedy = PROBLEMS[int(row["kind"])]
             bodies = self._reports.bodies[row["first"] : row["first"] + row["count"]]
+            kind, remedy = pair_events.why_again(*bodies) if row["kind"] == SQUEEZED else PROBLEMS[int(row["kind"])]
             names = tuple(run.world.names[i] for i in bodies.tolist())
             run.log.report(float(row["time"]), kind, names, remedy.format(value=float(row["value"])))
         self._reports.used[[ROWS, BODIES]] = 0
