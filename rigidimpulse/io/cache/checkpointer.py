@@ -11,22 +11,23 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.version import VERSION
+from rigidimpulse.engine.absent import NoCompiledLoop
 from rigidimpulse.engine.begin import bind_compiled_loop
 from rigidimpulse.engine.fingerprint import fingerprint
+from rigidimpulse.engine.run import Run
+from rigidimpulse.io.cache.constants import Constants
+from rigidimpulse.io.cache.decode import REMEDY, thaw
+from rigidimpulse.io.cache.encode import freeze
 from rigidimpulse.io.cache.file import FRAMES, SUFFIXES, CacheFile, Content, Header, read
-from rigidimpulse.io.cache.freeze import Constants, freeze, thaw
 from rigidimpulse.recording.cache import Cache
 from rigidimpulse.recording.recorder import sample_paths
 from rigidimpulse.recording.recording import Recording, RunSettings
-
-if TYPE_CHECKING:
-    from rigidimpulse.engine.run import Run
 
 EXPENSIVE = 20.0
 """How many times longer than the last checkpoint took the run goes on before the next, unless one is wanted after every step."""
@@ -86,6 +87,9 @@ class Checkpointer:
         log.buffers = log.buffers._replace(impacts=np.concatenate([stored.impacts, log.buffers.impacts]))
         self._frames, self._impacts = len(stored.frames["position"]), len(stored.impacts)
         known = thaw(stored.state or b"", _constants(run))
+        if not isinstance(known, Run):
+            raise SceneError("the checkpoint is none of a run", REMEDY, f"cache {str(self._path)!r}")
+        known.compiled = NoCompiledLoop()  # that of the other process is gone with its memory
         bind_compiled_loop(known)
         return known
 
@@ -146,7 +150,9 @@ def _constants(run: Run) -> Constants:
     """Return the parts of a run that its checkpoints do not hold."""
     world, recorder = run.world, run.recorder
     own = [run.plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), run.log.buffers.impacts]
-    return Constants([world.scene, world.scene.bodies, world.scene.effects, world.shapes, world.geometry, *own])
+    made_again = [run.compiled, run.triggers.narrowphase]
+    roots = [world.scene, world.scene.bodies, world.scene.effects, world.shapes, world.geometry, world.accuracy, *own, *made_again]
+    return Constants(roots)
 
 
 def _difference(known: Header, header: Header) -> str:
