@@ -108,10 +108,9 @@ def own_array(layout: Layout, order: Any, residue: int, data: memoryview) -> np.
     """
     if order not in ("C", "F") or not 0 <= residue < LINE:
         raise Damaged(f"an array in order {str(order)[:20]} at {residue}")
-    plain = np.frombuffer(data, np.uint8)
-    memory = np.empty(len(plain) + LINE, np.uint8)
-    begin = (residue - address(memory)) % LINE
-    memory[begin : begin + len(plain)] = plain
+    memory = bytearray(len(data) + LINE)  # no array: else this one would be a view when it is written again
+    begin = (residue - address(np.frombuffer(memory, np.uint8))) % LINE
+    memory[begin : begin + len(data)] = data
     array = np.ndarray(layout.shape, layout.dtype, buffer=memory, offset=begin, order=order)
     array.flags.writeable = layout.writeable
     return array

@@ -24,7 +24,9 @@ from rigidimpulse.engine.run import Run
 from rigidimpulse.io.cache.constants import Constants
 from rigidimpulse.io.cache.decode import REMEDY, thaw
 from rigidimpulse.io.cache.encode import freeze
-from rigidimpulse.io.cache.file import FRAMES, SUFFIXES, CacheFile, Content, Header, read
+from rigidimpulse.io.cache.file import CacheFile
+from rigidimpulse.io.cache.layout import FRAMES, SUFFIXES, Content, Header
+from rigidimpulse.io.cache.read import read
 from rigidimpulse.recording.cache import Cache
 from rigidimpulse.recording.recorder import sample_paths
 from rigidimpulse.recording.recording import Recording, RunSettings
@@ -75,7 +77,7 @@ class Checkpointer:
         if not self._path.exists():
             return None
         known, content = read(self._path, alone=True)
-        if known.fingerprint != header.fingerprint:
+        if (known.fingerprint, known.names) != (header.fingerprint, header.names) or not np.array_equal(known.times, header.times):
             raise SceneError(_difference(known, header), "delete it, or give another name", f"cache {str(self._path)!r}")
         return content
 

@@ -179,6 +179,7 @@ _MAKERS: dict[str, Callable[..., Any]] = {
     "dtype": lambda _, description: typed(description),
     "array": _Decoder.array,
     "view": _Decoder.view,
+    "records": lambda decoder, base: decoder.child(base).view(np.recarray),
     "scalar": _Decoder.scalar,
     "function": _Decoder.function,
     "method": _Decoder.method,

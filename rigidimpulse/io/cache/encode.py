@@ -94,7 +94,7 @@ class _Encoder:
         if schema is None:
             raise TypeError(f"it holds a {type(thing).__module__}.{type(thing).__qualname__}")
         if schema.is_tuple:
-            return ["named", schema.label, *map(self.child, thing)]
+            return ["named", schema.label, *(self.child(value) for value in thing)]
         return self.later(["object", schema.label], thing, schema)
 
     def later(self, node: list[Any], thing: Any, schema: Schema | None = None) -> list[Any]:
@@ -149,6 +149,7 @@ _WRITERS: dict[type, Callable[[_Encoder, Any], list[Any]]] = {
     collections.deque: lambda encoder, thing: encoder.later(["deque", thing.maxlen], thing),
     collections.defaultdict: _Encoder.default,
     np.ndarray: _Encoder.array,
+    np.recarray: lambda encoder, thing: ["records", encoder.child(thing.view(np.ndarray))],
     partial: _Encoder.partial,
     MethodType: _Encoder.method,
 }
