@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -196,42 +195,6 @@ def test_cut_off_files_are_refused_or_gone_on_with(tmp_path):
         (tmp_path / "cut.h5").write_bytes(whole[:part])
         with pytest.raises(ri.SceneError):
             ri.simulate(gas(), 0.2, cache=tmp_path / "cut.h5")
-
-
-class Harmful:
-    """Pickled, it would call a function of the system."""
-
-    def __reduce__(self):
-        import os
-
-        return os.getcwd, ()
-
-
-class RunsAFile:
-    """Pickled, it would have the library run a scene file."""
-
-    def __reduce__(self):
-        from rigidimpulse.studies.job import find_job
-
-        return find_job, ("harmful.py",)
-
-
-class Exports:
-    """Pickled, it would have a scene write a file."""
-
-    def __reduce__(self):
-        from rigidimpulse.io.cache.freeze import _bound
-
-        return _bound, (gas(), "export")
-
-
-def test_checkpoints_call_nothing_but_the_library(tmp_path):
-    from rigidimpulse.io.cache.freeze import Constants, thaw
-
-    harmful = [pickle.dumps((0, thing)) for thing in (Harmful(), RunsAFile(), Exports(), getattr)]
-    for bad in (*harmful, b"", b"junk", pickle.dumps((3, None))):
-        with pytest.raises(ri.SceneError, match="checkpoint"):
-            thaw(bad, Constants([]))
 
 
 def test_the_command_line_goes_on(tmp_path):

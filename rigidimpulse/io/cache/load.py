@@ -9,7 +9,7 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.dynamics.soft_body.track import tracks_in
 from rigidimpulse.io.cache.layout import Content, Header
-from rigidimpulse.io.cache.read import read
+from rigidimpulse.io.cache.read import REMEDY, read
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.events import impact_table
 from rigidimpulse.recording.recording import Recording
