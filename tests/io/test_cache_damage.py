@@ -218,7 +218,7 @@ def test_files_that_killed_runs_left_are_removed(tmp_path: Path) -> None:
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
     left = tmp_path / f".run.{gone.pid}.h5"
-    kept = [tmp_path / f".run.{os.getppid()}.h5", tmp_path / ".run.x.h5", tmp_path / f".other.{gone.pid}.h5", tmp_path / f".run.{gone.pid}.npz"]
+    kept = [tmp_path / name for name in (f".run.{os.getppid()}.h5", ".run.x.h5", f".other.{gone.pid}.h5", f".run.{gone.pid}.npz")]
     for path in (left, *kept):
         path.write_bytes(b"half a file")
     CacheFile(tmp_path / "run.h5", header(["a"]), None).close()

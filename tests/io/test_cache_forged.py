@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
 from pathlib import Path
@@ -141,7 +142,8 @@ def test_a_forged_state_is_refused(what: str) -> None:
 def test_nodes_of_the_forged_states_are_read_where_they_are_right() -> None:
     # Else a mistake in all of them would pass for a refusal.
     assert thaw(state(OBJECT), Constants([])).width == 4
-    assert thaw(state(ARRAY, ["view", [0], "<f8", [2], True, 8, [-8]], arrays=np.arange(2.0).tobytes()), Constants([])).tolist() == [1.0, 0.0]
+    backwards = state(ARRAY, ["view", [0], "<f8", [2], True, 8, [-8]], arrays=np.arange(2.0).tobytes())
+    assert thaw(backwards, Constants([])).tolist() == [1.0, 0.0]
     assert thaw(state(["list", [0]]), Constants([]))[0][0][0] is not None
     assert thaw(state(["constant", 0], constants=1), Constants([[]])) == []
 
@@ -159,7 +161,7 @@ def test_pickles_of_older_caches_run_nothing(stopped: bytes, tmp_path: Path) -> 
     with h5py.File(cache, "r+") as file:
         file.attrs["format"] = "rigidimpulse cache 1"
     for look in (ri.load_recording, lambda path: ri.simulate(pile(), 0.1, 100.0, cache=path)):
-        with pytest.raises(ri.SceneError, match="older version of the library.*delete it, and run again"):
+        with pytest.raises(ri.SceneError, match=r"older version of the library.*delete it, and run again"):
             look(cache)
     assert not mark.exists()
 
@@ -171,6 +173,36 @@ def test_a_state_that_is_none_of_a_run_is_refused(stopped: bytes, tmp_path: Path
         put_state(cache, content)
         with pytest.raises(ri.SceneError, match="the checkpoint"):
             ri.simulate(pile(), 0.1, 100.0, cache=cache)
+
+
+FIELDS = {
+    "a text for the world": ({"world": "text"}, "Run.world is a str"),
+    "a constant for the world": ({"world": [0]}, "Run.world is a"),
+    "nothing for the world": ({"world": None}, "Run.world is a NoneType"),
+    "a list for the recorder": ({"recorder": ["list"]}, "Run.recorder is a list"),
+    "a text for an array": ({"box_min": "text"}, "Run.box_min is a str"),
+    "another array": ({"box_min": ["array", "|u1", [0], True, "C", 0]}, "Run.box_min is an array of 1 axes of uint8"),
+}
+
+
+@pytest.mark.parametrize("what", FIELDS)
+def test_a_state_with_fields_of_other_kinds_is_refused(what: str, stopped: bytes, tmp_path: Path) -> None:
+    cache, (fields, told) = tmp_path / "run.h5", FIELDS[what]
+    cache.write_bytes(stopped)
+    known = read(cache)[1].state
+    assert known is not None
+    table_size, arrays_size = LENGTHS.unpack_from(known, len(MARK))
+    begin = len(MARK) + LENGTHS.size
+    number, root, nodes = json.loads(known[begin : begin + table_size])
+    run = next(node for node in nodes if node[:2] == ["object", "engine.run.Run"])
+    for name, child in fields.items():
+        if isinstance(child, list) and isinstance(child[0], str):
+            nodes.append(child)
+            child = [len(nodes) - 1]
+        run[2][name] = child
+    put_state(cache, packed(json.dumps([number, root, nodes]).encode(), known[-arrays_size:]))
+    with pytest.raises(ri.SceneError, match=rf"run\.h5.*engine\.run\.{told}.*delete the cache"):
+        ri.simulate(pile(), 0.1, 100.0, cache=cache)
 
 
 @pytest.mark.parametrize(

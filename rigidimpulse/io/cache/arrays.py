@@ -46,7 +46,8 @@ def described(dtype: np.dtype) -> Any:
         base, shape = dtype.subdtype
         return ["rows", described(base), list(shape)]
     if dtype.names is not None and dtype.fields is not None:
-        fields = [[name, described(dtype.fields[name][0]), dtype.fields[name][1]] for name in dtype.names]
+        by_name: Any = dtype.fields
+        fields = [[name, described(by_name[name][0]), by_name[name][1]] for name in dtype.names]
         return ["record", fields, dtype.itemsize, dtype.isalignedstruct]
     if not PLAIN_TYPE.fullmatch(dtype.str):
         raise TypeError(f"an array of {dtype}")
@@ -71,7 +72,7 @@ def typed(description: Any, depth: int = 0) -> np.dtype:
     if kind != "record" or type(aligned) is not bool:
         raise Damaged(f"the type of elements {str(description)[:60]!r}")
     names, formats, offsets = zip(*((name, typed(each, depth + 1), offset) for name, each, offset in fields), strict=True)
-    table = {"names": list(names), "formats": list(formats), "offsets": list(whole_numbers(offsets)), "itemsize": whole_number(size)}
+    table: Any = {"names": list(names), "formats": list(formats), "offsets": list(whole_numbers(offsets)), "itemsize": whole_number(size)}
     return np.dtype(table, align=aligned)
 
 

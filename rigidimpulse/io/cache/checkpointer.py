@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,16 +20,20 @@ from rigidimpulse.core.version import VERSION
 from rigidimpulse.engine.absent import NoCompiledLoop
 from rigidimpulse.engine.begin import bind_compiled_loop
 from rigidimpulse.engine.fingerprint import fingerprint
-from rigidimpulse.engine.run import Run
+from rigidimpulse.io.cache.arrays import Damaged
 from rigidimpulse.io.cache.constants import Constants
 from rigidimpulse.io.cache.decode import REMEDY, thaw
 from rigidimpulse.io.cache.encode import freeze
 from rigidimpulse.io.cache.file import CacheFile
 from rigidimpulse.io.cache.layout import FRAMES, SUFFIXES, Content, Header
+from rigidimpulse.io.cache.likeness import check_alike
 from rigidimpulse.io.cache.read import read
 from rigidimpulse.recording.cache import Cache
 from rigidimpulse.recording.recorder import sample_paths
 from rigidimpulse.recording.recording import Recording, RunSettings
+
+if TYPE_CHECKING:
+    from rigidimpulse.engine.run import Run
 
 EXPENSIVE = 20.0
 """How many times longer than the last checkpoint took the run goes on before the next, unless one is wanted after every step."""
@@ -88,9 +92,14 @@ class Checkpointer:
             getattr(recorder, name)[: len(frames)] = frames
         log.buffers = log.buffers._replace(impacts=np.concatenate([stored.impacts, log.buffers.impacts]))
         self._frames, self._impacts = len(stored.frames["position"]), len(stored.impacts)
-        known = thaw(stored.state or b"", _constants(run))
-        if not isinstance(known, Run):
-            raise SceneError("the checkpoint is none of a run", REMEDY, f"cache {str(self._path)!r}")
+        try:
+            constants = _constants(run)
+            known = thaw(stored.state or b"", constants)
+            check_alike(known, run, constants)
+        except SceneError as error:
+            raise error.within(f"cache {str(self._path)!r}") from None
+        except Damaged as error:
+            raise SceneError(f"the checkpoint is none of this run: {error}", REMEDY, f"cache {str(self._path)!r}") from None
         known.compiled = NoCompiledLoop()  # that of the other process is gone with its memory
         bind_compiled_loop(known)
         return known

@@ -26,7 +26,7 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.io.cache.arrays import LINE, address, described
 from rigidimpulse.io.cache.constants import Constants
-from rigidimpulse.io.cache.registry import Schema, function_name, named_method, schema_of
+from rigidimpulse.io.cache.registry import Schema, function_name, held_by, named_method, schema_of
 
 MARK = b"state 2\n"
 LENGTHS = struct.Struct("<QQ")
@@ -80,21 +80,22 @@ class _Encoder:
         return place
 
     def _node(self, thing: Any) -> list[Any]:
-        write = _WRITERS.get(type(thing))
+        kind = type(thing)
+        write = _WRITERS.get(kind)
         if write is not None:
             return write(self, thing)
-        if isinstance(thing, np.generic) and not thing.dtype.hasobject:
+        if issubclass(kind, np.generic) and not thing.dtype.hasobject:
             return ["scalar", described(thing.dtype), thing.tobytes().hex()]
         if isinstance(thing, np.dtype):
             return ["dtype", described(thing)]
         name = function_name(thing)
         if name is not None:
             return ["function", name]
-        schema = schema_of(type(thing))
+        schema = schema_of(kind)
         if schema is None:
-            raise TypeError(f"it holds a {type(thing).__module__}.{type(thing).__qualname__}")
+            raise TypeError(f"it holds a {kind.__module__}.{kind.__qualname__}")
         if schema.is_tuple:
-            return ["named", schema.label, *(self.child(value) for value in thing)]
+            return ["named", schema.label, *map(self.child, thing)]
         return self.later(["object", schema.label], thing, schema)
 
     def later(self, node: list[Any], thing: Any, schema: Schema | None = None) -> list[Any]:
@@ -157,8 +158,8 @@ _WRITERS: dict[type, Callable[[_Encoder, Any], list[Any]]] = {
 
 
 def _fields(thing: Any, schema: Schema) -> dict[str, Any]:
-    """The fields of an object by name, those in slots too."""
-    held = {**getattr(thing, "__dict__", {}), **{name: getattr(thing, name) for name in schema.slots if hasattr(thing, name)}}
+    """The fields of an object by name."""
+    held = held_by(thing, schema)
     wrong = sorted((held.keys() - schema.fields - schema.optional) | (schema.fields - held.keys()))
     if wrong:
         raise TypeError(f"a {schema.label} has other fields than its class says: {', '.join(wrong)}")

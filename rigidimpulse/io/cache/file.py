@@ -75,7 +75,7 @@ class CacheFile:
         _sync(file)
         told = (self._number, content.time, count, len(content.impacts), len(data), len(content.state), b"")
         commit = np.array(told, COMMIT)
-        commit["digest"] = digest_of(commit[()], data)
+        commit["digest"] = digest_of(commit, data)
         file["checkpoint/commits"][slot] = commit
         _sync(file)
 

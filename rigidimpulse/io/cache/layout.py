@@ -98,7 +98,7 @@ def check_words(*tables: np.ndarray) -> np.ndarray:
     return total
 
 
-def digest_of(commit: np.void, data: bytes) -> bytes:
+def digest_of(commit: np.void | np.ndarray, data: bytes) -> bytes:
     """Return the digest of a commit and the bytes of its slot."""
     told = [commit[name].tobytes() for name in COMMIT.names or () if name != "digest"]
     return hashlib.sha256(b"".join([*told, data])).hexdigest().encode()

@@ -52,6 +52,14 @@ class Schema(NamedTuple):
     slots: frozenset[str]
 
 
+def held_by(thing: Any, schema: Schema) -> dict[str, Any]:
+    """The fields of an object of a schema by name. Nothing is computed for it."""
+    if schema.is_tuple:
+        return dict(zip(schema.made._fields, thing, strict=True))  # type: ignore[attr-defined]
+    inside = {name: getattr(thing, name) for name in schema.slots if hasattr(thing, name)}
+    return {**getattr(thing, "__dict__", {}), **inside}
+
+
 @cache
 def schema_of(made: type) -> Schema | None:
     """The schema of a class; None for a class that is no part of a state."""
