@@ -174,6 +174,31 @@ def test_bad_caches_are_refused(tmp_path):
         ri.simulate(gas(), 0.1, cache=tmp_path / "run.h5", accuracy=ri.Within(position=0.1))
 
 
+class OwnPin:
+    """An energy of a user's own class: that of a pin."""
+
+    def __init__(self, pin):
+        self._pin = pin
+
+    def compile(self, world):
+        return OwnPin(self._pin.compile(world))
+
+    def __getattr__(self, name):
+        return getattr(self.__dict__["_pin"], name)
+
+
+def test_objects_of_own_classes_are_refused_at_the_start(tmp_path):
+    # Nothing could be made of them again. Functions are found again in the scene: see `forces` of kept_runs.
+    scene = ri.Scene(gravity=(0, 0, 0))
+    scene.add(ri.Body("box", ri.Shape.box((1, 1, 1))))
+    scene.add(ri.EnergyForce(OwnPin(ri.PinPoints(None, "box", (0, 0, 0), (0, 0, 0), 10.0)), name="pin"))
+    assert ri.simulate(scene, 0.02).status.ok
+    looks = []
+    with pytest.raises(ri.SceneError, match=r"it holds a test_cache\.OwnPin; simulate it without a cache"):
+        ri.simulate(scene, 0.02, cache=tmp_path / "run.h5", progress=looks.append)
+    assert looks == []
+
+
 def test_a_cache_that_is_written_to_is_left_alone(tmp_path):
     cache = tmp_path / "run.h5"
     program = f"import rigidimpulse as ri; from kept_runs import pile; ri.simulate(pile(), 0.1, cache={str(cache)!r})"

@@ -6,7 +6,9 @@ Only tables whose bytes lie in the file in one piece are read: no links to other
 from __future__ import annotations
 
 import json
+import os
 import zlib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +35,8 @@ from rigidimpulse.recording.events import ROW_LENGTH
 
 REMEDY = "delete it, and run again"
 LONGEST_TEXT = 1000
+TRIES = 3
+"""A run that goes on may write both checkpoints while one of them is read."""
 MOST_UNPACKED, LEAST_UNPACKED = 1032, 64
 """zlib packs no more bytes than this into one, and into an empty block."""
 
@@ -48,19 +52,27 @@ def read(path: Path, alone: bool = False) -> tuple[Header, Content]:
     if not path.is_file():
         raise SceneError("there is no such file", "check the path", where)
     try:
-        with _opened(path, alone) as file:
-            kind = file.attrs.get("format")
-            if isinstance(kind, str) and kind == FIRST_FORMAT:
-                raise SceneError("it is of an older version of the library, whose checkpoints could hold programs", REMEDY, where)
-            if not isinstance(kind, str) or kind != FORMAT:
-                raise SceneError("it is no cache of this version", "give another name, or delete it", where)
-            return _whole(file, path.stat().st_size)
+        for _ in range(TRIES - 1):
+            with suppress(Damaged):
+                return _read(path, alone, where)
+        return _read(path, alone, where)
     except BlockingIOError:
         raise SceneError("another run writes to it", "wait until that ends, or give another name", where) from None
     except SceneError:
         raise
     except Exception as error:  # h5py raises anything on damaged files
         raise SceneError(f"it cannot be read: {str(error) or type(error).__name__}", REMEDY, where) from None
+
+
+def _read(path: Path, alone: bool, where: str) -> tuple[Header, Content]:
+    """What the file holds at this moment."""
+    with _opened(path, alone) as file:
+        kind = file.attrs.get("format")
+        if isinstance(kind, str) and kind == FIRST_FORMAT:
+            raise SceneError("it is of an older version of the library, whose checkpoints could hold programs", REMEDY, where)
+        if not isinstance(kind, str) or kind != FORMAT:
+            raise SceneError("it is no cache of this version", "give another name, or delete it", where)
+        return _whole(file, os.fstat(file.id.get_vfd_handle()).st_size)
 
 
 def _opened(path: Path, alone: bool) -> Any:
