@@ -73,6 +73,21 @@ def test_every_effect_goes_on(name, tmp_path):
     same(ri.simulate(entry.scene(), **settings, cache=cache), whole)
 
 
+@pytest.mark.parametrize("solver", ["substepped", "qp"])
+def test_runs_go_on_with_methods_and_functions_in_their_state(solver, tmp_path):
+    # Bodies that a joint keeps from colliding are asked for by a method of the world; the solver of rows is a function.
+    scene = pile()
+    for k, name in enumerate(("left", "right")):
+        scene.add(ri.Body(name, ri.Shape.box((0.2, 0.2, 0.2)), position=(3 + 0.2 * k, 0, 0.1)))
+    scene.add(ri.BallJoint("left", "right", (3.1, 0, 0.1)))
+    accuracy = ri.Accuracy(contact_solver=solver)
+    whole = ri.simulate(scene, 0.1, accuracy=accuracy)
+    cache = ri.Cache(tmp_path / "run.h5", every=0.0)
+    with pytest.raises(Stopped):
+        ri.simulate(scene, 0.1, accuracy=accuracy, cache=cache, progress=stop_after(0.05))
+    same(ri.simulate(scene, 0.1, accuracy=accuracy, cache=cache), whole)
+
+
 def test_a_finished_cache_is_read_and_not_run_again(tmp_path):
     cache = tmp_path / "run.h5"
     first = ri.simulate(pile(), 0.5, cache=cache)

@@ -32,7 +32,7 @@ FUNCTIONS = {
     "solver of rows": ("dynamics.solvers.qp", "solve_qp"),
 }
 """Functions that a state may hold: modules and names."""
-METHODS = {("model.plan.Plan", "clock")}
+METHODS = {("model.plan.Plan", "clock"), ("model.world.World", "may_collide")}
 """Classes and names of the methods that a state may hold, bound to an object of just that class."""
 MADE_AGAIN = ("engine.exact.compiled_loop.CompiledLoop", "collision.distance.fcl.Narrowphase")
 """Classes of the homes whose objects hold addresses or trees of other libraries: a run that goes on has made its own."""
