@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import glob
 import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigidimpulse.core.errors import SceneError
+
+try:
+    import fcntl
+except ImportError:  # no POSIX
+    fcntl = None
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -23,6 +29,38 @@ def write_renamed(path: Path, write: Callable[[Path], object]) -> Path:
     finally:
         temporary.unlink(missing_ok=True)
     return path
+
+
+def remove_left_over(path: Path) -> None:
+    """Remove the temporary files that processes which are gone have left beside the target of `write_renamed`."""
+    if fcntl is None:  # elsewhere asking for a process may end it
+        return
+    for left in path.parent.glob(f".{glob.escape(path.stem)}.*{glob.escape(path.suffix)}"):
+        process = left.name.removeprefix(f".{path.stem}.").removesuffix(path.suffix)
+        if process.isascii() and process.isdigit() and not _is_alive(int(process)) and not _is_locked(left):
+            left.unlink(missing_ok=True)
+
+
+def _is_alive(process: int) -> bool:
+    """Whether there is a process of this number."""
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass
+    return True
+
+
+def _is_locked(path: Path) -> bool:
+    """Whether a process holds the file, as one on another machine with the same disk may."""
+    assert fcntl is not None
+    try:
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    return False
 
 
 def load_mesh(path: Path, where: str) -> Trimesh:

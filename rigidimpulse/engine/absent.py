@@ -143,6 +143,8 @@ class NoFlight:
 class NoTriggers:
     """A run without triggers."""
 
+    narrowphase = None
+
     def look(self, _begin: float, _end: float) -> None:
         """Nobody looks."""
 

@@ -226,7 +226,9 @@ class Flight(Protocol):
 
 
 class Observer(Protocol):
-    """The triggers of a run: `Triggers`, or `NoTriggers`."""
+    """The triggers of a run: `Triggers`, or `NoTriggers`. narrowphase: what they ask, which no step changes."""
+
+    narrowphase: Any
 
     def look(self, begin: float, end: float, /) -> None:
         """Look at what happened in the step from `begin` to `end` [s]."""

@@ -88,7 +88,12 @@ class _Watched:
 
 
 class Triggers:
-    """All triggers of a run."""
+    """All triggers of a run.
+
+    Attributes:
+        narrowphase: of the shapes of bodies and triggers.
+
+    """
 
     def __init__(self, run: Run, triggers: list[Trigger]) -> None:
         """Check the triggers and look at who is inside at the start."""
@@ -97,7 +102,7 @@ class Triggers:
         for trigger in triggers:
             trigger.check(world.names)
         compiled = [compile_shape(trigger.shape, np.zeros(3), np.eye(3)) for trigger in triggers]
-        self._narrowphase = Narrowphase([*world.shapes, *compiled])
+        self.narrowphase = Narrowphase([*world.shapes, *compiled])
         self._thickness = np.array([_thickness(body.shape) for body in world.scene.bodies])
         moves = world.dynamic | world.moving
         self._watched = []
@@ -176,7 +181,7 @@ class Triggers:
 
     def _overlaps(self, watched: _Watched, i: int, time: float) -> bool:
         shape = int(self._run.world.shape_of_body[i])
-        return bool(self._narrowphase.overlap(watched.shape, self._pose(watched, time), shape, self._body(i, time)))
+        return bool(self.narrowphase.overlap(watched.shape, self._pose(watched, time), shape, self._body(i, time)))
 
     def _speed(self, i: int, low: float, high: float, reach: float | None = None) -> float:
         """Bound of the speed of any point of a body on its trajectory, m/s."""

@@ -103,7 +103,7 @@ def load_tosses() -> tuple[Toss, ...]:
         SceneError: the file is missing.
 
     """
-    with np.load(asset_path("cube_tosses.npz", "tosses")) as data:
+    with np.load(asset_path("cube_tosses.npz", "tosses"), allow_pickle=False) as data:
         state, start, numbers = np.asarray(data["state"], dtype=np.float64), data["start"], data["ids"]
     return tuple(
         Toss(int(number), state[a:b, :3], state[a:b, 3:7])

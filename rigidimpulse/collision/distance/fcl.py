@@ -95,10 +95,6 @@ class Narrowphase:
         self._solids: dict[int, _Solid] = {}
         self._request = fcl.DistanceRequest(enable_nearest_points=True)
 
-    def __reduce__(self) -> tuple[type[Narrowphase], tuple[list[CompiledShape], Geometry]]:
-        """What to make it of again: trees of fcl have no bytes."""
-        return Narrowphase, (self.shapes, self.geometry)
-
     def separation(self, a: int, pose_a: Pose, b: int, pose_b: Pose) -> Separation:
         """Return gap, closest points and normal of shapes a and b.
 

@@ -14,7 +14,6 @@ from rigidimpulse.core.kernel_cache import is_kept, note_beside
 from rigidimpulse.core.memory import rows_of
 from rigidimpulse.core.record import Record
 from rigidimpulse.dynamics.impact.restitution import LAWS
-from rigidimpulse.engine.absent import NoCompiledLoop
 from rigidimpulse.engine.exact.contact_forces import NOT_SOLVED_REMEDY
 from rigidimpulse.engine.exact.event_loop import (
     ASKED,
@@ -124,10 +123,6 @@ class CompiledLoop:
                 run.column, state.sub_step, run.substepped.solve_count, run.impact_log, self._cycles, self._calls,
             )
         )  # fmt: skip
-
-    def __reduce__(self) -> tuple[type, tuple]:
-        """Nothing of it is kept in a checkpoint: addresses mean nothing to another process."""
-        return NoCompiledLoop, ()
 
     def is_compiled(self) -> bool:
         """Whether the kernel is in the cache for records of this layout."""

@@ -17,10 +17,17 @@ import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.version import VERSION
+from rigidimpulse.engine.absent import NoCompiledLoop
 from rigidimpulse.engine.begin import bind_compiled_loop
 from rigidimpulse.engine.fingerprint import fingerprint
-from rigidimpulse.io.cache.file import FRAMES, SUFFIXES, CacheFile, Content, Header, read
-from rigidimpulse.io.cache.freeze import Constants, freeze, thaw
+from rigidimpulse.io.cache.arrays import Damaged
+from rigidimpulse.io.cache.constants import Constants
+from rigidimpulse.io.cache.decode import REMEDY, thaw
+from rigidimpulse.io.cache.encode import freeze
+from rigidimpulse.io.cache.file import CacheFile
+from rigidimpulse.io.cache.layout import FRAMES, SUFFIXES, Content, Header
+from rigidimpulse.io.cache.likeness import check_alike
+from rigidimpulse.io.cache.read import read
 from rigidimpulse.recording.cache import Cache
 from rigidimpulse.recording.recorder import sample_paths
 from rigidimpulse.recording.recording import Recording, RunSettings
@@ -74,7 +81,7 @@ class Checkpointer:
         if not self._path.exists():
             return None
         known, content = read(self._path, alone=True)
-        if known.fingerprint != header.fingerprint:
+        if (known.fingerprint, known.names) != (header.fingerprint, header.names) or not np.array_equal(known.times, header.times):
             raise SceneError(_difference(known, header), "delete it, or give another name", f"cache {str(self._path)!r}")
         return content
 
@@ -85,7 +92,15 @@ class Checkpointer:
             getattr(recorder, name)[: len(frames)] = frames
         log.buffers = log.buffers._replace(impacts=np.concatenate([stored.impacts, log.buffers.impacts]))
         self._frames, self._impacts = len(stored.frames["position"]), len(stored.impacts)
-        known = thaw(stored.state or b"", _constants(run))
+        try:
+            constants = _constants(run)
+            known = thaw(stored.state or b"", constants)
+            check_alike(known, run, constants)
+        except SceneError as error:
+            raise error.within(f"cache {str(self._path)!r}") from None
+        except Damaged as error:
+            raise SceneError(f"the checkpoint is none of this run: {error}", REMEDY, f"cache {str(self._path)!r}") from None
+        known.compiled = NoCompiledLoop()  # that of the other process is gone with its memory
         bind_compiled_loop(known)
         return known
 
@@ -146,7 +161,9 @@ def _constants(run: Run) -> Constants:
     """Return the parts of a run that its checkpoints do not hold."""
     world, recorder = run.world, run.recorder
     own = [run.plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), run.log.buffers.impacts]
-    return Constants([world.scene, world.scene.bodies, world.scene.effects, world.shapes, world.geometry, *own])
+    made_again = [run.compiled, run.triggers.narrowphase]
+    roots = [world.scene, world.scene.bodies, world.scene.effects, world.shapes, world.geometry, world.accuracy, *own, *made_again]
+    return Constants(roots)
 
 
 def _difference(known: Header, header: Header) -> str:

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.dynamics.soft_body.track import tracks_in
-from rigidimpulse.io.cache.file import Content, Header, read
+from rigidimpulse.io.cache.layout import Content, Header
+from rigidimpulse.io.cache.read import REMEDY, read
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.events import impact_table
 from rigidimpulse.recording.recording import Recording
@@ -36,14 +38,17 @@ def load_cache(path: Path) -> Recording:
         centers=frames["position"],
         impacts=impacts[impacts["time"] <= header.duration],
         contacts=content.tables.get("contacts", np.zeros(0, CONTACT_DTYPE)),
-        status=_status(header, content),
+        status=_status(path, header, content),
         soft_bodies=tracks_in(content.tables),
     )
 
 
-def _status(header: Header, content: Content) -> Status:
+def _status(path: Path, header: Header, content: Content) -> Status:
     """That of the finished run; of another, how far it is."""
     if content.complete:
-        return restored(content.tables["status"]) if "status" in content.tables else Status(True, "loaded")
+        try:
+            return restored(content.tables["status"])
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            raise SceneError(f"its status cannot be read: {error}", REMEDY, f"cache {str(path)!r}") from None
     so_far = f"{content.time:.6g} s of {header.duration:g} s: the run was stopped, or still goes on"
     return Status(False, f"{so_far}; simulate the scene with this cache again to go on from there")

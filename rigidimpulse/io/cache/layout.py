@@ -1,0 +1,113 @@
+"""What lies where in the HDF5 file of a run, and the checks that tell damage from content.
+
+    attributes      format, fingerprint, version, duration [s], fps, complete, seal: `seal_of` what does not change while the run goes on
+    names           of the bodies, a list in JSON
+    times           (f,) s, of all frames of the run
+    body            offset (n, 3) m and turn (n, 4): centre of mass and principal axes in body frames
+    frames          position (f, n, 3) m of centres of mass, orientation (f, n, 4) wxyz of principal axes, velocity and
+                    angular_velocity (f, n, 3)
+    impacts         (m, 15), columns as in `recording.events.IMPACT_DTYPE`
+    checks          frames (f,) and impacts (m,): `check_words` of each row
+    checkpoint      two slots of bytes, and commits (2,): number, time, frames, impacts, size, length (unpacked) and digest of each
+    tables          of a finished run: contacts, status (JSON), and vertices and faces of flexible bodies
+
+Names are no attribute, because attributes hold 64 kB. Seal, checks and digests find damage. They are no signature: who forges a cache makes
+them, too.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.recording.events import ROW_LENGTH
+
+FORMAT = "rigidimpulse cache 2"
+FIRST_FORMAT = "rigidimpulse cache 1"
+"""The format whose checkpoints are pickles."""
+SUFFIXES = (".h5", ".hdf5")
+FRAMES = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3}
+COMMIT = np.dtype([
+    ("number", "<u8"), ("time", "<f8"), ("frames", "<u8"), ("impacts", "<u8"), ("size", "<u8"), ("length", "<u8"), ("digest", "S64"),
+])  # fmt: skip
+CHECK = np.dtype("<u8")
+_ODD = 0x9E3779B97F4A7C15
+
+
+def library() -> Any:
+    """The module h5py.
+
+    Raises:
+        SceneError: it is not installed.
+
+    """
+    try:
+        import h5py
+    except ImportError:
+        raise SceneError("a cache needs the library h5py", "pip install rigidimpulse[cache]") from None
+    return h5py
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a file says of its run: fingerprint, version, duration [s], fps, names (n,), frame times (f,) s, frames of the bodies."""
+
+    fingerprint: str
+    version: str
+    duration: float
+    fps: float
+    names: list[str]
+    times: np.ndarray
+    offset: np.ndarray
+    turn: np.ndarray
+
+
+class Content(NamedTuple):
+    """What a file holds: frames by name (k, n, ...), impacts (m, 15), until when they go [s], the state there, whether that is all.
+
+    tables: what only a finished run has, by name.
+    """
+
+    frames: dict[str, np.ndarray]
+    impacts: np.ndarray
+    time: float
+    state: bytes | None
+    complete: bool
+    tables: dict[str, Any]
+
+
+def empty(n: int) -> Content:
+    """Return the content of a run of n bodies before its first checkpoint."""
+    return Content({name: np.zeros((0, n, width)) for name, width in FRAMES.items()}, np.zeros((0, ROW_LENGTH)), 0.0, None, False, {})
+
+
+def check_words(*tables: np.ndarray) -> np.ndarray:
+    """Return a number (k,) for each row of tables (k, ...) of doubles, which is another one if a single double of the row is."""
+    total = np.zeros(len(tables[0]), CHECK)
+    for rows in tables:
+        width = prod(rows.shape[1:])
+        factors = np.arange(1, 2 * width, 2, dtype=CHECK) * CHECK.type(_ODD)
+        total = total * CHECK.type(3) + np.ascontiguousarray(rows).reshape(len(rows), width).view(CHECK) @ factors
+    return total
+
+
+def digest_of(commit: np.void | np.ndarray, data: bytes) -> bytes:
+    """Return the digest of a commit and the bytes of its slot."""
+    told = [commit[name].tobytes() for name in COMMIT.names or () if name != "digest"]
+    return hashlib.sha256(b"".join([*told, data])).hexdigest().encode()
+
+
+def seal_of(header: Header, complete: bool, tables: Mapping[str, Any]) -> str:
+    """Return a hash of what a file says of its run, and of what only a finished run has."""
+    told = [header.fingerprint, header.version, header.duration, header.fps, header.names, complete, sorted(tables)]
+    digest = hashlib.sha256(json.dumps(told).encode())
+    for table in (header.times, header.offset, header.turn, *(tables[name] for name in sorted(tables))):
+        digest.update(np.ascontiguousarray(table).tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,231 @@
+"""The HDF5 file of a run, read. It may come from anywhere: every table is checked for its type, its shape and its bytes before it is used.
+
+Only tables whose bytes lie in the file in one piece are read: no links to other files, no tables put together from others, no filters.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.io.cache.arrays import Damaged
+from rigidimpulse.io.cache.layout import (
+    CHECK,
+    COMMIT,
+    FIRST_FORMAT,
+    FORMAT,
+    FRAMES,
+    Content,
+    Header,
+    check_words,
+    digest_of,
+    empty,
+    library,
+    seal_of,
+)
+from rigidimpulse.recording.contacts import CONTACT_DTYPE
+from rigidimpulse.recording.events import ROW_LENGTH
+
+REMEDY = "delete it, and run again"
+LONGEST_TEXT = 1000
+TRIES = 3
+"""A run that goes on may write both checkpoints while one of them is read."""
+MOST_UNPACKED, LEAST_UNPACKED = 1032, 64
+"""zlib packs no more bytes than this into one, and into an empty block."""
+
+
+def read(path: Path, alone: bool = False) -> tuple[Header, Content]:
+    """Return what the file holds as of its last commit; alone: refuse a file that somebody writes to.
+
+    Raises:
+        SceneError: no such file, no cache, one that is damaged, or one that is written to.
+
+    """
+    where = f"cache {str(path)!r}"
+    if not path.is_file():
+        raise SceneError("there is no such file", "check the path", where)
+    try:
+        for _ in range(TRIES - 1):
+            with suppress(Damaged):
+                return _read(path, alone, where)
+        return _read(path, alone, where)
+    except BlockingIOError:
+        raise SceneError("another run writes to it", "wait until that ends, or give another name", where) from None
+    except SceneError:
+        raise
+    except Exception as error:  # h5py raises anything on damaged files
+        raise SceneError(f"it cannot be read: {str(error) or type(error).__name__}", REMEDY, where) from None
+
+
+def _read(path: Path, alone: bool, where: str) -> tuple[Header, Content]:
+    """What the file holds at this moment."""
+    with _opened(path, alone) as file:
+        kind = file.attrs.get("format")
+        if isinstance(kind, str) and kind == FIRST_FORMAT:
+            raise SceneError("it is of an older version of the library, whose checkpoints could hold programs", REMEDY, where)
+        if not isinstance(kind, str) or kind != FORMAT:
+            raise SceneError("it is no cache of this version", "give another name, or delete it", where)
+        return _whole(file, os.fstat(file.id.get_vfd_handle()).st_size)
+
+
+def _opened(path: Path, alone: bool) -> Any:
+    """The file, open for reading."""
+    h5py = library()
+    try:
+        return h5py.File(path, "r")
+    except BlockingIOError:
+        if alone:
+            raise
+        return h5py.File(path, "r", locking=False)
+
+
+def _whole(file: Any, size: int) -> tuple[Header, Content]:
+    """What a file of `size` bytes holds."""
+    reader = _Reader(file, size)
+    header, complete = reader.header(), bool(reader.attribute("complete", np.bool_))
+    tables = reader.tables(len(header.names)) if complete else {}
+    if seal_of(header, complete, tables) != reader.text("seal"):
+        raise Damaged("what it says of its run has been changed")
+    content = reader.content(header, complete)
+    return header, content._replace(tables={name: _plain(table) for name, table in tables.items()})
+
+
+def _plain(table: Any) -> Any:
+    return table.decode() if isinstance(table, bytes) else table
+
+
+class _Reader:
+    """An open file of `size` bytes."""
+
+    def __init__(self, file: Any, size: int) -> None:
+        self._file, self._size = file, size
+
+    def attribute(self, name: str, kind: type) -> Any:
+        """An attribute of just this type."""
+        value = self._file.attrs[name]
+        if not isinstance(value, kind):
+            raise Damaged(f"its {name} is a {type(value).__name__}")
+        return value
+
+    def text(self, name: str) -> str:
+        """A short text among the attributes."""
+        text = self.attribute(name, str)
+        if len(text) > LONGEST_TEXT:
+            raise Damaged(f"its {name} has {len(text)} characters")
+        return text
+
+    def number(self, name: str) -> float:
+        """A number > 0 among the attributes."""
+        value = float(self.attribute(name, np.floating))
+        if not 0.0 < value < np.inf:
+            raise Damaged(f"its {name} is {value}")
+        return value
+
+    def table(self, name: str, dtype: Any, shape: tuple[int | None, ...]) -> Any:
+        """A table whose bytes lie in the file, of this type and shape; None: any length. dtype None: a text."""
+        h5py = library()
+        parts = name.split("/")
+        for end in range(1, len(parts) + 1):
+            if not isinstance(self._file.get("/".join(parts[:end]), getlink=True), h5py.HardLink):
+                raise Damaged(f"there is no table {name} in it")
+        table = self._file[name]
+        if not isinstance(table, h5py.Dataset) or table.shape is None or table.is_virtual or table.external or table.chunks is not None:
+            raise Damaged(f"{name} is no table in one piece")
+        if (table.dtype.kind != "S") if dtype is None else (table.dtype != dtype):
+            raise Damaged(f"{name} holds numbers of type {table.dtype}")
+        if len(table.shape) != len(shape) or any(want not in (None, have) for want, have in zip(shape, table.shape, strict=True)):
+            raise Damaged(f"{name} is of shape {table.shape}")
+        size, offset = table.id.get_storage_size(), table.id.get_offset() or 0
+        if size != table.nbytes or offset + size > self._size:
+            raise Damaged(f"{name} has {table.nbytes} bytes, in the file are {min(size, max(self._size - offset, 0))}")
+        return table
+
+    def header(self) -> Header:
+        """What the file says of its run."""
+        names = json.loads(bytes(self.table("names", None, ())[()]))
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise Damaged("its names are none")
+        times = self.table("times", np.float64, (None,))[()]
+        if not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0) or np.any(times < 0.0):
+            raise Damaged("its times are none that follow each other")
+        offset, turn = (self.table(f"body/{name}", np.float64, (len(names), width))[()] for name, width in (("offset", 3), ("turn", 4)))
+        if not np.all(np.isfinite(offset)) or not np.all(np.isfinite(turn)):
+            raise Damaged("the frames of its bodies are no finite numbers")
+        known = self.text("fingerprint"), self.text("version"), self.number("duration"), self.number("fps")
+        return Header(*known, names, times, offset, turn)
+
+    def content(self, header: Header, complete: bool) -> Content:
+        """What the last commit counts that agrees with its digest."""
+        commits = self.table("checkpoint/commits", COMMIT, (2,))[()]
+        for slot in np.argsort(commits["number"])[::-1].tolist():
+            state = self._state(slot, commits[slot])
+            if state is None:
+                continue
+            time, counts = float(commits["time"][slot]), {name: int(commits[name][slot]) for name in ("frames", "impacts")}
+            if not 0.0 <= time < np.inf:
+                raise Damaged(f"its last checkpoint is at {time} s")
+            frames = {
+                name: self._rows(f"frames/{name}", (len(header.times), len(header.names), width), counts["frames"])
+                for name, width in FRAMES.items()
+            }
+            self._check("frames", *frames.values())
+            impacts = self._rows("impacts", (None, ROW_LENGTH), counts["impacts"])
+            self._check("impacts", impacts)
+            bodies = impacts[:, 1:3]
+            if not np.all((bodies >= 0.0) & (bodies < len(header.names))):
+                raise Damaged("its impacts are of bodies that it does not have")
+            return Content(frames, impacts, time, state, complete, {})
+        if complete or np.all(commits["number"] > 0):
+            raise Damaged("no checkpoint agrees with its digest")
+        return empty(len(header.names))
+
+    def _state(self, slot: int, commit: np.void) -> bytes | None:
+        """The state in a slot, None where it does not agree with its commit."""
+        stored = self.table(f"checkpoint/{slot}", np.uint8, (None,))
+        size, length = int(commit["size"]), int(commit["length"])
+        if commit["number"] == 0 or size > len(stored):
+            return None
+        data = stored[:size].tobytes()
+        if digest_of(commit, data) != commit["digest"]:
+            return None
+        if length > MOST_UNPACKED * size + LEAST_UNPACKED:
+            raise Damaged(f"a state of {length} bytes in {size}")
+        unpacked = zlib.decompressobj().decompress(data, length + 1)
+        if len(unpacked) != length:
+            raise Damaged(f"a state of another length than {length} bytes")
+        return unpacked
+
+    def _rows(self, name: str, shape: tuple[int | None, ...], count: int) -> np.ndarray:
+        """The first rows of a table of numbers."""
+        table = self.table(name, np.float64, shape)
+        if count > len(table):
+            raise Damaged(f"{name} has {len(table)} rows, and counts {count}")
+        return table[:count]
+
+    def _check(self, name: str, *tables: np.ndarray) -> None:
+        """Compare rows with what was noted of them when they were written."""
+        noted = self.table(f"checks/{name}", CHECK, (None,))
+        if not np.array_equal(noted[: len(tables[0])], check_words(*tables)):
+            raise Damaged(f"its {name} have been changed")
+
+    def tables(self, n: int) -> dict[str, Any]:
+        """What only a finished run of n bodies has, as it is stored."""
+        known: dict[str, Any] = {"status": self.table("tables/status", None, ())[()]}
+        known["contacts"] = self.table("tables/contacts", CONTACT_DTYPE, (None,))[()]
+        for name in ("body_a", "body_b"):
+            if not np.all((known["contacts"][name] >= 0) & (known["contacts"][name] < n)):
+                raise Damaged("its contacts are of bodies that it does not have")
+        while (name := f"soft_body{len(known) // 3}") + "_name" in self._file["tables"]:
+            known[f"{name}_name"] = self.table(f"tables/{name}_name", None, ())[()]
+            vertices = known[f"{name}_vertices"] = self.table(f"tables/{name}_vertices", np.float64, (None, None, 3))[()]
+            faces = known[f"{name}_faces"] = self.table(f"tables/{name}_faces", np.int64, (None, 3))[()]
+            if not np.all((faces >= 0) & (faces < vertices.shape[1])):
+                raise Damaged("its flexible bodies have faces without corners")
+        return known
