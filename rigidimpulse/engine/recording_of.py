@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidimpulse.engine.exact.joints import reaction_table
+from rigidimpulse.engine.measure.measure import record_of, report_measured
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.step import react
@@ -84,6 +85,8 @@ def make_recording(run: Run, duration: float) -> Recording:
     )
     run.soft_bodies.add_to(ledger)
     contacts = run.contact_log.table()
+    measured = record_of(world, recorder.frames._replace(times=times), ledger, impulses_by_cause(run, times, impacts, work))
+    report_measured(measured, run.log)
     return Recording(
         times=times,
         names=list(world.names),

@@ -1,0 +1,100 @@
+r"""Energy that a run made of nothing.
+
+    E(t) = K(t) + V(t) + sum of D_c(t)    over the causes c that may give energy
+
+must not rise. K and V are the kinetic and potential energy of the frames, D_c what a cause took until then (see `recording.ledger`).
+Causes that can only take energy are left out of the sum: what they gave is what is looked for. Which these are follows from the scene:
+
+    impact                           takes, unless a restitution is above 1
+    contact, energy correction       take, unless supports move or joints store energy: the ledger has their work in one sum with friction
+    stick, sub-stepping              take, unless supports move
+    joints                           take, unless supports move, or a row is soft or driven: springs and motors
+
+All others are added: forces by their names, "position correction", "overlap" and "let go", which move bodies without a force, and "mass
+that left". Where supports move everything is added, and E is constant as far as the ledger is complete. Then only energy that the ledger has
+under no cause is found. So it is for flexible bodies, which check their own energy.
+
+The rise is that of E over its least value so far. It is compared with the energy that moves,
+
+    rise <= RISE S,    S = max K + (max V - min V) + sum of (max D_c - min D_c) over the causes that are added
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.engine.measure.record import Fault, RunRecord
+from rigidimpulse.model.world import World
+from rigidimpulse.recording.ledger import Masses, mechanics
+
+KIND = "energy made"
+RISE: float = 1e-3
+"""Rise of the energy that no cause accounts for, of the energy that moves, from which a run is not ok."""
+MOST_NAMES: int = 3
+"""Bodies that a message names at most."""
+MOST_OF_RISE: float = 0.1
+"""Part of what the body gained that gained most, from which another is named beside it."""
+REMEDY = "use a smaller step, or contact_solver='newton' where islands are sub-stepped"
+
+
+def taking_causes(world: World) -> frozenset[str]:
+    """Causes that can only take energy in this scene."""
+    if np.any(world.moving):
+        return frozenset()
+    takes = {"stick", "sub-stepping"}
+    if not np.any(world.coefficients[:, :, 0] > 1.0):
+        takes.add("impact")
+    if not _joints_give(world):
+        takes |= {"joints", "contact", "energy correction"}
+    return frozenset(takes)
+
+
+def _joints_give(world: World) -> bool:
+    """Whether a joint has a spring or a motor."""
+    if not world.joints_of_scene:
+        return False
+    table = world.joints
+    return bool(np.any(np.isfinite(table.stiffness) & (table.stiffness > 0.0)) or np.any(table.rate != 0.0))
+
+
+def energy_balance(record: RunRecord) -> tuple[np.ndarray, float]:
+    """E (f,) J, and S, J; see the head of the module."""
+    ledger, takes = record.ledger, taking_causes(record.world)
+    total = ledger.total.copy()
+    moved = float(ledger.kinetic.max() + np.ptp(ledger.potential))
+    for cause, taken in ledger.dissipated.items():
+        if cause not in takes:
+            total += taken
+            moved += float(np.ptp(taken))
+    return total, moved
+
+
+def energy_rise(record: RunRecord) -> tuple[np.ndarray, float]:
+    """Rise of E over its least value so far (f,) J, and S, J."""
+    total, moved = energy_balance(record)
+    return total - np.minimum.accumulate(total), moved
+
+
+def energy_faults(record: RunRecord) -> list[Fault]:
+    """The fault of a run that made energy, with the time at which the rise came to its bound, and the bodies that gained in that frame."""
+    rise, moved = energy_rise(record)
+    if not np.isfinite(moved) or not np.any(rise > RISE * moved):
+        return []
+    first = int(np.argmax(rise > RISE * moved))
+    time, amount = float(record.frames.times[first]), float(rise.max())
+    text = f"{amount:.3g} J came from nothing until {record.frames.times[int(np.argmax(rise))]:.6g} s"
+    return [
+        Fault(time, KIND, _gainers(record, first), amount, f"{text}, {amount / moved:.1%} of the energy that moves; {REMEDY}")
+    ]
+
+
+def _gainers(record: RunRecord, frame: int) -> tuple[str, ...]:
+    """Names of the bodies whose energy rose most from the frame before to this one."""
+    frames, world = record.frames, record.world
+    here = slice(frame - 1, frame + 1)
+    mass = np.where(world.dynamic & (frames.times[here, None] >= record.release), world.mass, 0.0)
+    parts = type(frames)(*(part[here] for part in frames))
+    kinetic, potential, _, _ = mechanics(parts, Masses(mass, world.inertia, world.steady_acceleration), np.ones((1, 1)))
+    gain = np.diff(kinetic + potential, axis=0)[0]
+    order = np.argsort(-gain, kind="stable")[:MOST_NAMES]
+    return tuple(world.names[i] for i in order if gain[i] > 0.0 and gain[i] >= MOST_OF_RISE * gain[order[0]])

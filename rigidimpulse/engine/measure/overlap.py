@@ -1,0 +1,186 @@
+r"""Overlap at recorded frames, found by other means than those of the engine.
+
+Frames are chosen evenly. In each, pairs of bodies are candidates whose boxes along the axes of the world overlap; not those of which neither
+body is dynamic then, those that a joint or a collision filter keeps apart, and those that stand as they did in the frame chosen before. The
+depth of a candidate is a lower bound, see `depth`. A pair is in order if
+
+    depth <= EXACT s        exact contacts
+    depth <= SUB_STEPPED s  in a run with sub-stepped islands
+    s: size of the smaller body
+
+Pairs that are deeper at the start are not looked at until they are in order for the first time: such an overlap is reported where the run
+starts. Bodies of the penalty method are inside each other by design, so there nothing is looked at.
+
+The cost follows counts, never the clock, so a run gives the same result on every machine: FRAMES frames at most, and so many candidates that
+the products of their probes and faces add up to WORK for each body and frame that was recorded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE
+from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, depth_in, probe_of, solid_of
+from rigidimpulse.engine.measure.record import Fault, RunRecord
+from rigidimpulse.model.world import World
+
+KIND = "bodies inside each other"
+EXACT: float = 1e-3
+"""Depth, of the size of the smaller body, from which a run is not ok: nobody sees less."""
+SUB_STEPPED: float = 2e-2
+"""The same of runs with sub-stepped islands, whose contacts are soft."""
+FRAMES: int = 24
+"""Frames that are looked at, at most."""
+AT_ONCE: int = 2_000_000
+"""Products of probes and faces that are computed at once."""
+REMEDY = "use a smaller step"
+
+
+@dataclass(frozen=True, eq=False)
+class Depths:
+    """Depths of c candidates, those of a pair in order of time."""
+
+    frame: np.ndarray  # (c,)
+    a: np.ndarray  # (c,)
+    b: np.ndarray  # (c,)
+    depth: np.ndarray  # (c,) m
+    size: np.ndarray  # (c,) m, of the smaller body
+
+
+def overlap_faults(record: RunRecord) -> list[Fault]:
+    """A fault for each pair that was too deep inside each other, with the frame at which it was deepest."""
+    found, names = overlap_depths(record), record.world.names
+    bound = SUB_STEPPED if record.may_be_sub_stepped else EXACT
+    deep = found.depth > bound * found.size
+    faults = []
+    for pair in np.unique(np.column_stack([found.a, found.b])[deep], axis=0).tolist():
+        mine = np.flatnonzero((found.a == pair[0]) & (found.b == pair[1]))
+        if deep[mine[0]] and found.frame[mine[0]] == 0:
+            # Deep where the run starts: from the first frame on in which it is in order.
+            mine = mine[np.logical_or.accumulate(~deep[mine])]
+        if not np.any(deep[mine]):
+            continue
+        worst = mine[int(np.argmax(found.depth[mine]))]
+        depth, time = float(found.depth[worst]), float(record.frames.times[found.frame[worst]])
+        share = depth / float(found.size[worst])
+        text = f"the bodies are inside each other by {depth:.3g} m, {share:.2g} of the size of the smaller"
+        faults.append(Fault(time, KIND, (names[pair[0]], names[pair[1]]), depth, f"{text}; {REMEDY}"))
+    return faults
+
+
+def overlap_depths(record: RunRecord) -> Depths:
+    """Depths of all candidates, see the head of the module."""
+    world = record.world
+    frame, a, b = _candidates(record)
+    size, depth = np.minimum(world.size[a], world.size[b]), np.zeros(len(a))
+    if not len(a):
+        return Depths(frame, a, b, depth, size)
+    shapes = _Shapes(world)
+    kinds, number = np.unique(np.column_stack([world.shape_of_body[a], world.shape_of_body[b]]), axis=0, return_inverse=True)
+    order = np.argsort(number, kind="stable")
+    for (shape_a, shape_b), those in zip(kinds.tolist(), np.split(order, np.flatnonzero(np.diff(number[order])) + 1), strict=True):
+        for mine, other, shapes_of in ((a, b, (shape_a, shape_b)), (b, a, (shape_b, shape_a))):
+            probe, solid = shapes.probe(shapes_of[0]), shapes.solid(shapes_of[1])
+            if not _work(probe, solid):
+                continue
+            length = max(AT_ONCE // _work(probe, solid), 1)
+            for first in range(0, len(those), length):
+                some = those[first : first + length]
+                posed = _posed(record, frame[some], mine[some], other[some])
+                depth[some] = np.maximum(depth[some], depth_in(solid, probe, posed))
+    return Depths(frame, a, b, depth, size)
+
+
+class _Shapes:
+    """Probes and solids of shapes, made when they are first asked for."""
+
+    def __init__(self, world: World) -> None:
+        self._shapes = world.shapes
+        self._probes: dict[int, Probe] = {}
+        self._solids: dict[int, Solid] = {}
+
+    def probe(self, shape: int) -> Probe:
+        if shape not in self._probes:
+            self._probes[shape] = probe_of(self._shapes[shape])
+        return self._probes[shape]
+
+    def solid(self, shape: int) -> Solid:
+        if shape not in self._solids:
+            self._solids[shape] = solid_of(self._shapes[shape])
+        return self._solids[shape]
+
+
+def _work(probe: Probe, solid: Solid) -> int:
+    """Products of probes and faces of a candidate."""
+    faces = sum(map(len, solid.convex)) + len(solid.rounded) + len(solid.cylinders) + len(solid.surface)
+    return (len(probe.radii) + 2 * len(probe.edges)) * faces
+
+
+def _posed(record: RunRecord, frame: np.ndarray, mine: np.ndarray, other: np.ndarray) -> Posed:
+    """Poses of bodies `mine` (c,) in the frames of bodies `other` (c,)."""
+    position, orientation = record.frames.position, record.frames.orientation
+    rotation, into = to_matrix(orientation[frame, mine]), to_matrix(orientation[frame, other])
+    apart = position[frame, mine] - position[frame, other]
+    return Posed(np.einsum("cji,cjk->cik", into, rotation), np.einsum("cji,cj->ci", into, apart))
+
+
+def _candidates(record: RunRecord) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frames, bodies a and bodies b > a (c,) of the candidates, frame by frame."""
+    frames, world = record.frames, record.world
+    out = [np.zeros((0, 3), np.int64)]
+    if not world.can_collide:
+        return tuple(out[0].T)
+    chosen = np.unique(np.linspace(0, len(frames.times) - 1, FRAMES).astype(int))
+    centre, half, flat = _boxes_of_bodies(world)
+    before = None
+    for f in chosen.tolist():
+        position, orientation = frames.position[f], frames.orientation[f]
+        still = np.zeros(world.num_bodies, bool)
+        if before is not None:
+            still = np.all(position == frames.position[before], axis=1) & np.all(orientation == frames.orientation[before], axis=1)
+        before = f
+        dynamic = world.dynamic & (frames.times[f] >= record.release)
+        rotation = to_matrix(orientation)
+        middle = position + np.einsum("nij,nj->ni", rotation, centre)
+        reach = np.einsum("nij,nj->ni", np.abs(rotation), half)
+        reach[flat] = np.inf
+        a, b = box_pairs(middle - reach, middle + reach)
+        kept = (dynamic[a] | dynamic[b]) & ~(still[a] & still[b]) & ~world.is_apart(a, b)
+        out.append(np.column_stack([np.full(np.count_nonzero(kept), f), a[kept], b[kept]]))
+    return tuple(np.concatenate(out).T)
+
+
+def _boxes_of_bodies(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Middles and half lengths (n, 3) m of boxes of bodies along their own axes, and which bodies (n,) have none."""
+    low, high = np.full((len(world.shapes), 3), np.inf), np.full((len(world.shapes), 3), -np.inf)
+    for s, shape in enumerate(world.shapes):
+        for primitive in shape.primitives:
+            points, radius = primitive.vertices, primitive.radius
+            if primitive.kind == CYLINDER:
+                points = primitive.frame[:3] + np.outer([-1.0, 1.0], primitive.frame[6] * primitive.frame[3:6])
+            if len(points):
+                low[s], high[s] = np.minimum(low[s], points.min(axis=0) - radius), np.maximum(high[s], points.max(axis=0) + radius)
+    endless = np.any(low > high, axis=1) | np.array([any(p.kind == HALF_SPACE for p in shape.primitives) for shape in world.shapes])
+    low[endless] = high[endless] = 0.0
+    of = world.shape_of_body
+    return 0.5 * (low + high)[of], 0.5 * (high - low)[of], endless[of]
+
+
+def box_pairs(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs a < b (k,) of boxes (n, 3) that overlap, found along the axis on which the lower ends are spread most."""
+    finite = low[np.isfinite(low[:, 0])]
+    axis = int(np.argmax(np.ptp(finite, axis=0))) if len(finite) else 0
+    order = np.argsort(low[:, axis], kind="stable")
+    last = np.searchsorted(low[order, axis], high[order, axis], side="right")
+    count = np.maximum(last - np.arange(len(order)) - 1, 0)
+    first = np.repeat(np.arange(len(order)), count)
+    second = first + 1 + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    i, j = order[first], order[second]
+    meets = np.all((low[i] <= high[j]) & (low[j] <= high[i]), axis=1)
+    i, j = i[meets], j[meets]
+    a, b = np.minimum(i, j), np.maximum(i, j)
+    order = np.lexsort((b, a))
+    return a[order], b[order]
