@@ -14,6 +14,8 @@ All others are added: forces by their names, "position correction", "overlap" an
 that left". Where supports move everything is added, and E is constant as far as the ledger is complete. Then only energy that the ledger has
 under no cause is found. So it is for flexible bodies, which check their own energy.
 
+Frame 0 is the state as given: what a cause takes at the time 0 counts from frame 1 on.
+
 The rise is that of E over its least value so far. It is compared with the energy that moves,
 
     rise <= RISE S,    S = max K + (max V - min V) + sum of (max D_c - min D_c) over the causes that are added
@@ -64,7 +66,7 @@ def energy_balance(record: RunRecord) -> tuple[np.ndarray, float]:
     moved = float(ledger.kinetic.max() + np.ptp(ledger.potential))
     for cause, taken in ledger.dissipated.items():
         if cause not in takes:
-            total += taken
+            total[1:] += taken[1:]
             moved += float(np.ptp(taken))
     return total, moved
 

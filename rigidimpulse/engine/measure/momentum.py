@@ -12,7 +12,7 @@ are constant; L where all bodies have the same a. They are compared with what mo
     |L(t) - L(0)| <= BOUND max over t of sum |x - X| |m (v - V)| + |I w|
 
 Contacts of sub-stepped islands are in no table: where there were any, all bodies without joints count as one set, with all that are not
-dynamic, so only bodies with joints are looked at.
+dynamic, so only bodies with joints are looked at. Kinematic impacts (`response="kinematic"`) do not keep momentum by design.
 """
 
 from __future__ import annotations
@@ -54,6 +54,8 @@ def free_sets(record: RunRecord) -> np.ndarray:
     root = roots(n, a[inside], b[inside])
     if record.may_be_sub_stepped:
         free &= record.jointed
+    if world.accuracy.response == "kinematic":
+        free[record.touched[inside].ravel()] = False
     held = np.zeros(n, bool)
     held[root[~free]] = True
     return np.where(held[root], -1, root)

@@ -9,10 +9,10 @@ depth of a candidate is a lower bound, see `depth`. A pair is in order if
     s: size of the smaller body
 
 Pairs that are deeper at the start are not looked at until they are in order for the first time: such an overlap is reported where the run
-starts. Bodies of the penalty method are inside each other by design, so there nothing is looked at.
+starts. Nothing is looked at where bodies are inside each other by the caller's choice: with `response="penalty"`, and with an `impact_time`
+that is late.
 
-The cost follows counts, never the clock, so a run gives the same result on every machine: FRAMES frames at most, and so many candidates that
-the products of their probes and faces add up to WORK for each body and frame that was recorded.
+The cost follows the numbers of bodies and of frames that are looked at, never the clock: a run gives the same result on every machine.
 """
 
 from __future__ import annotations
@@ -32,8 +32,12 @@ EXACT: float = 1e-3
 """Depth, of the size of the smaller body, from which a run is not ok: nobody sees less."""
 SUB_STEPPED: float = 2e-2
 """The same of runs with sub-stepped islands, whose contacts are soft."""
-FRAMES: int = 24
-"""Frames that are looked at, at most."""
+MOST_FRAMES: int = 24
+FEWEST_FRAMES: int = 6
+POSES: int = 1500
+"""Frames that are looked at: so many that frames times bodies are POSES, within these bounds."""
+LATE = ("linear", "after")
+"""Settings of `Accuracy.impact_time` by which impacts are found too late, or missed."""
 AT_ONCE: int = 2_000_000
 """Products of probes and faces that are computed at once."""
 REMEDY = "use a smaller step"
@@ -127,28 +131,31 @@ def _posed(record: RunRecord, frame: np.ndarray, mine: np.ndarray, other: np.nda
     return Posed(np.einsum("cji,cjk->cik", into, rotation), np.einsum("cji,cj->ci", into, apart))
 
 
+def frames_looked_at(world: World, number: int) -> np.ndarray:
+    """Which of `number` frames are looked at, the first and the last included."""
+    count = min(max(POSES // world.num_bodies, FEWEST_FRAMES), MOST_FRAMES)
+    return np.unique(np.linspace(0, number - 1, count).astype(int))
+
+
 def _candidates(record: RunRecord) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Frames, bodies a and bodies b > a (c,) of the candidates, frame by frame."""
     frames, world = record.frames, record.world
     out = [np.zeros((0, 3), np.int64)]
-    if not world.can_collide:
+    if not world.can_collide or world.accuracy.impact_time in LATE:
         return tuple(out[0].T)
-    chosen = np.unique(np.linspace(0, len(frames.times) - 1, FRAMES).astype(int))
-    centre, half, flat = _boxes_of_bodies(world)
-    before = None
-    for f in chosen.tolist():
-        position, orientation = frames.position[f], frames.orientation[f]
-        still = np.zeros(world.num_bodies, bool)
-        if before is not None:
-            still = np.all(position == frames.position[before], axis=1) & np.all(orientation == frames.orientation[before], axis=1)
-        before = f
-        dynamic = world.dynamic & (frames.times[f] >= record.release)
-        rotation = to_matrix(orientation)
-        middle = position + np.einsum("nij,nj->ni", rotation, centre)
-        reach = np.einsum("nij,nj->ni", np.abs(rotation), half)
-        reach[flat] = np.inf
-        a, b = box_pairs(middle - reach, middle + reach)
-        kept = (dynamic[a] | dynamic[b]) & ~(still[a] & still[b]) & ~world.is_apart(a, b)
+    chosen = frames_looked_at(world, len(frames.times))
+    position, orientation = frames.position[chosen], frames.orientation[chosen]
+    still = np.zeros(position.shape[:2], bool)
+    still[1:] = np.all(position[1:] == position[:-1], axis=2) & np.all(orientation[1:] == orientation[:-1], axis=2)
+    dynamic = world.dynamic & (frames.times[chosen, None] >= record.release)
+    centre, half, endless = _boxes_of_bodies(world)
+    rotation = to_matrix(orientation)
+    middle = position + np.einsum("fnij,nj->fni", rotation, centre)
+    reach = np.einsum("fnij,nj->fni", np.abs(rotation), half)
+    reach[:, endless] = np.inf
+    for k, f in enumerate(chosen.tolist()):
+        a, b = box_pairs(middle[k] - reach[k], middle[k] + reach[k])
+        kept = (dynamic[k, a] | dynamic[k, b]) & ~(still[k, a] & still[k, b]) & ~world.is_apart(a, b)
         out.append(np.column_stack([np.full(np.count_nonzero(kept), f), a[kept], b[kept]]))
     return tuple(np.concatenate(out).T)
 
