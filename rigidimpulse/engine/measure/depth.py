@@ -3,14 +3,16 @@
 A shape is looked at as what may enter another one, its probes, and as what may be entered, its solids. All are made of the primitives of
 the compiled shape, in its principal frame.
 
-    probe   a ball (c, r): a sphere, points of the axis of a capsule; or an edge (p, q) of a polyhedron; or points of the rims of a cylinder
+    probe   a ball (c, r): a sphere, points of the axis of a capsule; or an edge (p, q) of a polyhedron, and lines
+            from the middle of a convex one to those of its faces; or points of a cylinder
     solid   n.x <= d for all faces of a half space or a convex polyhedron; a segment with a radius; a cylinder; a closed surface
 
 A point at the depth d in a convex solid, its least distance from the faces, has to move by d to come out, and with it the body: the depth of
 penetration is d or more. A ball around it has to move by d + r. An edge is cut by the planes of all faces; the depth is a concave function
 along what is left, and the largest of the depths at both ends and in the middle is at least half the largest of all. Two convex polyhedra
 are inside each other if and only if an edge of one enters the other. A ball outside a face is as deep as r - h, h its height above the
-face, if its foot lies in the face; feet beside it do not count. The ball is then found by the edges of the polyhedron.
+face, if its foot lies in the face; a ball whose foot is beside it is
+found by the edges of the polyhedron.
 """
 
 from __future__ import annotations
@@ -24,23 +26,29 @@ from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, Geometry, build_geometry
 from rigidimpulse.collision.geometry import CompiledShape, Primitive
 
-MOST_EDGES: int = 192
+MOST_EDGES: int = 96
 """Edges of a primitive that are looked at, evenly chosen of all; all corners of those with fewer count."""
+CORNERS_OF_BOX = np.array(list(np.ndindex(2, 2, 2)), bool)
+"""(8, 3), on which side each corner is."""
+MOST_BOUNDS: int = 64
+"""Corners, and faces, with which shapes are told to be apart at once; larger shapes by their boxes."""
+MOST_SPOKES: int = 48
+"""Faces of a convex polyhedron to whose middles lines are drawn."""
 MOST_FACES: int = 400
 """Faces up to which a polyhedron may be looked at as convex; larger ones are surfaces."""
 RIM_POINTS: int = 24
 """Points of a rim of a cylinder: they are off the rim by less than 1 % of its radius."""
 AXIS_POINTS: int = 5
-"""Points of the axis of a capsule."""
-ALONG: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75)
-"""Places along an edge that are looked for in a surface."""
+"""Points of the axis of a capsule, and circles of a cylinder."""
+ALONG: tuple[float, ...] = (0.0, 0.5)
+"""Places along an edge that are looked for in a cylinder and in a surface."""
 CONVEX: float = 1e-6
 """Height of a vertex above a face, of the size of the polyhedron, up to which it counts as convex."""
 FLAT: float = 1e-9
 """1 less the cosine of the angle of two faces up to which the edge between them is a diagonal of one face."""
 SAME_PLANE: float = 1e-6
 """Difference of unit normals, and of offsets over the size, up to which two faces are in one plane."""
-DEEPEST: int = 8
+DEEPEST: int = 3
 """Points inside a surface whose depth is computed: those that are farthest from its corners."""
 
 
@@ -51,6 +59,7 @@ class Probe:
     centres: np.ndarray  # (k, 3) m of balls
     radii: np.ndarray  # (k,) m
     edges: np.ndarray  # (e, 2, 3) m
+    corners: np.ndarray  # (v, 3) m, their convex hull holds the shape; none for half spaces
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +70,9 @@ class Solid:
     rounded: list[tuple[np.ndarray, np.ndarray, float]]  # ends (3,) of a segment, and its radius, m
     cylinders: list[Primitive]
     surface: np.ndarray  # (t, 3, 3) m, triangles of closed surfaces that are not convex
-    geometry: Geometry | None  # of these surfaces
+    middles: np.ndarray  # (t, 4) m, of these triangles, and how far their corners are
+    inside: tuple[Geometry, int] | None  # compiled shape of these surfaces
+    bounds: np.ndarray  # (m, 4) planes behind which the shape is
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +84,12 @@ class Posed:
 
     def points(self, x: np.ndarray) -> np.ndarray:
         """Points (..., 3) of the shape in the other frame, (c, ..., 3)."""
-        flat = x.reshape(-1, 3)
-        return (np.einsum("cij,kj->cki", self.rotation, flat) + self.translation[:, None]).reshape(len(self.rotation), *x.shape)
+        moved = x.reshape(-1, 3) @ self.rotation.swapaxes(1, 2) + self.translation[:, None]
+        return moved.reshape(len(self.rotation), *x.shape)
+
+    def part(self, which: np.ndarray) -> Posed:
+        """The poses of these places or of this mask."""
+        return Posed(self.rotation[which], self.translation[which])
 
 
 def probe_of(shape: CompiledShape) -> Probe:
@@ -82,20 +97,19 @@ def probe_of(shape: CompiledShape) -> Probe:
     centres, radii, edges = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros((0, 2, 3))]
     for primitive in shape.primitives:
         if primitive.kind == CYLINDER:
-            centres.append(_rims(primitive))
-            radii.append(np.zeros(2 * RIM_POINTS))
+            centres.append(_points_of(primitive))
+            radii.append(np.zeros(len(centres[-1])))
         elif primitive.kind != HALF_SPACE and len(primitive.faces):
-            edges.append(_edges(primitive))
+            edges += [_edges(primitive), _spokes(primitive)]
         elif primitive.kind != HALF_SPACE:
-            places = np.linspace(0.0, 1.0, AXIS_POINTS if len(primitive.vertices) > 1 else 1)[:, None]
-            centres.append(primitive.vertices[0] + places * (primitive.vertices[-1] - primitive.vertices[0]))
-            radii.append(np.full(len(places), primitive.radius))
-    return Probe(np.vstack(centres), np.concatenate(radii), np.concatenate(edges))
+            centres.append(_on_axis(primitive.vertices[0], primitive.vertices[-1]))
+            radii.append(np.full(len(centres[-1]), primitive.radius))
+    return Probe(np.vstack(centres), np.concatenate(radii), np.concatenate(edges), _hull_corners(shape))
 
 
-def solid_of(shape: CompiledShape) -> Solid:
-    """What of a shape may be entered; open surfaces may not."""
-    solid, hollow = Solid([], [], [], np.zeros((0, 3, 3)), None), []
+def solid_of(shape: CompiledShape, geometry: Geometry | None = None, index: int = 0) -> Solid:
+    """What of a shape may be entered; open surfaces may not. geometry, index: where the shape is compiled already, if it is."""
+    solid, hollow = Solid([], [], [], np.zeros((0, 3, 3)), np.zeros((0, 4)), None, _bounds(shape)), []
     for primitive in shape.primitives:
         if primitive.kind == HALF_SPACE:
             solid.convex.append(primitive.frame[None, :4])
@@ -109,11 +123,24 @@ def solid_of(shape: CompiledShape) -> Solid:
                 hollow.append(primitive)
             else:
                 solid.convex.append(planes)
+    if len(shape.primitives) == 1 and solid.convex and len(solid.convex[0]) <= MOST_BOUNDS:
+        return replace(solid, bounds=np.vstack([solid.bounds, solid.convex[0]]))
     if not hollow:
         return solid
-    geometry = build_geometry([CompiledShape(tuple(hollow))])
+    if geometry is None or len(hollow) < len(shape.primitives):
+        geometry, index = build_geometry([CompiledShape(tuple(hollow))]), 0
     surface = np.concatenate([p.vertices[p.faces] for p in hollow])
-    return replace(solid, surface=surface, geometry=geometry)
+    middle = surface.mean(axis=1)
+    farthest = np.linalg.norm(surface - middle[:, None], axis=2).max(axis=1)
+    return replace(solid, surface=surface, middles=np.column_stack([middle, farthest]), inside=(geometry, index))
+
+
+def surely_apart(solid: Solid, probe: Probe, posed: Posed) -> np.ndarray:
+    """Which of c probes (c,) are in front of a plane behind which the solid is, and so apart from it."""
+    if not len(probe.corners) or not len(solid.bounds):
+        return np.zeros(len(posed.translation), bool)
+    heights = posed.points(probe.corners) @ solid.bounds[:, :3].T - solid.bounds[:, 3]
+    return heights.min(axis=1).max(axis=1) > 0.0
 
 
 def depth_in(solid: Solid, probe: Probe, posed: Posed) -> np.ndarray:
@@ -128,12 +155,14 @@ def depth_in(solid: Solid, probe: Probe, posed: Posed) -> np.ndarray:
     points = np.concatenate([centres, *(edges[:, :, 0] + s * (edges[:, :, 1] - edges[:, :, 0]) for s in ALONG)], axis=1)
     radii = np.concatenate([probe.radii, np.zeros(points.shape[1] - len(probe.radii))])
     for first, last, radius in solid.rounded:
-        inside = radius + radii - _distance_to_segment(points, first, last)
+        inside = radius + probe.radii - _distance_to_segment(centres, first, last)
         np.maximum(depth, inside.max(axis=1, initial=0.0), out=depth)
+        for centre in _on_axis(first, last):
+            np.maximum(depth, (radius - _distance_of_edges(edges, centre)).max(axis=1, initial=0.0), out=depth)
     for cylinder in solid.cylinders:
-        np.maximum(depth, _depth_in_cylinder(cylinder, points).max(axis=1, initial=0.0), out=depth)
-    if solid.geometry is not None:
-        np.maximum(depth, _depth_in_surface(solid.surface, solid.geometry, points), out=depth)
+        np.maximum(depth, (radii + _depth_in_cylinder(cylinder, points)).max(axis=1, initial=0.0), out=depth)
+    if solid.inside is not None:
+        np.maximum(depth, _depth_in_surface(solid, points, radii), out=depth)
     return depth
 
 
@@ -177,43 +206,102 @@ def _distance_to_segment(points: np.ndarray, first: np.ndarray, last: np.ndarray
     return np.linalg.norm(points - first - place[:, :, None] * along, axis=2)
 
 
+def _distance_of_edges(edges: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Distance (c, e) of edges (c, e, 2, 3) from a point (3,), m."""
+    begin, along = edges[:, :, 0], edges[:, :, 1] - edges[:, :, 0]
+    squared = np.einsum("cei,cei->ce", along, along)
+    place = np.einsum("cei,cei->ce", point - begin, along)
+    place = np.clip(np.divide(place, squared, out=np.zeros_like(place), where=squared > 0.0), 0.0, 1.0)
+    return np.linalg.norm(begin + place[:, :, None] * along - point, axis=2)
+
+
+def _on_axis(first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Points (k, 3) of the axis of a capsule, evenly spread; the middle of a sphere."""
+    places = np.linspace(0.0, 1.0, AXIS_POINTS if np.any(first != last) else 1)
+    return first + places[:, None] * (last - first)
+
+
 def _depth_in_cylinder(cylinder: Primitive, points: np.ndarray) -> np.ndarray:
-    """Depth (c, k) of points in a cylinder, negative outside, m."""
+    """Depth (c, k) of points in a cylinder, less the distance from it outside, m."""
     axis = cylinder.frame[3:6]
     from_centre = points - cylinder.frame[:3]
     along = from_centre @ axis
     across = np.linalg.norm(from_centre - along[:, :, None] * axis, axis=2)
-    return np.minimum(cylinder.radius - across, cylinder.frame[6] - np.abs(along))
+    side, cap = cylinder.radius - across, cylinder.frame[6] - np.abs(along)
+    return np.where((side > 0.0) & (cap > 0.0), np.minimum(side, cap), -np.hypot(np.minimum(side, 0.0), np.minimum(cap, 0.0)))
 
 
-def _depth_in_surface(surface: np.ndarray, geometry: Geometry, points: np.ndarray) -> np.ndarray:
-    """Depth (c,) of points (c, k, 3) in closed surfaces (t, 3, 3), m."""
-    depth = np.zeros(len(points))
-    corners = surface.reshape(-1, 3)
+def _depth_in_surface(solid: Solid, points: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Depth (c,) of balls of radii (k,) about points (c, k, 3) in the surfaces of a solid, m; of points those that are inside count."""
+    if solid.inside is None:
+        return np.zeros(len(points))
+    depth, (geometry, index) = np.zeros(len(points)), solid.inside
+    corners = solid.surface.reshape(-1, 3)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    near = np.all((points > low) & (points < high), axis=2)
+    near = np.all((points > low - radii[:, None]) & (points < high + radii[:, None]), axis=2)
     for c in np.flatnonzero(near.any(axis=1)).tolist():
-        inside = points[c, near[c]]
-        inside = inside[points_inside(geometry, 0, inside)]
-        if len(inside) > DEEPEST:
-            step = max(len(corners) // MOST_EDGES, 1)
-            far = np.linalg.norm(inside[:, None] - corners[None, ::step], axis=2).min(axis=1)
-            inside = inside[np.argsort(-far, kind="stable")[:DEEPEST]]
-        for point in inside:
-            nearest = closest_point(surface, np.broadcast_to(point, (len(surface), 3)))
-            depth[c] = max(depth[c], float(np.linalg.norm(nearest - point, axis=1).min()))
+        centres, r = points[c, near[c]], radii[near[c]]
+        inside = points_inside(geometry, index, centres)
+        chosen = np.flatnonzero(inside | (r > 0.0))
+        if len(chosen) > DEEPEST:
+            far = np.linalg.norm(centres[chosen, None] - corners[None, :: max(len(corners) // MOST_EDGES, 1)], axis=2).min(axis=1)
+            chosen = chosen[np.argsort(np.where(inside[chosen], -far, far), kind="stable")[:DEEPEST]]
+        for k in chosen.tolist():
+            distance = _distance_from_surface(solid, centres[k])
+            depth[c] = max(depth[c], r[k] + distance if inside[k] else r[k] - distance)
     return depth
 
 
-def _rims(cylinder: Primitive) -> np.ndarray:
-    """Points (2 RIM_POINTS, 3) of both rims."""
+def _distance_from_surface(solid: Solid, point: np.ndarray) -> float:
+    """Distance of a point (3,) from the triangles of a solid, m."""
+    from_middles = np.linalg.norm(solid.middles[:, :3] - point, axis=1)
+    # Middles are points of the surface: no triangle that is farther away than the nearest of them counts.
+    surface = solid.surface[from_middles - solid.middles[:, 3] <= from_middles.min()]
+    nearest = closest_point(surface, np.broadcast_to(point, (len(surface), 3)))
+    return float(np.linalg.norm(nearest - point, axis=1).min())
+
+
+def _hull_corners(shape: CompiledShape) -> np.ndarray:
+    """Points (v, 3) whose convex hull holds a shape; none for shapes with half spaces."""
+    if any(primitive.kind == HALF_SPACE for primitive in shape.primitives):
+        return np.zeros((0, 3))
+    polyhedra = all(len(primitive.faces) for primitive in shape.primitives)
+    if polyhedra and sum(len(primitive.vertices) for primitive in shape.primitives) <= MOST_BOUNDS:
+        return np.vstack([primitive.vertices for primitive in shape.primitives])
+    low, high = box_of(shape)
+    return np.where(CORNERS_OF_BOX, high, low)
+
+
+def _bounds(shape: CompiledShape) -> np.ndarray:
+    """Planes (6, 4) of the box of a shape; none for shapes with half spaces."""
+    low, high = box_of(shape)
+    return np.column_stack([np.vstack([-np.eye(3), np.eye(3)]), [*-low, *high]]) if np.all(np.isfinite(high)) else np.zeros((0, 4))
+
+
+def box_of(shape: CompiledShape) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner (3,) m of a shape along the axes of its frame; without end for half spaces."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for primitive in shape.primitives:
+        if primitive.kind == HALF_SPACE:
+            return np.full(3, -np.inf), np.full(3, np.inf)
+        points, reach = primitive.vertices, np.full(3, primitive.radius)
+        if primitive.kind == CYLINDER:
+            axis = primitive.frame[3:6]
+            points = primitive.frame[:3] + np.outer([-1.0, 1.0], primitive.frame[6] * axis)
+            reach = primitive.radius * np.sqrt(np.maximum(1.0 - axis * axis, 0.0))
+        low, high = np.minimum(low, points.min(axis=0) - reach), np.maximum(high, points.max(axis=0) + reach)
+    return low, high
+
+
+def _points_of(cylinder: Primitive) -> np.ndarray:
+    """Points (k, 3) of a cylinder: of both rims, of circles between them, and of the caps."""
     axis = cylinder.frame[3:6]
     across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     across /= np.linalg.norm(across)
     angle = 2.0 * np.pi * np.arange(RIM_POINTS) / RIM_POINTS
-    rim = cylinder.radius * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * np.cross(axis, across))
-    cap = cylinder.frame[6] * axis
-    return cylinder.frame[:3] + np.vstack([rim + cap, rim - cap])
+    circle = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * np.cross(axis, across)
+    circles = [(1.0, height) for height in np.linspace(-1.0, 1.0, AXIS_POINTS)] + [(0.5, -1.0), (0.5, 1.0)]
+    return cylinder.frame[:3] + np.vstack([part * cylinder.radius * circle + s * cylinder.frame[6] * axis for part, s in circles])
 
 
 def _edges(primitive: Primitive) -> np.ndarray:
@@ -228,6 +316,18 @@ def _edges(primitive: Primitive) -> np.ndarray:
     twin[pair + 1] = True
     chosen = sides[~flat & ~twin]
     return primitive.vertices[chosen[:: -(-len(chosen) // MOST_EDGES)]] if len(chosen) else np.zeros((0, 2, 3))
+
+
+def _spokes(primitive: Primitive) -> np.ndarray:
+    """Lines (e, 2, 3) from the middle of a convex polyhedron to the middles of its faces: equal boxes may overlap with all edges in faces."""
+    planes = _convex_planes(primitive)
+    if planes is None:
+        return np.zeros((0, 2, 3))
+    corners, middle = primitive.vertices, primitive.vertices.mean(axis=0)
+    planes = planes[:: -(-len(planes) // MOST_SPOKES)]
+    on_face = np.abs(corners @ planes[:, :3].T - planes[:, 3]) <= CONVEX * np.ptp(corners, axis=0).max()
+    faces = on_face.T @ corners / on_face.sum(axis=0)[:, None]
+    return np.stack([np.broadcast_to(middle, faces.shape), faces], axis=1)
 
 
 def _sides(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -247,8 +347,10 @@ def _normals(primitive: Primitive) -> np.ndarray:
 
 def _convex_planes(primitive: Primitive) -> np.ndarray | None:
     """Planes (m, 4) of a convex polyhedron, one for all faces in it; None for other surfaces, and those of very many faces."""
+    if len(primitive.faces) > MOST_FACES:
+        return None
     sides, _ = _sides(primitive.faces)
-    if len(primitive.faces) > MOST_FACES or len(sides) % 2 or np.any(sides[::2] != sides[1::2]):
+    if len(sides) % 2 or np.any(sides[::2] != sides[1::2]):
         return None
     normals = _normals(primitive)
     offsets = np.einsum("ij,ij->i", normals, primitive.vertices[primitive.faces[:, 0]])

@@ -11,12 +11,13 @@ Causes that can only take energy are left out of the sum: what they gave is what
     joints                           take, unless supports move, or a row is soft or driven: springs and motors
 
 All others are added: forces by their names, "position correction", "overlap" and "let go", which move bodies without a force, and "mass
-that left". Where supports move everything is added, and E is constant as far as the ledger is complete. Then only energy that the ledger has
-under no cause is found. So it is for flexible bodies, which check their own energy.
+that left". Where supports move everything is added. A second balance adds all causes in any scene: it is constant as far as the ledger is
+complete, and shows energy that is under no cause even where impacts take more at the same time. What a cause gave that the first balance
+adds is not judged: friction on a moving support is in one sum with the work of the support.
 
 Frame 0 is the state as given: what a cause takes at the time 0 counts from frame 1 on.
 
-The rise is that of E over its least value so far. It is compared with the energy that moves,
+The rise is that of either balance over its least value so far. It is compared with the energy that moves,
 
     rise <= RISE S,    S = max K + (max V - min V) + sum of (max D_c - min D_c) over the causes that are added
 """
@@ -59,22 +60,17 @@ def _joints_give(world: World) -> bool:
     return bool(np.any(np.isfinite(table.stiffness) & (table.stiffness > 0.0)) or np.any(table.rate != 0.0))
 
 
-def energy_balance(record: RunRecord) -> tuple[np.ndarray, float]:
-    """E (f,) J, and S, J; see the head of the module."""
+def energy_rise(record: RunRecord) -> tuple[np.ndarray, float]:
+    """Rise (f,) J over its least value so far, of E or of the balance of all causes, whichever is larger; and S, J."""
     ledger, takes = record.ledger, taking_causes(record.world)
-    total = ledger.total.copy()
+    given, all_causes = ledger.total.copy(), ledger.total.copy()
     moved = float(ledger.kinetic.max() + np.ptp(ledger.potential))
     for cause, taken in ledger.dissipated.items():
+        all_causes[1:] += taken[1:]
         if cause not in takes:
-            total[1:] += taken[1:]
+            given[1:] += taken[1:]
             moved += float(np.ptp(taken))
-    return total, moved
-
-
-def energy_rise(record: RunRecord) -> tuple[np.ndarray, float]:
-    """Rise of E over its least value so far (f,) J, and S, J."""
-    total, moved = energy_balance(record)
-    return total - np.minimum.accumulate(total), moved
+    return np.maximum(given - np.minimum.accumulate(given), all_causes - np.minimum.accumulate(all_causes)), moved
 
 
 def energy_faults(record: RunRecord) -> list[Fault]:
@@ -99,4 +95,4 @@ def _gainers(record: RunRecord, frame: int) -> tuple[str, ...]:
     kinetic, potential, _, _ = mechanics(parts, Masses(mass, world.inertia, world.steady_acceleration), np.ones((1, 1)))
     gain = np.diff(kinetic + potential, axis=0)[0]
     order = np.argsort(-gain, kind="stable")[:MOST_NAMES]
-    return tuple(world.names[i] for i in order if gain[i] > 0.0 and gain[i] >= MOST_OF_RISE * gain[order[0]])
+    return tuple(world.names[i] for i in order if gain[i] >= MOST_OF_RISE * abs(gain[order[0]]) or i == order[0])

@@ -21,9 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE
 from rigidimpulse.core.quaternion import to_matrix
-from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, depth_in, probe_of, solid_of
+from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, box_of, depth_in, probe_of, solid_of, surely_apart
 from rigidimpulse.engine.measure.record import Fault, RunRecord
 from rigidimpulse.model.world import World
 
@@ -34,7 +33,7 @@ SUB_STEPPED: float = 2e-2
 """The same of runs with sub-stepped islands, whose contacts are soft."""
 MOST_FRAMES: int = 24
 FEWEST_FRAMES: int = 6
-POSES: int = 1500
+POSES: int = 1200
 """Frames that are looked at: so many that frames times bodies are POSES, within these bounds."""
 LATE = ("linear", "after")
 """Settings of `Accuracy.impact_time` by which impacts are found too late, or missed."""
@@ -88,13 +87,13 @@ def overlap_depths(record: RunRecord) -> Depths:
     for (shape_a, shape_b), those in zip(kinds.tolist(), np.split(order, np.flatnonzero(np.diff(number[order])) + 1), strict=True):
         for mine, other, shapes_of in ((a, b, (shape_a, shape_b)), (b, a, (shape_b, shape_a))):
             probe, solid = shapes.probe(shapes_of[0]), shapes.solid(shapes_of[1])
-            if not _work(probe, solid):
-                continue
-            length = max(AT_ONCE // _work(probe, solid), 1)
+            posed = _posed(record, frame[those], mine[those], other[those])
+            near = np.flatnonzero(~surely_apart(solid, probe, posed))
+            those, posed = those[near], posed.part(near)
+            length = max(AT_ONCE // max(_work(probe, solid), 1), 1)
             for first in range(0, len(those), length):
-                some = those[first : first + length]
-                posed = _posed(record, frame[some], mine[some], other[some])
-                depth[some] = np.maximum(depth[some], depth_in(solid, probe, posed))
+                here = slice(first, first + length)
+                depth[those[here]] = np.maximum(depth[those[here]], depth_in(solid, probe, posed.part(here)))
     return Depths(frame, a, b, depth, size)
 
 
@@ -102,18 +101,18 @@ class _Shapes:
     """Probes and solids of shapes, made when they are first asked for."""
 
     def __init__(self, world: World) -> None:
-        self._shapes = world.shapes
+        self._world = world
         self._probes: dict[int, Probe] = {}
         self._solids: dict[int, Solid] = {}
 
     def probe(self, shape: int) -> Probe:
         if shape not in self._probes:
-            self._probes[shape] = probe_of(self._shapes[shape])
+            self._probes[shape] = probe_of(self._world.shapes[shape])
         return self._probes[shape]
 
     def solid(self, shape: int) -> Solid:
         if shape not in self._solids:
-            self._solids[shape] = solid_of(self._shapes[shape])
+            self._solids[shape] = solid_of(self._world.shapes[shape], self._world.geometry, shape)
         return self._solids[shape]
 
 
@@ -162,15 +161,8 @@ def _candidates(record: RunRecord) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _boxes_of_bodies(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Middles and half lengths (n, 3) m of boxes of bodies along their own axes, and which bodies (n,) have none."""
-    low, high = np.full((len(world.shapes), 3), np.inf), np.full((len(world.shapes), 3), -np.inf)
-    for s, shape in enumerate(world.shapes):
-        for primitive in shape.primitives:
-            points, radius = primitive.vertices, primitive.radius
-            if primitive.kind == CYLINDER:
-                points = primitive.frame[:3] + np.outer([-1.0, 1.0], primitive.frame[6] * primitive.frame[3:6])
-            if len(points):
-                low[s], high[s] = np.minimum(low[s], points.min(axis=0) - radius), np.maximum(high[s], points.max(axis=0) + radius)
-    endless = np.any(low > high, axis=1) | np.array([any(p.kind == HALF_SPACE for p in shape.primitives) for shape in world.shapes])
+    low, high = (np.array(side).reshape(-1, 3) for side in zip(*map(box_of, world.shapes), strict=True))
+    endless = ~np.isfinite(high).all(axis=1)
     low[endless] = high[endless] = 0.0
     of = world.shape_of_body
     return 0.5 * (low + high)[of], 0.5 * (high - low)[of], endless[of]
