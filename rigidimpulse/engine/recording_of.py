@@ -80,9 +80,7 @@ def make_recording(run: Run, duration: float) -> Recording:
     close_stretches(run)
     work = run.forces.finish(world, times, recorder)
     mass = np.where(world.dynamic & (times[:, None] >= release_times(world)), world.mass, 0.0)
-    ledger = make_ledger(
-        recorder.frames._replace(times=times), Masses(mass, world.inertia, world.steady_acceleration), run.log, work
-    )
+    ledger = make_ledger(recorder.frames._replace(times=times), Masses(mass, world.inertia, world.steady_acceleration), run.log, work)
     run.soft_bodies.add_to(ledger)
     contacts = run.contact_log.table()
     measured = record_of(world, recorder.frames._replace(times=times), ledger, impulses_by_cause(run, times, impacts, work))

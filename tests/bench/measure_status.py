@@ -1,7 +1,7 @@
 """Print what runs measure of themselves: energy made, drift of momentum, deepest overlap, and what the measuring costs.
 
-Run it from the root of the repository: `python tests/bench/measure_status.py [gallery] [hard] [newcomer] [NAME ...]`. One process; a scene that
-takes more than LONG is given up.
+Run it from the root of the repository: `python tests/bench/measure_status.py [gallery] [hard] [newcomer] [substepped] [NAME ...]`. A scene
+that takes more than LONG is given up. With "substepped" all islands without joints are sub-stepped.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from rigidimpulse.engine.measure.record import RunRecord
 sys.path.insert(0, str(Path(__file__).parent.parent / "newcomer"))
 LONG = 20.0
 """s of wall clock for a scene."""
+FORCED = ri.Accuracy(contact_solver="substepped")
 WARM = 0.3
 """s that a scene is run first, so that the time to compile is not counted."""
 
@@ -46,17 +47,17 @@ class Case:
 
 def cases(wanted: list[str]) -> Iterator[Case]:
     """All scenes that are asked for; all of the gallery and the newcomers' where none is."""
-    from scenes import CORPUS
+    from scenes import CORPUS  # pyright: ignore[reportMissingImports]
 
-    chosen = wanted or ["gallery", "newcomer"]
+    chosen = [word for word in wanted if word != "substepped"] or ["gallery", "newcomer"]
     for kind, names in (("gallery", gallery.names()), ("hard", gallery.hard_names())):
         for name in names:
             if kind in chosen or name in chosen:
                 entry = gallery.load(name)
-                yield Case(name, entry.scene(), entry.duration, entry.fps, entry.accuracy)
+                yield Case(name, entry.scene(), entry.duration, entry.fps, FORCED if "substepped" in wanted else entry.accuracy)
     for name, case in CORPUS.items():
         if "newcomer" in chosen or name in chosen:
-            yield Case(name, case.make()[0].scene, case.duration)
+            yield Case(name, case.make()[0].scene, case.duration, accuracy=FORCED if "substepped" in wanted else "standard")
 
 
 def look(case: Case) -> str:

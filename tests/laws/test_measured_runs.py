@@ -9,11 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 import rigidimpulse as ri
-from rigidimpulse.core.quaternion import multiply
+from rigidimpulse.collision.distance.fcl import Narrowphase
+from rigidimpulse.collision.geometry import CompiledShape, compile_shape
+from rigidimpulse.core.quaternion import multiply, rotate, to_matrix
 from rigidimpulse.engine.compile_scene import compile_scene
-from rigidimpulse.engine.measure.depth import Posed, depth_in, probe_of, solid_of, surely_apart
+from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, depth_in, planes_of, probe_of, solid_of, surely_apart
 from rigidimpulse.engine.measure.measure import measured_faults, record_of
 from rigidimpulse.engine.measure.overlap import box_pairs
 from rigidimpulse.engine.measure.record import RunRecord
@@ -99,7 +102,7 @@ def test_a_sound_run_shows_nothing(make) -> None:
 
 
 def recorded(run: ri.Recording, **altered: np.ndarray) -> RunRecord:
-    """The record of a run, with some of its arrays altered: position, velocity, angular_velocity. The ledger follows, but for its causes."""
+    """The record of a run with some arrays altered: position, velocity, angular_velocity. The ledger follows, except its causes."""
     assert run.scene is not None and run.settings is not None and run.ledger is not None and run.by_cause is not None
     world = compile_scene(run.scene, run.settings.accuracy)
     frames = Frames(run.times, run.centers, multiply(run.orientations, world.turn), run.velocities, run.angular_velocities)
@@ -158,7 +161,7 @@ def test_a_body_moved_into_another_is_inside_it(make) -> None:
     a, b = run.index("box 0"), run.index("box 1")
     position = run.centers.copy()
     inside = 0.2 * (1.0 - 0.38)
-    axis = ri_axis(run, a, frame)
+    axis = axis_of(run, a, frame)
     position[frame, b] = position[frame, a] + inside * axis
     faults = [f for f in measured_faults(recorded(run, position=position)) if f.bodies == ("box 0", "box 1") and f.kind != "energy made"]
     assert [fault.kind for fault in faults] == ["bodies inside each other"]
@@ -166,10 +169,8 @@ def test_a_body_moved_into_another_is_inside_it(make) -> None:
     assert 0.2 * 0.19 < faults[0].amount < 0.2 * 0.6
 
 
-def ri_axis(run: ri.Recording, body: int, frame: int) -> np.ndarray:
+def axis_of(run: ri.Recording, body: int, frame: int) -> np.ndarray:
     """The x axis (3,) of a body."""
-    from rigidimpulse.core.quaternion import rotate
-
     return rotate(run.orientations[frame, body], np.array([1.0, 0.0, 0.0]))
 
 
@@ -189,31 +190,37 @@ SHAPES = {
 }
 
 
+def probe(shape: CompiledShape) -> Probe:
+    """What of a shape may enter another one."""
+    return probe_of(shape, planes_of(shape))
+
+
+def solid(shape: CompiledShape) -> Solid:
+    """What of a shape may be entered."""
+    return solid_of(shape, planes_of(shape))
+
+
 @pytest.mark.parametrize("other", SHAPES)
 @pytest.mark.parametrize("mine", [name for name in SHAPES if name != "half space"])
 def test_depths_are_lower_bounds(mine: str, other: str) -> None:
     """Bodies at random poses. Where FCL says that they are apart the depth is 0; where they are deep inside each other it is not."""
-    from rigidimpulse.collision.distance.fcl import Narrowphase
-    from rigidimpulse.collision.geometry import compile_shape
-    from rigidimpulse.core.quaternion import to_matrix
-
     rng = np.random.default_rng(7)
     shapes = [compile_shape(SHAPES[name], np.zeros(3), np.eye(3)) for name in (mine, other)]
-    exact = Narrowphase(shapes)
+    probes, solids, exact = [probe(shape) for shape in shapes], [solid(shape) for shape in shapes], Narrowphase(shapes)
     found = 0
     for _ in range(150):
         x, q = rng.normal(size=3) * 0.2, rng.normal(size=4)
         q /= np.linalg.norm(q)
         rotation = to_matrix(q)
         there, back = Posed(rotation[None], x[None]), Posed(rotation.T[None], -(rotation.T @ x)[None])
-        depth = depth_in(solid_of(shapes[1]), probe_of(shapes[0]), there)[0]
-        depth = max(depth, depth_in(solid_of(shapes[0]), probe_of(shapes[1]), back)[0] if other != "half space" else 0.0)
+        depth = depth_in(solids[1], probes[0], there)[0]
+        depth = max(depth, depth_in(solids[0], probes[1], back)[0] if other != "half space" else 0.0)
         still = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
         apart = exact.separation(1, still, 0, (x, q))
         if apart.gap > 0.0:
             assert depth <= 1e-6
             continue
-        assert not surely_apart(solid_of(shapes[1]), probe_of(shapes[0]), there)[0] or apart.gap > -1e-9
+        assert not surely_apart(solids[1], probes[0], there)[0] or apart.gap > -1e-9
         if np.all(np.isfinite(apart.normal)) and "cylinder" not in (mine, other):
             # Closed forms: of balls, and of half spaces.
             assert depth <= -apart.gap * (1.0 + 1e-9) + 1e-12
@@ -227,33 +234,29 @@ def test_depths_are_lower_bounds(mine: str, other: str) -> None:
 
 def test_rods_that_cross_are_inside_each_other() -> None:
     """Two long boxes cross: no corner of one is in the other, only edges are."""
-    from rigidimpulse.collision.geometry import compile_shape
 
     rod = compile_shape(ri.Shape.box((2.0, 0.02, 0.02)), np.zeros(3), np.eye(3))
     turned = Posed(np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]]), np.array([[0.31, 0.17, 0.015]]))
-    assert depth_in(solid_of(rod), probe_of(rod), turned)[0] == pytest.approx(0.005)
+    assert depth_in(solid(rod), probe(rod), turned)[0] == pytest.approx(0.005)
 
 
 def test_a_point_in_a_tube_is_in_the_air() -> None:
     """A surface with a hole is entered in its walls only."""
-    import trimesh
-
-    from rigidimpulse.collision.geometry import compile_shape
 
     tube = trimesh.creation.annulus(0.5, 0.7, 1.0)
     shape = compile_shape(ri.Shape.mesh(tube.vertices, tube.faces), np.zeros(3), np.eye(3))
-    ball = probe_of(compile_shape(ri.Shape.sphere(1e-3), np.zeros(3), np.eye(3)))
+    ball = probe(compile_shape(ri.Shape.sphere(1e-3), np.zeros(3), np.eye(3)))
     places = np.array([[0.0, 0.0, 0.0], [0.6, 0.0, 0.0], [0.8, 0.0, 0.0]])
-    depth = depth_in(solid_of(shape), ball, Posed(np.tile(np.eye(3), (3, 1, 1)), places))
+    depth = depth_in(solid(shape), ball, Posed(np.tile(np.eye(3), (3, 1, 1)), places))
     assert depth[0] == depth[2] == 0.0 and 0.09 < depth[1] < 0.102
 
 
-def test_boxes_that_overlap_are_all_found() -> None:
+@pytest.mark.parametrize("number", [10, 60])
+def test_boxes_that_overlap_are_all_found(number: int) -> None:
     rng = np.random.default_rng(1)
-    low = rng.normal(size=(60, 3))
-    high = low + rng.uniform(0.0, 1.0, size=(60, 3))
-    low[7], high[7] = -np.inf, np.inf
-    expected = [
-        (i, j) for i in range(60) for j in range(i + 1, 60) if np.all((low[i] <= high[j]) & (low[j] <= high[i]))
-    ]
+    low = rng.normal(size=(3, number, 3))
+    high = low + rng.uniform(0.0, 1.0, size=low.shape)
+    low[:, 7], high[:, 7] = -np.inf, np.inf
+    every = [(f, i, j) for f in range(3) for i in range(number) for j in range(i + 1, number)]
+    expected = [(f, i, j) for f, i, j in every if np.all((low[f, i] <= high[f, j]) & (low[f, j] <= high[f, i]))]
     assert list(zip(*(side.tolist() for side in box_pairs(low, high)), strict=True)) == expected

@@ -7,12 +7,12 @@ the compiled shape, in its principal frame.
             from the middle of a convex one to those of its faces; or points of a cylinder
     solid   n.x <= d for all faces of a half space or a convex polyhedron; a segment with a radius; a cylinder; a closed surface
 
-A point at the depth d in a convex solid, its least distance from the faces, has to move by d to come out, and with it the body: the depth of
-penetration is d or more. A ball around it has to move by d + r. An edge is cut by the planes of all faces; the depth is a concave function
-along what is left, and the largest of the depths at both ends and in the middle is at least half the largest of all. Two convex polyhedra
-are inside each other if and only if an edge of one enters the other. A ball outside a face is as deep as r - h, h its height above the
-face, if its foot lies in the face; a ball whose foot is beside it is
-found by the edges of the polyhedron.
+A point at the depth d in a convex solid, its least distance from the faces, has to move by d to come out, and with it the body: the depth
+of penetration is d or more. A ball around it has to move by d + r. An edge is cut by the planes of all faces; the depth is a concave
+function along what is left, and the largest of the depths at both ends and in the middle is at least half the largest of all. Two convex
+polyhedra are inside each other if and only if an edge of one enters the other; equal boxes may have all of them in each other's faces, so
+there are the lines to the middles of faces, too. A ball outside a face is as deep as r - h, h its height above the face, if its foot lies
+in the face; a ball whose foot is beside it is found by the edges of the polyhedron.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ import numpy as np
 from trimesh.triangles import closest_point
 
 from rigidimpulse.collision.containment import points_inside
-from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, Geometry, build_geometry
-from rigidimpulse.collision.geometry import CompiledShape, Primitive
+from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, CompiledShape, Geometry, Primitive, build_geometry
 
 MOST_EDGES: int = 96
 """Edges of a primitive that are looked at, evenly chosen of all; all corners of those with fewer count."""
@@ -92,37 +91,40 @@ class Posed:
         return Posed(self.rotation[which], self.translation[which])
 
 
-def probe_of(shape: CompiledShape) -> Probe:
+def planes_of(shape: CompiledShape) -> list[np.ndarray | None]:
+    """Planes (m, 4) of each primitive that is convex and has faces, for `probe_of` and `solid_of`."""
+    return [_convex_planes(primitive) if len(primitive.faces) else None for primitive in shape.primitives]
+
+
+def probe_of(shape: CompiledShape, planes: list[np.ndarray | None]) -> Probe:
     """What of a shape may enter another one."""
     centres, radii, edges = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros((0, 2, 3))]
-    for primitive in shape.primitives:
+    for primitive, faces in zip(shape.primitives, planes, strict=True):
         if primitive.kind == CYLINDER:
             centres.append(_points_of(primitive))
             radii.append(np.zeros(len(centres[-1])))
         elif primitive.kind != HALF_SPACE and len(primitive.faces):
-            edges += [_edges(primitive), _spokes(primitive)]
+            edges += [_edges(primitive)] if faces is None else [_edges(primitive), _spokes(primitive, faces)]
         elif primitive.kind != HALF_SPACE:
             centres.append(_on_axis(primitive.vertices[0], primitive.vertices[-1]))
             radii.append(np.full(len(centres[-1]), primitive.radius))
     return Probe(np.vstack(centres), np.concatenate(radii), np.concatenate(edges), _hull_corners(shape))
 
 
-def solid_of(shape: CompiledShape, geometry: Geometry | None = None, index: int = 0) -> Solid:
+def solid_of(shape: CompiledShape, planes: list[np.ndarray | None], geometry: Geometry | None = None, index: int = 0) -> Solid:
     """What of a shape may be entered; open surfaces may not. geometry, index: where the shape is compiled already, if it is."""
     solid, hollow = Solid([], [], [], np.zeros((0, 3, 3)), np.zeros((0, 4)), None, _bounds(shape)), []
-    for primitive in shape.primitives:
+    for primitive, faces in zip(shape.primitives, planes, strict=True):
         if primitive.kind == HALF_SPACE:
             solid.convex.append(primitive.frame[None, :4])
         elif primitive.kind == CYLINDER:
             solid.cylinders.append(primitive)
         elif not len(primitive.faces):
             solid.rounded.append((primitive.vertices[0], primitive.vertices[-1], primitive.radius))
+        elif faces is None:
+            hollow.append(primitive)
         else:
-            planes = _convex_planes(primitive)
-            if planes is None:
-                hollow.append(primitive)
-            else:
-                solid.convex.append(planes)
+            solid.convex.append(faces)
     if len(shape.primitives) == 1 and solid.convex and len(solid.convex[0]) <= MOST_BOUNDS:
         return replace(solid, bounds=np.vstack([solid.bounds, solid.convex[0]]))
     if not hollow:
@@ -237,7 +239,7 @@ def _depth_in_surface(solid: Solid, points: np.ndarray, radii: np.ndarray) -> np
         return np.zeros(len(points))
     depth, (geometry, index) = np.zeros(len(points)), solid.inside
     corners = solid.surface.reshape(-1, 3)
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    low, high = (-solid.bounds[:3, 3], solid.bounds[3:6, 3]) if len(solid.bounds) else (-np.inf, np.inf)
     near = np.all((points > low - radii[:, None]) & (points < high + radii[:, None]), axis=2)
     for c in np.flatnonzero(near.any(axis=1)).tolist():
         centres, r = points[c, near[c]], radii[near[c]]
@@ -318,11 +320,8 @@ def _edges(primitive: Primitive) -> np.ndarray:
     return primitive.vertices[chosen[:: -(-len(chosen) // MOST_EDGES)]] if len(chosen) else np.zeros((0, 2, 3))
 
 
-def _spokes(primitive: Primitive) -> np.ndarray:
-    """Lines (e, 2, 3) from the middle of a convex polyhedron to the middles of its faces: equal boxes may overlap with all edges in faces."""
-    planes = _convex_planes(primitive)
-    if planes is None:
-        return np.zeros((0, 2, 3))
+def _spokes(primitive: Primitive, planes: np.ndarray) -> np.ndarray:
+    """Lines (e, 2, 3) from the middle of a convex polyhedron to the middles of its faces."""
     corners, middle = primitive.vertices, primitive.vertices.mean(axis=0)
     planes = planes[:: -(-len(planes) // MOST_SPOKES)]
     on_face = np.abs(corners @ planes[:, :3].T - planes[:, 3]) <= CONVEX * np.ptp(corners, axis=0).max()

@@ -81,9 +81,7 @@ def energy_faults(record: RunRecord) -> list[Fault]:
     first = int(np.argmax(rise > RISE * moved))
     time, amount = float(record.frames.times[first]), float(rise.max())
     text = f"{amount:.3g} J came from nothing until {record.frames.times[int(np.argmax(rise))]:.6g} s"
-    return [
-        Fault(time, KIND, _gainers(record, first), amount, f"{text}, {amount / moved:.1%} of the energy that moves; {REMEDY}")
-    ]
+    return [Fault(time, KIND, _gainers(record, first), amount, f"{text}, {amount / moved:.1%} of the energy that moves; {REMEDY}")]
 
 
 def _gainers(record: RunRecord, frame: int) -> tuple[str, ...]:

@@ -1,8 +1,8 @@
 r"""Overlap at recorded frames, found by other means than those of the engine.
 
-Frames are chosen evenly. In each, pairs of bodies are candidates whose boxes along the axes of the world overlap; not those of which neither
-body is dynamic then, those that a joint or a collision filter keeps apart, and those that stand as they did in the frame chosen before. The
-depth of a candidate is a lower bound, see `depth`. A pair is in order if
+Frames are chosen evenly. In each, pairs of bodies are candidates whose boxes along the axes of the world overlap. Left out are pairs of
+which neither body is dynamic then, those that a joint or a collision filter keeps apart, and those that stand as they did in the frame that
+was chosen before. The depth of a candidate is a lower bound, see `depth`. A pair is in order if
 
     depth <= EXACT s        exact contacts
     depth <= SUB_STEPPED s  in a run with sub-stepped islands
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.core.quaternion import to_matrix
-from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, box_of, depth_in, probe_of, solid_of, surely_apart
+from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, box_of, depth_in, planes_of, probe_of, solid_of, surely_apart
 from rigidimpulse.engine.measure.record import Fault, RunRecord
 from rigidimpulse.model.world import World
 
@@ -37,9 +37,11 @@ POSES: int = 1200
 """Frames that are looked at: so many that frames times bodies are POSES, within these bounds."""
 LATE = ("linear", "after")
 """Settings of `Accuracy.impact_time` by which impacts are found too late, or missed."""
+FEW: int = 24
+"""Bodies up to which all pairs are compared at once."""
 AT_ONCE: int = 2_000_000
 """Products of probes and faces that are computed at once."""
-REMEDY = "use a smaller step"
+REMEDY = "use a smaller step, or contact_solver='newton' where islands are sub-stepped"
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +94,7 @@ def overlap_depths(record: RunRecord) -> Depths:
             those, posed = those[near], posed.part(near)
             length = max(AT_ONCE // max(_work(probe, solid), 1), 1)
             for first in range(0, len(those), length):
-                here = slice(first, first + length)
+                here = np.arange(first, min(first + length, len(those)))
                 depth[those[here]] = np.maximum(depth[those[here]], depth_in(solid, probe, posed.part(here)))
     return Depths(frame, a, b, depth, size)
 
@@ -102,17 +104,23 @@ class _Shapes:
 
     def __init__(self, world: World) -> None:
         self._world = world
+        self._planes: dict[int, list[np.ndarray | None]] = {}
         self._probes: dict[int, Probe] = {}
         self._solids: dict[int, Solid] = {}
 
+    def _planes_of(self, shape: int) -> list[np.ndarray | None]:
+        if shape not in self._planes:
+            self._planes[shape] = planes_of(self._world.shapes[shape])
+        return self._planes[shape]
+
     def probe(self, shape: int) -> Probe:
         if shape not in self._probes:
-            self._probes[shape] = probe_of(self._world.shapes[shape])
+            self._probes[shape] = probe_of(self._world.shapes[shape], self._planes_of(shape))
         return self._probes[shape]
 
     def solid(self, shape: int) -> Solid:
         if shape not in self._solids:
-            self._solids[shape] = solid_of(self._world.shapes[shape], self._world.geometry, shape)
+            self._solids[shape] = solid_of(self._world.shapes[shape], self._planes_of(shape), self._world.geometry, shape)
         return self._solids[shape]
 
 
@@ -139,39 +147,47 @@ def frames_looked_at(world: World, number: int) -> np.ndarray:
 def _candidates(record: RunRecord) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Frames, bodies a and bodies b > a (c,) of the candidates, frame by frame."""
     frames, world = record.frames, record.world
-    out = [np.zeros((0, 3), np.int64)]
     if not world.can_collide or world.accuracy.impact_time in LATE:
-        return tuple(out[0].T)
+        return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
     chosen = frames_looked_at(world, len(frames.times))
     position, orientation = frames.position[chosen], frames.orientation[chosen]
     still = np.zeros(position.shape[:2], bool)
     still[1:] = np.all(position[1:] == position[:-1], axis=2) & np.all(orientation[1:] == orientation[:-1], axis=2)
-    dynamic = world.dynamic & (frames.times[chosen, None] >= record.release)
+    dynamic = np.logical_and(world.dynamic, frames.times[chosen, None] >= record.release)
     centre, half, endless = _boxes_of_bodies(world)
     rotation = to_matrix(orientation)
     middle = position + np.einsum("fnij,nj->fni", rotation, centre)
     reach = np.einsum("fnij,nj->fni", np.abs(rotation), half)
     reach[:, endless] = np.inf
-    for k, f in enumerate(chosen.tolist()):
-        a, b = box_pairs(middle[k] - reach[k], middle[k] + reach[k])
-        kept = (dynamic[k, a] | dynamic[k, b]) & ~(still[k, a] & still[k, b]) & ~world.is_apart(a, b)
-        out.append(np.column_stack([np.full(np.count_nonzero(kept), f), a[kept], b[kept]]))
-    return tuple(np.concatenate(out).T)
+    k, a, b = box_pairs(middle - reach, middle + reach)
+    kept = (dynamic[k, a] | dynamic[k, b]) & ~(still[k, a] & still[k, b]) & ~world.is_apart(a, b)
+    return chosen[k[kept]], a[kept], b[kept]
 
 
 def _boxes_of_bodies(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Middles and half lengths (n, 3) m of boxes of bodies along their own axes, and which bodies (n,) have none."""
     low, high = (np.array(side).reshape(-1, 3) for side in zip(*map(box_of, world.shapes), strict=True))
-    endless = ~np.isfinite(high).all(axis=1)
+    endless = np.any(np.isinf(high), axis=1)
     low[endless] = high[endless] = 0.0
     of = world.shape_of_body
     return 0.5 * (low + high)[of], 0.5 * (high - low)[of], endless[of]
 
 
-def box_pairs(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs a < b (k,) of boxes (n, 3) that overlap, found along the axis on which the lower ends are spread most."""
-    finite = low[np.isfinite(low[:, 0])]
-    axis = int(np.argmax(np.ptp(finite, axis=0))) if len(finite) else 0
+def box_pairs(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frames, and pairs a < b, (k,) each, of boxes (f, n, 3) that overlap; frame by frame, in order of a and b."""
+    count = low.shape[1]
+    if count <= FEW:
+        a, b = np.triu_indices(count, 1)
+        frame, pair = np.nonzero(np.all((low[:, a] <= high[:, b]) & (low[:, b] <= high[:, a]), axis=2))
+        return frame, a[pair], b[pair]
+    found = [_pairs_along_axis(*boxes) for boxes in zip(low, high, strict=True)]
+    frame = np.repeat(np.arange(len(found)), [len(pairs) for pairs in found])
+    return frame, *np.concatenate(found).T
+
+
+def _pairs_along_axis(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Pairs a < b (k, 2) of boxes (n, 3) that overlap, found along the axis on which the lower ends are spread most."""
+    axis = int(np.argmax(np.ptp(low[np.isfinite(low[:, 0])], axis=0)))
     order = np.argsort(low[:, axis], kind="stable")
     last = np.searchsorted(low[order, axis], high[order, axis], side="right")
     count = np.maximum(last - np.arange(len(order)) - 1, 0)
@@ -179,7 +195,5 @@ def box_pairs(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray
     second = first + 1 + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     i, j = order[first], order[second]
     meets = np.all((low[i] <= high[j]) & (low[j] <= high[i]), axis=1)
-    i, j = i[meets], j[meets]
-    a, b = np.minimum(i, j), np.maximum(i, j)
-    order = np.lexsort((b, a))
-    return a[order], b[order]
+    a, b = np.minimum(i, j)[meets], np.maximum(i, j)[meets]
+    return np.column_stack([a, b])[np.lexsort((b, a))]
