@@ -13,18 +13,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
-from rigidimpulse.engine import recording_of
-from rigidimpulse.engine.measure.energy import energy_rise
-from rigidimpulse.engine.measure.measure import measured_faults
+from rigidimpulse.engine.measure.energy import RISE, allowed_rise, energy_rise
+from rigidimpulse.engine.measure.measure import measured_faults, record_of_recording
 from rigidimpulse.engine.measure.momentum import momentum_drifts
 from rigidimpulse.engine.measure.overlap import overlap_depths
-from rigidimpulse.engine.measure.record import RunRecord
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "newcomer"))
 LONG = 20.0
@@ -62,7 +59,6 @@ def cases(wanted: list[str]) -> Iterator[Case]:
 
 def look(case: Case) -> str:
     """Run a scene and return its row."""
-    kept: list[RunRecord] = []
     ri.simulate(case.scene, min(case.duration, WARM), case.fps, accuracy=case.accuracy)  # compiles what is not in the cache
     begin = time.perf_counter()
 
@@ -70,13 +66,9 @@ def look(case: Case) -> str:
         if time.perf_counter() - begin > LONG:
             raise TimeoutError(f"more than {LONG} s")
 
-    def keep(record: RunRecord, _log: Any) -> None:
-        kept.append(record)
-
-    with patch.object(recording_of, "report_measured", keep):
-        run = ri.simulate(case.scene, case.duration, case.fps, accuracy=case.accuracy, progress=give_up)
+    run = ri.simulate(case.scene, case.duration, case.fps, accuracy=case.accuracy, progress=give_up)
     took = time.perf_counter() - begin
-    record = kept[0]
+    record = record_of_recording(run)
     begin = time.perf_counter()
     faults = measured_faults(record)
     cost = time.perf_counter() - begin
@@ -84,7 +76,7 @@ def look(case: Case) -> str:
     drifts = momentum_drifts(record)
     depths = overlap_depths(record)
     share = depths.depth / depths.size
-    made = float(rise.max()) / moved if moved > 0.0 else 0.0
+    made = float((rise / np.maximum(allowed_rise(record, moved), 1e-300)).max()) * RISE if moved > 0.0 else 0.0
     deepest = float(share.max(initial=0.0))
     return (
         f"{case.name:<24}{len(run.names):5d}{'sub' if record.may_be_sub_stepped else '':>5}{made:10.1e}"

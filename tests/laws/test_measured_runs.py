@@ -14,10 +14,9 @@ import trimesh
 import rigidimpulse as ri
 from rigidimpulse.collision.distance.fcl import Narrowphase
 from rigidimpulse.collision.geometry import CompiledShape, compile_shape
-from rigidimpulse.core.quaternion import multiply, rotate, to_matrix
-from rigidimpulse.engine.compile_scene import compile_scene
+from rigidimpulse.core.quaternion import rotate, to_matrix
 from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, depth_in, planes_of, probe_of, solid_of, surely_apart
-from rigidimpulse.engine.measure.measure import measured_faults, record_of
+from rigidimpulse.engine.measure.measure import measured_faults, record_of_recording
 from rigidimpulse.engine.measure.overlap import box_pairs
 from rigidimpulse.engine.measure.record import RunRecord
 from rigidimpulse.recording.ledger import Masses, mechanics
@@ -103,13 +102,11 @@ def test_a_sound_run_shows_nothing(make) -> None:
 
 def recorded(run: ri.Recording, **altered: np.ndarray) -> RunRecord:
     """The record of a run with some arrays altered: position, velocity, angular_velocity. The ledger follows, except its causes."""
-    assert run.scene is not None and run.settings is not None and run.ledger is not None and run.by_cause is not None
-    world = compile_scene(run.scene, run.settings.accuracy)
-    frames = Frames(run.times, run.centers, multiply(run.orientations, world.turn), run.velocities, run.angular_velocities)
-    before, after = (_mechanical(world, one) for one in (frames, frames._replace(**altered)))
-    ledger = run.ledger
+    record = record_of_recording(run)
+    frames, ledger = record.frames._replace(**altered), record.ledger
+    before, after = (_mechanical(record.world, one) for one in (record.frames, frames))
     kinetic, potential = (old + new - was for old, new, was in zip((ledger.kinetic, ledger.potential), after, before, strict=True))
-    return record_of(world, frames._replace(**altered), replace(ledger, kinetic=kinetic, potential=potential), run.by_cause)
+    return replace(record, frames=frames, ledger=replace(ledger, kinetic=kinetic, potential=potential))
 
 
 def _mechanical(world, frames: Frames) -> tuple[np.ndarray, np.ndarray]:

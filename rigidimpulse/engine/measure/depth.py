@@ -31,6 +31,8 @@ CORNERS_OF_BOX = np.array(list(np.ndindex(2, 2, 2)), bool)
 """(8, 3), on which side each corner is."""
 MOST_BOUNDS: int = 64
 """Corners, and faces, with which shapes are told to be apart at once; larger shapes by their boxes."""
+MOST_SORTED: int = 4000
+"""Faces up to which edges are looked for that are no diagonals."""
 MOST_SPOKES: int = 48
 """Faces of a convex polyhedron to whose middles lines are drawn."""
 MOST_FACES: int = 400
@@ -307,7 +309,12 @@ def _points_of(cylinder: Primitive) -> np.ndarray:
 
 
 def _edges(primitive: Primitive) -> np.ndarray:
-    """Edges (e, 2, 3) of a polyhedron that are no diagonals of flat faces; evenly chosen where there are many."""
+    """Edges (e, 2, 3) of a polyhedron that are no diagonals of flat faces; evenly chosen where there are many.
+
+    Of surfaces of very many faces one side of each chosen face: edges in flat faces do no harm.
+    """
+    if len(primitive.faces) > MOST_SORTED:
+        return primitive.vertices[primitive.faces[:: -(-len(primitive.faces) // MOST_EDGES), :2]]
     normals = _normals(primitive)
     sides, owner = _sides(primitive.faces)
     pair = np.flatnonzero(np.all(sides[1:] == sides[:-1], axis=1))

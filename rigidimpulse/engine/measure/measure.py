@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import multiply
+from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.measure.energy import energy_faults
 from rigidimpulse.engine.measure.momentum import momentum_faults
 from rigidimpulse.engine.measure.overlap import overlap_faults
@@ -14,6 +17,7 @@ from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.impulses import Impulses
 from rigidimpulse.recording.ledger import Ledger
 from rigidimpulse.recording.recorder import Frames
+from rigidimpulse.recording.recording import Recording
 
 
 def record_of(world: World, frames: Frames, ledger: Ledger, by_cause: Impulses) -> RunRecord:
@@ -27,6 +31,21 @@ def record_of(world: World, frames: Frames, ledger: Ledger, by_cause: Impulses) 
         touched.append(np.column_stack([world.joints.body_a, world.joints.body_b]))
     pairs = np.unique(np.concatenate(touched), axis=0)
     return RunRecord(world, frames, ledger, by_cause.release, pairs, forced, jointed(world))
+
+
+def record_of_recording(run: Recording) -> RunRecord:
+    """The record of a recording that `simulate` returned.
+
+    Raises:
+        SceneError: for a recording that was loaded from a file.
+
+    """
+    if run.scene is None or run.settings is None or run.ledger is None or run.by_cause is None:
+        raise SceneError("a loaded recording cannot be measured", "ask the run that simulate() returned")
+    world = compile_scene(run.scene, run.settings.accuracy)
+    orientation = multiply(run.orientations, world.turn)
+    frames = Frames(run.times, run.centers, orientation, run.velocities, run.angular_velocities)
+    return record_of(world, frames, run.ledger, run.by_cause)
 
 
 def measured_faults(record: RunRecord) -> list[Fault]:

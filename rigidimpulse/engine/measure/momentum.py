@@ -31,9 +31,11 @@ MOMENTUM: float = 1e-7
 """Drift of the momentum of a free set of bodies, of what moves, from which a run is not ok."""
 ANGULAR: float = 1e-5
 """The same of its angular momentum: forces of joints and contacts turn with the bodies from frame to frame."""
+MOST_FRAMES: int = 240
+"""Frames that are looked at, at most, evenly chosen."""
 MOST_NAMES: int = 3
 """Bodies that a message names at most."""
-REMEDY = "use a smaller step"
+REMEDY = "use a smaller step; give joints limits, so that motors do not press the bodies that they join on each other"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +43,7 @@ class Drifts:
     """Of k free sets of bodies, over what moves."""
 
     members: list[np.ndarray]
-    momentum: np.ndarray  # (f, k)
+    momentum: np.ndarray  # (f, k) of the frames that are looked at
     angular: np.ndarray  # (f, k), 0 where the bodies of the set are pulled differently
 
 
@@ -66,11 +68,12 @@ def free_sets(record: RunRecord) -> np.ndarray:
 def momentum_faults(record: RunRecord) -> list[Fault]:
     """A fault for each free set whose momentum or angular momentum was not kept, with the first time at which it was not."""
     faults, names, drifts = [], record.world.names, momentum_drifts(record)
+    times = record.frames.times[_looked_at(record)]
     for k, members in enumerate(drifts.members):
         found = ("momentum", drifts.momentum[:, k], MOMENTUM), ("angular momentum", drifts.angular[:, k], ANGULAR)
         for what, drift, bound in found:
             if np.any(drift > bound):
-                time = float(record.frames.times[int(np.argmax(drift > bound))])
+                time = float(times[int(np.argmax(drift > bound))])
                 more = f" and {len(members) - MOST_NAMES} more" if len(members) > MOST_NAMES else ""
                 text = f"the {what} of these bodies{more} changed by {drift.max():.2g} of what moves, though nothing else acts on them"
                 bodies = tuple(names[i] for i in members[:MOST_NAMES].tolist())
@@ -84,11 +87,12 @@ def momentum_drifts(record: RunRecord) -> Drifts:
     number = free_sets(record)
     order = np.argsort(number, kind="stable")
     order = order[np.count_nonzero(number < 0) :]
-    times = record.frames.times[:, None]
+    looked_at = _looked_at(record)
+    times = record.frames.times[looked_at, None]
     if not len(order):
         return Drifts([], np.zeros((len(times), 0)), np.zeros((len(times), 0)))
     first = np.flatnonzero(np.diff(number[order], prepend=-1))
-    x, q, v, w = (part[:, order] for part in record.frames[1:])
+    x, q, v, w = (part[np.ix_(looked_at, order)] for part in record.frames[1:])
     world = record.world
     mass, inertia, pull = world.mass[order], world.inertia[order], world.steady_acceleration[order]
     momenta = mass[:, None] * v
@@ -108,6 +112,12 @@ def momentum_drifts(record: RunRecord) -> Drifts:
     alike = ~np.logical_or.reduceat(np.any(pull != np.repeat(pull[first], count, axis=0), axis=1), first)
     angular = np.where(alike, np.linalg.norm(sums - sums[:1], axis=2), 0.0)
     return Drifts(np.split(order, first[1:]), _share(momentum, moves), _share(angular, turns))
+
+
+def _looked_at(record: RunRecord) -> np.ndarray:
+    """The frames that are looked at."""
+    number = len(record.frames.times)
+    return np.unique(np.linspace(0, number - 1, min(number, MOST_FRAMES)).astype(int))
 
 
 def _share(drift: np.ndarray, moves: np.ndarray | float) -> np.ndarray:
