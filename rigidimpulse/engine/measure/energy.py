@@ -50,6 +50,7 @@ MOST_NAMES: int = 3
 MOST_OF_RISE: float = 0.1
 """Part of what the body gained that gained most, from which another is named beside it."""
 REMEDY = "use a smaller step, or contact_solver='newton' where islands are sub-stepped"
+"""Tried on a jointed board that falls (`drawbridge` of the newcomers): 1.4e-4 of what moves by default, 1.1e-5 at a step of 1/240 s."""
 
 
 def taking_causes(world: World) -> frozenset[str]:
