@@ -35,7 +35,8 @@ MOST_FRAMES: int = 240
 """Frames that are looked at, at most, evenly chosen."""
 MOST_NAMES: int = 3
 """Bodies that a message names at most."""
-REMEDY = "use a smaller step; give joints limits, so that motors do not press the bodies that they join on each other"
+REMEDY = "give joints limits, so that motors do not press bodies of a chain on each other"
+"""Tried on a free chain of four boxes whose motors fold it: L changes by 5.6e-4 of what moves, by 1.4e-7 with limits of 1 rad."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,8 +42,8 @@ FEW: int = 24
 AT_ONCE: int = 2_000_000
 """Products of probes and faces that are computed at once."""
 REMEDY = "use a smaller step, or contact_solver='newton' where islands are sub-stepped"
-"""Tried on letters that fall on a floor and are forced to be sub-stepped (`falling_letters` of the newcomers): 6.6 % inside at a step of 1/60 s,
-nothing at 1/240 s nor with "newton"."""
+"""Tried on letters that fall on a floor and are forced to be sub-stepped (`falling_letters` of the newcomers): 6.6 % inside at a step of
+1/60 s, nothing at 1/240 s nor with "newton"."""
 
 
 @dataclass(frozen=True, eq=False)
