@@ -83,8 +83,8 @@ def make_recording(run: Run, duration: float) -> Recording:
     ledger = make_ledger(recorder.frames._replace(times=times), Masses(mass, world.inertia, world.steady_acceleration), run.log, work)
     run.soft_bodies.add_to(ledger)
     contacts = run.contact_log.table()
-    measured = record_of(world, recorder.frames._replace(times=times), ledger, impulses_by_cause(run, times, impacts, work))
-    report_measured(measured, run.log)
+    by_cause = impulses_by_cause(run, times, impacts, work)
+    report_measured(record_of(world, recorder.frames._replace(times=times), ledger, by_cause), run.log)
     return Recording(
         times=times,
         names=list(world.names),
@@ -100,6 +100,6 @@ def make_recording(run: Run, duration: float) -> Recording:
         scene=world.scene,
         reactions=reaction_table(run.joints, times),
         contacts=contacts,
-        by_cause=impulses_by_cause(run, times, impacts, work),
+        by_cause=by_cause,
         soft_bodies=run.soft_bodies.tracks(),
     )
