@@ -197,7 +197,7 @@ class PairEvents:
         given_up = np.empty(len(self.pairs), np.int64)
         count = count_contacts(self.table, time, INSTANT * self.run.world.accuracy.step, given_up)
         for place in given_up[:count].tolist():
-            kind, remedy = self.why_again(self.pairs[place]["a"], self.pairs[place]["b"])
+            kind, remedy = self.why_again(int(self.pairs[place]["a"]), int(self.pairs[place]["b"]))
             self.report(time, kind, given_up[given_up == place], remedy)
 
     def why_again(self, a: int, b: int) -> tuple[str, str]:

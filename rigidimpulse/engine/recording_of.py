@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidimpulse.engine.exact.joints import reaction_table
+from rigidimpulse.engine.measure.measure import record_of, report_measured
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.step import react
@@ -79,11 +80,11 @@ def make_recording(run: Run, duration: float) -> Recording:
     close_stretches(run)
     work = run.forces.finish(world, times, recorder)
     mass = np.where(world.dynamic & (times[:, None] >= release_times(world)), world.mass, 0.0)
-    ledger = make_ledger(
-        recorder.frames._replace(times=times), Masses(mass, world.inertia, world.steady_acceleration), run.log, work
-    )
+    ledger = make_ledger(recorder.frames._replace(times=times), Masses(mass, world.inertia, world.steady_acceleration), run.log, work)
     run.soft_bodies.add_to(ledger)
     contacts = run.contact_log.table()
+    by_cause = impulses_by_cause(run, times, impacts, work)
+    report_measured(record_of(world, recorder.frames._replace(times=times), ledger, by_cause), run.log)
     return Recording(
         times=times,
         names=list(world.names),
@@ -99,6 +100,6 @@ def make_recording(run: Run, duration: float) -> Recording:
         scene=world.scene,
         reactions=reaction_table(run.joints, times),
         contacts=contacts,
-        by_cause=impulses_by_cause(run, times, impacts, work),
+        by_cause=by_cause,
         soft_bodies=run.soft_bodies.tracks(),
     )

@@ -81,7 +81,7 @@ def make_ledger(frames: Frames, masses: Masses, log: EventLog, work: ForceWork |
             for sums in (kinetic, potential, momentum, angular):
                 sums[block] = sums[first - 1]
             continue
-        kinetic[block], potential[block], momentum[block], angular[block] = _mechanics(
+        kinetic[block], potential[block], momentum[block], angular[block] = mechanics(
             Frames(*(one[block] for one in frames)),
             masses._replace(mass=mass[block]),
             np.ones((1, 1)) if share is None else share[block],
@@ -108,7 +108,7 @@ def make_ledger(frames: Frames, masses: Masses, log: EventLog, work: ForceWork |
     return Ledger(times, kinetic.sum(1), stored, momentum, angular, dissipated)
 
 
-def _mechanics(frames: Frames, masses: Masses, share: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def mechanics(frames: Frames, masses: Masses, share: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Energies, kinetic and potential (f, n), momentum and angular momentum (f, 3) of frames; share (f, n): mass and inertia left."""
     _, position, orientation, velocity, angular_velocity = frames
     mass, inertia, steady_acceleration = masses

@@ -122,7 +122,7 @@ def _keep_better(rows, found, best, residual):
 
 @jit_with_callbacks
 def _raise_friction(solve, rows, n, target):
-    """Solve the rows with more and more of their friction, from none on. Returns the residual, m/s: inf if it finds no answer on the way."""
+    """Solve the rows with more and more of their friction, from none on. Returns the residual, m/s: inf if the way ends before."""
     full = rows.coefficient.copy()
     rows.impulse[:] = 0.0
     found = 0.0

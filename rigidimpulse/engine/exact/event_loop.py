@@ -658,7 +658,7 @@ def _places(which):
 
 @jit_making_arrays
 def _correct_positions(loop, island, touch, held, members):
-    """Bring sunken contacts back to their gap, and contacts inside each other that leave apart, and look at the island's contacts again (see `contact_forces`)."""
+    """Bring contacts that have sunk or are inside each other apart, and look at the island's contacts again (see `contact_forces`)."""
     motion, constants, time = loop.motion, loop.bodies.constants, island.time
     now, k = motion.now, len(members)
     place, turn, way = np.empty((k, 3)), np.empty((k, 4)), np.empty((k, 3))

@@ -1,0 +1,131 @@
+r"""Energy that a run made of nothing.
+
+    E(t) = K(t) + V(t) + sum of D_c(t)    over the causes c that may give energy
+
+must not rise. K and V are the kinetic and potential energy of the frames, D_c what a cause took until then (see `recording.ledger`).
+Causes that can only take energy are left out of the sum: what they gave is what is looked for. Which these are follows from the scene:
+
+    impact                           takes, unless a restitution is above 1
+    contact, energy correction       take, unless supports move or joints store energy: the ledger has their work in one sum with friction
+    stick, sub-stepping              take, unless supports move
+    joints                           take, unless supports move, or a row is soft or driven: springs and motors
+
+All others are added: forces by their names, "position correction", "overlap" and "let go", which move bodies without a force, and "mass
+that left". Where supports move everything is added. A second balance adds all causes in any scene: it is constant as far as the ledger is
+complete, and shows energy that is under no cause even where impacts take more at the same time. What a cause gave that the first balance
+adds is not judged: friction on a moving support is in one sum with the work of the support.
+
+The ledger spreads what a sub-stepped island took evenly over its step, so between the ends of steps a sum with "sub-stepping" is not
+constant. Where there were such islands the second balance is not looked at, and neither is the first where supports move. Contacts that
+join such an island are moved apart, by up to GAP of the inner radius r of a body, and what is above them goes up, too. The ledger has this
+in "sub-stepping". A body of the weight w, at the height h above the lowest, stands on h / 2 r others of its kind at most, so
+
+    A = sum of w GAP (h / 2 + r)    in runs with sub-stepped islands, else 0
+
+Frame 0 is the state as given: what a cause takes at the time 0 counts from frame 1 on.
+
+The rise is that of either balance over its least value so far. It is compared with the energy that moves,
+
+    rise <= RISE S + A,    S = max K + (max V - min V) + sum of (max D_c - min D_c) over the causes that are added
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.collision.manifold.shrunk_shapes import inner_radii
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.engine.measure.record import Fault, RunRecord
+from rigidimpulse.model.world import World
+from rigidimpulse.recording.ledger import Masses, mechanics
+
+KIND = "energy made"
+RISE: float = 1e-3
+"""Rise of the energy that no cause accounts for, of the energy that moves, from which a run is not ok."""
+GAP: float = 0.6 * TOLERANCES.sub_stepping.skin
+"""Gap to which sub-stepped contacts are moved apart, of the inner radius: a fifth of the skin, and three times that, since wedges go up by
+more than their gaps."""
+MOST_NAMES: int = 3
+"""Bodies that a message names at most."""
+MOST_OF_RISE: float = 0.1
+"""Part of what the body gained that gained most, from which another is named beside it."""
+REMEDY = "use a smaller step, or contact_solver='newton' where islands are sub-stepped"
+"""Tried on a jointed board that falls (`drawbridge` of the newcomers): 1.4e-4 of what moves by default, 1.1e-5 at a step of 1/240 s."""
+
+
+def taking_causes(world: World) -> frozenset[str]:
+    """Causes that can only take energy in this scene."""
+    if np.any(world.moving):
+        return frozenset()
+    takes = {"stick", "sub-stepping"}
+    if not np.any(world.coefficients[:, :, 0] > 1.0):
+        takes.add("impact")
+    if not _joints_give(world):
+        takes |= {"joints", "contact", "energy correction"}
+    return frozenset(takes)
+
+
+def _joints_give(world: World) -> bool:
+    """Whether a joint has a spring or a motor."""
+    if not world.joints_of_scene:
+        return False
+    table = world.joints
+    return bool(np.any(np.isfinite(table.stiffness) & (table.stiffness > 0.0)) or np.any(table.rate != 0.0))
+
+
+def energy_rise(record: RunRecord) -> tuple[np.ndarray, float]:
+    """Rise (f,) J over its least value so far, of the first balance or of the second, whichever is larger; and S, J."""
+    ledger, takes = record.ledger, taking_causes(record.world)
+    given, all_causes = ledger.total.copy(), ledger.total.copy()
+    moved = float(ledger.kinetic.max() + np.ptp(ledger.potential))
+    for cause, taken in ledger.dissipated.items():
+        all_causes[1:] += taken[1:]
+        if cause not in takes:
+            given[1:] += taken[1:]
+            moved += float(np.ptp(taken))
+    rise = np.zeros(len(given))
+    if not record.may_be_sub_stepped:
+        rise = all_causes - np.minimum.accumulate(all_causes)
+    if not record.may_be_sub_stepped or "sub-stepping" in takes:
+        rise = np.maximum(rise, given - np.minimum.accumulate(given))
+    return rise, moved
+
+
+def allowed_rise(record: RunRecord, moved: float) -> np.ndarray:
+    """Rise (f,) J that is allowed at each frame; moved: S, J."""
+    allowed, world = np.full(len(record.frames.times), RISE * moved), record.world
+    if record.may_be_sub_stepped:
+        dynamic = world.dynamic
+        weight = world.mass[dynamic, None] * world.steady_acceleration[dynamic]
+        strength = np.linalg.norm(weight, axis=1)
+        inner = inner_radii(world.geometry)[world.shape_of_body[dynamic]]
+        stored = -np.einsum("fnk,nk->fn", record.frames.position[:, dynamic], weight)
+        height = np.divide(stored, strength, out=np.zeros_like(stored), where=strength > 0.0)
+        allowed += GAP * (0.5 * (height - height.min(axis=1, keepdims=True)) + inner) @ strength
+    return allowed
+
+
+def energy_faults(record: RunRecord) -> list[Fault]:
+    """The fault of a run that made energy, with the time at which the rise came to its bound, and the bodies that gained in that frame."""
+    rise, moved = energy_rise(record)
+    if not np.isfinite(moved) or not moved > 0.0:
+        return []
+    too_much = rise > allowed_rise(record, moved)
+    if not np.any(too_much):
+        return []
+    first, most = int(np.argmax(too_much)), int(np.argmax(rise))
+    times, amount = record.frames.times, float(rise[most])
+    text = f"{amount:.3g} J came from nothing until {times[most]:.6g} s, {amount / moved:.1%} of the energy that moves; {REMEDY}"
+    return [Fault(float(times[first]), KIND, _gainers(record, first), amount, text)]
+
+
+def _gainers(record: RunRecord, frame: int) -> tuple[str, ...]:
+    """Names of the bodies whose energy rose most from the frame before to this one."""
+    frames, world = record.frames, record.world
+    here = slice(frame - 1, frame + 1)
+    mass = np.where(world.dynamic & (frames.times[here, None] >= record.release), world.mass, 0.0)
+    parts = type(frames)(*(part[here] for part in frames))
+    kinetic, potential, _, _ = mechanics(parts, Masses(mass, world.inertia, world.steady_acceleration), np.ones((1, 1)))
+    gain = np.diff(kinetic + potential, axis=0)[0]
+    order = np.argsort(-gain, kind="stable")[:MOST_NAMES]
+    return tuple(world.names[i] for i in order if gain[i] >= MOST_OF_RISE * abs(gain[order[0]]) or i == order[0])

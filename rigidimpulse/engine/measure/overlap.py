@@ -1,0 +1,201 @@
+r"""Overlap at recorded frames, found by other means than those of the engine.
+
+Frames are chosen evenly. In each, pairs of bodies are candidates whose boxes along the axes of the world overlap. Left out are pairs of
+which neither body is dynamic then, those that a joint or a collision filter keeps apart, and those that stand as they did in the frame that
+was chosen before. The depth of a candidate is a lower bound, see `depth`. A pair is in order if
+
+    depth <= EXACT s        exact contacts
+    depth <= SUB_STEPPED s  in a run with sub-stepped islands
+    s: size of the smaller body
+
+Pairs that are deeper at the start are not looked at until they are in order for the first time: such an overlap is reported where the run
+starts. Nothing is looked at where bodies are inside each other by the caller's choice: with `response="penalty"`, and with an `impact_time`
+that is late.
+
+The cost follows the numbers of bodies and of frames that are looked at, never the clock: a run gives the same result on every machine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, box_of, depth_in, planes_of, probe_of, solid_of, surely_apart
+from rigidimpulse.engine.measure.record import Fault, RunRecord
+from rigidimpulse.model.world import World
+
+KIND = "bodies inside each other"
+EXACT: float = 1e-4
+"""Depth, of the size of the smaller body, from which a run is not ok; contacts are held at gaps of some 1e-6."""
+SUB_STEPPED: float = 2e-2
+"""The same of runs with sub-stepped islands, whose contacts are soft."""
+MOST_FRAMES: int = 24
+FEWEST_FRAMES: int = 6
+POSES: int = 1200
+"""Frames that are looked at: POSES over the number of bodies, within these bounds."""
+LATE = ("linear", "after")
+"""Settings of `Accuracy.impact_time` by which impacts are found too late, or missed."""
+FEW: int = 24
+"""Bodies up to which all pairs are compared at once."""
+AT_ONCE: int = 2_000_000
+"""Products of probes and faces that are computed at once."""
+REMEDY = "use a smaller step, or contact_solver='newton' where islands are sub-stepped"
+"""Tried on letters that fall on a floor and are forced to be sub-stepped (`falling_letters` of the newcomers): 6.6 % inside at a step of
+1/60 s, nothing at 1/240 s nor with "newton"."""
+
+
+@dataclass(frozen=True, eq=False)
+class Depths:
+    """Depths of c candidates, those of a pair in order of time."""
+
+    frame: np.ndarray  # (c,)
+    a: np.ndarray  # (c,)
+    b: np.ndarray  # (c,)
+    depth: np.ndarray  # (c,) m
+    size: np.ndarray  # (c,) m, of the smaller body
+
+
+def overlap_faults(record: RunRecord) -> list[Fault]:
+    """A fault for each pair that was too deep inside each other, with the frame at which it was deepest."""
+    found, names = overlap_depths(record), record.world.names
+    bound = SUB_STEPPED if record.may_be_sub_stepped else EXACT
+    deep = found.depth > bound * found.size
+    faults = []
+    for pair in np.unique(np.column_stack([found.a, found.b])[deep], axis=0).tolist():
+        mine = np.flatnonzero((found.a == pair[0]) & (found.b == pair[1]))
+        if deep[mine[0]] and found.frame[mine[0]] == 0:
+            # Deep where the run starts: from the first frame on in which it is in order.
+            mine = mine[np.logical_or.accumulate(~deep[mine])]
+        if not np.any(deep[mine]):
+            continue
+        worst = mine[int(np.argmax(found.depth[mine]))]
+        depth, time = float(found.depth[worst]), float(record.frames.times[found.frame[worst]])
+        share = depth / float(found.size[worst])
+        text = f"the bodies are inside each other by {depth:.3g} m, {share:.2g} of the size of the smaller"
+        faults.append(Fault(time, KIND, (names[pair[0]], names[pair[1]]), depth, f"{text}; {REMEDY}"))
+    return faults
+
+
+def overlap_depths(record: RunRecord) -> Depths:
+    """Depths of all candidates, see the head of the module."""
+    world = record.world
+    frame, a, b = _candidates(record)
+    size, depth = np.minimum(world.size[a], world.size[b]), np.zeros(len(a))
+    if not len(a):
+        return Depths(frame, a, b, depth, size)
+    shapes = _Shapes(world)
+    kinds, number = np.unique(np.column_stack([world.shape_of_body[a], world.shape_of_body[b]]), axis=0, return_inverse=True)
+    order = np.argsort(number, kind="stable")
+    for (shape_a, shape_b), those in zip(kinds.tolist(), np.split(order, np.flatnonzero(np.diff(number[order])) + 1), strict=True):
+        for mine, other, shapes_of in ((a, b, (shape_a, shape_b)), (b, a, (shape_b, shape_a))):
+            probe, solid = shapes.probe(shapes_of[0]), shapes.solid(shapes_of[1])
+            posed = _posed(record, frame[those], mine[those], other[those])
+            near = np.flatnonzero(~surely_apart(solid, probe, posed))
+            those, posed = those[near], posed.part(near)
+            length = max(AT_ONCE // max(_work(probe, solid), 1), 1)
+            for first in range(0, len(those), length):
+                here = np.arange(first, min(first + length, len(those)))
+                depth[those[here]] = np.maximum(depth[those[here]], depth_in(solid, probe, posed.part(here)))
+    return Depths(frame, a, b, depth, size)
+
+
+class _Shapes:
+    """Probes and solids of shapes, made when they are first asked for."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._planes: dict[int, list[np.ndarray | None]] = {}
+        self._probes: dict[int, Probe] = {}
+        self._solids: dict[int, Solid] = {}
+
+    def _planes_of(self, shape: int) -> list[np.ndarray | None]:
+        if shape not in self._planes:
+            self._planes[shape] = planes_of(self._world.shapes[shape])
+        return self._planes[shape]
+
+    def probe(self, shape: int) -> Probe:
+        if shape not in self._probes:
+            self._probes[shape] = probe_of(self._world.shapes[shape], self._planes_of(shape))
+        return self._probes[shape]
+
+    def solid(self, shape: int) -> Solid:
+        if shape not in self._solids:
+            self._solids[shape] = solid_of(self._world.shapes[shape], self._planes_of(shape), self._world.geometry, shape)
+        return self._solids[shape]
+
+
+def _work(probe: Probe, solid: Solid) -> int:
+    """Products of probes and faces of a candidate."""
+    faces = sum(map(len, solid.convex)) + len(solid.rounded) + len(solid.cylinders) + len(solid.surface)
+    return (len(probe.radii) + 2 * len(probe.edges)) * faces
+
+
+def _posed(record: RunRecord, frame: np.ndarray, mine: np.ndarray, other: np.ndarray) -> Posed:
+    """Poses of bodies `mine` (c,) in the frames of bodies `other` (c,)."""
+    position, orientation = record.frames.position, record.frames.orientation
+    rotation, into = to_matrix(orientation[frame, mine]), to_matrix(orientation[frame, other])
+    apart = position[frame, mine] - position[frame, other]
+    return Posed(np.einsum("cji,cjk->cik", into, rotation), np.einsum("cji,cj->ci", into, apart))
+
+
+def frames_looked_at(world: World, number: int) -> np.ndarray:
+    """Which of `number` frames are looked at, the first and the last included."""
+    count = min(max(POSES // world.num_bodies, FEWEST_FRAMES), MOST_FRAMES)
+    return np.unique(np.linspace(0, number - 1, count).astype(int))
+
+
+def _candidates(record: RunRecord) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frames, bodies a and bodies b > a (c,) of the candidates, frame by frame."""
+    frames, world = record.frames, record.world
+    if not world.can_collide or world.accuracy.impact_time in LATE:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
+    chosen = frames_looked_at(world, len(frames.times))
+    position, orientation = frames.position[chosen], frames.orientation[chosen]
+    still = np.zeros(position.shape[:2], bool)
+    still[1:] = np.all(position[1:] == position[:-1], axis=2) & np.all(orientation[1:] == orientation[:-1], axis=2)
+    dynamic = np.logical_and(world.dynamic, frames.times[chosen, None] >= record.release)
+    centre, half, endless = _boxes_of_bodies(world)
+    rotation = to_matrix(orientation)
+    middle = position + np.einsum("fnij,nj->fni", rotation, centre)
+    reach = np.einsum("fnij,nj->fni", np.abs(rotation), half)
+    reach[:, endless] = np.inf
+    k, a, b = box_pairs(middle - reach, middle + reach)
+    kept = (dynamic[k, a] | dynamic[k, b]) & ~(still[k, a] & still[k, b]) & ~world.is_apart(a, b)
+    return chosen[k[kept]], a[kept], b[kept]
+
+
+def _boxes_of_bodies(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Middles and half lengths (n, 3) m of boxes of bodies along their own axes, and which bodies (n,) have none."""
+    low, high = (np.array(side).reshape(-1, 3) for side in zip(*map(box_of, world.shapes), strict=True))
+    endless = np.any(np.isinf(high), axis=1)
+    low[endless] = high[endless] = 0.0
+    of = world.shape_of_body
+    return 0.5 * (low + high)[of], 0.5 * (high - low)[of], endless[of]
+
+
+def box_pairs(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frames, and pairs a < b, (k,) each, of boxes (f, n, 3) that overlap; frame by frame, in order of a and b."""
+    count = low.shape[1]
+    if count <= FEW:
+        a, b = np.triu_indices(count, 1)
+        frame, pair = np.nonzero(np.all((low[:, a] <= high[:, b]) & (low[:, b] <= high[:, a]), axis=2))
+        return frame, a[pair], b[pair]
+    found = [_pairs_along_axis(*boxes) for boxes in zip(low, high, strict=True)]
+    frame = np.repeat(np.arange(len(found)), [len(pairs) for pairs in found])
+    return frame, *np.concatenate(found).T
+
+
+def _pairs_along_axis(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Pairs a < b (k, 2) of boxes (n, 3) that overlap, found along the axis on which the lower ends are spread most."""
+    axis = int(np.argmax(np.ptp(low[np.isfinite(low[:, 0])], axis=0)))
+    order = np.argsort(low[:, axis], kind="stable")
+    last = np.searchsorted(low[order, axis], high[order, axis], side="right")
+    count = np.maximum(last - np.arange(len(order)) - 1, 0)
+    first = np.repeat(np.arange(len(order)), count)
+    second = first + 1 + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    i, j = order[first], order[second]
+    meets = np.all((low[i] <= high[j]) & (low[j] <= high[i]), axis=1)
+    a, b = np.minimum(i, j)[meets], np.maximum(i, j)[meets]
+    return np.column_stack([a, b])[np.lexsort((b, a))]

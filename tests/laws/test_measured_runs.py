@@ -1,0 +1,259 @@
+"""A run measures itself: planted faults are found with time, bodies and amount, and sound runs of ordinary scenes show none.
+
+Faults are planted in recorded arrays. The measures are functions of them, so what finds these finds those of a solver, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+import rigidimpulse as ri
+from rigidimpulse.collision.distance.fcl import Narrowphase
+from rigidimpulse.collision.geometry import CompiledShape, compile_shape
+from rigidimpulse.core.quaternion import rotate, to_matrix
+from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, depth_in, planes_of, probe_of, solid_of, surely_apart
+from rigidimpulse.engine.measure.measure import measured_faults, record_of_recording
+from rigidimpulse.engine.measure.overlap import box_pairs
+from rigidimpulse.engine.measure.record import RunRecord
+from rigidimpulse.recording.ledger import Masses, mechanics
+from rigidimpulse.recording.recorder import Frames
+
+MEASURED = {"energy made", "momentum not kept", "bodies inside each other"}
+BOX = ri.Shape.box((0.2, 0.2, 0.2))
+FLOOR = ri.Body("floor", ri.Shape.half_space(), motion="static")
+
+
+def scene_of(*bodies: ri.Body, gravity: float = -9.81) -> ri.Scene:
+    """A scene of these bodies."""
+    scene = ri.Scene(gravity=(0.0, 0.0, gravity))
+    for body in bodies:
+        scene.add(body)
+    return scene
+
+
+def falling_boxes() -> ri.Recording:
+    """Three boxes fall, tilted, onto a floor."""
+    scene = scene_of(FLOOR)
+    for k in range(3):
+        scene.add(ri.Body(f"box {k}", BOX, position=(0.05 * k, 0.0, 0.3 + 0.3 * k), angular_velocity=(1.0, 0.5 * k, 0.0)))
+    return ri.simulate(scene, 0.6)
+
+
+def sub_stepped_pile() -> ri.Recording:
+    """Four boxes fall on each other and are sub-stepped."""
+    scene = scene_of(FLOOR)
+    for k in range(4):
+        scene.add(ri.Body(f"box {k}", BOX, position=(0.03 * k, 0.0, 0.11 + 0.25 * k)))
+    return ri.simulate(scene, 1.0, accuracy=ri.Accuracy(contact_solver="substepped"))
+
+
+def pendulum() -> ri.Recording:
+    """A box swings on a hinge."""
+    scene = scene_of(ri.Body("bob", BOX, position=(0.5, 0.0, 0.0)))
+    scene.add(ri.HingeJoint(None, "bob", anchor=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0)))
+    return ri.simulate(scene, 1.0)
+
+
+def motor() -> ri.Recording:
+    """A motor turns a box up."""
+    scene = scene_of(ri.Body("arm", BOX, position=(0.3, 0.0, 0.0), mass=1.0))
+    drive = ri.Motor(velocity=4.0, damping=50.0)
+    scene.add(ri.HingeJoint(None, "arm", anchor=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0), motor=drive))
+    return ri.simulate(scene, 0.5)
+
+
+def moving_platform() -> ri.Recording:
+    """A platform that moves up carries a box."""
+    scene = scene_of(FLOOR)
+    keys = ri.Keyframes((0.0, 1.0), ((0.0, 0.0, 0.5), (0.5, 0.0, 1.5)))
+    scene.add(ri.Body("platform", ri.Shape.box((1.0, 1.0, 0.1)), motion="kinematic", position=(0.0, 0.0, 0.5), keyframes=keys))
+    scene.add(ri.Body("box", BOX, position=(0.0, 0.0, 0.7)))
+    return ri.simulate(scene, 1.2)
+
+
+def spring() -> ri.Recording:
+    """A spring throws a box up."""
+    scene = scene_of(ri.Body("bob", BOX, position=(0.0, 0.0, 1.0), mass=1.0))
+    scene.add(ri.Spring(None, "bob", (0.0, 0.0, 2.0), (0.0, 0.0, 1.1), stiffness=100.0, rest_length=0.3))
+    return ri.simulate(scene, 1.0)
+
+
+def collision_in_space() -> ri.Recording:
+    """Two boxes meet without gravity, off centre and rough; a third one is far away."""
+    moving = ri.Body("a", BOX, velocity=(1.0, 0.0, 0.0), angular_velocity=(0.3, 0.2, 1.0))
+    hit = ri.Body("b", BOX, position=(0.6, 0.08, 0.05), mass=5.0)
+    far = ri.Body("c", BOX, position=(0.0, 5.0, 0.0), angular_velocity=(1.0, 2.0, 3.0))
+    return ri.simulate(scene_of(moving, hit, far, gravity=0.0), 1.0)
+
+
+SOUND = (falling_boxes, sub_stepped_pile, pendulum, motor, moving_platform, spring, collision_in_space)
+
+
+@pytest.mark.parametrize("make", SOUND, ids=lambda make: make.__name__)
+def test_a_sound_run_shows_nothing(make) -> None:
+    run = make()
+    assert run.status.ok, run.status.message
+    assert measured_faults(recorded(run)) == []
+
+
+def recorded(run: ri.Recording, **altered: np.ndarray) -> RunRecord:
+    """The record of a run with some arrays altered: position, velocity, angular_velocity. The ledger follows, except its causes."""
+    record = record_of_recording(run)
+    frames, ledger = record.frames._replace(**altered), record.ledger
+    before, after = (_mechanical(record.world, one) for one in (record.frames, frames))
+    kinetic, potential = (old + new - was for old, new, was in zip((ledger.kinetic, ledger.potential), after, before, strict=True))
+    return replace(record, frames=frames, ledger=replace(ledger, kinetic=kinetic, potential=potential))
+
+
+def _mechanical(world, frames: Frames) -> tuple[np.ndarray, np.ndarray]:
+    masses = Masses(np.where(world.dynamic, world.mass, 0.0), world.inertia, world.steady_acceleration)
+    kinetic, potential, _, _ = mechanics(frames, masses, np.ones((1, 1)))
+    return kinetic.sum(1), potential.sum(1)
+
+
+@pytest.mark.parametrize("make", [falling_boxes, pendulum, motor, spring, collision_in_space], ids=lambda make: make.__name__)
+def test_faster_bodies_are_energy_made(make) -> None:
+    """All speeds are 1 % larger from the fastest frame on: 2 % of the kinetic energy of that instant appears."""
+    run = make()
+    frame = 1 + int(np.argmax(run.ledger.kinetic[1:-1]))
+    faster = np.ones(len(run.times))
+    faster[frame:] = 1.01
+    record = recorded(run, velocity=run.velocities * faster[:, None, None], angular_velocity=run.angular_velocities * faster[:, None, None])
+    fault = next(fault for fault in measured_faults(record) if fault.kind == "energy made")
+    kinetic = run.ledger.kinetic[frame]
+    assert fault.time == run.times[frame] and fault.bodies
+    assert 0.5 * 0.0201 * kinetic < fault.amount < 0.0202 * run.ledger.kinetic.max()
+
+
+def test_energy_of_nothing_names_the_body_that_got_it() -> None:
+    run = falling_boxes()
+    velocity = run.velocities.copy()
+    velocity[20:, run.index("box 1"), 0] += 1.0
+    fault = next(fault for fault in measured_faults(recorded(run, velocity=velocity)) if fault.kind == "energy made")
+    assert fault.time == run.times[20] and fault.bodies[0] == "box 1"
+
+
+@pytest.mark.parametrize(("what", "kick"), [("velocity", (1e-4, 0.0, 0.0)), ("angular_velocity", (0.0, 0.0, 1e-2))])
+def test_a_kick_is_momentum_that_is_not_kept(what: str, kick: tuple[float, float, float]) -> None:
+    """The kick is a ten-thousandth of the speed of the bodies: far too small to be seen in the energy."""
+    run = collision_in_space()
+    state = {"velocity": run.velocities, "angular_velocity": run.angular_velocities}[what].copy()
+    state[25:, run.index("b")] += kick
+    faults = measured_faults(recorded(run, **{what: state}))
+    assert [fault.kind for fault in faults if fault.kind != "energy made"] == ["momentum not kept"]
+    fault = next(fault for fault in faults if fault.kind == "momentum not kept")
+    assert fault.time == run.times[25] and fault.bodies == ("a", "b")
+    assert 1e-5 < fault.amount < 1.0
+
+
+@pytest.mark.parametrize("make", [falling_boxes, sub_stepped_pile], ids=lambda make: make.__name__)
+def test_a_body_moved_into_another_is_inside_it(make) -> None:
+    """For one of the frames that are looked at, box 1 stands 38 % of its size inside box 0, face to face."""
+    run = make()
+    frame = int(np.unique(np.linspace(0, len(run.times) - 1, 24).astype(int))[10])
+    a, b = run.index("box 0"), run.index("box 1")
+    position = run.centers.copy()
+    inside = 0.2 * (1.0 - 0.38)
+    axis = axis_of(run, a, frame)
+    position[frame, b] = position[frame, a] + inside * axis
+    faults = [f for f in measured_faults(recorded(run, position=position)) if f.bodies == ("box 0", "box 1") and f.kind != "energy made"]
+    assert [fault.kind for fault in faults] == ["bodies inside each other"]
+    assert faults[0].time == run.times[frame]
+    assert 0.2 * 0.19 < faults[0].amount < 0.2 * 0.6
+
+
+def axis_of(run: ri.Recording, body: int, frame: int) -> np.ndarray:
+    """The x axis (3,) of a body."""
+    return rotate(run.orientations[frame, body], np.array([1.0, 0.0, 0.0]))
+
+
+def test_an_overlap_that_the_scene_begins_with_is_reported_once() -> None:
+    """The engine says that the boxes were drawn inside each other; the measures do not say so again."""
+    run = ri.simulate(scene_of(ri.Body("a", BOX), ri.Body("b", BOX, position=(0.15, 0.0, 0.0)), gravity=0.0), 0.5)
+    assert [event.kind for event in run.status.problems] == ["overlap at the start"]
+
+
+SHAPES = {
+    "box": ri.Shape.box((0.2, 0.3, 0.4)),
+    "hull": ri.Shape.convex_hull(0.2 * np.random.default_rng(3).normal(size=(20, 3))),
+    "sphere": ri.Shape.sphere(0.15),
+    "capsule": ri.Shape.capsule(0.1, 0.4),
+    "cylinder": ri.Shape.cylinder(0.15, 0.3),
+    "half space": ri.Shape.half_space(),
+}
+
+
+def probe(shape: CompiledShape) -> Probe:
+    """What of a shape may enter another one."""
+    return probe_of(shape, planes_of(shape))
+
+
+def solid(shape: CompiledShape) -> Solid:
+    """What of a shape may be entered."""
+    return solid_of(shape, planes_of(shape))
+
+
+@pytest.mark.parametrize("other", SHAPES)
+@pytest.mark.parametrize("mine", [name for name in SHAPES if name != "half space"])
+def test_depths_are_lower_bounds(mine: str, other: str) -> None:
+    """Bodies at random poses. Where FCL says that they are apart the depth is 0; where they are deep inside each other it is not."""
+    rng = np.random.default_rng(7)
+    shapes = [compile_shape(SHAPES[name], np.zeros(3), np.eye(3)) for name in (mine, other)]
+    probes, solids, exact = [probe(shape) for shape in shapes], [solid(shape) for shape in shapes], Narrowphase(shapes)
+    found = 0
+    for _ in range(150):
+        x, q = rng.normal(size=3) * 0.2, rng.normal(size=4)
+        q /= np.linalg.norm(q)
+        rotation = to_matrix(q)
+        there, back = Posed(rotation[None], x[None]), Posed(rotation.T[None], -(rotation.T @ x)[None])
+        depth = depth_in(solids[1], probes[0], there)[0]
+        depth = max(depth, depth_in(solids[0], probes[1], back)[0] if other != "half space" else 0.0)
+        still = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+        apart = exact.separation(1, still, 0, (x, q))
+        if apart.gap > 0.0:
+            assert depth <= 1e-6
+            continue
+        assert not surely_apart(solids[1], probes[0], there)[0] or apart.gap > -1e-9
+        if np.all(np.isfinite(apart.normal)) and "cylinder" not in (mine, other):
+            # Closed forms: of balls, and of half spaces.
+            assert depth <= -apart.gap * (1.0 + 1e-9) + 1e-12
+        # No way out along any axis of the world by 6 cm: deep.
+        ways = 0.06 * np.vstack([np.eye(3), -np.eye(3)])
+        if all(exact.overlap(1, still, 0, (x + way, q)) for way in ways):
+            found += 1
+            assert depth > 0.005
+    assert found > 5
+
+
+def test_rods_that_cross_are_inside_each_other() -> None:
+    """Two long boxes cross: no corner of one is in the other, only edges are."""
+
+    rod = compile_shape(ri.Shape.box((2.0, 0.02, 0.02)), np.zeros(3), np.eye(3))
+    turned = Posed(np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]]), np.array([[0.31, 0.17, 0.015]]))
+    assert depth_in(solid(rod), probe(rod), turned)[0] == pytest.approx(0.005)
+
+
+def test_a_point_in_a_tube_is_in_the_air() -> None:
+    """A surface with a hole is entered in its walls only."""
+
+    tube = trimesh.creation.annulus(0.5, 0.7, 1.0)
+    shape = compile_shape(ri.Shape.mesh(tube.vertices, tube.faces), np.zeros(3), np.eye(3))
+    ball = probe(compile_shape(ri.Shape.sphere(1e-3), np.zeros(3), np.eye(3)))
+    places = np.array([[0.0, 0.0, 0.0], [0.6, 0.0, 0.0], [0.8, 0.0, 0.0]])
+    depth = depth_in(solid(shape), ball, Posed(np.tile(np.eye(3), (3, 1, 1)), places))
+    assert depth[0] == depth[2] == 0.0 and 0.09 < depth[1] < 0.102
+
+
+@pytest.mark.parametrize("number", [10, 60])
+def test_boxes_that_overlap_are_all_found(number: int) -> None:
+    rng = np.random.default_rng(1)
+    low = rng.normal(size=(3, number, 3))
+    high = low + rng.uniform(0.0, 1.0, size=low.shape)
+    low[:, 7], high[:, 7] = -np.inf, np.inf
+    every = [(f, i, j) for f in range(3) for i in range(number) for j in range(i + 1, number)]
+    expected = [(f, i, j) for f, i, j in every if np.all((low[f, i] <= high[f, j]) & (low[f, j] <= high[f, i]))]
+    assert list(zip(*(side.tolist() for side in box_pairs(low, high)), strict=True)) == expected
