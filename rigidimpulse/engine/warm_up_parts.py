@@ -12,6 +12,7 @@ from collections.abc import Collection
 import numpy as np
 
 from rigidimpulse.collision.time_of_impact import bisection
+from rigidimpulse.core.union_find import roots
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_impact import fill_rates, impact_rows
@@ -88,7 +89,7 @@ def _respond_and_detect(run: Run) -> None:
     members = np.array([1])
     now.inv_inertia[1] = np.eye(3)
     needs_correction(contacts, np.ones(1, bool), one)
-    which = leaves_from_inside(contacts, np.ones(1, bool))
+    which = leaves_from_inside(contacts, np.ones(1, bool), one)
     correct_positions(now, contacts, Sunk(which, which, np.zeros(1)), members, run.column)
     refresh_pose(members, now, state.rotation, state.trajectory.inertia)
     bring_gyroscopic(members, now, state.rotation, state.trajectory.inertia, run.angular_acceleration)
@@ -124,6 +125,8 @@ def _record(run: Run, contacts: Contacts, members: np.ndarray) -> None:
     run.contact_log.close(members, 1.0)
     run.contact_log.table()
     run.log.add_stretch(0.0, 1.0, 1, 0.0, 0.0)
+    # At the end a run looks which bodies belong together.
+    roots(1, members[:0], members[:0])
 
 
 def _move_and_sweep(run: Run) -> None:

@@ -47,8 +47,16 @@ def sub_stepped_pile() -> ri.Recording:
     """Four boxes fall on each other and are sub-stepped."""
     scene = scene_of(FLOOR)
     for k in range(4):
-        scene.add(ri.Body(f"box {k}", BOX, position=(0.03 * k, 0.0, 0.11 + 0.25 * k)))
+        scene.add(ri.Body(f"box {k}", BOX, position=(0.03 * k, 0.0, 0.11 + 0.205 * k)))
     return ri.simulate(scene, 1.0, accuracy=ri.Accuracy(contact_solver="substepped"))
+
+
+def boxes_dropped_on_boxes(**accuracy) -> ri.Recording:
+    """Four boxes fall on each other from 5 cm."""
+    scene = scene_of(FLOOR)
+    for k in range(4):
+        scene.add(ri.Body(f"box {k}", BOX, position=(0.03 * k, 0.0, 0.11 + 0.25 * k)))
+    return ri.simulate(scene, 1.0, accuracy=ri.Accuracy(**accuracy))
 
 
 def pendulum() -> ri.Recording:
@@ -91,6 +99,14 @@ def collision_in_space() -> ri.Recording:
 
 
 SOUND = (falling_boxes, sub_stepped_pile, pendulum, motor, moving_platform, spring, collision_in_space)
+
+
+def test_what_rises_out_of_deep_overlaps_is_reported_and_the_remedies_help() -> None:
+    """In steps of 1/60 s boxes at 2 m/s go 16 mm into each other and rise out of that: 2 % of the energy, which no speed pays."""
+    coarse = boxes_dropped_on_boxes(contact_solver="substepped")
+    assert [event.kind for event in coarse.status.problems] == ["energy made"]
+    assert boxes_dropped_on_boxes(contact_solver="substepped", step=1.0 / 240.0).status.ok
+    assert boxes_dropped_on_boxes(contact_solver="newton").status.ok
 
 
 @pytest.mark.parametrize("make", SOUND, ids=lambda make: make.__name__)

@@ -6,7 +6,8 @@ the island are moved by the smallest displacement in the metric of mass that bri
     dx = M^-1 J_n^T p,    0 <= p _|_ g + J_n dx - target >= 0.
 
 A contact inside the other surface that leaves is met again and again on its way out. It is brought back to CLEAR d only: what is inside
-by round-off moves by round-off. Velocities do not change. The ledger records the change of potential energy.
+by round-off moves by round-off. One that is deeper than DEPTH d, as rough ways of finding impacts leave it, moves out by its own speed.
+Velocities do not change. The ledger records the change of potential energy.
 """
 
 from typing import NamedTuple
@@ -21,6 +22,7 @@ from rigidimpulse.dynamics.solvers.newton import solve_newton
 SUNK = 0.7
 # Other contacts of the island may not sink below this part of the contact margin.
 KEPT = 0.75
+DEPTH = TOLERANCES.manifold.depth
 CLEAR = TOLERANCES.events.contact_margin_round_off
 SOLVE_TOLERANCE = TOLERANCES.contact_forces.correction_residual
 
@@ -34,19 +36,21 @@ class Sunk(NamedTuple):
 
 
 @jit_making_arrays
-def leaves_from_inside(contacts, held):
-    """Contacts (m,) bool inside each other that do not last; held (m,) bool: those that do."""
+def leaves_from_inside(contacts, held, contact_margin):
+    """Contacts (m,) bool a little inside each other that do not last; held (m,) bool: those that do; contact_margin (m,) m."""
     inside = np.empty(held.shape[0], np.bool_)
     for c in range(held.shape[0]):
-        inside[c] = contacts.gap[c] < 0.0 and not held[c]
+        inside[c] = not held[c] and -DEPTH * contact_margin[c] < contacts.gap[c] < 0.0
     return inside
 
 
 @jit
 def needs_correction(contacts, held, contact_margin):
-    """Whether a held contact has sunk, or another is inside; held (m,) bool, contact_margin (m,) m."""
+    """Whether a held contact has sunk, or another is a little inside; held (m,) bool, contact_margin (m,) m."""
     for c in range(contacts.gap.shape[0]):
-        if contacts.gap[c] < (SUNK * contact_margin[c] if held[c] else 0.0):
+        if held[c] and contacts.gap[c] < SUNK * contact_margin[c]:
+            return True
+        if not held[c] and -DEPTH * contact_margin[c] < contacts.gap[c] < 0.0:
             return True
     return False
 

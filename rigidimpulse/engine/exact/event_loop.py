@@ -671,7 +671,8 @@ def _correct_positions(loop, island, touch, held, members):
     around = _contacts_near(loop, members, time)
     lifted, inside, depth = np.zeros(len(around.live), np.bool_), np.zeros(len(around.live), np.bool_), 0.0
     mark_same(touch.contacts, touch.touching, held, around.contacts, around.touching, lifted)
-    mark_same(touch.contacts, touch.touching, leaves_from_inside(touch.contacts, held), around.contacts, around.touching, inside)
+    leaving = leaves_from_inside(touch.contacts, held, touch.contact_margin)
+    mark_same(touch.contacts, touch.touching, leaving, around.contacts, around.touching, inside)
     correct_positions(now, around.contacts, Sunk(lifted, inside, around.contact_margin), members, loop.number)
     refresh_pose(members, now, motion.rotation, motion.trajectory.inertia)
     log_energy(loop.log, time, POSITION_CORRECTION, mechanical_energy(now, constants, members) - before)

@@ -71,6 +71,7 @@ class _Began(NamedTuple):
     members: np.ndarray  # (k,)
     energy: float  # J, at its start
     taken: float  # J that the balance of energy takes off until its end
+    raised: float  # J that bodies gain until then by rising out of each other, and cannot pay
 
 
 class SubsteppedIslands:
@@ -283,9 +284,10 @@ class SubsteppedIslands:
             began = self._began.pop(label)
             change = mechanical_energy(run.state.now, run.world.constants, began.members) - began.energy
             # Trajectories that end early have had their share of it.
-            corrected = -began.taken * (time - began.time) / (began.end - began.time)
-            run.log.account_over(began.time, time, "energy correction", corrected)
-            run.log.account_over(began.time, time, "sub-stepping", change - corrected)
+            share = (time - began.time) / (began.end - began.time)
+            run.log.account_over(began.time, time, "energy correction", -began.taken * share)
+            run.log.account_over(began.time, time, "position correction", began.raised * share)
+            run.log.account_over(began.time, time, "sub-stepping", change - (began.raised - began.taken) * share)
 
     def finish(self, run: Run) -> None:
         """Account for the energy of sub-steps that last until the end of the run, and tell the plan what was done."""
@@ -366,13 +368,13 @@ class SubsteppedIslands:
             run.log.account(island.time, "position correction", mechanical_energy(run.state.now, world.constants, fresh) - before)
         self._outcome = out = self.stepper.step(run, island.time, end)
         self._outcome_end = end
-        taken = np.zeros(world.num_bodies)
-        taken[out.members] = out.taken
+        taken, raised = np.zeros((2, world.num_bodies))
+        taken[out.members], raised[out.members] = out.taken, out.raised
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
             self._ends[label] = end
             energy = mechanical_energy(run.state.now, world.constants, mine)
-            self._began[label] = _Began(island.time, end, mine, energy, float(taken[mine].sum()))
+            self._began[label] = _Began(island.time, end, mine, energy, float(taken[mine].sum()), float(raised[mine].sum()))
         # The island was not stepped to the end of the step: it is woken there.
         if end < pair_events.end:
             pair_events.wake[members] = end

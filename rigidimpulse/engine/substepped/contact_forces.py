@@ -85,7 +85,7 @@ CLEAR = 0.2
 class Outcome:
     """Result of a step: bodies (k,) of the scene in the solver's order, and their poses and velocities (k, 6) at its end.
 
-    taken: (k,) J that the balance of energy took off their speeds.
+    taken, raised: (k,) J that the balance of energy took off their speeds, and that they gained and could not pay.
     """
 
     members: np.ndarray
@@ -93,6 +93,7 @@ class Outcome:
     orientation: np.ndarray
     velocity: np.ndarray
     taken: np.ndarray
+    raised: np.ndarray
 
 
 class ContactStepper:
@@ -374,7 +375,7 @@ class ContactStepper:
         self._report_slowed(run, time)
         at = self.rank[members]
         velocity = bodies.velocity.reshape(-1, ROW)[at, :6]
-        return Outcome(members, bodies.position[at], bodies.orientation[at], velocity, self._balance.taken[at])
+        return Outcome(members, bodies.position[at], bodies.orientation[at], velocity, self._balance.taken[at], self._balance.raised[at])
 
     def _report_slowed(self, run: Run, time: float) -> None:
         """Report whose motion the balance of energy took a good part of."""

@@ -8,7 +8,8 @@ before it, the work G of moving supports and the kinetic energy T, its speeds ar
 
 A member without any contact flies, and is left as it is. A position correction that moves bodies by dx costs -m g.dx each. A body pays
 for its own rise first, from its own speed. What it cannot pay is paid by those that were moved apart from it, and from each other: by
-one factor in each such set; what is owed still, by their clusters at the end of the step. Clusters at rest cannot pay.
+one factor in each such set; what is owed still, by their clusters at the end of the step. Clusters at rest cannot pay: what they gain by
+rising out of each other is a position correction, too.
 """
 
 from __future__ import annotations
@@ -45,13 +46,14 @@ class Balance(NamedTuple):
     given: np.ndarray  # (n+1,) J, work of moving supports on the body
     taken: np.ndarray  # (n+1,) J, taken off its speed at the end
     owed: np.ndarray  # (n+1,) J, of position corrections: what is to be paid at the end of the step
+    raised: np.ndarray  # (n+1,) J, what a cluster gained beyond that and cannot pay, of its root
     slowed: np.ndarray  # (n+1,) bool, lost a part of its motion that is worth a report
 
 
 def make_balance(n: int) -> Balance:
     """Arrays for n bodies."""
-    none, no = np.zeros((4, n + 1)), np.zeros((2, n + 1), bool)
-    return Balance(np.arange(n + 1), no[0], none[0], none[1], none[2], none[3], no[1])
+    none, no = np.zeros((5, n + 1)), np.zeros((2, n + 1), bool)
+    return Balance(np.arange(n + 1), no[0], *none, no[1])
 
 
 @jit
@@ -84,7 +86,7 @@ def clear_balance(balance):
     """Forget the last step."""
     for i in range(balance.parent.shape[0]):
         balance.parent[i], balance.touched[i], balance.slowed[i] = i, False, False
-        balance.given[i] = balance.taken[i] = balance.before[i] = 0.0
+        balance.given[i] = balance.taken[i] = balance.before[i] = balance.raised[i] = 0.0
 
 
 @jit
@@ -127,6 +129,7 @@ def end_balance(balance, bodies, weights):
         if bodies.part[i] != MEMBER or not balance.touched[i]:
             continue
         root = root_of(balance.parent, i)
+        balance.raised[root] = max(gained[root] - debt[root] - kinetic[root], 0.0)
         if gained[root] > 0.0 and kinetic[root] > 0.0:
             share = min(gained[root] / kinetic[root], 1.0)
             _slow_down(bodies, i, sqrt(1.0 - share))
