@@ -118,7 +118,8 @@ def energy_faults(record: RunRecord) -> list[Fault]:
         return []
     first, most = int(np.argmax(too_much)), int(np.argmax(rise))
     times, amount = record.frames.times, float(rise[most])
-    text = f"{amount:.3g} J came from nothing, or from position corrections, until {times[most]:.6g} s, {amount / moved:.1%} of the energy that moves; {REMEDY}"
+    origin = "position corrections, or from nothing," if record.may_be_sub_stepped else "nothing"
+    text = f"{amount:.3g} J came from {origin} until {times[most]:.6g} s, {amount / moved:.1%} of the energy that moves; {REMEDY}"
     return [Fault(float(times[first]), KIND, _gainers(record, first), amount, text)]
 
 

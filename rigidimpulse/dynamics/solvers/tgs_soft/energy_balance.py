@@ -53,7 +53,7 @@ class Balance(NamedTuple):
 def make_balance(n: int) -> Balance:
     """Arrays for n bodies."""
     none, no = np.zeros((5, n + 1)), np.zeros((2, n + 1), bool)
-    return Balance(np.arange(n + 1), no[0], *none, no[1])
+    return Balance(np.arange(n + 1), no[0], none[0], none[1], none[2], none[3], none[4], no[1])
 
 
 @jit
