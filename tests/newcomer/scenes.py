@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import everyday  # noqa: F401
 import machines  # noqa: F401
 import piles  # noqa: F401
 import tracks  # noqa: F401
