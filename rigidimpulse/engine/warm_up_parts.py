@@ -18,7 +18,7 @@ from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_impact import fill_rates, impact_rows
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, fill_closing_rows, start_joint_rows, stop_rows
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
-from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, leaves_from_inside, needs_correction
+from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, needs_correction
 from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
 from rigidimpulse.dynamics.constraints.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
 from rigidimpulse.dynamics.solvers.newton import solve_newton
@@ -88,8 +88,8 @@ def _respond_and_detect(run: Run) -> None:
     state, world, now, one, contacts = run.state, run.world, run.state.now, np.ones(1), _contact()
     members = np.array([1])
     now.inv_inertia[1] = np.eye(3)
-    needs_correction(contacts, np.ones(1, bool), one)
-    which = leaves_from_inside(contacts, np.ones(1, bool), one)
+    needs_correction(contacts, np.ones(1, bool), np.ones(1, bool), one)
+    which = np.zeros(1, bool)
     correct_positions(now, contacts, Sunk(which, which, np.zeros(1)), members, run.column)
     refresh_pose(members, now, state.rotation, state.trajectory.inertia)
     bring_gyroscopic(members, now, state.rotation, state.trajectory.inertia, run.angular_acceleration)

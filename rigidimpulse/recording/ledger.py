@@ -91,7 +91,10 @@ def make_ledger(frames: Frames, masses: Masses, log: EventLog, work: ForceWork |
     for cause, number in sorted((CAUSES[number], number) for number in np.unique(energy["cause"]).tolist()):
         changes = energy[energy["cause"] == number]
         sums = np.concatenate([[0.0], np.cumsum(-changes["change"])])
-        dissipated[cause] = sums[np.searchsorted(changes["time"], times, side="right")]
+        count = np.searchsorted(changes["time"], times, side="right")
+        # Frame 0 is the state as it is given: what happens at its time shows from frame 1 on.
+        count[:1] = 0
+        dissipated[cause] = sums[count]
     for start, end, cause, change in log.spans:
         done = np.clip((times - start) / (end - start), 0.0, 1.0)
         dissipated[cause] = dissipated.get(cause, 0.0) - change * done

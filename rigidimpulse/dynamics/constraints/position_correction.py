@@ -5,9 +5,8 @@ the island are moved by the smallest displacement in the metric of mass that bri
 
     dx = M^-1 J_n^T p,    0 <= p _|_ g + J_n dx - target >= 0.
 
-A contact inside the other surface that leaves is met again and again on its way out. It is brought back to CLEAR d only: what is inside
-by round-off moves by round-off. One that is deeper than DEPTH d, as rough ways of finding impacts leave it, moves out by its own speed.
-Velocities do not change. The ledger records the change of potential energy.
+A contact of surfaces without a radius that is inside and leaves is met again and again on its way out. It is brought back to CLEAR d only:
+what is inside by round-off moves by round-off. Velocities do not change. The ledger records the change of potential energy.
 """
 
 from typing import NamedTuple
@@ -22,7 +21,6 @@ from rigidimpulse.dynamics.solvers.newton import solve_newton
 SUNK = 0.7
 # Other contacts of the island may not sink below this part of the contact margin.
 KEPT = 0.75
-DEPTH = TOLERANCES.manifold.depth
 CLEAR = TOLERANCES.events.contact_margin_round_off
 SOLVE_TOLERANCE = TOLERANCES.contact_forces.correction_residual
 
@@ -35,22 +33,11 @@ class Sunk(NamedTuple):
     contact_margin: np.ndarray  # (m,) m
 
 
-@jit_making_arrays
-def leaves_from_inside(contacts, held, contact_margin):
-    """Contacts (m,) bool a little inside each other that do not last; held (m,) bool: those that do; contact_margin (m,) m."""
-    inside = np.empty(held.shape[0], np.bool_)
-    for c in range(held.shape[0]):
-        inside[c] = not held[c] and -DEPTH * contact_margin[c] < contacts.gap[c] < 0.0
-    return inside
-
-
 @jit
-def needs_correction(contacts, held, contact_margin):
-    """Whether a held contact has sunk, or another is a little inside; held (m,) bool, contact_margin (m,) m."""
+def needs_correction(contacts, held, inside, contact_margin):
+    """Whether a held contact has sunk, or another leaves from inside; held, inside (m,) bool, contact_margin (m,) m."""
     for c in range(contacts.gap.shape[0]):
-        if held[c] and contacts.gap[c] < SUNK * contact_margin[c]:
-            return True
-        if not held[c] and -DEPTH * contact_margin[c] < contacts.gap[c] < 0.0:
+        if inside[c] or (held[c] and contacts.gap[c] < SUNK * contact_margin[c]):
             return True
     return False
 

@@ -13,7 +13,7 @@ from rigidimpulse.core.vector import turned
 from rigidimpulse.dynamics.constraints.contact import ContactProblem, Held
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
-from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, leaves_from_inside, needs_correction
+from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, needs_correction
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling, rolling_of
 from rigidimpulse.dynamics.energy import kinetic_energy, kinetic_of, mechanical_energy
 from rigidimpulse.engine.exact.energy_limit import limit_correction_energy, note_hold
@@ -28,6 +28,7 @@ from rigidimpulse.model.contacts import Contacts, Touching, select
 from rigidimpulse.model.island import Island
 from rigidimpulse.motion.evaluate import refresh_pose
 
+DEPTH = TOLERANCES.manifold.depth
 PLAY = TOLERANCES.contact_forces.unsolved_energy
 NOT_SOLVED_REMEDY = "residual {value:.1e}; use a smaller step"
 NO_SUPPORTS = np.zeros(0, np.int64)
@@ -40,8 +41,9 @@ def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
     run.wrench[island.members] = 0.0
     forget_forces(state.memory, number, island.contacts)
     island.held = island.slow()
-    if needs_correction(island.contacts, island.held, island.contact_margin):
-        _correct_positions(run, pair_events, island)
+    inside = leaves_from_inside(pair_events.table.pairs, island.place, island.contacts, island.held)
+    if needs_correction(island.contacts, island.held, inside, island.contact_margin):
+        _correct_positions(run, pair_events, island, inside)
     subset = np.flatnonzero(island.held)
     if not len(subset) and not len(island.joints):
         pair_events.look_around(island.members, island.time, island.shift)
@@ -168,8 +170,8 @@ def _energy_after(problem, constants, wrench, h):
     return energy
 
 
-def _correct_positions(run: Run, pair_events: PairEvents, island: Island) -> None:
-    """Bring sunken contacts back to their gap, and contacts inside each other that leave apart, and look at the island's contacts again.
+def _correct_positions(run: Run, pair_events: PairEvents, island: Island, leaves: np.ndarray) -> None:
+    """Bring sunken contacts back to their gap, and those that leave from inside, leaves (m,) bool, apart; look at all contacts again.
 
     A light body may turn far to get out of the way of a heavy one, so its neighbours are looked for within a larger distance. Bodies
     outside the island do not move.
@@ -180,8 +182,7 @@ def _correct_positions(run: Run, pair_events: PairEvents, island: Island) -> Non
     around, contact_margin, touching = near_contacts(run, pair_events, members, island.time)
     lifted, inside = np.zeros((2, len(contact_margin)), bool)
     mark_same(island.contacts, island.touching, island.held, around, touching, lifted)
-    leaving = leaves_from_inside(island.contacts, island.held, island.contact_margin)
-    mark_same(island.contacts, island.touching, leaving, around, touching, inside)
+    mark_same(island.contacts, island.touching, leaves, around, touching, inside)
     correct_positions(now, around, Sunk(lifted, inside, contact_margin), members, run.column)
     refresh_pose(members, now, state.rotation, state.trajectory.inertia)
     run.log.account(island.time, "position correction", mechanical_energy(now, constants, members) - before)
@@ -196,6 +197,21 @@ def _correct_positions(run: Run, pair_events: PairEvents, island: Island) -> Non
     for name in ("contacts", "place", "touching", "contact_margin", "speeds", "live"):
         setattr(island, name, getattr(again, name))
     island.held = island.slow()
+
+
+@jit_making_arrays
+def leaves_from_inside(pairs, place, contacts, held):
+    """Contacts (m,) bool a little inside each other that do not last, of surfaces without a radius; held (m,) bool: those that do.
+
+    place (m,): their pairs. Surfaces with a radius may be inside each other by round-off: they are met at no gap. What is deeper than
+    DEPTH margins, as rough ways of finding impacts leave it, moves out by its own speed.
+    """
+    inside = np.empty(held.shape[0], np.bool_)
+    for c in range(held.shape[0]):
+        pair = pairs[place[c]]
+        is_near = -DEPTH * pair.contact_margin < contacts.gap[c] < 0.0
+        inside[c] = is_near and not held[c] and pair.least_impact_margin > 0.0
+    return inside
 
 
 @jit

@@ -25,10 +25,10 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
-from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, leaves_from_inside, needs_correction
+from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, needs_correction
 from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.engine.exact.contact_forces import makes_energy, mark_same, shift_of
+from rigidimpulse.engine.exact.contact_forces import leaves_from_inside, makes_energy, mark_same, shift_of
 from rigidimpulse.engine.exact.energy_limit import limit_correction_energy, limit_energy, note_end_energy, note_hold
 from rigidimpulse.engine.exact.impacts import (
     SEQUENTIAL,
@@ -590,8 +590,9 @@ def _hold(loop, island, touch, members):
             wrench[i, k] = 0.0
     forget_forces(memory, number, touch.contacts)
     held = _slow(island, touch.speeds)
-    if needs_correction(touch.contacts, held, touch.contact_margin):
-        touch = _correct_positions(loop, island, touch, held, members)
+    inside = leaves_from_inside(loop.table.pairs, touch.place, touch.contacts, held)
+    if needs_correction(touch.contacts, held, inside, touch.contact_margin):
+        touch = _correct_positions(loop, island, touch, (held, inside), members)
         held = _slow(island, touch.speeds)
     if not _any(held):
         look_around(loop.table, members, time, island.shift)
@@ -657,8 +658,8 @@ def _places(which):
 
 
 @jit_making_arrays
-def _correct_positions(loop, island, touch, held, members):
-    """Bring contacts that have sunk or are inside each other apart, and look at the island's contacts again (see `contact_forces`)."""
+def _correct_positions(loop, island, touch, which, members):
+    """Bring contacts apart, which (2, m) bool have sunk or leave from inside, and look at all again (see `contact_forces`)."""
     motion, constants, time = loop.motion, loop.bodies.constants, island.time
     now, k = motion.now, len(members)
     place, turn, way = np.empty((k, 3)), np.empty((k, 4)), np.empty((k, 3))
@@ -670,9 +671,8 @@ def _correct_positions(loop, island, touch, held, members):
     before = mechanical_energy(now, constants, members)
     around = _contacts_near(loop, members, time)
     lifted, inside, depth = np.zeros(len(around.live), np.bool_), np.zeros(len(around.live), np.bool_), 0.0
-    mark_same(touch.contacts, touch.touching, held, around.contacts, around.touching, lifted)
-    leaving = leaves_from_inside(touch.contacts, held, touch.contact_margin)
-    mark_same(touch.contacts, touch.touching, leaving, around.contacts, around.touching, inside)
+    mark_same(touch.contacts, touch.touching, which[0], around.contacts, around.touching, lifted)
+    mark_same(touch.contacts, touch.touching, which[1], around.contacts, around.touching, inside)
     correct_positions(now, around.contacts, Sunk(lifted, inside, around.contact_margin), members, loop.number)
     refresh_pose(members, now, motion.rotation, motion.trajectory.inertia)
     log_energy(loop.log, time, POSITION_CORRECTION, mechanical_energy(now, constants, members) - before)

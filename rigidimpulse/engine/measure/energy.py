@@ -23,8 +23,6 @@ in "sub-stepping". A body of the weight w, at the height h above the lowest, sta
 
     A = sum of w GAP (h / 2 + r)    in runs with sub-stepped islands, else 0
 
-Frame 0 is the state as given: what a cause takes at the time 0 counts from frame 1 on.
-
 The rise is that of either balance over its least value so far. It is compared with the energy that moves,
 
     rise <= RISE S + A,    S = max K + (max V - min V) + sum of (max D_c - min D_c) over the causes that are added
@@ -82,9 +80,9 @@ def energy_rise(record: RunRecord) -> tuple[np.ndarray, float]:
     given, all_causes = ledger.total.copy(), ledger.total.copy()
     moved = float(ledger.kinetic.max() + np.ptp(ledger.potential))
     for cause, taken in ledger.dissipated.items():
-        all_causes[1:] += taken[1:]
+        all_causes += taken
         if cause not in takes:
-            given[1:] += taken[1:]
+            given += taken
             moved += float(np.ptp(taken))
     rise = np.zeros(len(given))
     if not record.may_be_sub_stepped:
