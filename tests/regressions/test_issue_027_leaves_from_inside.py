@@ -6,6 +6,7 @@ on its whole way out: it was met 100 times at one instant, reported as "contact 
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import rigidimpulse as ri
@@ -29,3 +30,14 @@ def test_a_body_that_leaves_from_inside_another_rises_as_if_it_were_free(depth: 
         risen = run.position(name)[:, 2] - run.position(name)[0, 2]
         assert abs(risen - free)[flies].max() < depth + 1e-6
         assert risen.min() > -1e-6
+
+
+def test_a_body_that_leaves_from_a_gap_of_exactly_nothing_leaves() -> None:
+    """At this height the rounded corners of the box lie exactly in the top of the floor."""
+    scene = ri.Scene(gravity=(0.0, 0.0, -GRAVITY))
+    scene.add(ri.Body("floor", ri.Shape.box((5.0, 5.0, 0.5)), position=(0.1, 0.2, -0.25), motion="static"))
+    size = (0.03025415, 1.51089546, 1.6248431240281453)
+    scene.add(ri.Body("box", ri.Shape.box(size), position=(0.0, 0.0, 0.81242156201407256), velocity=(0.0, 0.0, 0.0076747887)))
+    run = ri.simulate(scene, 0.2)
+    assert run.status.ok, run.status.message
+    assert np.ptp(run.position("box")[:, 2]) < 1e-5

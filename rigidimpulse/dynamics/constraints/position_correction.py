@@ -50,7 +50,7 @@ def correct_positions(bodies, contacts, sunk, members, number):
     """
     contact_margin = sunk.contact_margin
     all_rows, first_row, _ = contact_rows(bodies, contacts, members, number, 0)
-    rows, largest = take_rows(all_rows, first_row), 0.0
+    rows, largest, fine = take_rows(all_rows, first_row), 0.0, 1.0
     for c in range(first_row.shape[0]):
         # Bodies that do not belong to the island are taken as immovable.
         if not _is_member(members, number, contacts.body_a[c]):
@@ -63,10 +63,10 @@ def correct_positions(bodies, contacts, sunk, members, number):
         if sunk.lifted[c]:
             target = contact_margin[c]
         elif sunk.inside[c]:
-            target = CLEAR * contact_margin[c]
+            target, fine = CLEAR * contact_margin[c], CLEAR
         rows.bias[c] = contacts.gap[c] - target
         largest = max(largest, contact_margin[c])
-    solve_newton(rows, members.shape[0], SOLVE_TOLERANCE * largest)
+    solve_newton(rows, members.shape[0], SOLVE_TOLERANCE * fine * largest)
     move_bodies(bodies, members, rows)
 
 

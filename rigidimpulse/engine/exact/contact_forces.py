@@ -209,7 +209,7 @@ def leaves_from_inside(pairs, place, contacts, held):
     inside = np.empty(held.shape[0], np.bool_)
     for c in range(held.shape[0]):
         pair = pairs[place[c]]
-        is_near = -DEPTH * pair.contact_margin < contacts.gap[c] < 0.0
+        is_near = -DEPTH * pair.contact_margin < contacts.gap[c] <= 0.0
         inside[c] = is_near and not held[c] and pair.least_impact_margin > 0.0
     return inside
 
