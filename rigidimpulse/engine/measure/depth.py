@@ -257,10 +257,10 @@ def _depth_in_surface(solid: Solid, points: np.ndarray, radii: np.ndarray) -> np
 
 def _distance_from_surface(solid: Solid, point: np.ndarray) -> float:
     """Distance of a point (3,) from the triangles of a solid, m."""
-    from_middles = np.linalg.norm(solid.middles[:, :3] - point, axis=1)
     # With trimesh comes half a second of imports, which the first picture of simple shapes need not wait for.
     from trimesh.triangles import closest_point
 
+    from_middles = np.linalg.norm(solid.middles[:, :3] - point, axis=1)
     # Middles are points of the surface: no triangle that is farther away than the nearest of them counts.
     surface = solid.surface[from_middles - solid.middles[:, 3] <= from_middles.min()]
     nearest = closest_point(surface, np.broadcast_to(point, (len(surface), 3)))

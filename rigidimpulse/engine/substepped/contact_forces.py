@@ -30,7 +30,6 @@ from rigidimpulse.dynamics.solvers.tgs_soft.depenetration import move_apart
 from rigidimpulse.dynamics.solvers.tgs_soft.energy_balance import (
     Weights,
     begin_balance,
-    clear_balance,
     connect,
     end_balance,
     make_balance,
@@ -79,6 +78,7 @@ FINER_STEP, FINER_SUB_STEP, FINER_MOTION = 1.0 / 8.0, 1.0 / 32.0, 1.0 / 10.0
 """Parts of the settings `step` and `substep_motion` that scenes of few bodies are stepped with: they can afford finer ones."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
+MOTION_TAKEN_REMEDY = "it was raised to the margin of contacts, and its speed paid for that; contact_solver='newton' needs no such margin"
 
 
 @dataclass
@@ -345,11 +345,11 @@ class ContactStepper:
         mine = np.zeros(len(bodies.part), bool)
         mine[at] = True
         before = bodies.position.copy()
-        clear_balance(self._balance)
-        if not move_apart(bodies, self.table.pairs, self.table.points, mine, self._balance.parent):
+        if not move_apart(bodies, self.table.pairs, self.table.points, mine):
             return
-        pay_for_rise(self._balance, bodies, self._weights, bodies.position - before, at)
-        self._report_slowed(run, time)
+        slowed = pay_for_rise(bodies, self._weights, bodies.position - before, at)
+        for i in fresh[slowed].tolist():
+            run.log.report(time, "motion taken in a sub-stepped island", (self.world.names[i],), MOTION_TAKEN_REMEDY)
         now.position[fresh], now.orientation[fresh] = bodies.position[at], bodies.orientation[at]
         velocity = bodies.velocity.reshape(-1, ROW)[at]
         now.velocity[fresh], now.angular_velocity[fresh] = velocity[:, :3], velocity[:, 3:6]
@@ -372,18 +372,9 @@ class ContactStepper:
         note_pressed(bodies, self.order, self.pressed)
         # Sub-steps must not make energy beyond what moving supports gave.
         end_balance(self._balance, bodies, self._weights)
-        self._report_slowed(run, time)
         at = self.rank[members]
         velocity = bodies.velocity.reshape(-1, ROW)[at, :6]
         return Outcome(members, bodies.position[at], bodies.orientation[at], velocity, self._balance.taken[at], self._balance.raised[at])
-
-    def _report_slowed(self, run: Run, time: float) -> None:
-        """Report whose motion the balance of energy took a good part of."""
-        for i in self.order[np.flatnonzero(self._balance.slowed[: len(self.order)])].tolist():
-            run.log.report(
-                time, "motion taken in a sub-stepped island", (self.world.names[i],),
-                "moving bodies apart made energy, which was taken off its motion; contact_solver=\"newton\" solves exactly",
-            )  # fmt: skip
 
     def _advance(self, sub_steps: int, h: float) -> None:
         """Sub-steps of h s with the contacts as they are known."""

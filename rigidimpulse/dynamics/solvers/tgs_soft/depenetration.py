@@ -10,7 +10,6 @@ the island are moved. Contacts deeper than DEEPEST skins are left to the solver,
 
 from rigidimpulse.collision.contact_records import SEPARATION, SKIN, in_play
 from rigidimpulse.core.kernels import jit
-from rigidimpulse.core.union_find import unite
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import INVERSE_MASS, set_inverse_inertia
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import set_orientation
 from rigidimpulse.dynamics.solvers.tgs_soft.records import normal_of, point_of
@@ -43,11 +42,8 @@ def _shift(bodies, i, p, n, w):
 
 
 @jit
-def move_apart(bodies, pairs, rows, fresh, parent):
-    """Move fresh members (n+1,) bool apart from each other and from all else; returns whether any was moved.
-
-    Fresh members that were moved apart from each other become one set of parent (n+1,), see `core.union_find`.
-    """
+def move_apart(bodies, pairs, rows, fresh):
+    """Move fresh members (n+1,) bool apart from each other and from all else; returns whether any was moved."""
     moved = False
     for _ in range(MOST_PASSES):
         worst = 0.0
@@ -73,8 +69,6 @@ def move_apart(bodies, pairs, rows, fresh, parent):
                 give_a, give_b = give_a if fresh[a] else 0.0, give_b if fresh[b] else 0.0
                 # The smallest displacement in the metric of mass; only bodies new to the island give way.
                 push = -s / (give_a + give_b)
-                if fresh[a] and fresh[b]:
-                    unite(parent, a, b)
                 if fresh[a]:
                     _shift(bodies, a, -push, (nx, ny, nz), (ax, ay, az))
                 if fresh[b]:
