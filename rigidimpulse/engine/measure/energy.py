@@ -25,7 +25,9 @@ in "sub-stepping". A body of the weight w, at the height h above the lowest, sta
 
 The rise is that of either balance over its least value so far. It is compared with the energy that moves,
 
-    rise <= RISE S + A,    S = max K + (max V - min V) + sum of (max D_c - min D_c) over the causes that are added
+    rise <= RISE S + A,    S = max K + (max V - min V) + sum of (max D_c - min D_c) over the causes that are added + sum of m u^2 / 2
+
+with the speed u up to which a body stands still (`RunRecord.unseen_speed`): where nothing moves, all else is round-off.
 """
 
 from __future__ import annotations
@@ -78,7 +80,9 @@ def energy_rise(record: RunRecord) -> tuple[np.ndarray, float]:
     """Rise (f,) J over its least value so far, of the first balance or of the second, whichever is larger; and S, J."""
     ledger, takes = record.ledger, taking_causes(record.world, record.may_be_sub_stepped)
     given, all_causes = ledger.total.copy(), ledger.total.copy()
-    moved = float(ledger.kinetic.max() + np.ptp(ledger.potential))
+    dynamic = record.world.dynamic
+    still = 0.5 * record.world.mass[dynamic] @ record.unseen_speed[dynamic] ** 2
+    moved = float(ledger.kinetic.max() + np.ptp(ledger.potential) + still)
     for cause, taken in ledger.dissipated.items():
         all_causes += taken
         if cause not in takes:

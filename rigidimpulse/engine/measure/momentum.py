@@ -8,10 +8,11 @@ dynamic from the start, none met a body that is not or the world, and no force t
 
 are constant; L where all bodies have the same a. They are compared with what moves,
 
-    |P(t) - P(0)| <= MOMENTUM (max over t of sum |m v| + t |sum m a|)
-    |L(t) - L(0)| <= ANGULAR max over t of sum (|x - X| + LEAST |x|) (|m (v - V)| + LEAST |m v|) + |I w|
+    |P(t) - P(0)| <= MOMENTUM (max over t of sum |m v| + m u, + t |sum m a|)
+    |L(t) - L(0)| <= ANGULAR max over t of sum |x - X| |m (v - V)| + |I w| + m u s
 
-A body that flies alone without spin has x - X and v - V of round-off only, and so has its L: LEAST covers that.
+with the size s of a body, and the speed u up to which it stands still (`RunRecord.unseen_speed`): where nothing moves, or a body flies
+alone without spin, all else is round-off.
 
 Contacts of sub-stepped islands are in no table: where there were any, all bodies without joints count as one set, with all that are not
 dynamic, so only bodies with joints are looked at. Kinematic impacts (`response="kinematic"`) do not keep momentum by design.
@@ -33,8 +34,6 @@ MOMENTUM: float = 1e-7
 """Drift of the momentum of a free set of bodies, of what moves, from which a run is not ok."""
 ANGULAR: float = 1e-5
 """The same of its angular momentum: forces of joints and contacts turn with the bodies from frame to frame."""
-LEAST: float = 1e-9
-"""Part of a place, or of a momentum, below which a difference of two of them is taken for round-off."""
 MOST_FRAMES: int = 240
 """Frames that are looked at, at most, evenly chosen."""
 MOST_NAMES: int = 3
@@ -103,7 +102,9 @@ def momentum_drifts(record: RunRecord) -> Drifts:
     momenta = mass[:, None] * v
     steady = np.add.reduceat(mass[:, None] * pull, first)
     total = np.add.reduceat(momenta, first, axis=1)
+    still = mass * record.unseen_speed[order]
     moves = np.add.reduceat(np.linalg.norm(momenta, axis=2), first, axis=1).max(axis=0) + times * np.linalg.norm(steady, axis=1)
+    moves += np.add.reduceat(still, first)
     momentum = np.linalg.norm(total - total[:1] - times[:, :, None] * steady, axis=2)
     whole = np.add.reduceat(mass, first)
     count = np.diff(np.append(first, len(order)))
@@ -112,9 +113,8 @@ def momentum_drifts(record: RunRecord) -> Drifts:
     relative = mass[:, None] * (v - np.repeat(total / whole[:, None], count, axis=1))
     spin = rotate(q, inertia * rotate_inverse(q, w))
     sums = np.add.reduceat(spin + cross_arrays(arm, relative), first, axis=1)
-    lever = np.linalg.norm(arm, axis=2) + LEAST * np.linalg.norm(x, axis=2)
-    parts = np.linalg.norm(spin, axis=2) + lever * (np.linalg.norm(relative, axis=2) + LEAST * np.linalg.norm(momenta, axis=2))
-    turns = np.add.reduceat(parts, first, axis=1).max(axis=0)
+    parts = np.linalg.norm(spin, axis=2) + np.linalg.norm(arm, axis=2) * np.linalg.norm(relative, axis=2)
+    turns = np.add.reduceat(parts, first, axis=1).max(axis=0) + np.add.reduceat(still * world.size[order], first)
     alike = ~np.logical_or.reduceat(np.any(pull != np.repeat(pull[first], count, axis=0), axis=1), first)
     angular = np.where(alike, np.linalg.norm(sums - sums[:1], axis=2), 0.0)
     return Drifts(np.split(order, first[1:]), _share(momentum, moves), _share(angular, turns))

@@ -14,6 +14,9 @@ from rigidimpulse.model.world import World
 from rigidimpulse.recording.ledger import Ledger
 from rigidimpulse.recording.recorder import Frames
 
+STILL: float = 1e-6
+"""Way in a run, of the size of a body, below which it stands still: what moves less is not measured, it may be round-off alone."""
+
 
 @dataclass(frozen=True, eq=False)
 class RunRecord:
@@ -31,6 +34,12 @@ class RunRecord:
     def may_be_sub_stepped(self) -> bool:
         """Whether the run may have had sub-stepped islands, whose contacts are in no table."""
         return "sub-stepping" in self.ledger.dissipated
+
+    @property
+    def unseen_speed(self) -> np.ndarray:
+        """Speed (n,) m/s up to which a dynamic body stands still, 0 for others."""
+        size = np.where(self.world.dynamic, self.world.size, 0.0)
+        return STILL * size / float(self.frames.times[-1] - self.frames.times[0])
 
 
 @dataclass(frozen=True, eq=False)
