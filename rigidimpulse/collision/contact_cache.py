@@ -146,6 +146,18 @@ def most_motion(bodies, pairs, ahead):
 
 
 @jit
+def most_approach(bodies, pairs, ahead):
+    """Greatest relative motion in `ahead` s of the pairs that take part, in the farthest that contacts are looked for."""
+    part, most = bodies.part, 0.0
+    for p in range(pairs.first.shape[0]):
+        a, b = pairs.first[p], pairs.second[p]
+        if in_play(part, a, b):
+            speed = closing_speed(bodies.position, bodies.velocity, bodies.reach, a, b, pairs.carrier[p])
+            most = max(most, ahead * speed / (FARTHEST * min(bodies.inner[a], bodies.inner[b])))
+    return most
+
+
+@jit
 def share_of(number, share, shares):
     """Where the places of a share of `number` pairs begin. Pairs are divided in blocks, so that all shares have equal work."""
     return share * (number // (BLOCK * shares) + 1) * BLOCK

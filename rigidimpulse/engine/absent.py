@@ -12,6 +12,7 @@ from rigidimpulse.model.island import Island
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.constraints.jointed_island import JointMemory
     from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
+    from rigidimpulse.model.joint_table import Joints
     from rigidimpulse.recording.ledger import Ledger
 
 NONE, NO_LINKS = np.zeros(0, np.int64), np.zeros((0, 2), np.int64)
@@ -23,10 +24,11 @@ def _ask_nobody(*_asked: Any, **_named: Any) -> NoReturn:
 
 
 class NoJoints:
-    """A run without joints. `are_closed`, `memory` and `moment` have no value: only islands with joints are asked for them."""
+    """A run without joints. `are_closed`, `memory`, `moment` and `table` have no value: only islands with joints are asked for them."""
 
     are_closed: bool
     memory: JointMemory
+    table: Joints
     moment: np.ndarray
 
     def __init__(self) -> None:
@@ -51,6 +53,7 @@ class NoJoints:
         return NONE
 
     movable_end = are_passive = will_let_go = supports_of = project_velocities = impact_block = hold = let_go = log_rest = _ask_nobody
+    begin_sub_steps = note_sub_steps = account_sub_steps = break_at = next_release = _ask_nobody
 
 
 class NoForces:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
     from rigidimpulse.model.contacts import Contacts
     from rigidimpulse.model.island import Island
+    from rigidimpulse.model.joint_table import Joints
     from rigidimpulse.model.world import World
     from rigidimpulse.recording.ledger import Ledger
     from rigidimpulse.recording.recorder import Recorder
@@ -82,6 +83,31 @@ class RunJoints(Protocol):
 
     def log_rest(self, island: Island, /) -> None:
         """Forces on b from here on, while the island sleeps."""
+        ...
+
+    def begin_sub_steps(self, run: Any, bodies: np.ndarray, time: float, /) -> None:
+        """End what exact sub-steps do to bodies that come to a sub-stepped island."""
+        ...
+
+    def note_sub_steps(self, run: Any, which: np.ndarray, force: np.ndarray, span: tuple[float, float], worst: float, /) -> None:
+        """Note the mean forces (j, 3) N on b over a span of sub-steps, and what was left open."""
+        ...
+
+    def account_sub_steps(self, run: Any, which: np.ndarray, began: float, time: float, /) -> None:
+        """Record the impulses of sub-steps that lasted from `began` to `time`, s."""
+        ...
+
+    def break_at(self, run: Any, which: np.ndarray, time: float, /) -> np.ndarray:
+        """Take out joints that are overloaded or due; returns those that stay."""
+        ...
+
+    def next_release(self, which: np.ndarray, time: float, /) -> float:
+        """Time after `time` at which the first of these joints lets go, inf if none does."""
+        ...
+
+    @property
+    def table(self) -> Joints:
+        """The rows of all joints."""
         ...
 
     @property

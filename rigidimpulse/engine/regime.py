@@ -7,16 +7,18 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
     or costly   at least FEW, each of which the exact regime solved more than EXPENSIVE_SOLVES times in the last step, in the mean.
                 Bodies at rest take 2 to 4 solves, a fall of boxes 10 to 20; each takes about as long as a step of a small
                 sub-stepped island
-    no joints   joints want exact rows
+    or joints   an island with joints, each body of which the exact regime solved more than EXPENSIVE_JOINTED times in the last step, or
+                EXPENSIVE_SWING times where nothing is near it; a body that hangs alone stays exact
 
 and, where an island begins to be sub-stepped (a body that comes near later is taken in):
 
-    alike       no two neighbours of masses beyond RATIO : 1
+    alike       no two neighbours of masses beyond RATIO : 1; where joints are, contacts and joints are solved exactly at any ratio
     dull        no restitution above REBOUND: a rebound is found at the end of the step only
-    low         no body more than TALL others above a support: long columns want exact rows
+    low         no body more than TALL others above a support: long columns want exact rows; not asked where joints are
 
-Scenes of fewer than SOME movable bodies have no sub-stepped islands. "substepped" takes every island without joints. A body that moves
-farther than FAST of its inner radius in a sub-step, or turns by more than SPIN rad, is swept instead.
+Scenes of fewer than SOME movable bodies without joints have sub-stepped islands only where there are joints. "substepped" takes every island
+that touches something or has joints. A body without joints that moves farther than FAST of its inner radius in a sub-step, or turns by more
+than SPIN rad, is swept instead.
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ from rigidimpulse.motion.body_state import BodyState
 
 MANY, SOME, FEW, KEPT = 60, 12, 8, 2
 EXPENSIVE_SOLVES = 6.0
+EXPENSIVE_JOINTED, EXPENSIVE_SWING = 48.0, 256.0
 RATIO, REBOUND, TALL = 30.0, 0.5, 12
 FAST, SPIN = 0.5, 2.5 / 16.0
 
@@ -43,14 +46,14 @@ def why_not_substepped(world: World) -> str:
         return "left out by the caller"
     if solver not in ("auto", "substepped"):
         return f"contact_solver is {solver!r}"
-    if not world.can_collide or not world.can_press:
+    if not world.joints_of_scene and not (world.can_collide and world.can_press):
         return "nothing presses bodies together"
     if world.force_tables:
         return "forces vary"
     if solver == "substepped":
         return ""
-    if _number(world) < SOME:
-        return f"fewer than {SOME} movable bodies without joints"
+    if _number(world) < SOME and not world.joints_of_scene:
+        return f"fewer than {SOME} movable bodies"
     used, movable = np.unique(world.material_of_body), np.unique(world.material_of_body[world.dynamic])
     if np.all(world.coefficients[np.ix_(movable, used)][:, :, 0] > REBOUND):
         return f"all bodies rebound by more than {REBOUND}"
@@ -133,29 +136,31 @@ def refusals(
         substepped_before: (n,) bool, members of sub-stepped islands. joined, moves: (n,) bool.
         solve_count: (n,) how often the exact solver dealt with each body in the last step.
         pairs: bodies a and b, (k,) each, of the pairs that may touch in the step.
-        auto: False where every island without joints is taken.
+        auto: False where every island is taken that touches something or has joints.
 
     """
     out: dict[int, str] = {}
     a, b = pairs
     members = np.flatnonzero(root >= 0)
     size = np.bincount(root[members], minlength=len(root))
-    was_substepped = np.zeros(len(root), bool)
+    was_substepped, has_joints, touches = np.zeros((3, len(root)), bool)
     was_substepped[root[members[substepped_before[members]]]] = True
-    for r in np.unique(root[members[joined[members]]]).tolist():
-        out[r] = "joints"
+    has_joints[root[members[joined[members]]]] = True
     # The island of each pair: that of whichever body is in one.
     owner = np.where(root[a] >= 0, root[a], root[b])
+    touches[owner] = True
     if not auto:
-        alone = np.setdiff1d(np.flatnonzero(size), owner)
-        out.update(dict.fromkeys(alone.tolist(), "alone"))
-        return out
+        return dict.fromkeys(np.flatnonzero((size > 0) & ~touches & ~has_joints).tolist(), "alone")
     moving_count = np.bincount(root[members[moves[members]]], minlength=len(root))
-    expensive = np.bincount(root[members], weights=solve_count[members], minlength=len(root)) > EXPENSIVE_SOLVES * size
+    solves = np.bincount(root[members], weights=solve_count[members], minlength=len(root))
+    expensive = solves > EXPENSIVE_SOLVES * size
     lively_enough = expensive if only_expensive(world) else expensive | (moving_count >= FEW)
     least = np.where(was_substepped, KEPT, np.where(lively_enough, FEW, MANY))
-    for r in np.flatnonzero((size > 0) & (size < least)).tolist():
+    for r in np.flatnonzero((size > 0) & (size < least) & ~has_joints).tolist():
         out[r] = "few bodies"
+    stays_exact = solves <= np.where(touches, EXPENSIVE_JOINTED, EXPENSIVE_SWING) * size
+    for r in np.flatnonzero(has_joints & ~was_substepped & (stays_exact | (size < KEPT))).tolist():
+        out[r] = "joints"
     # The rest holds only where an island begins: a body that comes near later is taken in.
     begins = ~was_substepped[owner]
     if not begins.any():
@@ -165,6 +170,6 @@ def refusals(
     heavy = np.maximum(world.mass[a], world.mass[b]) > RATIO * np.minimum(world.mass[a], world.mass[b])
     for r in np.unique(owner[begins & (coefficient > REBOUND)]).tolist():
         out.setdefault(r, "restitution")
-    for r in np.unique(owner[begins & both & heavy]).tolist():
+    for r in np.unique(owner[begins & both & heavy & ~has_joints[owner]]).tolist():
         out.setdefault(r, "mass ratio")
     return out

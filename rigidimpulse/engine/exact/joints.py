@@ -20,7 +20,7 @@ from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.participants import RunJoints
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.contacts import Contacts
-from rigidimpulse.model.island import Island
+from rigidimpulse.model.island import Island, island_without_contacts
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.evaluate import refresh_pose
@@ -138,7 +138,8 @@ class JointState:
         state, now, memory = run.state, run.state.now, self.memory
         members, which = island.members, island.joints
         elapsed = np.zeros(len(self.whole))
-        elapsed[which] = island.time - self.began[which]
+        # Sub-steps of the other regime are noted up to their end, and may be cut short.
+        elapsed[which] = np.maximum(island.time - self.began[which], 0.0)
         self.moment[which] = 0.0
         before = mechanical_energy(now, run.world.constants, members)
         arrived = np.hstack([now.velocity[members], now.angular_velocity[members]])
@@ -306,25 +307,67 @@ class JointState:
 
     def _break(self, run: Run, island: Island) -> bool:
         """Take out a joint whose time has come, or the most overloaded one, if there is one."""
-        which = island.joints
-        due = which[self.release_time[which] <= island.time]
+        j = self._gone(run, island.joints, island.time)
+        island.joints = island.joints[island.joints != j]
+        return j >= 0
+
+    def _gone(self, run: Run, which: np.ndarray, time: float) -> int:
+        """The joint that is taken out at `time`, -1 if none is."""
+        due = which[self.release_time[which] <= time]
         if len(due):
-            self._take_out(run, island, int(due[0]), "joint let go", "")
-            return True
+            return self._take_out(run, int(due[0]), time, "joint let go", "")
         load = np.linalg.norm(self.pull[which], axis=1) / self.break_force[which]
         if not len(which) or load.max() <= 1.0:
-            return False
+            return -1
         j = int(which[np.argmax(load)])
-        self._take_out(run, island, j, "joint broke", f": {np.linalg.norm(self.pull[j]):.6g} N")
-        return True
+        return self._take_out(run, j, time, "joint broke", f": {np.linalg.norm(self.pull[j]):.6g} N")
 
-    def _take_out(self, run: Run, island: Island, j: int, kind: str, why: str) -> None:
+    def _take_out(self, run: Run, j: int, time: float, kind: str, why: str) -> int:
         """The joint is gone."""
         self.whole[j] = False
-        island.joints = island.joints[island.joints != j]
         pair = tuple(run.world.names[i] for i in self.bodies_of(np.array([j])))
-        run.log.note(island.time, kind, pair, f"{self.names[j]}{why}")
-        self.reactions.append((island.time, j, np.zeros(3)))
+        run.log.note(time, kind, pair, f"{self.names[j]}{why}")
+        self.reactions.append((time, j, np.zeros(3)))
+        return j
+
+    def begin_sub_steps(self, run: Run, bodies: np.ndarray, time: float) -> None:
+        """End what exact sub-steps do to bodies that come to a sub-stepped island: half of the forces is taken back, joints are stopped."""
+        which = self.at(bodies)
+        if len(which):
+            members = self.bodies_of(which)
+            members = members[self._dynamic[members]]
+            now = run.state.now
+            island = island_without_contacts(time, members, now.velocity[members], now.angular_velocity[members])
+            island.joints = which
+            self.project_velocities(run, island)
+
+    def note_sub_steps(self, run: Run, which: np.ndarray, force: np.ndarray, span: tuple[float, float], worst: float) -> None:
+        """Note the mean forces (j, 3) N on b over a span [s] of sub-steps of the other regime, and what they left open, m or rad."""
+        time, end = span
+        self.pull[which], self.moment[which], self.began[which], self.length[which] = force[which], 0.0, end, 0.0
+        for j in which.tolist():
+            self.reactions.append((time, j, force[j].copy()))
+        if worst > TOLERANCES.sub_stepping.joints_open * run.world.joint_size:
+            names = tuple(run.world.names[i] for i in self.bodies_of(which))
+            far = f"off by {worst:.1e}" if math.isfinite(worst) else "no pose closes them"
+            run.log.report(time, "joints not closed", names, f"{far}; use a smaller step")
+
+    def account_sub_steps(self, run: Run, which: np.ndarray, began: float, time: float) -> None:
+        """Record the impulses of sub-steps that lasted from `began` to `time`, s."""
+        for j in which.tolist():
+            a, b = int(self.table.body_a[j]), int(self.table.body_b[j])
+            run.impulses.add(f"joint {self.names[j]}", a, b, began, time, self.pull[j])
+
+    def break_at(self, run: Run, which: np.ndarray, time: float) -> np.ndarray:
+        """Take out joints that are overloaded or due; returns those that stay."""
+        while (j := self._gone(run, which, time)) >= 0:
+            which = which[which != j]
+        return which
+
+    def next_release(self, which: np.ndarray, time: float) -> float:
+        """Time after `time` at which the first of these joints lets go, inf if none does."""
+        release = self.release_time[which]
+        return float(release[release > time].min(initial=np.inf))
 
     def log_rest(self, island: Island) -> None:
         """Forces on b from here on, while the island sleeps."""

@@ -40,7 +40,8 @@ from rigidimpulse.engine.regime import (
 )
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import advance_sleep_timers, wake_by_contact
-from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Outcome
+from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Fineness, Outcome, joined_outcomes
+from rigidimpulse.engine.substepped.jointed import JointedStepper
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.warm_up import prepare_kernels
@@ -72,6 +73,8 @@ class _Began(NamedTuple):
     energy: float  # J, at its start
     taken: float  # J that the balance of energy takes off until its end
     raised: float  # J that bodies gain until then by rising out of each other, and cannot pay
+    given: float  # J that drives and moving supports give by joints and the contacts beside them
+    joints: np.ndarray  # of the members
 
 
 class SubsteppedIslands:
@@ -103,6 +106,7 @@ class SubsteppedIslands:
         self._taken = np.zeros(world.num_bodies, bool)
         self._auto = world.accuracy.contact_solver == "auto"
         self._jointed = jointed(world)
+        self._joint_stepper: JointedStepper | None = None
         self.solve_count, self._step_end = np.zeros(world.num_bodies), 0.0
         self._ends: dict[int, float] = {}
         self._began: dict[int, _Began] = {}
@@ -125,6 +129,8 @@ class SubsteppedIslands:
         """What became of sub-stepped islands in the run."""
         refused = ", ".join(f"{reason} ({count})" for reason, count in sorted(self._refused.items()))
         text = f"{self._steps} steps, largest {self._most} bodies" if self._steps else "none"
+        if self._joint_stepper is not None:
+            text += f", {self._joint_stepper.halved} sub-steps halved so that joints close"
         return f"{text}; left to the exact regime, islands times steps: {refused}" if refused else text
 
     def choose(self, run: Run, pair_events: PairEvents) -> None:
@@ -165,23 +171,28 @@ class SubsteppedIslands:
         while len(woken := self._touched(run, member, a, b)):
             member[woken] = True
             a, b, touch = self._near(run, member, ahead)
-        root = island_roots(world.num_bodies, a, b, member)
+        links = run.joints.links()
+        root = island_roots(world.num_bodies, np.append(a, links[:, 0]), np.append(b, links[:, 1]), member)
         root[~member] = -1
         moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
-        refused = refusals(world, root, self.label >= 0, self._jointed, moves, solve_count, (a, b), self._auto)
+        joined = np.zeros_like(member)
+        joined[run.joints.bodies_of(run.joints.at(np.flatnonzero(member & self._jointed)))] = True
+        refused = refusals(world, root, self.label >= 0, joined, moves, solve_count, (a, b), self._auto)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         # Tall columns are found from contacts, so only in islands that are not refused yet.
-        chosen = self._low(run, pair_events, chosen, root, refused)
+        chosen = self._low(run, pair_events, chosen, root, joined, refused)
         for reason in refused.values():
             self._refused[reason] = self._refused.get(reason, 0) + 1
         self.label[member & ~chosen] = -1
-        self._settle(run, chosen, root, a, b, touch > 0, time)
+        holds = touch > 0
+        self._settle(run, chosen, root, np.append(a[holds], links[:, 0]), np.append(b[holds], links[:, 1]), time)
         return chosen
 
     def _leave_out_fast(self, run: Run, member: np.ndarray) -> None:
-        """Unmark those that are too fast for sub-steps."""
-        h = self.stepper.sub_step(np.flatnonzero(run.world.dynamic))
+        """Unmark those that are too fast for sub-steps; what joints join stays together, and is given more of them."""
+        h, joined = self.stepper.sub_step(np.flatnonzero(run.world.dynamic)), member & self._jointed
         mark_slow(run.state.now, self.stepper.inner, FAST / h, SPIN / h, member)
+        member |= joined
 
     def _near(self, run: Run, member: np.ndarray, ahead: float) -> np.ndarray:
         """Pairs (3, k) of members that may meet something in `ahead` s."""
@@ -192,7 +203,7 @@ class SubsteppedIslands:
 
     def _touched(self, run: Run, member: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Bodies at rest that members touch, and all of the islands they belong to."""
-        world = run.world
+        world, links = run.world, run.joints.links()
         resting = world.dynamic & ~member & (run.state.trajectory.mode == FIXED)
         which = np.flatnonzero(resting[a] | resting[b])
         if not len(which):
@@ -205,13 +216,16 @@ class SubsteppedIslands:
         touched = np.unique(buffer.integer[:count, :2])
         touched = touched[resting[touched]]
         labels = self.label[touched]
-        # Sleeping islands wake as a whole.
-        mates = np.flatnonzero(resting & np.isin(self.label, labels[labels >= 0]))
-        return np.union1d(touched, mates)
+        # Sleeping islands wake as a whole, and so does what joints join.
+        joined = island_roots(world.num_bodies, links[:, 0], links[:, 1], world.dynamic)
+        mates = np.isin(self.label, labels[labels >= 0]) | np.isin(joined, joined[touched])
+        return np.flatnonzero(resting & mates)
 
-    def _low(self, run: Run, pair_events: PairEvents, chosen: np.ndarray, root: np.ndarray, refused: dict[int, str]) -> np.ndarray:
-        """Leave out islands that begin as tall columns."""
-        begins = chosen & (self.label < 0)
+    def _low(
+        self, run: Run, pair_events: PairEvents, chosen: np.ndarray, root: np.ndarray, joined: np.ndarray, refused: dict[int, str]
+    ) -> np.ndarray:
+        """Leave out islands that begin as tall columns; joined (n,) bool: bodies with joints, whose islands may be."""
+        begins = chosen & (self.label < 0) & ~np.isin(root, root[joined])
         if not self._auto or not begins.any():
             return chosen
         begins &= ~np.isin(root, np.unique(root[chosen & ~begins]))
@@ -225,10 +239,11 @@ class SubsteppedIslands:
         refused.update(dict.fromkeys(tall.tolist(), "tall"))
         return chosen & ~np.isin(root, tall)
 
-    def _settle(
-        self, run: Run, chosen: np.ndarray, root: np.ndarray, a: np.ndarray, b: np.ndarray, touch: np.ndarray, time: float
-    ) -> None:
-        """Label the islands; put to sleep those that have been sleepy for long, and members that are far from moving ones."""
+    def _settle(self, run: Run, chosen: np.ndarray, root: np.ndarray, a: np.ndarray, b: np.ndarray, time: float) -> None:
+        """Label the islands; put to sleep those that have been sleepy for long, and members that are far from moving ones.
+
+        a, b (k,): bodies that touch each other, or that joints join.
+        """
         world, trajectory = run.world, run.state.trajectory
         inner = self.stepper.inner
         # Islands on moving supports never sleep.
@@ -239,19 +254,34 @@ class SubsteppedIslands:
             members = np.flatnonzero(chosen & (root == r))
             self.label[members] = r
             strength = float(world.steady_strength[members].max())
-            if strength > 0.0 and r not in moving:
+            if strength > 0.0 and r not in moving and not self._is_driven(run, members):
                 restless[members] = self.sleep_timer[members] < self._rest * np.sqrt(inner[members] / strength)
+        restless = self._with_joined(run, chosen, restless)
         if np.array_equal(restless, chosen):
             self.asleep[:] = False
             return
         now, strength = run.state.now, world.steady_strength
-        asleep = chosen & ~wake_by_contact(a[touch], b[touch], chosen, restless, now, world.mass, strength, inner)
+        awake = wake_by_contact(a, b, chosen, restless, now, world.mass, strength, inner)
+        asleep = chosen & ~self._with_joined(run, chosen, awake)
         self._put_to_sleep(run, np.flatnonzero(asleep & (trajectory.mode != FIXED)), time)
         alive = np.zeros(len(root), bool)
         alive[root[restless]] = True
         # Islands whose members all sleep are not stepped.
         chosen &= alive[root]
         self.asleep = asleep & chosen
+
+    def _is_driven(self, run: Run, members: np.ndarray) -> bool:
+        """Whether joints of members hang from something that moves, or will let go."""
+        which = run.joints.at(members[self._jointed[members]])
+        return bool(len(which)) and (bool(run.world.moving[run.joints.bodies_of(which)].any()) or run.joints.will_let_go(which))
+
+    def _with_joined(self, run: Run, chosen: np.ndarray, marked: np.ndarray) -> np.ndarray:
+        """What is marked, (n,) bool, with the chosen bodies that joints join to it."""
+        links = run.joints.links()
+        if not len(links):
+            return marked
+        joined = island_roots(run.world.num_bodies, links[:, 0], links[:, 1], chosen)
+        return marked | (chosen & np.isin(joined, joined[chosen & marked]))
 
     def _put_to_sleep(self, run: Run, members: np.ndarray, time: float) -> None:
         """Let members stay where they are."""
@@ -287,7 +317,10 @@ class SubsteppedIslands:
             share = (time - began.time) / (began.end - began.time)
             run.log.account_over(began.time, time, "energy correction", -began.taken * share)
             run.log.account_over(began.time, time, "position correction", began.raised * share)
-            run.log.account_over(began.time, time, "sub-stepping", change - (began.raised - began.taken) * share)
+            run.log.account_over(began.time, time, "joints", began.given * share)
+            run.log.account_over(began.time, time, "sub-stepping", change - (began.raised - began.taken + began.given) * share)
+            if len(began.joints) and time > began.time:
+                run.joints.account_sub_steps(run, began.joints, began.time, time)
 
     def finish(self, run: Run) -> None:
         """Account for the energy of sub-steps that last until the end of the run, and tell the plan what was done."""
@@ -338,18 +371,20 @@ class SubsteppedIslands:
 
     def contact_forces(self, run: Run, pair_events: PairEvents, island: Island) -> None:
         """Step an island from its time to the end of the step, with what touches it and is slow."""
-        run.contact_log.close(island.members, island.time)
         world, members = run.world, island.substepped
         assert members is not None
+        run.contact_log.close(np.union1d(island.members, members), island.time)
         if len(island.members):
             stays = np.zeros(world.num_bodies, bool)
             stays[island.members] = True
             # Bodies that touch the island join it, except jointed ones, and those that are too fast for sub-steps and leave it.
             self._leave_out_fast(run, stays)
             stays[island.members] |= ~self._leaves(run, island)
-            near = island.members[stays[island.members] & ~self._jointed[island.members]]
-            self.label[np.setdiff1d(near, members)] = self.label[members].max()
+            stays[island.members] |= self._jointed[island.members]
+            near = island.members[stays[island.members]]
             island.substepped = members = np.union1d(members, near)
+            # What an island connects is one sub-stepped island from here on.
+            self.label[members] = self.label[members].max()
             pair_events.inside[members] = True
             run.wrench[island.members] = 0.0
             self.asleep[members] = False
@@ -359,29 +394,63 @@ class SubsteppedIslands:
         self._steps += 1
         self._most = max(self._most, len(members))
         members = members[~self.asleep[members]]
-        end = self._end_of(run, pair_events, island.time, members)
+        joints = run.joints.at(members[self._jointed[members]])
+        if len(joints):
+            joints = run.joints.break_at(run, joints, island.time)
+        end = self._end_of(run, pair_events, island.time, members, joints)
         # In the middle of a step contacts may be kept for longer motion.
-        self._set_up(run, members, island.time, end - island.time, self.stepper.kept if island.time > pair_events.begin else 0.0)
-        if len(fresh):
-            before = mechanical_energy(run.state.now, world.constants, fresh)
-            self.stepper.move_apart(run, fresh, island.time)
-            run.log.account(island.time, "position correction", mechanical_energy(run.state.now, world.constants, fresh) - before)
-        self._outcome = out = self.stepper.step(run, island.time, end)
-        self._outcome_end = end
-        taken, raised = np.zeros((2, world.num_bodies))
-        taken[out.members], raised[out.members] = out.taken, out.raised
-        for label in np.unique(self.label[members]).tolist():
-            mine = members[self.label[members] == label]
-            self._ends[label] = end
-            energy = mechanical_energy(run.state.now, world.constants, mine)
-            self._began[label] = _Began(island.time, end, mine, energy, float(taken[mine].sum()), float(raised[mine].sum()))
+        kept = self.stepper.kept if island.time > pair_events.begin else 0.0
+        groups = self._groups(run, members)
+        outcomes = [self._step(run, group, np.intersect1d(fresh, group), (island.time, end), kept) for group in groups]
+        self._outcome, self._outcome_end = joined_outcomes(outcomes), end
         # The island was not stepped to the end of the step: it is woken there.
         if end < pair_events.end:
             pair_events.wake[members] = end
 
+    def _groups(self, run: Run, members: np.ndarray) -> list[np.ndarray]:
+        """Members that are solved together: islands with joints one by one, all others at once."""
+        joined = members[self._jointed[members]]
+        labels = np.unique(self.label[joined[[len(run.joints.at([i])) > 0 for i in joined.tolist()]]])
+        groups = [members[self.label[members] == label] for label in labels.tolist()]
+        rest = members[~np.isin(self.label[members], labels)]
+        return [rest, *groups] if len(rest) else groups
+
+    def _step(self, run: Run, members: np.ndarray, fresh: np.ndarray, span: tuple[float, float], kept: float) -> Outcome:
+        """Step members that are solved together; fresh: those of them that were in no sub-stepped island."""
+        time, end = span
+        which = run.joints.at(members[self._jointed[members]])
+        if len(which):
+            out = self._step_jointed(run, members, span, kept)
+        else:
+            self._set_up(run, members, time, end - time, kept)
+            if len(fresh):
+                before = mechanical_energy(run.state.now, run.world.constants, fresh)
+                self.stepper.move_apart(run, fresh, time)
+                change = mechanical_energy(run.state.now, run.world.constants, fresh) - before
+                run.log.account(time, "position correction", change)
+            out = self.stepper.step(run, time, end)
+        amounts = np.zeros((3, run.world.num_bodies))
+        amounts[:, out.members] = out.taken, out.raised, out.given
+        for label in np.unique(self.label[members]).tolist():
+            mine = members[self.label[members] == label]
+            self._ends[label] = end
+            energy = mechanical_energy(run.state.now, run.world.constants, mine)
+            taken, raised, given = amounts[:, mine].sum(axis=1).tolist()
+            self._began[label] = _Began(time, end, mine, energy, taken, raised, given, which)
+        return out
+
+    def _step_jointed(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome:
+        """Step an island with joints."""
+        if self._joint_stepper is None:
+            self._joint_stepper = JointedStepper(run, self.stepper)
+        self._set_up(run, members, span[0], span[1] - span[0], kept, self._joint_stepper.fineness)
+        return self._joint_stepper.step(run, *span)
+
     def _take_in(self, run: Run, fresh: np.ndarray, time: float) -> None:
         """What exact contact did to bodies ends where they come to a sub-stepped island."""
         self._taken[fresh] = True
+        if self._jointed[fresh].any():
+            run.joints.begin_sub_steps(run, fresh, time)
         run.wrench[fresh] = 0.0
         run.contact_log.close(fresh, time)
         note_end_energy(run.state.limiter, run.state.now, run.world.constants, fresh)
@@ -389,8 +458,13 @@ class SubsteppedIslands:
             account_contact_work(run, i, time)
             run.state.under_contact[i] = False
 
-    def _end_of(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray) -> float:
-        """When the trajectories of members end: before the step does where bodies are tiny, spin fast, or stray from lines."""
+    def _end_of(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray, joints: np.ndarray) -> float:
+        """When the trajectories of members end: before the step does where bodies are tiny, spin fast, or stray from lines, or joints let go."""
+        end = self._end_of_trajectories(run, pair_events, time, members)
+        return min(end, run.joints.next_release(joints, time)) if len(joints) else end
+
+    def _end_of_trajectories(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray) -> float:
+        """The same without what joints ask for."""
         stepper = self.stepper
         step, allowed, pressed = stepper.step_length, STRAY * stepper.motion, stepper.pressed | self._only_expensive
         stray = most_stray(run.state.now, members, pressed, stepper.reach, stepper.skin, allowed)
@@ -407,8 +481,10 @@ class SubsteppedIslands:
         speed = np.linalg.norm(run.state.now.velocity[island.members], axis=1)
         return slowest[island.members] > LEAVING * speed
 
-    def _set_up(self, run: Run, members: np.ndarray, time: float, ahead: float, kept: float) -> None:
-        """Put members, in their order, and the bodies near them that stand still before the solver; kept: see `review`."""
+    def _set_up(
+        self, run: Run, members: np.ndarray, time: float, ahead: float, kept: float, fineness: Fineness | None = None
+    ) -> None:
+        """Put members, in their order, and the bodies near them that stand still before the solver; kept, fineness: see `ContactStepper`."""
         world, order = run.world, self.stepper.order
         marked = np.zeros(world.num_bodies, bool)
         marked[members] = True
@@ -419,7 +495,7 @@ class SubsteppedIslands:
             run.state.trajectory, moving, time, run.state.now, run.state.rotation, run.acceleration,
             run.angular_acceleration,
         )  # fmt: skip
-        self.stepper.set_up(run, members, fixed, ahead, kept)
+        self.stepper.set_up(run, members, fixed, ahead, kept, fineness)
 
     def begin_trajectories(self, run: Run, pair_events: PairEvents, island: Island) -> None:
         """Give the members the trajectories that the solver found."""

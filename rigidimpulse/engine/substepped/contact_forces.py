@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from rigidimpulse.collision.contact_buffer import ContactBuffer, Question, find_together
-from rigidimpulse.collision.contact_cache import Convex, Limits, Share, classify, find_contacts, make_workspace, most_motion, share_of
+from rigidimpulse.collision.contact_cache import (
+    Convex,
+    Limits,
+    Share,
+    classify,
+    find_contacts,
+    make_workspace,
+    most_approach,
+    most_motion,
+    share_of,
+)
 from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
 from rigidimpulse.collision.contact_table import ContactTable
 from rigidimpulse.collision.contact_update import FARTHER, Searched, SmallerShapes, store_contacts
@@ -86,6 +96,7 @@ class Outcome:
     """Result of a step: bodies (k,) of the scene in the solver's order, and their poses and velocities (k, 6) at its end.
 
     taken, raised: (k,) J that the balance of energy took off their speeds, and that they gained and could not pay.
+    given: (k,) J, work of drives and moving supports in islands with joints.
     """
 
     members: np.ndarray
@@ -94,6 +105,29 @@ class Outcome:
     velocity: np.ndarray
     taken: np.ndarray
     raised: np.ndarray
+    given: np.ndarray
+
+
+def joined_outcomes(outcomes: list[Outcome]) -> Outcome:
+    """The outcomes of several sets of bodies as one."""
+    if len(outcomes) == 1:
+        return outcomes[0]
+    return Outcome(*(np.concatenate([getattr(out, column.name) for out in outcomes]) for column in fields(Outcome)))
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """How finely a set of bodies is stepped.
+
+    Attributes:
+        sub_step: s, the longest. motion: inner radii that touching bodies move until they are looked at again.
+        meets_fast: whether there may be bodies that are too fast for contacts to be found for the whole step.
+
+    """
+
+    sub_step: float
+    motion: float
+    meets_fast: bool = False
 
 
 class ContactStepper:
@@ -104,7 +138,8 @@ class ContactStepper:
         inner: (n,) m, distance from the centre of mass to the nearest face; inf for what cannot be moved. skin: (n,) m.
         step_length: s, that is stepped at once at most; motion: inner radii, see `Accuracy.substep_motion`.
         kept: inner radii that a pair may come past each other with the contacts it has, in the middle of a step.
-        bodies: by rank. table: pairs and contact points. pressed: (n,) bool, contacts acted on the body when it was last stepped.
+        bodies: by rank. table: pairs and contact points. balance: of their energy. sub_steps, parts: of the step that is set up; between
+            parts contacts are looked for again. pressed: (n,) bool, contacts acted on the body when it was last stepped.
 
     """
 
@@ -140,7 +175,7 @@ class ContactStepper:
         self._taken_off = self._depth + (1.0 - self._factor) * bound[self.order]
         self.bodies = self._make_bodies()
         self._weights = Weights(world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order]))
-        self._balance = make_balance(n)
+        self.balance = make_balance(n)
         self._shares, self._looked_at = self._sharing.most_cores, 0
         self._workspaces = [make_workspace() for _ in range(self._shares)]
         self._more_buffers: list[ContactBuffer] = []
@@ -166,7 +201,7 @@ class ContactStepper:
         self._special = self._all_quick or bool(world.coefficients[:, :, 0].any())
         self.pressed = np.zeros(n, bool)
         self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
-        self.members, self.ahead, self._parts, self._sub_steps = np.zeros(0, np.int64), 0.0, 1, 1
+        self.members, self.ahead, self.parts, self.sub_steps = np.zeros(0, np.int64), 0.0, 1, 1
 
     def _make_bodies(self) -> SolverBodies:
         """Rows of all bodies by rank, and one of none."""
@@ -211,8 +246,14 @@ class ContactStepper:
         """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `FatBoxes.near`."""
         return self.fat_boxes.near(self.table.pairs, run.state.now, run.acceleration, member, other, ahead)
 
-    def set_up(self, run: Run, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0) -> None:
-        """Put members and what they may touch before the kernels at the present instant, with their contacts; kept: see `review`."""
+    def set_up(
+        self, run: Run, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0, fineness: Fineness | None = None
+    ) -> None:
+        """Put members and what they may touch before the kernels at the present instant, with their contacts.
+
+        kept: see `review`; fineness: None for that of bodies without joints.
+        """
+        fineness = fineness or Fineness(self.sub_step(members), self.motion)
         self.find_pairs(run, members, supports, ahead)
         self.table.pack()
         self.members = members
@@ -222,10 +263,12 @@ class ContactStepper:
         motion = most_motion(self.bodies, self.table.pairs, ahead)
         # Fast bodies are looked at more often, with enough sub-steps between the looks.
         needed = math.ceil(motion / COARSEST)
-        self._sub_steps = max(math.ceil(ahead / self.sub_step(members) - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
-        most = max(self._sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
-        self._parts = min(max(math.ceil(motion / self.motion), 1), most)
-        self.ahead = ahead / self._parts
+        if fineness.meets_fast:
+            needed = max(needed, math.ceil(most_approach(self.bodies, self.table.pairs, ahead)))
+        self.sub_steps = max(math.ceil(ahead / fineness.sub_step - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
+        most = max(self.sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
+        self.parts = min(max(math.ceil(motion / fineness.motion), needed, 1), most)
+        self.ahead = ahead / self.parts
         self._look(run, kept)
 
     def _look(self, run: Run, kept: float) -> None:
@@ -357,30 +400,47 @@ class ContactStepper:
 
     def step(self, run: Run, time: float, end: float) -> Outcome:
         """Step what `set_up` put before the kernels from `time` to `end`."""
-        bodies, members = self.bodies, self.members
-        sub_steps = self._sub_steps
-        h = (end - time) / sub_steps
-        done = 0
-        begin_balance(self._balance, bodies, self._weights)
+        h = (end - time) / self.sub_steps
+        self.begin_step()
         self._steady = _NO_STEADY
-        for part in range(self._parts):
+        for part, some in enumerate(self.sub_steps_of_parts()):
             if part:
                 self._look_again(run)
-            some = (part + 1) * sub_steps // self._parts - done
             self._advance(some, h)
-            done += some
-        note_pressed(bodies, self.order, self.pressed)
-        # Sub-steps must not make energy beyond what moving supports gave.
-        end_balance(self._balance, bodies, self._weights)
-        at = self.rank[members]
+        note_pressed(self.bodies, self.order, self.pressed)
+        out = self.end_step()
+        out.given[:] = 0.0
+        return out
+
+    def sub_steps_of_parts(self) -> list[int]:
+        """Sub-steps of each part of the step, between which contacts are looked for again."""
+        edges = [part * self.sub_steps // self.parts for part in range(self.parts + 1)]
+        return np.diff(edges).tolist()
+
+    def begin_step(self) -> None:
+        """Remember the energies of the members."""
+        begin_balance(self.balance, self.bodies, self._weights)
+
+    def look_again_at_all(self, run: Run) -> None:
+        """Find the contacts of all bodies again in the middle of a step."""
+        self._look(run, self.kept)
+
+    def end_step(self) -> Outcome:
+        """Balance the energy, and say where the members are."""
+        bodies, balance, members, at = self.bodies, self.balance, self.members, self.rank[self.members]
+        # Sub-steps must not make energy beyond what moving supports and drives gave.
+        given = balance.given[at]
+        end_balance(balance, bodies, self._weights)
         velocity = bodies.velocity.reshape(-1, ROW)[at, :6]
-        return Outcome(members, bodies.position[at], bodies.orientation[at], velocity, self._balance.taken[at], self._balance.raised[at])
+        return Outcome(
+            members, bodies.position[at], bodies.orientation[at], velocity, balance.taken[at], balance.raised[at], given
+        )  # fmt: skip
 
     def _advance(self, sub_steps: int, h: float) -> None:
         """Sub-steps of h s with the contacts as they are known."""
         bodies, table, width = self.bodies, self.table, self.simd.width
         number, steady = self._fill(h), len(self._steady[1]) - 1
-        connect(self._balance, bodies, table.pairs, self._patches, self._count)
+        connect(self.balance, bodies, table.pairs, self._patches, self._count)
         solve = Solve(bodies, table.pairs, self._patches, self._batches, table.points, self._edges, steady)
         lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
         balls = rebounds = supports = 0
@@ -389,7 +449,7 @@ class ContactStepper:
             balls, rebounds, supports = special_patches(
                 width, solve, self._steady[0], self._count, self.world.coefficients, strength, lists, target
             )
-        special = SpecialPatches(lists[0, :balls], lists[1, :rebounds], lists[2, :supports], target, self._balance.given)
+        special = SpecialPatches(lists[0, :balls], lists[1, :rebounds], lists[2, :supports], target, self.balance.given)
         shares = min(self._shares, self._sharing.solvers) if number * sub_steps > self._sharing.batches else 1
         self._work_queue[:] = empty_work_queue()
         self._sharing.call(advance, [

@@ -4,7 +4,7 @@ With h the length of the sub-step, v the velocity, w the spin, g gravity, x the 
 
     kick    v <- v + h g
     move    x <- x + h v,   q <- exp(h w) q;   where no contact pushed also x <- x - h^2 g / 2, which makes it the parabola
-    bodies whose moments differ keep their angular momentum: w <- I(q')^-1 I(q) w, see `_turn_freely`
+    bodies whose moments differ keep their angular momentum: w <- I(q')^-1 I(q) w, see `turn_freely`
 """
 
 from math import sqrt
@@ -35,7 +35,7 @@ def _spin_rate(moments, i, x0, x1, x2):
 
 
 @inlined
-def _turn_freely(bodies, i, h):
+def turn_freely(bodies, i, h):
     """Turn body i of unlike moments by its spin over h, keeping its angular momentum; returns the mean spin.
 
     The spin x in the body's axes by the classical Runge-Kutta method, x_m half-way by Hermite's cubic, and the turn of fourth order
@@ -105,7 +105,7 @@ def move(bodies, begin, end, h):
             continue
         # Bodies whose moments differ keep their angular momentum, not their spin.
         if member and not bodies.alike[i]:
-            wx, wy, wz = _turn_freely(bodies, i, h)
+            wx, wy, wz = turn_freely(bodies, i, h)
         for k, turn in ((3, h * wx), (4, h * wy), (5, h * wz)):
             moved[o + k] += turn
             drift[o + k] += turn

@@ -1,0 +1,121 @@
+"""What the rows of a jointed island ask for in a sub-step h: u is the rate of a row before impulses act, u' = u + W p the one after.
+
+    contact, s > 0           u'_n >= -s / h                      free to close the gap, no further
+             -skin <= s <= 0 u'_n >= 0                           held where it is
+             s < -skin       u'_n >= PUSH min(-s - skin, skin) / h
+             it closes in h, -e u_n > sqrt(2 g skin):  u'_n >= -e u_n
+    hard row of a joint      u' = -x / h                         x: coordinate less target; what is left is closed by `flight`
+    limit not reached        u' >= -x / h                        (u' <= -x / h of an upper one)
+    limit overrun            u' >= PUSH |x| / h
+    soft row, drive          p = -h (k (x + h t u') + c (u' - r)),   t = 0 where k W h^2 < SLOW, else 1
+
+The soft row is explicit in x where its own oscillation is well resolved, so that it keeps its energy, and implicit where it is not, so that
+any stiffness is stable. With d = h (t h k + c) it reads  u' + p / d = h (c r - k x) / d;  where d = 0 the impulse is known.
+"""
+
+from math import inf, sqrt
+
+import numpy as np
+
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.dynamics.constraints.joint import joint_rows, relative_point_velocity
+from rigidimpulse.dynamics.constraints.joint_limits import joint_weights, limit_side, spring_of
+from rigidimpulse.dynamics.constraints.rows import row_velocities, rows_of
+
+PUSH = 0.2
+"""Part of what is too deep that is put right in a sub-step."""
+SLOW = 0.25
+TINY = TOLERANCES.arithmetic.least_divisor
+
+
+@jit_making_arrays
+def fill_contact_biases(now, contacts, of_contacts, skins, pull, h):
+    """Write b of the rows of contacts; skins (m,) m; pull: strength of gravity, m/s2. Returns the velocities u (m, 3) along the frames."""
+    rows, first_row = of_contacts.rows, of_contacts.first_row
+    u, along = np.zeros(rows.bias.shape[0]), np.zeros((first_row.shape[0], 3))
+    row_velocities(now, contacts, first_row, of_contacts.frames, u)
+    for c in range(first_row.shape[0]):
+        i, s, skin = first_row[c], contacts.gap[c], skins[c]
+        for k in range(rows_of(rows, i)):
+            rows.bias[i + k] = along[c, k] = u[i + k]
+        rebound = -contacts.restitution[c] * u[i]
+        if s + h * u[i] < 0.0 and rebound > sqrt(2.0 * pull * skin):
+            rows.bias[i] -= rebound
+        elif s > 0.0:
+            rows.bias[i] += s / h
+        elif s < -skin:
+            rows.bias[i] -= PUSH * min(-s - skin, skin) / h
+    return along
+
+
+@jit_making_arrays
+def fill_joint_biases(island, rows, start, h):
+    """Fill the rows of joints from `start` on, with biases, bounds, softness and first impulses; remembers their coordinates.
+
+    Returns their directions (s, 3).
+    """
+    joints, memory = island.joints, island.memory
+    count = rows.bias.shape[0] - start
+    value, direction, u, weight = np.empty(count), np.empty((count, 3)), np.empty(count), np.empty(count)
+    joint_rows(island, rows, start, value, direction)
+    relative_point_velocity(island, direction, u)
+    joint_weights(joints, island.which, rows, start, weight)
+    i = 0
+    for j in island.which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            r, x, side = start + i, value[i], limit_side(joints, k)
+            memory.start_value[k] = x
+            rows.bias[r], rows.impulse[r] = u[i], memory.force[k] * h
+            rows.lower[r], rows.upper[r] = joints.lower[k] * h, joints.upper[k] * h
+            slack = side * x > 0.0
+            if joints.stiffness[k] == inf:
+                rows.bias[r] += x / h if side == 0.0 or slack else PUSH * x / h
+            elif side != 0.0 and slack:
+                rows.lower[r] = rows.upper[r] = rows.impulse[r] = 0.0
+            else:
+                stiffness, damping = spring_of(joints, k, weight[i])
+                _soften(rows, r, (stiffness, damping, joints.rate[k]), weight[i], x, h)
+            i += 1
+    return direction
+
+
+@jit
+def _soften(rows, r, spring, weight, x, h):
+    """Let row r be the spring (stiffness, damping, rate) at the coordinate x; its bounds are there."""
+    stiffness, damping, rate = spring
+    implicit = 1.0 if stiffness * weight * h * h >= SLOW else 0.0
+    d, push = h * (implicit * h * stiffness + damping), h * (damping * rate - stiffness * x)
+    if d <= TINY:
+        rows.lower[r] = rows.upper[r] = rows.impulse[r] = min(max(push, rows.lower[r]), rows.upper[r])
+        return
+    rows.softness[r] = 1.0 / d
+    rows.bias[r] -= push / d
+
+
+@jit_making_arrays
+def fill_still_biases(island, contacts, of_contacts, start):
+    """Write the biases that make the rates of joints vanish, and stop contacts that are closed: at the end of a step, where nothing moves on.
+
+    Soft rows, limits that are not reached, and contacts with a gap carry nothing. Returns the directions of the joints' rows (s, 3).
+    """
+    joints, rows, first_row = island.joints, of_contacts.rows, of_contacts.first_row
+    count = rows.bias.shape[0] - start
+    value, direction, u = np.empty(count), np.empty((count, 3)), np.zeros(rows.bias.shape[0])
+    joint_rows(island, rows, start, value, direction)
+    relative_point_velocity(island, direction, u[start:])
+    row_velocities(island.bodies, contacts, first_row, of_contacts.frames, u)
+    for i in range(u.shape[0]):
+        rows.bias[i] = u[i]
+    for c in range(first_row.shape[0]):
+        if contacts.gap[c] > 0.0:
+            rows.upper[first_row[c]] = 0.0
+    i = 0
+    for j in island.which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            r, side = start + i, limit_side(joints, k)
+            rows.lower[r], rows.upper[r] = joints.lower[k], joints.upper[k]
+            if joints.stiffness[k] < inf or side * value[i] > 0.0:
+                rows.lower[r] = rows.upper[r] = 0.0
+            i += 1
+    return direction

@@ -1,0 +1,237 @@
+"""Time stepping of a jointed island: contacts and joints are solved together, exactly, once in a sub-step (kernels).
+
+A sub-step of length h, with J_0 the rows of contacts and joints at its start and the biases of `biases`:
+
+    v <- v + h/2 g
+    p:  u' = b + J_0 v + W p  obeys the laws of all rows (`newton`),   v <- v + M^-1 J_0^T p
+    fly, and close the joints (`flight`)
+    v <- v + h/2 g
+
+Where no contact acts this is the method of Verlet with constraints: of second order, and symplectic; half of a step's gravity at each of its
+ends makes a free body's path the parabola. At the end of all sub-steps impulses nu make the rates of joints and of closed contacts vanish:
+
+    J_1 (v + M^-1 J_1^T nu) = 0
+
+A sub-step whose joints stay open by more than GIVE_UP of what is allowed is taken back and halved, down to 1 / MOST_HALVED of its length.
+Contacts and joints feel each other in one solve. So loads of any mass ratio are carried: a sweep over contacts and joints in turn would need
+the more sweeps the heavier the load.
+
+Source: Stewart and Trinkle 1996, Anitescu and Potra 1997 (time stepping with contact and friction at velocity level).
+"""
+
+import numpy as np
+
+from rigidimpulse.collision.contact_records import SKIN, SUPPORT
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.union_find import unite
+from rigidimpulse.dynamics.constraints.joint import is_linear
+from rigidimpulse.dynamics.constraints.jointed_island import count_joint_rows
+from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows
+from rigidimpulse.dynamics.constraints.slip import solve_until_slip
+from rigidimpulse.dynamics.solvers.time_stepping.biases import fill_contact_biases, fill_joint_biases, fill_still_biases
+from rigidimpulse.dynamics.solvers.time_stepping.contact_points import contact_points, keep_for_next, start_from_kept
+from rigidimpulse.dynamics.solvers.time_stepping.flight import carry_supports, fly_and_close, kick, set_inertia, stiffen
+
+GIVE_UP, MOST_HALVED = 100.0, 32.0
+ACCURATE, SLIP, LAST = TOLERANCES.sub_stepping.joint_residual, TOLERANCES.sub_stepping.joint_no_slip, TOLERANCES.sub_stepping.last_sub_step
+TINY = TOLERANCES.arithmetic.least_divisor
+
+
+@jit_making_arrays
+def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h):
+    """Step an island by `sub_steps` sub-steps of h s.
+
+    island: its joints and members by rank, with the velocities; bodies: the solver's bodies, with the poses. table: of contacts. balance: its
+    clusters are joined, and it is given the work of drives and moving supports. kept: stiffening (n,) kg m2, which is updated; moment
+    (j, 3) N s, to which the impulses of the joints on their b are added; driven (n,) bool, members that drives, springs or moving supports
+    may give energy to. Returns how many sub-steps were halved, and the worst gap of a joint, m or rad.
+    """
+    members, now, stiffening = island.members, island.bodies, kept[0]
+    supports = _supports(bodies)
+    left, step, halved, worst = sub_steps * h, h, np.int64(0), 0.0
+    begin, spin = np.empty((bodies.part.shape[0], 7)), np.empty((bodies.part.shape[0], 3))
+    before = np.empty((bodies.part.shape[0], 6))
+    set_inertia(bodies, now, members, stiffening)
+    while left > LAST * h:
+        step = min(step, left)
+        _remember(bodies, now, members, begin, before)
+        kick(bodies, now, members, 0.5 * step)
+        gap = _sub_step(island, bodies, table, coefficients, balance, kept, (begin, spin), step)
+        if gap > GIVE_UP * island.allowed and step > h / MOST_HALVED:
+            _take_back(bodies, now, members, begin, before)
+            step *= 0.5
+            halved += 1
+            continue
+        for i in members:
+            for k in range(3):
+                now.angular_velocity[i, k] = spin[i, k]
+        carry_supports(bodies, now, supports, step)
+        set_inertia(bodies, now, members, stiffening)
+        kick(bodies, now, members, 0.5 * step)
+        worst = max(worst, gap)
+        left -= step
+        # After a halved sub-step the next ones may be whole again.
+        step = min(2.0 * step, h)
+    return halved, worst
+
+
+@jit_making_arrays
+def _supports(bodies):
+    """Bodies that are no members and move on a path of their own."""
+    found, m = np.empty(bodies.part.shape[0], np.int64), 0
+    for i in range(bodies.part.shape[0]):
+        if bodies.part[i] == SUPPORT and np.any(bodies.velocity[8 * i : 8 * i + 6] != 0.0):
+            found[m] = i
+            m += 1
+    return found[:m]
+
+
+@jit
+def _remember(bodies, now, members, begin, before):
+    for i in members:
+        for k in range(3):
+            begin[i, k], before[i, k], before[i, 3 + k] = bodies.position[i, k], now.velocity[i, k], now.angular_velocity[i, k]
+        for k in range(4):
+            begin[i, 3 + k] = bodies.orientation[i, k]
+
+
+@jit
+def _take_back(bodies, now, members, begin, before):
+    for i in members:
+        for k in range(3):
+            bodies.position[i, k], now.velocity[i, k], now.angular_velocity[i, k] = begin[i, k], before[i, k], before[i, 3 + k]
+        for k in range(4):
+            bodies.orientation[i, k] = begin[i, 3 + k]
+
+
+@jit
+def _kinetic_energy(bodies, now, i):
+    """Kinetic energy of body i with its true inertia, J."""
+    r, w, v = bodies.rotation[i], now.angular_velocity[i], now.velocity[i]
+    total = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) / now.inv_mass[i]
+    for k in range(3):
+        along = r[0, k] * w[0] + r[1, k] * w[1] + r[2, k] * w[2]
+        total += bodies.inertia[i, k] * along * along
+    return 0.5 * total
+
+
+@jit_making_arrays
+def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
+    """Solve the rows at the present pose, fly, and close; returns the gap that is left of joints, m or rad."""
+    members, now, (stiffening, moment, driven) = island.members, island.bodies, kept
+    contacts, place = contact_points(bodies, now, table.pairs, table.points, coefficients, h)
+    start_of = contact_rows(now, contacts, members, island.number, count_joint_rows(island.joints, island.which))
+    rows, start = start_of.rows, start_of.rows.bias.shape[0] - count_joint_rows(island.joints, island.which)
+    start_from_kept(rows, start_of, table.points, place)
+    pull = 0.0
+    for i in members:
+        pull = max(pull, np.sqrt(bodies.gravity[i, 0] ** 2 + bodies.gravity[i, 1] ** 2 + bodies.gravity[i, 2] ** 2))
+    u = fill_contact_biases(now, contacts, start_of, table.points[place, SKIN], pull, h)
+    direction = fill_joint_biases(island, rows, start, h)
+    scale = max(_fastest(rows), h * pull) + TINY
+    _set_friction(start_of, contacts, u, SLIP * scale)
+    _give(bodies, now, members, balance, driven, -1.0)
+    solve_until_slip(None, start_of, members.shape[0], contacts, ACCURATE * scale, SLIP * scale)
+    change_velocities(now, members, rows)
+    _give(bodies, now, members, balance, driven, 1.0)
+    keep_for_next(start_of, contacts, table.points, place)
+    _connect(balance, island, contacts, start_of)
+    begin, spin = flight
+    gap = fly_and_close(island, bodies, rows, start, begin, spin, h)
+    if gap > GIVE_UP * island.allowed:
+        return gap
+    own = np.zeros(moment.shape)
+    _add_moments(island, rows, start, direction, own)
+    _remember_forces(island, rows, start, h)
+    stiffen(island, stiffening, own, h)
+    for j in island.which:
+        for k in range(3):
+            moment[j, k] += own[j, k]
+    return gap
+
+
+@jit
+def _fastest(rows):
+    fastest = 0.0
+    for i in range(rows.bias.shape[0]):
+        if rows.lower[i] < rows.upper[i]:
+            fastest = max(fastest, abs(rows.bias[i]))
+    return fastest
+
+
+@jit
+def _set_friction(of_contacts, contacts, u, slow):
+    """Contacts that slip faster than `slow` m/s have dynamic friction, all others the static one; u (m, 3) m/s."""
+    rows = of_contacts.rows
+    for c in range(u.shape[0]):
+        if contacts.static_friction[c] > 0.0:
+            i = of_contacts.first_row[c] + 1
+            slips = abs(u[c, 1]) + abs(u[c, 2]) > slow
+            rows.coefficient[i] = rows.coefficient[i + 1] = contacts.dynamic_friction[c] if slips else contacts.static_friction[c]
+
+
+@jit
+def _give(bodies, now, members, balance, driven, sign):
+    """Add the kinetic energy of driven members, times the sign, to what they are given."""
+    for i in members:
+        if driven[i]:
+            balance.given[i] += sign * _kinetic_energy(bodies, now, i)
+
+
+@jit
+def _connect(balance, island, contacts, of_contacts):
+    """Join the clusters of members that joints and bearing contacts connect."""
+    joints, inv_mass, touched = island.joints, island.bodies.inv_mass, False
+    for c in range(contacts.gap.shape[0]):
+        if of_contacts.rows.impulse[of_contacts.first_row[c]] > 0.0:
+            a, b, touched = contacts.body_a[c], contacts.body_b[c], True
+            if inv_mass[a] > 0.0 and inv_mass[b] > 0.0:
+                unite(balance.parent, a, b)
+    if not touched:
+        # What only joints hold keeps its energy by the method: nothing is taken off it.
+        return
+    for j in island.which:
+        a, b = joints.body_a[j], joints.body_b[j]
+        if a >= 0 and b >= 0 and inv_mass[a] > 0.0 and inv_mass[b] > 0.0:
+            unite(balance.parent, a, b)
+    for i in island.members:
+        balance.touched[i] = True
+
+
+@jit
+def _add_moments(island, rows, start, direction, moment):
+    """Add the linear impulses on b of each joint to moment (j, 3)."""
+    joints, i = island.joints, 0
+    for j in island.which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            if is_linear(joints.coordinate[k]):
+                for r in range(3):
+                    moment[j, r] += rows.impulse[start + i] * direction[i, r]
+            i += 1
+
+
+@jit
+def _remember_forces(island, rows, start, h):
+    """Remember the forces of the rows of joints, from which the next sub-step starts."""
+    joints, i = island.joints, start
+    for j in island.which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            island.memory.force[k] = rows.impulse[i] / h
+            i += 1
+
+
+@jit_making_arrays
+def stop_island(island, bodies, table, coefficients, stiffening, moment):
+    """Make the rates of joints and closed contacts vanish at the end of the sub-steps; adds the impulses on b of joints to moment (j, 3)."""
+    members, now = island.members, island.bodies
+    set_inertia(bodies, now, members, stiffening)
+    contacts, _ = contact_points(bodies, now, table.pairs, table.points, coefficients, 0.0)
+    of_contacts = contact_rows(now, contacts, members, island.number, count_joint_rows(island.joints, island.which))
+    rows = of_contacts.rows
+    start = rows.bias.shape[0] - count_joint_rows(island.joints, island.which)
+    direction = fill_still_biases(island, contacts, of_contacts, start)
+    scale = _fastest(rows) + TINY
+    solve_until_slip(None, of_contacts, members.shape[0], contacts, ACCURATE * scale, SLIP * scale)
+    change_velocities(now, members, rows)
+    _add_moments(island, rows, start, direction, moment)

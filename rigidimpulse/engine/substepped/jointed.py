@@ -1,0 +1,104 @@
+"""Sub-stepped islands with joints: contacts and joints are solved together, see `dynamics/solvers/time_stepping`.
+
+An island with joints is stepped by itself, with all bodies that its joints and contacts connect. What it needs of bodies and contacts is
+the stepper's (`contact_forces`): poses, contact table, and the balance of energy.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidimpulse.core.simd import ROW
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
+from rigidimpulse.dynamics.solvers.time_stepping.solver import step_island, stop_island
+from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Fineness, Outcome
+from rigidimpulse.engine.substepped.given_impulses import GivenImpulses
+from rigidimpulse.motion.body_state import BodyState
+
+SUB_STEPS = 8
+"""Sub-steps of a whole step, at least."""
+MOTION = 1.0
+"""Parts of `Accuracy.substep_motion` that touching bodies move until their contacts are looked for again."""
+CLOSED = TOLERANCES.sub_stepping.joints_closed
+
+
+class JointedStepper:
+    """Steps islands with joints, one by one.
+
+    Attributes:
+        fineness: how finely. halved: sub-steps that were halved, so far.
+
+    """
+
+    def __init__(self, run: Run, stepper: ContactStepper) -> None:
+        """Bodies by rank; joints with the ranks of their bodies."""
+        world, bodies, n = run.world, stepper.bodies, run.world.num_bodies
+        self._stepper, self._world = stepper, world
+        self.fineness = Fineness(world.accuracy.step / SUB_STEPS, MOTION * world.accuracy.substep_motion, meets_fast=True)
+        inv_mass = np.concatenate([world.inv_mass[stepper.order], np.zeros(1)])
+        self._now = BodyState(
+            bodies.position, bodies.orientation, np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), inv_mass, np.zeros((n + 1, 3, 3))
+        )
+        table, rank = run.joints.table, stepper.rank
+        self._joints = table._replace(body_a=_by_rank(table.body_a, rank), body_b=_by_rank(table.body_b, rank))
+        self._driven_joints = _driven(run)
+        self._stiffening, self._column = np.zeros(n + 1), np.zeros(n + 1, np.int64)
+        self._driven, self.halved = np.zeros(n + 1, bool), 0
+        self._allowed = CLOSED * world.joint_size
+
+    def step(self, run: Run, time: float, end: float) -> Outcome:
+        """Step the island that is set up, whose bodies have joints, from `time` to `end`."""
+        stepper, now, world = self._stepper, self._now, self._world
+        bodies, members = stepper.bodies, np.sort(stepper.rank[stepper.members])
+        which = run.joints.at(stepper.members)
+        velocity = bodies.velocity.reshape(-1, ROW)
+        now.velocity[:], now.angular_velocity[:] = velocity[:, :3], velocity[:, 3:6]
+        # What is no member does not give way.
+        now.inv_mass[:] = 0.0
+        now.inv_mass[members] = world.inv_mass[stepper.order[members]]
+        carried = world.moving.any()
+        self._driven[:] = carried or bool(self._driven_joints[which].any())
+        moment = np.zeros((len(self._joints.body_a), 3))
+        kept = self._stiffening, moment, self._driven
+        island = JointedIsland(
+            self._joints, which, now, bodies.rotation, members, self._column, run.joints.memory, self._allowed
+        )
+        stepper.begin_step()
+        given = GivenImpulses(stepper)
+        h, worst = (end - time) / stepper.sub_steps, 0.0
+        for part, some in enumerate(stepper.sub_steps_of_parts()):
+            if part:
+                self._hand_over(members)
+                stepper.look_again_at_all(run)
+                given.forget(stepper)
+            halved, gap = step_island(
+                island, bodies, stepper.table.arrays, world.coefficients, stepper.balance, kept, some, h
+            )
+            self.halved, worst = self.halved + halved, max(worst, gap)
+            given.add(stepper)
+        stop_island(island, bodies, stepper.table.arrays, world.coefficients, self._stiffening, moment)
+        self._hand_over(members)
+        stepper.pressed[stepper.members] = True
+        given.log(run, stepper.members, time, end)
+        run.joints.note_sub_steps(run, which, moment / (end - time), (time, end), worst)
+        return stepper.end_step()
+
+    def _hand_over(self, members: np.ndarray) -> None:
+        """Give the stepper the velocities of the members."""
+        velocity = self._stepper.bodies.velocity.reshape(-1, ROW)
+        velocity[members, :3], velocity[members, 3:6] = self._now.velocity[members], self._now.angular_velocity[members]
+
+
+def _by_rank(bodies: np.ndarray, rank: np.ndarray) -> np.ndarray:
+    """Ranks of bodies (j,); the world stays -1."""
+    return np.where(bodies >= 0, rank[bodies], -1)
+
+
+def _driven(run: Run) -> np.ndarray:
+    """Which joints (j,) have springs, drives, or an end on a moving body that is not dynamic."""
+    table, world = run.joints.table, run.world
+    soft = np.add.reduceat(np.isfinite(table.stiffness).astype(np.int64), table.first[:-1]) > 0
+    moving = [(ends >= 0) & world.moving[ends] for ends in (table.body_a, table.body_b)]
+    return soft | moving[0] | moving[1]
