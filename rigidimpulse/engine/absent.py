@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from rigidimpulse.engine.pair_table import NEVER
 from rigidimpulse.model.island import Island
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ class NoSubstepping:
 
     def __init__(self, num_bodies: int) -> None:
         """None of the bodies belongs to one."""
-        self.label, self.solve_count = np.full(num_bodies, -1), np.zeros(num_bodies)
+        self.label, self.solve_count = np.full(num_bodies, -1), np.full(num_bodies, NEVER)
 
     def choose(self, _run: Any, _pair_events: Any) -> None:
         """No island is chosen."""
@@ -114,6 +115,10 @@ class NoSubstepping:
     def join(self, _run: Any, _pair_events: Any, _time: float, islands: list[Island]) -> list[Island]:
         """All islands are exact."""
         return islands
+
+    def may_take(self, _bodies: np.ndarray) -> bool:
+        """Nothing is handed over."""
+        return False
 
     def is_idle(self) -> bool:
         """Nothing is sub-stepped, nor will be."""

@@ -217,6 +217,11 @@ class ContactForces:
         return Bound(f"{how}bodies may come to rest on each other", verbs)
 
 
+def choose_islands(run: Run, pair_events: PairEvents) -> None:
+    """Which islands are sub-stepped in the step, where no contact is looked for."""
+    run.substepped.choose(run, pair_events)
+
+
 def substep_contacts(run: Run, pair_events: PairEvents, island: Island) -> None:
     """Contact forces of a sub-stepped island, by sub-steps to the end of the step."""
     run.substepped.contact_forces(run, pair_events, island)
@@ -229,7 +234,7 @@ def begin_substepped_trajectories(run: Run, pair_events: PairEvents, island: Isl
 
 @dataclass(frozen=True)
 class SubsteppedContact:
-    """Contact inside islands of many bodies."""
+    """Contacts and joints of islands that the exact regime would take long for."""
 
     stage: str = "constrain"
     name: str = "sub-stepped islands"
@@ -239,8 +244,10 @@ class SubsteppedContact:
         reason = why_not_substepped(world)
         if reason:
             return Skip(reason)
-        when = f"once exact contact gets expensive: fewer than {MANY} bodies" if only_expensive(world) else "bodies may pile up"
+        when = f"once the exact regime gets expensive: fewer than {MANY} bodies" if only_expensive(world) else "bodies may pile up"
         verbs = {"substepped.contact_forces": substep_contacts, "substepped.trajectories": begin_substepped_trajectories}
+        if not world.can_collide:
+            verbs["pairs"] = choose_islands
         return Bound(f"sub-stepped: {when}", verbs)
 
 

@@ -193,12 +193,24 @@ class PairEvents:
         look_around(self.table, bodies, time, shift)
 
     def count_contacts(self, time: float) -> None:
-        """Count contacts at one instant; a pair with too many is left alone until the end of the step, and reported."""
+        """Count contacts at one instant; a pair with too many is handed to sub-steps, or left alone until the step ends, and reported."""
         given_up = np.empty(len(self.pairs), np.int64)
         count = count_contacts(self.table, time, INSTANT * self.run.world.accuracy.step, given_up)
-        for place in given_up[:count].tolist():
+        for place in self._left_alone(given_up[:count], time).tolist():
             kind, remedy = self.why_again(int(self.pairs[place]["a"]), int(self.pairs[place]["b"]))
-            self.report(time, kind, given_up[given_up == place], remedy)
+            self.report(time, kind, np.array([place]), remedy)
+
+    def _left_alone(self, given_up: np.ndarray, time: float) -> np.ndarray:
+        """Those of the pairs given up at `time` that the sub-stepped regime does not take; bodies of the others are looked at again."""
+        stays = []
+        for place in given_up.tolist():
+            bodies = np.array([self.pairs[place]["a"], self.pairs[place]["b"]], np.int64)
+            if self.run.substepped.may_take(bodies):
+                mine = bodies[self._dynamic[bodies]]
+                self.wake[mine] = np.minimum(self.wake[mine], time)
+            else:
+                stays.append(place)
+        return np.array(stays, np.int64)
 
     def why_again(self, a: int, b: int) -> tuple[str, str]:
         """Kind of problem, and remedy, of two bodies that come to contact again and again at one instant.
@@ -218,7 +230,7 @@ class PairEvents:
         """Pairs that came to contact without consequence are swept again from here with a smaller gap."""
         given_up = np.empty(len(self.pairs), np.int64)
         count = settle_pairs(self.table, time, self._dynamic, given_up)
-        self.report(time, "contact not resolved", given_up[:count], NOT_RESOLVED_REMEDY)
+        self.report(time, "contact not resolved", self._left_alone(given_up[:count], time), NOT_RESOLVED_REMEDY)
 
     def report(self, time: float, kind: str, places: np.ndarray, remedy: str) -> None:
         """Report a problem of the pairs at these places."""

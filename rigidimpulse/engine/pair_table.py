@@ -31,6 +31,9 @@ MAX_REPEATS = 100
 """Contacts of a pair at one instant after which there is no motion that its neighbours allow: bodies are squeezed."""
 MAX_TRIES = 30
 """Contacts of a pair at one instant without an impulse after which the pair is left alone."""
+RUNAWAY, NEVER = 300.0, -np.inf
+"""Times in a step that a body is dealt with, from which its island costs more than it advances and is handed to sub-steps; the count of a
+body that is not handed over, however often that is."""
 FIRST_ROWS = 64
 USED, SHORT = np.arange(2)
 """Places in `PairTable.number`."""

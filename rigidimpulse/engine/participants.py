@@ -222,6 +222,10 @@ class Substepping(Protocol):
         """The islands at `time` with the sub-stepped ones that they touch."""
         ...
 
+    def may_take(self, bodies: np.ndarray, /) -> bool:
+        """Whether islands of bodies that no impulse keeps apart are handed over; they are, when they are looked at next."""
+        ...
+
     def is_idle(self) -> bool:
         """Whether no island is sub-stepped and none may begin to be."""
         ...

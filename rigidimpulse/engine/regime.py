@@ -8,7 +8,12 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
                 Bodies at rest take 2 to 4 solves, a fall of boxes 10 to 20; each takes about as long as a step of a small
                 sub-stepped island
     or joints   an island with joints, each body of which the exact regime solved more than EXPENSIVE_JOINTED times in the last step, or
-                EXPENSIVE_SWING times where nothing is near it; a body that hangs alone stays exact
+                EXPENSIVE_SWING times where nothing is near it: by as much less often as it has more bodies than SMALL. A body that hangs
+                alone stays exact
+    or runaway  in the middle of a step, an island of which a body was solved more than RUNAWAY times in the step: it costs more than it
+                advances. So do islands in which two bodies come to contact again and again and no impulse keeps them apart. They are handed
+                over at that instant, whatever they are made of, but for RUNAWAY where contacts rebound by more than REBOUND: many impacts
+                are what such scenes are about
 
 and, where an island begins to be sub-stepped (a body that comes near later is taken in):
 
@@ -16,7 +21,7 @@ and, where an island begins to be sub-stepped (a body that comes near later is t
     dull        no restitution above REBOUND: a rebound is found at the end of the step only
     low         no body more than TALL others above a support: long columns want exact rows; not asked where joints are
 
-Scenes of fewer than SOME movable bodies without joints have sub-stepped islands only where there are joints. "substepped" takes every island
+In scenes of fewer than SOME movable bodies without joints only what has joints or runs away is sub-stepped. "substepped" takes every island
 that touches something or has joints. A body without joints that moves farther than FAST of its inner radius in a sub-step, or turns by more
 than SPIN rad, is swept instead.
 """
@@ -28,13 +33,14 @@ import numpy as np
 from rigidimpulse.collision.contact_records import SEPARATION, SKIN, SUPPORT, in_play
 from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.core.union_find import roots
+from rigidimpulse.engine.pair_table import NEVER
 from rigidimpulse.engine.sleeping import SLEEP_SPEED
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 
 MANY, SOME, FEW, KEPT = 60, 12, 8, 2
 EXPENSIVE_SOLVES = 6.0
-EXPENSIVE_JOINTED, EXPENSIVE_SWING = 48.0, 256.0
+EXPENSIVE_JOINTED, EXPENSIVE_SWING, SMALL = 12.0, 64.0, 8.0
 RATIO, REBOUND, TALL = 30.0, 0.5, 12
 FAST, SPIN = 0.5, 2.5 / 16.0
 
@@ -52,12 +58,21 @@ def why_not_substepped(world: World) -> str:
         return "forces vary"
     if solver == "substepped":
         return ""
-    if _number(world) < SOME and not world.joints_of_scene:
-        return f"fewer than {SOME} movable bodies"
     used, movable = np.unique(world.material_of_body), np.unique(world.material_of_body[world.dynamic])
     if np.all(world.coefficients[np.ix_(movable, used)][:, :, 0] > REBOUND):
         return f"all bodies rebound by more than {REBOUND}"
     return ""
+
+
+def may_begin(world: World, joined: np.ndarray, solve_count: np.ndarray) -> bool:
+    """Whether an island may begin to be sub-stepped at the start of a step; joined (n,) bool: bodies with joints.
+
+    solve_count: (n,) how often the exact solver dealt with each body in the last step.
+    """
+    if not only_expensive(world):
+        return True
+    dear = _number(world) >= SOME and float(solve_count[solve_count > NEVER].sum()) > FEW * EXPENSIVE_SOLVES
+    return dear or bool(np.any(joined & (SMALL * solve_count > EXPENSIVE_JOINTED)))
 
 
 def only_expensive(world: World) -> bool:
@@ -158,7 +173,7 @@ def refusals(
     least = np.where(was_substepped, KEPT, np.where(lively_enough, FEW, MANY))
     for r in np.flatnonzero((size > 0) & (size < least) & ~has_joints).tolist():
         out[r] = "few bodies"
-    stays_exact = solves <= np.where(touches, EXPENSIVE_JOINTED, EXPENSIVE_SWING) * size
+    stays_exact = solves * np.maximum(size / SMALL, 1.0) <= np.where(touches, EXPENSIVE_JOINTED, EXPENSIVE_SWING) * size
     for r in np.flatnonzero(has_joints & ~was_substepped & (stays_exact | (size < KEPT))).tolist():
         out[r] = "joints"
     # The rest holds only where an island begins: a body that comes near later is taken in.

@@ -24,19 +24,21 @@ from rigidimpulse.model.world import World
 logger = logging.getLogger("rigidimpulse")
 LOOP, ROLLING = "order of events", "rolling"
 CYLINDERS, CONTACTS, EVENTS, SUBSTEPPED, JOINTS = "cylinders", "contacts", "impacts of balls", "sub-stepped islands", "joints"
+STEPPED_JOINTS = "joints in sub-stepped islands"
 LAST = {
     CONTACTS: ("engine.touching", "find_touching"),
     EVENTS: ("engine.spheres.flight", "fly"),
     SUBSTEPPED: ("dynamics.solvers.tgs_soft.solver", "advance"),
     JOINTS: ("dynamics.constraints.joint_sub_step", "close_at_end"),
+    STEPPED_JOINTS: ("dynamics.solvers.time_stepping.solver", "step_island"),
 }
 """The kernel of each kind that is compiled last."""
 _BACKGROUND: list[subprocess.Popen] = []
 """Processes that nobody waits for."""
 PARTS_MODULE = "rigidimpulse.engine.warm_up_parts"
-SECONDS = {CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 35, JOINTS: 30}
+SECONDS = {CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 35, JOINTS: 30, STEPPED_JOINTS: 40}
 """s that compiling each kind takes, about, on two threads of one core."""
-NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 2}
+NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 2, STEPPED_JOINTS: 1}
 
 
 def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> None:
@@ -55,7 +57,10 @@ def kernels_to_compile(
 
     is_ready: whether a kernel need not be compiled.
     """
-    needed = {CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: bool(world.joints_of_scene)}
+    joints = bool(world.joints_of_scene)
+    needed = {
+        CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: joints, STEPPED_JOINTS: with_substepped and joints,
+    }  # fmt: skip
     missing = []
     for kind, (module, name) in LAST.items():
         if needed[kind] and not is_ready(getattr(import_module(f"rigidimpulse.{module}"), name)):

@@ -38,8 +38,9 @@ from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still
 from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.step import step
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
+from rigidimpulse.engine.substepped.jointed import JointedStepper
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
-from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, LOOP, ROLLING, SUBSTEPPED
+from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, LOOP, ROLLING, STEPPED_JOINTS, SUBSTEPPED
 from rigidimpulse.model.contact_memory import grown, make_memory
 from rigidimpulse.model.contacts import Contacts, Touching
 from rigidimpulse.model.island import empty_contacts
@@ -223,6 +224,15 @@ def _close_and_stop_joints(run: Run) -> None:
     stop_rows(island, np.zeros(1))
 
 
+def _step_jointed(run: Run) -> None:
+    """Joints and contacts of sub-stepped islands, solved together."""
+    stepper = ContactStepper(run.world, run.world.dynamic, finer=False)
+    joints = JointedStepper(run, stepper)
+    run.state.now.inv_inertia[1] = np.eye(3)
+    stepper.set_up(run, np.array([1]), np.array([0]), STEP, fineness=joints.fineness)
+    joints.step(run, 0.0, STEP)
+
+
 def _fly(_run: Run) -> None:
     """The event kernel; it knows balls only."""
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static"), Body("ball", Shape.sphere(1.0), position=(0, 0, 9))])
@@ -247,6 +257,7 @@ PARTS = {
     EVENTS: (_fly,),
     SUBSTEPPED: (_find_substepped_contacts, _step_substepped),
     JOINTS: (_start_joints, _close_and_stop_joints),
+    STEPPED_JOINTS: (_step_jointed,),
     LOOP: (_go_from_event_to_event,),
 }
 """What is compiled at once, by kind; each gets a run."""
@@ -254,7 +265,7 @@ PARTS = {
 
 def compile_part(kind: str, part: int, features: Collection[str]) -> None:
     """Compile one part, for scenes with these features: CYLINDERS, ROLLING."""
-    PARTS[kind][part](_box_on_floor(CYLINDERS in features, kind == JOINTS, ROLLING in features))
+    PARTS[kind][part](_box_on_floor(CYLINDERS in features, kind in (JOINTS, STEPPED_JOINTS), ROLLING in features))
 
 
 if __name__ == "__main__":

@@ -44,6 +44,8 @@ from rigidimpulse.engine.exact.trajectories import set_impact_margins, take_stea
 from rigidimpulse.engine.exact.velocity_projection import ProjectionScratch, project
 from rigidimpulse.engine.pair_table import (
     MARGIN,
+    NEVER,
+    RUNAWAY,
     SHORT,
     USED,
     PairBodies,
@@ -292,7 +294,7 @@ def run_events(loop, bodies, is_given, time, end, scratch):
         if not _has_capacity(loop, count):
             return NO_CAPACITY, time, is_given
         if not is_given:
-            _count_contacts(table, loop.reports, time, loop.settings.instant)
+            _count_contacts(loop, time)
         is_given = False
         for i in range(number):
             if bodies[i]:
@@ -329,11 +331,33 @@ def _has_capacity(loop, count):
 
 
 @jit_making_arrays
-def _count_contacts(table, reports, time, instant):
-    """Count contacts at one instant [s]; pairs with too many are left alone until the end of the step, and reported."""
-    given_up = np.empty(table.number[USED], np.int64)
-    count = count_contacts(table, time, instant, given_up)
-    _report_pairs(reports, SQUEEZED, time, table, given_up[:count])
+def _count_contacts(loop, time):
+    """Count contacts at one instant [s]; pairs with too many are handed over, or left alone until the end of the step, and reported."""
+    given_up = np.empty(loop.table.number[USED], np.int64)
+    count = count_contacts(loop.table, time, loop.settings.instant, given_up)
+    _give_up(loop, SQUEEZED, time, given_up[:count])
+
+
+@jit
+def _give_up(loop, kind, time, places):
+    """Mark the bodies of pairs as those that run away, or report the pairs where nothing is handed over."""
+    dynamic, solve_count, table = loop.bodies.constants.dynamic, loop.solve_count, loop.table
+    for k in range(places.shape[0]):
+        pair, handed = table.pairs[places[k]], False
+        for i in (pair.a, pair.b):
+            if dynamic[i] and solve_count[i] > NEVER:
+                solve_count[i], handed = np.inf, True
+        if not handed:
+            _report_pairs(loop.reports, kind, time, table, places[k : k + 1])
+
+
+@jit
+def _hand_over(loop, members, time):
+    """Leave members that run away to the loop in Python, at once."""
+    for i in members:
+        if loop.solve_count[i] > RUNAWAY:
+            loop.elsewhere[i] = True
+            loop.table.wake[i] = min(loop.table.wake[i], time)
 
 
 @jit_making_arrays
@@ -357,7 +381,8 @@ def _react(loop, found, count, time, end):
         )  # fmt: skip
     given_up = np.empty(table.number[USED], np.int64)
     stuck = settle_pairs(table, time, dynamic, given_up)
-    _report_pairs(loop.reports, NOT_RESOLVED, time, table, given_up[:stuck])
+    _give_up(loop, NOT_RESOLVED, time, given_up[:stuck])
+    _hand_over(loop, islands.member, time)
 
 
 @jit_making_arrays

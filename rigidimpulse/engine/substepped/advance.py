@@ -25,15 +25,16 @@ from rigidimpulse.dynamics.energy import mechanical_energy
 from rigidimpulse.engine.exact.energy_limit import note_end_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work
 from rigidimpulse.engine.pair_events import PairEvents
+from rigidimpulse.engine.pair_table import NEVER, RUNAWAY
 from rigidimpulse.engine.regime import (
-    EXPENSIVE_SOLVES,
     FAST,
-    FEW,
+    REBOUND,
     SPIN,
     TALL,
     island_roots,
     jointed,
     lively,
+    may_begin,
     only_expensive,
     refusals,
     support_levels,
@@ -62,6 +63,7 @@ STRAY = 10.0
 """Skins by which trajectories may stray from the ways of turning bodies, over `Accuracy.substep_motion`: a skin by default."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the island that comes near it."""
+HANDED = "exact contact cost more than it advanced: sub-steps hold these bodies, which may sink in by a skin, 0.8 % of the inner radius"
 
 
 class _Began(NamedTuple):
@@ -107,7 +109,8 @@ class SubsteppedIslands:
         self._auto = world.accuracy.contact_solver == "auto"
         self._jointed = jointed(world)
         self._joint_stepper: JointedStepper | None = None
-        self.solve_count, self._step_end = np.zeros(world.num_bodies), 0.0
+        self.solve_count, self._step_end = self._no_solves(), 0.0
+        self._handed: dict[tuple[str, ...], int] = {}
         self._ends: dict[int, float] = {}
         self._began: dict[int, _Began] = {}
         self._outcome: Outcome | None = None
@@ -121,14 +124,27 @@ class SubsteppedIslands:
         prepare_kernels(self._world, with_events=False, with_substepped=True)
         return ContactStepper(self._world, self._movable, self._only_expensive, self._sharing)
 
+    def _no_solves(self) -> np.ndarray:
+        """Counts (n,) at the start of a step; nothing is handed over unless the planner may choose."""
+        return np.full(self._world.num_bodies, 0.0 if self._auto else NEVER)
+
     def is_idle(self) -> bool:
         """Whether no island is sub-stepped and none may begin to be."""
-        return self._only_expensive and self.solve_count.sum() <= FEW * EXPENSIVE_SOLVES and bool(np.all(self.label < 0))
+        begins = not self._auto or may_begin(self._world, self._jointed, self.solve_count)
+        return not begins and bool(np.all(self.label < 0))
+
+    def may_take(self, bodies: np.ndarray) -> bool:
+        """Whether islands of bodies that no impulse keeps apart are handed over; they are, when they are looked at next."""
+        mine = bodies[self._world.dynamic[bodies]]
+        self.solve_count[mine] = np.inf if self._auto else NEVER
+        return self._auto
 
     def summary(self) -> str:
         """What became of sub-stepped islands in the run."""
         refused = ", ".join(f"{reason} ({count})" for reason, count in sorted(self._refused.items()))
         text = f"{self._steps} steps, largest {self._most} bodies" if self._steps else "none"
+        if self._handed:
+            text += f", {sum(self._handed.values())} times handed over by the exact regime in the middle of a step"
         if self._joint_stepper is not None:
             text += f", {self._joint_stepper.halved} sub-steps halved so that joints close"
         return f"{text}; left to the exact regime, islands times steps: {refused}" if refused else text
@@ -137,7 +153,7 @@ class SubsteppedIslands:
         """Choose the islands of the step: `pair_events.inside` marks their bodies, `pair_events.asleep` the sleepers."""
         idle, solve_count = self.is_idle(), self.solve_count
         if pair_events.end > self._step_end:
-            self.solve_count, self._step_end = np.zeros_like(solve_count), pair_events.end
+            self.solve_count, self._step_end = self._no_solves(), pair_events.end
         if idle:
             return
         world, trajectory, time = run.world, run.state.trajectory, pair_events.begin
@@ -339,10 +355,15 @@ class SubsteppedIslands:
             self.solve_count[island.members] += 1.0
         if pair_events.end <= pair_events.begin:  # the end of the run: there is no time to step over
             return [island for island in islands if np.all(self.label[island.members] < 0)]
+        for island in islands:
+            if np.any(self.solve_count[island.members] > RUNAWAY) and np.all(self.label[island.members] < 0):
+                self._hand_over(run, island)
+        lost = self._lost(islands)
+        pair_events.inside[lost] = True
         first = not pair_events.substepped_begun
         pair_events.substepped_begun = True
         hit = [island for island in islands if np.any(self.label[island.members] >= 0)]
-        members = np.flatnonzero(pair_events.inside) if first else self._due(pair_events, time)
+        members = np.flatnonzero(pair_events.inside) if first else np.union1d(self._due(pair_events, time), lost)
         if len(members) and not hit:
             bare = island_without_contacts(time, np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
             self._bring_in(run, bare, members)
@@ -353,6 +374,29 @@ class SubsteppedIslands:
             members = np.union1d(members, np.flatnonzero(np.isin(self.label, labels[labels >= 0])))
             self._bring_in(run, island, members)
         return islands
+
+    def _hand_over(self, run: Run, island: Island) -> None:
+        """Let an exact island that runs away be sub-stepped from its instant on, and say so."""
+        members, rebound = island.members, float(island.contacts.restitution.max(initial=0.0))
+        if rebound > REBOUND and np.isfinite(self.solve_count[members]).all():
+            # Looked at, and left to the exact regime until the end of the step.
+            self.solve_count[members] = NEVER
+            return
+        self.solve_count[members] = 0.0
+        self.label[members] = members.min()
+        names = tuple(run.world.names[i] for i in members.tolist())
+        if names not in self._handed:
+            run.log.note(island.time, "handed to sub-steps", names, HANDED)
+        self._handed[names] = self._handed.get(names, 0) + 1
+
+    def _lost(self, islands: list[Island]) -> np.ndarray:
+        """Bodies that no impulse keeps apart and whose contacts the exact regime does not see: one sub-stepped island from here on."""
+        lost = np.flatnonzero(np.isposinf(self.solve_count) & (self.label < 0))
+        for island in islands:
+            lost = np.setdiff1d(lost, island.members)
+        self.solve_count[lost] = 0.0
+        self.label[lost] = lost.min(initial=len(self.label))
+        return lost
 
     def _due(self, pair_events: PairEvents, time: float) -> np.ndarray:
         """Members whose trajectories end at `time`."""
@@ -442,6 +486,7 @@ class SubsteppedIslands:
     def _step_jointed(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome:
         """Step an island with joints."""
         if self._joint_stepper is None:
+            prepare_kernels(self._world, with_events=False, with_substepped=True)
             self._joint_stepper = JointedStepper(run, self.stepper)
         self._set_up(run, members, span[0], span[1] - span[0], kept, self._joint_stepper.fineness)
         return self._joint_stepper.step(run, *span)
@@ -459,7 +504,7 @@ class SubsteppedIslands:
             run.state.under_contact[i] = False
 
     def _end_of(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray, joints: np.ndarray) -> float:
-        """When the trajectories of members end: before the step does where bodies are tiny, spin fast, or stray from lines, or joints let go."""
+        """When trajectories of members end: before the step does where bodies are tiny, spin fast or stray from lines, or joints let go."""
         end = self._end_of_trajectories(run, pair_events, time, members)
         return min(end, run.joints.next_release(joints, time)) if len(joints) else end
 
@@ -484,7 +529,7 @@ class SubsteppedIslands:
     def _set_up(
         self, run: Run, members: np.ndarray, time: float, ahead: float, kept: float, fineness: Fineness | None = None
     ) -> None:
-        """Put members, in their order, and the bodies near them that stand still before the solver; kept, fineness: see `ContactStepper`."""
+        """Put members, in their order, and bodies near them that stand still before the solver; kept, fineness: see `ContactStepper`."""
         world, order = run.world, self.stepper.order
         marked = np.zeros(world.num_bodies, bool)
         marked[members] = True

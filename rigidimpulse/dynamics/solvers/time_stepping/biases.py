@@ -95,7 +95,7 @@ def _soften(rows, r, spring, weight, x, h):
 
 @jit_making_arrays
 def fill_still_biases(island, contacts, of_contacts, start):
-    """Write the biases that make the rates of joints vanish, and stop contacts that are closed: at the end of a step, where nothing moves on.
+    """Write the biases that make the rates of joints and of closed contacts vanish: at the end of a step, where nothing moves on.
 
     Soft rows, limits that are not reached, and contacts with a gap carry nothing. Returns the directions of the joints' rows (s, 3).
     """

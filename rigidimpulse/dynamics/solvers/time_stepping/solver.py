@@ -7,14 +7,14 @@ A sub-step of length h, with J_0 the rows of contacts and joints at its start an
     fly, and close the joints (`flight`)
     v <- v + h/2 g
 
-Where no contact acts this is the method of Verlet with constraints: of second order, and symplectic; half of a step's gravity at each of its
-ends makes a free body's path the parabola. At the end of all sub-steps impulses nu make the rates of joints and of closed contacts vanish:
+Where no contact acts this is the method of Verlet with constraints: of second order, and symplectic. Half of a step's gravity at each of
+its ends makes a free body's path the parabola. At the end of all sub-steps impulses nu make the rates of joints and closed contacts vanish:
 
     J_1 (v + M^-1 J_1^T nu) = 0
 
 A sub-step whose joints stay open by more than GIVE_UP of what is allowed is taken back and halved, down to 1 / MOST_HALVED of its length.
-Contacts and joints feel each other in one solve. So loads of any mass ratio are carried: a sweep over contacts and joints in turn would need
-the more sweeps the heavier the load.
+Contacts and joints feel each other in one solve. So loads of any mass ratio are carried: sweeps over contacts and joints in turn would
+need to be the more, the heavier the load.
 
 Source: Stewart and Trinkle 1996, Anitescu and Potra 1997 (time stepping with contact and friction at velocity level).
 """
@@ -42,8 +42,8 @@ TINY = TOLERANCES.arithmetic.least_divisor
 def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h):
     """Step an island by `sub_steps` sub-steps of h s.
 
-    island: its joints and members by rank, with the velocities; bodies: the solver's bodies, with the poses. table: of contacts. balance: its
-    clusters are joined, and it is given the work of drives and moving supports. kept: stiffening (n,) kg m2, which is updated; moment
+    island: its joints and members by rank, with the velocities; bodies: the solver's bodies, with the poses. table: of contacts. balance:
+    its clusters are joined, and it is given the work of drives and moving supports. kept: stiffening (n,) kg m2, which is updated; moment
     (j, 3) N s, to which the impulses of the joints on their b are added; driven (n,) bool, members that drives, springs or moving supports
     may give energy to. Returns how many sub-steps were halved, and the worst gap of a joint, m or rad.
     """
@@ -223,7 +223,7 @@ def _remember_forces(island, rows, start, h):
 
 @jit_making_arrays
 def stop_island(island, bodies, table, coefficients, stiffening, moment):
-    """Make the rates of joints and closed contacts vanish at the end of the sub-steps; adds the impulses on b of joints to moment (j, 3)."""
+    """Make the rates of joints and closed contacts vanish at the end of the sub-steps; adds the joints' impulses on b to moment (j, 3)."""
     members, now = island.members, island.bodies
     set_inertia(bodies, now, members, stiffening)
     contacts, _ = contact_points(bodies, now, table.pairs, table.points, coefficients, 0.0)
