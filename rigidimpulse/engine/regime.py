@@ -18,7 +18,7 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
 and, where an island begins to be sub-stepped (a body that comes near later is taken in):
 
     alike       no two neighbours of masses beyond RATIO : 1; where joints are, contacts and joints are solved exactly at any ratio
-    dull        no restitution above REBOUND: a rebound is found at the end of the step only
+    dull        no restitution above REBOUND, or ELASTIC where joints are: a rebound is found at the end of the step only
     low         no body more than TALL others above a support: long columns want exact rows; not asked where joints are
 
 In scenes of fewer than SOME movable bodies without joints only what has joints or runs away is sub-stepped. "substepped" takes every island
@@ -41,7 +41,7 @@ from rigidimpulse.motion.body_state import BodyState
 MANY, SOME, FEW, KEPT = 60, 12, 8, 2
 EXPENSIVE_SOLVES = 6.0
 EXPENSIVE_JOINTED, EXPENSIVE_SWING, SMALL = 12.0, 64.0, 8.0
-RATIO, REBOUND, TALL = 30.0, 0.5, 12
+RATIO, REBOUND, ELASTIC, TALL = 30.0, 0.5, 0.9, 12
 FAST, SPIN = 0.5, 2.5 / 16.0
 
 
@@ -59,8 +59,9 @@ def why_not_substepped(world: World) -> str:
     if solver == "substepped":
         return ""
     used, movable = np.unique(world.material_of_body), np.unique(world.material_of_body[world.dynamic])
-    if np.all(world.coefficients[np.ix_(movable, used)][:, :, 0] > REBOUND):
-        return f"all bodies rebound by more than {REBOUND}"
+    most = ELASTIC if world.joints_of_scene else REBOUND
+    if np.all(world.coefficients[np.ix_(movable, used)][:, :, 0] > most):
+        return f"all bodies rebound by more than {most}"
     return ""
 
 
@@ -183,7 +184,7 @@ def refusals(
     coefficient = world.coefficients[world.material_of_body[a], world.material_of_body[b], 0]
     both = world.dynamic[a] & world.dynamic[b]
     heavy = np.maximum(world.mass[a], world.mass[b]) > RATIO * np.minimum(world.mass[a], world.mass[b])
-    for r in np.unique(owner[begins & (coefficient > REBOUND)]).tolist():
+    for r in np.unique(owner[begins & (coefficient > np.where(has_joints[owner], ELASTIC, REBOUND))]).tolist():
         out.setdefault(r, "restitution")
     for r in np.unique(owner[begins & both & heavy & ~has_joints[owner]]).tolist():
         out.setdefault(r, "mass ratio")
