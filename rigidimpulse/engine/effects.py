@@ -245,7 +245,9 @@ class SubsteppedContact:
         if reason:
             return Skip(reason)
         when = f"once the exact regime gets expensive: fewer than {MANY} bodies" if only_expensive(world) else "bodies may pile up"
-        verbs = {"substepped.contact_forces": substep_contacts, "substepped.trajectories": begin_substepped_trajectories}
+        verbs: dict[str, Callable[..., Any]] = {
+            "substepped.contact_forces": substep_contacts, "substepped.trajectories": begin_substepped_trajectories
+        }  # fmt: skip
         if not world.can_collide:
             verbs["pairs"] = choose_islands
         return Bound(f"sub-stepped: {when}", verbs)

@@ -59,7 +59,8 @@ def kernels_to_compile(
     """
     joints = bool(world.joints_of_scene)
     needed = {
-        CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: joints, STEPPED_JOINTS: with_substepped and joints,
+        CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: joints,
+        STEPPED_JOINTS: with_substepped and joints,
     }  # fmt: skip
     missing = []
     for kind, (module, name) in LAST.items():

@@ -132,7 +132,7 @@ def trebuchet():
     stage.box("weight", (0.4, 0.4, 0.4), (0.7, 0.0, 1.6), mass=500.0, material=STONE)
     stage.join(ri.HingeJoint("arm", "weight", (0.7, 0.0, 2.0), (0.0, 1.0, 0.0)))
     stage.ball("stone", 0.1, (-2.2, 0.0, 1.5), mass=5.0, material=STONE)
-    stage.join(ri.DistanceJoint("arm", "stone", (-2.2, 0.0, 2.0), (-2.2, 0.0, 1.5), release_time=0.7))
+    stage.join(ri.DistanceJoint("arm", "stone", (-2.2, 0.0, 2.0), (-2.2, 0.0, 1.5), release_time=0.4))
     return stage, lambda run: must((np.linalg.norm(run.velocity("stone")[-1]) > 4.0, "the stone is slow"))
 
 

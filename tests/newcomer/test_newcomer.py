@@ -7,13 +7,7 @@ import pytest
 from scenes import CORPUS
 from stage import look
 
-COST = "the run takes far more processor time than motion of this kind may"
-NOT_YET: dict[str, str] = {
-    "newtons_cradle": COST,
-    "trebuchet": COST,
-    "cart": COST,
-    "catapult": "a jointed weight that lands on the floor: joints not closed, contact forces not solved",
-}
+NOT_YET: dict[str, str] = {}
 """Scenes that do not pass, and what is seen instead."""
 
 MOST = 5.0

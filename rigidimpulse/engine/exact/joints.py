@@ -26,7 +26,7 @@ from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.evaluate import refresh_pose
 from rigidimpulse.motion.trajectory import FIXED
 from rigidimpulse.scene.joint import Joint
-from rigidimpulse.scene.joint_coordinates import RADIUS
+from rigidimpulse.scene.joint_coordinates import DISTANCE, RADIUS
 
 TURN = 0.02
 """rad, how far the bodies of a joint may turn against each other in a sub-step."""
@@ -86,6 +86,9 @@ class JointState:
         held_along = np.bincount(self._joint_of_row[held], minlength=len(joints))
         self._pins = (held_along == 3) & ~(movable[0] & movable[1])
         self._slides = (held_along == 1) | (held_along == 2)
+        rods = np.where(self.table.coordinate == DISTANCE, self.table.target, 0.0)
+        self._rod = np.zeros(len(joints))
+        np.maximum.at(self._rod, self._joint_of_row, rods)
         self._limited = bool(np.any((self.table.lower == 0.0) != (self.table.upper == 0.0)))
         self._dynamic = world.dynamic
         self._of_body: dict[int, list[int]] = {}
@@ -202,6 +205,10 @@ class JointState:
             a, b = int(self.table.body_a[j]), int(self.table.body_b[j])
             spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
             fastest = max(fastest, float(np.linalg.norm(spins[1] - spins[0])))
+            if self._rod[j] > 0.0:
+                # A string or rod turns without its bodies.
+                speeds = [now.velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
+                fastest = max(fastest, float(np.linalg.norm(speeds[1] - speeds[0])) / self._rod[j])
             if self._slides[j] and min(a, b) >= 0:
                 fastest = max(fastest, _slide_rate(now, a, b, world.accuracy.step))
         waits = self.release_time[island.joints] - island.time
@@ -228,16 +235,18 @@ class JointState:
         return math.sqrt(square.max(initial=0.0))
 
     def _tension_rates(self, run: Run, which: np.ndarray) -> tuple[float, float]:
-        """Bounds of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m r)).
+        """Bounds of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m (r + l))).
 
-        Returns that of all others, and that of bodies that only swing about a point which cannot be moved.
+        r is the arm of the joint, l the length of a rod or string. Returns the bound of bodies that only swing about a point which cannot
+        be moved last, that of all others first.
         """
         world, table, squares = run.world, self.table, {}
         force = np.linalg.norm(self.pull[which], axis=1)
         for bodies, anchors in ((table.body_a[which], table.anchor_a[which]), (table.body_b[which], table.anchor_b[which])):
-            for i, f, r in zip(bodies.tolist(), force.tolist(), np.linalg.norm(anchors, axis=1).tolist(), strict=True):
-                if i >= 0 and world.dynamic[i] and r > 0.0:
-                    square = f * (r / world.inertia[i].min() + world.inv_mass[i] / r)
+            arms = np.linalg.norm(anchors, axis=1)
+            for i, f, r, far in zip(bodies.tolist(), force.tolist(), arms.tolist(), (arms + self._rod[which]).tolist(), strict=True):
+                if i >= 0 and world.dynamic[i] and far > 0.0:
+                    square = f * (r / world.inertia[i].min() + world.inv_mass[i] / far)
                     squares[i] = squares.get(i, 0.0) + square
         swinging = {self.movable_end(j) for j in which[self._pins[which]].tolist()}
         swinging = {i for i in swinging if len(self.at([i])) == 1}

@@ -505,15 +505,17 @@ class SubsteppedIslands:
 
     def _end_of(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray, joints: np.ndarray) -> float:
         """When trajectories of members end: before the step does where bodies are tiny, spin fast or stray from lines, or joints let go."""
-        end = self._end_of_trajectories(run, pair_events, time, members)
+        alone = len(joints) > 0 and len(self._groups(run, members)) == len(np.unique(self.label[members]))
+        step = run.world.accuracy.step if alone else self.stepper.step_length
+        end = self._end_of_trajectories(run, pair_events, time, members, step)
         return min(end, run.joints.next_release(joints, time)) if len(joints) else end
 
-    def _end_of_trajectories(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray) -> float:
-        """The same without what joints ask for."""
+    def _end_of_trajectories(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray, step: float) -> float:
+        """The same without what joints ask for; step: that is stepped at once at most, s."""
         stepper = self.stepper
-        step, allowed, pressed = stepper.step_length, STRAY * stepper.motion, stepper.pressed | self._only_expensive
+        allowed, pressed = STRAY * stepper.motion, stepper.pressed | self._only_expensive
         stray = most_stray(run.state.now, members, pressed, stepper.reach, stepper.skin, allowed)
-        spans = max(math.ceil(step / stepper.span(members) - 1e-9), 1)
+        spans = max(math.ceil(step / stepper.span(members, step) - 1e-9), 1)
         pieces = max(min(math.ceil(stray * step), MOST_PIECES * spans), spans)
         left = max(math.ceil((pair_events.end - time) * pieces / step - 1e-6), 1)
         return pair_events.end if left == 1 else time + (pair_events.end - time) / left

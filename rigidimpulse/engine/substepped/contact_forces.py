@@ -230,9 +230,9 @@ class ContactStepper:
             pieces = max(math.ceil(step / h), pieces)
         return step / pieces
 
-    def span(self, members: np.ndarray) -> float:
-        """Longest time that members are stepped at once, s: bodies may fall by half an inner radius in it."""
-        strength, step = float(self.world.steady_strength[members].max()), self.step_length
+    def span(self, members: np.ndarray, step: float) -> float:
+        """Longest time of a step [s] that members are stepped at once, s: bodies may fall by half an inner radius in it."""
+        strength = float(self.world.steady_strength[members].max())
         return min(step, SPAN * math.sqrt(float(self.inner[members].min()) / strength)) if strength > 0.0 else step
 
     def find_pairs(self, run: Run, members: np.ndarray, others: np.ndarray, ahead: float) -> None:
