@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import from_matrix, multiply, rotate, rotate_inverse
+from rigidimpulse.core.quaternion import from_matrix, multiply, to_matrix
 from rigidimpulse.motion import free_rotation
 from rigidimpulse.scene.mass import BodyMass, masses_of
 
@@ -75,6 +75,7 @@ class _Body:
     orientation: np.ndarray
     velocity: np.ndarray
     angular_velocity: np.ndarray
+    inverse_inertia: np.ndarray
 
     def advance(self, time: float) -> None:
         """Go on, free of forces but gravity. A body that cannot be pushed keeps its velocities."""
@@ -90,17 +91,12 @@ class _Body:
             free_rotation.prepare(np.ascontiguousarray(moments), self.orientation, self.angular_velocity, constants)
             free_rotation.evaluate(constants, s, turned, spin)
             self.orientation, self.angular_velocity = turned, spin
-
-    def turn_by(self, torque: np.ndarray) -> np.ndarray:
-        """I^-1 times a vector (3,)."""
-        if not np.isfinite(self.mass.mass):
-            return np.zeros(3)
-        return rotate(self.orientation, rotate_inverse(self.orientation, torque) / self.mass.moments)
+            self.inverse_inertia = _inverse_inertia(self.mass, turned)
 
     def push(self, arm: np.ndarray, impulse: np.ndarray) -> None:
         """Apply an impulse (3,) N s."""
         self.velocity = self.velocity + impulse / self.mass.mass
-        self.angular_velocity = self.angular_velocity + self.turn_by(_cross(arm, impulse))
+        self.angular_velocity = self.angular_velocity + self.inverse_inertia @ _cross(arm, impulse)
 
     def at(self, point: np.ndarray) -> np.ndarray:
         """Velocity (3,) of the body at a point, m/s."""
@@ -178,7 +174,7 @@ class _Walk:
         gravity = body.gravity_factor * self.gravity if body.motion == "dynamic" else np.zeros(3)
         return _Body(
             mass, float(run.times[frame]), gravity, run.centers[frame, i], np.ascontiguousarray(orientation),
-            run.velocities[frame, i], np.ascontiguousarray(run.angular_velocities[frame, i]),
+            run.velocities[frame, i], np.ascontiguousarray(run.angular_velocities[frame, i]), _inverse_inertia(mass, orientation),
         )  # fmt: skip
 
     def _is_at(self, body: _Body, i: int, frame: int) -> bool:
@@ -213,7 +209,8 @@ class _Walk:
                 return []
             for i, arm, impulse in self._pushes(row, now):
                 changed.setdefault(i, _copy(now[i])).push(arm, impulse)
-            if all(self._agrees(r, {**now, **changed}, "separation_speed", 1.0) for r in rows[:end]):
+            after = {**now, **changed}
+            if all(self._agrees(r, after, "separation_speed", 1.0) for r in rows[:end]):
                 return rows[:end]
         return []
 
@@ -232,7 +229,8 @@ class _Walk:
 
     def _apply(self, block: list[int], now: dict[int, _Body]) -> None:
         """Apply the impulses of a block and note what is known of them."""
-        before = {i: _copy(body) for i, body in now.items()}
+        members = {int(self.impacts[side][row]) for row in block for side in ("body_a", "body_b")}
+        before = {i: _copy(now[i]) for i in members}
         for row in block:
             for i, arm, impulse in self._pushes(row, before):
                 now[i].push(arm, impulse)
@@ -251,7 +249,7 @@ class _Walk:
                 found.velocity[k, side, when], found.angular_velocity[k, side, when] = body.velocity, body.angular_velocity
                 energy += 0.5 * sign * float(impulse @ body.at(point))
             arm = point - before[i].position
-            lever = before[i].turn_by(_cross(arm, normal))
+            lever = before[i].inverse_inertia @ _cross(arm, normal)
             found.inverse_mass[k, side] = 1.0 / before[i].mass.mass
             found.spin[k, side] = float(_cross(arm, normal) @ lever)
             slip += float(_cross(arm, impact["tangent_impulse"]) @ lever)
@@ -288,6 +286,12 @@ def _instants(times: np.ndarray) -> list[tuple[int, int]]:
     """First and end of each run of equal times."""
     cuts = [0, *(np.flatnonzero(np.diff(times)) + 1).tolist(), len(times)]
     return list(zip(cuts[:-1], cuts[1:], strict=True))
+
+
+def _inverse_inertia(mass: BodyMass, orientation: np.ndarray) -> np.ndarray:
+    """Inverse inertia (3, 3) in world axes, 1/(kg m2); 0 for what cannot be pushed."""
+    axes = to_matrix(orientation)
+    return (axes / mass.moments) @ axes.T
 
 
 def _copy(body: _Body) -> _Body:

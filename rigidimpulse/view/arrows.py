@@ -61,11 +61,11 @@ def arrow_rows(
 
 
 def arrow_scale(impacts: npt.NDArray[Any], longest: float) -> float:
-    """Return the length of an arrow of 1 N s, m, where that of the largest impulse is `longest`."""
+    """Return the length of an arrow of 1 N s, m, where that of the largest impulse is `longest`; 0 where there is no impulse."""
     _, size = _impulses(impacts)
     seen = size[np.isfinite(size)]
     largest = float(seen.max(initial=0.0))
-    return longest / largest if largest > 0.0 else longest
+    return longest / largest if largest > 0.0 else 0.0
 
 
 def _impulses(impacts: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

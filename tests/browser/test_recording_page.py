@@ -25,7 +25,7 @@ from rigidimpulse.view.page import render_page
 
 pytestmark = pytest.mark.browser
 
-WIDTH, HEIGHT = 900, 440
+WIDTH, HEIGHT = 900, 620
 PIXELS = 2.0 / 480.0  # s: two pixels of a time line of 1 s with at least 480 pixels
 OFFSET = np.array([0.1, -0.05, 0.2])  # m, of the centre of mass in the frame of the box
 CONTACT_FRAMES = (20, 40)
@@ -54,6 +54,7 @@ def shared(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Opened:
     path.write_text(render_page(full_run(), drawn_of=lambda scene, collision: {STRANGE_NAME: drawn}), encoding="utf-8")
     page = open_page(browser, path.as_uri(), WIDTH, HEIGHT)
     page.page.keyboard.press("p")  # so low a window has the plots put away
+    page.page.click("#layers-button")
     return page
 
 

@@ -167,6 +167,7 @@ class ComparisonPanel extends Panel {
 const exposeOneRun = expose;
 expose = (viewer, stage, transport, parts) => {
   exposeOneRun(viewer, stage, transport, parts);
+  parts.inspector.picks = false; // here a click on a body shows its curve
   const panel = new ComparisonPanel(viewer, stage, transport, JSON.parse(element("manifest").textContent));
   const tell = transport.onTime, render = viewer.render.bind(viewer);
   transport.onTime = () => {

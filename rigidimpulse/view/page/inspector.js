@@ -5,7 +5,7 @@ const CLICK_MOVE = 4; // pixels that a pointer may move in a click
 
 class Inspector {
   constructor(viewer, stage, transport, impacts, parts) {
-    Object.assign(this, {viewer, stage, transport, impacts, parts, selected: -1});
+    Object.assign(this, {viewer, stage, transport, impacts, parts, selected: -1, picks: true});
     this.card = element("impact");
     for (const [id, step] of [["previous", -1], ["next", 1], ["card-previous", -1], ["card-next", 1]]) {
       element(id).hidden = impacts.count === 0;
@@ -68,7 +68,7 @@ class Inspector {
     return hit ? names[meshes.indexOf(hit.object)] : null;
   }
 
-  /* Clicks and hovering in the scene; comparisons have clicks of their own. */
+  /* Clicks and hovering in the scene, unless `picks` is off: a page may have clicks of its own. */
   bindScene() {
     const pane = element("meshcat-pane");
     let pressed = null;
@@ -76,10 +76,10 @@ class Inspector {
     window.addEventListener("pointerup", (event) => {
       const near = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < CLICK_MOVE;
       pressed = null;
-      if (near && pane.contains(event.target)) { this.pick(event.clientX, event.clientY); }
+      if (this.picks && near && pane.contains(event.target)) { this.pick(event.clientX, event.clientY); }
     });
     pane.addEventListener("pointermove", (event) => {
-      if (event.buttons === 0) { this.parts.marks.hover(this.parts.impacts.at(event.clientX, event.clientY, this.viewer, PICK), this.impacts); }
+      if (this.picks && event.buttons === 0) { this.parts.marks.hover(this.parts.impacts.at(event.clientX, event.clientY, this.viewer, PICK), this.impacts); }
     });
     pane.addEventListener("pointerleave", () => this.parts.marks.hover(null, this.impacts));
   }

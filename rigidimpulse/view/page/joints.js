@@ -1,7 +1,7 @@
 /* Joints and springs: anchors, rods to the bodies they join, axes, and limits with where the joint is between them. They are drawn over the
    bodies, which would hide them. Anchors and axes are given in the frame of their bodies. */
 
-const JOINT_SIZE = 0.28; // of a body's radius: half the length of a hinge's axis is three of them
+const JOINT_SIZE = [0.28, 0.022]; // of a body's radius, and of that of the action, the smaller; half a hinge's axis is three of them
 const ROD = 0.14, THREAD = 0.07; // thickness, in joint sizes
 const COIL_TURNS = 9;
 const ARC_STEPS = 48;
@@ -128,7 +128,8 @@ class JointShape {
 
 class Joints {
   constructor(stage, manifest) {
-    const entries = new Map(manifest.bodies.map((body) => [body.name, body])), size = JOINT_SIZE * manifest.framing.body_radius;
+    const entries = new Map(manifest.bodies.map((body) => [body.name, body])), {body_radius: radius} = manifest.framing;
+    const size = Math.min(JOINT_SIZE[0] * radius, JOINT_SIZE[1] * stage.radius);
     this.object = new THREE.Group();
     this.shapes = manifest.joints.filter(({a, b}) => [a, b].every((name) => name === null || entries.has(name)))
       .map((entry) => new JointShape(stage, entries, entry, size, this.object));

@@ -104,7 +104,7 @@ async function main() {
   const bar = makeBar(transport, inspector.timeline);
   if (manifest.ledger) { parts.ledger = new LedgerPanel(viewer, stage, transport, curves, manifest.ledger.energySpan); }
   const header = showHeader(manifest, transport, layout);
-  startViewing({viewer, stage, transport, bar, parts, inspector, header, layout, picks: manifest.comparison === undefined});
+  startViewing({viewer, stage, transport, bar, parts, inspector, header, layout});
   expose(viewer, stage, transport, {...parts, inspector, cards: impacts});
   transport.seek(transport.start);
   if (!reducedMotion) { transport.play(); }
@@ -123,7 +123,7 @@ const KEYS = [
   ["D", "dark or light"], ["?", "these keys"],
 ];
 
-function startViewing({viewer, stage, transport, bar, parts, inspector, header, layout, picks}) {
+function startViewing({viewer, stage, transport, bar, parts, inspector, header, layout}) {
   const layer = (label, key, set, on = true) => ({
     label, key, on, set: (shown) => { set(shown); viewer.set_dirty(); }});
   const folder = (name) => (shown) => { viewer.scene_tree.find([name]).object.visible = shown; };
@@ -166,7 +166,7 @@ function startViewing({viewer, stage, transport, bar, parts, inspector, header, 
     parts.marks.show();
     render();
   };
-  if (picks) { inspector.bindScene(); } // in comparisons a click shows the curve of a body
+  inspector.bindScene();
   window.addEventListener("resize", layout);
   layout();
 }

@@ -54,7 +54,7 @@ class Spins {
         if (!(share > LEAST_VECTOR)) { return; }
         const at = this.centres.get(name).clone().applyQuaternion(node.quaternion).add(node.position), length = share * this.reach;
         const turn = new THREE.Quaternion().setFromUnitVectors(up, vector.normalize());
-        pair.set(drawn++, new THREE.Matrix4().compose(at, turn, one), length, Math.min(0.04 * this.reach, 0.2 * length), 0.95);
+        pair.set(drawn++, new THREE.Matrix4().compose(at, turn, one), length, Math.min(0.022 * this.reach, 0.2 * length), 0.95);
       });
       pair.finish(drawn);
     }

@@ -179,9 +179,10 @@ class Timeline {
     old.replaceWith(canvas); // without what was bound to the last one
     Object.assign(this, {from, to});
     element("magnifier").hidden = false;
-    element("hill-title").textContent = `${group.reduce((sum, {count}) => sum + count, 0).toLocaleString("en")} impacts, ${digits(from)} to ${digits(to)} s`;
+    const highest = group.reduce((most, {height}) => Math.max(most, height), 0);
+    element("hill-title").textContent = `${group.reduce((sum, {count}) => sum + count, 0).toLocaleString("en")} impacts, ${digits(from)} to ${digits(to)} s, drawn higher here`;
     const options = {gap: STRIP_GAP, onSelect: this.onSelect, onOpen: (inner) => this.open(inner), holder: element("magnifier-strip")};
-    this.strip = new ImpactStrip(canvas, [from - margin, to + margin], group.map((spike) => ({...spike})), options);
+    this.strip = new ImpactStrip(canvas, [from - margin, to + margin], group.map((spike) => ({...spike, height: spike.height / highest})), options);
     this.strip.selected = this.line.selected;
     this.strip.bind(this.transport);
     this.line.openFrom = from;
