@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -128,7 +129,7 @@ class _Walk:
         self.bodies, self.impacts = list(run.scene.bodies), run.impacts
         self.masses = masses_of(self.bodies)
         self.gravity = np.asarray(run.scene.gravity, dtype=np.float64)
-        self.jointed = {name for effect in run.scene.effects for name in (getattr(effect, "a", None), getattr(effect, "b", None))}
+        self.jointed = {getattr(effect, end, None) for effect in run.scene.effects for end in ("a", "b")}
         count, last = len(chosen), max(len(run.times) - 2, 0)
         # A frame at exactly the time of an impact shows the state after it, frame 0 the state as given.
         self.frame = np.clip(np.searchsorted(run.times, self.impacts["time"], side="left") - 1, 0, last)
@@ -285,7 +286,7 @@ class _Walk:
 def _instants(times: np.ndarray) -> list[tuple[int, int]]:
     """First and end of each run of equal times."""
     cuts = [0, *(np.flatnonzero(np.diff(times)) + 1).tolist(), len(times)]
-    return list(zip(cuts[:-1], cuts[1:], strict=True))
+    return list(pairwise(cuts))
 
 
 def _inverse_inertia(mass: BodyMass, orientation: np.ndarray) -> np.ndarray:

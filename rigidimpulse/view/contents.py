@@ -343,7 +343,9 @@ def warning_entries(recording: RecordingLike) -> list[dict[str, Any]]:
 def check_entries(checks: Iterable[Any]) -> list[dict[str, Any]]:
     """Return what the page says of checks, each with what, value, bound, passed, law and relation."""
     names = ("what", "law", "relation", "passed")
-    return [{name: getattr(check, name) for name in names} | {key: _number(getattr(check, key)) for key in ("value", "bound")} for check in checks]
+    return [
+        {name: getattr(check, name) for name in names} | {key: _number(getattr(check, key)) for key in ("value", "bound")} for check in checks
+    ]
 
 
 def _number(value: float) -> str:

@@ -36,7 +36,8 @@ def joint_entries(recording: Any) -> list[dict[str, Any]]:
             anchor_a, anchor_b, axis = effect.points(start)
             label, num_joints = effect.name or f"joint{num_joints}", num_joints + 1
             entry = {"kind": KINDS.get(type(effect), "ball"), "lower": _finite(effect.lower), "upper": _finite(effect.upper)}
-            entry |= {"axis": _local(recording, effect.a, np.asarray(axis, float), is_point=False), "until": _last_time(recording, effect, label)}
+            entry["axis"] = _local(recording, effect.a, np.asarray(axis, float), is_point=False)
+            entry["until"] = _last_time(recording, effect, label)
         elif all(hasattr(effect, name) for name in ("a", "b", "anchor_a", "anchor_b")):
             anchor_a, anchor_b = np.asarray(effect.anchor_a, float), np.asarray(effect.anchor_b, float)
             label = effect.name or f"spring of {effect.a or 'the world'} and {effect.b or 'the world'}"

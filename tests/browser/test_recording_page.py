@@ -54,7 +54,6 @@ def shared(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Opened:
     path.write_text(render_page(full_run(), drawn_of=lambda scene, collision: {STRANGE_NAME: drawn}), encoding="utf-8")
     page = open_page(browser, path.as_uri(), WIDTH, HEIGHT)
     page.page.keyboard.press("p")  # so low a window has the plots put away
-    page.page.click("#layers-button")
     return page
 
 
@@ -147,7 +146,9 @@ def test_contacts_show_the_forces_of_the_frame_when_they_are_asked_for(opened: O
     for frame, count in ((first - 1, 0), (first, 1), (after - 1, 1), (after, 0)):
         opened.do(f"r.seek({frame / FPS})")
         assert len(opened.do("r.contacts()")) == count, frame
+    opened.page.click("#layers-button")
     opened.page.click("text=Contacts")
+    opened.page.click("#layers-button")
     assert opened.do("r.contacts()") == []
 
 
@@ -171,7 +172,9 @@ def test_the_shape_that_collides_takes_the_place_of_what_is_drawn(opened: Opened
     opened.page.keyboard.press("s")
     assert opened.do("r.simulated()") is True
     assert changed(drawn, opened.picture()) > 300
+    opened.page.click("#layers-button")
     opened.page.click("text=As simulated")
+    opened.page.click("#layers-button")
     assert opened.do("r.simulated()") is False
     assert changed(drawn, opened.picture()) < 20
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,39 +44,30 @@ def run() -> Recording:
 
 
 def test_states_before_and_after_obey_the_laws_of_an_impact(run: Recording) -> None:
-    states, impacts = all_states(run), run.impacts
+    """The impulse is the change of momentum of each body, and its speeds at the point are those that the run recorded."""
+    states, impacts, checked = all_states(run), run.impacts, 0
+    assert run.scene is not None
     masses = masses_of(run.scene.bodies)
     assert len(impacts) >= 3 and states.known[:3].all()
     for k in np.flatnonzero(states.known):
         impact = impacts[k]
+        frame = int(np.searchsorted(run.times, impact["time"], side="left")) - 1
+        if np.sum((impacts["time"] > run.times[frame]) & (impacts["time"] <= impact["time"])) > 1:
+            continue  # only this impact since the frame: each body is on the parabola that begins there
         impulse = impact["impulse"] * impact["normal"] + impact["tangent_impulse"]
-        speeds = []
-        for when in (0, 1):
-            at_point = []
-            for side, name in enumerate(("body_a", "body_b")):
-                i = impact[name]
-                frame = int(np.searchsorted(run.times, impact["time"], side="left")) - 1
-                flight = impact["time"] - run.times[frame]
-                # The centre of mass just before: a parabola from the frame before, where nothing else happened in it.
-                alone = np.sum((impacts["time"] > run.times[frame]) & (impacts["time"] < impact["time"])) == 0
-                if not alone or masses[i].mass == np.inf:
-                    centre = None if masses[i].mass < np.inf else impact["point"]
-                else:
-                    centre = run.centers[frame, i] + flight * run.velocities[frame, i] + 0.5 * flight**2 * np.array([0, 0, -9.81])
-                if centre is None:
-                    break
-                v, w = states.velocity[k, side, when], states.angular_velocity[k, side, when]
-                at_point.append(v + np.cross(w, impact["point"] - centre))
-            else:
-                speeds.append(float(impact["normal"] @ (at_point[1] - at_point[0])))
-        if len(speeds) == 2:
-            scale = abs(impact["approach_speed"]) + abs(impact["separation_speed"])
-            assert speeds == pytest.approx([-impact["approach_speed"], impact["separation_speed"]], abs=CLOSE * (scale + 1.0))
+        flight, at_point = impact["time"] - run.times[frame], np.zeros((2, 2, 3))
         for side, (name, sign) in enumerate((("body_a", -1.0), ("body_b", 1.0))):
-            mass = masses[impact[name]].mass
-            change = states.velocity[k, side, 1] - states.velocity[k, side, 0]
-            if np.sum(impacts["time"] == impact["time"]) == 1:
-                assert np.allclose(mass * change if mass < np.inf else 0.0, sign * impulse if mass < np.inf else 0.0, rtol=CLOSE, atol=1e-9)
+            i = impact[name]
+            if np.isfinite(masses[i].mass):
+                change = states.velocity[k, side, 1] - states.velocity[k, side, 0]
+                assert np.allclose(masses[i].mass * change, sign * impulse, rtol=CLOSE, atol=CLOSE * impact["impulse"])
+                centre = run.centers[frame, i] + flight * run.velocities[frame, i] + 0.5 * flight**2 * np.array([0, 0, -9.81])
+                at_point[side] = states.velocity[k, side] + np.cross(states.angular_velocity[k, side], impact["point"] - centre)
+        before, after = (at_point[1] - at_point[0]) @ impact["normal"]
+        scale = CLOSE * (1.0 + abs(impact["approach_speed"]))
+        assert (before, after) == pytest.approx((-impact["approach_speed"], impact["separation_speed"]), abs=scale)
+        checked += 1
+    assert checked >= 3
 
 
 def test_parts_of_the_formula_add_up_to_the_recorded_impulse(run: Recording) -> None:
@@ -84,9 +77,10 @@ def test_parts_of_the_formula_add_up_to_the_recorded_impulse(run: Recording) -> 
     total = states.inverse_mass.sum(1) + states.spin.sum(1) + states.slip + states.others
     speed = impacts["approach_speed"] + impacts["separation_speed"]
     assert np.allclose(speed[known] / total[known], impacts["impulse"][known], rtol=1e-3)
+    assert run.scene is not None
     ball = run.names.index("ball")
-    mass = masses_of(run.scene.bodies)[ball].mass
-    assert np.allclose(states.inverse_mass[impacts["body_b"] == ball][:, 1][known[impacts["body_b"] == ball]], 1.0 / mass)
+    hits = known & (impacts["body_b"] == ball)
+    assert hits.any() and np.allclose(states.inverse_mass[hits, 1], 1.0 / masses_of(run.scene.bodies)[ball].mass)
     # The energy that an impact takes is that of the bodies before less that after.
     first = states.energy[states.known & known]
     assert np.all(first < 0.0)
@@ -95,8 +89,9 @@ def test_parts_of_the_formula_add_up_to_the_recorded_impulse(run: Recording) -> 
 def test_the_energy_of_all_impacts_is_the_one_of_the_ledger() -> None:
     scene = ri.Scene(gravity=(0, 0, 0))
     material = ri.Material(density=1000, restitution=0.5, static_friction=0.3, dynamic_friction=0.3)
-    scene.add(ri.Body("a", ri.Shape.box((0.2, 0.2, 0.2)), position=(0, 0, 0), velocity=(1, 0, 0), angular_velocity=(0, 1, 2), material=material))
-    scene.add(ri.Body("b", ri.Shape.sphere(0.1), position=(0.5, 0.03, 0.02), velocity=(-1, 0, 0), material=material))
+    box, ball = ri.Shape.box((0.2, 0.2, 0.2)), ri.Shape.sphere(0.1)
+    scene.add(ri.Body("a", box, velocity=(1, 0, 0), angular_velocity=(0, 1, 2), material=material))
+    scene.add(ri.Body("b", ball, position=(0.5, 0.03, 0.02), velocity=(-1, 0, 0), material=material))
     run = ri.simulate(scene, 0.4, fps=20)
     states = all_states(run)
     assert len(run.impacts) > 0 and states.known.all() and run.ledger is not None
@@ -120,8 +115,6 @@ def test_a_planted_fault_is_not_taken_for_known(run: Recording) -> None:
     """A recording whose impulse is wrong by one part in a thousand does not agree with its own speeds."""
     wrong = run.impacts.copy()
     wrong["impulse"][0] *= 1.001
-    from dataclasses import replace
-
     states = all_states(replace(run, impacts=wrong))
     assert all_states(run).known[0] and not states.known[0]
 
