@@ -136,8 +136,8 @@ class _Walk:
         self.place = np.full(len(self.impacts), -1)
         self.place[chosen] = np.arange(count)
         self.found = ImpactStates(
-            np.zeros(count, bool), np.zeros((count, 2, 2, 3)), np.zeros((count, 2, 2, 3)), np.zeros((count, 2)), np.full((count, 2), np.nan),
-            np.full(count, np.nan), np.full(count, np.nan), np.full(count, np.nan),
+            np.zeros(count, bool), np.zeros((count, 2, 2, 3)), np.zeros((count, 2, 2, 3)), np.zeros((count, 2)),
+            np.full((count, 2), np.nan), np.full(count, np.nan), np.full(count, np.nan), np.full(count, np.nan),
         )  # fmt: skip
 
     def states(self) -> ImpactStates:

@@ -344,7 +344,8 @@ def check_entries(checks: Iterable[Any]) -> list[dict[str, Any]]:
     """Return what the page says of checks, each with what, value, bound, passed, law and relation."""
     names = ("what", "law", "relation", "passed")
     return [
-        {name: getattr(check, name) for name in names} | {key: _number(getattr(check, key)) for key in ("value", "bound")} for check in checks
+        {name: getattr(check, name) for name in names} | {key: _number(getattr(check, key)) for key in ("value", "bound")}
+        for check in checks
     ]
 
 

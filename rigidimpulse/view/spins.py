@@ -15,7 +15,7 @@ from rigidimpulse.core.quaternion import from_matrix
 from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.scene.mass import masses_of
 
-MOST_SPINS = 60_000
+MOST_SPINS = 20_000
 """Bodies times frames, above which the page has no vectors of them: 12 bytes each."""
 LEAST_SPIN = 1e-3
 """rad/s, of a body that spins."""

@@ -1,6 +1,6 @@
 """The card of an impact in a real browser: its numbers are those of the recording, whatever way it is opened.
 
-The run is a box that tumbles onto the ground and rattles to rest, with a ball on a string beside it.
+The run is a box that tumbles onto the ground and bounces to rest, with a ball on a string beside it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ WIDTH, HEIGHT = 960, 680
 SERIOUS = ("serious", "critical")
 
 
-def rattling() -> Recording:
+def bouncing() -> Recording:
     """The run."""
     material = ri.Material(density=600, restitution=0.65, static_friction=0.4, dynamic_friction=0.3)
     scene = ri.Scene()
@@ -38,15 +38,15 @@ def rattling() -> Recording:
 
 @pytest.fixture(scope="module")
 def run() -> Recording:
-    """The run of `rattling`."""
-    return rattling()
+    """The run of `bouncing`."""
+    return bouncing()
 
 
 @pytest.fixture(scope="module")
 def address(run: Recording, tmp_path_factory: pytest.TempPathFactory) -> str:
     """Its page, with a check that holds and one that does not."""
     path = tmp_path_factory.mktemp("card") / "run.html"
-    write_html(run, path, "A box rattles to rest", [at_most("depth, m", 1e-9, 1e-6, "apart"), at_most("speed, m/s", 2.0, 1.0, "rest")])
+    write_html(run, path, "A box bounces to rest", [at_most("depth, m", 1e-9, 1e-6, "apart"), at_most("speed, m/s", 2.0, 1.0, "rest")])
     return path.as_uri()
 
 
@@ -226,7 +226,7 @@ def test_the_action_is_framed_in_what_panels_leave_free_and_never_from_below_the
 
 def test_title_checks_joints_and_vectors_are_on_the_page(opened: Opened, run: Recording) -> None:
     page = opened.page
-    assert page.inner_text("h1") == "A box rattles to rest"
+    assert page.inner_text("h1") == "A box bounces to rest"
     assert "1 of 2 checks hold" in page.inner_text("#checks summary")
     page.click("#checks summary")
     assert "speed, m/s" in page.inner_text("#checks") and "at most 1" in page.inner_text("#checks")

@@ -76,15 +76,15 @@ function formula(impact) {
 
 /* How much each part gives way, as a bar. */
 function shares(parts) {
-  const total = parts.reduce((sum, {value}) => sum + Math.max(value, 0), 0), shown = parts.filter(({value}) => value > 0);
+  const total = parts.reduce((sum, {value}) => sum + Math.max(value, 0), 0);
   const bar = make("div", {className: "bar", "aria-hidden": "true"}), key = make("ul", {className: "key"});
-  shown.forEach(({value, words}, k) => {
+  parts.forEach(({value, words}, k) => {
     const colour = `var(--${PART_COLOURS[k % PART_COLOURS.length]})`;
     const piece = make("span");
-    piece.style.flex = `${value / total}`;
+    piece.style.flex = `${Math.max(value, 0) / total}`;
     piece.style.background = colour;
-    bar.append(piece);
-    const entry = make("li", {textContent: `${words}, ${((100 * value) / total).toFixed(0)} %`});
+    if (value > 0) { bar.append(piece); } // what takes from the sum is told below the bar
+    const entry = make("li", {textContent: `${words}, ${((100 * value) / total).toFixed(0).replace("-", "\u2212")} %`});
     entry.style.setProperty("--line", colour);
     key.append(entry);
   });
