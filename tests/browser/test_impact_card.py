@@ -241,6 +241,15 @@ def test_title_checks_joints_and_vectors_are_on_the_page(opened: Opened, run: Re
     assert page.query_selector(".dg") is None
 
 
+def test_time_goes_on_while_everything_is_hidden(opened: Opened) -> None:
+    opened.page.keyboard.press("u")
+    opened.do("r.seek(0.3)")
+    assert not opened.page.is_visible("footer") and opened.do("r.room()") == {"left": 0, "top": 0, "right": WIDTH, "bottom": HEIGHT}
+    opened.page.keyboard.press("u")
+    opened.do("r.seek(0.4)")
+    assert opened.page.is_visible("footer") and opened.errors == []
+
+
 def test_phone_dark_and_reduced_motion(browser: Any, address: str, run: Recording) -> None:
     phone = open_page(browser, address, 390, 844, color_scheme="dark", reduced_motion="reduce", has_touch=True)
     page = phone.page

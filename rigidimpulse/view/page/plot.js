@@ -73,6 +73,7 @@ class TimePlot {
 
   /* Copies the layer, which `drawLayer(pen)` of a subclass draws when it is stale. */
   copyLayer(pen, now, faint = NOT_PLAYED) {
+    if (this.layer.width === 0 || this.layer.height === 0) { return; } // everything is hidden
     if (this.stale) {
       this.drawLayer(this.pen(this.layer));
       this.stale = false;
