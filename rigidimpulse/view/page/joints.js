@@ -3,7 +3,7 @@
 
 const JOINT_SIZE = [0.28, 0.022]; // of a body's radius, and of that of the action, the smaller; half a hinge's axis is three of them
 const ROD = 0.14, THREAD = 0.07; // thickness, in joint sizes
-const COIL_TURNS = 9;
+const COIL_TURNS = 12, COIL_HEIGHT = 30;
 const ARC_STEPS = 48;
 const FULL_TURN = 2 * Math.PI;
 
@@ -15,11 +15,11 @@ function jointMaterial(name, opacity) {
   return material;
 }
 
-/* A coil about +y from 0 to 1. */
+/* A coil about +y, as high as COIL_HEIGHT of its radii: it is scaled to the length of its spring, and so is its wire. */
 class Coil extends THREE.Curve {
   getPoint(share) {
     const turn = FULL_TURN * COIL_TURNS * share, wide = share > 0.06 && share < 0.94 ? 1 : 0;
-    return new THREE.Vector3(wide * Math.cos(turn), share, wide * Math.sin(turn));
+    return new THREE.Vector3(wide * Math.cos(turn), share * COIL_HEIGHT, wide * Math.sin(turn));
   }
 }
 
@@ -49,7 +49,7 @@ class JointShape {
     const solid = jointMaterial("joint", 0.9), faint = jointMaterial("joint", 0.45);
     this.link = ["distance", "spring"].includes(entry.kind);
     this.rods = (this.link ? [0] : this.frames.map((frame, k) => (frame.middle ? k : -1)).filter((k) => k >= 0)).map((k) => ({k, mesh: add(
-      entry.kind === "spring" ? new THREE.TubeGeometry(new Coil(), 240, 0.18, 6) : rod(), this.link ? solid : faint)}));
+      entry.kind === "spring" ? new THREE.TubeGeometry(new Coil(), 240, 0.18, 6).scale(1, 1 / COIL_HEIGHT, 1) : rod(), this.link ? solid : faint)}));
     this.knobs = (this.link ? [0, 1] : [0]).map((k) => ({k, mesh: add(
       entry.kind === "fixed" ? new THREE.BoxGeometry(1.4, 1.4, 1.4) : new THREE.SphereGeometry(this.link ? 0.45 : 0.7, 20, 14), solid)}));
     this.pin = ["hinge", "slider"].includes(entry.kind) ? add(rod(), solid) : null;
