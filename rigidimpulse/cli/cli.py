@@ -12,6 +12,7 @@ import rigidimpulse
 from rigidimpulse.cli.jobs import (
     BAD_SCENE,
     CHECK_FAILED,
+    Head,
     given_options,
     print_table,
     recording_with_shapes,
@@ -117,13 +118,13 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, c
     job = job_of(entry)._replace(**given_options(settings))
     click.echo(f"{entry.name}: {entry.description}")
     run = run_job(job, output, profile, cache)
-    passed = True
+    checks = entry.check(run) if job.duration == entry.duration else []
     if job.duration == entry.duration:
-        passed = _print_checks(entry.check(run))
+        _print_checks(checks)
     else:
         click.echo(f"checks left out: they are for the scene's own duration, {entry.duration:g} s")
-    _hand_over(run, output, view, keys)
-    if not passed:
+    _hand_over(run, output, view, keys, Head(entry.description, tuple(checks)))
+    if not all(check.passed for check in checks):
         sys.exit(CHECK_FAILED)
 
 
@@ -138,7 +139,8 @@ def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, cac
 
     keys = _export_settings(settings)
     job = find_job(scene)._replace(**given_options(settings))
-    _hand_over(run_job(job, output, profile, cache), output, view, keys)
+    head = None if job.entry is None else Head(job.entry.description)
+    _hand_over(run_job(job, output, profile, cache), output, view, keys, head)
 
 
 @main.command()
@@ -183,24 +185,29 @@ def _export_settings(settings: dict[str, Any]) -> dict[str, Any]:
     return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys", "samples", "up_axis", "unit", "pre_roll")}
 
 
-def _print_checks(checks: Sequence[Check]) -> bool:
-    """Print a table of checks; return whether all hold."""
+def _print_checks(checks: Sequence[Check]) -> None:
+    """Print a table of checks."""
     from rigidimpulse.gallery.record import figure
 
     rows = [("ok" if check.passed else "FAILED", check.what, figure(check.value), figure(check.bound), check.law) for check in checks]
     print_table([("", "check", "value", "bound", "law"), *rows], right=(2, 3))
-    return all(check.passed for check in checks)
 
 
-def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str, Any]) -> None:
-    """Write the recording where it was asked for, and open it; keys: options of animated nodes, and the pre-roll."""
+def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str, Any], head: Head | None) -> None:
+    """Write the recording where it was asked for, and open it; keys: options of animated nodes, and the pre-roll; head: of its page."""
+    from rigidimpulse.core.files import write_renamed
+    from rigidimpulse.view.page import write_html
+
     run = run.part(keys.pop("pre_roll"))
     takes_options = export_suffixes(with_options=True)
-    for target in output:
-        path = run.export(target, **(keys if Path(target).suffix in takes_options else {}))
+    for target in map(Path, output):
+        if target.suffix == ".html" and head is not None:
+            path = write_renamed(target, lambda part: write_html(run, part, head.title, head.checks))
+        else:
+            path = run.export(target, **(keys if target.suffix in takes_options else {}))
         click.echo(f"wrote {path} ({size_of(path)})")
     if view:
-        show(run)
+        show(run, head)
 
 
 for command in (hardcases, study, compare, wedge, gallery_pages):

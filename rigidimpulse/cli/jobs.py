@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
@@ -12,6 +13,7 @@ from rigidimpulse.recording.exporters import export_suffixes
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rigidimpulse.gallery.record import Check
     from rigidimpulse.recording.recording import Recording
     from rigidimpulse.studies.compare import Comparison
     from rigidimpulse.studies.job import Job
@@ -90,9 +92,19 @@ def print_table(rows: Sequence[tuple[str, ...]], right: tuple[int, ...]) -> None
         click.echo("  ".join([*cells, row[-1]]))
 
 
-def show(run: Recording | Comparison) -> None:
-    """Open a recording in the browser; where there is none, serve it until Ctrl-C."""
-    viewer = run.show()
+@dataclass(frozen=True)
+class Head:
+    """What stands above a page: the scene's sentence, and its checks."""
+
+    title: str
+    checks: tuple[Check, ...] = ()
+
+
+def show(run: Recording | Comparison, head: Head | None = None) -> None:
+    """Open a recording in the browser; where there is none, serve it until Ctrl-C. head: of its page."""
+    from rigidimpulse.view import server
+
+    viewer = run.show() if head is None else server.show(cast("Recording", run), head.title, head.checks)
     if not viewer.fetched.is_set():
         click.echo("open this address in a browser; Ctrl-C ends")
         viewer.wait()

@@ -106,9 +106,10 @@ def run_scene(entry: GalleryScene, folder: Path) -> CaseResult:
 
     start, name = perf_counter(), entry.name
     run = simulate(entry.scene(), entry.duration, entry.fps, accuracy=entry.accuracy)
-    checks = [as_plain(check) for check in entry.check(run)]
+    found = entry.check(run)
+    checks = [as_plain(check) for check in found]
     seconds = perf_counter() - start
-    write_html(run, folder / f"{name}_play.html", title=name)
+    write_html(run, folder / f"{name}_play.html", title=entry.description, checks=found)
     (folder / f"{name}.png").write_bytes(png(draw_picture(run)))
     outcome = PASSED if all(check["passed"] for check in checks) else FAILED
     result = CaseResult(

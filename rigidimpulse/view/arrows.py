@@ -1,9 +1,8 @@
 """Impact arrows: what the page needs to draw the impulse of every impact.
 
 An arrow starts at the point of contact and shows the impulse on a dynamic body: +j on b, -j on a; an impact of two
-dynamic bodies has both. Impulses of one run differ by orders of magnitude, so the length grows with the square root of
-j: a sixteenth of the largest impulse still has a quarter of the length. Weaker ones than that of `LEAST_LENGTH` are
-drawn alike.
+dynamic bodies has both. All arrows of a run have one scale, in m an N s, so that they add up as impulses do: the normal and the friction
+part of an arrow are its sides. Weaker ones than that of `LEAST_LENGTH` are drawn alike, so that they can be seen and picked.
 """
 
 from __future__ import annotations
@@ -14,11 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-ROW = 11
-"""Numbers of an arrow: time, point (3), direction (3), contact normal (3), length."""
+ROW = 12
+"""Numbers of an arrow: time, point (3), direction (3), contact normal (3), length, number of its card (-1: none)."""
 MOST_ROWS = 20_000
 """Arrows kept, the largest first: a page of a long stacking run would otherwise be mostly arrows."""
-LEAST_LENGTH = 0.15
+LEAST_LENGTH = 0.06
 """Shortest arrow, as a share of the longest."""
 FADE = 0.4
 """How long an arrow is seen, s, unless the whole run is short."""
@@ -26,21 +25,22 @@ FADE_SHARE = 0.15
 """Longest time an arrow is seen, as a share of the run."""
 
 
-def arrow_rows(impacts: npt.NDArray[Any], dynamic: Sequence[bool], longest: float) -> npt.NDArray[np.float32]:
-    """Return the arrows (k, 11) sorted by time.
+def arrow_rows(
+    impacts: npt.NDArray[Any], dynamic: Sequence[bool], longest: float, with_card: npt.NDArray[np.int64]
+) -> npt.NDArray[np.float32]:
+    """Return the arrows (k, 12) sorted by time.
 
     Args:
         impacts: structured array of a recording.
         dynamic: for each body whether it can be pushed.
         longest: length of the arrow of the largest impulse, m.
+        with_card: rows of the impacts that have a card, in its order.
 
     """
-    impulse = (
-        np.asarray(impacts["impulse"], dtype=np.float64)[:, None] * impacts["normal"] + impacts["tangent_impulse"]
-    ).reshape(-1, 3)
-    size = np.linalg.norm(impulse, axis=1)
-    seen = np.isfinite(size) & (size > 0.0)
-    largest = float(size[seen].max()) if seen.any() else 1.0
+    impulse, size = _impulses(impacts)
+    seen, scale = np.isfinite(size) & (size > 0.0), arrow_scale(impacts, longest)
+    card = np.full(len(impacts), -1)
+    card[with_card] = np.arange(len(with_card))
     pushed = np.asarray(dynamic, dtype=bool)
     parts, sizes = [], []
     for sign, body in ((1.0, impacts["body_b"]), (-1.0, impacts["body_a"])):
@@ -50,13 +50,29 @@ def arrow_rows(impacts: npt.NDArray[Any], dynamic: Sequence[bool], longest: floa
         rows[:, 1:4] = impacts["point"][chosen]
         rows[:, 4:7] = sign * impulse[chosen] / size[chosen, None]
         rows[:, 7:10] = impacts["normal"][chosen]
-        rows[:, 10] = longest * np.maximum(np.sqrt(size[chosen] / largest), LEAST_LENGTH)
+        rows[:, 10] = np.maximum(scale * size[chosen], LEAST_LENGTH * longest)
+        rows[:, 11] = card[chosen]
         parts.append(rows)
         sizes.append(size[chosen])
     rows = np.concatenate(parts)
     if len(rows) > MOST_ROWS:
         rows = rows[np.argsort(-np.concatenate(sizes), kind="stable")[:MOST_ROWS]]
     return rows[np.argsort(rows[:, 0], kind="stable")].astype(np.float32)
+
+
+def arrow_scale(impacts: npt.NDArray[Any], longest: float) -> float:
+    """Return the length of an arrow of 1 N s, m, where that of the largest impulse is `longest`; 0 where there is no impulse."""
+    _, size = _impulses(impacts)
+    seen = size[np.isfinite(size)]
+    largest = float(seen.max(initial=0.0))
+    return longest / largest if largest > 0.0 else 0.0
+
+
+def _impulses(impacts: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Impulses on b (k, 3) and their sizes (k,), N s."""
+    normal = np.asarray(impacts["impulse"], dtype=np.float64)[:, None] * impacts["normal"]
+    impulse = (normal + impacts["tangent_impulse"]).reshape(-1, 3)
+    return impulse, np.linalg.norm(impulse, axis=1)
 
 
 def fade_time(duration: float) -> float:

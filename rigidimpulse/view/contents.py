@@ -8,12 +8,17 @@ Manifest (JSON)
     softBodies  name, key in meshcat's tree, surface, and whether it is thin (cloth), of each flexible body
     numShapes, fade (s an arrow is seen), summary (a line of text), contacts (whether
               there are any), ledger (least range of its plot, J; null: none), warnings (time, kind, bodies, message)
+    status    whether the run is ok, and its message; checks: of a gallery scene, see `check_entries`
+    cards     see `impact_cards.card_entries`           arrowScale   m an N s
+    joints    see `joints.joint_entries`                spins        see `spins.spin_entries`
 Messages, each with its kind
     shape     a display geometry at /shapes/k, shared by all bodies of that shape
     times     frame times as a property of /impacts        rows      arrows as a property of /impacts
     marks     impacts along the time line, see `history`, as a property of /impacts
     contacts  rows of lasting contacts, see `history`, as a property of /contacts
-    ledger    energies and momentum, see `history`, as a property of /ledger
+    ledger    energies and momentum, see `history`, as a property of /ledger; and angular momentum, see `spins`
+    cards     the tables of `impact_cards`, as properties of /cards
+    spins     angular velocities, see `spins`, as a property of /spins
     motion    the animation of all bodies that move; in large recordings instead
     glb       the glTF file that `Recording.export` writes, as a property of /motion
     soft body, frames  faces of a flexible body, and its vertices in all frames, at /softBodies/k
@@ -21,7 +26,7 @@ Messages, each with its kind
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, replace
 from functools import partial
 from typing import Any
@@ -30,14 +35,17 @@ import numpy as np
 
 from rigidimpulse.recording.exporters import ExportOptions, ExportTarget
 from rigidimpulse.scene.shape import rotation_matrix
-from rigidimpulse.view.arrows import arrow_rows, fade_time, longest_arrow
+from rigidimpulse.view.arrows import arrow_rows, arrow_scale, fade_time, longest_arrow
 from rigidimpulse.view.camera import Framing, Path, frame_action, up_axis
 from rigidimpulse.view.display import SEGMENTS, DisplayMesh, display_mesh, display_planes
 from rigidimpulse.view.history import contact_rows, energy_span, impact_marks, ledger_curves
+from rigidimpulse.view.impact_cards import card_entries, card_keys, card_rows, card_table
+from rigidimpulse.view.joints import fixed_anchors, joint_entries
 from rigidimpulse.view.materials import ROUND_KINDS, soft_body_surface, surface
 from rigidimpulse.view.protocol import RecordingLike, SoftBodyLike
 from rigidimpulse.view.rendered import rendered_meshes
 from rigidimpulse.view.soft_bodies import is_closed, soft_body_messages
+from rigidimpulse.view.spins import angular_momentum, spin_entries, spin_rows, spinning
 from rigidimpulse.view.tracks import animation_message, body_tracks, pack_bytes, pack_float32, quaternion_keys
 
 MANY_SHAPES = 50
@@ -90,14 +98,16 @@ def page_contents(
     framed = poses if other is None else [_both(pose, finite_poses(other, body.name)) for body, pose in zip(bodies, poses, strict=True)]
     runs = [run for run in (recording, other) if run is not None]
     soft_body_paths = [_soft_body_path(*tracks) for tracks in zip(*(run.soft_bodies for run in runs), strict=True)]
-    framing = frame_action(_paths(bodies, framed, numbers, meshes) + soft_body_paths, up)
+    anchors = [Path(name, place, 0.0, moves=False, surface=place) for name, place in fixed_anchors(recording)]
+    framing = frame_action(_paths(bodies, framed, numbers, meshes) + soft_body_paths + anchors, up)
     framing = replace(framing, movers=[name for name in framing.movers if name not in {track.name for track in soft_bodies}])
     entries = _entries(recording, bodies, poses, numbers, rendered)
     num_coloured = sum(body.motion != "static" for body in bodies)
     radius = float(np.linalg.norm(framing.half))
     dynamic = [body.motion == "dynamic" for body in bodies]
     longest = longest_arrow(radius, framing.body_radius)
-    rows = arrow_rows(recording.impacts, dynamic, longest)
+    with_card, spins = card_rows(recording.impacts), spinning(recording)
+    rows = arrow_rows(recording.impacts, dynamic, longest, with_card)
     contacts = contact_rows(recording.contacts, times, dynamic, up, longest)
     curves = ledger_curves(recording.ledger)
     manifest = {
@@ -112,6 +122,12 @@ def page_contents(
         "ledger": None if curves is None else {"energySpan": energy_span(recording.ledger)},
         "contacts": len(contacts) > 0,
         "warnings": warning_entries(recording),
+        "status": {"ok": recording.status.ok, "message": recording.status.message},
+        "checks": [],
+        "cards": card_entries(recording, with_card),
+        "arrowScale": arrow_scale(recording.impacts, longest),
+        "joints": joint_entries(recording),
+        "spins": spin_entries(recording, spins),
     }
     messages = [("shape", _shape_message(number, mesh)) for number, mesh in enumerate(meshes)]
     for kind, path, name, values in (
@@ -120,6 +136,10 @@ def page_contents(
         ("marks", "impacts", "marks", impact_marks(recording.impacts, times[0], times[-1])),
         ("contacts", "contacts", "rows", contacts if len(contacts) else None),
         ("ledger", "ledger", "curves", curves),
+        ("ledger", "ledger", "angular", angular_momentum(recording) if curves is not None else None),
+        ("cards", "cards", "keys", card_keys(recording, with_card).tobytes() if len(with_card) else None),
+        ("cards", "cards", "rows", card_table(recording, with_card) if len(with_card) else None),
+        ("spins", "spins", "rows", spin_rows(recording, spins) if spins else None),
     ):
         if values is not None:
             messages.append((kind, property_message(path, name, values)))
@@ -318,6 +338,20 @@ def warning_entries(recording: RecordingLike) -> list[dict[str, Any]]:
     if not status.problems:
         return [{"time": None, "kind": warning, "bodies": "", "message": ""} for warning in status.warnings]
     return [{"time": e.time, "kind": e.kind, "bodies": ", ".join(e.bodies), "message": e.message} for e in status.problems]
+
+
+def check_entries(checks: Iterable[Any]) -> list[dict[str, Any]]:
+    """Return what the page says of checks, each with what, value, bound, passed, law and relation."""
+    names = ("what", "law", "relation", "passed")
+    return [
+        {name: getattr(check, name) for name in names} | {key: _number(getattr(check, key)) for key in ("value", "bound")}
+        for check in checks
+    ]
+
+
+def _number(value: float) -> str:
+    """Return a value of a check as people read it: counts in full, quantities with three digits."""
+    return f"{int(value):,}" if float(value).is_integer() and abs(value) < 1e15 else f"{value:.3g}"
 
 
 def _summary(num_dynamic: int, num_impacts: int, duration: float) -> str:

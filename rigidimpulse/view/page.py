@@ -12,38 +12,43 @@ import gzip
 import html
 import json
 import os
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from rigidimpulse.recording.exporters import ExportTarget
-from rigidimpulse.view.contents import MOST_KEYS, DrawnMeshes, is_large, page_contents
+from rigidimpulse.view.contents import MOST_KEYS, DrawnMeshes, check_entries, is_large, page_contents
 from rigidimpulse.view.protocol import RecordingLike
 from rigidimpulse.view.rendered import rendered_meshes
 
 SCRIPTS = (
-    "look.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "soft_bodies.js", "shapes.js", "transport.js", "plot.js", "timeline.js",
-    "panel.js", "ledger.js", "hud.js", "messages.js", "main.js",
+    "theme.js", "look.js", "room.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "soft_bodies.js", "shapes.js", "joints.js",
+    "spins.js", "transport.js", "plot.js", "clusters.js", "timeline.js", "panel.js", "ledger.js", "impacts.js", "card.js", "inspector.js",
+    "marks.js", "header.js", "hud.js", "messages.js", "main.js",
 )  # fmt: skip
 LARGE_SCRIPTS = tuple("glb.js" if name == "messages.js" else name for name in SCRIPTS)
 """Those of a large recording, see `contents.MOST_KEYS`."""
-STYLES = ("page.css", "panel.css")
+STYLES = ("page.css", "layout.css", "panel.css", "card.css")
 DEFAULT_TITLE = "rigidimpulse"
 
 
-def write_html(recording: RecordingLike, path: str | os.PathLike[str], title: str = DEFAULT_TITLE) -> None:
+def write_html(
+    recording: RecordingLike, path: str | os.PathLike[str], title: str = DEFAULT_TITLE, checks: Sequence[Any] = ()
+) -> None:
     """Write a recording as one HTML file, which needs nothing else, not even a network.
 
     Args:
         recording: the motion.
         path: the file.
-        title: shown in the page's corner and as its name.
+        title: the sentence of the scene, shown as the page's head and as its name.
+        checks: comparisons of the run with laws, see `gallery.record.Check`.
 
     Raises:
         ValueError: the recording has no frames, or a pose is not finite.
 
     """
-    Path(path).write_text(render_page(recording, title), encoding="utf-8")
+    Path(path).write_text(render_page(recording, title, checks=checks), encoding="utf-8")
 
 
 def export_html(recording: RecordingLike, target: ExportTarget) -> None:
@@ -52,11 +57,14 @@ def export_html(recording: RecordingLike, target: ExportTarget) -> None:
 
 
 def render_page(
-    recording: RecordingLike, title: str = DEFAULT_TITLE, most_keys: int = MOST_KEYS, drawn_of: DrawnMeshes = rendered_meshes
-) -> str:
+    recording: RecordingLike, title: str = DEFAULT_TITLE, most_keys: int = MOST_KEYS, drawn_of: DrawnMeshes = rendered_meshes,
+    checks: Sequence[Any] = (),
+) -> str:  # fmt: skip
     """Return the HTML page of a recording, as `write_html` writes it; most_keys, drawn_of: see `contents`."""
     large = is_large(recording, most_keys)
-    return assemble(*page_contents(recording, large=large, drawn_of=drawn_of), title, LARGE_SCRIPTS if large else SCRIPTS)
+    manifest, messages = page_contents(recording, large=large, drawn_of=drawn_of)
+    manifest["checks"] = check_entries(checks)
+    return assemble(manifest, messages, title, LARGE_SCRIPTS if large else SCRIPTS)
 
 
 def assemble(

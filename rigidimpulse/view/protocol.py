@@ -61,7 +61,7 @@ class RecordingLike(Protocol):
 
     @property
     def impacts(self) -> npt.NDArray[Any]:
-        """Structured array: time, body_a, body_b, point, normal, impulse, tangent_impulse."""
+        """Structured array of `recording.events.IMPACT_DTYPE`."""
         ...
 
     @property

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import threading
 import webbrowser
+from collections.abc import Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -25,7 +26,7 @@ CLOSE_DELAY = 0.05
 _viewer: Viewer | None = None
 
 
-def show(recording: RecordingLike, title: str = DEFAULT_TITLE, open_browser: bool = True) -> Viewer:
+def show(recording: RecordingLike, title: str = DEFAULT_TITLE, checks: Sequence[Any] = (), open_browser: bool = True) -> Viewer:
     """Show a recording in the browser and return the viewer that serves it.
 
     The call returns once the browser has the page, which needs the server no longer: a script may end at once. Where
@@ -34,14 +35,14 @@ def show(recording: RecordingLike, title: str = DEFAULT_TITLE, open_browser: boo
 
     Args:
         recording: the motion.
-        title: shown in the page's corner and as its name.
+        title, checks: as `write_html` has them.
         open_browser: open the page here; otherwise only serve it at `Viewer.url`.
 
     Raises:
         ValueError: as `write_html`.
 
     """
-    return show_page(render_page(recording, title), open_browser)
+    return show_page(render_page(recording, title, checks=checks), open_browser)
 
 
 def show_page(page: str, open_browser: bool = True) -> Viewer:

@@ -71,9 +71,9 @@ class Opened:
         return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), dtype=np.float64)
 
 
-def open_page(browser: Any, url: str, width: int = 480, height: int = 320) -> Opened:
-    """Open a page and wait until it has drawn itself."""
-    page = browser.new_page(viewport={"width": width, "height": height})
+def open_page(browser: Any, url: str, width: int = 480, height: int = 320, **options: Any) -> Opened:
+    """Open a page and wait until it has drawn itself; options: of the browser's `new_page`."""
+    page = browser.new_page(viewport={"width": width, "height": height}, **options)
     opened = Opened(page)
     page.on("console", lambda message: opened.errors.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: opened.errors.append(str(error)))

@@ -184,8 +184,10 @@ def test_names_and_title_are_text_not_markup(opened: Opened) -> None:
 
 def test_page_leaves_out_what_its_recording_has_not(opened: Opened) -> None:
     assert opened.page.query_selector("#ledger") is None
-    buttons = opened.page.eval_on_selector_all("#layers button", "all => all.map(each => each.textContent)")
-    assert buttons == ["Bodies", "Impacts", "Trails", "Ground", "Wireframe", "Track", "More"]
+    layers = opened.page.eval_on_selector_all("#layers label span", "all => all.map(each => each.textContent)")
+    assert layers == ["Bodies", "Impacts", "Normal part", "Friction part", "Trails", "Ground", "Wireframe", "Track"]
+    assert not opened.page.is_visible("#plots-button") and not opened.page.is_visible("#checks")
+    assert opened.page.query_selector(".dg") is None
 
 
 def test_live_page_of_a_single_frame(browser: Any, capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,7 +25,7 @@ from rigidimpulse.view.page import render_page
 
 pytestmark = pytest.mark.browser
 
-WIDTH, HEIGHT = 900, 440
+WIDTH, HEIGHT = 900, 620
 PIXELS = 2.0 / 480.0  # s: two pixels of a time line of 1 s with at least 480 pixels
 OFFSET = np.array([0.1, -0.05, 0.2])  # m, of the centre of mass in the frame of the box
 CONTACT_FRAMES = (20, 40)
@@ -146,7 +146,9 @@ def test_contacts_show_the_forces_of_the_frame_when_they_are_asked_for(opened: O
     for frame, count in ((first - 1, 0), (first, 1), (after - 1, 1), (after, 0)):
         opened.do(f"r.seek({frame / FPS})")
         assert len(opened.do("r.contacts()")) == count, frame
+    opened.page.click("#layers-button")
     opened.page.click("text=Contacts")
+    opened.page.click("#layers-button")
     assert opened.do("r.contacts()") == []
 
 
@@ -170,7 +172,9 @@ def test_the_shape_that_collides_takes_the_place_of_what_is_drawn(opened: Opened
     opened.page.keyboard.press("s")
     assert opened.do("r.simulated()") is True
     assert changed(drawn, opened.picture()) > 300
+    opened.page.click("#layers-button")
     opened.page.click("text=As simulated")
+    opened.page.click("#layers-button")
     assert opened.do("r.simulated()") is False
     assert changed(drawn, opened.picture()) < 20
 

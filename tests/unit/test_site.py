@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 import re
@@ -48,7 +49,8 @@ def test_index_and_pages_name_every_scene_with_its_checks(folder: Path) -> None:
         assert f'src="{name}_play.html"' in page and "SCENES = " in unescape(re.sub("<[^>]*>", "", page))
         assert outside(index) + outside(page) == []
         assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-        assert "<title>" + name in (folder / f"{name}_play.html").read_text(encoding="utf-8")
+        head = f"<title>{html.escape(gallery.load(name).description)}"
+        assert head in (folder / f"{name}_play.html").read_text(encoding="utf-8")
 
 
 def test_a_scene_is_kept_until_the_package_is_newer(folder: Path, tmp_path: Path) -> None:

@@ -27,13 +27,14 @@ from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 from rigidimpulse.view import camera as framing
-from rigidimpulse.view.arrows import LEAST_LENGTH, MOST_ROWS, arrow_rows, fade_time
+from rigidimpulse.view.arrows import LEAST_LENGTH, MOST_ROWS, arrow_rows, arrow_scale, fade_time
 from rigidimpulse.view.display import display_mesh, display_planes, shade
 from rigidimpulse.view.materials import PALETTE, color, surface
 from rigidimpulse.view.page import render_page, write_html
 from rigidimpulse.view.server import show
 from rigidimpulse.view.tracks import body_tracks, quaternion_keys, thin_keys
 
+NO_CARD = np.zeros(0, np.int64)
 QUARTER_TURN = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)  # about x
 
 
@@ -189,30 +190,33 @@ class TestArrows:
     def test_impulse_acts_plus_on_b_and_minus_on_a(self) -> None:
         table = impacts_of((0.5, 0, 1, 4.0), (0.25, 1, 2, 1.0))
         table["tangent_impulse"][0] = (3, 0, 0)
-        rows = arrow_rows(table, dynamic=[False, True, True], longest=2.0)
+        rows = arrow_rows(table, dynamic=[False, True, True], longest=2.0, with_card=np.array([1, 0]))
         assert np.array_equal(rows[:, 0], np.float32([0.25, 0.25, 0.5]))  # sorted; two for the pair of dynamic bodies
         assert np.allclose(rows[0, 4:7] + rows[1, 4:7], 0.0)
         assert np.allclose(rows[2, 4:7], [0.6, 0.0, 0.8])
         assert rows[2, 10] == pytest.approx(2.0)
-        assert rows[0, 10] == pytest.approx(2.0 * np.sqrt(1.0 / 5.0))
+        assert rows[0, 10] == pytest.approx(2.0 / 5.0)  # one scale: 5 N s are 2 m long
+        assert arrow_scale(table, 2.0) == pytest.approx(2.0 / 5.0)
+        assert np.array_equal(rows[:, 11], [0, 0, 1])  # numbers of their cards
 
     def test_length_keeps_the_order_of_the_impulses(self) -> None:
         impulses = 10.0 ** np.arange(-9, 3)
-        rows = arrow_rows(impacts_of(*((k, 0, 1, j) for k, j in enumerate(impulses))), [False, True], 1.0)
+        rows = arrow_rows(impacts_of(*((k, 0, 1, j) for k, j in enumerate(impulses))), [False, True], 1.0, NO_CARD)
         assert np.all(np.diff(rows[:, 10]) >= 0.0)
         assert rows[0, 10] == pytest.approx(LEAST_LENGTH)
         assert rows[-1, 10] == 1.0
 
     def test_nothing_to_draw(self) -> None:
-        assert arrow_rows(impacts_of(), [False, True], 1.0).shape == (0, 11)
-        assert arrow_rows(impacts_of((0.0, 0, 1, 0.0)), [True, True], 1.0).shape == (0, 11)
-        assert arrow_rows(impacts_of((0.0, 0, 1, 2.0)), [False, False], 1.0).shape == (0, 11)
+        assert arrow_rows(impacts_of(), [False, True], 1.0, NO_CARD).shape == (0, 12)
+        assert arrow_rows(impacts_of((0.0, 0, 1, 0.0)), [True, True], 1.0, NO_CARD).shape == (0, 12)
+        assert arrow_rows(impacts_of((0.0, 0, 1, 2.0)), [False, False], 1.0, NO_CARD).shape == (0, 12)
+        assert arrow_scale(impacts_of(), 1.0) == 0.0
 
     def test_most_arrows_are_the_largest(self) -> None:
         table = np.repeat(impacts_of((0.0, 0, 1, 1.0)), MOST_ROWS + 7)
         table["impulse"] = 1.0 + np.arange(len(table))
         table["time"] = np.arange(len(table))
-        rows = arrow_rows(table, [False, True], 1.0)
+        rows = arrow_rows(table, [False, True], 1.0, NO_CARD)
         assert len(rows) == MOST_ROWS
         assert rows[0, 0] == 7.0
 

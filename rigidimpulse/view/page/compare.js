@@ -86,10 +86,9 @@ class ComparisonPanel extends Panel {
       2: run(1, (shown) => { this.ghosts.folder.visible = shown; }),
     };
     window.addEventListener("keydown", (event) => {
-      const typing = event.target.tagName === "INPUT" && event.target.type !== "range";
-      if (!typing && !event.ctrlKey && !event.metaKey && !event.altKey && keys[event.key]) { keys[event.key](); }
+      if (!isTaken(event) && !event.ctrlKey && !event.metaKey && !event.altKey && keys[event.key]) { keys[event.key](); }
     });
-    element("keys").textContent += " \u00b7 1 2 runs \u00b7 click a body: its own curve";
+    showKeys([["1 2", "show, hide run A, run B"], ["click", "on a body: its own curve"]]);
   }
 
   bindScene() {
@@ -124,7 +123,7 @@ class ComparisonPanel extends Panel {
     for (const [name, until] of Object.entries(this.plot.horizon)) {
       if (this.bodies.entries.has(name)) { this.bodies.fade(name, time > until); }
     }
-    const colour = focus === null ? PLOT_INK : this.bodies.entries.get(focus).colour;
+    const colour = focus === null ? theme.colour("ink") : this.bodies.entries.get(focus).colour;
     this.plot.draw(time, frame, focus, colour);
     const [distance, angle] = this.plot.at(focus, frame, time), until = this.plot.horizonOf(focus);
     element("who").textContent = focus ?? (this.bodies.entries.size === 1 ? [...this.bodies.entries.keys()][0] : "largest of all bodies");
@@ -168,6 +167,7 @@ class ComparisonPanel extends Panel {
 const exposeOneRun = expose;
 expose = (viewer, stage, transport, parts) => {
   exposeOneRun(viewer, stage, transport, parts);
+  parts.inspector.picks = false; // here a click on a body shows its curve
   const panel = new ComparisonPanel(viewer, stage, transport, JSON.parse(element("manifest").textContent));
   const tell = transport.onTime, render = viewer.render.bind(viewer);
   transport.onTime = () => {

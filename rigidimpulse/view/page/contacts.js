@@ -5,7 +5,6 @@
 
 const CONTACT_ROW = 8;
 const MOST_CONTACTS = 4096; // drawn at once; the longest arrows win
-const CONTACT_COLOUR = "#5a2bd8";
 const DOT = 0.085; // radius of a dot, relative to the longest arrow
 
 const DOT_VERTEX = `
@@ -39,8 +38,8 @@ class ContactArrows {
     this.longest = 0;
     for (let i = 0; i < this.count; i++) { this.longest = Math.max(this.longest, this.lengthOf(i)); }
     const most = Math.min(this.count, MOST_CONTACTS);
-    this.arrows = instancedPair(arrowGeometry(), ARROW_VERTEX, ARROW_FRAGMENT, this.object, most, CONTACT_COLOUR);
-    this.dots = instancedPair(new THREE.PlaneGeometry(2, 2), DOT_VERTEX, DOT_FRAGMENT, this.object, most, CONTACT_COLOUR);
+    this.arrows = themedPair(arrowGeometry(), this.object, most, "violet");
+    this.dots = themedPair(new THREE.PlaneGeometry(2, 2), this.object, most, "violet", DOT_VERTEX, DOT_FRAGMENT);
   }
 
   lengthOf(i) { return Math.hypot(...this.rows.subarray(i * CONTACT_ROW + 5, i * CONTACT_ROW + 8)); }

@@ -47,7 +47,7 @@ class DistancePlot extends TimePlot {
   }
 
   draw(time, frame, focus, colour) {
-    const pen = this.pen(this.canvas), now = this.x(time), own = focus === null ? PLOT_INK : colour;
+    const pen = this.pen(this.canvas), now = this.x(time), own = focus === null ? theme.colour("ink") : colour;
     if (this.same) { this.drawSame(pen); } else { this.drawScale(pen); }
     this.drawHorizon(pen, focus);
     this.paintPlayed(pen, now, NOT_PLAYED, () => this.drawCurves(pen, focus, colour));
@@ -60,8 +60,8 @@ class DistancePlot extends TimePlot {
     pen.rect(0, 0, this.width, this.height - PLOT_FOOT + 1); // what is below the scale is out of sight
     pen.clip();
     this.drawShade(pen);
-    this.drawLine(pen, this.of(null).angle, PLOT_SOFT, 1);
-    this.drawLine(pen, this.of(null).distance, PLOT_INK, focus === null ? 1.8 : 1);
+    this.drawLine(pen, this.of(null).angle, theme.colour("soft"), 1);
+    this.drawLine(pen, this.of(null).distance, theme.colour("ink"), focus === null ? 1.8 : 1);
     if (focus !== null) {
       this.drawLine(pen, this.of(focus).angle, colour, 1);
       this.drawLine(pen, this.of(focus).distance, colour, 2.4);
@@ -72,7 +72,7 @@ class DistancePlot extends TimePlot {
     const step = (this.height - PLOT_HEAD - PLOT_FOOT) / (this.top - this.bottom), every = step < LEAST_STEP ? 3 : 1;
     for (let power = this.bottom; power <= this.top; power++) {
       const labelled = power % every === 0, y = this.y(Math.pow(10, power));
-      pen.fillStyle = `rgba(29, 39, 48, ${labelled ? 0.13 : 0.05})`;
+      pen.fillStyle = theme.ink(labelled ? 0.13 : 0.05);
       pen.fillRect(this.left, y - 0.5, this.right - this.left, 1);
       if (labelled) { this.drawFigure(pen, withUnit(Math.pow(10, power), "m"), y); }
     }
@@ -82,7 +82,7 @@ class DistancePlot extends TimePlot {
     pen.font = "13px system-ui, sans-serif";
     pen.textAlign = "center";
     pen.textBaseline = "middle";
-    pen.fillStyle = PLOT_SOFT;
+    pen.fillStyle = theme.colour("soft");
     pen.fillText("the runs are the same", (this.left + this.right) / 2, this.height / 2);
   }
 

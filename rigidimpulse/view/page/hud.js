@@ -1,4 +1,4 @@
-/* What lies over the picture: title, layers, the bar, and the keys. */
+/* What is around the picture: the menu of layers, the bar, and the keys. */
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 
@@ -12,43 +12,26 @@ function makeSwitch(button, set, on) {
     set(on);
   };
   button.setAttribute("aria-pressed", String(on));
-  button.addEventListener("click", () => {
-    flip();
-    button.blur(); // so that the space bar plays instead of pressing it again
-  });
+  button.addEventListener("click", flip);
   return flip;
 }
 
-/* The problems of the run, below its title; a click on one goes to its time. */
-function showWarnings(warnings, transport) {
-  if (warnings.length === 0) { return; }
-  const box = element("warnings"), head = document.createElement("summary"), list = document.createElement("ol");
-  head.textContent = `${warnings.length} ${warnings.length === 1 ? "warning" : "warnings"}: look before you use this run`;
-  for (const {time, kind, bodies, message} of warnings) {
-    const item = document.createElement("li"), go = document.createElement("button");
-    const parts = [["b", kind], ["span", bodies], ["p", message]].filter(([, text]) => text);
-    go.textContent = time === null ? "" : `${Number(time.toPrecision(4))} s`;
-    go.hidden = time === null;
-    go.title = "go there";
-    go.addEventListener("click", () => { transport.pause(); transport.seek(Math.min(Math.max(time, transport.start), transport.end)); go.blur(); });
-    item.append(go, ...parts.map(([tag, text]) => Object.assign(document.createElement(tag), {textContent: text})));
-    list.append(item);
-  }
-  box.append(head, list);
-  box.open = window.innerWidth > 820 && window.innerHeight > 500;
-  box.hidden = false;
-}
-
+/* The menu of layers, a check box each; returns what flips them, by key. */
 function makeLayers(layers) {
   const keys = {};
   for (const {label, key, set, on} of layers) {
-    const button = document.createElement("button");
-    button.textContent = label;
-    button.title = `${label.toLowerCase()} (${key.toUpperCase()})`;
-    element("layers").append(button);
-    keys[key] = makeSwitch(button, set, on);
+    const box = make("input", {type: "checkbox", checked: on}), flip = () => { box.checked = !box.checked; set(box.checked); };
+    box.addEventListener("change", () => set(box.checked));
+    element("layers").append(make("label", {children: [box, make("span", {textContent: label}), make("kbd", {textContent: key.toUpperCase(), "aria-hidden": "true"})]}));
+    keys[key] = flip;
   }
   return keys;
+}
+
+/* The table of keys. */
+function showKeys(keys) {
+  element("help").append(make("h2", {textContent: "Keys"}), make("dl", {children: keys.map(([key, what]) => make("div", {children: [
+    make("dt", {children: key.split(" ").map((one) => make("kbd", {textContent: one}))}), make("dd", {textContent: what})]}))}));
 }
 
 /* Decimals such that neighbouring frames read differently. */
@@ -57,28 +40,23 @@ function clockDecimals(times) {
   return step > 0 ? Math.min(Math.max(2, Math.ceil(-Math.log10(step)) + 1), 9) : 2;
 }
 
-function makeBar(transport, marks) {
-  const timeline = new Timeline(element("marks"), transport.times, marks), scrubber = element("scrubber"), decimals = clockDecimals(transport.times);
+function makeBar(transport, timeline) {
+  const scrubber = element("scrubber"), decimals = clockDecimals(transport.times);
   scrubber.min = transport.start;
   scrubber.max = transport.end;
   scrubber.addEventListener("input", () => transport.seek(Number(scrubber.value)));
   for (const speed of SPEEDS) {
     element("speed").add(new Option(`${speed}\u00d7`, speed, speed === 1, speed === 1));
   }
-  element("speed").addEventListener("change", (event) => {
-    transport.speed = Number(event.target.value);
-    event.target.blur();
-  });
-  element("play").addEventListener("click", () => {
-    if (transport.playing) { transport.pause(); } else { transport.play(); }
-    element("play").blur();
-  });
+  element("speed").addEventListener("change", (event) => { transport.speed = Number(event.target.value); });
+  element("play").addEventListener("click", () => { if (transport.playing) { transport.pause(); } else { transport.play(); } });
   const flipLoop = makeSwitch(element("loop"), (on) => { transport.loop = on; }, true);
   const update = () => {
+    const clock = `${transport.time.toFixed(decimals)} s`, frame = `frame ${transport.frame} / ${transport.times.length - 1}`;
     scrubber.value = transport.time;
+    scrubber.setAttribute("aria-valuetext", `${clock}, ${frame}`);
     element("play").classList.toggle("playing", transport.playing);
-    element("clock").innerHTML = `${transport.time.toFixed(decimals)} s` +
-      `<small>frame ${transport.frame} / ${transport.times.length - 1}</small>`;
+    element("clock").innerHTML = `${clock} <small>${frame}</small>`;
     timeline.draw(transport.time);
   };
   window.addEventListener("resize", update);
@@ -89,10 +67,17 @@ function makeBar(transport, marks) {
   return {update, flipLoop, changeSpeed};
 }
 
+/* Whether a key belongs to what has the focus: text, a choice, or a button that was reached by the keyboard. */
+function isTaken(event) {
+  const {target} = event, presses = event.key === " " || event.key === "Enter";
+  if (target.tagName === "INPUT" && !["range", "checkbox"].includes(target.type)) { return true; }
+  if (target.tagName === "SELECT" && (event.key.startsWith("Arrow") || ["Home", "End"].includes(event.key) || presses)) { return true; }
+  return presses && target.matches("button, summary, input[type=checkbox]") && target.matches(":focus-visible");
+}
+
 function bindKeys(transport, keys) {
   window.addEventListener("keydown", (event) => {
-    const typing = event.target.tagName === "INPUT" && event.target.type !== "range";
-    if (typing || event.ctrlKey || event.metaKey || event.altKey) { return; }
+    if (isTaken(event) || event.ctrlKey || event.metaKey || event.altKey) { return; }
     const actions = {
       " ": () => (transport.playing ? transport.pause() : transport.play()),
       ArrowLeft: () => transport.step(event.shiftKey ? -10 : -1),

@@ -17,7 +17,7 @@ function dressRenderer(renderer) {
   renderer.shadowMap.type = THREE.PCFShadowMap; // the only filter of this three.js whose width can be chosen
 }
 
-/* A dome at infinity. It writes screen colours, so it passes by the tone mapping. */
+/* A dome at infinity. It writes screen colours, so it passes by the tone mapping; `paint(colours)` of its result changes them. */
 function makeSky() {
   const material = new THREE.ShaderMaterial({
     side: THREE.BackSide,
@@ -49,6 +49,7 @@ function makeSky() {
   const sky = new THREE.Mesh(new THREE.SphereGeometry(1, 48, 32), material);
   sky.frustumCulled = false;
   sky.renderOrder = -1;
+  sky.paint = (colours) => Object.entries(colours).forEach(([name, colour]) => material.uniforms[name].value.set(colour));
   return sky;
 }
 
@@ -153,6 +154,10 @@ function makeGround(spacing, reach, opacity) {
   face.receiveShadow = true;
   const ground = new THREE.Group();
   ground.add(face);
+  ground.paint = (face, line) => {
+    material.color.copy(linearColour(face));
+    uniforms.line.value.copy(linearColour(line));
+  };
   ground.centreOn = (x, y) => {
     uniforms.centre.value.set(x, y);
     face.position.set(x, y, 0);

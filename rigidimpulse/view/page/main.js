@@ -37,10 +37,37 @@ function takeGeometries(viewer, count) {
   return geometries;
 }
 
+/* What is in the scene besides its bodies, by name; null where the run has none. */
+function makeParts(viewer, stage, manifest, geometries, times) {
+  const found = (path) => viewer.scene_tree.find([path]).object, {rows} = found("impacts");
+  const parts = {
+    impacts: new ImpactArrows(rows, manifest.fade),
+    contacts: manifest.contacts ? new ContactArrows(found("contacts").rows) : null,
+    shapes: new SimulatedShapes(stage, manifest, geometries),
+    joints: new Joints(stage, manifest),
+    spins: new Spins(stage, manifest, found("spins").rows ?? new Float32Array(0), times),
+    softBodies: makeSoftBodies(viewer, manifest.softBodies, times),
+    marks: new Marks(viewer, stage, manifest.arrowScale, longestOf(rows)),
+    trails: new Trails(viewer, stage, manifest, times),
+  };
+  for (const name of ["impacts", "contacts", "joints", "spins", "marks"]) {
+    if (parts[name]) { viewer.set_object([name], parts[name].object); }
+  }
+  parts.softBodies.forEach((each) => stage.surfaces.push(each.surface));
+  return parts;
+}
+
+/* Length of the longest arrow. */
+function longestOf(rows) {
+  let longest = 0;
+  for (let i = 0; i < rows.length / ROW; i++) { longest = Math.max(longest, rows[i * ROW + 10]); }
+  return longest;
+}
+
 async function main() {
   const manifest = JSON.parse(element("manifest").textContent);
   const viewer = new MeshCat.Viewer(element("meshcat-pane"));
-  viewer.gui.domElement.style.display = "none";
+  viewer.gui.domElement.remove();
   const stage = new Stage(viewer, manifest);
   stage.dress();
   const send = await readMessages(viewer);
@@ -50,75 +77,102 @@ async function main() {
   motionSource.animate(viewer, stage, send);
   send(() => true);
 
-  const {times, rows, marks} = viewer.scene_tree.find(["impacts"]).object;
-  const contactRows = viewer.scene_tree.find(["contacts"]).object.rows;
-  const parts = {
-    impacts: new ImpactArrows(rows, manifest.fade),
-    contacts: manifest.contacts ? new ContactArrows(contactRows) : null,
-    shapes: new SimulatedShapes(stage, manifest, geometries),
-    softBodies: makeSoftBodies(viewer, manifest.softBodies, times),
-  };
-  viewer.set_object(["impacts"], parts.impacts.object);
-  if (parts.contacts) { viewer.set_object(["contacts"], parts.contacts.object); }
-  parts.softBodies.forEach((each) => stage.surfaces.push(each.surface));
+  const found = (path) => viewer.scene_tree.find([path]).object, {times, marks} = found("impacts"), cards = found("cards"), curves = found("ledger");
+  const impacts = new Impacts(cards.keys, cards.rows, manifest);
+  const parts = makeParts(viewer, stage, manifest, geometries, times);
   const transport = new Transport(viewer.animator, times, () => {
-    parts.impacts.show(transport.time);
-    parts.contacts?.show(transport.frame);
-    parts.softBodies.forEach((each) => each.show(transport.frame, transport.time));
-    parts.trails.show(transport.time);
+    const {time, frame} = transport;
+    parts.impacts.show(time);
+    parts.contacts?.show(frame);
+    parts.softBodies.forEach((each) => each.show(frame, time));
+    parts.trails.show(time);
+    parts.joints.show(time);
+    parts.spins.show(frame);
     bar.update();
     parts.ledger?.show();
   });
-  parts.trails = new Trails(viewer, stage, manifest, times);
-  const bar = makeBar(transport, marks);
-  if (manifest.ledger) {
-    parts.ledger = new LedgerPanel(viewer, stage, transport, viewer.scene_tree.find(["ledger"]).object.curves,
-      manifest.ledger.energySpan);
-  }
-  startViewing(viewer, stage, transport, bar, parts);
-  expose(viewer, stage, transport, parts);
-  element("summary").textContent = manifest.summary;
-  showWarnings(manifest.warnings, transport);
+  const inspector = new Inspector(viewer, stage, transport, impacts, parts);
+  const layout = () => {
+    fitHeights();
+    parts.ledger?.fit();
+    stage.refit();
+  };
+  const spikes = impacts.complete ? makeSpikes(Array.from(impacts.times), impacts.heights())
+    : binnedSpikes(marks, transport.start, transport.end, (from, to) => impacts.strongestIn(from, to));
+  inspector.timeline = new Timeline(transport, spikes, (index) => inspector.select(index), layout);
+  inspector.onLayout = layout;
+  const bar = makeBar(transport, inspector.timeline);
+  if (manifest.ledger) { parts.ledger = new LedgerPanel(viewer, stage, transport, curves, manifest.ledger.energySpan); }
+  const header = showHeader(manifest, transport, layout);
+  startViewing({viewer, stage, transport, bar, parts, inspector, header, layout});
+  expose(viewer, stage, transport, {...parts, inspector, cards: impacts});
   transport.seek(transport.start);
-  transport.play();
+  if (!reducedMotion) { transport.play(); }
 }
 
-function startViewing(viewer, stage, transport, bar, parts) {
+/* Tells the style sheet how high head and bar are: panels and card lie between them. */
+function fitHeights() {
+  const set = (name, value) => document.documentElement.style.setProperty(name, `${Math.round(value)}px`);
+  set("--foot", element("bar").parentElement.getBoundingClientRect().height);
+  set("--head", document.querySelector("header").getBoundingClientRect().bottom);
+}
+
+const KEYS = [
+  ["space", "play or pause"], ["\u2190 \u2192", "a frame back, on; with shift ten"], ["Home End", "start, end"], ["- +", "slower, faster"], ["L", "loop"],
+  ["[ ]", "previous, next impact; also , and ."], ["Esc", "close the card"], ["F", "frame the action"], ["U", "hide everything but the picture"],
+  ["D", "dark or light"], ["?", "these keys"],
+];
+
+function startViewing({viewer, stage, transport, bar, parts, inspector, header, layout}) {
   const layer = (label, key, set, on = true) => ({
     label, key, on, set: (shown) => { set(shown); viewer.set_dirty(); }});
   const folder = (name) => (shown) => { viewer.scene_tree.find([name]).object.visible = shown; };
-  const {impacts, contacts, shapes, trails, ledger} = parts;
+  const {impacts, contacts, shapes, trails, ledger, joints, spins} = parts;
+  const part = (name) => (on) => impacts.turnPart(name, on, transport.time);
   const keys = makeLayers([
     layer("Bodies", "b", folder("bodies")),
     impacts.count > 0 && layer("Impacts", "i", folder("impacts")),
+    impacts.count > 0 && layer("Normal part", "n", part("normal"), false),
+    impacts.count > 0 && layer("Friction part", "k", part("friction"), false),
     contacts && layer("Contacts", "c", (on) => contacts.turn(on, transport.frame), false),
+    joints.count > 0 && layer("Joints", "j", folder("joints")),
+    spins.count > 0 && layer("Angular velocity", "v", (on) => spins.turn("velocity", on, transport.frame), false),
+    spins.count > 0 && layer("Angular momentum", "a", (on) => spins.turn("momentum", on, transport.frame), false),
     trails.movers.length > 0 && layer("Trails", "r", (on) => trails.turn(on, transport.time), false),
     layer("Ground", "g", folder("ground")),
     shapes.differ && layer("As simulated", "s", (on) => shapes.turn(on), false),
     layer("Wireframe", "w", (on) => stage.surfaces.forEach((surface) => { surface.wireframe = on; }), false),
     layer("Track", "t", (on) => { stage.follow = on; }, stage.follow),
-    ledger && layer("Plots", "p", (on) => ledger.turn(on), ledger.shown),
-    layer("More", "m", (on) => {
-      viewer.gui.domElement.style.display = on ? "" : "none";
-      viewer.gui.open();
-    }, false),
   ].filter(Boolean));
+  if (ledger) {
+    element("plots-button").hidden = false;
+    keys.p = makeSwitch(element("plots-button"), (on) => ledger.turn(on), ledger.shown);
+  }
   keys.f = () => stage.frameAction();
   keys.l = bar.flipLoop;
-  keys.u = () => document.body.classList.toggle("bare");
+  keys.u = () => { document.body.classList.toggle("bare"); layout(); };
+  keys.d = () => theme.set(!theme.dark);
+  keys["?"] = header.help;
   keys["-"] = () => bar.changeSpeed(-1);
   keys["+"] = keys["="] = () => bar.changeSpeed(1);
+  keys["["] = keys[","] = () => inspector.step(-1);
+  keys["]"] = keys["."] = () => inspector.step(1);
+  keys.Escape = () => inspector.select(-1);
   bindKeys(transport, keys);
+  showKeys(KEYS);
   const render = viewer.render.bind(viewer);
   viewer.render = () => {
     stage.prepare();
+    parts.marks.show();
     render();
   };
-  stage.frameAction();
+  inspector.bindScene();
+  window.addEventListener("resize", layout);
+  layout();
 }
 
 /* For scripts and tests. */
-function expose(viewer, stage, transport, {impacts, contacts, shapes, trails, softBodies, ledger}) {
+function expose(viewer, stage, transport, {impacts, contacts, shapes, trails, softBodies, ledger, joints, spins, inspector, cards}) {
   window.rigidimpulse = {
     get time() { return transport.time; },
     get frame() { return transport.frame; },
@@ -139,6 +193,18 @@ function expose(viewer, stage, transport, {impacts, contacts, shapes, trails, so
     simulated: () => shapes.shown,
     ledger,
     viewer,
+    room: freeRoom,
+    camera: () => viewer.camera.position.toArray(),
+    joints: () => joints.shapes.map(({entry, object}) => ({name: entry.name, kind: entry.kind, shown: object.visible})),
+    spin: (name, kind, frame) => spins[kind](spins.entries.findIndex((entry) => entry.name === name), frame).toArray(),
+    impact: {
+      get selected() { return inspector.selected; },
+      count: cards.count,
+      select: (index) => inspector.select(index),
+      get: (index) => cards.get(index),
+      groups: () => inspector.timeline.line.groups.map((group) => group.map(({time, x, index, count}) => ({time, x, index, count}))),
+      strip: () => (inspector.timeline.strip?.groups ?? []).map((group) => group.map(({time, x, index, count}) => ({time, x, index, count}))),
+    },
   };
 }
 

@@ -1,7 +1,6 @@
 /* Plots over time whose axis lies over that of the bar. What does not change with time is drawn once, on a layer of its own;
    with each picture it is copied, faintly where it is not played yet, and the cursor comes on top. */
 
-const PLOT_INK = "#1d2730", PLOT_SOFT = "#5b6873";
 const PREFIXES = ["f", "p", "n", "\u00b5", "m", "", "k", "M", "G"]; // of 10^-15, 10^-12, ...
 const NOT_PLAYED = 0.32;
 const ROOM_FOR_FIGURES = 52; // pixels beside a plot, without which the figures of its scale are in it
@@ -74,6 +73,7 @@ class TimePlot {
 
   /* Copies the layer, which `drawLayer(pen)` of a subclass draws when it is stale. */
   copyLayer(pen, now, faint = NOT_PLAYED) {
+    if (this.layer.width === 0 || this.layer.height === 0) { return; } // everything is hidden
     if (this.stale) {
       this.drawLayer(this.pen(this.layer));
       this.stale = false;
@@ -97,21 +97,21 @@ class TimePlot {
   /* Writes a figure at a height of the scale: beside the plot, or where it does not fit just above its line, in the plot. */
   drawFigure(pen, text, y) {
     const inside = this.left < ROOM_FOR_FIGURES;
-    pen.font = "10.5px system-ui, sans-serif";
+    pen.font = "12px system-ui, sans-serif";
     pen.textAlign = inside ? "left" : "right";
     pen.textBaseline = "middle";
-    pen.fillStyle = PLOT_SOFT;
+    pen.fillStyle = theme.colour("soft");
     pen.fillText(text, this.left + (inside ? 2 : -7), inside ? Math.max(y - 7, 7) : y);
   }
 
   drawCursor(pen, now) {
-    pen.fillStyle = "rgba(29, 39, 48, 0.6)";
+    pen.fillStyle = theme.ink(0.75);
     pen.fillRect(Math.round(now - 0.5), 6, 1, this.height - 6); // on whole pixels, so that it stays sharp
   }
 
   drawDot(pen, now, y, colour) {
     pen.fillStyle = colour;
-    pen.strokeStyle = "#fff";
+    pen.strokeStyle = theme.colour("panel");
     pen.lineWidth = 1.5;
     pen.beginPath();
     pen.arc(now, y, 4, 0, 2 * Math.PI);

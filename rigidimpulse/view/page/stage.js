@@ -2,8 +2,13 @@
 
 const GRID_CELLS = 12; // about as many across the action
 const FIELD_OF_VIEW = 35; // degrees, up and down
-const CAMERA_MARGIN = 1.25;
-const CAMERA_DROP = 0.08; // looks below the middle by this share of the half height: the bar lies at the bottom
+const CAMERA_MARGIN = 1.12;
+const FLOOR_MARGIN = 0.02; // of the radius of the action: the camera stays so much above level ground
+const SKIES = {
+  light: {zenith: "#c3d5e8", horizon: "#f5f1ea", nadir: "#d3d7d9"},
+  dark: {zenith: "#0f1418", horizon: "#1d2328", nadir: "#0c1013"},
+};
+const GROUNDS = {light: ["#b3b8bd", "#5d6b78"], dark: ["#20272d", "#4d5a65"]}; // face, line
 
 function roundSpacing(length) {
   const power = Math.pow(10, Math.floor(Math.log10(length)));
@@ -21,7 +26,10 @@ class Stage {
     this.nodes = new Map();
     this.meshOf = new Map(); // what is drawn of a body
     this.grounds = [];
+    this.floor = -Infinity; // height of the highest level ground, Y up
     this.surfaces = [];
+    this.moved = false; // whether people have moved the camera
+    this.room = freeRoom();
     this.follow = this.framing.follow;
     viewer.scene.quaternion.copy(this.turn);
     viewer.scene_tree.find(["Cameras", "default", "rotated"]).object.quaternion.copy(this.unturn);
@@ -35,9 +43,30 @@ class Stage {
     for (const name of ["Grid", "Axes", "Lights"]) { viewer.delete_path([name]); }
     viewer.scene_tree.find(["Background"]).on_update = () => viewer.set_dirty();
     viewer.scene.background = null;
-    viewer.set_object(["sky"], makeSky());
+    this.sky = makeSky();
+    viewer.set_object(["sky"], this.sky);
     this.light = makeKeyLight(this.turn, this.recorded(this.centre), 1.35 * this.radius);
     viewer.set_object(["Lights", "key"], this.light);
+    this.watchCamera();
+    theme.listeners.push(() => this.paint());
+    this.paint();
+  }
+
+  paint() {
+    const name = theme.dark ? "dark" : "light";
+    this.sky.paint(SKIES[name]);
+    for (const ground of this.grounds) { ground.paint(...GROUNDS[name]); }
+    this.viewer.set_dirty();
+  }
+
+  /* A camera that people have moved stays where they have put it. */
+  watchCamera() {
+    const {controls, camera} = this.viewer, from = new THREE.Vector3();
+    controls.addEventListener("start", () => from.copy(camera.position).sub(controls.target));
+    controls.addEventListener("end", () => {
+      this.moved ||= camera.position.clone().sub(controls.target).distanceTo(from) > 1e-6 * this.radius;
+    });
+    this.viewer.renderer.domElement.addEventListener("wheel", () => { this.moved = true; }, {passive: true});
   }
 
   addBody(body, geometries) {
@@ -52,6 +81,11 @@ class Stage {
     node.position.fromArray(body.position);
     node.quaternion.fromArray(body.quaternion);
     this.nodes.set(body.name, node);
+    for (const plane of body.planes.filter(({level}) => level)) {
+      const foot = new THREE.Vector3().fromArray(plane.normal).multiplyScalar(plane.offset);
+      foot.applyQuaternion(node.quaternion).add(node.position).applyQuaternion(this.turn);
+      this.floor = Math.max(this.floor, foot.y);
+    }
   }
 
   makeMesh(body, geometry) {
@@ -69,23 +103,47 @@ class Stage {
     ground.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), normal);
     ground.position.copy(normal).multiplyScalar(plane.offset);
     this.grounds.push(ground);
+    ground.paint(...GROUNDS[theme.dark ? "dark" : "light"]);
     return ground;
   }
 
-  /* The nearest camera along the framing's view direction that sees the whole outline of the action, in the middle of
-     what the bar leaves free. */
+  /* The nearest camera along the framing's view direction that sees the whole outline of the action inside the free room. */
   frameAction() {
-    const camera = this.viewer.camera, controls = this.viewer.controls;
+    const camera = this.viewer.camera, controls = this.viewer.controls, room = this.measureRoom();
+    this.moved = false;
     camera.fov = FIELD_OF_VIEW;
-    const tall = Math.tan((camera.fov * Math.PI) / 360), wide = tall * (window.innerWidth / window.innerHeight);
-    const back = new THREE.Vector3().fromArray(this.framing.view), over = acrossAndUp(back).over;
+    const half = Math.tan((camera.fov * Math.PI) / 360) / window.innerHeight;
+    const tall = half * (room.bottom - room.top), wide = half * (room.right - room.left);
+    const back = new THREE.Vector3().fromArray(this.framing.view);
     const {target, distance} = nearestView(this.framing.outline, back, tall, wide, CAMERA_MARGIN, 3 * this.radius);
-    target.addScaledVector(over, -CAMERA_DROP * tall * distance).add(this.follow ? this.middleOfMovers() : this.centre);
+    target.add(this.follow ? this.middleOfMovers() : this.centre);
     controls.target.copy(target);
     controls.minDistance = 0.02 * this.radius;
     controls.maxDistance = 60 * this.radius;
+    controls.maxPolarAngle = this.floor > -Infinity ? 0.5 * Math.PI - FLOOR_MARGIN : Math.PI;
     camera.position.copy(target).addScaledVector(back, distance);
+    this.centrePicture();
+  }
+
+  measureRoom() {
+    this.room = freeRoom();
+    return this.room;
+  }
+
+  /* The middle of the picture is that of the free room. */
+  centrePicture() {
+    const {room} = this, {camera} = this.viewer;
+    const offsetX = 0.5 - (room.left + room.right) / 2 / window.innerWidth, offsetY = 0.5 - (room.top + room.bottom) / 2 / window.innerHeight;
+    camera.view = {enabled: true, fullWidth: 1, fullHeight: 1, offsetX, offsetY, width: 1, height: 1};
+    camera.updateProjectionMatrix();
     this.viewer.set_dirty();
+  }
+
+  /* When the free room has changed. */
+  refit() {
+    if (!this.moved) { return this.frameAction(); }
+    this.measureRoom();
+    this.centrePicture();
   }
 
   middleOfMovers() {
@@ -102,6 +160,10 @@ class Stage {
       target.add(shift);
       camera.position.add(shift);
       this.light.aimAt(this.recorded(target));
+    }
+    if (this.floor > -Infinity) {
+      camera.position.y = Math.max(camera.position.y, this.floor + FLOOR_MARGIN * this.radius);
+      camera.lookAt(target);
     }
     const distance = camera.position.distanceTo(target);
     camera.near = 0.01 * distance;
