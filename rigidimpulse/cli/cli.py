@@ -19,6 +19,7 @@ from rigidimpulse.cli.jobs import (
     show,
     size_of,
 )
+from rigidimpulse.cli.live import live
 from rigidimpulse.cli.site import gallery as gallery_pages
 from rigidimpulse.cli.studies import compare, hardcases, study
 from rigidimpulse.cli.wedge import wedge
@@ -203,5 +204,5 @@ def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str
         show(run)
 
 
-for command in (hardcases, study, compare, wedge, gallery_pages):
+for command in (hardcases, study, compare, wedge, live, gallery_pages):
     main.add_command(command)

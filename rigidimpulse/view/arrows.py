@@ -35,28 +35,43 @@ def arrow_rows(impacts: npt.NDArray[Any], dynamic: Sequence[bool], longest: floa
         longest: length of the arrow of the largest impulse, m.
 
     """
-    impulse = (
-        np.asarray(impacts["impulse"], dtype=np.float64)[:, None] * impacts["normal"] + impacts["tangent_impulse"]
-    ).reshape(-1, 3)
-    size = np.linalg.norm(impulse, axis=1)
-    seen = np.isfinite(size) & (size > 0.0)
-    largest = float(size[seen].max()) if seen.any() else 1.0
+    rows = impulse_rows(impacts, dynamic)
+    size = rows[:, 10]
+    largest = float(np.max(_sizes(impacts), initial=0.0)) or 1.0
+    if len(rows) > MOST_ROWS:
+        rows = rows[np.sort(np.argsort(-size, kind="stable")[:MOST_ROWS])]
+    rows[:, 10] = longest * np.maximum(np.sqrt(rows[:, 10] / largest), LEAST_LENGTH)
+    return rows.astype(np.float32)
+
+
+def impulse_rows(impacts: npt.NDArray[Any], dynamic: Sequence[bool]) -> npt.NDArray[np.float64]:
+    """Return all arrows (k, 11) sorted by time, with the size of their impulse [N s] in the place of a length; see `arrow_rows`."""
+    impulse, size = _impulses(impacts), _sizes(impacts)
     pushed = np.asarray(dynamic, dtype=bool)
-    parts, sizes = [], []
+    parts = []
     for sign, body in ((1.0, impacts["body_b"]), (-1.0, impacts["body_a"])):
-        chosen = np.flatnonzero(seen & pushed[body])
+        chosen = np.flatnonzero((size > 0.0) & pushed[body])
         rows = np.empty((len(chosen), ROW))
         rows[:, 0] = impacts["time"][chosen]
         rows[:, 1:4] = impacts["point"][chosen]
         rows[:, 4:7] = sign * impulse[chosen] / size[chosen, None]
         rows[:, 7:10] = impacts["normal"][chosen]
-        rows[:, 10] = longest * np.maximum(np.sqrt(size[chosen] / largest), LEAST_LENGTH)
+        rows[:, 10] = size[chosen]
         parts.append(rows)
-        sizes.append(size[chosen])
     rows = np.concatenate(parts)
-    if len(rows) > MOST_ROWS:
-        rows = rows[np.argsort(-np.concatenate(sizes), kind="stable")[:MOST_ROWS]]
-    return rows[np.argsort(rows[:, 0], kind="stable")].astype(np.float32)
+    return rows[np.argsort(rows[:, 0], kind="stable")]
+
+
+def _impulses(impacts: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Return the impulses (k, 3) on the second bodies, N s."""
+    along = np.asarray(impacts["impulse"], dtype=np.float64)[:, None] * impacts["normal"]
+    return (along + impacts["tangent_impulse"]).reshape(-1, 3)
+
+
+def _sizes(impacts: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Return the sizes (k,) of the impulses, N s; 0 where they are not finite."""
+    size = np.linalg.norm(_impulses(impacts), axis=1)
+    return np.where(np.isfinite(size), size, 0.0)
 
 
 def fade_time(duration: float) -> float:
