@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rigidimpulse.scene.scene import Scene
+if TYPE_CHECKING:
+    from rigidimpulse.scene.scene import Scene
 
 
 @dataclass(frozen=True)

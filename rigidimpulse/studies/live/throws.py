@@ -50,7 +50,7 @@ def _throw(run: Run, i: int, velocity: np.ndarray, time: float) -> None:
     state_at(trajectory, i, time, now.position[i], now.orientation[i], now.velocity[i], now.angular_velocity[i])
     before = mechanical_energy(now, world.constants, one)
     now.velocity[i] = velocity
-    run.log.account(time, "throw", mechanical_energy(now, world.constants, one) - before)
+    run.log.account(time, "let go", mechanical_energy(now, world.constants, one) - before)
     state.under_contact[i] = False
     trajectory.position[i], trajectory.orientation[i] = now.position[i], now.orientation[i]
     trajectory.velocity[i], trajectory.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]

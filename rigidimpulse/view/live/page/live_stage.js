@@ -1,7 +1,7 @@
 /* The stage of the live page: bodies of one run take the place of those of the run before, and the camera stays where people put it. */
 
 const DARK_SKY = {zenith: "#0d1520", horizon: "#34414f", nadir: "#1a222b"};
-const DARK_GROUND = "#56616c";
+const DARK_GROUND = "#3b444d";
 const TURN_TIME = 600; // ms in which the camera goes to another view
 const isDark = window.matchMedia("(prefers-color-scheme: dark)").matches;
 if (isDark) { Object.assign(SKY, DARK_SKY); }
@@ -76,9 +76,11 @@ class LiveStage extends Stage {
       this.radius = radius;
       this.build(this.bodies, this.geometries);
     }
+    const light = makeKeyLight(this.turn, this.recorded(this.centre), 1.35 * this.radius), parent = this.light.parent;
     this.light.shadow.map?.dispose();
-    this.light = makeKeyLight(this.turn, this.recorded(this.centre), 1.35 * this.radius);
-    this.viewer.set_object(["Lights", "key"], this.light);
+    parent.remove(this.light);
+    parent.add(light);
+    this.light = light;
     if (!this.touched) { this.goTo(); }
   }
 
