@@ -16,7 +16,7 @@ from rigidimpulse.studies.live.request import Request
 
 PATIENCE = 3.0
 """s until a worker that does not take a request is ended and another one is started."""
-LONG = ("preparing",)
+LONG = ("preparing", "compiling")
 """What a worker is not disturbed in: it compiles kernels, once for all runs to come."""
 OF_RUN = ("shape", "begin", "frames", "impacts", "framing")
 """Kinds of messages that are of one run; others say what the worker does."""

@@ -166,9 +166,10 @@ class Live:
             self.throws = (*earlier, Throw(body, float(time), velocity))
             self.run_again()
 
-    def forget_throws(self) -> None:
-        """Take all throws back and run again."""
+    def reset(self) -> None:
+        """Take back all that was chosen and thrown, and run the scene as it is written."""
         with self._lock:
+            self.values.clear()
             self.throws = ()
             self.run_again()
 
@@ -177,8 +178,7 @@ class Live:
         actions: dict[str, Callable[[], None]] = {
             "set": lambda: self.set(str(command["name"]), command["value"]),
             "throw": lambda: self.throw(command["body"], command["time"], _vector(command["velocity"])),
-            "forget throws": self.forget_throws,
-            "reset": self._reset,
+            "reset": self.reset,
         }
         action = actions.get(str(command.get("do")))
         try:
@@ -186,12 +186,6 @@ class Live:
                 action()
         except (KeyError, TypeError, ValueError):
             return  # not from our page
-
-    def _reset(self) -> None:
-        """Take back everything that was chosen."""
-        with self._lock:
-            self.values.clear()
-            self.run_again()
 
     def _receive(self, number: int, kind: str, message: dict[str, Any]) -> None:
         """Hand a message of the worker on to the pages."""

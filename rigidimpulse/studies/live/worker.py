@@ -24,8 +24,8 @@ from rigidimpulse.studies.live.problem import problem_of
 from rigidimpulse.studies.live.request import Request
 from rigidimpulse.view.live.messages import begin_messages, text_message
 
-MAKING, PREPARING, STEPPING, DONE, FAILED = "making", "preparing", "computing", "done", "failed"
-"""What the process does: it runs people's own code, compiles, steps; or how that ended."""
+MAKING, PREPARING, STEPPING, COMPILING, DONE, FAILED = "making", "preparing", "computing", "compiling", "done", "failed"
+"""What the process does: it runs people's own code, makes ready, steps, or compiles kernels meanwhile; or how that ended."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,8 @@ class Worker:
     def __init__(self, channel: Channel) -> None:
         """Of a channel to the process that shows the runs."""
         self._channel, self._inbox = channel, Inbox(channel)
-        self._has_begun = False
+        self._has_begun = self._listens = False
+        self._number, self._doing = 0, MAKING
 
     def serve(self) -> None:
         """Compute what is asked for, for ever."""
@@ -113,6 +114,7 @@ class Worker:
                 self._begin(number, messages)
                 messages = []
             self._tell(number, PREPARING)
+            self._listen_to_compilation()
             from rigidimpulse.engine.simulate import prepare
             from rigidimpulse.studies.live.throws import Throws
 
@@ -165,8 +167,23 @@ class Worker:
             traceback.print_exception(error)
         self._tell(number, FAILED, problem=problem)
 
+    def _listen_to_compilation(self) -> None:
+        """From the first run on, once: numba takes long to import."""
+        if not self._listens:
+            from rigidimpulse.core.compilation import watch_compilation
+
+            self._listens = True
+            watch_compilation(self._tell_compiling)
+
+    def _tell_compiling(self, begins: bool) -> None:
+        """Say that kernels are being compiled, or go on with what was said before."""
+        number, doing = self._number, self._doing
+        self._tell(number, COMPILING if begins else doing)
+        self._doing = doing
+
     def _tell(self, number: int, doing: str, **more: Any) -> None:
         """Say what the process does."""
+        self._number, self._doing = number, doing
         self._channel.send((number, doing, text_message("state", {"number": number, "doing": doing, **more})))
 
     def _send(self, number: int, message: dict[str, Any]) -> None:

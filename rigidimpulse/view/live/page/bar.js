@@ -9,17 +9,28 @@ class LiveTimeline extends Timeline {
     Object.assign(this, {bins: marks.length / 2, counts: marks.subarray(0, marks.length / 2), heights: marks.subarray(marks.length / 2), stale: true});
   }
 
-  drawComputed(head) {
-    const pen = this.context, to = this.x(head);
-    pen.fillStyle = getComputedStyle(document.body).getPropertyValue("--accent");
-    pen.globalAlpha = 0.55;
-    pen.fillRect(this.left, this.middle + 4, to - this.left, 2);
+  /* As on the recorded page, in the colours of this one, and with what is computed of the run as a second line below. */
+  draw(time, head) {
+    this.fitIfChanged();
+    const pen = this.pen(this.canvas), now = this.x(time), {middle, left, right} = this, style = getComputedStyle(document.body);
+    const ink = style.getPropertyValue("--ink");
+    this.copyLayer(pen, now, 0.45);
+    pen.lineCap = "round";
+    for (const [colour, strength, from, to, y, width] of [
+      [ink, 0.18, left, right, middle, 3], [ink, 1, left, now, middle, 3],
+      ...(head < this.times[this.times.length - 1] ? [[style.getPropertyValue("--accent"), 0.7, left, this.x(head), middle + 7, 2]] : []),
+    ]) {
+      Object.assign(pen, {strokeStyle: colour, globalAlpha: strength, lineWidth: width});
+      pen.beginPath();
+      pen.moveTo(from, y);
+      pen.lineTo(to, y);
+      pen.stroke();
+    }
     pen.globalAlpha = 1;
-  }
-
-  draw(time) {
-    super.draw(time);
-    this.context = this.canvas.getContext("2d");
+    pen.fillStyle = ink;
+    pen.beginPath();
+    pen.arc(now, middle, 6, 0, 2 * Math.PI);
+    pen.fill();
   }
 }
 
@@ -88,9 +99,6 @@ class Bar {
     element("scrubber").value = player.time;
     element("play").classList.toggle("playing", player.playing);
     element("clock").innerHTML = `${player.time.toFixed(2)} s<small>frame ${player.frame} / ${player.total - 1}</small>`;
-    if (this.timeline) {
-      this.timeline.draw(player.time);
-      if (!player.complete) { this.timeline.drawComputed(player.head); }
-    }
+    this.timeline?.draw(player.time, player.head);
   }
 }

@@ -2,17 +2,16 @@
 
 class Controls {
   constructor(send) {
-    Object.assign(this, {send, rows: new Map(), wanted: new Map(), changed: false});
+    Object.assign(this, {send, rows: new Map()});
     element("reset").addEventListener("click", (event) => {
       event.preventDefault(); // it stands in the summary, which would close the panel
-      this.wanted.clear();
       send({do: "reset"});
     });
     element("controls").open = window.innerWidth > 820;
   }
 
-  /* The controls of a run, with the values of the scene itself, and what was chosen (by name). */
-  show(controls, chosen) {
+  /* The controls of a run, with the values of the scene itself; what was chosen (by name), and how many throws there were. */
+  show(controls, chosen, throws) {
     const key = JSON.stringify(controls.map(({value, ...rest}) => rest));
     if (key !== this.key) {
       this.key = key;
@@ -26,8 +25,7 @@ class Controls {
         row.show(isChosen ? chosen[control.name] : control.value);
       }
     }
-    this.changed = Object.keys(chosen).length > 0;
-    element("reset").hidden = !this.changed;
+    element("reset").hidden = Object.keys(chosen).length + throws === 0;
     element("controls").hidden = false;
   }
 

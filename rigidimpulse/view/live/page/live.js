@@ -71,7 +71,8 @@ class LivePage {
     this.shapes = this.nextShapes;
     this.nextShapes = [];
     this.number = manifest.number;
-    if (!this.stage) {
+    this.isFirst = !this.stage;
+    if (this.isFirst) {
       this.stage = new LiveStage(this.viewer, manifest);
       this.thrower = new Thrower(this.stage, this.player, (command) => this.send(command));
       this.viewer.set_object(["impacts"], this.arrows.arrows.object);
@@ -84,7 +85,7 @@ class LivePage {
     this.player.begin(manifest);
     this.arrows.begin(manifest);
     this.bar.begin();
-    this.controls.show(manifest.controls, manifest.chosen);
+    this.controls.show(manifest.controls, manifest.chosen, manifest.throws);
     this.throws = manifest.throws;
     this.show();
   }
@@ -102,14 +103,14 @@ class LivePage {
 
   takeFraming({framing, ...sizes}) {
     this.arrows.resizeArrows(sizes);
-    this.stage.reframe(framing);
+    this.stage.reframe(framing, this.isFirst);
     this.nodes = this.stage.list;
     this.show();
   }
 
   takeState({doing, problem, seconds, warnings}) {
     const text = {
-      making: "reading the scene", preparing: "preparing: kernels are compiled the first time", computing: "computing",
+      making: "reading the scene", preparing: "preparing", compiling: "compiling kernels, once for this machine", computing: "computing",
       done: `computed in ${Number((seconds ?? 0).toPrecision(2))} s`, failed: "the last good run is shown"}[doing];
     if (doing === "failed") { this.showProblem(problem); } else if (doing === "computing") { element("problem").hidden = true; }
     this.warnings = warnings ?? [];

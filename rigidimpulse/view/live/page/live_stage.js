@@ -63,8 +63,8 @@ class LiveStage extends Stage {
     return ground;
   }
 
-  /* More of the motion is known: light and ground fit it; the camera goes there where nobody has moved it yet. */
-  reframe(framing) {
+  /* More of the motion is known: light and ground fit it; the camera goes there if it follows and nobody has moved it yet. */
+  reframe(framing, follows) {
     this.framing = framing;
     this.turn.fromArray(framing.stage);
     this.unturn.copy(this.turn).invert();
@@ -81,7 +81,7 @@ class LiveStage extends Stage {
     parent.remove(this.light);
     parent.add(light);
     this.light = light;
-    if (!this.touched) { this.goTo(); }
+    if (follows && !this.touched) { this.goTo(); }
   }
 
   /* Where the camera is: place and target. */
