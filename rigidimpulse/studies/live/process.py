@@ -18,7 +18,7 @@ PATIENCE = 3.0
 """s until a worker that does not take a request is ended and another one is started."""
 LONG = ("preparing", "compiling")
 """What a worker is not disturbed in: it compiles kernels, once for all runs to come."""
-OF_RUN = ("shape", "begin", "frames", "impacts", "framing")
+OF_RUN = ("shape", "begin", "softBody", "softFrames", "frames", "impacts", "framing")
 """Kinds of messages that are of one run; others say what the worker does."""
 END_TIMEOUT = 5.0
 """Longest wait, s, for a process that was ended."""

@@ -7,6 +7,7 @@ trajectories, as for a checkpoint; the recorder writes them again later, alike.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
@@ -17,7 +18,15 @@ from rigidimpulse.recording.events import impact_table
 from rigidimpulse.recording.recorder import sample_paths
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.frames import own_frames
-from rigidimpulse.view.live.messages import Motion, framing_message, frames_message, impacts_message, movers_of
+from rigidimpulse.view.live.messages import (
+    Motion,
+    frames_message,
+    framing_message,
+    impacts_message,
+    movers_of,
+    soft_body_message,
+    soft_frames_message,
+)
 
 PAUSE = 1.0 / 60.0
 """Least time between two lots of frames, s."""
@@ -39,6 +48,9 @@ class Tap:
         self._last, self._last_framing = -np.inf, perf_counter()
         self._positions = np.empty((len(run.recorder.times), len(run.world.names), 3))
         self._orientations = np.empty((len(run.recorder.times), len(run.world.names), 4))
+        num_coloured = len(self._movers)
+        for number, track in enumerate(run.soft_bodies.tracks()):
+            send(soft_body_message(track, number, num_coloured))
 
     def look(self, time: float) -> None:
         """Send what is new at the time of the run [s], if it is time to."""
@@ -72,6 +84,8 @@ class Tap:
             return
         position, orientation = own_frames(recorder.position[first:last], recorder.orientation[first:last], world.offset, world.turn)
         self._positions[first:last], self._orientations[first:last] = position, orientation
+        for number, track in enumerate(self._run.soft_bodies.tracks()):
+            self._send(soft_frames_message(number, first, track.vertices[first:last]))
         self._send(frames_message(first, position[:, self._movers], orientation[:, self._movers]))
         self._frames = last
 
@@ -87,4 +101,5 @@ class Tap:
     def _motion(self, frames: int) -> Motion:
         """The motion until now."""
         world, times = self._run.world, self._run.recorder.times
-        return Motion(world.scene, times[:frames], self._positions[:frames], self._orientations[:frames])
+        tracks = [replace(track, vertices=track.vertices[:frames]) for track in self._run.soft_bodies.tracks()]
+        return Motion(world.scene, times[:frames], self._positions[:frames], self._orientations[:frames], tracks)

@@ -6,6 +6,8 @@ All hang on the node /live. Text is JSON, numbers are a Float32Array:
     begin      manifest of a run: number, frames, bodies, framing, controls; its shapes came before it
     frames     first frame, then for each frame and each body that can move its position (3) and its quaternion x y z w
     impacts    first arrow, then the arrows, see `arrows.impulse_rows`
+    softBody   number, faces and surface of a flexible body
+    softFrames number, first frame, then the vertices (3 each) of each frame
     framing    where the camera looks from, now that more of the motion is known
     state      what the computation does, how far it is, and what is wrong
 """
@@ -23,9 +25,11 @@ from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import normalized_quaternion
 from rigidimpulse.view.arrows import LEAST_LENGTH, fade_time, impulse_rows, longest_arrow
 from rigidimpulse.view.camera import Framing
-from rigidimpulse.view.contents import page_scene
+from rigidimpulse.view.contents import SOFT_BODY_COLOUR, page_scene
 from rigidimpulse.view.display import DisplayMesh
+from rigidimpulse.view.materials import soft_body_surface
 from rigidimpulse.view.protocol import RecordingLike, SoftBodyLike
+from rigidimpulse.view.soft_bodies import is_closed
 from rigidimpulse.view.tracks import pack_float32, quaternion_keys
 
 NODE = "live"
@@ -156,6 +160,19 @@ def impacts_message(first: int, impacts: np.ndarray, dynamic: Sequence[bool]) ->
 def text_message(name: str, value: Any) -> dict[str, Any]:
     """Return a message of which the page gets JSON."""
     return _message(name, json.dumps(value, ensure_ascii=False, allow_nan=False))
+
+
+def soft_body_message(track: SoftBodyLike, number: int, num_coloured: int) -> dict[str, Any]:
+    """Return the message with the faces of a flexible body; num_coloured: how many bodies have a colour of the palette before them."""
+    closed = is_closed(track.faces)
+    surface = soft_body_surface(num_coloured + SOFT_BODY_COLOUR + number, closed)
+    entry = {"number": number, "faces": track.faces.ravel().tolist(), "vertices": track.vertices.shape[1], "surface": surface, "thin": not closed}
+    return text_message("softBody", entry)
+
+
+def soft_frames_message(number: int, first: int, vertices: np.ndarray) -> dict[str, Any]:
+    """Return the message with the vertices (f, v, 3) m of a flexible body from frame `first` on."""
+    return number_message("softFrames", number, np.concatenate([[first], vertices.ravel()]))
 
 
 def number_message(name: str, first: int, values: np.ndarray) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from rigidimpulse.view.server import HOST
 
 SCRIPTS = ("player.js", "arrows_growing.js", "bar.js", "controls.js", "live_stage.js", "throw.js", "live.js")
 """Files of this folder's `page/`."""
-SHARED_SCRIPTS = ("look.js", "stage.js", "arrows.js", "plot.js", "timeline.js")
+SHARED_SCRIPTS = ("look.js", "stage.js", "arrows.js", "plot.js", "timeline.js", "soft_bodies.js")
 """Those of the recorded page that the live page uses, too."""
 START_TIMEOUT = 10.0
 """Longest wait, s, for the server to begin."""

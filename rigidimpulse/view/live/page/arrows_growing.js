@@ -8,7 +8,7 @@ class GrowingArrows {
   }
 
   begin({longestArrow, shortestArrow, fade}) {
-    Object.assign(this, {longest: longestArrow, shortest: shortestArrow, rows: new Float32Array(64 * ROW), sizes: new Float32Array(64)});
+    Object.assign(this, {longest: longestArrow, shortest: shortestArrow, rows: new Float32Array(64 * ROW), sizes: new Float32Array(64), largest: 0});
     this.arrows.fade = fade;
     this.resize(0);
   }
@@ -29,22 +29,25 @@ class GrowingArrows {
   add(first, rows) {
     this.resize(first + rows.length / ROW);
     this.rows.set(rows, first * ROW);
-    for (let i = first; i < this.count; i++) { this.sizes[i] = this.rows[i * ROW + 10]; }
-    this.measure();
+    let largest = first > 0 ? this.largest : 0;
+    for (let i = first; i < this.count; i++) {
+      this.sizes[i] = this.rows[i * ROW + 10];
+      largest = Math.max(largest, this.sizes[i]);
+    }
+    const from = largest > this.largest || first === 0 ? 0 : first; // all of them, where there is a larger one than before
+    this.largest = largest;
+    this.measure(from);
   }
 
-  measure() {
-    let largest = 0;
-    for (let i = 0; i < this.count; i++) { largest = Math.max(largest, this.sizes[i]); }
-    for (let i = 0; i < this.count; i++) {
-      this.rows[i * ROW + 10] = Math.max(this.longest * Math.sqrt(this.sizes[i] / largest), this.shortest);
+  measure(from) {
+    for (let i = from; i < this.count; i++) {
+      this.rows[i * ROW + 10] = Math.max(this.longest * Math.sqrt(this.sizes[i] / this.largest), this.shortest);
     }
-    this.largest = largest;
   }
 
   resizeArrows({longestArrow, shortestArrow}) {
     Object.assign(this, {longest: longestArrow, shortest: shortestArrow});
-    this.measure();
+    this.measure(0);
   }
 
   /* Time of the next impact after a time, or of the last one before it; undefined if there is none. */

@@ -8,6 +8,23 @@ class Controls {
       send({do: "reset"});
     });
     element("controls").open = window.innerWidth > 820;
+    this.asked = new URLSearchParams(location.search); // values in the address of the page, which are chosen once
+  }
+
+  /* Chooses the values that the address of the page names; it follows what is chosen from then on. */
+  followAddress(controls, chosen) {
+    for (const control of controls) {
+      const text = this.asked?.get(control.name);
+      if (text === null || text === undefined) { continue; }
+      const value = control.kind === "range" ? Number(text) : control.kind === "switch" ? text === "true" : text;
+      if (control.kind === "range" ? text !== "" && Number.isFinite(value) : control.kind === "switch" || control.choices.includes(value)) {
+        this.send({do: "set", name: control.name, value});
+        chosen = {...chosen, [control.name]: value};
+      }
+    }
+    this.asked = null;
+    const query = new URLSearchParams(Object.entries(chosen)).toString();
+    history.replaceState(null, "", location.pathname + (query ? `?${query}` : ""));
   }
 
   /* The controls of a run, with the values of the scene itself; what was chosen (by name), and how many throws there were. */
@@ -27,6 +44,7 @@ class Controls {
     }
     element("reset").hidden = Object.keys(chosen).length + throws === 0;
     element("controls").hidden = false;
+    this.followAddress(controls, chosen);
   }
 
   makeRow(control, first) {

@@ -1,14 +1,15 @@
 /* Puts the live page together: meshcat's viewer, which is told of runs while they are computed, and the socket for what people do. */
 
+const MARKS_PAUSE = 200; // ms between two drawings of all impacts on the time line, while more of them come
 const RETRY = 1000; // ms until the page asks for a server that is gone again
 
 class LivePage {
   constructor() {
     this.viewer = new MeshCat.Viewer(element("meshcat-pane"));
     this.viewer.gui.domElement.style.display = "none";
-    Object.assign(this, {stage: null, thrower: null, shapes: [], nextShapes: [], pictures: 0, number: 0, doing: "starting", throws: 0});
+    Object.assign(this, {stage: null, thrower: null, shapes: [], nextShapes: [], softBodies: [], pictures: 0, lots: 0, marked: 0, number: 0, doing: "starting", throws: 0});
     this.arrows = new GrowingArrows();
-    this.player = new Player(this.viewer.animator, () => this.show());
+    this.player = new Player(this.viewer.animator, () => this.show(), () => this.refresh());
     this.bar = new Bar(this.player, this.arrows);
     this.bar.keys.f = () => {
       if (this.stage) { this.stage.touched = false; this.stage.goTo(); }
@@ -27,6 +28,8 @@ class LivePage {
       frames: (numbers) => this.takeFrames(numbers[0], numbers.subarray(1)),
       impacts: (numbers) => this.takeImpacts(numbers[0], numbers.subarray(1)),
       framing: (text) => this.takeFraming(JSON.parse(text)),
+      softBody: (text) => this.takeSoftBody(JSON.parse(text)),
+      softFrames: (numbers) => this.softBodies[numbers[0]].frames.set(numbers.subarray(2), numbers[1] * this.softBodies[numbers[0]].row),
       state: (text) => this.takeState(JSON.parse(text)),
     };
     this.viewer.set_property = (path, name, value) => {
@@ -79,6 +82,11 @@ class LivePage {
       this.bodies = manifest.bodies;
       this.player.lastTick = performance.now();
     }
+    this.softBodies.forEach(({geometry, mesh}) => {
+      geometry.dispose();
+      mesh.material.dispose();
+    });
+    this.softBodies = [];
     this.stage.build(manifest.bodies, this.shapes);
     this.thrower.dynamic = new Set(manifest.dynamic);
     this.nodes = this.stage.list;
@@ -90,20 +98,36 @@ class LivePage {
     this.show();
   }
 
+  /* A flexible body as on the recorded page, with room for the frames that are to come. */
+  takeSoftBody({number, faces, vertices, surface, thin}) {
+    const geometry = new THREE.BufferGeometry(), row = 3 * vertices, material = makeSurface(surface);
+    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(row), 3));
+    geometry.setIndex(faces);
+    Object.assign(material, {side: THREE.DoubleSide, polygonOffset: thin, polygonOffsetUnits: -DRAPE});
+    const body = Object.assign(Object.create(SoftBody.prototype), {geometry, row, times: this.player.times, frames: new Float32Array(row * this.player.total)});
+    body.mesh = Object.assign(new THREE.Mesh(geometry, material), {castShadow: true, receiveShadow: true, frustumCulled: false});
+    this.softBodies[number] = body;
+    this.addSoftBodies();
+  }
+
+  /* Once more after the stage was built again. */
+  addSoftBodies() { this.softBodies.forEach((body) => motionSource.place(this.viewer, "bodies", "", body.mesh)); }
+
   takeFrames(first, poses) {
     this.player.add(first, poses);
-    this.show();
+    this.lots += 1;
+    this.stale = true;
   }
 
   takeImpacts(first, rows) {
     this.arrows.add(first, rows);
-    this.bar.setMarks();
-    this.show();
+    this.stale = this.unmarked = true;
   }
 
   takeFraming({framing, ...sizes}) {
     this.arrows.resizeArrows(sizes);
     this.stage.reframe(framing, this.isFirst);
+    this.addSoftBodies();
     this.nodes = this.stage.list;
     this.show();
   }
@@ -114,6 +138,7 @@ class LivePage {
       done: `computed in ${Number((seconds ?? 0).toPrecision(2))} s`, failed: "the last good run is shown"}[doing];
     if (doing === "failed") { this.showProblem(problem); } else if (doing === "computing") { element("problem").hidden = true; }
     this.warnings = warnings ?? [];
+    this.stale = true;
     this.say(doing, this.warnings.length > 0 ? `${text} \u00b7 ${this.warnings.length === 1 ? "a warning" : `${this.warnings.length} warnings`}` : text);
     element("state").title = this.warnings.join("\n");
   }
@@ -135,10 +160,23 @@ class LivePage {
     box.hidden = false;
   }
 
+  /* Before a picture: what has come since the last one. */
+  refresh() {
+    const now = performance.now();
+    if (this.unmarked && (now > this.marked + MARKS_PAUSE || this.doing === "done")) {
+      this.unmarked = false;
+      this.marked = now;
+      this.bar.setMarks();
+    }
+    if (this.stale) { this.show(); }
+  }
+
   show() {
+    this.stale = false;
     if (this.nodes) {
       this.player.pose(this.nodes);
       this.arrows.arrows.show(this.player.time);
+      this.softBodies.forEach((body) => body.show(this.player.frame, this.player.time));
     }
     this.bar.update();
     this.viewer.set_dirty();

@@ -4,10 +4,14 @@
 const POSE = 7; // numbers of a pose: position, quaternion x y z w
 
 class Player {
-  constructor(animator, onTime) {
-    Object.assign(this, {animator, onTime, wanted: 0, playing: true, loop: true, speed: 1, lastTick: 0});
+  /* onTime: when the time has changed; onPicture: before every picture. */
+  constructor(animator, onTime, onPicture) {
+    Object.assign(this, {animator, onTime, onPicture, wanted: 0, playing: true, loop: true, speed: 1, lastTick: 0});
     this.begin({frames: 1, duration: 0, movers: []});
-    animator.update = () => this.tick();
+    animator.update = () => {
+      this.tick();
+      this.onPicture();
+    };
   }
 
   /* Another run begins; the time stays, and so does whether it plays. */
