@@ -83,7 +83,8 @@ def declared_controls(function: Callable[..., Scene]) -> list[Control]:
 def _arguments(function: Callable[..., Scene]) -> dict[str, inspect.Parameter]:
     """Arguments of a function that have a default and can be given by name."""
     named = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
-    return {name: each for name, each in inspect.signature(function).parameters.items() if each.kind in named and each.default is not each.empty}
+    known = inspect.signature(function).parameters
+    return {name: each for name, each in known.items() if each.kind in named and each.default is not each.empty}
 
 
 def _declared(name: str, default: Any, hint: Any) -> Control | None:
@@ -107,7 +108,8 @@ def _range(name: str, default: float, whole: bool, stated: tuple[Any, ...] | Non
         least = 10.0 if whole else 1.0 if default == 0.0 else 0.0
         low, high = min(2.0 * default, 0.0), max(2.0 * default, least)
         stated = (-high if default == 0.0 and not whole else low, high)
-    if not (len(stated) in (2, 3) and all(isinstance(part, int | float) and math.isfinite(part) for part in stated) and stated[0] < stated[1]):
+    numbers = all(isinstance(part, int | float) and math.isfinite(part) for part in stated)
+    if not (numbers and len(stated) in (2, 3) and stated[0] < stated[1]):
         raise SceneError(f"argument {name!r} of scene() has the range {stated!r}", "write Annotated[float, (lowest, highest)]")
     step = stated[2] if len(stated) == 3 else 1 if whole else 10.0 ** math.floor(math.log10((stated[1] - stated[0]) / STEPS))
     return stated[0], stated[1], step
@@ -118,9 +120,11 @@ def own_controls(scene: Scene, job: Job) -> list[Control]:
     materials = [body.material for body in scene.bodies if body.becomes_dynamic]
     gravity = float(np.linalg.norm(np.asarray(scene.gravity, float)))
     accuracy = job.accuracy if isinstance(job.accuracy, str) else None
+    restitution = _common([material.restitution for material in materials], 0.0)
+    friction = _common([material.frictions()[1] for material in materials], DEFAULT_FRICTION)
     return [
-        Control("restitution", "restitution e", "range", _common([material.restitution for material in materials], 0.0)),
-        Control("friction", "friction \u03bc", "range", _common([material.frictions()[1] for material in materials], DEFAULT_FRICTION), 0.0, MOST_FRICTION),
+        Control("restitution", "restitution e", "range", restitution),
+        Control("friction", "friction \u03bc", "range", friction, 0.0, MOST_FRICTION),
         Control("mass", "mass", "range", 1.0, 1.0 / MASS_FACTOR, MASS_FACTOR, logarithmic=True, unit="\u00d7"),
         Control("gravity", "gravity", "range", gravity, 0.0, max(MOST_GRAVITY, 2.0 * gravity), unit="m/s\u00b2"),
         Control("accuracy", "accuracy", "choice", accuracy, choices=tuple(PRESETS)),

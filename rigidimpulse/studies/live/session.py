@@ -95,7 +95,7 @@ class Live:
             raise
         finally:
             self._served.set()
-        self.url = self._server.url
+        self.url: str = self._server.url
         atexit.register(self.close)
         self._watcher = threading.Thread(target=self._watch, name="rigidimpulse-watch", daemon=True)
         self._watcher.start()
@@ -160,7 +160,7 @@ class Live:
             self.run_again()
 
     def throw(self, body: str, time: float, velocity: tuple[float, float, float]) -> None:
-        """Give a body another velocity [m/s] at a time [s]; the run is the same until then. Throws that were to come later are taken back."""
+        """Give a body another velocity [m/s] at a time [s]; the run is the same until then. Later throws are taken back."""
         with self._lock:
             earlier = tuple(throw for throw in self.throws if throw.time < time)
             self.throws = (*earlier, Throw(body, float(time), velocity))

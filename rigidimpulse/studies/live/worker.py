@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from time import perf_counter
 from typing import Any
 
+from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.frame_times import frame_times
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.job import DEFAULT_DURATION, DEFAULT_FPS, Job, find_job
@@ -118,6 +119,7 @@ class Worker:
             from rigidimpulse.engine.simulate import prepare
             from rigidimpulse.studies.live.throws import Throws
 
+            assert isinstance(job.accuracy, str | Accuracy)
             run = prepare(scene, times, job.accuracy)
             if request.throws:
                 run.keyframes = Throws(run, request.throws)

@@ -130,7 +130,8 @@ def _entry(
 
 def _shape_message(number: int, mesh: DisplayMesh) -> dict[str, Any]:
     """Return the message with the geometry of a shape."""
-    return number_message("shape", number, np.concatenate([[len(mesh.vertices)], *map(np.ravel, (mesh.vertices, mesh.normals, mesh.faces))]))
+    parts = map(np.ravel, (mesh.vertices, mesh.normals, mesh.faces))
+    return number_message("shape", number, np.concatenate([[len(mesh.vertices)], *parts]))
 
 
 def _arrow_sizes(framing: Framing) -> dict[str, float]:
@@ -166,8 +167,8 @@ def soft_body_message(track: SoftBodyLike, number: int, num_coloured: int) -> di
     """Return the message with the faces of a flexible body; num_coloured: how many bodies have a colour of the palette before them."""
     closed = is_closed(track.faces)
     surface = soft_body_surface(num_coloured + SOFT_BODY_COLOUR + number, closed)
-    entry = {"number": number, "faces": track.faces.ravel().tolist(), "vertices": track.vertices.shape[1], "surface": surface, "thin": not closed}
-    return text_message("softBody", entry)
+    entry = {"number": number, "faces": track.faces.ravel().tolist(), "vertices": track.vertices.shape[1]}
+    return text_message("softBody", entry | {"surface": surface, "thin": not closed})
 
 
 def soft_frames_message(number: int, first: int, vertices: np.ndarray) -> dict[str, Any]:

@@ -63,7 +63,7 @@ class LiveServer:
             self._failure = error
             self._begun.set()
             return
-        self.url, self.zmq_url = self._bridge.web_url, self._bridge.zmq_url
+        self.url, self.zmq_url = str(self._bridge.web_url), str(self._bridge.zmq_url)
         self._loop.call_soon(self._begun.set)
         self._loop.run_forever()
         self._bridge.close()
@@ -143,7 +143,8 @@ class Bridge(ZMQWebSocketBridge):
         """Free the ports."""
         for websocket in list(self.websocket_pool):
             websocket.close()
-        self.app.server.stop()
+        if isinstance(self.app, LocalApplication):
+            self.app.server.stop()
         self.zmq_stream.close()
 
 

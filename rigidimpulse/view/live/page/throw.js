@@ -7,11 +7,9 @@ class Thrower {
   constructor(stage, player, send) {
     Object.assign(this, {stage, player, send, dynamic: new Set(), held: null, ray: new THREE.Raycaster()});
     this.canvas = stage.viewer.renderer.domElement;
-    this.arrow = new THREE.ArrowHelper(new THREE.Vector3(1, 0, 0), new THREE.Vector3(), 1, 0xff4a1c);
-    this.arrow.visible = false;
-    for (const part of [this.arrow.line, this.arrow.cone]) { Object.assign(part.material, {depthTest: false, toneMapped: false, transparent: true}); }
-    this.arrow.renderOrder = 3;
-    stage.viewer.set_object(["throw"], this.arrow);
+    this.arrow = new ImpactArrows(new Float32Array(ROW), 1); // one of those of impacts, at the time 0
+    this.arrow.object.visible = false;
+    stage.viewer.set_object(["throw"], this.arrow.object);
     // Before the camera's own controls hear of it.
     const pane = this.canvas.parentElement;
     pane.addEventListener("pointerdown", (event) => this.press(event), true);
@@ -55,10 +53,10 @@ class Thrower {
     if (!held.moved || !this.ray.ray.intersectPlane(held.plane, to)) { return; }
     const way = this.stage.recorded(to.sub(held.point)), length = way.length();
     held.velocity.copy(way).divideScalar(THROW_TIME);
-    this.arrow.position.copy(this.stage.recorded(held.point));
-    this.arrow.setDirection(way.normalize());
-    this.arrow.setLength(length, 0.25 * length, 0.1 * length);
-    this.arrow.visible = true;
+    way.normalize();
+    this.arrow.rows.set([0, ...this.stage.recorded(held.point).toArray(), ...way.toArray(), ...way.toArray(), length]);
+    this.arrow.show(0);
+    this.arrow.object.visible = true;
     const label = element("throw");
     label.hidden = false;
     label.textContent = `${held.body}  ${Number(held.velocity.length().toPrecision(3))}\u2009m/s`;
@@ -81,7 +79,7 @@ class Thrower {
 
   drop() {
     this.held = null;
-    this.arrow.visible = false;
+    this.arrow.object.visible = false;
     element("throw").hidden = true;
     this.stage.viewer.controls.enabled = true;
     this.stage.viewer.set_dirty();
