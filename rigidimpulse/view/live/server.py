@@ -129,15 +129,12 @@ class Bridge(ZMQWebSocketBridge):
         super().send_scene(websocket)
         for messages in list(self._kept.values()):
             for message in messages:
-                websocket.write_message(message, binary=True)
+                _write(websocket, message)
 
     def broadcast(self, data: bytes) -> None:
         """Send a message to all pages."""
         for websocket in list(self.websocket_pool):
-            try:
-                websocket.write_message(data, binary=True)
-            except tornado.websocket.WebSocketClosedError:
-                self.websocket_pool.discard(websocket)
+            _write(websocket, data)
 
     def close(self) -> None:
         """Free the ports."""
@@ -208,6 +205,15 @@ class CommandSocket(tornado.websocket.WebSocketHandler):
             return
         if isinstance(command, dict):
             self._on_command(command)
+
+
+def _write(websocket: tornado.websocket.WebSocketHandler, data: bytes) -> None:
+    """Send a message to a page; one that has just been closed misses nothing."""
+    try:
+        sent = asyncio.ensure_future(websocket.write_message(data, binary=True))
+    except tornado.websocket.WebSocketClosedError:
+        return
+    sent.add_done_callback(lambda done: done.cancelled() or done.exception())  # asked for, so that asyncio does not report it
 
 
 def _page(title: str) -> str:
