@@ -49,6 +49,7 @@ def _throw(run: Run, i: int, velocity: np.ndarray, time: float) -> None:
     run.recorder.flush(trajectory, i, time, NO_CORRECTION)
     state_at(trajectory, i, time, now.position[i], now.orientation[i], now.velocity[i], now.angular_velocity[i])
     before = mechanical_energy(now, world.constants, one)
+    run.impulses.add_at("throw", -1, i, time, world.mass[i] * (velocity - now.velocity[i]))
     now.velocity[i] = velocity
     run.log.account(time, "let go", mechanical_energy(now, world.constants, one) - before)
     state.under_contact[i] = False

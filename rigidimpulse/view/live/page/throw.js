@@ -27,6 +27,7 @@ class Thrower {
 
   /* The dynamic body under the pointer, and where on it. */
   pick(event) {
+    this.stage.viewer.scene.updateMatrixWorld(); // there may have been no picture since bodies and camera moved
     this.aim(event);
     const nameOf = new Map([...this.stage.meshOf].map(([name, mesh]) => [mesh, name]));
     const hit = this.ray.intersectObjects([...nameOf.keys()], false)[0];
