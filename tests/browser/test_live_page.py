@@ -215,8 +215,8 @@ def test_a_scene_that_never_comes_back_is_given_up_when_it_is_mended(page: Opene
 
 
 def test_a_body_is_thrown(page: Opened) -> None:
-    page.do("r.player.pause(), r.player.seek(0.5)")
-    page.page.wait_for_timeout(900)
+    page.do("r.player.pause(), r.page.bar.keys.f(), r.player.seek(0.3)")  # above the bar
+    page.page.wait_for_function("() => window.rigidimpulse.page.stage.way === null", timeout=TIMEOUT)  # the camera has come to rest
     frame, before = page.do("r.player.frame"), heights(page)
     x, y = page.do("r.onScreen('ball')")
     mouse = page.page.mouse

@@ -169,6 +169,7 @@ class LivePage {
       this.bar.setMarks();
     }
     if (this.stale) { this.show(); }
+    this.stage?.goOn();
   }
 
   show() {

@@ -35,7 +35,6 @@ class LiveStage extends Stage {
     });
     const render = viewer.render.bind(viewer);
     viewer.render = () => {
-      this.goOn();
       this.prepare();
       render();
     };
@@ -94,6 +93,7 @@ class LiveStage extends Stage {
     this.goOn();
   }
 
+  /* Before every picture: one that is drawn does not ask for the next one. */
   goOn() {
     if (!this.way) { return; }
     const share = Math.min((performance.now() - this.way.begin) / TURN_TIME, 1), eased = share * share * (3 - 2 * share);
