@@ -20,6 +20,7 @@ from rigidimpulse.cli.jobs import (
     show,
     size_of,
 )
+from rigidimpulse.cli.live import live
 from rigidimpulse.cli.site import gallery as gallery_pages
 from rigidimpulse.cli.studies import compare, hardcases, study
 from rigidimpulse.cli.wedge import wedge
@@ -210,5 +211,5 @@ def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str
         show(run, head)
 
 
-for command in (hardcases, study, compare, wedge, gallery_pages):
+for command in (hardcases, study, compare, wedge, live, gallery_pages):
     main.add_command(command)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Mapping
 from contextlib import closing
@@ -22,6 +21,7 @@ from rigidimpulse.engine.run import Run
 from rigidimpulse.recording.profile import Stopwatch
 from rigidimpulse.recording.recording import Recording, RunSettings
 from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.frame_times import frame_times
 from rigidimpulse.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -109,20 +109,6 @@ def complete(run: Run, duration: float, progress: Callable[[float], None] | None
     """Step a run to its end at `duration` [s]; hand back what was recorded."""
     run_to_end(run, duration, progress)
     return finish_run(run, duration)
-
-
-def frame_times(duration: float, fps: float) -> np.ndarray:
-    """Times of round(duration * fps) + 1 frames [s].
-
-    Raises:
-        SceneError: duration or fps is not a positive finite number.
-
-    """
-    if not (math.isfinite(duration) and duration >= 0.0):
-        raise SceneError(f"duration = {duration!r}", "give a finite time in seconds, >= 0")
-    if not (math.isfinite(fps) and fps > 0.0):
-        raise SceneError(f"fps = {fps!r}", "give a positive number of frames per second")
-    return np.arange(round(duration * fps) + 1) / fps
 
 
 def chosen_out(scene: Scene, accuracy: str | Accuracy, effects: Mapping[str, bool] | None) -> dict[str, str]:

@@ -20,11 +20,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.engine.simulate import frame_times, simulate
+from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.frame_times import frame_times
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.deviation import agree_until, deviation
 from rigidimpulse.studies.measures import Truth, mechanical_energy, truth_of

@@ -27,9 +27,9 @@ from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.files import write_renamed
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.fingerprint import fingerprint
-from rigidimpulse.engine.simulate import frame_times
 from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.model.world import World
+from rigidimpulse.scene.frame_times import frame_times
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.job import Job
 from rigidimpulse.studies.measured_runs import MeasuredRuns, TimeUp, peer_setting

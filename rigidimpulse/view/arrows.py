@@ -19,6 +19,8 @@ MOST_ROWS = 20_000
 """Arrows kept, the largest first: a page of a long stacking run would otherwise be mostly arrows."""
 LEAST_LENGTH = 0.06
 """Shortest arrow, as a share of the longest."""
+NO_CARD = np.zeros(0, np.int64)
+"""No impact has a card."""
 FADE = 0.4
 """How long an arrow is seen, s, unless the whole run is short."""
 FADE_SHARE = 0.15
@@ -37,42 +39,52 @@ def arrow_rows(
         with_card: rows of the impacts that have a card, in its order.
 
     """
-    impulse, size = _impulses(impacts)
-    seen, scale = np.isfinite(size) & (size > 0.0), arrow_scale(impacts, longest)
+    rows = impulse_rows(impacts, dynamic, with_card)
+    if len(rows) > MOST_ROWS:
+        rows = rows[np.sort(np.argsort(-rows[:, 10], kind="stable")[:MOST_ROWS])]
+    rows[:, 10] = np.maximum(arrow_scale(impacts, longest) * rows[:, 10], LEAST_LENGTH * longest)
+    return rows.astype(np.float32)
+
+
+def impulse_rows(
+    impacts: npt.NDArray[Any], dynamic: Sequence[bool], with_card: npt.NDArray[np.int64] = NO_CARD
+) -> npt.NDArray[np.float64]:
+    """Return all arrows (k, 12) sorted by time, with the size of their impulse [N s] in the place of a length; see `arrow_rows`."""
+    impulse, size = _impulses(impacts), _sizes(impacts)
     card = np.full(len(impacts), -1)
     card[with_card] = np.arange(len(with_card))
     pushed = np.asarray(dynamic, dtype=bool)
-    parts, sizes = [], []
+    parts = []
     for sign, body in ((1.0, impacts["body_b"]), (-1.0, impacts["body_a"])):
-        chosen = np.flatnonzero(seen & pushed[body])
+        chosen = np.flatnonzero((size > 0.0) & pushed[body])
         rows = np.empty((len(chosen), ROW))
         rows[:, 0] = impacts["time"][chosen]
         rows[:, 1:4] = impacts["point"][chosen]
         rows[:, 4:7] = sign * impulse[chosen] / size[chosen, None]
         rows[:, 7:10] = impacts["normal"][chosen]
-        rows[:, 10] = np.maximum(scale * size[chosen], LEAST_LENGTH * longest)
+        rows[:, 10] = size[chosen]
         rows[:, 11] = card[chosen]
         parts.append(rows)
-        sizes.append(size[chosen])
     rows = np.concatenate(parts)
-    if len(rows) > MOST_ROWS:
-        rows = rows[np.argsort(-np.concatenate(sizes), kind="stable")[:MOST_ROWS]]
-    return rows[np.argsort(rows[:, 0], kind="stable")].astype(np.float32)
+    return rows[np.argsort(rows[:, 0], kind="stable")]
 
 
 def arrow_scale(impacts: npt.NDArray[Any], longest: float) -> float:
     """Return the length of an arrow of 1 N s, m, where that of the largest impulse is `longest`; 0 where there is no impulse."""
-    _, size = _impulses(impacts)
-    seen = size[np.isfinite(size)]
-    largest = float(seen.max(initial=0.0))
+    largest = float(_sizes(impacts).max(initial=0.0))
     return longest / largest if largest > 0.0 else 0.0
 
 
-def _impulses(impacts: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Impulses on b (k, 3) and their sizes (k,), N s."""
-    normal = np.asarray(impacts["impulse"], dtype=np.float64)[:, None] * impacts["normal"]
-    impulse = (normal + impacts["tangent_impulse"]).reshape(-1, 3)
-    return impulse, np.linalg.norm(impulse, axis=1)
+def _impulses(impacts: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Return the impulses (k, 3) on the second bodies, N s."""
+    along = np.asarray(impacts["impulse"], dtype=np.float64)[:, None] * impacts["normal"]
+    return (along + impacts["tangent_impulse"]).reshape(-1, 3)
+
+
+def _sizes(impacts: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Return the sizes (k,) of the impulses, N s; 0 where they are not finite."""
+    size = np.linalg.norm(_impulses(impacts), axis=1)
+    return np.where(np.isfinite(size), size, 0.0)
 
 
 def fade_time(duration: float) -> float:

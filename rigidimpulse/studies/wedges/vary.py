@@ -130,14 +130,14 @@ def with_parameter(scene: Scene, name: str, value: Any) -> Scene:
     if name == "seed":
         return with_seed(scene, value)
     if name.split(".")[0] == "gravity":
-        return _copy(scene, {}, _part(scene.gravity, name.split(".")[1:], value, name))
+        return copy_with(scene, {}, _part(scene.gravity, name.split(".")[1:], value, name))
     changed: dict[int, Any] = {}
     for start, path in _splits(name):
         for thing in (*scene.bodies, *scene.effects):
             if _is_meant(thing, start, path) and _has(thing, path[0]):
                 changed[id(thing)] = _part(thing, path, value, name)
         if changed:
-            return _copy(scene, changed, scene.gravity)
+            return copy_with(scene, changed, scene.gravity)
     names = [body.name for body in scene.bodies] + [effect.name for effect in scene.effects if getattr(effect, "name", None)]
     raise UnknownParameter(
         f"nothing to vary is called {name!r}",
@@ -176,7 +176,7 @@ def _part(thing: Any, path: list[str], value: Any, name: str) -> Any:
     raise UnknownParameter(f"{name}: there is no {path[0]!r}", "name a field of the body, of its material, or x, y, z of a vector")
 
 
-def _copy(scene: Scene, changed: Mapping[int, Any], gravity: Any) -> Scene:
+def copy_with(scene: Scene, changed: Mapping[int, Any], gravity: Any) -> Scene:
     """The scene with other things in the place of some, by their identity."""
     made = Scene(gravity)
     made.origin = scene.origin
@@ -207,7 +207,7 @@ def with_seed(scene: Scene, seed: int) -> Scene:
             velocity = np.asarray(body.velocity, float)
             speed = np.sqrt(strength * _size(body)) if strength > 0.0 else float(np.linalg.norm(velocity))
             changed[id(body)] = dataclasses.replace(body, velocity=tuple((velocity + NUDGE * speed * nudge).tolist()))
-    return _copy(scene, changed, scene.gravity)
+    return copy_with(scene, changed, scene.gravity)
 
 
 def _size(body: Body) -> float:
