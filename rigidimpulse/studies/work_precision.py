@@ -138,7 +138,7 @@ def study(
 
     """
     start = perf_counter()
-    topic = _topic(scene, duration, fps)
+    topic = topic_of(scene, duration, fps)
     chosen = _settings(settings)
     tell = progress or (lambda what, share: None)
     world = compile_scene(topic.scene)
@@ -183,7 +183,7 @@ def _settings(settings: Sequence[Setting] | str) -> Sequence[Setting]:
     return grid(full=settings == "full")
 
 
-def _topic(scene: Scene | str | Job, duration: float | None, fps: float | None) -> _Topic:
+def topic_of(scene: Scene | str | Job, duration: float | None, fps: float | None) -> _Topic:
     """Find the scene; its duration and fps are those of the gallery scene where they are not given."""
     entry, name = None, "scene"
     if isinstance(scene, str):
@@ -192,6 +192,7 @@ def _topic(scene: Scene | str | Job, duration: float | None, fps: float | None) 
         entry = gallery.load(scene)
         name, scene = entry.name, entry.scene()
     elif isinstance(scene, Job):
+        duration, fps = duration if duration is not None else scene.duration, fps if fps is not None else scene.fps
         entry, name, scene = scene.entry, scene.name, scene.make()
     elif not isinstance(scene, Scene):
         raise SceneError(f"scene is a {type(scene).__name__}", "give a Scene, or the name of one in the gallery")
