@@ -60,6 +60,7 @@ _HOMES = {
     "compare": "studies.compare",
     "compile_scene": "engine.compile_scene",
     "contains": "collision.containment",
+    "glance": "studies.glance.glance",
     "load_recording": "recording.recording",
     "load_scene": "io.scene_file",
     "settle": "engine.settle",

@@ -129,7 +129,7 @@ def study(
         settings: those to run, or the name of a grid of all strategies: "small", or "full", which has more members a family.
         budget: s that the study may take, the reference included; settings that do not fit any more are named in `Study.left`.
         peers: other engines to run beside it, of `peers.PEERS`; they need `pip install 'rigidimpulse[peers]'`.
-        output: folder for `study.csv` and, where the extra `study` is installed, the charts `study.png` and `study.html`; a study found
+        output: folder for `study.csv` and, where the extra `study` is installed, the charts `study.png` and `settings.html`; a study found
             there is gone on with.
         progress: called with what is being run, and the share of the budget that is spent.
 
@@ -160,7 +160,7 @@ def study(
         from rigidimpulse.studies.charts import write_html, write_png
 
         write_renamed(folder / "study.png", partial(write_png, out))
-        write_renamed(folder / "study.html", partial(write_html, out))
+        write_renamed(folder / "settings.html", partial(write_html, out))
     return out
 
 

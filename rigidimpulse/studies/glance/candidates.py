@@ -6,6 +6,7 @@ step that takes as long as the standard run. The same two are run of every other
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from importlib.util import find_spec
 
@@ -13,6 +14,8 @@ from rigidimpulse.scene.accuracy import PRESETS, Accuracy
 from rigidimpulse.studies.peers import PEERS
 
 PRESET, FIXED, PENALTY, PEER = "preset", "fixed", "penalty", "engine"
+TITLES = {"mujoco": "MuJoCo", "pybullet": "Bullet"}
+"""Names of other engines for people."""
 FIXED_RATE = 60
 """Steps a second of the coarse fixed step."""
 MOST_RATE = 30_720
@@ -61,7 +64,7 @@ def penalty() -> Candidate:
 
 def other_engine(engine: str, rate: int) -> Candidate:
     """Another engine with steps of 1/rate s."""
-    return Candidate(f"{engine} 1/{rate}", PEER, f"another engine, step 1/{rate} s", None, engine, rate)
+    return Candidate(f"{TITLES.get(engine, engine)} 1/{rate}", PEER, f"another engine, step 1/{rate} s", None, engine, rate)
 
 
 def installed_engines() -> list[str]:
@@ -70,5 +73,10 @@ def installed_engines() -> list[str]:
 
 
 def same_cost_rate(seconds: float, coarse_seconds: float, coarse_rate: int) -> int:
-    """Steps a second with which fixed steps take `seconds`, if they take `coarse_seconds` at the coarse rate; coarser never."""
-    return int(min(max(coarse_rate * seconds / max(coarse_seconds, 1e-6), coarse_rate), MOST_RATE))
+    """Steps a second with which fixed steps take `seconds`, or a little less, if they take `coarse_seconds` at the coarse rate.
+
+    It is a round multiple of the coarse rate, 1 at least.
+    """
+    times = min(max(seconds / max(coarse_seconds, 1e-6), 1.0), MOST_RATE / coarse_rate)
+    power = 10.0 ** math.floor(math.log10(times))
+    return coarse_rate * round(math.floor(times / power) * power)

@@ -4,8 +4,8 @@
     bound      largest error(t) + uncertainty of the reference: the run is not further from the truth (triangle inequality)
     left       first frame at which a body is further off than LEFT of its size + uncertainty: anybody would see it
 
-Where the reference tells too little there is no truth to be off: motion in a heap is chaotic, rounding decides it after a few impacts. There
-the measure is depth, the deepest that two bodies are inside each other.
+Where the reference tells too little there is no truth to be off: motion in a heap is chaotic, round-off decides it after a few impacts.
+There the measure is depth, the deepest that two bodies are inside each other.
 """
 
 from __future__ import annotations

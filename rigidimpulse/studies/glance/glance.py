@@ -8,26 +8,25 @@ fixed steps, other engines and penalty forces. After every run `changed` is call
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from pathlib import Path
 from time import perf_counter
 
-import numpy as np
-
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.engine.compile_scene import compile_scene
-from rigidimpulse.engine.simulate import frame_times, simulate
-from rigidimpulse.gallery.record import GalleryScene
-from rigidimpulse.model.world import World
+from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.glance import candidates
 from rigidimpulse.studies.glance.candidates import Candidate
-from rigidimpulse.studies.glance.figures import DEPTH, PLACE, Figures, depth_figures, is_heap, measure_of, place_figures
+from rigidimpulse.studies.glance.figures import is_heap
+from rigidimpulse.studies.glance.known import Glance
+from rigidimpulse.studies.glance.page import write_page
 from rigidimpulse.studies.glance.played import GivenUp, Played, Player, watch
-from rigidimpulse.studies.glance.verdict import Evidence, Verdict, make_verdict
 from rigidimpulse.studies.job import Job
-from rigidimpulse.studies.reference import Reference, exact_reference, perturbed, reference_of
+from rigidimpulse.studies.reference import exact_reference, perturbed, reference_of
 from rigidimpulse.studies.settings import TIGHT
 from rigidimpulse.studies.work_precision import topic_of
 
@@ -37,90 +36,12 @@ SENTENCE = 11.0
 """s from the start of a study after which the reference of its first pass is not made finer."""
 PILOT = 1.2
 """s of computing that a preview may take, or the first pass has the beginning only."""
-PATIENCE = 6.0
+PATIENCE = 3.0
 """How many times longer than the standard run another one may take, or this many s, until it is given up."""
 REFERENCE_SHARE = 0.8
 """Of the budget, until which the reference is made finer."""
 FINER_STEPS = (480, 960, 1920)
 """Steps a second of the runs that the reference is made of, besides exact."""
-
-
-@dataclass(eq=False)
-class Glance:
-    """What is known of a study until now.
-
-    Attributes:
-        name: of the scene. scene: what was run. world: compiled.
-        duration: s, of the motion that was run. asked: s, of the motion that was asked for. fps: frames per second.
-        entry: its record in the gallery, or None.
-        runs: in the order they were made. waiting: names of runs still to come. reference: None until it is made.
-        truth: the run that shows the reference; None if that has a closed form, or is still to come.
-        spent: s since the start. finished: whether nothing more will come.
-
-    """
-
-    name: str
-    scene: Scene
-    world: World
-    duration: float
-    asked: float
-    fps: float
-    entry: GalleryScene | None = None
-    runs: list[Played] = field(default_factory=list)
-    waiting: list[str] = field(default_factory=list)
-    reference: Reference | None = None
-    spent: float = 0.0
-    finished: bool = False
-    truth: Recording | None = None
-    _figures: dict[str, Figures] = field(default_factory=dict)
-
-    def take_reference(self, reference: Reference, run: Recording) -> None:
-        """Compare with a reference from now on, whose motion is that of a run."""
-        self.reference, self.truth = reference, run
-        self._figures.clear()
-
-    @property
-    def measure(self) -> str:
-        """What errors are: of places, or depths."""
-        if self.reference is None:
-            return PLACE
-        heap = any(is_heap(played.recording) for played in self.runs if played.recording is not None)
-        return measure_of(self.reference, heap, self.duration)
-
-    @property
-    def times(self) -> np.ndarray:
-        """(f,) s, of the frames."""
-        return frame_times(self.duration, self.fps)
-
-    @property
-    def until(self) -> float:
-        """Time until which the measure holds, s: the reference's horizon, or the end where depth is measured."""
-        if self.measure == DEPTH or self.reference is None:
-            return float(self.times[-1])
-        return float(min(self.reference.until, self.times[-1]))
-
-    def figures(self, played: Played) -> Figures | None:
-        """How wrong a run is; None without a motion or a reference."""
-        if played.recording is None or self.reference is None:
-            return None
-        key = f"{self.measure} {played.candidate.name}"
-        if key not in self._figures:
-            place = self.measure == PLACE
-            self._figures[key] = (
-                place_figures(self.world, played.recording, self.reference) if place else depth_figures(self.world, played.recording)
-            )
-        return self._figures[key]
-
-    @property
-    def verdict(self) -> Verdict | None:
-        """The sentence; None before it can be said."""
-        reference = self.reference
-        if reference is None:
-            return None
-        pairs = [(played, figures) for played in self.runs if (figures := self.figures(played)) is not None]
-        until = self.until if self.measure == PLACE else reference.until
-        size = float(self.world.size[self.world.dynamic].min(initial=np.inf))
-        return make_verdict(Evidence(pairs, self.measure, until, self.duration, self.times, reference.uncertainty, size))
 
 
 def glance(
@@ -130,6 +51,7 @@ def glance(
     *,
     budget: float = BUDGET,
     peers: Sequence[str] | None = None,
+    output: str | os.PathLike[str] | None = None,
     changed: Callable[[Glance], None] | None = None,
 ) -> Glance:
     """Say what accuracy costs in a scene: run a few telling settings and compare them with a reference.
@@ -139,7 +61,8 @@ def glance(
         duration: s; fps: frames per second; by default those of the gallery scene, else 4 s at 60.
         budget: s that all may take; a first sentence comes within about 15 s.
         peers: other engines to run beside it, of `peers.PEERS`; by default those that are installed.
-        changed: called with what is known after every run.
+        output: folder for the page `study.html`, which is there at once and follows the study while it is open.
+        changed: called with what is known, first before any run, then after each, and at the end.
 
     Raises:
         SceneError: the scene cannot be simulated, or nothing in it moves freely.
@@ -147,10 +70,19 @@ def glance(
     """
     start = perf_counter()
     topic = topic_of(scene, duration, fps)
+    if not any(body.motion == "dynamic" for body in topic.scene.bodies):
+        raise SceneError("nothing in the scene moves freely, so there is no error to measure", "add a body with motion='dynamic'")
     engines = candidates.installed_engines() if peers is None else list(peers)
     world = compile_scene(topic.scene)
+
+    def tell(known: Glance) -> None:
+        if output is not None:
+            write_page(known, Path(output))
+        if changed is not None:
+            changed(known)
+
+    tell(Glance(topic.name, topic.scene, world, topic.duration, topic.duration, topic.fps, topic.entry))
     first = _first_duration(topic.scene, topic.duration, topic.fps)
-    tell = changed or (lambda known: None)
     known = Glance(topic.name, topic.scene, world, first, topic.duration, topic.fps, topic.entry)
     study = _Pass(known, start, start + budget, tell)
     study.go(engines, min(SENTENCE, budget))
@@ -203,8 +135,7 @@ class _Pass:
             played = self.play(candidate)
             rate = self._same_cost(played)
             if rate is not None:
-                make = candidates.fixed_step if not candidate.engine else lambda steps: candidates.other_engine(candidate.engine, steps)
-                self.play(make(rate))
+                self.play(candidates.other_engine(candidate.engine, rate) if candidate.engine else candidates.fixed_step(rate))
         self.play(later[-1])
         self.make_reference(REFERENCE_SHARE * (self.deadline - self.start))
 
@@ -272,5 +203,4 @@ class _Pass:
         if coarse.recording is None:
             return None
         rate = candidates.same_cost_rate(self._seconds("standard"), coarse.seconds, coarse.candidate.rate)
-        rate = round(self.known.fps) * max(1, round(rate / self.known.fps)) if coarse.candidate.engine else rate
         return rate if rate >= 1.5 * coarse.candidate.rate else None

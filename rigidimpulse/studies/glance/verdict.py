@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.studies.glance import words
-from rigidimpulse.studies.glance.candidates import FIXED, PEER, PRESET
+from rigidimpulse.studies.glance.candidates import FIXED, PEER, PRESET, TITLES
 from rigidimpulse.studies.glance.figures import DEPTH, DEPTH_FRAMES, Figures
 from rigidimpulse.studies.glance.played import Played
 
@@ -141,7 +141,8 @@ def _rivals(evidence: Evidence, spent: float) -> list[tuple[Played, Figures]]:
 def _beside(evidence: Evidence, other: tuple[Played, Figures], standard: tuple[Played, Figures]) -> tuple[str, Claim]:
     """A sentence about a rival, and what it claims."""
     played, figures = other
-    who = "A fixed step of" if played.candidate.kind == FIXED else f"{played.candidate.engine} with steps of"
+    engine = played.candidate.engine
+    who = f"{TITLES.get(engine, engine)} with steps of" if engine else "A fixed step of"
     who = f"{who} 1/{played.candidate.rate} s"
     spent = words.cost(played.seconds, standard[0].seconds)
     spent = "at the same cost" if spent == "the same time" else f"in {spent}"
