@@ -21,7 +21,8 @@ def tumbling() -> ri.Scene:
     scene = ri.Scene()
     bouncing = ri.Material(restitution=0.5, static_friction=0.3, dynamic_friction=0.3)
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=bouncing))
-    scene.add(ri.Body("box", ri.Shape.box((0.4, 0.3, 0.2)), position=(0, 0, 0.8), angular_velocity=(3, 1, 2), velocity=(1, 0, 0), material=bouncing))
+    moving = {"position": (0, 0, 0.8), "velocity": (1, 0, 0), "angular_velocity": (3, 1, 2)}
+    scene.add(ri.Body("box", ri.Shape.box((0.4, 0.3, 0.2)), material=bouncing, **moving))
     return scene
 
 

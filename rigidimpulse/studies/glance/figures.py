@@ -4,7 +4,7 @@
     bound      largest error(t) + uncertainty of the reference: the run is not further from the truth (triangle inequality)
     left       first frame at which a body is further off than LEFT of its size + uncertainty: anybody would see it
 
-Where the reference tells too little there is no truth to be off: motion in a heap is chaotic, round-off decides it after a few impacts.
+Where the reference tells too little there is no truth to be off: motion in a pile is chaotic, round-off decides it after a few impacts.
 There the measure is depth, the deepest that two bodies are inside each other.
 """
 
@@ -46,12 +46,12 @@ class Figures:
     left: float
 
 
-def measure_of(reference: Reference, heap: bool, duration: float) -> str:
-    """Whether runs are measured by places or by depth; heap: whether bodies are in sub-stepped islands."""
-    return DEPTH if heap or reference.truth is None or reference.until < LEAST_TOLD * duration else PLACE
+def measure_of(reference: Reference, pile: bool, duration: float) -> str:
+    """Whether runs are measured by places or by depth; pile: whether bodies are in sub-stepped islands."""
+    return DEPTH if pile or reference.truth is None or reference.until < LEAST_TOLD * duration else PLACE
 
 
-def is_heap(run: Recording) -> bool:
+def is_pile(run: Recording) -> bool:
     """Whether bodies of a run were in sub-stepped islands."""
     return run.ledger is not None and "sub-stepping" in run.ledger.dissipated
 

@@ -15,13 +15,14 @@ from time import perf_counter
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.engine.compile_scene import compile_scene
+from rigidimpulse.engine.forecast import remember
 from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.glance import candidates
 from rigidimpulse.studies.glance.candidates import Candidate
-from rigidimpulse.studies.glance.figures import is_heap
+from rigidimpulse.studies.glance.figures import is_pile
 from rigidimpulse.studies.glance.known import Glance
 from rigidimpulse.studies.glance.page import write_page
 from rigidimpulse.studies.glance.played import GivenUp, Played, Player, watch
@@ -36,8 +37,8 @@ SENTENCE = 11.0
 """s from the start of a study after which the reference of its first pass is not made finer."""
 PILOT = 1.2
 """s of computing that a preview may take, or the first pass has the beginning only."""
-PATIENCE = 3.0
-"""How many times longer than the standard run another one may take, or this many s, until it is given up."""
+PATIENCE = 5.0
+"""How many times longer than the standard run another one may take, or this many s, before it is given up."""
 REFERENCE_SHARE = 0.8
 """Of the budget, until which the reference is made finer."""
 FINER_STEPS = (480, 960, 1920)
@@ -91,9 +92,17 @@ def glance(
         known = Glance(topic.name, topic.scene, world, topic.duration, topic.duration, topic.fps, topic.entry)
         whole = _Pass(known, start, start + budget, lambda now: tell(now) if now.verdict is not None else None)
         whole.go(engines, spent + 0.6 * (budget - spent))
+    _remember_cost(known)
     known.finished, known.waiting, known.spent = True, [], perf_counter() - start
     tell(known)
     return known
+
+
+def _remember_cost(known: Glance) -> None:
+    """Keep what the standard run took, for the forecasts of `explain`."""
+    standard = next(played for played in known.runs if played.candidate.name == "standard")
+    if standard.recording is not None and standard.recording.plan is not None:
+        remember(known.world, standard.recording.plan, known.duration, standard.seconds)
 
 
 def _first_duration(scene: Scene, duration: float, fps: float) -> float:
@@ -163,8 +172,8 @@ class _Pass:
             known.reference = exact_reference(known.entry, known.world, known.times)
             return
         coarse = [played.recording for played in known.runs if played.recording is not None and played.candidate.kind == candidates.PRESET]
-        if any(map(is_heap, coarse)):
-            self._heap_reference()
+        if any(map(is_pile, coarse)):
+            self._pile_reference()
             return
         before, spent = len(self.fine), self._seconds("exact")
         for rate in FINER_STEPS[before:]:
@@ -178,8 +187,8 @@ class _Pass:
             note = "compared with the two runs before it and one started off by round-off"
             self._compare_fine([*coarse, *self.fine][-3:], note)
 
-    def _heap_reference(self) -> None:
-        """The standard run, until round-off has changed it: of a heap nothing more can be told."""
+    def _pile_reference(self) -> None:
+        """The standard run, until round-off has changed it: of a pile nothing more can be told."""
         standard = next(played.recording for played in self.known.runs if played.candidate.name == "standard")
         if self.known.reference is None and standard is not None:
             self._compare_fine([standard], "compared with one started off by round-off")

@@ -11,7 +11,7 @@ from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.scene import Scene
-from rigidimpulse.studies.glance.figures import DEPTH, PLACE, Figures, depth_figures, is_heap, measure_of, place_figures
+from rigidimpulse.studies.glance.figures import DEPTH, PLACE, Figures, depth_figures, is_pile, measure_of, place_figures
 from rigidimpulse.studies.glance.played import Played
 from rigidimpulse.studies.glance.verdict import Evidence, Verdict, make_verdict
 from rigidimpulse.studies.reference import Reference
@@ -56,8 +56,8 @@ class Glance:
         """What errors are: of places, or depths."""
         if self.reference is None:
             return PLACE
-        heap = any(is_heap(played.recording) for played in self.runs if played.recording is not None)
-        return measure_of(self.reference, heap, self.duration)
+        pile = any(is_pile(played.recording) for played in self.runs if played.recording is not None)
+        return measure_of(self.reference, pile, self.duration)
 
     @property
     def times(self) -> np.ndarray:

@@ -54,7 +54,7 @@ def write_page(known: Glance, folder: Path) -> Path:
     if known.finished:
         (folder / SIDECAR).unlink(missing_ok=True)
     else:
-        text = f'window.rigidimpulseStudy({told},"{packed}");'
+        text = f'rigidimpulseStudy({told},"{packed}");'
         write_renamed(folder / SIDECAR, lambda target: target.write_text(text, encoding="utf-8"))
     return path
 

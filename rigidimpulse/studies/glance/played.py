@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from time import perf_counter
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.kernels import KERNELS
+from rigidimpulse.core.providers import load_function
 from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.scene import Scene
@@ -75,7 +75,7 @@ class Player:
     def _run_engine(self, candidate: Candidate, limit: float) -> tuple[float, Recording]:
         """Time of the steps of another engine alone, s, and the motion: how its model is built is not counted, in its favour."""
         try:
-            import_module(f"rigidimpulse.studies.peers.{candidate.engine}_peer")
+            load_function(f"rigidimpulse.studies.peers.{candidate.engine}_peer:make")
         except ImportError as error:
             raise SceneError(f"{candidate.engine} is not installed ({error})", "pip install 'rigidimpulse[peers]'") from None
         steps = max(1, round(candidate.rate / self.fps))

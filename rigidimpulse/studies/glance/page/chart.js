@@ -1,8 +1,9 @@
 /* Error against seconds, both logarithmic: down and left is better. Every point is labelled, and a button. */
 
-const HEIGHT = 300, LEFT = 62, RIGHT = 26, TOP = 22, BOTTOM = 34;
+const HEIGHT = 280, LEFT = 62, RIGHT = 26, TOP = 22, BOTTOM = 34;
 const LETTER = 7.2; // px, of a label
 const LINE = 16; // px
+const BELOW = 0.12; // of the height, free below the lowest point
 const FACTOR = 1.35; // times by which the axes go beyond the points
 const SAME = 1.6; // ratio below which two times count as the same
 const TELLING = 20; // ratio of errors from which the arrow between two runs of the same cost is drawn
@@ -63,6 +64,7 @@ class Chart {
     };
     this.x = pad(Math.min(...times), Math.max(...times), 1.2);
     this.y = pad(Math.min(...errors), Math.max(...errors), 2);
+    this.y[0] -= BELOW * (this.y[1] - this.y[0]);
   }
 
   across(seconds) { return LEFT + ((Math.log10(seconds) - this.x[0]) / (this.x[1] - this.x[0])) * (this.width - LEFT - RIGHT); }
@@ -79,8 +81,10 @@ class Chart {
     if (!depth && this.down(this.floor) < bottom) {
       const top = this.down(this.floor);
       this.svg.append(makeSvg("rect", {class: "below", x: LEFT, y: top, width: right - LEFT, height: bottom - top}));
-      this.svg.append(makeSvg("text", {x: right - 6, y: bottom - 6, "text-anchor": "end"},
-        `finer than the reference can tell, ${lengthText(this.floor)}`));
+      if (bottom - top > 24) {
+        this.svg.append(makeSvg("text", {x: right - 6, y: bottom - 6, "text-anchor": "end"},
+          `finer than the reference can tell, ${lengthText(this.floor)}`));
+      }
     }
     for (const power of decades(this.y, 6)) {
       const y = this.down(10 ** power);

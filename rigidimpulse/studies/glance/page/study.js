@@ -191,7 +191,7 @@ function stageBar(run, whole) {
   const entries = Object.entries(run.stages).filter(([, spent]) => spent > 0.005 * whole).sort((a, b) => b[1] - a[1]);
   for (const [stage, spent] of entries) {
     const part = make("i"), line = make("span"), key = make("span", "key", STAGE_WORDS[stage]);
-    part.style.cssText = `background: ${STAGES[stage]}; flex: ${spent}`;
+    part.style.cssText = `background: ${STAGES[stage]}; flex: ${(100 * spent) / whole}`;
     key.style.setProperty("--own", STAGES[stage]);
     key.style.display = "inline";
     line.append(key, make("b", "", `${Math.round((100 * spent) / whole)} %`));
