@@ -219,8 +219,8 @@ def pile_section(pile: Path) -> str:
     )
     return "\n".join([
         "## A pile\n", message + "\n",
-        "Boxes fall into a pit and are [sub-stepped](../theory/sub_stepping.md). Where they land has no truth: motion in a pile is chaotic. "
-        "So the measure is depth.\n",
+        "Boxes fall into a pit and are [sub-stepped](../theory/sub_stepping.md). Where they land has no truth: motion in a pile is "
+        "chaotic. So the measure is depth.\n",
         "![Depth against time of a pile](pile_costs.png)\n",
         origin(pile),
         table(

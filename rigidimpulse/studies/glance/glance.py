@@ -166,7 +166,7 @@ class _Pass:
         self.tell(self.known)
 
     def make_reference(self, until: float) -> None:
-        """The closed form, or the finest run that there is time for until so many s after the start; see `reference_of`."""
+        """The closed form, or the finest run that there is time for until `until`, s after the start; see `reference_of`."""
         known = self.known
         if known.entry is not None and known.entry.exact is not None:
             known.reference = exact_reference(known.entry, known.world, known.times)
