@@ -18,6 +18,7 @@ from rigidimpulse.studies.glance.figures import DEPTH, PLACE
 from rigidimpulse.studies.glance.known import Glance
 from rigidimpulse.studies.glance.page import contents
 
+WOOD = ri.Material(density=600.0, restitution=0.0)
 UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
 
 
@@ -110,9 +111,13 @@ def test_what_is_known_is_told_before_the_end() -> None:
 
 
 def test_a_pile_is_measured_by_depth() -> None:
-    from rigidimpulse.gallery.pile import pile
-
-    known = ri.glance(pile(24, 4), 1.0, budget=6.0, peers=())
+    """Boxes that fall on each other at once: even a beginning of the motion is that of a pile."""
+    random = np.random.default_rng(1)
+    scene = ri.Scene(bodies=[ri.Body("floor", ri.Shape.half_space(), motion="static")])
+    for k in range(64):
+        place = (0.52 * (k % 4), 0.52 * (k // 4 % 4), 0.251 + 0.503 * (k // 16))
+        scene.add(ri.Body(f"box {k}", ri.Shape.box(0.5), position=place, velocity=random.normal(0.0, 0.5, 3), material=WOOD))
+    known = ri.glance(scene, 0.3, budget=6.0, peers=())
     verdict = known.verdict
     assert known.measure == DEPTH and verdict is not None
     assert "inside another" in verdict.headline and "chaotic" in verdict.trust
