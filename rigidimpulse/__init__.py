@@ -61,6 +61,7 @@ _HOMES = {
     "compile_scene": "engine.compile_scene",
     "contains": "collision.containment",
     "live": "studies.live.session",
+    "glance": "studies.glance.glance",
     "load_recording": "recording.recording",
     "load_scene": "io.scene_file",
     "settle": "engine.settle",

@@ -23,7 +23,7 @@ from fit_tosses import GOALS
 
 from rigidimpulse.gallery.hard import FAMILIES
 from rigidimpulse.gallery.record import figure
-from rigidimpulse.studies.peers import PEERS
+from rigidimpulse.studies.glance import words
 from rigidimpulse.studies.reference import Reference
 from rigidimpulse.studies.row import Row
 from rigidimpulse.studies.work_precision import Study
@@ -38,6 +38,13 @@ README_CHECKS = (
     ("rolling", "steel: error of the way"), ("planets", "comet: way from its start"),
 )  # fmt: skip
 """Scene and the beginning of the check that the README shows."""
+PLAYER = """<details><summary>Play the runs (1 MB)</summary>
+<iframe src="../_static/study_spot.html" loading="lazy" title="spot: what accuracy costs" width="100%" height="860"
+ style="border: 0; border-radius: 14px"></iframe>
+</details>
+<p><a href="../_static/study_spot.html">Open it in a page of its own</a></p>
+"""
+"""The playable page, which is loaded when it is asked for; `measure_accuracy_costs.py` makes it."""
 
 
 def read(path: Path) -> list[dict[str, str]]:
@@ -176,61 +183,89 @@ def small(value: float) -> str:
 
 
 def what_accuracy_costs() -> str:
-    """Studies of ten scenes and of a pile."""
+    """Studies of ten scenes and of a pile: a sentence and a chart each, tables below for those who want them."""
     studies = {name: study_of(name) for name in TOPICS}
-    lines = []
-    for name, study in studies.items():
-        cells = []
-        for family in METHODS.values():
-            rows = [row for row in study.rows if row.family == family and row.ran and not math.isnan(row.whole.position)]
-            best = min(rows, key=lambda row: row.whole.position, default=None)
-            cells.append("-" if best is None else f"{small(best.whole.position)} in {small(best.cost)}")
-        lines.append((f"`{name}`", *cells))
     pile = KEPT / "pile_1000.csv"
     parts = [
-        "Errors are the largest of any body at any frame. Costs are processor seconds of the loop (of the steps, in "
-        "other engines). How to study your\n"
-        "own scene is in the [guide](../guide/studies.md). What to choose is in the guide, too: [accuracy](../guide/accuracy.md).\n",
+        "Each scene has one message and one chart. The message says how far the `standard` run is from the truth at most, "
+        "what it costs, and what other methods\n"
+        "are worth at about the same cost. Down and left is better on a chart. "
+        "For your own scene, `rigidimpulse study SCENE` says its sentence within seconds:\n"
+        "see the [guide](../guide/studies.md). What to choose is in the guide, too: [accuracy](../guide/accuracy.md).\n",
+        "## See it move\n\nA cow falls on a ring. Each picture is the same fall, computed in another way, with its seconds, "
+        "and its error counts up as it plays. Click a point of\n"
+        "the chart to play that run.\n",
+        PLAYER,
+        "## Where the numbers come from\n\nErrors are the largest of any body at any frame. "
+        "Costs are processor seconds of the loop (of the steps, in other engines).\n",
         origin(KEPT / "spot.csv"),
-        "## Side by side\n\nThe least error of the place that a method reached, m, and what that cost, s.\n",
-        table(("scene", *METHODS), lines),
-        "## A pile\n\nBoxes fall into a pit and are [sub-stepped](../theory/sub_stepping.md). There is no reference "
-        "for where they land. The table shows how deep\n"
-        "they are inside each other on the way. Two settings matter: `substep_motion` and `step`. Time is that of "
-        "the loop for 1/60 s of motion.\n",
-        origin(pile),
-        table(
-            ("engine or step", "setting", "mean, ms", "median, ms", "deepest overlap, mm", "at the end, mm"),
-            [(row["family"], row["setting"], row["mean"], row["median"], row["depth"], row["last_depth"]) for row in read(pile)],
-        ),
-        "![Depth against time of a pile](pile_costs.png)\n",
         *(section(name, study) for name, study in studies.items()),
+        pile_section(pile),
     ]
     return page("What accuracy costs", *parts)
 
 
+def pile_section(pile: Path) -> str:
+    """What is said of a pile, whose measure is depth."""
+    rows = read(pile)
+    standard = next(row for row in rows if row["setting"] == "standard")
+    others = [row for row in rows if row["family"] not in ("step 1/60", "step 1/30", "step 1/20")]
+    told = ", ".join(
+        f"{row['family']}, {row['setting']}: {words.length(float(row['depth']) / 1e3)} in {number(row['mean'])} ms" for row in others
+    )
+    message = (
+        f"Standard lets no box be deeper inside another than {words.length(float(standard['depth']) / 1e3)}, and takes "
+        f"{number(standard['mean'])} ms for 1/60 s of motion. Other engines: {told}."
+    )
+    return "\n".join([
+        "## A pile\n", message + "\n",
+        "Boxes fall into a pit and are [sub-stepped](../theory/sub_stepping.md). Where they land has no truth: motion in a pile is "
+        "chaotic. So the measure is depth.\n",
+        "![Depth against time of a pile](pile_costs.png)\n",
+        origin(pile),
+        table(
+            ("engine or step", "setting", "mean, ms", "median, ms", "deepest overlap, mm", "at the end, mm"),
+            [(row["family"], row["setting"], row["mean"], row["median"], row["depth"], row["last_depth"]) for row in rows],
+        ),
+    ])  # fmt: skip
+
+
+def message_of(study: Study) -> str:
+    """What a study showed, in sentences; lengths are bounds, as in the sentence of `rigidimpulse study`."""
+    rows = {row.name: row for row in study.rows if row.ran and not math.isnan(row.whole.position)}
+    standard, least = rows["standard"], study.reference.uncertainty
+    bound = standard.whole.position + least
+    measured = study.reference.kind == "measured"
+    truth = "recorded motion" if measured else "truth"
+    until, cost = words.motion_time(study.duration), words.seconds(standard.cost)
+    text = f"Standard stays within {words.length(bound)} of the {truth} for {until} and takes {cost}."
+    for title, family in METHODS.items():
+        rivals = [row for row in rows.values() if row.family == family and row.same_as != "standard"]
+        if family == "bisection, step" or not rivals:
+            continue
+        rival = min(rivals, key=lambda row: abs(math.log(max(row.cost, 1e-6) / max(standard.cost, 1e-6))))
+        off, cost = rival.whole.position - least, words.cost(max(rival.cost, 1e-6), max(standard.cost, 1e-6))
+        cost = "at the same cost" if cost == "the same time" else f"in {cost}"
+        if off > 2.0 * bound:
+            text += f" {title[0].upper()}{title[1:]} {cost}: {words.length(off, up=False)} off."
+    return text
+
+
 def section(name: str, study: Study) -> str:
-    """What is said of one scene."""
+    """What is said of one scene: a message, its chart, and the numbers of the best settings, folded."""
     rows = [row for row in study.rows if row.family == "presets"] + [row for row in study.front() if row.family != "presets"]
     least, cells = study.reference.uncertainty, []
     for row in rows:
         whole = row.whole
         place = small(whole.position) if whole.position >= least else f"< {small(least)}"
         cells.append((row.name, small(row.cost), place, *(small(value) for value in (whole.energy, whole.impact_time, whole.penetration))))
-    parts = [f"## `{name}`\n", TOPICS[name].words + "\n", f"Reference: {study.reference.kind}.\n"]
-    parts.append(table(("setting", "cost, s", "place, m", "energy", "impact times, s", "overlap, m"), cells))
-    found = study.advantage()
-    for peer in PEERS:
-        ratios = [ratio for row, _, ratio in found if row.family == peer]
-        faster = sum(row.family == peer and row.ran for row in study.rows) - len(ratios)
-        if ratios:
-            between = f"{small(min(ratios))} to {small(max(ratios))}"
-            parts.append(f"At equal time the error of {peer} is {between} times as large, over its steps.\n")
-        if faster:
-            parts.append(f"{peer} is faster than any run here with {faster} of its steps.\n")
-    if study.left:
-        parts.append(f"The budget had no time for {len(study.left)} settings.\n")
-    return "\n".join([*parts, f"![{name}](accuracy_costs/{name}.png)\n"])
+    numbers = table(("setting", "cost, s", "place, m", "energy", "impact times, s", "overlap, m"), cells)
+    parts = [
+        f"## `{name}`\n", message_of(study) + "\n", TOPICS[name].words + f" Reference: {study.reference.kind}.\n",
+        f"![{name}](accuracy_costs/{name}.png)\n",
+        f"<details><summary>The presets and the best settings</summary>\n\n{numbers}\n</details>\n",
+    ]  # fmt: skip
+    return "\n".join(parts)
 
 
 def speed() -> str:

@@ -167,17 +167,24 @@ def view(file: str, scene: str | None) -> None:
 @click.option("--duration", type=float, help="Also simulate for this time [s], to see each effect's share of the work.")
 @click.option("--accuracy", help="preview, standard or exact.")
 def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
-    """Say which effects SCENE calls for, which not, and why."""
+    """Say which effects SCENE calls for, which not, and why; and what a run of it will cost."""
     from rigidimpulse.engine.begin import make_plan
     from rigidimpulse.engine.compile_scene import compile_scene
+    from rigidimpulse.engine.forecast import forecast, remember
+    from rigidimpulse.scene.accuracy import Accuracy
     from rigidimpulse.studies.job import find_job
 
     job = find_job(scene)._replace(**given_options({"accuracy": accuracy, "duration": duration}))
-    if duration is None:
-        plan = make_plan(compile_scene(job.make(), accuracy or (job.entry.accuracy if job.entry is not None else "standard")))
-    else:
-        plan = run_job(job, ()).plan
-        assert plan is not None
+    chosen = job.accuracy if isinstance(job.accuracy, str | Accuracy) else "standard"
+    world = compile_scene(job.make(), chosen)
+    plan = make_plan(world)
+    told = forecast(world, plan, job.duration).text(job.duration)
+    if duration is not None:
+        run = run_job(job, ())
+        assert run.plan is not None and run.profile is not None
+        remember(world, plan, job.duration, run.profile.seconds - run.profile.preparing)
+        plan, told = run.plan, forecast(world, plan, job.duration).text(job.duration)
+    plan.forecast = told
     click.echo(plan.explain())
 
 

@@ -13,7 +13,9 @@ from rigidimpulse.cli.jobs import CHECK_FAILED, given_options, print_table, reco
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rigidimpulse.studies.glance.known import Glance
     from rigidimpulse.studies.hard_cases import CaseResult
+    from rigidimpulse.studies.job import Job
 
 
 @click.command()
@@ -48,54 +50,82 @@ def hardcases(names: tuple[str, ...], output: str, limit: float) -> None:
 
 @click.command()
 @click.argument("scene", required=False)
-@click.option("-o", "--output", help="Folder for the table and the charts; a study found there is gone on with.  [default: study_SCENE]")
+@click.option("-o", "--output", help="Folder for the page study.html, and the table of --full.  [default: study_SCENE]")
 @click.option("--budget", type=float, help="Time the study may take, s.  [default: 60, or 3600 with --full]")
-@click.option("--full", is_flag=True, help="All settings of every strategy.")
-@click.option("--peer", "peers", multiple=True, help="Another engine on the same chart: mujoco or pybullet; may be repeated.")
+@click.option("--view", is_flag=True, help="Open the page in the browser at once; it follows the study.")
+@click.option("--full", is_flag=True, help="Then also all settings of every strategy: a table and charts.")
+@click.option("--peer", "peers", multiple=True, help="Another engine beside it: mujoco or pybullet.  [default: those installed]")
 @click.option("--duration", type=float, help="Time to simulate, s.")
 @click.option("--scaling", is_flag=True, help="Instead, time scenes of 10 to 20,000 bodies and print exponents p of cost ~ n^p.")
 @click.option("--most", type=int, default=20_000, show_default=True, help="Bodies of the largest scene of --scaling.")
-def study(scene: str | None, output: str | None, scaling: bool, most: int, **settings: Any) -> None:
-    """Measure what accuracy costs in time: run SCENE with many settings, against a reference."""
+def study(scene: str | None, output: str | None, scaling: bool, most: int, full: bool, **settings: Any) -> None:
+    """Say what accuracy costs in SCENE: one sentence soon, and a page on which its runs play side by side."""
     from rigidimpulse.core.errors import SceneError
+    from rigidimpulse.studies.job import find_job
 
     if scaling == (scene is not None):
         raise SceneError("study takes a SCENE, or --scaling", "give one of them")
-    if scene is not None:
-        _study_scene(scene, output, **settings)
-    else:
+    if scene is None:
         _study_scaling(most)
+        return
+    job = find_job(scene)
+    if settings["duration"] is not None:
+        job = job._replace(duration=settings["duration"])
+    folder = Path(output or f"study_{job.name}")
+    _glance_at(job, folder, settings["budget"], settings["peers"] or None, settings["view"])
+    if full:
+        _study_settings(job, folder, settings["budget"], settings["peers"])
 
 
-def _study_scene(scene: str, output: str | None, budget: float | None, full: bool, peers: tuple[str, ...], duration: float | None) -> None:
-    """Print the table of a study and write its files."""
+def _glance_at(job: Job, folder: Path, budget: float | None, peers: tuple[str, ...] | None, view: bool) -> None:
+    """Print the sentence as soon as it is known, and again if it has changed at the end; the page is written all the while."""
+    from rigidimpulse.studies.glance.glance import BUDGET, glance
+    from rigidimpulse.studies.glance.page import PAGE
+
+    told: list[str] = []
+
+    def changed(known: Glance) -> None:
+        if not told:
+            told.append("")
+            click.echo(f"{folder / PAGE} shows the runs, and follows the study while it is open")
+            if view:
+                click.launch((folder / PAGE).resolve().as_uri())
+        text = known.verdict.text() if known.verdict is not None else ""
+        if text and (len(told) == 1 or (known.finished and text != told[-1])):
+            told.append(text)
+            click.echo(text if known.finished else f"{text}\n(still measuring)")
+
+    known = glance(job, budget=min(budget or BUDGET, BUDGET), peers=peers, output=folder, changed=changed)
+    for played in known.runs:
+        if played.why_not:
+            click.echo(f"{played.candidate.name}: {played.why_not}")
+    if known.duration < known.asked:
+        click.echo(f"this is about the first {known.duration:.3g} s of {known.asked:g} s; --budget allows more")
+
+
+def _study_settings(job: Job, folder: Path, budget: float | None, peers: tuple[str, ...]) -> None:
+    """Print the table of all settings and write its files."""
     from tqdm import tqdm
 
-    from rigidimpulse.studies.job import find_job
-    from rigidimpulse.studies.work_precision import BUDGET, FULL_BUDGET, charts_are_installed
+    from rigidimpulse.studies.work_precision import FULL_BUDGET, charts_are_installed
     from rigidimpulse.studies.work_precision import study as run_study
 
-    job = find_job(scene)
-    folder = Path(output or f"study_{job.name}")
     with tqdm(total=100, disable=None, leave=False, bar_format="{desc} {percentage:3.0f} % of the budget |{bar}|") as bar:
 
         def progress(what: str, share: float) -> None:
             bar.set_description(what)
             bar.update(round(100.0 * share) - bar.n)
 
-        result = run_study(
-            job, duration or job.duration, job.fps, settings="full" if full else "small",
-            budget=budget or (FULL_BUDGET if full else BUDGET), peers=peers, output=folder, progress=progress,
-        )  # fmt: skip
+        result = run_study(job, settings="full", budget=budget or FULL_BUDGET, peers=peers, output=folder, progress=progress)
     click.echo(f"{result.name}, {result.duration:g} s; reference: {result.reference.describe()}")
     click.echo(result.table())
     if result.left:
-        click.echo(f"no time for {len(result.left)} settings: {', '.join(result.left)}; raise --budget, and the study goes on")
+        click.echo(f"{len(result.left)} more settings need a larger --budget; the same command goes on with them")
     click.echo(f"wrote {folder / 'study.csv'}")
     if not charts_are_installed():
         click.echo("charts need matplotlib and plotly: pip install 'rigidimpulse[study]', and run this again")
         return
-    for name in ("study.png", "study.html"):
+    for name in ("study.png", "settings.html"):
         click.echo(f"wrote {folder / name}")
 
 

@@ -54,6 +54,7 @@ class Plan:
     Attributes:
         lines: of all effects, in or out.
         pairs, time_of_impact, observe: functions of a step. exact, substepped: those of an island, by its regime.
+        forecast: what a run will cost, lines for people at the end of `explain`; empty if nobody asked.
 
     """
 
@@ -78,6 +79,7 @@ class Plan:
                 for verb, function in bound.verbs.items():
                     for participants in self._lists(verb):
                         participants.append((function, line))
+        self.forecast = ""
         self._inner = 0.0
 
     def _lists(self, verb: str) -> list[Participants]:
@@ -130,13 +132,12 @@ class Plan:
         line.reason, line.counts = reason, dict(counts)
 
     def explain(self) -> str:
-        """Return a table: stage, effect, in or out, share of the time so far, why."""
+        """Return a table: stage, effect, in or out, share of the time so far, why; then the forecast of the cost, if there is one."""
         total = sum(line.seconds for line in self.lines)
         rows = [("stage", "effect", "in", "time", "why")]
         for line in sorted(self.lines, key=lambda entry: STAGES.index(entry.stage)):
             share = f"{100.0 * line.seconds / total:.0f} %" if total > 0.0 and line.included else "-"
             rows.append((line.stage, line.name, "in" if line.included else "out", share, line.reason))
         widths = [max(len(row[k]) for row in rows) for k in range(4)]
-        return "\n".join(
-            "  ".join([*(cell.ljust(width) for cell, width in zip(row, widths)), row[4]]).rstrip() for row in rows
-        )
+        lines = ["  ".join([*(cell.ljust(width) for cell, width in zip(row, widths)), row[4]]).rstrip() for row in rows]
+        return "\n".join([*lines, self.forecast] if self.forecast else lines)

@@ -121,14 +121,19 @@ def _largest(values: np.ndarray) -> float:
     return float(told.max()) if len(told) else np.nan
 
 
-def penetration(world: World, run: Recording) -> np.ndarray:
+def penetration(world: World, run: Recording, most_frames: int = MOST_FRAMES) -> np.ndarray:
     """Depth (f,) m by which the deepest pair of bodies is inside each other in each frame; NaN in frames left out.
 
     Exact for balls, capsules and half spaces; else the least way out along the axes of either body and the line of their centres, an upper
     bound, to three digits. Pairs that cannot touch in the scene (jointed ones, say) are left out.
+
+    Args:
+        world: the compiled scene. run: its motion.
+        most_frames: frames that are looked at, evenly spread.
+
     """
     depth = np.full(len(run.times), np.nan)
-    chosen = np.unique(np.linspace(0, len(run.times) - 1, MOST_FRAMES).astype(int))
+    chosen = np.unique(np.linspace(0, len(run.times) - 1, most_frames).astype(int))
     depth[chosen] = 0.0
     narrowphase = Narrowphase(world.shapes, world.geometry)
     a, b = np.triu_indices(world.num_bodies, 1)

@@ -140,7 +140,7 @@ def converged_reference(
     settings = runs[-1].settings
     assert settings is not None
     twin = simulate(perturbed(scene), duration, fps, accuracy=settings.accuracy)
-    return _reference(world, times, runs[-1], [runs[-2] if len(runs) > 1 else twin, twin], note)
+    return reference_of(world, times, runs[-1], [runs[-2] if len(runs) > 1 else twin, twin], note)
 
 
 def _distance(a: Recording, b: Recording, world: World) -> np.ndarray:
@@ -148,8 +148,16 @@ def _distance(a: Recording, b: Recording, world: World) -> np.ndarray:
     return deviation(a, b).distance[:, world.dynamic]
 
 
-def _reference(world: World, times: np.ndarray, finest: Recording, others: list[Recording], note: str) -> Reference:
-    """The finest run, as far as the others agree with it."""
+def reference_of(world: World, times: np.ndarray, finest: Recording, others: list[Recording], note: str) -> Reference:
+    """The finest run, as far as the others agree with it.
+
+    Args:
+        world: the compiled scene. times: (f,) s.
+        finest: the run that is taken for the truth.
+        others: what it is compared with: coarser runs, and one that started off by rounding.
+        note: for people, how the runs came about.
+
+    """
     bodies = np.flatnonzero(world.dynamic)
     distance = np.maximum.reduce([_distance(finest, other, world) for other in others])
     until = agree_until(times, distance, TOLERANCE * world.size[bodies])

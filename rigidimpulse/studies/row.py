@@ -53,8 +53,8 @@ class Row:
 
     def cells(self) -> list[str]:
         """Values in the order of COLUMNS; numbers in full."""
-        stages = [repr(self.stages[stage]) if stage in self.stages else "" for stage in STAGES]
-        numbers = [repr(value) for value in (self.knob, self.cost, self.seconds, *self.whole, *self.beginning)]
+        stages = [repr(float(self.stages[stage])) if stage in self.stages else "" for stage in STAGES]
+        numbers = [repr(float(value)) for value in (self.knob, self.cost, self.seconds, *self.whole, *self.beginning)]
         return [self.name, self.family, *numbers, *stages, self.same_as, self.status]
 
     @staticmethod

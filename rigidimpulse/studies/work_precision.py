@@ -129,7 +129,7 @@ def study(
         settings: those to run, or the name of a grid of all strategies: "small", or "full", which has more members a family.
         budget: s that the study may take, the reference included; settings that do not fit any more are named in `Study.left`.
         peers: other engines to run beside it, of `peers.PEERS`; they need `pip install 'rigidimpulse[peers]'`.
-        output: folder for `study.csv` and, where the extra `study` is installed, the charts `study.png` and `study.html`; a study found
+        output: folder for `study.csv` and, where the extra `study` is installed, the charts `study.png` and `settings.html`; a study found
             there is gone on with.
         progress: called with what is being run, and the share of the budget that is spent.
 
@@ -138,7 +138,7 @@ def study(
 
     """
     start = perf_counter()
-    topic = _topic(scene, duration, fps)
+    topic = topic_of(scene, duration, fps)
     chosen = _settings(settings)
     tell = progress or (lambda what, share: None)
     world = compile_scene(topic.scene)
@@ -160,7 +160,7 @@ def study(
         from rigidimpulse.studies.charts import write_html, write_png
 
         write_renamed(folder / "study.png", partial(write_png, out))
-        write_renamed(folder / "study.html", partial(write_html, out))
+        write_renamed(folder / "settings.html", partial(write_html, out))
     return out
 
 
@@ -183,7 +183,7 @@ def _settings(settings: Sequence[Setting] | str) -> Sequence[Setting]:
     return grid(full=settings == "full")
 
 
-def _topic(scene: Scene | str | Job, duration: float | None, fps: float | None) -> _Topic:
+def topic_of(scene: Scene | str | Job, duration: float | None, fps: float | None) -> _Topic:
     """Find the scene; its duration and fps are those of the gallery scene where they are not given."""
     entry, name = None, "scene"
     if isinstance(scene, str):
@@ -192,6 +192,7 @@ def _topic(scene: Scene | str | Job, duration: float | None, fps: float | None) 
         entry = gallery.load(scene)
         name, scene = entry.name, entry.scene()
     elif isinstance(scene, Job):
+        duration, fps = duration if duration is not None else scene.duration, fps if fps is not None else scene.fps
         entry, name, scene = scene.entry, scene.name, scene.make()
     elif not isinstance(scene, Scene):
         raise SceneError(f"scene is a {type(scene).__name__}", "give a Scene, or the name of one in the gallery")

@@ -61,20 +61,21 @@ class Card:
     final: str = ""
 
 
-class _Block:
+class Block:
     """Bytes that grow by arrays; an array is known by [offset in bytes, number of values]."""
 
     def __init__(self) -> None:
         self.bytes = bytearray()
 
     def add(self, array: np.ndarray) -> list[int]:
+        """Put an array at the end; return its place."""
         self.bytes.extend(b"\0" * (-len(self.bytes) % 4))
         place = [len(self.bytes), array.size]
         self.bytes.extend(np.ascontiguousarray(array).tobytes())
         return place
 
 
-class _Shapes:
+class Shapes:
     """Different shapes of all runs."""
 
     def __init__(self) -> None:
@@ -94,9 +95,9 @@ class _Shapes:
 
 def write_sheet(path: Path, cards: Sequence[Card], title: str) -> None:
     """Write the page."""
-    block, shapes, ways = _Block(), _Shapes(), []
+    block, shapes, ways = Block(), Shapes(), []
     shown = [card for card in cards if card.recording is not None]
-    moving = sum(len(_movers(card.recording)) for card in shown if card.recording is not None)
+    moving = sum(len(movers_of(card.recording)) for card in shown if card.recording is not None)
     frames = int(np.clip(MOST_BYTES / (BYTES_A_KEY * max(moving, 1)), 2, MOST_FRAMES))
     entries = []
     for card in cards:
@@ -105,7 +106,7 @@ def write_sheet(path: Path, cards: Sequence[Card], title: str) -> None:
             "message": card.message, "final": card.final,
         }  # fmt: skip
         if card.recording is not None:
-            motion, own_ways = _motion(card.recording, shapes, block, frames)
+            motion, own_ways = motion_entry(card.recording, shapes, block, frames)
             entry["motion"] = motion
             ways += own_ways
         entries.append(entry)
@@ -135,15 +136,16 @@ def _page(index: dict[str, Any], block: bytes, title: str) -> str:
     return fill_template((files / "sheet.html").read_text(encoding="utf-8"), fields)
 
 
-def _movers(recording: Recording) -> list[int]:
+def movers_of(recording: Recording) -> list[int]:
+    """Indices of the bodies that are not static."""
     assert recording.scene is not None
     return [i for i, body in enumerate(recording.scene.bodies) if body.motion != "static"]
 
 
-def _motion(recording: Recording, shapes: _Shapes, block: _Block, frames: int) -> tuple[dict[str, Any], list[Way]]:
+def motion_entry(recording: Recording, shapes: Shapes, block: Block, frames: int) -> tuple[dict[str, Any], list[Way]]:
     """What the index says of a run, and the ways of its bodies."""
     assert recording.scene is not None
-    bodies, movers = recording.scene.bodies, _movers(recording)
+    bodies, movers = recording.scene.bodies, movers_of(recording)
     chosen = np.unique(np.linspace(0, len(recording.times) - 1, frames).round().astype(int))
     entries, ways, number_of_movers = [], [], 0
     for i, body in enumerate(bodies):

@@ -28,6 +28,8 @@ MAY_LOAD_MODULES = {
     "engine/warm_up.py": "kernels, from its own table",
     "gallery/__init__.py": "scenes of the gallery, from its own table",
     "io/cache/registry.py": "classes and functions of a state, from its own tables",
+    "studies/glance/candidates.py": "asks whether another engine is installed",
+    "studies/glance/page.py": "files of the package",
     "studies/job.py": "runs a scene in Python, which is a program",
     "studies/hard_cases.py": "asks for versions of other libraries",
     "studies/peers/__init__.py": "other engines, from its own table",

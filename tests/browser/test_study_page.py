@@ -21,7 +21,7 @@ def test_the_page_shows_families_and_changes_the_measure(browser: Any, tmp_path:
     asked: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.on("request", lambda request: asked.append(request.url) if not request.url.startswith(("file:", "data:", "blob:")) else None)
-    page.goto((tmp_path / "study.html").as_uri())
+    page.goto((tmp_path / "settings.html").as_uri())
     page.wait_for_selector(".legendtext")
 
     def names() -> set[str]:

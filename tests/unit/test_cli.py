@@ -174,13 +174,23 @@ def test_mistakes_in_scene_files_are_named(tmp_path, text, words):
     assert not (tmp_path / "run.npz").exists()
 
 
-def test_study_of_a_scene_prints_a_table_and_writes_its_files(scene_file, tmp_path):
-    arguments = ("study", scene_file, "--duration", 0.5, "--budget", 20, "-o", tmp_path / "out")
+def test_study_of_a_scene_says_its_sentence_and_writes_one_page(scene_file, tmp_path):
+    result = call("study", scene_file, "--duration", 0.5, "--budget", 6, "--peer", "mujoco", "-o", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "Standard stays within" in result.stdout and "of the truth for 0.5 s" in result.stdout
+    assert "MuJoCo with steps of 1/" in result.stdout and 'Recommended: accuracy="' in result.stdout
+    assert "Bullet" not in result.stdout
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["study.html"]
+
+
+def test_a_full_study_prints_a_table_and_writes_its_files(scene_file, tmp_path):
+    arguments = ("study", scene_file, "--full", "--duration", 0.2, "--budget", 6, "-o", tmp_path / "out")
     result = call(*arguments)
     assert result.exit_code == 0, result.output
-    assert "falling_ball, 0.5 s; reference: self-converged, until 0.5 s" in result.stdout
-    assert "standard" in result.stdout and "bisection, step 1/30" in result.stdout
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"study.csv", "study.png", "study.html", "reference.npz"}
+    assert "falling_ball, 0.2 s; reference: self-converged, until 0.2 s" in result.stdout
+    assert "bisection, step 1/30" in result.stdout and "no time for" not in result.stdout
+    files = {"study.html", "study.csv", "study.png", "settings.html", "reference.npz"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == files
     table = (tmp_path / "out" / "study.csv").read_text()
     assert call(*arguments).exit_code == 0
     # Gone on with: what was there is there to the last digit.
@@ -213,7 +223,7 @@ def test_study_prints_exponents_of_cost():
 
 def test_a_study_without_charts_says_what_they_need(scene_file, tmp_path, monkeypatch):
     monkeypatch.setattr("rigidimpulse.studies.work_precision.find_spec", lambda name: None)
-    result = call("study", scene_file, "--duration", 0.1, "--budget", 5, "-o", tmp_path / "out")
+    result = call("study", scene_file, "--full", "--duration", 0.1, "--budget", 3, "-o", tmp_path / "out")
     assert result.exit_code == 0, result.output
     assert "rigidimpulse[study]" in result.stdout
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"study.csv", "reference.npz"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"study.html", "study.csv", "reference.npz"}

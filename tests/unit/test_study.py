@@ -153,7 +153,7 @@ def test_a_study_goes_on_where_it_was(tmp_path) -> None:
     # The very same times: the rows were read, not run.
     assert [row.cost for row in again.rows[:2]] == [row.cost for row in first.rows]
     assert len(again.rows) == 3
-    assert (tmp_path / "study.png").stat().st_size > 10_000 and (tmp_path / "study.html").stat().st_size > 1_000_000
+    assert (tmp_path / "study.png").stat().st_size > 10_000 and (tmp_path / "settings.html").stat().st_size > 1_000_000
     with (tmp_path / "study.csv").open() as file:
         assert file.readline().startswith("# study ")
         assert [cells["name"] for cells in csv.DictReader(file)] == [row.name for row in again.rows]

@@ -15,6 +15,8 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError, unknown_name
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rigidimpulse.recording.recording import Recording
     from rigidimpulse.scene.scene import Scene
     from rigidimpulse.studies.peers.common import Peer
@@ -43,7 +45,9 @@ def load_peer(name: str, scene: Scene, step: float) -> Peer:
     return module.make(scene, step)
 
 
-def run_peer(name: str, scene: Scene, duration: float, fps: float, steps_a_frame: int) -> tuple[Recording, float]:
+def run_peer(
+    name: str, scene: Scene, duration: float, fps: float, steps_a_frame: int, progress: Callable[[float], None] | None = None
+) -> tuple[Recording, float]:
     """Run a scene in another engine; return its frames, and the time that its steps took, s.
 
     Args:
@@ -51,6 +55,7 @@ def run_peer(name: str, scene: Scene, duration: float, fps: float, steps_a_frame
         scene: the scene.
         duration: s. fps: frames per second.
         steps_a_frame: the step is 1 / (fps steps_a_frame).
+        progress: called with the simulated time in s after every frame.
 
     Raises:
         SceneError: as `load_peer`.
@@ -64,11 +69,13 @@ def run_peer(name: str, scene: Scene, duration: float, fps: float, steps_a_frame
     peer = load_peer(name, scene, 1.0 / (fps * steps_a_frame))
     try:
         frames, spent = [peer.state()], 0.0
-        for _ in times[1:]:
+        for time in times[1:].tolist():
             start = process_time()
             peer.advance(steps_a_frame)
             spent += process_time() - start
             frames.append(peer.state())
+            if progress is not None:
+                progress(time)
         columns = [np.array(column) for column in zip(*frames, strict=True)]
     finally:
         peer.close()
