@@ -43,6 +43,8 @@ MEETING = 30.0
 """Gap over round-off below which surfaces meet: the line between the points has no direction."""
 NEARER = 1e-3
 """Part of the gap by which a contact may be nearer than FCL's distance, which is exact."""
+SAME_PLACE = 1e-3
+"""Distance below which two contacts are one, over the contact margin."""
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]) / np.sqrt(3.0)
 FACE, EDGE, VERTEX = 0, 1, 2
 """What of a triangle a point lies on."""
@@ -92,7 +94,7 @@ class FclManifolds:
         nearest = self.closest(pair, limits.margin)
         if nearest is None or nearest.gap > limits.reach:
             return None if nearest is None else []
-        return self._without_ties([nearest, *self._others(pair, limits, nearest)])
+        return _without_ties([nearest, *self._others(pair, limits, nearest)], SAME_PLACE * limits.margin)
 
     def closest(self, pair: Placed, margin: float) -> MeshContact | None:
         """The contact at the closest points of two meshes, None where the surfaces meet; margin: the contact margin, m."""
@@ -234,22 +236,6 @@ class FclManifolds:
             return bool(direction @ np.cross(along, first) >= -TILT) or not np.array_equal(first, second)
         return bool(min(direction @ np.cross(along, first), direction @ np.cross(second, along)) >= -TILT)
 
-    def _without_ties(self, contacts: list[MeshContact]) -> list[MeshContact]:
-        """Each contact once: of those of one corner or of two edges the first, if their normals agree.
-
-        The closest points of faces in parallel planes may lie anywhere on them; they are left out where corners or edges are as near.
-        """
-        kept: list[MeshContact] = []
-        for contact in contacts:
-            known = any(_key(contact) == _key(other) and contact.normal @ other.normal > ALIKE_NORMAL for other in kept)
-            if not known:
-                kept.append(contact)
-        nearest, others = kept[0], kept[1:]
-        is_tie = nearest.kind == CORNER and min(nearest.feature_a, nearest.feature_b) < 0
-        if is_tie and any(other.normal @ nearest.normal > ALIKE_NORMAL for other in others):
-            return others
-        return kept
-
     def _convex(self, shape: int) -> bool:
         """Whether a mesh is one closed surface without hollows: then all its contacts with another such mesh have nearly one normal."""
         if shape not in self._is_convex:
@@ -291,13 +277,26 @@ def _corner_name(what: int, number: int) -> int:
     return {VERTEX: 2 * number, EDGE: 2 * number + 1, FACE: -1}[what]
 
 
-def _key(contact: MeshContact) -> tuple[int, int, int]:
-    """What a contact is known by: of a corner on a face not the triangle, of which there are several."""
-    if contact.kind == VERTEX_FACE:
-        return contact.kind, contact.feature_a, -1
-    if contact.kind == FACE_VERTEX:
-        return contact.kind, -1, contact.feature_b
-    return contact.kind, contact.feature_a, contact.feature_b
+def _without_ties(contacts: list[MeshContact], near: float) -> list[MeshContact]:
+    """Each contact once; of those at one place (`near` m) and with one normal the one of the lowest kind, as in the own manifolds.
+
+    The closest points of faces in parallel planes may lie anywhere on them; they are left out where corners or edges are as near.
+    """
+    kept: list[MeshContact] = []
+    for contact in contacts:
+        known = [k for k, other in enumerate(kept) if _are_one(contact, other, near)]
+        if not known:
+            kept.append(contact)
+        elif contact.kind < kept[known[0]].kind:
+            kept[known[0]] = contact
+    nearest, others = kept[0], kept[1:]
+    is_tie = nearest.kind == CORNER and min(nearest.feature_a, nearest.feature_b) < 0
+    return others if is_tie and any(other.normal @ nearest.normal > ALIKE_NORMAL for other in others) else kept
+
+
+def _are_one(contact: MeshContact, other: MeshContact, near: float) -> bool:
+    """Whether two contacts are at one place and have one normal; a corner over a face is there for several of its triangles."""
+    return bool(np.abs(contact.point_a - other.point_a).max() <= near and contact.normal @ other.normal > ALIKE_NORMAL)
 
 
 def _all_around(normal: np.ndarray) -> np.ndarray:

@@ -6,8 +6,9 @@ The gap g(t) of two surfaces changes by at most L |dt|, with L a bound of the sp
 
 So between two times at which the gap was measured it is at least (g_1 + g_2 - L (t_2 - t_1)) / 2. An interval is split in two, the earlier
 half first, until either this bound is above half the impact margin: then there is no contact in it. Or the bodies move by less than the
-*resolution* in it: then its end tells. The first interval at whose end the gap is at the impact margin or below is bisected with
-interpolation until the gap at its beginning is at the margin (Piyavskii 1972, for the first root instead of the least value).
+*resolution* in it: then its end tells. The first interval at whose end the gap is at the impact margin or below, and in which bodies move
+by less than the contact margin, is bisected with interpolation until the gap at its beginning is at the margin (Piyavskii 1972, for the
+first root instead of the least value).
 
 The resolution is the contact margin. A pair that is in contact already slides along itself with gaps that hardly change, and the bound can
 show nothing; there it is a hundredth of the smaller body. What comes and goes within that way while the pair slides is missed.
@@ -178,8 +179,8 @@ def sweep(
 def first_contact(path: PairPath, search: Search, most: int) -> tuple[float, int]:
     """Time and status of the first contact on a path; most: how often FCL may be asked."""
     gap = path.gap(search.start)
-    margin = search.margin
-    if gap <= margin + search.above:
+    margin, above = search.margin, search.above
+    if gap <= margin + above:
         contact = path.closest(search.start, search.contact_margin)
         if contact is None:
             return search.start, MEETS
@@ -187,8 +188,9 @@ def first_contact(path: PairPath, search: Search, most: int) -> tuple[float, int
             return search.start, int(TOUCHING if gap <= margin else IMPACT)
         # They hover, slide or leave: they may come closer by the slack for rounding.
         margin = min(gap, margin) - search.slack
+        above = min(above, 0.5 * (gap - margin))
     resolution = SLIDING * search.size if gap <= NEAR * search.contact_margin else search.contact_margin
-    return _search(path, replace(search, margin=margin), gap, resolution, most)
+    return _search(path, replace(search, margin=margin, above=above), gap, resolution, most)
 
 
 def _search(path: PairPath, search: Search, gap: float, resolution: float, most: int) -> tuple[float, int]:
@@ -205,7 +207,7 @@ def _search(path: PairPath, search: Search, gap: float, resolution: float, most:
         middle = max(0.5 * (low + high), low + (above - least) / speed)
         if below > margin and (0.5 * (above + below - way) > least or way <= resolution or not low < middle < high):
             low, above = later.pop()
-        elif below <= margin and (way <= resolution or not low < middle < high):
+        elif below <= margin and (way <= search.contact_margin or not low < middle < high):
             return _root(path, search, (low, above - margin), (high, below - margin)), int(IMPACT)
         else:
             later.append((middle, path.gap(middle)))
