@@ -76,13 +76,21 @@ class TriangleTrees:
 
     def meeting(self, a: int, b: int, R: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Pairs (k, 2) of triangles of meshes a and b that meet, ascending."""
-        first, second = self._tree(a)[0], self._tree(b)[1]
-        second.setTransform(fcl.Transform(R, t * self._scale))
-        result = fcl.CollisionResult()
-        fcl.collide(first, second, self._all_contacts, result)
-        pairs = {(contact.b1, contact.b2) for contact in result.contacts}
+        pairs = {(contact.b1, contact.b2) for contact in self._collide(a, b, R, t)}
         found = np.array(sorted(pairs), np.int64).reshape(-1, 2)
         return found + [self._first_triangle(a), self._first_triangle(b)]
+
+    def raw_contacts(self, a: int, b: int, R: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points (k, 3) m and normals (k, 3) from a to b as FCL's collision gives them, ghosts included; for studies."""
+        contacts = self._collide(a, b, R, t)
+        points = np.array([contact.pos for contact in contacts]).reshape(-1, 3) / self._scale
+        return points, np.array([contact.normal for contact in contacts]).reshape(-1, 3)
+
+    def _collide(self, a: int, b: int, R: np.ndarray, t: np.ndarray) -> list[fcl.Contact]:
+        second, result = self._tree(b)[1], fcl.CollisionResult()
+        second.setTransform(fcl.Transform(R, t * self._scale))
+        fcl.collide(self._tree(a)[0], second, self._all_contacts, result)
+        return result.contacts
 
     def _ask(
         self, first: fcl.CollisionObject, second: fcl.CollisionObject, R: np.ndarray, t: np.ndarray
