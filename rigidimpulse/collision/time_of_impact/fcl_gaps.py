@@ -4,14 +4,18 @@ The gap g(t) of two surfaces changes by at most L |dt|, with L a bound of the sp
 
     L >= |v_b - v_a| + W_a r_a + W_b r_b        r: bounding radii, W: bounds of the spins over the interval (`motion_bound`)
 
-So between two times at which the gap was measured it is at least (g_1 + g_2 - L (t_2 - t_1)) / 2. An interval is split in two, the earlier
-half first, until either this bound is above half the impact margin: then there is no contact in it. Or the bodies move by less than the
-*resolution* in it: then its end tells. The first interval at whose end the gap is at the impact margin or below, and in which bodies move
-by less than the contact margin, is bisected with interpolation until the gap at its beginning is at the margin (Piyavskii 1972, for the
-first root instead of the least value).
+So between two times at which the gap was measured, a way w = L (t_2 - t_1) apart, it is at least (g_1 + g_2 - w) / 2. An interval is split
+in two, the earlier half first, until one of this holds:
 
-The resolution is the contact margin. A pair that is in contact already slides along itself with gaps that hardly change, and the bound can
-show nothing; there it is a hundredth of the smaller body. What comes and goes within that way while the pair slides is missed.
+    this bound is above half the impact margin: there is no contact in the interval
+    w is less than the contact margin: its end tells
+    w is less than a hundredth of the smaller body, the pair was in contact at the start, and with A a bound of the accelerations
+        min(g_1, g_2) - A (t_2 - t_1)^2 / 8 is above half the impact margin: features that are there all the time stay apart
+
+The last one is for pairs that slide: their gaps hardly change, and L shows nothing. A hump on which they are for less than that way may be
+missed. The first interval at whose end the gap is at the impact margin or below, with w below the contact margin, is bisected with
+interpolation until the gap at its beginning is at the margin (the search is Piyavskii's, 1972, for the first root instead of the least
+value).
 """
 
 from __future__ import annotations
@@ -23,7 +27,7 @@ import numpy as np
 
 from rigidimpulse.collision.manifold.fcl_contacts import FclManifolds, MeshContact, Placed
 from rigidimpulse.collision.time_of_impact.free_flight import rounding_slack
-from rigidimpulse.collision.time_of_impact.motion_bound import ACCELERATION, CENTRE_JERK, MOTION_SIZE, SPIN_BOUND, VELOCITY, motion_bound
+from rigidimpulse.collision.time_of_impact.motion_bound import ACCELERATION, CENTRE_JERK, MOTION_SIZE, SPIN_BOUND, SPIN_RATE_BOUND, VELOCITY, motion_bound
 from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE, STALLED, TOUCHING, ImpactTimes, PairsToSweep, no_impacts
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
@@ -32,7 +36,7 @@ from rigidimpulse.motion.trajectory import Trajectories, motion_at
 MEETS = -1
 """Status of a pair whose surfaces meet at the start: FCL knows no gap below 0, so it is not swept."""
 SLIDING = 1e-2
-"""Resolution of pairs in contact, over the size of the smaller body."""
+"""Way within which features of a pair in contact do not come and go, over the size of the smaller body."""
 NEAR = 2.0
 """A pair is in contact at the start if its gap is less than this many contact margins."""
 _EPSILON = 2.0**-52
@@ -60,19 +64,24 @@ def _bring_pair(trajectory, a, b, t, motion):
 
 
 @jit_making_arrays
-def _fastest(trajectory, a, b, t, horizon, radius):
-    """The bound L [m/s] of two bodies from t on, over a horizon [s]; radius (n,) m."""
-    work, speed, turning = np.empty((2, MOTION_SIZE)), 0.0, 0.0
+def _bounds(trajectory, a, b, t, horizon, radius):
+    """The bounds L [m/s] and A [m/s2] of two bodies from t on, over a horizon [s]; radius (n,) m."""
+    work, turning, bending, spin = np.empty((2, MOTION_SIZE)), 0.0, 0.0, 0.0
     for side in range(2):
-        i = b if side else a
-        motion_bound(trajectory, i, t, horizon, work[side])
-        if work[side, SPIN_BOUND] > 0.0:
-            turning += work[side, SPIN_BOUND] * radius[i]
+        i, record = b if side else a, work[side]
+        motion_bound(trajectory, i, t, horizon, record)
+        if record[SPIN_BOUND] > 0.0:
+            spin += record[SPIN_BOUND]
+            turning += record[SPIN_BOUND] * radius[i]
+            bending += (record[SPIN_RATE_BOUND] + record[SPIN_BOUND] ** 2) * radius[i]
+    speed, pull = 0.0, 0.0
     for k in range(3):
-        pull = abs(work[1, ACCELERATION + k] - work[0, ACCELERATION + k])
-        pull += horizon * abs(work[1, CENTRE_JERK + k] - work[0, CENTRE_JERK + k])
-        speed += (abs(work[1, VELOCITY + k] - work[0, VELOCITY + k]) + horizon * pull) ** 2
-    return sqrt(speed) + turning
+        most = abs(work[1, ACCELERATION + k] - work[0, ACCELERATION + k])
+        most += horizon * abs(work[1, CENTRE_JERK + k] - work[0, CENTRE_JERK + k])
+        speed += (abs(work[1, VELOCITY + k] - work[0, VELOCITY + k]) + horizon * most) ** 2
+        pull += most**2
+    # A frame that turns with one of the bodies sees the velocities turn.
+    return sqrt(speed) + turning, sqrt(pull) + bending + 2.0 * spin * (sqrt(speed) + turning)
 
 
 @dataclass(frozen=True)
@@ -122,9 +131,9 @@ class PairPath:
         """The contact at the closest points at t, in the frame of a; None where the surfaces meet."""
         return self._swept.manifolds.closest(self._placed(t), margin)
 
-    def fastest(self, start: float, end: float) -> float:
-        """The bound L of an interval, m/s."""
-        return float(_fastest(self._trajectory, *self._bodies, start, end - start, self._swept.radius))
+    def bounds(self, start: float, end: float) -> tuple[float, float]:
+        """The bounds L [m/s] and A [m/s2] of an interval."""
+        return _bounds(self._trajectory, *self._bodies, start, end - start, self._swept.radius)
 
     def witness(self, contact: MeshContact) -> np.ndarray:
         """Points, normal and gap (10,) in the world, at the time that was asked about last."""
@@ -195,7 +204,7 @@ def first_contact(path: PairPath, search: Search, most: int) -> tuple[float, int
 
 def _search(path: PairPath, search: Search, gap: float, resolution: float, most: int) -> tuple[float, int]:
     """Time and status of the first contact of a pair that has a gap above the margin at the start."""
-    margin, speed = search.margin, path.fastest(search.start, search.end)
+    margin, (speed, bend) = search.margin, path.bounds(search.start, search.end)
     least = margin - 0.5 * abs(margin)
     low, above = search.start, gap
     if gap - speed * (search.end - search.start) > least:
@@ -205,7 +214,9 @@ def _search(path: PairPath, search: Search, gap: float, resolution: float, most:
         high, below = later[-1]
         way = speed * (high - low)
         middle = max(0.5 * (low + high), low + (above - least) / speed)
-        if below > margin and (0.5 * (above + below - way) > least or way <= resolution or not low < middle < high):
+        dip = min(above, below) - 0.125 * bend * (high - low) ** 2
+        is_free = 0.5 * (above + below - way) > least or (way <= resolution and dip > least) or way <= search.contact_margin
+        if below > margin and (is_free or not low < middle < high):
             low, above = later.pop()
         elif below <= margin and (way <= search.contact_margin or not low < middle < high):
             return _root(path, search, (low, above - margin), (high, below - margin)), int(IMPACT)
