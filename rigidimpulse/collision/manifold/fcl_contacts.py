@@ -25,13 +25,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
 
 from rigidimpulse.collision.distance.fcl_trees import Nearest, TriangleTrees
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, VERTEX_FACE
 from rigidimpulse.collision.geometry import EDGE_BOUNDARY, EDGE_HIDDEN
-from rigidimpulse.collision.manifold.contact_points import ALIKE_NORMAL, INSIDE, MERGE, TILT
+from rigidimpulse.collision.manifold.contact_points import ALIKE_NORMAL, INSIDE, MERGE, SAME_NORMAL, TILT
 from rigidimpulse.core.tolerances import TOLERANCES
 
 AWAY = 5.0
@@ -45,6 +44,8 @@ NEARER = 1e-3
 """Part of the gap by which a contact may be nearer than FCL's distance, which is exact."""
 SAME_PLACE = 1e-3
 """Distance below which two contacts are one, over the contact margin."""
+FILLS = 1e-3
+"""Part of its volume by which the hull of a convex mesh may differ."""
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]) / np.sqrt(3.0)
 FACE, EDGE, VERTEX = 0, 1, 2
 """What of a triangle a point lies on."""
@@ -192,9 +193,10 @@ class FclManifolds:
         sides = np.roll(face, -1, axis=1) - face
         lengths = np.linalg.norm(sides, axis=2)
         outside = -np.sum(np.cross(normal[:, None, :], sides) * (place[:, None, :] - face), axis=2)
-        # A face goes on beyond edges inside it; the triangle there may not be among those that meet.
-        inner = geometry.edge_kind[geometry.triangle_edge[candidates[:, 1]]] == EDGE_HIDDEN
-        slack = np.where(inner, reach, INSIDE * lengths)
+        # A face goes on beyond the edges inside it: the triangle there may not be among those that meet.
+        edges = geometry.triangle_edge[candidates[:, 1]]
+        level = np.sum(geometry.edge_normal[edges, 0] * geometry.edge_normal[edges, 1], axis=2) > SAME_NORMAL
+        slack = np.where(level & (geometry.edge_kind[edges] == EDGE_HIDDEN), reach, INSIDE * lengths)
         is_over = (height >= least) & (height <= reach) & np.all(outside <= slack * lengths, axis=1)
         out: list[tuple[int, int, np.ndarray, float]] = []
         for k in np.flatnonzero(is_over):
@@ -243,7 +245,7 @@ class FclManifolds:
         return self._is_convex[shape]
 
     def _look_for_hollows(self, shape: int) -> bool:
-        """Whether a mesh is closed, in one part, and turns inwards at no edge."""
+        """Whether a mesh turns inwards at no edge, and fills its hull: it may be in several parts, or run through itself."""
         geometry = self.geometry
         first, last = geometry.shape_first[shape], geometry.shape_first[shape + 1]
         if last > first + 1 or not geometry.closed[first]:
@@ -254,10 +256,10 @@ class FclManifolds:
         bend = np.sum(np.cross(normals[:, 0], normals[:, 1]) * along, axis=1)
         if np.any(bend < -TOLERANCES.surface.flat_angle * np.linalg.norm(along, axis=1)):
             return False
-        number = int(geometry.vertex_first[last] - geometry.vertex_first[first])
-        local = ends - geometry.vertex_first[first]
-        _, part = connected_components(coo_array((np.ones(len(local)), local.T), shape=(number, number)), directed=False)
-        return len(np.unique(part[local])) == 1
+        corners = geometry.vertex[geometry.triangle[geometry.triangle_first[first] : geometry.triangle_first[last]]]
+        volume = float(np.sum(corners[:, 0] * np.cross(corners[:, 1], corners[:, 2]))) / 6.0
+        hull = ConvexHull(geometry.vertex[geometry.vertex_first[first] : geometry.vertex_first[last]])
+        return abs(volume - hull.volume) <= FILLS * hull.volume
 
 
 def _names(on_a: tuple[int, int], on_b: tuple[int, int]) -> tuple[int, int, int]:
@@ -295,7 +297,9 @@ def _without_ties(contacts: list[MeshContact], near: float) -> list[MeshContact]
 
 
 def _are_one(contact: MeshContact, other: MeshContact, near: float) -> bool:
-    """Whether two contacts are at one place and have one normal; a corner over a face is there for several of its triangles."""
+    """Whether two contacts are of the same edges, or at one place, with one normal; a corner is there for several triangles of a face."""
+    if (contact.kind, contact.feature_a, contact.feature_b) == (other.kind, other.feature_a, other.feature_b):
+        return True
     return bool(np.abs(contact.point_a - other.point_a).max() <= near and contact.normal @ other.normal > ALIKE_NORMAL)
 
 
