@@ -36,7 +36,7 @@ DEEP = 1e-4
 ALIKE = np.cos(np.radians(1.0))
 """Cosine of the angle of normals that are one."""
 SAME_PLACE, SAME_NORMAL = 1e-6, 1e-6
-"""Distance over the size of the smaller body, and 1 less the cosine of normals, of contacts that are one."""
+"""Distance over the size of the smaller body, and angle of normals (rad), of contacts that are one."""
 INSTANT = 1.0
 """s, of a step in which nothing happens."""
 ONE_IMPACT = 1e-9
@@ -162,16 +162,15 @@ class _Instant:
         """The first impact of two bodies; own, fcl: its rows of impulses."""
         run = self._at(float(own["time"][0]))
         contacts, others = (self._contacts(run, pair, by) for by in (OwnContacts(), run.narrow_phase))
-        common = sum(_is_among(place, normal, others, SAME_PLACE * self._size(pair), 1.0 - SAME_NORMAL) for place, normal in zip(*contacts, strict=True))
+        common = sum(_is_among(place, normal, others, SAME_PLACE * self._size(pair), np.cos(SAME_NORMAL)) for place, normal in zip(*contacts, strict=True))
         raw = self._raw(run, pair, contacts)
         impulse, other = _impulse(own), _impulse(fcl)
-        cosine = float(np.clip(_direction(own) @ _direction(fcl), -1.0, 1.0))
-        return FirstImpact(
+            return FirstImpact(
             bodies=(self._world.names[pair[0]], self._world.names[pair[1]]),
             time=float(own["time"][0]),
             later=float(fcl["time"][0] - own["time"][0]),
             place=float(np.linalg.norm(_centre(fcl) - _centre(own))) / self._size(pair),
-            turn=float(np.arccos(cosine)),
+            turn=float(np.arcsin(min(1.0, np.linalg.norm(np.cross(_direction(own), _direction(fcl)))))),
             impulse=float(np.linalg.norm(other - impulse) / np.linalg.norm(impulse)),
             own=len(contacts[0]),
             fcl=len(others[0]),

@@ -2,8 +2,8 @@
 
 The meshes are a gap apart. FCL is asked for
 
-    distance   the closest points, and the normal between them. It is asked again with the second mesh moved away along the normal, where
-               the difference of the points has its digits
+    distance   the closest points, and the normal between them. At small gaps it is asked again with the second mesh moved away along the
+               normal, where the difference of the points has its digits
     collide    the triangles that meet after the second mesh is moved in by a little more than the reach: along the normal, and along 13
                other directions where a mesh is concave, since its other contacts have other normals
 
@@ -35,6 +35,8 @@ from rigidimpulse.core.tolerances import TOLERANCES
 
 AWAY = 5.0
 """How far the second mesh is moved away to take the normal, over the contact margin."""
+CLEAR = 0.1
+"""Gap over the contact margin from which on the normal needs no second question: it is good to 1e-9."""
 IN = 1.5
 """How far it is moved in, over the reach: what is within the reach meets though the direction differs by up to 48 degrees from its normal."""
 ROUND_OFF = TOLERANCES.arithmetic.round_off
@@ -99,33 +101,33 @@ class FclManifolds:
 
     def closest(self, pair: Placed, margin: float) -> MeshContact | None:
         """The contact at the closest points of two meshes, None where the surfaces meet; margin: the contact margin, m."""
-        found = self._precise(lambda t: self.trees.nearest(pair.a, pair.b, pair.R, t), pair, margin)
-        return None if found is None else self._contact(pair, found)
+        return self._precise(lambda t: self.trees.nearest(pair.a, pair.b, pair.R, t), pair, margin)
 
-    def _precise(self, ask: Callable[[np.ndarray], Nearest], pair: Placed, margin: float) -> tuple[Nearest, np.ndarray] | None:
-        """Closest points and normal (3,) by `ask`, which gets the place of b; None where the surfaces meet."""
-        found = ask(pair.t)
-        between = found.point_b - found.point_a
+    def _precise(self, ask: Callable[[np.ndarray], Nearest], pair: Placed, margin: float) -> MeshContact | None:
+        """The contact at the closest points by `ask`, which gets the place of b; None where the surfaces meet."""
+        nearest = ask(pair.t)
+        between = nearest.point_b - nearest.point_a
         length = float(np.linalg.norm(between))
-        size = float(np.abs(found.point_a).max() + np.abs(pair.t).max())
-        if min(found.gap, length) <= MEETING * ROUND_OFF * size:
+        size = float(np.abs(nearest.point_a).max() + np.abs(pair.t).max())
+        if min(nearest.gap, length) <= MEETING * ROUND_OFF * size:
             return None
-        normal, away = between / length, AWAY * margin
-        best = found
+        contact, away = self._contact(pair, nearest, between / length), AWAY * margin
+        if nearest.gap >= CLEAR * margin:
+            return contact
         # The first normal may be off by round-off over the gap, the second one by what that moves the points.
         for _ in range(2):
-            moved = ask(pair.t + away * normal)
+            way = away * contact.normal
+            moved = ask(pair.t + way)
             between = moved.point_b - moved.point_a
-            better = between / np.linalg.norm(between)
-            if better @ normal < ALIKE_NORMAL:
+            back = Nearest(nearest.gap, moved.point_a, moved.point_b - way, moved.triangle_a, moved.triangle_b)
+            better = self._contact(pair, back, between / np.linalg.norm(between))
+            if _corners_and_edges(better) != _corners_and_edges(contact):
                 break  # something else is nearest from there
-            best = Nearest(found.gap, moved.point_a, moved.point_b - away * normal, moved.triangle_a, moved.triangle_b)
-            normal = better
-        return best, normal
+            contact = better
+        return contact
 
-    def _contact(self, pair: Placed, found: tuple[Nearest, np.ndarray]) -> MeshContact:
+    def _contact(self, pair: Placed, nearest: Nearest, normal: np.ndarray) -> MeshContact:
         """The contact at the closest points, named by what they lie on."""
-        nearest, normal = found
         on_a = self._feature(nearest.triangle_a, nearest.point_a)
         on_b = self._feature(nearest.triangle_b, (nearest.point_b - pair.t) @ pair.R)
         return MeshContact(nearest.point_a, nearest.point_b, normal, nearest.gap, *_names(on_a, on_b))
@@ -217,11 +219,8 @@ class FclManifolds:
         geometry, out = self.geometry, []
         has_edge = np.any(geometry.edge_kind[geometry.triangle_edge[pairs]] != EDGE_HIDDEN, axis=2).all(axis=1)
         for i, j in pairs[has_edge].tolist():
-            found = self._precise(lambda t, i=i, j=j: self.trees.nearest_of_triangles(i, j, pair.R, t), pair, limits.margin)
-            if found is None or not least <= found[0].gap <= limits.reach:
-                continue
-            contact = self._contact(pair, found)
-            if contact.kind != EDGE_EDGE:
+            contact = self._precise(lambda t, i=i, j=j: self.trees.nearest_of_triangles(i, j, pair.R, t), pair, limits.margin)
+            if contact is None or contact.kind != EDGE_EDGE or not least <= contact.gap <= limits.reach:
                 continue
             outward_b = -(contact.normal @ pair.R)
             if self._in_arc(contact.feature_a, contact.normal) and self._in_arc(contact.feature_b, outward_b):
@@ -274,6 +273,15 @@ def _names(on_a: tuple[int, int], on_b: tuple[int, int]) -> tuple[int, int, int]
     return int(CORNER), _corner_name(what_a, a), _corner_name(what_b, b)
 
 
+def _corners_and_edges(contact: MeshContact) -> tuple[int, int, int]:
+    """What a contact is known by: of a corner on a face not the triangle, of which a face has several."""
+    if contact.kind == VERTEX_FACE:
+        return contact.kind, contact.feature_a, -1
+    if contact.kind == FACE_VERTEX:
+        return contact.kind, -1, contact.feature_b
+    return contact.kind, contact.feature_a, contact.feature_b
+
+
 def _corner_name(what: int, number: int) -> int:
     """The feature of a CORNER; -1 for a face."""
     return {VERTEX: 2 * number, EDGE: 2 * number + 1, FACE: -1}[what]
@@ -298,7 +306,7 @@ def _without_ties(contacts: list[MeshContact], near: float) -> list[MeshContact]
 
 def _are_one(contact: MeshContact, other: MeshContact, near: float) -> bool:
     """Whether two contacts are of the same edges, or at one place, with one normal; a corner is there for several triangles of a face."""
-    if (contact.kind, contact.feature_a, contact.feature_b) == (other.kind, other.feature_a, other.feature_b):
+    if contact.kind == EDGE_EDGE and _corners_and_edges(contact) == _corners_and_edges(other):
         return True
     return bool(np.abs(contact.point_a - other.point_a).max() <= near and contact.normal @ other.normal > ALIKE_NORMAL)
 
