@@ -24,7 +24,17 @@ from rigidimpulse.engine.absent import (
 from rigidimpulse.engine.exact.step_size import ErrorEstimate, make_error_estimate
 from rigidimpulse.engine.finder import Finder
 from rigidimpulse.engine.narrow_phase import OwnContacts
-from rigidimpulse.engine.participants import Compiled, Flight, Keyframed, NarrowPhase, Observer, RunForces, RunJoints, RunSoftBodies, Substepping
+from rigidimpulse.engine.participants import (
+    Compiled,
+    Flight,
+    Keyframed,
+    NarrowPhase,
+    Observer,
+    RunForces,
+    RunJoints,
+    RunSoftBodies,
+    Substepping,
+)
 from rigidimpulse.engine.touching import Motion
 from rigidimpulse.model.plan import Plan
 from rigidimpulse.model.state import State

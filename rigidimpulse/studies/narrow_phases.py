@@ -23,6 +23,7 @@ from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.narrow_phase import OwnContacts, mesh_bodies, why_not_fcl
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.pair_table import MARGIN, append_pairs, pair_bodies
+from rigidimpulse.engine.participants import NarrowPhase
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.recording.events import EventLog
@@ -90,7 +91,7 @@ class NarrowPhases:
     def table(self) -> str:
         """A text table, a line for each pair."""
         head = ("bodies", "time, s", "later, s", "place", "turn, rad", "impulse", "contacts", "of FCL", "common", "raw", "ghosts")
-        rows = [head]
+        rows: list[tuple[str, ...]] = [head]
         for impact in self.first_impacts:
             numbers = (f"{value:.1e}" for value in (impact.later, impact.place, impact.turn, impact.impulse))
             counts = map(str, (impact.own, impact.fcl, impact.common, impact.raw, impact.ghosts))
@@ -162,10 +163,11 @@ class _Instant:
         """The first impact of two bodies; own, fcl: its rows of impulses."""
         run = self._at(float(own["time"][0]))
         contacts, others = (self._contacts(run, pair, by) for by in (OwnContacts(), run.narrow_phase))
-        common = sum(_is_among(place, normal, others, SAME_PLACE * self._size(pair), np.cos(SAME_NORMAL)) for place, normal in zip(*contacts, strict=True))
+        near, alike = SAME_PLACE * self._size(pair), float(np.cos(SAME_NORMAL))
+        common = sum(_is_among(point, normal, others, near, alike) for point, normal in zip(*contacts, strict=True))
         raw = self._raw(run, pair, contacts)
         impulse, other = _impulse(own), _impulse(fcl)
-            return FirstImpact(
+        return FirstImpact(
             bodies=(self._world.names[pair[0]], self._world.names[pair[1]]),
             time=float(own["time"][0]),
             later=float(fcl["time"][0] - own["time"][0]),
@@ -174,7 +176,7 @@ class _Instant:
             impulse=float(np.linalg.norm(other - impulse) / np.linalg.norm(impulse)),
             own=len(contacts[0]),
             fcl=len(others[0]),
-            common=int(common),
+            common=common,
             raw=raw[0],
             ghosts=raw[1],
         )
@@ -196,7 +198,7 @@ class _Instant:
         run.state.rotation[:] = [to_matrix(q) for q in world.orientation]
         return run
 
-    def _contacts(self, run: Run, pair: tuple[int, int], by: OwnContacts) -> tuple[np.ndarray, np.ndarray]:
+    def _contacts(self, run: Run, pair: tuple[int, int], by: NarrowPhase) -> tuple[np.ndarray, np.ndarray]:
         """Points on a (k, 3) m and normals (k, 3) of the contacts within the margin."""
         table = PairEvents(run, INSTANT).table
         a, b = min(pair), max(pair)

@@ -27,7 +27,15 @@ import numpy as np
 
 from rigidimpulse.collision.manifold.fcl_contacts import FclManifolds, MeshContact, Placed
 from rigidimpulse.collision.time_of_impact.free_flight import rounding_slack
-from rigidimpulse.collision.time_of_impact.motion_bound import ACCELERATION, CENTRE_JERK, MOTION_SIZE, SPIN_BOUND, SPIN_RATE_BOUND, VELOCITY, motion_bound
+from rigidimpulse.collision.time_of_impact.motion_bound import (
+    ACCELERATION,
+    CENTRE_JERK,
+    MOTION_SIZE,
+    SPIN_BOUND,
+    SPIN_RATE_BOUND,
+    VELOCITY,
+    motion_bound,
+)
 from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE, STALLED, TOUCHING, ImpactTimes, PairsToSweep, no_impacts
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
