@@ -93,7 +93,8 @@ KERNELS = {"FCL contacts", "springs", "joints", "sub-stepped islands", "contact 
 ASKED_FOR = (
     "rigidimpulse.dynamics.forces.", "rigidimpulse.dynamics.soft_body", "rigidimpulse.io", "rigidimpulse.engine.triggers",
     "rigidimpulse.engine.varying_forces", "rigidimpulse.engine.soft_bodies", "rigidimpulse.engine.fcl_contacts",
-    "rigidimpulse.collision.distance.fcl_trees", "rigidimpulse.collision.manifold.fcl_contacts", "rigidimpulse.collision.time_of_impact.fcl_gaps",
+    "rigidimpulse.collision.distance.fcl_trees", "rigidimpulse.collision.manifold.fcl_contacts",
+    "rigidimpulse.collision.time_of_impact.fcl_gaps",
 )  # fmt: skip
 """Modules that are imported only where a scene asks for them; those of forces that do not vary are in ALWAYS."""
 ALWAYS = {"rigidimpulse.dynamics.forces.constant", "rigidimpulse.io", "rigidimpulse.io.registration"}

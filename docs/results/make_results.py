@@ -1,7 +1,7 @@
 """Write the pages of docs/results/ from their data: `python docs/results/make_results.py [PAGE ...]`.
 
-Pages: accuracy, hard_cases, validation, what_accuracy_costs, narrow_phases, speed, tosses; none: all. No number is typed here: each comes from
-a file of data, and the page says which machine, commit and command made it. The table in README.md is written, too.
+Pages: accuracy, hard_cases, validation, what_accuracy_costs, narrow_phases, speed, tosses; none: all. No number is typed here: each comes
+from a file of data, and the page says which machine, commit and command made it. The table in README.md is written, too.
 """
 
 from __future__ import annotations
@@ -237,11 +237,13 @@ def section(name: str, study: Study) -> str:
 def narrow_phases() -> str:
     """First impacts with own manifolds and with FCL's."""
     rows, lines = read(NARROW_PHASES), []
+    quantities = {"later": "time, s", "place": "place, of the size", "turn": "normal, rad", "impulse": "impulse, relative"}
     for kind in dict.fromkeys(row["kind"] for row in rows):
         chosen = [row for row in rows if row["kind"] == kind]
-        for name, words in (("later", "time, s"), ("place", "place, of the size"), ("turn", "normal, rad"), ("impulse", "impulse, relative")):
+        for name, words in quantities.items():
             values = sorted(abs(float(row[name])) for row in chosen)
-            lines.append((kind if name == "later" else "", len(chosen) if name == "later" else "", words, small(values[len(values) // 2]), small(values[-1])))
+            first = (kind, len(chosen)) if name == "later" else ("", "")
+            lines.append((*first, words, small(values[len(values) // 2]), small(values[-1])))
     counts = []
     for kind in dict.fromkeys(row["kind"] for row in rows):
         own, fcl, common, raw, ghosts = (
@@ -381,7 +383,8 @@ def readme() -> str:
 
 
 PAGES: dict[str, Callable[[], str]] = {
-    "narrow_phases": narrow_phases, "accuracy": accuracy, "hard_cases": hard_cases, "validation": validation, "what_accuracy_costs": what_accuracy_costs, "speed": speed,
+    "narrow_phases": narrow_phases, "accuracy": accuracy, "hard_cases": hard_cases, "validation": validation, "what_accuracy_costs": what_accuracy_costs,
+    "speed": speed,
     "tosses": tosses,
 }  # fmt: skip
 

@@ -33,8 +33,9 @@ class FclContacts(OwnContacts):
         self._is_mesh = mesh_bodies(world)
         self._manifolds = FclManifolds(TriangleTrees(world.shapes, world.geometry))
         self._swept = Swept(
-            self._manifolds, world.shape_of_body, world.size, world.bound_radius, run.detector.sweep_scratch.reach, world.accuracy.iterations
-        )
+            self._manifolds, world.shape_of_body, world.size, world.bound_radius, run.detector.sweep_scratch.reach,
+            world.accuracy.iterations,
+        )  # fmt: skip
 
     def find_touching(self, run: Any, table: PairTable, shared: Shared, time: float) -> int:
         """The same order as that of `touching.find_touching`: from some bodies on, contact by contact."""

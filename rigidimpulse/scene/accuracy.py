@@ -64,7 +64,7 @@ class Accuracy(BaseModel):
             if self.impact_time != "bisection":
                 raise ValueError(f"it backs time up by bisection on FCL's gaps, not by {self.impact_time!r}; leave impact_time out")
             if self.response == "penalty":
-                raise ValueError("springs push bodies apart, there are no contacts to find; leave narrow_phase out, or use another response")
+                raise ValueError("springs push bodies apart, no contacts are found; leave narrow_phase out, or use another response")
             if self.contact_solver == "substepped":
                 raise ValueError("FCL finds no contacts of soft islands; use contact_solver='auto' or 'newton'")
         return self

@@ -1,7 +1,7 @@
 """Own manifolds against FCL: the first impact of each pair of meshes in a scene, with either narrow phase.
 
-Both runs start alike. So the first impact of two bodies happens at one time and place, unless something before it went another way. Compared
-are its time, the contacts at its instant, and the impulse
+Both runs start alike. So the first impact of two bodies happens at one time and place, unless something before it went another way.
+Compared are its time, the contacts at its instant, and the impulse
 
     J = sum over its contact points of (j n + tangent impulse)
 

@@ -1,7 +1,7 @@
 """First impacts of random pairs of meshes with own manifolds and with FCL's: `python tests/bench/narrow_phases.py [--fresh N] [--write]`.
 
-200 pairs of hulls that meet, and 60 of meshes with hollows (`tests/both_sides/mesh_pairs.py`). The exit code is 1 if the impulses of a pair of hulls
-differ by more than BOUND, or a pair meets in one of the runs only.
+200 pairs of hulls that meet, and 60 of meshes with hollows (`tests/both_sides/mesh_pairs.py`). The exit code is 1 if the impulses
+of a pair of hulls differ by more than BOUND, or a pair meets in one of the runs only.
 
     --fresh N    pairs of other seeds, from N on
     --write      keep the table as docs/results/data/narrow_phases.csv
@@ -15,8 +15,8 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tests" / "both_sides"), str(ROOT / "docs" / "results")]
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "both_sides"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "docs" / "results"))
 
 from mesh_pairs import DURATION, concave_pair, convex_pair
 from provenance import DATA, note

@@ -28,7 +28,8 @@ def concave(kind: str, dice: np.random.Generator, size: float) -> ri.Shape:
     if kind == "spot":
         return ri.Shape.from_file(MESHES / "spot.obj", scale=0.6 * size)
     if kind == "ring":
-        return ri.Shape.from_trimesh(trimesh.creation.torus(0.38 * size, 0.12 * size, major_sections=int(dice.integers(12, 30)), minor_sections=8))
+        sections = int(dice.integers(12, 30))
+        return ri.Shape.from_trimesh(trimesh.creation.torus(0.38 * size, 0.12 * size, major_sections=sections, minor_sections=8))
     ball = trimesh.creation.icosphere(subdivisions=1)
     spikes = np.where(np.arange(len(ball.vertices)) < 12, 0.5, 0.25) * size
     return ri.Shape.mesh(ball.vertices * spikes[:, None], ball.faces)

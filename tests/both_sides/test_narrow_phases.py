@@ -81,7 +81,8 @@ def test_two_sides_of_a_hollow_are_touched_at_once() -> None:
 
 def test_stacks_rest_and_slides_end_where_they_do_with_own_manifolds() -> None:
     stack = [ri.Body(f"cube {k}", ri.Shape.box(0.4), position=(0.01 * k, 0, 0.2 + 0.42 * k), material=WOOD) for k in range(3)]
-    slider = ri.Body("slider", ri.Shape.box((0.6, 0.4, 0.2)), position=(2, 0, 0.1), velocity=(2, 0.5, 0), angular_velocity=(0, 0, 2), material=WOOD)
+    plank, motion = ri.Shape.box((0.6, 0.4, 0.2)), {"velocity": (2, 0.5, 0), "angular_velocity": (0, 0, 2)}
+    slider = ri.Body("slider", plank, position=(2, 0, 0.1), material=WOOD, **motion)
     runs = [ri.simulate(table_scene(*stack, slider), 1.0, accuracy=accuracy) for accuracy in ("standard", "classic")]
     for run in runs:
         assert run.status.ok and np.abs(run.velocity("cube 2")[-1]).max() == 0.0
@@ -114,7 +115,8 @@ def test_half_spaces_balls_and_moving_supports_take_part() -> None:
 
 
 def test_a_scene_without_two_meshes_has_no_use_for_fcl() -> None:
-    scene = ri.Scene(bodies=[ri.Body("ground", ri.Shape.half_space(), motion="static"), ri.Body("box", ri.Shape.box(1), position=(0, 0, 2))])
+    scene = ri.Scene(bodies=[ri.Body("box", ri.Shape.box(1), position=(0, 0, 2))])
+    scene.add(ri.Body("ground", ri.Shape.half_space(), motion="static"))
     run = ri.simulate(scene, 0.8, accuracy="classic")
     assert "no two meshes" in run.plan.line("FCL contacts").reason
     assert run.state_hash() == ri.simulate(scene, 0.8).state_hash()

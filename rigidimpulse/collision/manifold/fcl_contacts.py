@@ -38,7 +38,7 @@ AWAY = 5.0
 CLEAR = 0.1
 """Gap over the contact margin from which on the normal needs no second question: it is good to 1e-9."""
 IN = 1.5
-"""How far it is moved in, over the reach: what is within the reach meets though the direction differs by up to 48 degrees from its normal."""
+"""How far it is moved in, over the reach: what is within the reach meets, though its normal is up to 48 degrees off the direction."""
 ROUND_OFF = TOLERANCES.arithmetic.round_off
 MEETING = 30.0
 """Gap over round-off below which surfaces meet: the line between the points has no direction."""
