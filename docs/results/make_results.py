@@ -383,8 +383,8 @@ def readme() -> str:
 
 
 PAGES: dict[str, Callable[[], str]] = {
-    "narrow_phases": narrow_phases, "accuracy": accuracy, "hard_cases": hard_cases, "validation": validation, "what_accuracy_costs": what_accuracy_costs,
-    "speed": speed,
+    "narrow_phases": narrow_phases, "accuracy": accuracy, "hard_cases": hard_cases, "validation": validation,
+    "what_accuracy_costs": what_accuracy_costs, "speed": speed,
     "tosses": tosses,
 }  # fmt: skip
 
