@@ -78,6 +78,9 @@ EFFECTS = {
     "contact detection": (
         "flight", 'scene.add(ri.Body("b", ri.Shape.box(1), position=(0, 0, -9)))', ["collision.broad_phase", "collision.time_of_impact"]
     ),
+    "FCL contacts": (
+        "ground", 'settings = {"accuracy": "classic"}', ["collision.time_of_impact.fcl_gaps"]
+    ),
     "event kernel": (
         "ground", 'scene.add(ri.Body("c", ri.Shape.sphere(0.1), position=(9, 9, 2), material=rough))', ["engine.spheres"]
     ),
@@ -85,11 +88,13 @@ EFFECTS = {
     "gyroscopic term": ("balls", 'scene.add(ri.Body("d", ri.Shape.box((1, 2, 3)), position=(9, 9, 9)))', []),
 }
 """Name in the plan: the plain scene, what calls for the effect, modules of the package whose kernels are the effect's."""
-KERNELS = {"springs", "joints", "sub-stepped islands", "contact forces", "contact detection", "event kernel"}
+KERNELS = {"FCL contacts", "springs", "joints", "sub-stepped islands", "contact forces", "contact detection", "event kernel"}
 """Effects with kernels of their own."""
 ASKED_FOR = (
     "rigidimpulse.dynamics.forces.", "rigidimpulse.dynamics.soft_body", "rigidimpulse.io", "rigidimpulse.engine.triggers",
-    "rigidimpulse.engine.varying_forces", "rigidimpulse.engine.soft_bodies",
+    "rigidimpulse.engine.varying_forces", "rigidimpulse.engine.soft_bodies", "rigidimpulse.engine.fcl_contacts",
+    "rigidimpulse.collision.distance.fcl_trees", "rigidimpulse.collision.manifold.fcl_contacts",
+    "rigidimpulse.collision.time_of_impact.fcl_gaps",
 )  # fmt: skip
 """Modules that are imported only where a scene asks for them; those of forces that do not vary are in ALWAYS."""
 ALWAYS = {"rigidimpulse.dynamics.forces.constant", "rigidimpulse.io", "rigidimpulse.io.registration"}

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigidimpulse.core.kernels import INTERPRETED
 from rigidimpulse.dynamics.forces import KINDS
-from rigidimpulse.engine.effects import EventKernel, SubsteppedContact, TriggerVolumes, all_effects
+from rigidimpulse.engine.effects import EventKernel, FclNarrowPhase, SubsteppedContact, TriggerVolumes, all_effects
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
 from rigidimpulse.engine.exact.compiled_loop import why_not as why_not_compiled
 from rigidimpulse.engine.exact.joints import JointState
@@ -69,6 +69,10 @@ def _start(world: World, plan: Plan, times: np.ndarray) -> Run:
 def make_run(world: World, plan: Plan, recorder: Recorder, log: EventLog) -> Run:
     """A run with the participants that hold contacts and joints."""
     run = Run(world, plan, recorder, log)
+    if plan.includes(FclNarrowPhase.name):
+        from rigidimpulse.engine.fcl_contacts import FclContacts
+
+        run.narrow_phase = FclContacts(run)
     if world.joints_of_scene:
         run.joints = JointState(world)
     if not why_not_substepped(world):

@@ -19,6 +19,7 @@ from rigidimpulse.engine.exact.trajectories import begin_trajectories
 from rigidimpulse.engine.impact_time import REASONS as IMPACT_TIMES
 from rigidimpulse.engine.impact_time import sweep_with
 from rigidimpulse.engine.loads import add_gyroscopic_term, keep_steady_load, set_steady_load
+from rigidimpulse.engine.narrow_phase import FCL, mesh_bodies, why_not_fcl
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.regime import MANY, only_expensive, why_not_substepped
 from rigidimpulse.engine.run import Run
@@ -47,6 +48,25 @@ class BroadPhase:
             springs = world.accuracy.response == "penalty"
             return Skip(world.why_no_impacts if springs else "a dynamic body and another are needed for contact")
         return Bound(f"{world.num_bodies} bodies may touch", {"pairs": find_pairs})
+
+
+@dataclass(frozen=True)
+class FclNarrowPhase:
+    """FCL's contacts and gaps of meshes; the narrow phase of a run calls it."""
+
+    stage: str = "detect"
+    name: str = FCL
+
+    def bind(self, world: World) -> Bound | Skip:
+        """Included where the accuracy asks for it and two meshes may meet."""
+        reason = why_not_fcl(world)
+        if reason:
+            return Skip(reason)
+        meshes, others = int(np.count_nonzero(mesh_bodies(world))), int(np.count_nonzero(~mesh_bodies(world)))
+        elsewhere = ["where surfaces meet"]
+        elsewhere += [f"at pairs with the {others} other bodies"] if others else []
+        elsewhere += [] if why_not_substepped(world) else ["in sub-stepped islands"]
+        return Bound(f"fcl: contacts and gaps of {meshes} meshes with each other; own manifolds {', '.join(elsewhere)}")
 
 
 @dataclass(frozen=True)
@@ -339,6 +359,7 @@ def all_effects(world: World) -> list[Effect]:
     kinds_of_force = [*KINDS.values(), *(table.kind for table in world.force_tables)]
     return [
         BroadPhase(),
+        FclNarrowPhase(),
         ImpactResponse(),
         Gravity(),
         ConstantForces(),

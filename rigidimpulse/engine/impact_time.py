@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.collision.time_of_impact.result import STALLED
+from rigidimpulse.collision.time_of_impact.result import STALLED, PairsToSweep
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
 
@@ -42,9 +42,8 @@ def sweep_stale_pairs(run: Run, pair_events: PairEvents, method: Callable[..., A
     if not len(stale):
         return
     asked = pairs[stale]
-    columns = (np.ascontiguousarray(asked[name]) for name in ("a", "b", "start", "impact_margin", "tolerance"))
-    a, b, start, impact_margin, tolerance = columns
-    found = method(run.detector, run.state.trajectory, a, b, start, pair_events.end, impact_margin, tolerance)
+    columns = PairsToSweep(*(np.ascontiguousarray(asked[name]) for name in PairsToSweep._fields))
+    found = run.narrow_phase.sweep(run, method, columns, pair_events.end)
     pairs["time"][stale], pairs["witness"][stale], pairs["start"][stale] = found.time, found.witness, np.nan
     for k in np.flatnonzero(found.status == STALLED).tolist():
         pair_events.report(float(found.time[k]), "sweep stalled", stale[k : k + 1], STALLED_REMEDY)

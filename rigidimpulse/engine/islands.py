@@ -15,9 +15,7 @@ from rigidimpulse.engine.touching import (
     FAR_MARGIN,
     Pressing,
     Shared,
-    contacts_at,
     fill_contacts,
-    find_touching,
     near_pairs,
     press,
     split_islands,
@@ -33,14 +31,14 @@ if TYPE_CHECKING:
 
 def touching_islands(run: Run, pair_events: PairEvents, time: float, bodies: np.ndarray) -> tuple[list[Island], np.ndarray]:
     """Islands that the given bodies belong to at `time`, and all bodies looked at, which are brought to it."""
-    world, finder = run.world, run.finder
+    finder = run.finder
     finder.links = np.concatenate([run.joints.links(), run.forces.links()])
     shared = Shared(run.state.under_contact, run.state.sharing, finder.links)
     count = -1
     while count < 0:
         finder.found.reached[:] = False
         finder.found.reached[bodies] = True
-        count = find_touching(world.compiled_shapes, world.constants, run.motion, pair_events.table, shared, finder.found, time)
+        count = run.narrow_phase.find_touching(run, pair_events.table, shared, time)
         if count < 0:
             finder.grow(-count)
     run.forces.weigh(np.flatnonzero(finder.found.brought), time)
@@ -124,9 +122,9 @@ def look_again(run: Run, pair_events: PairEvents, island: Island) -> Island:
 
 def _collect(run: Run, pair_events: PairEvents, pairs: np.ndarray, time: float, margin: float) -> int:
     """Write the contacts of pairs at the present poses within `margin` contact margins into the buffers; returns their number."""
-    world, finder, table = run.world, run.finder, pair_events.table
+    finder, table = run.finder, pair_events.table
     while True:
-        count = contacts_at(world.compiled_shapes, run.motion, table, pairs, margin, finder.found, 0)
+        count = run.narrow_phase.contacts_at(run, table, pairs, margin, 0)
         if count >= 0:
             count = witness_contacts(table, pairs, time, finder.found, 0, count)
         if count >= 0:

@@ -5,18 +5,21 @@ A run and its pair events are `Any` here: their types are made of these.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from rigidimpulse.collision.time_of_impact.result import ImpactTimes, PairsToSweep
     from rigidimpulse.dynamics.constraints.joint_impact import JointBlock
     from rigidimpulse.dynamics.constraints.jointed_island import JointMemory
     from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
     from rigidimpulse.dynamics.forces.force import ForceTable
     from rigidimpulse.dynamics.forces.force_log import ForceWork
     from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
+    from rigidimpulse.engine.pair_table import PairTable
+    from rigidimpulse.engine.touching import Shared
     from rigidimpulse.model.contacts import Contacts
     from rigidimpulse.model.island import Island
     from rigidimpulse.model.joint_table import Joints
@@ -252,6 +255,22 @@ class Flight(Protocol):
 
     def fly(self, end: float, /, at_boundary: bool = True) -> tuple[int, float, float]:
         """Fly towards `end` [s]; returns how that ended, and the step that is under way."""
+        ...
+
+
+class NarrowPhase(Protocol):
+    """Who finds contacts and gaps: `OwnContacts`, or `FclContacts`."""
+
+    def find_touching(self, run: Any, table: PairTable, shared: Shared, time: float, /) -> int:
+        """Write the contacts of all that hangs together with the bodies marked as reached; see `touching.find_touching`."""
+        ...
+
+    def contacts_at(self, run: Any, table: PairTable, places: np.ndarray, margin: float, count: int, /) -> int:
+        """Append the contacts of the pairs at these places, within `margin` contact margins; see `touching.contacts_at`."""
+        ...
+
+    def sweep(self, run: Any, method: Callable[..., ImpactTimes], pairs: PairsToSweep, end: float, /) -> ImpactTimes:
+        """First contacts of pairs until `end` [s]; method: of the accuracy."""
         ...
 
 

@@ -23,7 +23,18 @@ from rigidimpulse.engine.absent import (
 )
 from rigidimpulse.engine.exact.step_size import ErrorEstimate, make_error_estimate
 from rigidimpulse.engine.finder import Finder
-from rigidimpulse.engine.participants import Compiled, Flight, Keyframed, Observer, RunForces, RunJoints, RunSoftBodies, Substepping
+from rigidimpulse.engine.narrow_phase import OwnContacts
+from rigidimpulse.engine.participants import (
+    Compiled,
+    Flight,
+    Keyframed,
+    NarrowPhase,
+    Observer,
+    RunForces,
+    RunJoints,
+    RunSoftBodies,
+    Substepping,
+)
 from rigidimpulse.engine.touching import Motion
 from rigidimpulse.model.plan import Plan
 from rigidimpulse.model.state import State
@@ -53,6 +64,7 @@ class Run:
 
     Attributes:
         joints, forces, substepped, soft_bodies, triggers: participants; what the scene does not call for is one of `absent.py`.
+        narrow_phase: who finds contacts and gaps.
         keyframes: paths of kinematic bodies. flight: the kernel of balls. compiled: the compiled order of events.
         solve_rows: the solver of contacts and joints, None for `newton.solve_newton`.
 
@@ -70,6 +82,7 @@ class Run:
         self.contact_log = ContactLog(recorder.times, n, self.impulses)
         self.detector = Detector(world.geometry, world.shape_of_body, make_scratch(world.geometry), world.accuracy.iterations)
         self.finder = Finder(n)
+        self.narrow_phase: NarrowPhase = OwnContacts()
         self.contact_buffer = ContactBuffer()
         self.impact_log = np.empty((LOG_CAPACITY, 7))
         self.column = np.zeros(n, np.int64)

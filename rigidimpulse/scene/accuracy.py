@@ -5,6 +5,9 @@ Slots
     response        how impulses are computed (stage respond); "penalty": none are, springs push bodies apart that are inside each other,
                     with penalty_stiffness [N/m] and penalty_damping [N s/m] at every point that is inside; None: from weights, speeds
                     and restitutions, see docs/theory/penalty.md
+    narrow_phase    who finds contacts and measures gaps: "exact": own manifolds; "fcl": FCL's contact points and normals for pairs of
+                    meshes, boxes and hulls, and time is backed up by bisection on FCL's gaps; own manifolds for pairs with a half
+                    space, a sphere, a capsule or a cylinder, where surfaces meet, and in sub-stepped islands
     restitution     law that ends an impact: "newton" (speeds), "poisson" (impulses), "energetic" (works; Stronge), or "auto":
                     energetic where a contact has friction, Newton's where it has none. They differ only with friction, and
                     there where the contact couples normal and tangential motion (see dynamics/impact/restitution.py)
@@ -23,9 +26,9 @@ Slots
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from rigidimpulse.core.errors import SceneError
 
@@ -43,6 +46,7 @@ class Accuracy(BaseModel):
 
     impact_time: Literal["bisection", "conservative", "linear", "after"] = "bisection"
     response: Literal["sequential", "simultaneous", "kinematic", "penalty"] = "sequential"
+    narrow_phase: Literal["exact", "fcl"] = "exact"
     restitution: Literal["auto", "newton", "poisson", "energetic"] = "auto"
     penalty_stiffness: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     penalty_damping: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
@@ -53,17 +57,35 @@ class Accuracy(BaseModel):
     tolerance: float = Field(default=1e-13, gt=0.0, le=1e-2, allow_inf_nan=False)
     iterations: int = Field(default=10_000, ge=1)
 
+    @model_validator(mode="after")
+    def _fit_each_other(self) -> Accuracy:
+        """Refuse what a narrow phase cannot do."""
+        if self.narrow_phase == "fcl":
+            if self.impact_time != "bisection":
+                raise ValueError(f"it backs time up by bisection on FCL's gaps, not by {self.impact_time!r}; leave impact_time out")
+            if self.response == "penalty":
+                raise ValueError("springs push bodies apart, no contacts are found; leave narrow_phase out, or use another response")
+            if self.contact_solver == "substepped":
+                raise ValueError("FCL finds no contacts of soft islands; use contact_solver='auto' or 'newton'")
+        return self
+
     def __init__(self, **settings: object) -> None:
         try:
             super().__init__(**settings)
         except ValidationError as error:
-            lines = [f"accuracy: {'.'.join(map(str, e['loc']))} = {e['input']!r}: {e['msg']}" for e in error.errors()]
+            lines = [f"accuracy: {_named(e)}: {e['msg'].removeprefix('Value error, ')}" for e in error.errors()]
             raise SceneError("\n".join(lines)) from None
 
 
-PRESETS = {
+def _named(error: Any) -> str:
+    """The setting that an error is about, and its value; all errors of settings that do not fit each other are about narrow_phase."""
+    return f"{'.'.join(map(str, error['loc']))} = {error['input']!r}" if error["loc"] else "narrow_phase = 'fcl'"
+
+
+PRESETS: dict[str, dict[str, Any]] = {
     "preview": {"impact_time": "conservative", "tolerance": 1e-7, "step": 1.0 / 30.0, "substep_motion": 0.3},
     "standard": {},
+    "classic": {"narrow_phase": "fcl", "impact_time": "bisection", "response": "sequential"},
     "exact": {"step": 1.0 / 240.0, "tolerance": 1e-15, "iterations": 100000},
 }
 

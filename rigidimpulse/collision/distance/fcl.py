@@ -1,4 +1,4 @@
-"""Separation and overlap of two shapes, measured with FCL (the only file that uses it).
+"""Separation and overlap of two shapes, measured with FCL. Only this file and `fcl_trees` use it.
 
 Every finite ROUND primitive is a skeleton (triangles, a segment or a point; the last two are triangles without area)
 grown by a radius. Skeletons go to FCL as trees of triangles, for which its distance is exact to round-off; the gap is the
@@ -91,7 +91,7 @@ class Narrowphase:
         for index, shape in enumerate(self.shapes):
             _check(shape, index)
         self.geometry = build_geometry(self.shapes) if geometry is None else geometry
-        self._scale = _scale(self.shapes)
+        self._scale = scale_of(self.shapes)
         self._solids: dict[int, _Solid] = {}
         self._request = fcl.DistanceRequest(enable_nearest_points=True)
 
@@ -302,7 +302,7 @@ def _triangles(primitive: Primitive) -> np.ndarray:
     return np.asarray(primitive.faces) if len(primitive.faces) else np.array([[0, last, last]])
 
 
-def _scale(shapes: list[CompiledShape]) -> float:
+def scale_of(shapes: list[CompiledShape]) -> float:
     """Return the power of two that makes the smallest triangle a large one."""
     sizes = [1.0]
     for primitive in (primitive for shape in shapes for primitive in shape.primitives if primitive.kind == ROUND):
@@ -354,8 +354,13 @@ def _skeleton(primitives: list[Primitive], scale: float) -> _Skeleton:
     first = np.cumsum([0, *(len(primitive.vertices) for primitive in primitives)])
     vertices = np.concatenate([primitive.vertices for primitive in primitives]) * scale
     faces = np.concatenate([_triangles(p) + offset for p, offset in zip(primitives, first, strict=False)])
+    return _Skeleton(primitives[0].radius, objects_of(vertices, faces))
+
+
+def objects_of(vertices: np.ndarray, faces: np.ndarray) -> tuple[fcl.CollisionObject, fcl.CollisionObject]:
+    """FCL's tree of triangles, as two objects: vertices (v, 3), scaled; faces (f, 3), at least one."""
     tree = fcl.BVHModel()
     tree.beginModel(len(faces), len(vertices))
     tree.addSubModel(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
     tree.endModel()
-    return _Skeleton(primitives[0].radius, (fcl.CollisionObject(tree), fcl.CollisionObject(tree)))
+    return fcl.CollisionObject(tree), fcl.CollisionObject(tree)

@@ -44,6 +44,7 @@ from rigidimpulse.engine.exact.event_loop import (
 )
 from rigidimpulse.engine.exact.impacts import WITHOUT_REBOUND_REMEDY
 from rigidimpulse.engine.impact_time import STALLED_REMEDY
+from rigidimpulse.engine.narrow_phase import FCL
 from rigidimpulse.engine.pair_events import INSTANT, NOT_RESOLVED_REMEDY, PairEvents
 from rigidimpulse.engine.pair_table import pair_bodies
 from rigidimpulse.engine.run import NOT_FINITE_REMEDY, Run
@@ -83,6 +84,8 @@ def why_not(world: World, plan: Plan) -> str:
         return f"the response is {accuracy.response!r}"
     if accuracy.impact_time not in ("bisection", "conservative"):
         return f"the time of impact is found by {accuracy.impact_time!r}"
+    if plan.includes(FCL):
+        return "contacts are FCL's"
     if world.joints_of_scene or world.force_tables:
         return "there are joints, or forces vary"
     missing = [name for name in NEEDED if not plan.includes(name)]

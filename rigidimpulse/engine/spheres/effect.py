@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.collision.geometry import HALF_SPACE
+from rigidimpulse.engine.narrow_phase import why_not_fcl
 from rigidimpulse.engine.regime import only_expensive, why_not_substepped
 from rigidimpulse.engine.spheres.layout import BALL, OTHER, PLANE
 from rigidimpulse.model.world import World
@@ -24,6 +25,8 @@ def why_not(world: World) -> str:
         return "no ball may meet another one or a plane"
     if not np.all(np.isfinite(world.bound_radius[kind == OTHER])):
         return "half spaces that move, or in parts"
+    if not why_not_fcl(world):
+        return "contacts of meshes are FCL's"
     if world.joints_of_scene or world.force_tables:
         return "joints" if world.joints_of_scene else "forces vary"
     if world.triggers:

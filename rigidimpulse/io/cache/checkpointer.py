@@ -161,7 +161,7 @@ def _constants(run: Run) -> Constants:
     """Return the parts of a run that its checkpoints do not hold."""
     world, recorder = run.world, run.recorder
     own = [run.plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), run.log.buffers.impacts]
-    made_again = [run.compiled, run.triggers.narrowphase]
+    made_again = [run.compiled, run.narrow_phase, run.triggers.narrowphase]
     roots = [world.scene, world.scene.bodies, world.scene.effects, world.shapes, world.geometry, world.accuracy, *own, *made_again]
     return Constants(roots)
 

@@ -20,9 +20,10 @@ from typing import Any, NamedTuple
 PACKAGE = "rigidimpulse."
 HOMES = (
     "core.simd", "scene.mass", "scene.joint", "scene.joint_six_axis", "collision", "motion", "model", "dynamics", "engine.exact",
-    "engine.substepped", "engine.spheres", "engine.absent", "engine.islands", "engine.finder", "engine.touching", "engine.keyframe_paths",
-    "engine.pair_events", "engine.pair_table", "engine.regime", "engine.run", "engine.soft_bodies", "engine.triggers",
-    "engine.varying_forces", "recording.contact_log", "recording.contacts", "recording.events", "recording.impulses", "recording.recorder",
+    "engine.substepped", "engine.spheres", "engine.absent", "engine.islands", "engine.finder", "engine.touching", "engine.narrow_phase",
+    "engine.fcl_contacts", "engine.keyframe_paths", "engine.pair_events", "engine.pair_table", "engine.regime", "engine.run",
+    "engine.soft_bodies", "engine.triggers", "engine.varying_forces", "recording.contact_log", "recording.contacts", "recording.events",
+    "recording.impulses", "recording.recorder",
 )  # fmt: skip
 """Packages and modules whose classes a state is made of: nothing in them reads or runs files."""
 FUNCTIONS = {
@@ -34,7 +35,10 @@ FUNCTIONS = {
 """Functions that a state may hold: modules and names."""
 METHODS = {("model.plan.Plan", "clock"), ("model.world.World", "may_collide")}
 """Classes and names of the methods that a state may hold, bound to an object of just that class."""
-MADE_AGAIN = ("engine.exact.compiled_loop.CompiledLoop", "collision.distance.fcl.Narrowphase")
+MADE_AGAIN = (
+    "engine.exact.compiled_loop.CompiledLoop", "engine.fcl_contacts.FclContacts", "collision.distance.fcl.Narrowphase",
+    "collision.distance.fcl_trees.TriangleTrees",
+)  # fmt: skip
 """Classes of the homes whose objects hold addresses or trees of other libraries: a run that goes on has made its own."""
 
 
