@@ -488,7 +488,7 @@ class SubsteppedIslands:
         if self._joint_stepper is None:
             prepare_kernels(self._world, with_events=False, with_substepped=True)
             self._joint_stepper = JointedStepper(run, self.stepper)
-        self._set_up(run, members, span[0], span[1] - span[0], kept, self._joint_stepper.fineness)
+        self._set_up(run, members, span[0], span[1] - span[0], kept, self._joint_stepper.fineness(run, members))
         return self._joint_stepper.step(run, *span)
 
     def _take_in(self, run: Run, fresh: np.ndarray, time: float) -> None:

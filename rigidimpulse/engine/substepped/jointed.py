@@ -15,10 +15,13 @@ from rigidimpulse.dynamics.solvers.time_stepping.solver import step_island, stop
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Fineness, Outcome
 from rigidimpulse.engine.substepped.given_impulses import GivenImpulses
+from rigidimpulse.engine.substepped.trajectories import most_stray
 from rigidimpulse.motion.body_state import BodyState
 
-SUB_STEPS = 8
-"""Sub-steps of a whole step, at least."""
+SUB_STEPS, MOST_SUB_STEPS = 8, 64
+"""Sub-steps of a whole step, at least, and at most for what turns fast."""
+BEND: float = 1.5e-3
+"""Skins by which the path of a point may bend, over 8, in a sub-step: contacts are closed along straight lines, so bodies enter by as much."""
 MOTION = 1.0
 """Parts of `Accuracy.substep_motion` that touching bodies move until their contacts are looked for again."""
 CLOSED = TOLERANCES.sub_stepping.joints_closed
@@ -28,7 +31,7 @@ class JointedStepper:
     """Steps islands with joints, one by one.
 
     Attributes:
-        fineness: how finely. halved: sub-steps that were halved, so far.
+        halved: sub-steps that were halved, so far.
 
     """
 
@@ -36,7 +39,6 @@ class JointedStepper:
         """Bodies by rank; joints with the ranks of their bodies."""
         world, bodies, n = run.world, stepper.bodies, run.world.num_bodies
         self._stepper, self._world = stepper, world
-        self.fineness = Fineness(world.accuracy.step / SUB_STEPS, MOTION * world.accuracy.substep_motion, meets_fast=True)
         inv_mass = np.concatenate([world.inv_mass[stepper.order], np.zeros(1)])
         self._now = BodyState(
             bodies.position, bodies.orientation, np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), inv_mass, np.zeros((n + 1, 3, 3))
@@ -47,6 +49,14 @@ class JointedStepper:
         self._stiffening, self._column = np.zeros(n + 1), np.zeros(n + 1, np.int64)
         self._driven, self.halved = np.zeros(n + 1, bool), 0
         self._allowed = CLOSED * world.joint_size
+
+    def fineness(self, run: Run, members: np.ndarray) -> Fineness:
+        """How finely members are stepped from the present instant."""
+        stepper, accuracy = self._stepper, self._world.accuracy
+        pressed = np.ones(len(stepper.pressed), bool)
+        stray = most_stray(run.state.now, members, pressed, stepper.reach, stepper.skin, BEND)
+        pieces = min(max(stray * accuracy.step, SUB_STEPS), MOST_SUB_STEPS)
+        return Fineness(accuracy.step / pieces, MOTION * accuracy.substep_motion, meets_fast=True)
 
     def step(self, run: Run, time: float, end: float) -> Outcome:
         """Step the island that is set up, whose bodies have joints, from `time` to `end`."""
