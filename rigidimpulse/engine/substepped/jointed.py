@@ -21,7 +21,7 @@ from rigidimpulse.motion.body_state import BodyState
 SUB_STEPS, MOST_SUB_STEPS = 8, 64
 """Sub-steps of a whole step, at least, and at most for what turns fast."""
 BEND: float = 1.5e-3
-"""Skins by which the path of a point may bend, over 8, in a sub-step: contacts are closed along straight lines, so bodies enter by as much."""
+"""Skins by which the path of a point may bend in a sub-step, over 8: contacts close along straight lines, so bodies enter by as much."""
 MOTION = 1.0
 """Parts of `Accuracy.substep_motion` that touching bodies move until their contacts are looked for again."""
 CLOSED = TOLERANCES.sub_stepping.joints_closed
@@ -53,8 +53,9 @@ class JointedStepper:
     def fineness(self, run: Run, members: np.ndarray) -> Fineness:
         """How finely members are stepped from the present instant."""
         stepper, accuracy = self._stepper, self._world.accuracy
-        pressed = np.ones(len(stepper.pressed), bool)
-        stray = most_stray(run.state.now, members, pressed, stepper.reach, stepper.skin, BEND)
+        pairs, near = stepper.table.pairs, np.zeros(len(stepper.pressed), bool)
+        near[stepper.order[pairs.first]] = near[stepper.order[pairs.second]] = True
+        stray = most_stray(run.state.now, members, near, stepper.reach, stepper.skin, BEND)
         pieces = min(max(stray * accuracy.step, SUB_STEPS), MOST_SUB_STEPS)
         return Fineness(accuracy.step / pieces, MOTION * accuracy.substep_motion, meets_fast=True)
 
