@@ -46,7 +46,7 @@ def given_options(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str | None = None) -> Recording:
-    """Simulate with a progress bar, kept in a cache if one is named, and print the summary; names and folders of outputs are looked at first."""
+    """Simulate with a progress bar, kept in a cache if one is named, and print the summary; outputs are looked at first."""
     from rigidimpulse.core.errors import SceneError
     from rigidimpulse.core.files import check_target
 

@@ -1,7 +1,7 @@
 """The file below an HDF5 file that is written.
 
-HDF5 reports an error of the disk that it meets while it closes a table as text on the error stream, and may end the process. So it is given a
-file object whose writes always succeed: the first error is kept here, what comes after it is dropped, and `check` raises the error.
+HDF5 reports an error of the disk that it meets while it closes a table as text on the error stream, and may end the process. So it is
+given a file object whose writes always succeed: the first error is kept here, what comes after it is dropped, and `check` raises the error.
 """
 
 from __future__ import annotations
