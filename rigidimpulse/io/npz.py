@@ -98,7 +98,7 @@ class _Arrays:
             if dtype.hasobject or claimed != there:
                 raise ValueError(f"{name} claims {claimed} bytes of {dtype}, in the file are {there}")
         with self._archive.open(member) as file:
-            array = np.lib.format.read_array(file, allow_pickle=False)
+            array = np.lib.format.read_array(file)  # objects are refused above, and by default
             if file.read(1):  # the end of the bytes has their check sum
                 raise ValueError(f"{name} is longer than it says")
         return array
