@@ -41,7 +41,7 @@ def write_renamed(path: Path, write: Callable[[Path], object]) -> Path:
     """
     check_target(path)
     remove_left_over(path)
-    # A name that nobody can foresee, so that no link can wait there; threads and machines with the same disk never share one.
+    # A name that nobody can guess, so that no link can wait there; threads and machines with the same disk never share one.
     temporary = path.with_name(f".{path.stem}.{_machine()}.{os.getpid()}.{secrets.token_hex(4)}{path.suffix}")
     try:
         write(temporary)
