@@ -116,7 +116,7 @@ class _Arrays:
         return array
 
     def text(self, name: str, ndim: int) -> np.ndarray:
-        """Return an array of texts with so many dimensions.
+        """Return an array of texts with `ndim` dimensions.
 
         Raises:
             ValueError: it holds something else.
