@@ -48,12 +48,14 @@ def given_options(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str | None = None) -> Recording:
-    """Simulate with a progress bar, kept in a cache if one is named, and print the summary; names of outputs are looked at first."""
+    """Simulate with a progress bar, kept in a cache if one is named, and print the summary; outputs are looked at first."""
     from rigidimpulse.core.errors import SceneError
+    from rigidimpulse.core.files import check_target
 
     for target in output:
         if Path(target).suffix not in export_suffixes():
             raise SceneError(f"cannot write {target!r}", f"use a name that ends in {', '.join(export_suffixes())}")
+        check_target(Path(target))
     from time import perf_counter
 
     from tqdm import tqdm

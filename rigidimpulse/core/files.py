@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import glob
+import hashlib
 import os
+import platform
+import secrets
 from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,27 +23,105 @@ except ImportError:  # no POSIX
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
+TOKEN = 8
+"""Characters of each mark in a temporary name."""
+LONGEST_REASON = 200
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""A spreadsheet takes a cell that begins so for a formula."""
+MOST_UNPACKED, LEAST_UNPACKED = 1032, 64
+"""zlib packs no more bytes than this into one, and into an empty block."""
+
 
 def write_renamed(path: Path, write: Callable[[Path], object]) -> Path:
-    """Write to a temporary name beside the target, then rename: nobody ever sees half a file. Returns the path."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    """Write to a temporary name beside the target, then rename: nobody ever sees half a file. Returns the path.
+
+    Raises:
+        SceneError: the folder is missing, or the disk takes no file or not all of it.
+
+    """
+    check_target(path)
+    remove_left_over(path)
+    # A name that nobody can guess, so that no link can wait there; threads and machines with the same disk never share one.
+    temporary = path.with_name(f".{path.stem}.{_machine()}.{os.getpid()}.{secrets.token_hex(4)}{path.suffix}")
     try:
         write(temporary)
         temporary.replace(path)
+    except OSError as error:
+        raise unwritable(error, f"file {str(path)!r}") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
     return path
 
 
+def check_target(path: Path) -> None:
+    """Check that a file of this name can be there.
+
+    Raises:
+        SceneError: its folder is missing, it is a folder itself, or the name is none.
+
+    """
+    where = f"file {str(path)!r}"
+    try:
+        os.fsencode(path)
+    except ValueError:
+        raise SceneError("its name has letters that are none", "give another name", where) from None
+    if "\0" in str(path):
+        raise SceneError("its name has a NUL in it", "give another name", where)
+    if not path.parent.is_dir():
+        raise SceneError(f"there is no folder {str(path.parent)!r}", "make the folder, or correct the path", where)
+    if path.is_dir():
+        raise SceneError("it is a folder", "give the name of a file", where)
+
+
+def unwritable(error: Exception, where: str, remedy: str = "make space or give another folder, and write it again") -> SceneError:
+    """Return the `SceneError` for a file that the disk does not take; `where` names the file."""
+    reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return SceneError(f"it cannot be written ({reason.splitlines()[0][:LONGEST_REASON]})", remedy, where)
+
+
+def plain_cell(text: str) -> str:
+    """Return a text for a cell of a .csv table: an apostrophe stands before one that a spreadsheet would compute, if it is no number.
+
+    Source: OWASP, CSV Injection.
+    """
+    try:
+        float(text)
+    except ValueError:
+        return f"'{text}" if text.lstrip(" ").startswith(FORMULA) else text
+    return text
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for several files, and those above it, if they are missing.
+
+    Raises:
+        SceneError: the disk does not take it, or there is a file of that name.
+
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SceneError(f"it cannot be made ({reason})", "give another folder", f"folder {str(folder)!r}") from None
+
+
 def remove_left_over(path: Path) -> None:
-    """Remove the temporary files that processes which are gone have left beside the target of `write_renamed`."""
+    """Remove the temporary files that processes of this machine which are gone have left beside the target of `write_renamed`."""
     if fcntl is None:  # elsewhere asking for a process may end it
         return
-    for left in path.parent.glob(f".{glob.escape(path.stem)}.*{glob.escape(path.suffix)}"):
-        process = left.name.removeprefix(f".{path.stem}.").removesuffix(path.suffix)
-        if process.isascii() and process.isdigit() and not _is_alive(int(process)) and not _is_locked(left):
-            left.unlink(missing_ok=True)
+    head = f".{path.stem}.{_machine()}."
+    for left in path.parent.glob(f"{glob.escape(head)}*{glob.escape(path.suffix)}"):
+        process, _, token = left.name.removeprefix(head).removesuffix(path.suffix).partition(".")
+        if len(token) == TOKEN and process.isascii() and process.isdigit() and not _is_alive(int(process)) and not _is_locked(left):
+            with suppress(OSError):  # another run may be as quick
+                left.unlink(missing_ok=True)
+
+
+@cache
+def _machine() -> str:
+    """Return a mark of this machine: numbers of processes mean something on their own machine only."""
+    return hashlib.sha256(platform.node().encode()).hexdigest()[:TOKEN]
 
 
 def _is_alive(process: int) -> bool:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigidimpulse.core.files import plain_cell
+
 if TYPE_CHECKING:
     from rigidimpulse.recording.exporters import ExportTarget
     from rigidimpulse.recording.recording import Recording
@@ -22,11 +24,15 @@ COLUMNS = (
 
 
 def write_csv(run: Recording, target: ExportTarget) -> None:
-    """Write a .csv file of a run: UTF-8, with the head `COLUMNS`, frames in order, within a frame bodies in the order of `run.names`."""
+    """Write a .csv file of a run: UTF-8, with the head `COLUMNS`, frames in order, within a frame bodies in the order of `run.names`.
+
+    A name that a spreadsheet would compute has an apostrophe in front, see `plain_cell`.
+    """
     figures = np.concatenate([run.positions, run.orientations, run.velocities, run.angular_velocities], axis=2).tolist()
+    names = [plain_cell(name) for name in run.names]
     with target.path.open("w", newline="", encoding="utf-8") as file:
         file.writelines(f"# {warning}\r\n" for warning in run.status.warnings)
         rows = csv.writer(file)
         rows.writerow(COLUMNS)
         for frame, (time, bodies) in enumerate(zip(run.times.tolist(), figures, strict=True)):
-            rows.writerows([time, frame, name, *values] for name, values in zip(run.names, bodies, strict=True))
+            rows.writerows([time, frame, name, *values] for name, values in zip(names, bodies, strict=True))

@@ -47,16 +47,17 @@ class Scene:
         """Add a body, or an effect (a `SceneEffect`: forces, joints, triggers, soft bodies), and return it.
 
         Raises:
-            SceneError: the name is taken, or it is neither.
+            SceneError: the name is taken, no text, or a text that files cannot hold; or it is neither.
 
         """
         if isinstance(thing, Body):
-            if not isinstance(thing.name, str) or not thing.name:
-                raise SceneError(f"a body's name is {thing.name!r}", "give a text that is not empty")
+            _check_name(thing.name)
             if thing.name in self._bodies:
                 raise SceneError("the scene has a body of this name already", "give it another", f"body {thing.name!r}")
             self._bodies[thing.name] = thing
         elif isinstance(thing, SceneEffect):
+            if (name := getattr(thing, "name", None)) is not None and name != "":
+                _check_name(name, type(thing).__name__)
             self._effects.append(thing)
         else:
             what = f"the class {thing.__name__}" if isinstance(thing, type) else f"a {type(thing).__name__}"
@@ -111,6 +112,18 @@ class Scene:
     def __repr__(self) -> str:
         """Return the numbers of bodies and effects."""
         return f"Scene({len(self._bodies)} bodies, {len(self._effects)} effects)"
+
+
+def _check_name(name: object, what: str = "body") -> None:
+    """Raise a `SceneError` for a name that is no text, or one that some file could not hold."""
+    if not isinstance(name, str) or not name:
+        raise SceneError(f"a {what}'s name is {name!r}", "give a text that is not empty")
+    if "\0" in name:
+        raise SceneError(f"the name {name[:80]!r} has a NUL in it", "leave it out: files end a text there")
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        raise SceneError(f"the name {name[:80]!r} has a lone surrogate in it", "give letters that UTF-8 can write") from None
 
 
 def validate(scene: Scene) -> None:

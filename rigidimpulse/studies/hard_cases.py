@@ -21,6 +21,7 @@ from time import perf_counter
 from typing import Any
 
 from rigidimpulse import gallery
+from rigidimpulse.core.files import make_folder
 from rigidimpulse.core.version import VERSION
 from rigidimpulse.gallery.hard import FAMILIES
 from rigidimpulse.gallery.record import Check, GalleryScene
@@ -241,7 +242,7 @@ def write_results(results: Sequence[CaseResult], folder: Path, limit: float) -> 
     """Write hard_cases.json and hard_cases.html into a folder; return their paths."""
     from rigidimpulse.studies.hard_page import page
 
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     about = machine()
     figures = {"machine": about, "limit": limit, "passed": sum(r.passed for r in results), "cases": [asdict(r) for r in results]}
     arrays, table = folder / "hard_cases.json", folder / "hard_cases.html"

@@ -18,6 +18,7 @@ from pathlib import Path
 from time import perf_counter
 
 from rigidimpulse import gallery
+from rigidimpulse.core.files import make_folder
 from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.studies.hard_cases import FAILED, PASSED, CaseResult, as_plain, lost_case, run_limited
 
@@ -56,7 +57,7 @@ def make_site(
         raise SceneError(f"jobs is {jobs}", "give the number of scenes that run at a time, >= 1")
     chosen = list(dict.fromkeys(names)) or list(gallery.names())
     entries = [gallery.load(name) for name in chosen]
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     newest = max(path.stat().st_mtime for path in PACKAGE.rglob("*") if path.suffix in (".py", ".js", ".css", ".html"))
 
     def run(name: str) -> CaseResult:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.core.files import write_renamed
+from rigidimpulse.core.files import make_folder, write_renamed
 from rigidimpulse.studies.measures import Truth
 from rigidimpulse.studies.reference import Reference
 from rigidimpulse.studies.row import COLUMNS, Row
@@ -39,7 +39,7 @@ class StoredRows:
                 self._rows = {cells["name"]: Row.of(cells) for cells in complete}
             else:
                 path.replace(path.with_suffix(".old.csv"))
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         with path.open("w", encoding="utf-8", newline="") as file:
             file.write(first + "\n")
             writer = csv.writer(file)
@@ -69,6 +69,7 @@ def stored_reference(path: Path | None, fingerprint: str, make: Callable[[], Ref
             pass  # cut off while it was written: made again
     reference = make()
     if path is not None:
+        make_folder(path.parent)
         write_renamed(path, lambda target: np.savez_compressed(target, **_arrays(reference, fingerprint)))
     return reference
 

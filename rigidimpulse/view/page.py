@@ -10,13 +10,13 @@ from __future__ import annotations
 import base64
 import gzip
 import html
-import json
 import os
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from rigidimpulse.core.json_text import json_text
 from rigidimpulse.recording.exporters import ExportTarget
 from rigidimpulse.view.contents import MOST_KEYS, DrawnMeshes, check_entries, is_large, page_contents
 from rigidimpulse.view.protocol import RecordingLike
@@ -83,7 +83,7 @@ def assemble(
         "license": (viewer / "main.min.js.LICENSE.txt").read_text(encoding="utf-8").replace("--", "- -"),
         "meshcat": (viewer / "main.min.js").read_text(encoding="utf-8"),
         "commands": "\n".join(_command(kind, message) for kind, message in messages),
-        "manifest": json.dumps(manifest, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "manifest": json_text(manifest).replace("<", "\\u003c"),
         "script": "\n".join((files / name).read_text(encoding="utf-8") for name in scripts),
     }
     return fill_template((files / "page.html").read_text(encoding="utf-8"), fields)

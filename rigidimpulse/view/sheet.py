@@ -10,7 +10,6 @@ from __future__ import annotations
 import base64
 import gzip
 import html
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib import resources
@@ -19,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.core.json_text import json_text
 from rigidimpulse.engine.fingerprint import digest_of
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.shape import rotation_matrix
@@ -130,7 +130,7 @@ def _page(index: dict[str, Any], block: bytes, title: str) -> str:
         "license": (viewer / "main.min.js.LICENSE.txt").read_text(encoding="utf-8").replace("--", "- -"),
         "meshcat": (viewer / "main.min.js").read_text(encoding="utf-8"),
         "block": base64.b64encode(gzip.compress(block, compresslevel=6, mtime=0)).decode("ascii"),
-        "index": json.dumps(index, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "index": json_text(index).replace("<", "\\u003c"),
         "script": "\n".join((files / name).read_text(encoding="utf-8") for name in SCRIPTS),
     }
     return fill_template((files / "sheet.html").read_text(encoding="utf-8"), fields)

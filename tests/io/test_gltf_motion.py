@@ -326,6 +326,7 @@ def test_images_and_buffers_come_along(tmp_path: Path) -> None:
     tree = {**file.tree, "buffers": [{"byteLength": len(file.data), "uri": "data.bin"}], "images": [{"uri": "skin.png"}]}
     (tmp_path / "in.gltf").write_text(json.dumps(tree))
     scene = ri.load_scene(tmp_path / "in.gltf")
+    (tmp_path / "there").mkdir()
     out = recorded(scene, {"crate": smooth(3, (0, 0, 0))}).export(tmp_path / "there" / "out.glb")
     tree, data = unpack(out)
     check_structure(tree, data)

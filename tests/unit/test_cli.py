@@ -94,7 +94,7 @@ def test_checks_are_left_out_where_the_duration_is_another():
 
 
 def test_simulate_runs_a_scene_file(scene_file, tmp_path):
-    out = tmp_path / "folder" / "ball.npz"
+    out = tmp_path / "ball.npz"
     result = call("simulate", scene_file, "-o", out, "--duration", 1, "--fps", 100, "--accuracy", "preview", "--profile")
     assert result.exit_code == 0, result.output
     assert "sweep" in result.stdout and "loading or compiling kernels" in result.stdout

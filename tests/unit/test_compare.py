@@ -244,7 +244,7 @@ class TestCommand:
 
     @pytest.mark.parametrize(("words", "message"), [
         (("previw", "exact"), "cannot compare 'previw'"),
-        (("exact", "lost.npz"), "lost.npz is no recording"),
+        (("exact", "lost.npz"), "there is no such file"),
         (("exact", "preview", "-o", "page.htm"), "ends in .html"),
     ])  # fmt: skip
     def test_bad_words_are_refused_before_anything_runs(self, words: tuple[str, ...], message: str, tmp_path: Path) -> None:

@@ -74,7 +74,11 @@ class Checkpointer:
         self._file = None if complete else CacheFile(self._path, header, stored)
         self._last, self._cost = perf_counter(), 0.0
         if stored is None or stored.state is None:
-            self.write(0.0)  # a state that cannot be written is better known at once
+            try:
+                self.write(0.0)  # a state that cannot be written is better known at once
+            except BaseException:
+                self.close()
+                raise
 
     def _look_up(self, header: Header) -> Content | None:
         """Return what the file has of this run, None without a file."""

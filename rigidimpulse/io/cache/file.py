@@ -10,14 +10,16 @@ this one.
 from __future__ import annotations
 
 import json
-import os
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
-from rigidimpulse.core.files import remove_left_over, write_renamed
+from rigidimpulse.core.files import unwritable, write_renamed
+from rigidimpulse.io.cache.disk import Disk
 from rigidimpulse.io.cache.layout import CHECK, COMMIT, FORMAT, FRAMES, Content, Header, check_words, digest_of, empty, library, seal_of
 from rigidimpulse.recording.events import ROW_LENGTH
 
@@ -34,33 +36,41 @@ class CacheFile:
     def __init__(self, path: Path, header: Header, content: Content | None) -> None:
         """Begin the file, in the place of any of its name, with what there is already."""
         self._path, self._header, self._number = path, header, 0
-        remove_left_over(path)
         self._file = self._make(content or empty(len(header.names)))
 
-    def _make(self, content: Content) -> Any:
+    def _make(self, content: Content) -> _Open:
         """Make the file with this content and capacity for more; return it open."""
         data = b"" if content.state is None else zlib.compress(content.state, 1)
 
         def create(target: Path) -> None:
-            with library().File(target, "w", libver=(VERSION_OF_HDF5, VERSION_OF_HDF5)) as file:
-                _lay_out(file, self._header, max(SPARE * len(content.impacts), LEAST_IMPACTS), SPARE * len(data))
-                file.attrs["seal"] = seal_of(self._header, False, {})
-                self._commit(file, content, 0, 0, data)
+            with _Open(target, new=True) as made:
+                _lay_out(made.file, self._header, max(SPARE * len(content.impacts), LEAST_IMPACTS), SPARE * len(data))
+                made.file.attrs["seal"] = seal_of(self._header, False, {})
+                self._commit(made, content, 0, 0, data)
 
-        write_renamed(self._path, create)
-        return library().File(self._path, "r+", libver=(VERSION_OF_HDF5, VERSION_OF_HDF5))
+        with _told(self._path):
+            write_renamed(self._path, create)
+            return _Open(self._path, new=False)
 
     def commit(self, content: Content, first_frame: int, first_impact: int) -> None:
-        """Write frames and impacts of a content, from the first ones on, and its state."""
+        """Write frames and impacts of a content, from the first ones on, and its state.
+
+        Raises:
+            SceneError: the disk does not take it.
+
+        """
         assert content.state is not None
         data = zlib.compress(content.state, 1)
-        if len(data) > len(self._file["checkpoint/0"]) or len(content.impacts) > len(self._file["impacts"]):
-            self._file.close()
+        file = self._file.file
+        if len(data) > len(file["checkpoint/0"]) or len(content.impacts) > len(file["impacts"]):
+            self.close()
             self._file = self._make(content)
         else:
-            self._commit(self._file, content, first_frame, first_impact, data)
+            with _told(self._path):
+                self._commit(self._file, content, first_frame, first_impact, data)
 
-    def _commit(self, file: Any, content: Content, first_frame: int, first_impact: int, data: bytes) -> None:
+    def _commit(self, opened: _Open, content: Content, first_frame: int, first_impact: int, data: bytes) -> None:
+        file = opened.file
         count = len(content.frames["position"])
         for name, rows in content.frames.items():
             file[f"frames/{name}"][first_frame:count] = rows[first_frame:]
@@ -72,16 +82,17 @@ class CacheFile:
         self._number += 1
         slot = self._number % 2
         file[f"checkpoint/{slot}"][: len(data)] = np.frombuffer(data, np.uint8)
-        _sync(file)
+        opened.sync()
         told = (self._number, content.time, count, len(content.impacts), len(data), len(content.state), b"")
         commit = np.array(told, COMMIT)
         commit["digest"] = digest_of(commit, data)
         file["checkpoint/commits"][slot] = commit
-        _sync(file)
+        opened.sync()
 
     def close(self) -> None:
         """End writing."""
-        self._file.close()
+        with _told(self._path):
+            self._file.close()
 
     def finish(self, content: Content) -> None:
         """Put the file of the finished run in the place of this one."""
@@ -89,15 +100,17 @@ class CacheFile:
         tables = {name: np.bytes_(str(table).encode()) if table.dtype.kind == "U" else table for name, table in content.tables.items()}
 
         def create(target: Path) -> None:
-            with library().File(target, "w", libver=(VERSION_OF_HDF5, VERSION_OF_HDF5)) as file:
+            with _Open(target, new=True) as made:
+                file = made.file
                 _lay_out(file, self._header, len(content.impacts), len(data))
-                self._commit(file, content, 0, 0, data)
+                self._commit(made, content, 0, 0, data)
                 for name, table in tables.items():
                     file[f"tables/{name}"] = table
                 file.attrs["complete"] = True
                 file.attrs["seal"] = seal_of(self._header, True, tables)
 
-        write_renamed(self._path, create)
+        with _told(self._path):
+            write_renamed(self._path, create)
         self.close()
 
 
@@ -121,7 +134,44 @@ def _lay_out(file: Any, header: Header, impacts: int, size: int) -> None:
         file.create_dataset(f"checkpoint/{slot}", (size,), np.uint8, dcpl=now)
 
 
-def _sync(file: Any) -> None:
-    """Have all that was written on disk."""
-    file.flush()
-    os.fsync(file.id.get_vfd_handle())
+class _Open:
+    """An HDF5 file that is open for writing, and the file below it."""
+
+    def __init__(self, path: Path, *, new: bool) -> None:
+        """Open it; new: an empty one."""
+        self._disk = Disk(path, new=new)
+        try:
+            self.file: Any = library().File(self._disk, "w" if new else "r+", libver=(VERSION_OF_HDF5, VERSION_OF_HDF5))
+        except BaseException:
+            self._disk.close()
+            raise
+
+    def __enter__(self) -> Self:
+        """Return this."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Close both."""
+        self.close()
+
+    def sync(self) -> None:
+        """Have all that was written on disk; raises OSError where it does not take it."""
+        self.file.flush()
+        self._disk.sync()
+
+    def close(self) -> None:
+        """Close both; raises OSError where the disk has not taken all of it."""
+        try:
+            self.file.close()
+            self._disk.check()
+        finally:
+            self._disk.close()
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Turn what the disk does not take into a `SceneError` that names the cache."""
+    try:
+        yield
+    except OSError as error:
+        raise unwritable(error, f"cache {str(path)!r}", "make space, and run again: the run goes on from its last checkpoint") from error

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.files import LEAST_UNPACKED, MOST_UNPACKED
 from rigidimpulse.io.cache.arrays import Damaged
 from rigidimpulse.io.cache.layout import (
     CHECK,
@@ -37,8 +38,6 @@ REMEDY = "delete it, and run again"
 LONGEST_TEXT = 1000
 TRIES = 3
 """A run that goes on may write both checkpoints while one of them is read."""
-MOST_UNPACKED, LEAST_UNPACKED = 1032, 64
-"""zlib packs no more bytes than this into one, and into an empty block."""
 
 
 def read(path: Path, alone: bool = False) -> tuple[Header, Content]:

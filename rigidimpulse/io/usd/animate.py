@@ -22,7 +22,7 @@ from rigidimpulse.io.keys import Keys
 from rigidimpulse.io.motion import Motion
 from rigidimpulse.io.usd.draw import Drawing, draw_soft_body
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place, quaternions, sample, valid_name, vectors
-from rigidimpulse.io.usd.library import Gf, Layer, PrimSpec, Sdf, SdfPath, UsdUtils, Vt
+from rigidimpulse.io.usd.library import Gf, Layer, PrimSpec, Sdf, SdfPath, Tf, UsdUtils, Vt, cause_of
 from rigidimpulse.io.usd.origin import UsdOrigin
 from rigidimpulse.view.camera import stage_rotation, up_axis
 from rigidimpulse.view.materials import color
@@ -47,19 +47,28 @@ def write_usd(run: Recording, target: ExportTarget) -> None:
 
     Raises:
         SceneError: usd-core is missing, an option makes no sense, or a pose is not finite.
+        OSError: the disk does not take the file.
 
     """
     motion = Motion(run, target.options)
     path = target.path
     if path.suffix != ".usdz":
-        layer = Sdf.Layer.CreateNew(str(path))
-        _Writer(run, motion, layer).write()
-        layer.Save()
+        try:
+            layer = Sdf.Layer.CreateNew(str(path))
+            _Writer(run, motion, layer).write()
+            saved = layer.Save()
+        except Tf.ErrorException as error:
+            raise OSError(cause_of(error)) from None
+        if not saved:
+            raise OSError("USD does not save it")
         return
     inner = path.with_suffix(".usdc")
     try:
         write_usd(run, target._replace(path=inner))
-        UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(inner)), str(path))
+        if not UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(inner)), str(path)):
+            raise OSError("USD does not pack it")
+    except Tf.ErrorException as error:
+        raise OSError(cause_of(error)) from None
     finally:
         inner.unlink(missing_ok=True)
 

@@ -41,3 +41,9 @@ Stage: TypeAlias = Any
 """Usd.Stage"""
 Prim: TypeAlias = Any
 """Usd.Prim"""
+
+
+def cause_of(error: Exception) -> str:
+    """The cause of an error in one line; of several errors of usd-core the first, which has the line of the file."""
+    text = getattr(error.args[0], "commentary", "") if error.args else ""
+    return ((text or str(error)).strip() or type(error).__name__).splitlines()[-1][:200]

@@ -18,7 +18,7 @@ from rigidimpulse.io.usd.bodies import TRIGGER, BodyReader
 from rigidimpulse.io.usd.frames import Frames
 from rigidimpulse.io.usd.instancing import expand_instancers
 from rigidimpulse.io.usd.joints import JointReader
-from rigidimpulse.io.usd.library import SdfPath, Stage, Tf, Usd, UsdGeom, UsdPhysics
+from rigidimpulse.io.usd.library import SdfPath, Stage, Tf, Usd, UsdGeom, UsdPhysics, cause_of
 from rigidimpulse.io.usd.origin import UsdOrigin
 from rigidimpulse.io.usd.plain import is_seen, plain_bodies
 from rigidimpulse.scene.scene import Scene
@@ -44,7 +44,7 @@ def load_usd(path: Path, gravity: ArrayLike | None) -> Scene:
             if not layer.anonymous and not layer.dirty:
                 layer.Reload(True)
     except Tf.ErrorException as error:
-        raise SceneError(f"it is no readable USD file ({_first(error)})", "export it again", where) from None
+        raise SceneError(f"it is no readable USD file ({cause_of(error)})", "export it again", where) from None
     try:
         # Transforms and points are looked at after they are computed, so what overflows here is no number that a message could miss.
         with np.errstate(all="ignore"):
@@ -52,7 +52,7 @@ def load_usd(path: Path, gravity: ArrayLike | None) -> Scene:
     except SceneError as error:
         raise error.within(where) from None
     except (Tf.ErrorException, RuntimeError, TypeError, ValueError, ArithmeticError) as error:  # values of another type than their schema's
-        raise SceneError(f"it could not be read ({_first(error)})", "export it again", where) from None
+        raise SceneError(f"it could not be read ({cause_of(error)})", "export it again", where) from None
 
 
 def _scene(stage: Stage, gravity: ArrayLike | None) -> Scene:
@@ -131,9 +131,3 @@ def _listed(paths: list[str]) -> str:
     """The first of some paths, and how many more there are."""
     more = len(paths) - MOST_PATHS
     return ("prims " if len(paths) > 1 else "prim ") + ", ".join(paths[:MOST_PATHS]) + (f" and {more} more" if more > 0 else "")
-
-
-def _first(error: Exception) -> str:
-    """The cause of an error in one line; of several errors of usd-core the first, which has the line of the file."""
-    text = getattr(error.args[0], "commentary", "") if error.args else ""
-    return ((text or str(error)).strip() or type(error).__name__).splitlines()[-1][:200]

@@ -14,12 +14,15 @@ import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import write_renamed
+from rigidimpulse.core.json_text import json_text
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.job import find_job
 from rigidimpulse.studies.wedges.vary import is_of_run, run_settings, with_parameter
 
 DONE, REPORTED, FAILED = "ok", "reported", "failed"
 """How a take ends: as it should, with something that its status reports, or not at all."""
+FIGURES = ("kinetic", "potential", "dissipated", "travel", "seconds")
+"""Numbers of a take that its file has as texts where they are not finite."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,7 @@ def _run(job: TakeJob) -> Take:
 
 def write_take(stem: Path, take: Take) -> None:
     """Write the take's figures beside its cache."""
-    text = json.dumps(vars(take), indent=1)
+    text = json_text(vars(take), indent=1)
     write_renamed(stem.with_suffix(".json"), lambda target: target.write_text(text, encoding="utf-8"))
 
 
@@ -130,6 +133,7 @@ def read_take(stem: Path) -> Take | None:
     if not path.is_file():
         return None
     try:
-        return Take(**json.loads(path.read_text(encoding="utf-8")))
-    except (ValueError, TypeError):
+        told = json.loads(path.read_text(encoding="utf-8"))
+        return Take(**told | {name: float(told[name]) for name in FIGURES})
+    except (ValueError, TypeError, KeyError):
         return None  # of another version

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import logging
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.files import write_renamed
+from rigidimpulse.core.files import make_folder, plain_cell, write_renamed
+from rigidimpulse.core.json_text import json_text
 from rigidimpulse.recording.recording import Recording, load_recording
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.job import DEFAULT_DURATION, DEFAULT_FPS, find_job
@@ -141,8 +141,9 @@ def _check_names(job: TakeJob) -> None:
 
 def _claim(folder: Path, told: dict[str, Any]) -> None:
     """Write what the wedge is of into the folder, or compare it with what is there."""
+    make_folder(folder)
     path = folder / "wedge.json"
-    text = json.dumps(told, indent=1, default=lambda value: value.tolist() if hasattr(value, "tolist") else str(value))
+    text = json_text(told, indent=1, default=lambda value: value.tolist() if hasattr(value, "tolist") else str(value))
     if path.is_file() and path.read_text(encoding="utf-8") != text:
         raise SceneError(f"{str(folder)!r} has another wedge in it", "delete it, or give another folder")
     write_renamed(path, lambda target: target.write_text(text, encoding="utf-8"))
@@ -151,7 +152,7 @@ def _claim(folder: Path, told: dict[str, Any]) -> None:
 def _write_table(result: Wedge) -> None:
     def write(target: Path) -> None:
         with target.open("w", encoding="utf-8", newline="") as file:
-            csv.writer(file).writerows(result.rows())
+            csv.writer(file).writerows([plain_cell(cell) for cell in row] for row in result.rows())
 
     write_renamed(result.folder / "wedge.csv", write)
 
