@@ -444,20 +444,20 @@ class SubsteppedIslands:
         end = self._end_of(run, pair_events, island.time, members, joints)
         # In the middle of a step contacts may be kept for longer motion.
         kept = self.stepper.kept if island.time > pair_events.begin else 0.0
-        groups = self._groups(run, members)
-        outcomes = [self._step(run, group, np.intersect1d(fresh, group), (island.time, end), kept) for group in groups]
+        parts = self._solved_together(run, members)
+        outcomes = [self._step(run, part, np.intersect1d(fresh, part), (island.time, end), kept) for part in parts]
         self._outcome, self._outcome_end = joined_outcomes(outcomes), end
         # The island was not stepped to the end of the step: it is woken there.
         if end < pair_events.end:
             pair_events.wake[members] = end
 
-    def _groups(self, run: Run, members: np.ndarray) -> list[np.ndarray]:
+    def _solved_together(self, run: Run, members: np.ndarray) -> list[np.ndarray]:
         """Members that are solved together: islands with joints one by one, all others at once."""
         joined = members[self._jointed[members]]
         labels = np.unique(self.label[joined[[len(run.joints.at([i])) > 0 for i in joined.tolist()]]])
-        groups = [members[self.label[members] == label] for label in labels.tolist()]
+        parts = [members[self.label[members] == label] for label in labels.tolist()]
         rest = members[~np.isin(self.label[members], labels)]
-        return [rest, *groups] if len(rest) else groups
+        return [rest, *parts] if len(rest) else parts
 
     def _step(self, run: Run, members: np.ndarray, fresh: np.ndarray, span: tuple[float, float], kept: float) -> Outcome:
         """Step members that are solved together; fresh: those of them that were in no sub-stepped island."""
@@ -505,7 +505,7 @@ class SubsteppedIslands:
 
     def _end_of(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray, joints: np.ndarray) -> float:
         """When trajectories of members end: before the step does where bodies are tiny, spin fast or stray from lines, or joints let go."""
-        alone = len(joints) > 0 and len(self._groups(run, members)) == len(np.unique(self.label[members]))
+        alone = len(joints) > 0 and len(self._solved_together(run, members)) == len(np.unique(self.label[members]))
         step = run.world.accuracy.step if alone else self.stepper.step_length
         end = self._end_of_trajectories(run, pair_events, time, members, step)
         return min(end, run.joints.next_release(joints, time)) if len(joints) else end
