@@ -23,7 +23,7 @@ from rigidimpulse.view.protocol import RecordingLike
 from rigidimpulse.view.rendered import rendered_meshes
 
 SCRIPTS = (
-    "theme.js", "look.js", "room.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "soft_bodies.js", "shapes.js", "joints.js",
+    "elements.js", "numbers.js", "theme.js", "look.js", "room.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "soft_bodies.js", "shapes.js", "joints.js",
     "spins.js", "transport.js", "plot.js", "clusters.js", "timeline.js", "panel.js", "ledger.js", "impacts.js", "card.js", "inspector.js",
     "marks.js", "header.js", "hud.js", "messages.js", "main.js",
 )  # fmt: skip
