@@ -23,9 +23,9 @@ from rigidimpulse.view.protocol import RecordingLike
 from rigidimpulse.view.rendered import rendered_meshes
 
 SCRIPTS = (
-    "theme.js", "look.js", "room.js", "stage.js", "arrows.js", "contacts.js", "trails.js", "soft_bodies.js", "shapes.js", "joints.js",
-    "spins.js", "transport.js", "plot.js", "clusters.js", "timeline.js", "panel.js", "ledger.js", "impacts.js", "card.js", "inspector.js",
-    "marks.js", "header.js", "hud.js", "messages.js", "main.js",
+    "elements.js", "numbers.js", "theme.js", "look.js", "room.js", "stage.js", "arrows.js", "contacts.js", "trails.js",
+    "soft_bodies.js", "shapes.js", "joints.js", "spins.js", "transport.js", "plot.js", "clusters.js", "timeline.js", "panel.js",
+    "ledger.js", "impacts.js", "card.js", "inspector.js", "marks.js", "header.js", "hud.js", "messages.js", "main.js",
 )  # fmt: skip
 LARGE_SCRIPTS = tuple("glb.js" if name == "messages.js" else name for name in SCRIPTS)
 """Those of a large recording, see `contents.MOST_KEYS`."""

@@ -93,7 +93,7 @@ class Tap:
         """Send those of these impacts that are not later than a time [s]."""
         over = impacts[impacts["time"] <= time]
         if len(over):
-            message, number = impacts_message(self._arrows, over, self._dynamic)
+            message, number = impacts_message(self._arrows, self._impacts, over, self._dynamic)
             self._send(message)
             self._impacts += len(over)
             self._arrows += number

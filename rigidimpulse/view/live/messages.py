@@ -5,7 +5,7 @@ All hang on the node /live. Text is JSON, numbers are a Float32Array:
     shape      number, number of vertices, vertices (3 each), their normals (3 each), triangles (3 vertices each)
     begin      manifest of a run: number, frames, bodies, framing, controls; its shapes came before it
     frames     first frame, then for each frame and each body that can move its position (3) and its quaternion x y z w
-    impacts    first arrow, then the arrows, see `arrows.impulse_rows`
+    impacts    first arrow, then the arrows, see `arrows.impulse_rows`; in the place of a card they have the number of the impact
     softBody   number, faces and surface of a flexible body
     softFrames number, first frame, then the vertices (3 each) of each frame
     framing    where the camera looks from, now that more of the motion is known
@@ -152,9 +152,10 @@ def frames_message(first: int, positions: np.ndarray, orientations: np.ndarray) 
     return number_message("frames", first, rows)
 
 
-def impacts_message(first: int, impacts: np.ndarray, dynamic: Sequence[bool]) -> tuple[dict[str, Any], int]:
-    """Return the message with the arrows of impacts, of which the first one is number `first`, and how many they are."""
-    rows = impulse_rows(impacts, dynamic)
+def impacts_message(first: int, first_impact: int, impacts: np.ndarray, dynamic: Sequence[bool]) -> tuple[dict[str, Any], int]:
+    """Return the message with the arrows of impacts, and how many arrows they are; first, first_impact: numbers of the first of each."""
+    rows = impulse_rows(impacts, dynamic, np.arange(len(impacts)))
+    rows[:, 11] += first_impact
     return number_message("impacts", first, rows), len(rows)
 
 

@@ -24,9 +24,12 @@ from meshcat.servers.zmqserver import StaticFileHandlerNoCache, WebSocketHandler
 from rigidimpulse.view.page import fill_template, viewer_files
 from rigidimpulse.view.server import HOST
 
-SCRIPTS = ("player.js", "arrows_growing.js", "bar.js", "controls.js", "live_stage.js", "throw.js", "live.js")
+SCRIPTS = ("player.js", "arrows_growing.js", "live_timeline.js", "controls.js", "live_stage.js", "throw.js", "live.js")
 """Files of this folder's `page/`."""
-SHARED_SCRIPTS = ("look.js", "stage.js", "arrows.js", "plot.js", "timeline.js", "soft_bodies.js")
+SHARED_SCRIPTS = (
+    "elements.js", "numbers.js", "theme.js", "look.js", "room.js", "stage.js", "arrows.js", "soft_bodies.js", "plot.js", "clusters.js",
+    "timeline.js", "hud.js",
+)  # fmt: skip
 """Those of the recorded page that the live page uses, too."""
 START_TIMEOUT = 10.0
 """Longest wait, s, for the server to begin."""
@@ -226,7 +229,7 @@ def _page(title: str) -> str:
     scripts += [(own / name).read_text(encoding="utf-8") for name in SCRIPTS]
     fields = {
         "title": html.escape(title),
-        "style": (shared / "page.css").read_text(encoding="utf-8") + (own / "live.css").read_text(encoding="utf-8"),
+        "style": "".join(file.read_text(encoding="utf-8") for file in (shared / "page.css", shared / "layout.css", own / "live.css")),
         "script": "\n".join(scripts),
     }
     return fill_template((own / "live.html").read_text(encoding="utf-8"), fields)

@@ -4,16 +4,6 @@ const SAME = 1e-3; // relative: what is the same to the digits shown
 const ROUND_OFF_SHARE = 1e-9; // of what is beside it: shown as zero
 const PART_COLOURS = ["blue", "teal", "violet", "amber", "soft"];
 
-/* An element with text or children; nothing that comes from a recording is ever read as markup. */
-function make(tag, {children = [], ...properties} = {}) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(properties)) {
-    if (name.includes("-") || name === "role") { made.setAttribute(name, value); } else { made[name] = value; }
-  }
-  made.append(...[children].flat().filter((child) => child !== null && child !== undefined));
-  return made;
-}
-
 /* A row of terms and values. */
 function fact(term, value) { return make("div", {children: [make("dt", {textContent: term}), make("dd", {textContent: value})]}); }
 

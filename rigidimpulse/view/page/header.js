@@ -1,25 +1,5 @@
 /* The head of the page: the scene's sentence, its checks and warnings, and the menus at its right. */
 
-/* A button that opens what it controls; escape and a click elsewhere close it. */
-function makeMenu(button, menu) {
-  const turn = (on) => {
-    menu.hidden = !on;
-    button.setAttribute("aria-expanded", String(on));
-  };
-  button.addEventListener("click", () => turn(menu.hidden));
-  window.addEventListener("pointerdown", (event) => {
-    if (!menu.hidden && !menu.contains(event.target) && !button.contains(event.target)) { turn(false); }
-  }, true);
-  menu.addEventListener("keydown", (event) => {
-    if (event.key === "Escape") {
-      turn(false);
-      button.focus();
-      event.stopPropagation();
-    }
-  });
-  return turn;
-}
-
 /* The checks of a gallery scene. */
 function showChecks(checks) {
   if (checks.length === 0) { return; }

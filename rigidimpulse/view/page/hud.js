@@ -2,20 +2,6 @@
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 
-function element(id) { return document.getElementById(id); }
-
-/* A button that stays down; `set(on)` is told about every change. Returns a function that flips it. */
-function makeSwitch(button, set, on) {
-  const flip = () => {
-    on = !on;
-    button.setAttribute("aria-pressed", String(on));
-    set(on);
-  };
-  button.setAttribute("aria-pressed", String(on));
-  button.addEventListener("click", flip);
-  return flip;
-}
-
 /* The menu of layers, a check box each; returns what flips them, by key. */
 function makeLayers(layers) {
   const keys = {};
@@ -41,9 +27,7 @@ function clockDecimals(times) {
 }
 
 function makeBar(transport, timeline) {
-  const scrubber = element("scrubber"), decimals = clockDecimals(transport.times);
-  scrubber.min = transport.start;
-  scrubber.max = transport.end;
+  const scrubber = element("scrubber");
   scrubber.addEventListener("input", () => transport.seek(Number(scrubber.value)));
   for (const speed of SPEEDS) {
     element("speed").add(new Option(`${speed}\u00d7`, speed, speed === 1, speed === 1));
@@ -52,8 +36,8 @@ function makeBar(transport, timeline) {
   element("play").addEventListener("click", () => { if (transport.playing) { transport.pause(); } else { transport.play(); } });
   const flipLoop = makeSwitch(element("loop"), (on) => { transport.loop = on; }, true);
   const update = () => {
-    const clock = `${transport.time.toFixed(decimals)} s`, frame = `frame ${transport.frame} / ${transport.times.length - 1}`;
-    scrubber.value = transport.time;
+    const clock = `${transport.time.toFixed(clockDecimals(transport.times))} s`, frame = `frame ${transport.frame} / ${transport.times.length - 1}`;
+    Object.assign(scrubber, {min: transport.start, max: transport.end, value: transport.time});
     scrubber.setAttribute("aria-valuetext", `${clock}, ${frame}`);
     element("play").classList.toggle("playing", transport.playing);
     element("clock").innerHTML = `${clock} <small>${frame}</small>`;
@@ -67,11 +51,13 @@ function makeBar(transport, timeline) {
   return {update, flipLoop, changeSpeed};
 }
 
-/* Whether a key belongs to what has the focus: text, a choice, or a button that was reached by the keyboard. */
+/* Whether a key belongs to what has the focus: text, a slider, a choice, or a button that was reached by the keyboard. */
 function isTaken(event) {
   const {target} = event, presses = event.key === " " || event.key === "Enter";
+  const moves = event.key.startsWith("Arrow") || ["Home", "End"].includes(event.key);
+  if (target.type === "range" && target.id !== "scrubber" && moves) { return true; }
   if (target.tagName === "INPUT" && !["range", "checkbox"].includes(target.type)) { return true; }
-  if (target.tagName === "SELECT" && (event.key.startsWith("Arrow") || ["Home", "End"].includes(event.key) || presses)) { return true; }
+  if (target.tagName === "SELECT" && (moves || presses)) { return true; }
   return presses && target.matches("button, summary, input[type=checkbox]") && target.matches(":focus-visible");
 }
 

@@ -110,13 +110,6 @@ async function main() {
   if (!reducedMotion) { transport.play(); }
 }
 
-/* Tells the style sheet how high head and bar are: panels and card lie between them. */
-function fitHeights() {
-  const set = (name, value) => document.documentElement.style.setProperty(name, `${Math.round(value)}px`);
-  set("--foot", element("bar").parentElement.getBoundingClientRect().height);
-  set("--head", document.querySelector("header").getBoundingClientRect().bottom);
-}
-
 const KEYS = [
   ["space", "play or pause"], ["\u2190 \u2192", "a frame back, on; with shift ten"], ["Home End", "start, end"], ["- +", "slower, faster"], ["L", "loop"],
   ["[ ]", "previous, next impact; also , and ."], ["Esc", "close the card"], ["F", "frame the action"], ["U", "hide everything but the picture"],

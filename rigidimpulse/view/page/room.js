@@ -1,4 +1,4 @@
-/* The room for the action: the part of the window that title, panels, card and bar leave free. The camera frames the action in it. */
+/* The room for the action: the part of the window that title, panels, card, sliders and bar leave free. The camera frames the action in it. */
 
 const LEAST_ROOM = [160, 120]; // pixels, however much is open
 const NARROW = 820; // pixels, of a window in which the card lies below the scene
@@ -19,6 +19,8 @@ function freeRoom() {
     const box = card.getBoundingClientRect();
     if (narrow) { room.bottom = Math.min(room.bottom, box.top); } else { room.right = box.left; }
   }
+  const sliders = document.querySelector("#controls[open]");
+  if (isSeen(sliders) && !narrow) { room.right = Math.min(room.right, sliders.getBoundingClientRect().left); }
   for (const box of [...document.querySelectorAll("header details[open] > div")].filter(isSeen).map((part) => part.getBoundingClientRect())) {
     if (narrow) { room.top = Math.max(room.top, box.bottom); } else { room.left = Math.max(room.left, box.right); }
   }
@@ -27,4 +29,11 @@ function freeRoom() {
   if (room.right - room.left < wide) { room.left = Math.max(room.right - wide, 0); }
   room.bottom = Math.max(room.bottom, room.top + tall);
   return room;
+}
+
+/* Tells the style sheet how high head and bar are: panels and card lie between them. */
+function fitHeights() {
+  const set = (name, value) => document.documentElement.style.setProperty(name, `${Math.round(value)}px`);
+  set("--foot", element("bar").parentElement.getBoundingClientRect().height);
+  set("--head", document.querySelector("header").getBoundingClientRect().bottom);
 }

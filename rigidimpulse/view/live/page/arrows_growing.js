@@ -1,10 +1,13 @@
-/* Impact arrows of which more come while the run is computed. Their rows hold the size of the impulse; lengths follow once more from the
-   largest impulse until now, as in `view/arrows.py`. */
+/* Impact arrows of which more come while the run is computed. Their rows hold the size of the impulse in the place of a length, and the
+   number of the impact in that of a card; lengths follow once more from the largest impulse until now, as in `view/arrows.py`. */
+
+const MOST_SPIKES = 20000; // impacts; more are gathered before they are drawn
+const MARK_BINS = 1024; // parts of a run in which they are
 
 class GrowingArrows {
   constructor() {
     this.arrows = new ImpactArrows(new Float32Array(0), 0.4);
-    this.begin({longestArrow: 1, shortestArrow: 0.15, fade: 0.4});
+    this.begin({longestArrow: 1, shortestArrow: 0.06, fade: 0.4});
   }
 
   begin({longestArrow, shortestArrow, fade}) {
@@ -61,14 +64,34 @@ class GrowingArrows {
     return at >= 0 ? this.rows[at * ROW] : undefined;
   }
 
-  /* Numbers and heights along the time line, see `Timeline`. */
-  marks(duration, bins = 1024) {
-    const marks = new Float32Array(2 * bins);
+  /* Time and height on the time line of each impact, by number; it has an arrow for each body that it pushes. */
+  get impacts() {
+    const impacts = new Map();
     for (let i = 0; i < this.count; i++) {
-      const bin = Math.min(Math.floor((this.rows[i * ROW] / duration) * bins), bins - 1);
-      marks[bin] += 1;
-      marks[bins + bin] = Math.max(marks[bins + bin], Math.sqrt(this.sizes[i] / this.largest));
+      impacts.set(this.rows[i * ROW + 11], {time: this.rows[i * ROW], height: Math.sqrt(this.sizes[i] / this.largest)});
     }
-    return marks;
+    return impacts;
   }
+
+  timeOf(number) { return this.impacts.get(number).time; }
+
+  /* What stands on the time line of a run of this duration, see `Timeline`. */
+  spikes(duration) {
+    const impacts = [...this.impacts].sort(([, a], [, b]) => a.time - b.time);
+    if (impacts.length > MOST_SPIKES) { return gatheredSpikes(impacts, duration); }
+    const numbered = (spike) => Object.assign(spike, {index: impacts[spike.index][0]});
+    return makeSpikes(impacts.map(([, {time}]) => time), impacts.map(([, {height}]) => height)).map(numbered);
+  }
+}
+
+/* One spike for each part of a run; impacts are [number, {time, height}]. */
+function gatheredSpikes(impacts, duration) {
+  const marks = new Float32Array(2 * MARK_BINS), strongest = new Int32Array(MARK_BINS).fill(-1);
+  const binOf = (time) => Math.min(Math.floor((time / duration) * MARK_BINS), MARK_BINS - 1);
+  for (const [number, {time, height}] of impacts) {
+    const bin = binOf(time);
+    marks[bin] += 1;
+    if (height > marks[MARK_BINS + bin]) { [marks[MARK_BINS + bin], strongest[bin]] = [height, number]; }
+  }
+  return binnedSpikes(marks, 0, duration, (from, to) => strongest[binOf((from + to) / 2)]);
 }

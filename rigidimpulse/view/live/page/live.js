@@ -3,20 +3,56 @@
 const MARKS_PAUSE = 200; // ms between two drawings of all impacts on the time line, while more of them come
 const RETRY = 1000; // ms until the page asks for a server that is gone again
 
+const KEYS = [
+  ["drag", "on a body: throw it; elsewhere: turn the camera"], ["space", "play or pause"], ["\u2190 \u2192", "a frame back, on; with shift ten"],
+  ["R", "play from the start"], ["- +", "slower, faster"], ["L", "loop"], ["[ ]", "previous, next impact"], ["F", "frame the action"],
+  ["U", "hide everything but the picture"], ["D", "dark or light"], ["?", "these keys"],
+];
+
 class LivePage {
   constructor() {
     this.viewer = new MeshCat.Viewer(element("meshcat-pane"));
-    this.viewer.gui.domElement.style.display = "none";
+    this.viewer.gui.domElement.remove();
     Object.assign(this, {stage: null, thrower: null, shapes: [], nextShapes: [], softBodies: [], pictures: 0, lots: 0, marked: 0, number: 0, doing: "starting", throws: 0});
     this.arrows = new GrowingArrows();
     this.player = new Player(this.viewer.animator, () => this.show(), () => this.refresh());
-    this.bar = new Bar(this.player, this.arrows);
-    this.bar.keys.f = () => {
-      if (this.stage) { this.stage.touched = false; this.stage.goTo(); }
-    };
+    this.timeline = new LiveTimeline(this.player, this.arrows, () => this.layout());
+    this.bar = makeBar(this.player, this.timeline);
+    this.bindActions();
     this.controls = new Controls((command) => this.send(command));
     this.listen();
     this.connect();
+  }
+
+  /* Buttons and keys. */
+  bindActions() {
+    const {player, bar} = this, help = makeMenu(element("help-button"), element("help")), dark = () => theme.set(!theme.dark);
+    const toImpact = (way) => {
+      const time = this.arrows.beside(player.time, way);
+      player.pause();
+      if (time !== undefined) { player.seek(time); }
+    };
+    const restart = () => { player.seek(0); player.play(); };
+    element("previous").addEventListener("click", () => toImpact(-1));
+    element("next").addEventListener("click", () => toImpact(1));
+    element("theme-button").addEventListener("click", dark);
+    element("controls").addEventListener("toggle", () => this.layout());
+    window.addEventListener("resize", () => this.layout());
+    showKeys(KEYS);
+    bindKeys(player, {
+      "[": () => toImpact(-1), "]": () => toImpact(1), r: restart, l: bar.flipLoop, f: () => this.stage?.goTo(), d: dark,
+      "-": () => bar.changeSpeed(-1), "+": () => bar.changeSpeed(1), "=": () => bar.changeSpeed(1), "?": () => help(element("help").hidden),
+      u: () => {
+        document.body.classList.toggle("bare");
+        this.layout();
+      },
+    });
+  }
+
+  /* The parts around the picture have changed. */
+  layout() {
+    fitHeights();
+    this.stage?.refit();
   }
 
   /* meshcat hangs properties on nodes; those of /live are ours. */
@@ -92,9 +128,10 @@ class LivePage {
     this.nodes = this.stage.list;
     this.player.begin(manifest);
     this.arrows.begin(manifest);
-    this.bar.begin();
+    this.timeline.begin();
     this.controls.show(manifest.controls, manifest.chosen, manifest.throws);
     this.throws = manifest.throws;
+    if (this.isFirst) { this.layout(); }
     this.show();
   }
 
@@ -166,7 +203,7 @@ class LivePage {
     if (this.unmarked && (now > this.marked + MARKS_PAUSE || this.doing === "done")) {
       this.unmarked = false;
       this.marked = now;
-      this.bar.setMarks();
+      this.timeline.readImpacts();
     }
     if (this.stale) { this.show(); }
     this.stage?.goOn();

@@ -1,10 +1,6 @@
 /* The stage of the live page: bodies of one run take the place of those of the run before, and the camera stays where people put it. */
 
-const DARK_SKY = {zenith: "#0d1520", horizon: "#34414f", nadir: "#1a222b"};
-const DARK_GROUND = "#3b444d";
 const TURN_TIME = 600; // ms in which the camera goes to another view
-const isDark = window.matchMedia("(prefers-color-scheme: dark)").matches;
-if (isDark) { Object.assign(SKY, DARK_SKY); }
 
 /* Nodes stand in folders of their own: meshcat's tree keeps a panel for each of its nodes, which is slow to take away. */
 const motionSource = {
@@ -27,25 +23,22 @@ const motionSource = {
 class LiveStage extends Stage {
   constructor(viewer, manifest) {
     super(viewer, manifest);
-    this.touched = false; // whether people have moved the camera
+    Object.assign(this, {held: false, way: null}); // whether people are moving the camera, and its way to another view
     this.dress();
-    viewer.controls.addEventListener("start", () => {
-      this.touched = true;
-      this.way = null;
-    });
+    viewer.controls.addEventListener("start", () => Object.assign(this, {held: true, way: null}));
+    viewer.controls.addEventListener("end", () => { this.held = false; });
     const render = viewer.render.bind(viewer);
     viewer.render = () => {
       this.prepare();
       render();
     };
     viewer.camera.aspect = window.innerWidth / window.innerHeight;
-    this.frameAction();
   }
 
   /* The bodies of a run. */
   build(bodies, geometries) {
     this.surfaces.forEach((surface) => surface.dispose());
-    Object.assign(this, {bodies, geometries, grounds: [], surfaces: []});
+    Object.assign(this, {bodies, geometries, grounds: [], surfaces: [], floor: -Infinity});
     motionSource.clear(this.viewer);
     this.nodes.clear();
     this.meshOf.clear();
@@ -56,15 +49,10 @@ class LiveStage extends Stage {
     this.viewer.set_dirty();
   }
 
-  makePlane(plane) {
-    const ground = super.makePlane(plane);
-    if (isDark) { ground.children[0].material.color = linearColour(DARK_GROUND); }
-    return ground;
-  }
-
   /* More of the motion is known: light and ground fit it; the camera goes there if it follows and nobody has moved it yet. */
   reframe(framing, follows) {
     this.framing = framing;
+    this.follow &&= framing.follow;
     this.turn.fromArray(framing.stage);
     this.unturn.copy(this.turn).invert();
     this.viewer.scene.quaternion.copy(this.turn);
@@ -80,7 +68,7 @@ class LiveStage extends Stage {
     parent.remove(this.light);
     parent.add(light);
     this.light = light;
-    if (follows && !this.touched) { this.goTo(); }
+    if (follows && !this.moved && !this.held) { this.goTo(); }
   }
 
   /* Where the camera is: place and target. */

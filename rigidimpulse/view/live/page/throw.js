@@ -55,7 +55,7 @@ class Thrower {
     const way = this.stage.recorded(to.sub(held.point)), length = way.length();
     held.velocity.copy(way).divideScalar(THROW_TIME);
     way.normalize();
-    this.arrow.rows.set([0, ...this.stage.recorded(held.point).toArray(), ...way.toArray(), ...way.toArray(), length]);
+    this.arrow.rows.set([0, ...this.stage.recorded(held.point).toArray(), ...way.toArray(), ...way.toArray(), length, -1]);
     this.arrow.show(0);
     this.arrow.object.visible = true;
     const label = element("throw");
