@@ -275,10 +275,10 @@ def narrow_phases() -> str:
     quantities = {"later": "time, s", "place": "place, of the size", "turn": "normal, rad", "impulse": "impulse, relative"}
     for kind in dict.fromkeys(row["kind"] for row in rows):
         chosen = [row for row in rows if row["kind"] == kind]
-        for name, words in quantities.items():
+        for name, quantity in quantities.items():
             values = sorted(abs(float(row[name])) for row in chosen)
             first = (kind, len(chosen)) if name == "later" else ("", "")
-            lines.append((*first, words, small(values[len(values) // 2]), small(values[-1])))
+            lines.append((*first, quantity, small(values[len(values) // 2]), small(values[-1])))
     counts = []
     for kind in dict.fromkeys(row["kind"] for row in rows):
         own, fcl, common, raw, ghosts = (

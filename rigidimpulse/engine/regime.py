@@ -12,7 +12,7 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
                 alone stays exact
     or runaway  in the middle of a step, an island of which a body was solved more than RUNAWAY times in the step: it costs more than it
                 advances. So do islands in which two bodies come to contact again and again and no impulse keeps them apart. They are handed
-                over at that instant, whatever they are made of, except for RUNAWAY where contacts rebound by more than REBOUND: many impacts
+                over at that instant, whatever they are made of. Contacts that rebound by more than REBOUND are no runaways: many impacts
                 are what such scenes are about
 
 and, where an island begins to be sub-stepped (a body that comes near later is taken in):
