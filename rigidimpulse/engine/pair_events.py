@@ -34,9 +34,11 @@ from rigidimpulse.engine.pair_table import (
 )
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.contact_memory import place_of
+from rigidimpulse.model.island import Island
 from rigidimpulse.motion.trajectory import FIXED, PRESCRIBED
 
 INSTANT = TOLERANCES.events.instant
+SQUEEZED = "squeezed"
 SQUEEZED_REMEDY = "no motion keeps the body apart from all that presses on it; give it space, or let the pressing bodies move freely"
 NOT_RESOLVED_REMEDY = "the pair is left alone until the end of the step; use a smaller step"
 
@@ -223,8 +225,15 @@ class PairEvents:
         root = roots(len(free), first[joins], second[joins])
         pressed = free & np.isin(root, root[np.concatenate([first[presses], second[presses]])])
         if np.any(pressed[[a, b]]):
-            return "squeezed", SQUEEZED_REMEDY
+            return SQUEEZED, SQUEEZED_REMEDY
         return "contact not resolved", NOT_RESOLVED_REMEDY
+
+    def report_squeezed(self, island: Island) -> None:
+        """Report pairs of an island that no motion keeps apart, since bodies with paths of their own press on them."""
+        for place in np.unique(island.place):
+            kind, remedy = self.why_again(int(self.pairs[place]["a"]), int(self.pairs[place]["b"]))
+            if kind == SQUEEZED:
+                self.report(island.time, kind, np.array([place]), remedy)
 
     def settle(self, time: float) -> None:
         """Pairs that came to contact without consequence are swept again from here with a smaller gap."""

@@ -357,7 +357,7 @@ class SubsteppedIslands:
             return [island for island in islands if np.all(self.label[island.members] < 0)]
         for island in islands:
             if np.any(self.solve_count[island.members] > RUNAWAY) and np.all(self.label[island.members] < 0):
-                self._hand_over(run, island)
+                self._hand_over(run, pair_events, island)
         lost = self._lost(islands)
         pair_events.inside[lost] = True
         first = not pair_events.substepped_begun
@@ -375,13 +375,15 @@ class SubsteppedIslands:
             self._bring_in(run, island, members)
         return islands
 
-    def _hand_over(self, run: Run, island: Island) -> None:
-        """Let an exact island that runs away be sub-stepped from its instant on, and say so."""
+    def _hand_over(self, run: Run, pair_events: PairEvents, island: Island) -> None:
+        """Let an exact island that runs away be sub-stepped from its instant on, and say so; report what is squeezed in it."""
         members, rebound = island.members, float(island.contacts.restitution.max(initial=0.0))
         if rebound > REBOUND and np.isfinite(self.solve_count[members]).all():
             # Looked at, and left to the exact regime until the end of the step.
             self.solve_count[members] = NEVER
             return
+        if not np.isfinite(self.solve_count[members]).all():
+            pair_events.report_squeezed(island)
         self.solve_count[members] = 0.0
         self.label[members] = members.min()
         names = tuple(run.world.names[i] for i in members.tolist())
