@@ -217,23 +217,21 @@ class PairEvents:
     def why_again(self, a: int, b: int) -> tuple[str, str]:
         """Kind of problem, and remedy, of two bodies that come to contact again and again at one instant.
 
-        They are squeezed only if a body with a path of its own presses on one of them, itself or through others that may touch in the step.
+        They are squeezed only if a body with a path of its own presses on one of them.
         """
+        return (SQUEEZED, SQUEEZED_REMEDY) if np.any(self.pressed()[[a, b]]) else ("contact not resolved", NOT_RESOLVED_REMEDY)
+
+    def pressed(self) -> np.ndarray:
+        """Bodies (n,) bool that bodies with paths of their own press on, themselves or through others that may touch in the step."""
         pairs, prescribed = self.pairs, self.run.state.trajectory.mode == PRESCRIBED
         free, first, second = self._dynamic & ~prescribed, pairs["a"], pairs["b"]
         joins, presses = free[first] & free[second], prescribed[first] | prescribed[second]
         root = roots(len(free), first[joins], second[joins])
-        pressed = free & np.isin(root, root[np.concatenate([first[presses], second[presses]])])
-        if np.any(pressed[[a, b]]):
-            return SQUEEZED, SQUEEZED_REMEDY
-        return "contact not resolved", NOT_RESOLVED_REMEDY
+        return free & np.isin(root, root[np.concatenate([first[presses], second[presses]])])
 
     def report_squeezed(self, island: Island) -> None:
-        """Report pairs of an island that no motion keeps apart, since bodies with paths of their own press on them."""
-        for place in np.unique(island.place):
-            kind, remedy = self.why_again(int(self.pairs[place]["a"]), int(self.pairs[place]["b"]))
-            if kind == SQUEEZED:
-                self.report(island.time, kind, np.array([place]), remedy)
+        """Report the pairs of an island that no motion keeps apart, since bodies with paths of their own press on it."""
+        self.report(island.time, SQUEEZED, np.unique(island.place), SQUEEZED_REMEDY)
 
     def settle(self, time: float) -> None:
         """Pairs that came to contact without consequence are swept again from here with a smaller gap."""

@@ -136,8 +136,10 @@ class SubsteppedIslands:
     def may_take(self, bodies: np.ndarray) -> bool:
         """Whether islands of bodies that no impulse keeps apart are handed over; they are, when they are looked at next."""
         mine = bodies[self._world.dynamic[bodies]]
-        self.solve_count[mine] = np.inf if self._auto else NEVER
-        return self._auto
+        if np.any(self.solve_count[mine] == NEVER):
+            return False
+        self.solve_count[mine] = np.inf
+        return True
 
     def summary(self) -> str:
         """What became of sub-stepped islands in the run."""
@@ -358,7 +360,7 @@ class SubsteppedIslands:
         for island in islands:
             if np.any(self.solve_count[island.members] > RUNAWAY) and np.all(self.label[island.members] < 0):
                 self._hand_over(run, pair_events, island)
-        lost = self._lost(islands)
+        lost = self._lost(pair_events, islands)
         pair_events.inside[lost] = True
         first = not pair_events.substepped_begun
         pair_events.substepped_begun = True
@@ -376,14 +378,18 @@ class SubsteppedIslands:
         return islands
 
     def _hand_over(self, run: Run, pair_events: PairEvents, island: Island) -> None:
-        """Let an exact island that runs away be sub-stepped from its instant on, and say so; report what is squeezed in it."""
+        """Let an exact island that runs away be sub-stepped from its instant on, and say so.
+
+        What bodies with paths of their own press on is not: if it is squeezed, sub-steps would shoot it out.
+        """
         members, rebound = island.members, float(island.contacts.restitution.max(initial=0.0))
-        if rebound > REBOUND and np.isfinite(self.solve_count[members]).all():
+        stuck, pressed = bool(np.isposinf(self.solve_count[members]).any()), bool(pair_events.pressed()[members].any())
+        if pressed or (rebound > REBOUND and not stuck):
             # Looked at, and left to the exact regime until the end of the step.
             self.solve_count[members] = NEVER
+            if pressed and stuck:
+                pair_events.report_squeezed(island)
             return
-        if not np.isfinite(self.solve_count[members]).all():
-            pair_events.report_squeezed(island)
         self.solve_count[members] = 0.0
         self.label[members] = members.min()
         names = tuple(run.world.names[i] for i in members.tolist())
@@ -391,12 +397,15 @@ class SubsteppedIslands:
             run.log.note(island.time, "handed to sub-steps", names, HANDED)
         self._handed[names] = self._handed.get(names, 0) + 1
 
-    def _lost(self, islands: list[Island]) -> np.ndarray:
+    def _lost(self, pair_events: PairEvents, islands: list[Island]) -> np.ndarray:
         """Bodies that no impulse keeps apart and whose contacts the exact regime does not see: one sub-stepped island from here on."""
         lost = np.flatnonzero(np.isposinf(self.solve_count) & (self.label < 0))
+        if not len(lost):
+            return lost
         for island in islands:
             lost = np.setdiff1d(lost, island.members)
-        self.solve_count[lost] = 0.0
+        self.solve_count[lost] = NEVER
+        lost = lost[~pair_events.pressed()[lost]]
         self.label[lost] = lost.min(initial=len(self.label))
         return lost
 
