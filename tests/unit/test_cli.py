@@ -138,7 +138,7 @@ def test_view_of_arrays_needs_the_scene(scene_file, tmp_path, monkeypatch):
         (("demo", "two_spheres", "-o", "run.obj"), ".npz, .csv, .glb, .gltf"),
         (("demo", "two_spheres", "--fps", "0"), "fps"),
         (("demo", "two_spheres", "--duration", "-1"), "duration"),
-        (("demo", "two_spheres", "--accuracy", "perfect"), "'preview', 'standard', 'exact'"),
+        (("demo", "two_spheres", "--accuracy", "perfect"), "'preview', 'standard', 'exact', 'classic'"),
         (("simulate", "room.obj", "-o", "run.npz"), "a file.py that defines scene()"),
         (("simulate", "room.glb", "-o", "run.npz"), "check the path"),
         (("simulate", "missing.py", "-o", "run.npz"), "no such file"),
