@@ -39,6 +39,8 @@ MOST_SUB_STEPS, MOST_SWAYS, MOST_SWINGS = 4096, 256, 16
 what only swings about a fixed point has a far lower rate than its bound."""
 DRIFT = TOLERANCES.joint.energy_drift
 SHORT = TOLERANCES.joint.short_sub_step
+CENTRED = 0.1
+"""Arm of a joint, over the length of its rod or string, below which the body hangs at its centre."""
 MOST_CUTS = 20
 """Times a sub-step is cut to end where a limit is reached or lets go."""
 STEEP = 1e3
@@ -237,14 +239,16 @@ class JointState:
     def _tension_rates(self, run: Run, which: np.ndarray) -> tuple[float, float]:
         """Bounds of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m (r + l))).
 
-        r is the arm of the joint, l the length of a rod or string. Returns the bound of bodies that only swing about a point which cannot
-        be moved last, that of all others first.
+        r is the arm of the joint, l the length of a rod or string where r is short beside it, else 0. Returns the bound of all others, and
+        that of bodies that only swing about a point which cannot be moved.
         """
         world, table, squares = run.world, self.table, {}
         force = np.linalg.norm(self.pull[which], axis=1)
         for bodies, anchors in ((table.body_a[which], table.anchor_a[which]), (table.body_b[which], table.anchor_b[which])):
-            arms = np.linalg.norm(anchors, axis=1)
-            for i, f, r, far in zip(bodies.tolist(), force.tolist(), arms.tolist(), (arms + self._rod[which]).tolist(), strict=True):
+            arms, rods = np.linalg.norm(anchors, axis=1), self._rod[which]
+            # A body that hangs at its centre sways on its string alone.
+            reach = np.where(arms < CENTRED * rods, arms + rods, arms)
+            for i, f, r, far in zip(bodies.tolist(), force.tolist(), arms.tolist(), reach.tolist(), strict=True):
                 if i >= 0 and world.dynamic[i] and far > 0.0:
                     square = f * (r / world.inertia[i].min() + world.inv_mass[i] / far)
                     squares[i] = squares.get(i, 0.0) + square
