@@ -88,12 +88,16 @@ class RunJoints(Protocol):
         """Forces on b from here on, while the island sleeps."""
         ...
 
+    def report_open(self, run: Any, island: Island, /) -> None:
+        """Report joints of an island that the forces found last do not close."""
+        ...
+
     def begin_sub_steps(self, run: Any, bodies: np.ndarray, time: float, /) -> None:
         """End what exact sub-steps do to bodies that come to a sub-stepped island."""
         ...
 
-    def note_sub_steps(self, run: Any, which: np.ndarray, force: np.ndarray, span: tuple[float, float], worst: float, /) -> None:
-        """Note the mean forces (j, 3) N on b over a span of sub-steps, and what was left open."""
+    def note_sub_steps(self, which: np.ndarray, force: np.ndarray, span: tuple[float, float], /) -> None:
+        """Note the mean forces (j, 3) N on b over a span of sub-steps."""
         ...
 
     def account_sub_steps(self, run: Any, which: np.ndarray, began: float, time: float, /) -> None:

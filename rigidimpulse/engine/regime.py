@@ -7,9 +7,9 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
     or costly   at least FEW, each of which the exact regime solved more than EXPENSIVE_SOLVES times in the last step, in the mean.
                 Bodies at rest take 2 to 4 solves, a fall of boxes 10 to 20; each takes about as long as a step of a small
                 sub-stepped island
-    or joints   an island with joints, each body of which the exact regime solved more than EXPENSIVE_JOINTED times in the last step, or
-                EXPENSIVE_SWING times where nothing is near it: by as much less often as it has more bodies than SMALL. A body that hangs
-                alone stays exact
+    or joints   an island with joints, each body of which the exact regime solved more than EXPENSIVE_JOINTED times a step, in the mean
+                of the last ones, or EXPENSIVE_SWING times where nothing is near it: by as much less often as it has more bodies than
+                SMALL. A body that hangs alone stays exact
     or runaway  in the middle of a step, an island of which a body was solved more than RUNAWAY times in the step: it costs more than it
                 advances. So do islands in which two bodies come to contact again and again and no impulse keeps them apart. They are handed
                 over at that instant, whatever they are made of. Contacts that rebound by more than REBOUND are no runaways: many impacts
@@ -33,7 +33,6 @@ import numpy as np
 from rigidimpulse.collision.contact_records import SEPARATION, SKIN, SUPPORT, in_play
 from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.core.union_find import roots
-from rigidimpulse.engine.pair_table import NEVER
 from rigidimpulse.engine.sleeping import SLEEP_SPEED
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
@@ -68,11 +67,11 @@ def why_not_substepped(world: World) -> str:
 def may_begin(world: World, joined: np.ndarray, solve_count: np.ndarray) -> bool:
     """Whether an island may begin to be sub-stepped at the start of a step; joined (n,) bool: bodies with joints.
 
-    solve_count: (n,) how often the exact solver dealt with each body in the last step.
+    solve_count: (n,) how often the exact solver dealt with each body in the last step; with those that have joints, in the mean of steps.
     """
     if not only_expensive(world):
         return True
-    costly = _number(world) >= SOME and float(solve_count[solve_count > NEVER].sum()) > FEW * EXPENSIVE_SOLVES
+    costly = _number(world) >= SOME and float(solve_count.sum()) > FEW * EXPENSIVE_SOLVES
     return costly or bool(np.any(joined & (SMALL * solve_count > EXPENSIVE_JOINTED)))
 
 

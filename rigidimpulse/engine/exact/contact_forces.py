@@ -60,6 +60,12 @@ def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
         h, residual = held.length, held.residual
     run.log.account(island.time, "stick", kinetic_energy(now, constants, island.members) - before)
     failed = residual > UNSOLVED or (len(island.joints) > 0 and not run.joints.are_closed)
+    if failed and len(island.joints) and run.substepped.may_take(island.members):
+        # Sub-steps hold them from here on: the island is looked at again at this instant.
+        run.wrench[island.members] = 0.0
+        run.joints.let_go(island)
+        pair_events.wake[island.members] = island.time
+        return
     taken_back = run.joints.memory.wrench if len(island.joints) else None
     if failed and makes_energy(problem, constants, run.wrench, taken_back, h):
         run.wrench[island.members] = 0.0
@@ -76,6 +82,8 @@ def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
     keep_forces(state.memory, number, island.time, contacts, turning.touching, forces.force)
     if held is not None and turns(turning.motion, run.world.accuracy.step):
         keep_wrenches(state.memory, number, island.time, contacts, held.force, held.slides)
+    if failed and len(island.joints):
+        run.joints.report_open(run, island)
     if residual > UNSOLVED:
         names = tuple(run.world.names[i] for i in island.members)
         run.log.report(

@@ -39,8 +39,8 @@ MOST_SUB_STEPS, MOST_SWAYS, MOST_SWINGS = 4096, 256, 16
 what only swings about a fixed point has a far lower rate than its bound."""
 DRIFT = TOLERANCES.joint.energy_drift
 SHORT = TOLERANCES.joint.short_sub_step
-CENTRED = 0.1
-"""Arm of a joint, over the length of its rod or string, below which the body hangs at its centre."""
+CENTRED: float = 1e-6
+"""Arm of a joint, over the length of its rod or string, up to which the body hangs at its centre."""
 MOST_CUTS = 20
 """Times a sub-step is cut to end where a limit is reached or lets go."""
 STEEP = 1e3
@@ -75,7 +75,7 @@ class JointState:
         self.shock = np.zeros((len(joints), 3))
         self._accounted_shock = np.zeros((len(joints), 3))
         self.pull = np.zeros((len(joints), 3))
-        self.are_closed = True
+        self.are_closed, self._open_by = True, 0.0
         self.drift = np.zeros(len(joints))
         self._energy = np.full(len(joints), np.nan)
         self.began = np.zeros(len(joints))
@@ -237,20 +237,19 @@ class JointState:
         return math.sqrt(square.max(initial=0.0))
 
     def _tension_rates(self, run: Run, which: np.ndarray) -> tuple[float, float]:
-        """Bounds of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m (r + l))).
+        """Bounds of the rates [rad/s] at which bodies sway across the forces f of their joints: w^2 = f (r / I + 1 / (m r)).
 
-        r is the arm of the joint, l the length of a rod or string where r is short beside it, else 0. Returns the bound of all others, and
-        that of bodies that only swing about a point which cannot be moved.
+        Returns that of all others, and that of bodies that only swing about a point which cannot be moved.
         """
         world, table, squares = run.world, self.table, {}
         force = np.linalg.norm(self.pull[which], axis=1)
         for bodies, anchors in ((table.body_a[which], table.anchor_a[which]), (table.body_b[which], table.anchor_b[which])):
-            arms, rods = np.linalg.norm(anchors, axis=1), self._rod[which]
-            # A body that hangs at its centre sways on its string alone.
-            reach = np.where(arms < CENTRED * rods, arms + rods, arms)
-            for i, f, r, far in zip(bodies.tolist(), force.tolist(), arms.tolist(), reach.tolist(), strict=True):
-                if i >= 0 and world.dynamic[i] and far > 0.0:
-                    square = f * (r / world.inertia[i].min() + world.inv_mass[i] / far)
+            for i, f, r, rod in zip(
+                bodies.tolist(), force.tolist(), np.linalg.norm(anchors, axis=1).tolist(), self._rod[which].tolist(), strict=True
+            ):
+                # A body that hangs at its centre does not sway; files of single precision miss the centre by some 1e-8.
+                if i >= 0 and world.dynamic[i] and r > CENTRED * rod:
+                    square = f * (r / world.inertia[i].min() + world.inv_mass[i] / r)
                     squares[i] = squares.get(i, 0.0) + square
         swinging = {self.movable_end(j) for j in which[self._pins[which]].tolist()}
         swinging = {i for i in swinging if len(self.at([i])) == 1}
@@ -293,7 +292,8 @@ class JointState:
         self.began[island.joints] = island.time
         if not len(island.contacts.gap) and island.free is None and self.are_passive(island.joints):
             self._energy[island.joints] = mechanical_energy(state.now, run.world.constants, island.members)
-        self._report(run, island, worst)
+        self._open_by = worst
+        self._report_steep(run, island)
         self.are_closed = worst <= NOT_CLOSED * self._allowed
         return h, residual
 
@@ -304,12 +304,15 @@ class JointState:
         for j in island.joints.tolist():
             self.memory.force[self.table.first[j] : self.table.first[j + 1]] = 0.0
 
-    def _report(self, run: Run, island: Island, worst: float) -> None:
-        """Report joints that are off by `worst` m or rad, and those near the singularity of a twist."""
-        names = tuple(run.world.names[i] for i in island.members)
-        if worst > NOT_CLOSED * self._allowed:
+    def report_open(self, run: Run, island: Island) -> None:
+        """Report joints of an island that the forces found last do not close."""
+        if not self.are_closed:
+            names, worst = tuple(run.world.names[i] for i in island.members), self._open_by
             far = f"off by {worst:.1e}" if math.isfinite(worst) else "no pose closes them"
             run.log.report(island.time, "joints not closed", names, f"{far}; use a smaller step")
+
+    def _report_steep(self, run: Run, island: Island) -> None:
+        """Report joints that are near the singularity of a twist."""
         for j in island.joints.tolist():
             if self.memory.steepness[self.table.first[j] : self.table.first[j + 1]].max(initial=0.0) > STEEP:
                 pair = tuple(run.world.names[i] for i in self.bodies_of(np.array([j])))
@@ -354,16 +357,12 @@ class JointState:
             island.joints = which
             self.project_velocities(run, island)
 
-    def note_sub_steps(self, run: Run, which: np.ndarray, force: np.ndarray, span: tuple[float, float], worst: float) -> None:
-        """Note the mean forces (j, 3) N on b over a span [s] of sub-steps of the other regime, and what they left open, m or rad."""
+    def note_sub_steps(self, which: np.ndarray, force: np.ndarray, span: tuple[float, float]) -> None:
+        """Note the mean forces (j, 3) N on b over a span [s] of sub-steps of the other regime."""
         time, end = span
         self.pull[which], self.moment[which], self.began[which], self.length[which] = force[which], 0.0, end, 0.0
         for j in which.tolist():
             self.reactions.append((time, j, force[j].copy()))
-        if worst > TOLERANCES.sub_stepping.joints_open * run.world.joint_size:
-            names = tuple(run.world.names[i] for i in self.bodies_of(which))
-            far = f"off by {worst:.1e}" if math.isfinite(worst) else "no pose closes them"
-            run.log.report(time, "joints not closed", names, f"{far}; use a smaller step")
 
     def account_sub_steps(self, run: Run, which: np.ndarray, began: float, time: float) -> None:
         """Record the impulses of sub-steps that lasted from `began` to `time`, s."""

@@ -22,8 +22,9 @@ from rigidimpulse.collision.contact_buffer import Question
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.dynamics.energy import mechanical_energy
+from rigidimpulse.engine.exact.advance import NO_WRENCH
 from rigidimpulse.engine.exact.energy_limit import note_end_energy
-from rigidimpulse.engine.exact.trajectories import account_contact_work
+from rigidimpulse.engine.exact.trajectories import account_contact_work, begin_trajectory
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.pair_table import NEVER, RUNAWAY
 from rigidimpulse.engine.regime import (
@@ -61,6 +62,8 @@ MOST_PIECES = 4
 """Parts of what is stepped at once, between which trajectories begin again."""
 STRAY = 10.0
 """Skins by which trajectories may stray from the ways of turning bodies, over `Accuracy.substep_motion`: a skin by default."""
+OF_MEAN = 0.125
+"""Part of the mean number of solves that each step is, for bodies with joints."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the island that comes near it."""
 HANDED = "exact contact cost more than it advanced: sub-steps hold these bodies, which may sink in by a skin, 0.8 % of the inner radius"
@@ -109,6 +112,7 @@ class SubsteppedIslands:
         self._auto = world.accuracy.contact_solver == "auto"
         self._jointed = jointed(world)
         self._joint_stepper: JointedStepper | None = None
+        self._mean_solves, self._open = np.zeros(world.num_bodies), np.zeros(world.num_bodies, bool)
         self.solve_count, self._step_end = self._no_solves(), 0.0
         self._handed: dict[tuple[str, ...], int] = {}
         self._ends: dict[int, float] = {}
@@ -130,13 +134,17 @@ class SubsteppedIslands:
 
     def is_idle(self) -> bool:
         """Whether no island is sub-stepped and none may begin to be."""
-        begins = not self._auto or may_begin(self._world, self._jointed, self.solve_count)
+        return self._is_idle(np.maximum(self.solve_count, 0.0))
+
+    def _is_idle(self, solve_count: np.ndarray) -> bool:
+        """The same for these counts (n,) of solves in the last step."""
+        begins = not self._auto or may_begin(self._world, self._jointed, solve_count)
         return not begins and bool(np.all(self.label < 0))
 
     def may_take(self, bodies: np.ndarray) -> bool:
         """Whether islands of bodies that no impulse keeps apart are handed over; they are, when they are looked at next."""
         mine = bodies[self._world.dynamic[bodies]]
-        if np.any(self.solve_count[mine] == NEVER):
+        if np.any(self.solve_count[mine] == NEVER) or self._open[mine].any():
             return False
         self.solve_count[mine] = np.inf
         return True
@@ -153,9 +161,13 @@ class SubsteppedIslands:
 
     def choose(self, run: Run, pair_events: PairEvents) -> None:
         """Choose the islands of the step: `pair_events.inside` marks their bodies, `pair_events.asleep` the sleepers."""
-        idle, solve_count = self.is_idle(), self.solve_count
+        last = np.maximum(self.solve_count, 0.0)
         if pair_events.end > self._step_end:
+            self._mean_solves += OF_MEAN * (last - self._mean_solves)
             self.solve_count, self._step_end = self._no_solves(), pair_events.end
+        # One step with many events is no reason to leave the exact regime with a mechanism: it stays out of it for long.
+        solve_count = np.where(self._jointed, self._mean_solves, last)
+        idle = self._is_idle(solve_count)
         if idle:
             return
         world, trajectory, time = run.world, run.state.trajectory, pair_events.begin
@@ -196,6 +208,7 @@ class SubsteppedIslands:
         joined = np.zeros_like(member)
         joined[run.joints.bodies_of(run.joints.at(np.flatnonzero(member & self._jointed)))] = True
         refused = refusals(world, root, self.label >= 0, joined, moves, solve_count, (a, b), self._auto)
+        refused.update(dict.fromkeys(np.unique(root[member & self._open]).tolist(), "joints that sub-steps do not close"))
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         # Tall columns are found from contacts, so only in islands that are not refused yet.
         chosen = self._low(run, pair_events, chosen, root, joined, refused)
@@ -384,7 +397,7 @@ class SubsteppedIslands:
         """
         members, rebound = island.members, float(island.contacts.restitution.max(initial=0.0))
         stuck, pressed = bool(np.isposinf(self.solve_count[members]).any()), bool(pair_events.pressed()[members].any())
-        if pressed or (rebound > REBOUND and not stuck):
+        if pressed or self._open[members].any() or (rebound > REBOUND and not stuck):
             # Looked at, and left to the exact regime until the end of the step.
             self.solve_count[members] = NEVER
             if pressed and stuck:
@@ -457,10 +470,23 @@ class SubsteppedIslands:
         kept = self.stepper.kept if island.time > pair_events.begin else 0.0
         parts = self._solved_together(run, members)
         outcomes = [self._step(run, part, np.intersect1d(fresh, part), (island.time, end), kept) for part in parts]
-        self._outcome, self._outcome_end = joined_outcomes(outcomes), end
-        # The island was not stepped to the end of the step: it is woken there.
-        if end < pair_events.end:
-            pair_events.wake[members] = end
+        stepped = [out for out in outcomes if out is not None]
+        self._outcome, self._outcome_end = joined_outcomes(stepped) if stepped else None, end
+        for part, out in zip(parts, outcomes, strict=True):
+            if out is None:
+                self._give_back(run, pair_events, part, island.time)
+            elif end < pair_events.end:
+                # The island was not stepped to the end of the step: it is woken there.
+                pair_events.wake[part] = end
+
+    def _give_back(self, run: Run, pair_events: PairEvents, members: np.ndarray, time: float) -> None:
+        """Let the exact regime go on with an island whose joints no sub-steps close, from `time` on and until the end of the run."""
+        self.label[members], self._taken[members], self._open[members] = -1, False, True
+        self.solve_count[members] = NEVER
+        pair_events.inside[members] = False
+        for i in members.tolist():
+            begin_trajectory(run, pair_events, i, time, NO_WRENCH, rests=False)
+        pair_events.wake[members] = time
 
     def _solved_together(self, run: Run, members: np.ndarray) -> list[np.ndarray]:
         """Members that are solved together: islands with joints one by one, all others at once."""
@@ -470,8 +496,8 @@ class SubsteppedIslands:
         rest = members[~np.isin(self.label[members], labels)]
         return [rest, *parts] if len(rest) else parts
 
-    def _step(self, run: Run, members: np.ndarray, fresh: np.ndarray, span: tuple[float, float], kept: float) -> Outcome:
-        """Step members that are solved together; fresh: those of them that were in no sub-stepped island."""
+    def _step(self, run: Run, members: np.ndarray, fresh: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
+        """Step members that are solved together; fresh: those of them that were in no sub-stepped island. None if joints stay open."""
         time, end = span
         which = run.joints.at(members[self._jointed[members]])
         if len(which):
@@ -484,6 +510,8 @@ class SubsteppedIslands:
                 change = mechanical_energy(run.state.now, run.world.constants, fresh) - before
                 run.log.account(time, "position correction", change)
             out = self.stepper.step(run, time, end)
+        if out is None:
+            return None
         amounts = np.zeros((3, run.world.num_bodies))
         amounts[:, out.members] = out.taken, out.raised, out.given
         for label in np.unique(self.label[members]).tolist():
@@ -494,8 +522,8 @@ class SubsteppedIslands:
             self._began[label] = _Began(time, end, mine, energy, taken, raised, given, which)
         return out
 
-    def _step_jointed(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome:
-        """Step an island with joints."""
+    def _step_jointed(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
+        """Step an island with joints; None if they stay open."""
         if self._joint_stepper is None:
             prepare_kernels(self._world, with_events=False, with_substepped=True)
             self._joint_stepper = JointedStepper(run, self.stepper)
@@ -558,7 +586,8 @@ class SubsteppedIslands:
     def begin_trajectories(self, run: Run, pair_events: PairEvents, island: Island) -> None:
         """Give the members the trajectories that the solver found."""
         out, state, time = self._outcome, run.state, island.time
-        assert out is not None
+        if out is None:
+            return
         length = self._outcome_end - time
         run.recorder.flush_all(state.trajectory, out.members, time)
         depart(state.trajectory, out.members, time, length, state.now, out.position, out.orientation, out.velocity)

@@ -109,7 +109,7 @@ class Outcome:
 
 
 def joined_outcomes(outcomes: list[Outcome]) -> Outcome:
-    """The outcomes of several sets of bodies as one."""
+    """The outcomes of several sets of bodies as one; there is at least one."""
     if len(outcomes) == 1:
         return outcomes[0]
     return Outcome(*(np.concatenate([getattr(out, column.name) for out in outcomes]) for column in fields(Outcome)))

@@ -11,6 +11,7 @@ import numpy as np
 from rigidimpulse.core.simd import ROW
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
+from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.dynamics.solvers.time_stepping.solver import step_island, stop_island
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Fineness, Outcome
@@ -24,7 +25,9 @@ BEND: float = 1.5e-3
 """Skins by which the path of a point may bend in a sub-step, over 8: contacts close along straight lines, so bodies enter by as much."""
 MOTION = 1.0
 """Parts of `Accuracy.substep_motion` that touching bodies move until their contacts are looked for again."""
-CLOSED = TOLERANCES.sub_stepping.joints_closed
+GAINED: float = 1e-4
+"""Part of what moves by which the energy of an island may rise in a step: what the method makes, it takes back; a whip makes ever more."""
+CLOSED, OPEN = TOLERANCES.sub_stepping.joints_closed, TOLERANCES.sub_stepping.joints_open
 
 
 class JointedStepper:
@@ -48,7 +51,7 @@ class JointedStepper:
         self._driven_joints = _driven(run)
         self._stiffening, self._column = np.zeros(n + 1), np.zeros(n + 1, np.int64)
         self._driven, self.halved = np.zeros(n + 1, bool), 0
-        self._allowed = CLOSED * world.joint_size
+        self._allowed, self._open = CLOSED * world.joint_size, OPEN * world.joint_size
 
     def fineness(self, run: Run, members: np.ndarray) -> Fineness:
         """How finely members are stepped from the present instant."""
@@ -59,42 +62,71 @@ class JointedStepper:
         pieces = min(max(stray * accuracy.step, SUB_STEPS), MOST_SUB_STEPS)
         return Fineness(accuracy.step / pieces, MOTION * accuracy.substep_motion, meets_fast=True)
 
-    def step(self, run: Run, time: float, end: float) -> Outcome:
-        """Step the island that is set up, whose bodies have joints, from `time` to `end`."""
+    def step(self, run: Run, time: float, end: float) -> Outcome | None:
+        """Step the island that is set up, whose bodies have joints, from `time` to `end`; None if sub-steps cannot hold it.
+
+        They cannot where joints stay open, or where bodies gain energy that nothing gave: light links between heavy bodies may whip.
+        """
+        stepper, which = self._stepper, run.joints.at(self._stepper.members)
+        island = self._island(run, which)
+        moment, given = np.zeros((len(self._joints.body_a), 3)), GivenImpulses(stepper)
+        stepper.begin_step()
+        worst = self._sub_steps(run, island, moment, given, (end - time) / stepper.sub_steps)
+        if not worst <= self._open:
+            return None
+        stop_island(island, stepper.bodies, stepper.table.arrays, self._world.coefficients, self._stiffening, moment)
+        self._hand_over(island.members)
+        out = stepper.end_step()
+        if not (self._driven[island.members].any() or self._keeps_energy(run, out)):
+            return None
+        stepper.pressed[stepper.members] = True
+        given.log(run, stepper.members, time, end)
+        run.joints.note_sub_steps(which, moment / (end - time), (time, end))
+        return out
+
+    def _island(self, run: Run, which: np.ndarray) -> JointedIsland:
+        """The joints `which` and the bodies that are set up, at the start of the step."""
         stepper, now, world = self._stepper, self._now, self._world
-        bodies, members = stepper.bodies, np.sort(stepper.rank[stepper.members])
-        which = run.joints.at(stepper.members)
-        velocity = bodies.velocity.reshape(-1, ROW)
+        members = np.sort(stepper.rank[stepper.members])
+        velocity = stepper.bodies.velocity.reshape(-1, ROW)
         now.velocity[:], now.angular_velocity[:] = velocity[:, :3], velocity[:, 3:6]
         # What is no member does not give way.
         now.inv_mass[:] = 0.0
         now.inv_mass[members] = world.inv_mass[stepper.order[members]]
-        carried = world.moving.any()
-        self._driven[:] = carried or bool(self._driven_joints[which].any())
-        moment = np.zeros((len(self._joints.body_a), 3))
-        kept = self._stiffening, moment, self._driven
-        island = JointedIsland(
-            self._joints, which, now, bodies.rotation, members, self._column, run.joints.memory, self._allowed
+        self._driven[:] = bool(world.moving.any()) or bool(self._driven_joints[which].any())
+        return JointedIsland(
+            self._joints, which, now, stepper.bodies.rotation, members, self._column, run.joints.memory, self._allowed
         )
-        stepper.begin_step()
-        given = GivenImpulses(stepper)
-        h, worst = (end - time) / stepper.sub_steps, 0.0
+
+    def _sub_steps(self, run: Run, island: JointedIsland, moment: np.ndarray, given: GivenImpulses, h: float) -> float:
+        """All sub-steps of h s; returns the worst gap of a joint, m or rad."""
+        stepper, worst, kept = self._stepper, 0.0, (self._stiffening, moment, self._driven)
         for part, some in enumerate(stepper.sub_steps_of_parts()):
             if part:
-                self._hand_over(members)
+                self._hand_over(island.members)
                 stepper.look_again_at_all(run)
                 given.forget(stepper)
             halved, gap = step_island(
-                island, bodies, stepper.table.arrays, world.coefficients, stepper.balance, kept, some, h
+                island, stepper.bodies, stepper.table.arrays, self._world.coefficients, stepper.balance, kept, some, h
             )
             self.halved, worst = self.halved + halved, max(worst, gap)
             given.add(stepper)
-        stop_island(island, bodies, stepper.table.arrays, world.coefficients, self._stiffening, moment)
-        self._hand_over(members)
-        stepper.pressed[stepper.members] = True
-        given.log(run, stepper.members, time, end)
-        run.joints.note_sub_steps(run, which, moment / (end - time), (time, end), worst)
-        return stepper.end_step()
+        return worst
+
+    def _keeps_energy(self, run: Run, out: Outcome) -> bool:
+        """Whether members have no more energy than at the start, up to GAINED of what moves and the rise by a margin; no if it is no number."""
+        now, constants, members = run.state.now, self._world.constants, out.members
+        after = now._replace(
+            position=now.position.copy(), orientation=now.orientation.copy(), velocity=now.velocity.copy(),
+            angular_velocity=now.angular_velocity.copy(),
+        )  # fmt: skip
+        after.position[members], after.orientation[members] = out.position, out.orientation
+        after.velocity[members], after.angular_velocity[members] = out.velocity[:, :3], out.velocity[:, 3:]
+        gained = mechanical_energy(after, constants, members) - mechanical_energy(now, constants, members) - float(out.raised.sum())
+        moves = max(kinetic_energy(now, constants, members), kinetic_energy(after, constants, members))
+        rise = float(np.sum(constants.mass[members] * constants.steady_strength[members] * self._stepper.skin[members]))
+        # Comparisons with what is no number are false.
+        return gained <= GAINED * moves + rise
 
     def _hand_over(self, members: np.ndarray) -> None:
         """Give the stepper the velocities of the members."""
