@@ -88,6 +88,7 @@ EFFECTS = {
     "gyroscopic term": ("balls", 'scene.add(ri.Body("d", ri.Shape.box((1, 2, 3)), position=(9, 9, 9)))', []),
 }
 """Name in the plan: the plain scene, what calls for the effect, modules of the package whose kernels are the effect's."""
+IN_RESERVE = {"sub-stepped islands"}
 KERNELS = {"FCL contacts", "springs", "joints", "sub-stepped islands", "contact forces", "contact detection", "event kernel"}
 """Effects with kernels of their own."""
 ASKED_FOR = (
@@ -134,7 +135,8 @@ def test_every_registered_force_is_listed() -> None:
 def test_unused_effect_leaves_no_trace(name: str) -> None:
     kind, call, modules = EFFECTS[name]
     without, after = plain(kind), process(PLAIN[kind], call, RUN, "first = run", PLAIN[kind], RUN, REPORT)
-    assert name in after["used"] and not without["plan"][name]
+    # What may be called upon in the middle of a run is in the plan of a scene that does not call for it; its kernels are not called.
+    assert name in after["used"] and (name in IN_RESERVE or not without["plan"][name])
     assert after["hash"] == without["hash"]
     asked = [m for m in without["modules"] if m.startswith(ASKED_FOR) and m not in ALWAYS]
     assert not asked and not OPTIONAL.intersection(without["modules"])

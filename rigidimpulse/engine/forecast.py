@@ -24,7 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.core.files import write_renamed
+from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.files import make_folder, write_renamed
 from rigidimpulse.engine.effects import EventKernel, SubsteppedContact
 from rigidimpulse.engine.regime import only_expensive
 from rigidimpulse.model.plan import Plan
@@ -135,7 +136,8 @@ def _read() -> dict[str, Any]:
 
 
 def _write(kept: dict[str, Any]) -> None:
-    with suppress(OSError):
+    with suppress(SceneError):
+        make_folder(_file().parent)
         write_renamed(_file(), lambda target: target.write_text(json.dumps(kept), encoding="utf-8"))
 
 

@@ -85,9 +85,11 @@ def _named(error: Any) -> str:
 PRESETS: dict[str, dict[str, Any]] = {
     "preview": {"impact_time": "conservative", "tolerance": 1e-7, "step": 1.0 / 30.0, "substep_motion": 0.3},
     "standard": {},
-    "classic": {"narrow_phase": "fcl", "impact_time": "bisection", "response": "sequential"},
     "exact": {"step": 1.0 / 240.0, "tolerance": 1e-15, "iterations": 100000},
+    "classic": {"narrow_phase": "fcl", "impact_time": "bisection", "response": "sequential"},
 }
+LADDER = ("preview", "standard", "exact")
+"""Presets from fast to accurate; "classic" is as accurate as "standard", by another way."""
 
 
 def resolve_accuracy(accuracy: str | Accuracy) -> Accuracy:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rigidimpulse.scene.accuracy import PRESETS, Accuracy
+from rigidimpulse.scene.accuracy import LADDER, PRESETS, Accuracy
 
 COARSEST = 1.0 / 30.0
 """s, step of the lowest rung."""
@@ -49,7 +49,8 @@ def grid(full: bool = False) -> list[Setting]:
     fact ("after") at several steps; responses without impulses ("kinematic", "penalty") and with simultaneous ones; contact solvers;
     steps of the exact integrator and integrators of fixed steps.
     """
-    settings = [Setting(name, "presets", Accuracy(**values).step, Accuracy(**values)) for name, values in PRESETS.items()]
+    presets = {name: Accuracy(**PRESETS[name]) for name in LADDER}
+    settings = [Setting(name, "presets", accuracy.step, accuracy) for name, accuracy in presets.items()]
     for how in ("bisection", "conservative"):
         for tolerance in _chosen(TOLERANCES, full):
             accuracy = Accuracy(impact_time=how, tolerance=tolerance)

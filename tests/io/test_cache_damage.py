@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import platform
 import random
 import subprocess
 import sys
@@ -21,6 +23,9 @@ from rigidimpulse.io.cache.read import read
 
 h5py = pytest.importorskip("h5py")
 MUTATIONS = 400
+
+MACHINE = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
+"""The mark of this machine in names of temporary files."""
 
 
 class Stopped(Exception):
@@ -217,8 +222,14 @@ def test_a_changed_number_changes_the_check_of_its_row() -> None:
 def test_files_that_killed_runs_left_are_removed(tmp_path: Path) -> None:
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
-    left = tmp_path / f".run.{gone.pid}.h5"
-    kept = [tmp_path / name for name in (f".run.{os.getppid()}.h5", ".run.x.h5", f".other.{gone.pid}.h5", f".run.{gone.pid}.npz")]
+    left = tmp_path / f".run.{MACHINE}.{gone.pid}.0123abcd.h5"
+    kept = [
+        tmp_path / name
+        for name in (
+            f".run.{MACHINE}.{os.getppid()}.0123abcd.h5", ".run.x.h5", f".other.{MACHINE}.{gone.pid}.0123abcd.h5",
+            f".run.{MACHINE}.{gone.pid}.0123abcd.npz", f".run.89abcdef.{gone.pid}.0123abcd.h5",
+        )
+    ]  # fmt: skip
     for path in (left, *kept):
         path.write_bytes(b"half a file")
     CacheFile(tmp_path / "run.h5", header(["a"]), None).close()
@@ -230,7 +241,7 @@ def test_a_file_that_somebody_holds_is_kept(tmp_path: Path) -> None:
     fcntl = pytest.importorskip("fcntl")
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
-    left = tmp_path / f".run.{gone.pid}.h5"
+    left = tmp_path / f".run.{MACHINE}.{gone.pid}.0123abcd.h5"
     with left.open("wb") as held:
         fcntl.flock(held, fcntl.LOCK_EX)
         CacheFile(tmp_path / "run.h5", header(["a"]), None).close()

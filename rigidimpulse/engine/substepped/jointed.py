@@ -114,7 +114,7 @@ class JointedStepper:
         return worst
 
     def _keeps_energy(self, run: Run, out: Outcome) -> bool:
-        """Whether members have no more energy than at the start, up to GAINED of what moves and the rise by a margin; no if it is no number."""
+        """Whether members have no more energy than before, up to GAINED of what moves and a rise by the margin; no if it is no number."""
         now, constants, members = run.state.now, self._world.constants, out.members
         after = now._replace(
             position=now.position.copy(), orientation=now.orientation.copy(), velocity=now.velocity.copy(),

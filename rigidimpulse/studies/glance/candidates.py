@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from importlib.util import find_spec
 
-from rigidimpulse.scene.accuracy import PRESETS, Accuracy
+from rigidimpulse.scene.accuracy import LADDER, PRESETS, Accuracy
 from rigidimpulse.studies.peers import PEERS
 
 PRESET, FIXED, PENALTY, PEER = "preset", "fixed", "penalty", "engine"
@@ -43,7 +43,7 @@ class Candidate:
 
 def presets() -> list[Candidate]:
     """Preview, standard and exact."""
-    return [_preset(name) for name in PRESETS]
+    return [_preset(name) for name in LADDER]
 
 
 def _preset(name: str) -> Candidate:

@@ -14,6 +14,7 @@ from pathlib import Path
 from time import perf_counter
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.files import make_folder
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.forecast import remember
 from rigidimpulse.engine.simulate import simulate
@@ -66,10 +67,12 @@ def glance(
         changed: called with what is known, first before any run, then after each, and at the end.
 
     Raises:
-        SceneError: the scene cannot be simulated, or nothing in it moves freely.
+        SceneError: the scene cannot be simulated, nothing in it moves freely, or the folder cannot be made.
 
     """
     start = perf_counter()
+    if output is not None:
+        make_folder(Path(output))
     topic = topic_of(scene, duration, fps)
     if not any(body.motion == "dynamic" for body in topic.scene.bodies):
         raise SceneError("nothing in the scene moves freely, so there is no error to measure", "add a body with motion='dynamic'")
