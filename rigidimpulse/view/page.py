@@ -83,6 +83,7 @@ def assemble(
         "license": (viewer / "main.min.js.LICENSE.txt").read_text(encoding="utf-8").replace("--", "- -"),
         "meshcat": (viewer / "main.min.js").read_text(encoding="utf-8"),
         "commands": "\n".join(_command(kind, message) for kind, message in messages),
+        "bar": (files / "bar.html").read_text(encoding="utf-8"),
         "manifest": json_text(manifest).replace("<", "\\u003c"),
         "script": "\n".join((files / name).read_text(encoding="utf-8") for name in scripts),
     }

@@ -36,7 +36,7 @@ MOST_BYTES = 32_000_000
 BYTES_A_KEY = 20
 SHORT = 32767
 """What 1 is written as in quaternions."""
-SCRIPTS = ("look.js", "sheet.js")
+SCRIPTS = ("look.js", "block.js", "sheet.js")
 STYLES = ("page.css", "sheet.css")
 
 

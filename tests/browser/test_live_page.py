@@ -217,7 +217,8 @@ def test_an_error_is_shown_with_its_line_and_goes_away_when_mended(page: Opened,
 def test_a_scene_that_never_comes_back_is_given_up_when_it_is_mended(page: Opened, command: tuple[Command, Path]) -> None:
     command[1].write_text("while True:\n    pass\n")
     wait(page, "r.doing === 'making'")
-    again(page, lambda: command[1].write_text(SCENE))
+    assert again(page, lambda: command[1].write_text(SCENE)) < TIMEOUT / 1e3
+    assert page.page.is_hidden("#problem") and page.do("r.doing") == "done"
 
 
 def test_a_body_is_thrown(page: Opened) -> None:
@@ -303,6 +304,8 @@ def test_meshcats_own_visualizer_adds_to_the_picture(page: Opened, command: tupl
             pytest.skip("another meshcat server holds the first port")
         shown["mine"].set_object(meshcat.geometry.Box([0.1, 0.2, 0.3]))
         wait(page, "r.viewer.scene_tree.find(['meshcat', 'mine', '<object>']).object.isMesh")
+        box = page.do("r.viewer.scene_tree.find(['meshcat', 'mine', '<object>']).object.geometry.parameters")
+        assert sorted(box[side] for side in ("width", "height", "depth")) == pytest.approx([0.1, 0.2, 0.3])
     finally:
         shown.window.zmq_socket.close(0)
         del shown

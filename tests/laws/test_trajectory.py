@@ -1,4 +1,4 @@
-"""The path of a body between two changes of course.
+"""The path of a body between two changes of its trajectory.
 
 Law. x = x0 + v0 s + a s^2 / 2 + j s^3 / 6, v = v0 + a s + j s^2 / 2; rotation by mode. The path is one function of time: asked for
 in one go or by way of any times in between, by the sweep or by the integration, it is the same. Forces that vary enter by two moments.

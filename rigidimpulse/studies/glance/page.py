@@ -40,6 +40,7 @@ MOST_IMPACTS = 400
 """Marks on the timeline; the strongest."""
 DIGITS = 3
 """Of errors in the index."""
+SHARED_SCRIPTS = ("look.js", "block.js")
 SCRIPTS = ("format.js", "pictures.js", "chart.js", "timeline.js", "study.js")
 PAGE, SIDECAR = "study.html", "study.js"
 
@@ -154,6 +155,7 @@ def _impacts(known: Glance) -> list[list[float]]:
 
 def _page(index: str, block: str, name: str) -> str:
     own, shared = resources.files("rigidimpulse.studies.glance") / "page", resources.files("rigidimpulse.view") / "page"
+    scripts = [*(shared / name for name in SHARED_SCRIPTS), *(own / name for name in SCRIPTS)]
     viewer = viewer_files()
     fields = {
         "title": html.escape(f"{name}: what accuracy costs"),
@@ -161,6 +163,6 @@ def _page(index: str, block: str, name: str) -> str:
         "license": (viewer / "main.min.js.LICENSE.txt").read_text(encoding="utf-8").replace("--", "- -"),
         "meshcat": (viewer / "main.min.js").read_text(encoding="utf-8"),
         "block": block, "index": index,
-        "script": "\n".join([(shared / "look.js").read_text("utf-8"), *((own / name).read_text("utf-8") for name in SCRIPTS)]),
+        "script": "\n".join(file.read_text("utf-8") for file in scripts),
     }  # fmt: skip
     return fill_template((own / "study.html").read_text(encoding="utf-8"), fields)

@@ -230,6 +230,7 @@ def _page(title: str) -> str:
     fields = {
         "title": html.escape(title),
         "style": "".join(file.read_text(encoding="utf-8") for file in (shared / "page.css", shared / "layout.css", own / "live.css")),
+        "bar": (shared / "bar.html").read_text(encoding="utf-8"),
         "script": "\n".join(scripts),
     }
     return fill_template((own / "live.html").read_text(encoding="utf-8"), fields)

@@ -10,20 +10,6 @@ const HOLD = 0.8; // s that the last frame stays before all begin again
 const index = JSON.parse(document.getElementById("index").textContent);
 const state = {time: 0, playing: true, hold: 0, sort: "", rising: true, drawn: 0};
 
-async function readBlock() {
-  const packed = Uint8Array.from(atob(document.getElementById("block").textContent), (letter) => letter.charCodeAt(0));
-  const unpacked = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Response(unpacked).arrayBuffer();
-}
-
-function makeGeometry(buffer, [vertices, normals, faces]) {
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(buffer, ...vertices), 3));
-  geometry.setAttribute("normal", new THREE.BufferAttribute(new Float32Array(buffer, ...normals), 3));
-  geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(buffer, ...faces), 1));
-  return geometry;
-}
-
 /* The picture of one run: its bodies, posed at any time. */
 class Picture {
   constructor(motion, buffer, geometries, sheet) {
@@ -238,7 +224,7 @@ function turnOver(sheet) {
   requestAnimationFrame(step);
 }
 
-readBlock().then((buffer) => {
+readBlock(document.getElementById("block").textContent).then((buffer) => {
   const sheet = new Sheet(buffer);
   sheet.arrange();
   wire(sheet);

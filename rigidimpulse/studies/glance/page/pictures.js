@@ -11,19 +11,6 @@ const TURN = 0.006; // rad for a pixel of a drag
 const STEEPEST = 1.35; // rad
 const GROUNDS = {light: "#b3b8bd", dark: "#39434b"};
 
-async function readBlock(packed) {
-  const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
-  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
-}
-
-function makeGeometry(buffer, [vertices, normals, faces]) {
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(buffer, ...vertices), 3));
-  geometry.setAttribute("normal", new THREE.BufferAttribute(new Float32Array(buffer, ...normals), 3));
-  geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(buffer, ...faces), 1));
-  return geometry;
-}
-
 /* The motion of one run: poses of its moving bodies at any time. */
 class Motion {
   constructor(entry, buffer) {
