@@ -9,7 +9,7 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
                 sub-stepped island
     or joints   an island with joints, each body of which the exact regime solved more than EXPENSIVE_JOINTED times a step, in the mean
                 of the last ones, or EXPENSIVE_SWING times where nothing is near it: by as much less often as it has more bodies than
-                SMALL. A body that hangs alone stays exact
+                SMALL. A body that hangs alone stays exact, and so does what rolling friction may act on
     or runaway  in the middle of a step, an island of which a body was solved more than RUNAWAY times in the step: it costs more than it
                 advances. So do islands in which two bodies come to contact again and again and no impulse keeps them apart. They are handed
                 over at that instant, whatever they are made of. Contacts that rebound by more than REBOUND are no runaways: many impacts
@@ -173,8 +173,10 @@ def refusals(
     least = np.where(was_substepped, KEPT, np.where(lively_enough, FEW, MANY))
     for r in np.flatnonzero((size > 0) & (size < least) & ~has_joints).tolist():
         out[r] = "few bodies"
-    stays_exact = solves * np.maximum(size / SMALL, 1.0) <= np.where(touches, EXPENSIVE_JOINTED, EXPENSIVE_SWING) * size
-    for r in np.flatnonzero(has_joints & ~was_substepped & (stays_exact | (size < KEPT))).tolist():
+    cheap = solves * np.maximum(size / SMALL, 1.0) <= np.where(touches, EXPENSIVE_JOINTED, EXPENSIVE_SWING) * size
+    # Sub-steps have no rolling friction.
+    stays_exact = np.full(len(root), True) if world.rolling is not None else cheap | (size < KEPT)
+    for r in np.flatnonzero(has_joints & ~was_substepped & stays_exact).tolist():
         out[r] = "joints"
     # The rest holds only where an island begins: a body that comes near later is taken in.
     begins = ~was_substepped[owner]

@@ -23,6 +23,7 @@ import numpy as np
 
 from rigidimpulse.collision.contact_records import SKIN, SUPPORT
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.quaternion import quaternion_to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.union_find import unite
 from rigidimpulse.dynamics.constraints.joint import is_linear
@@ -57,8 +58,9 @@ def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h
         step = min(step, left)
         _remember(bodies, now, members, begin, before)
         kick(bodies, now, members, 0.5 * step)
-        gap = _sub_step(island, bodies, table, coefficients, balance, kept, (begin, spin), step)
-        if gap > GIVE_UP * island.allowed and step > h / MOST_HALVED:
+        most = GIVE_UP * island.allowed if step > h / MOST_HALVED else np.inf
+        gap = _sub_step(island, bodies, table, coefficients, balance, kept, (begin, spin, most), step)
+        if gap > most:
             _take_back(bodies, now, members, begin, before)
             step *= 0.5
             halved += 1
@@ -103,6 +105,7 @@ def _take_back(bodies, now, members, begin, before):
             bodies.position[i, k], now.velocity[i, k], now.angular_velocity[i, k] = begin[i, k], before[i, k], before[i, 3 + k]
         for k in range(4):
             bodies.orientation[i, k] = begin[i, 3 + k]
+        quaternion_to_matrix(bodies.orientation[i], bodies.rotation[i])
 
 
 @jit
@@ -117,8 +120,20 @@ def _kinetic_energy(bodies, now, i):
 
 
 @jit_making_arrays
+def _energies(bodies, now, members):
+    """Kinetic energies (k,) of the members, J."""
+    energy = np.empty(members.shape[0])
+    for k in range(members.shape[0]):
+        energy[k] = _kinetic_energy(bodies, now, members[k])
+    return energy
+
+
+@jit_making_arrays
 def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
-    """Solve the rows at the present pose, fly, and close; returns the gap that is left of joints, m or rad."""
+    """Solve the rows at the present pose, fly, and close; returns the gap that is left of joints, m or rad.
+
+    flight: see `flight.fly`; and the gap up to which things are counted and kept for later: else the caller takes the sub-step back.
+    """
     members, now, (stiffening, moment, driven) = island.members, island.bodies, kept
     contacts, place = contact_points(bodies, now, table.pairs, table.points, coefficients, h)
     start_of = contact_rows(now, contacts, members, island.number, count_joint_rows(island.joints, island.which))
@@ -131,16 +146,19 @@ def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
     direction = fill_joint_biases(island, rows, start, h)
     scale = max(_fastest(rows), h * pull) + TINY
     _set_friction(start_of, contacts, u, SLIP * scale)
-    _give(bodies, now, members, balance, driven, -1.0)
+    given = _energies(bodies, now, members)
     solve_until_slip(None, start_of, members.shape[0], contacts, ACCURATE * scale, SLIP * scale)
     change_velocities(now, members, rows)
-    _give(bodies, now, members, balance, driven, 1.0)
+    given = _energies(bodies, now, members) - given
+    begin, spin, most = flight
+    gap = fly_and_close(island, bodies, rows, start, begin, spin, h)
+    if gap > most:
+        return gap
+    for k in range(members.shape[0]):
+        if driven[members[k]]:
+            balance.given[members[k]] += given[k]
     keep_for_next(start_of, contacts, table.points, place)
     _connect(balance, island, contacts, start_of)
-    begin, spin = flight
-    gap = fly_and_close(island, bodies, rows, start, begin, spin, h)
-    if gap > GIVE_UP * island.allowed:
-        return gap
     own = np.zeros(moment.shape)
     _add_moments(island, rows, start, direction, own)
     _remember_forces(island, rows, start, h)
@@ -169,14 +187,6 @@ def _set_friction(of_contacts, contacts, u, slow):
             i = of_contacts.first_row[c] + 1
             slips = abs(u[c, 1]) + abs(u[c, 2]) > slow
             rows.coefficient[i] = rows.coefficient[i + 1] = contacts.dynamic_friction[c] if slips else contacts.static_friction[c]
-
-
-@jit
-def _give(bodies, now, members, balance, driven, sign):
-    """Add the kinetic energy of driven members, times the sign, to what they are given."""
-    for i in members:
-        if driven[i]:
-            balance.given[i] += sign * _kinetic_energy(bodies, now, i)
 
 
 @jit
