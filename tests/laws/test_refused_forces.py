@@ -35,8 +35,8 @@ def spoilt(factor: float, start: float, end: float = np.inf):
     return solve
 
 
-def sliding_box(solver, hinged: bool = False) -> ri.Recording:
-    """Run of a box of 1 kg that slides on a floor, maybe with a flap hinged to it."""
+def sliding_box(solver, hinged: bool = False, regime: str = "auto") -> ri.Recording:
+    """Run of a box of 1 kg that slides on a floor, maybe with a flap hinged to it; regime: name of a contact solver."""
     rough = ri.Material(static_friction=0.2, dynamic_friction=0.2, restitution=0.0)
     scene = ri.Scene(gravity=(0, 0, -G))
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=rough))
@@ -45,7 +45,7 @@ def sliding_box(solver, hinged: bool = False) -> ri.Recording:
     if hinged:
         scene.add(ri.Body("flap", ri.Shape.box((SIZE, SIZE, 0.02)), position=(0, 0, SIZE + 0.01), **moves))
         scene.add(ri.HingeJoint("box", "flap", (0.5 * SIZE, 0, SIZE), (0, 1, 0), name="hinge"))
-    run = prepare(scene, frame_times(0.5, 60.0))
+    run = prepare(scene, frame_times(0.5, 60.0), ri.Accuracy(contact_solver=regime))
     run.solve_rows = solver
     return complete(run, 0.5)
 
@@ -65,13 +65,19 @@ def test_energy_never_grows_by_forces_that_are_no_solution(factor, start, end) -
     assert rise(run) < 2.0 * GAP * G
 
 
+@pytest.mark.parametrize(
+    ("regime", "said"), [("newton", {"contact forces not solved", "joints not closed"}), ("auto", {"handed to sub-steps"})]
+)
 @pytest.mark.parametrize("factor", [1e6, np.nan])
-def test_nor_by_those_of_joints(factor: float) -> None:
-    """All of the twenty rounds that close the joints are spoilt, for some sub-steps. Joints are of second order: 1e-3 of the energy."""
-    run = sliding_box(spoilt(factor, 30, 75), hinged=True)
+def test_nor_by_those_of_joints(factor: float, regime: str, said: set[str]) -> None:
+    """All of the twenty rounds that close the joints are spoilt, for some sub-steps. Joints are of second order: 1e-3 of the energy.
+
+    Where the planner may choose, what has no solution goes to sub-steps at that instant.
+    """
+    run = sliding_box(spoilt(factor, 30, 75), hinged=True, regime=regime)
     assert np.all(np.isfinite(run.positions)) and np.all(np.isfinite(run.velocities))
     assert np.all(np.isfinite(run.reaction("hinge")))
-    assert {"contact forces not solved", "joints not closed"} & {event.kind for event in run.status.events}
+    assert said & {event.kind for event in run.status.events}
     assert rise(run) < 1e-3 * run.ledger.kinetic[0]
 
 
