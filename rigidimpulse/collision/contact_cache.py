@@ -147,13 +147,17 @@ def most_motion(bodies, pairs, ahead):
 
 @jit
 def most_approach(bodies, pairs, ahead):
-    """Greatest relative motion in `ahead` s of the pairs that take part, in the farthest that contacts are looked for."""
-    part, most = bodies.part, 0.0
+    """Greatest relative motion in `ahead` s of the pairs that may meet in that time, in the farthest that contacts are looked for."""
+    part, x, radius, most = bodies.part, bodies.position, bodies.radius, 0.0
     for p in range(pairs.first.shape[0]):
         a, b = pairs.first[p], pairs.second[p]
-        if in_play(part, a, b):
-            speed = closing_speed(bodies.position, bodies.velocity, bodies.reach, a, b, pairs.carrier[p])
-            most = max(most, ahead * speed / (FARTHEST * min(bodies.inner[a], bodies.inner[b])))
+        if not in_play(part, a, b):
+            continue
+        motion = ahead * closing_speed(x, bodies.velocity, bodies.reach, a, b, pairs.carrier[p])
+        far = radius[a] + radius[b] + motion
+        dx, dy, dz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+        if dx * dx + dy * dy + dz * dz <= far * far:
+            most = max(most, motion / (FARTHEST * min(bodies.inner[a], bodies.inner[b])))
     return most
 
 

@@ -83,7 +83,7 @@ def _named(error: Any) -> str:
 
 
 PRESETS: dict[str, dict[str, Any]] = {
-    "preview": {"impact_time": "conservative", "tolerance": 1e-7, "step": 1.0 / 30.0, "substep_motion": 0.3},
+    "preview": {"impact_time": "conservative", "tolerance": 1e-7, "substep_motion": 0.3, "contact_solver": "substepped"},
     "standard": {},
     "exact": {"step": 1.0 / 240.0, "tolerance": 1e-15, "iterations": 100000},
     "classic": {"narrow_phase": "fcl", "impact_time": "bisection", "response": "sequential"},

@@ -121,13 +121,11 @@ class Fineness:
 
     Attributes:
         sub_step: s, the longest. motion: inner radii that touching bodies move until they are looked at again.
-        meets_fast: whether there may be bodies that are too fast for contacts to be found for the whole step.
 
     """
 
     sub_step: float
     motion: float
-    meets_fast: bool = False
 
 
 class ContactStepper:
@@ -261,10 +259,9 @@ class ContactStepper:
         self._part[supports], self._part[members] = SUPPORT, MEMBER
         load_bodies(self.bodies, self.order, run.state.now, run.acceleration, self.world.inv_mass, self._part)
         motion = most_motion(self.bodies, self.table.pairs, ahead)
-        # Fast bodies are looked at more often, with enough sub-steps between the looks.
-        needed = math.ceil(motion / COARSEST)
-        if fineness.meets_fast:
-            needed = max(needed, math.ceil(most_approach(self.bodies, self.table.pairs, ahead)))
+        # Fast bodies are looked at more often, with enough sub-steps between the looks. So are those that come from farther than
+        # contacts are looked for: a big ball met small bricks only when it was a third inside of them (issue 28).
+        needed = max(math.ceil(motion / COARSEST), math.ceil(most_approach(self.bodies, self.table.pairs, ahead)))
         self.sub_steps = max(math.ceil(ahead / fineness.sub_step - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
         most = max(self.sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
         self.parts = min(max(math.ceil(motion / fineness.motion), needed, 1), most)

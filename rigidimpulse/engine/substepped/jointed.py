@@ -60,7 +60,7 @@ class JointedStepper:
         near[stepper.order[pairs.first]] = near[stepper.order[pairs.second]] = True
         stray = most_stray(run.state.now, members, near, stepper.reach, stepper.skin, BEND)
         pieces = min(max(stray * accuracy.step, SUB_STEPS), MOST_SUB_STEPS)
-        return Fineness(accuracy.step / pieces, MOTION * accuracy.substep_motion, meets_fast=True)
+        return Fineness(accuracy.step / pieces, MOTION * accuracy.substep_motion)
 
     def step(self, run: Run, time: float, end: float) -> Outcome | None:
         """Step the island that is set up, whose bodies have joints, from `time` to `end`; None if sub-steps cannot hold it.
