@@ -56,7 +56,8 @@ def why_not_substepped(world: World) -> str:
     if world.force_tables:
         return "forces vary"
     if solver == "substepped":
-        return ""
+        # Everything that touches would be stepped, and roll for ever.
+        return "rolling friction is exact only" if world.rolling is not None else ""
     used, movable = np.unique(world.material_of_body), np.unique(world.material_of_body[world.dynamic])
     most = ELASTIC if world.joints_of_scene else REBOUND
     if np.all(world.coefficients[np.ix_(movable, used)][:, :, 0] > most):
