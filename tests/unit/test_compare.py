@@ -238,7 +238,7 @@ class TestCommand:
         assert manifest_of(page.read_text(encoding="utf-8"))["comparison"]["labels"] == ["some", "exact"]
 
     def test_a_run_is_itself(self, tmp_path: Path) -> None:
-        result = call("preview", "preview", "--scene", _scene_file(tmp_path), "--duration", 0.25, "--fps", 24)
+        result = call("standard", "standard", "--scene", _scene_file(tmp_path), "--duration", 0.25, "--fps", 24)
         assert result.exit_code == 0, result.output
         assert result.stdout.splitlines()[-1].split() == ["ball", "0", "0", "never"]
 

@@ -23,7 +23,6 @@ from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.glance import candidates
 from rigidimpulse.studies.glance.candidates import Candidate
-from rigidimpulse.studies.glance.figures import is_pile
 from rigidimpulse.studies.glance.known import Glance
 from rigidimpulse.studies.glance.page import write_page
 from rigidimpulse.studies.glance.played import GivenUp, Played, Player, watch
@@ -175,7 +174,7 @@ class _Pass:
             known.reference = exact_reference(known.entry, known.world, known.times)
             return
         coarse = [played.recording for played in known.runs if played.recording is not None and played.candidate.kind == candidates.PRESET]
-        if any(map(is_pile, coarse)):
+        if known.pile:
             self._pile_reference()
             return
         before, spent = len(self.fine), self._seconds("exact")

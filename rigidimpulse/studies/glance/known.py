@@ -56,8 +56,12 @@ class Glance:
         """What errors are: of places, or depths."""
         if self.reference is None:
             return PLACE
-        pile = any(is_pile(played.recording) for played in self.runs if played.recording is not None)
-        return measure_of(self.reference, pile, self.duration)
+        return measure_of(self.reference, self.pile, self.duration)
+
+    @property
+    def pile(self) -> bool:
+        """Whether the scene is a pile: more than "preview" sub-steps bodies of it, which sub-steps all that touches."""
+        return any(is_pile(run.recording) for run in self.runs if run.candidate.name != "preview" and run.recording is not None)
 
     @property
     def times(self) -> np.ndarray:
