@@ -21,8 +21,9 @@ from rigidimpulse.motion.body_state import BodyState
 
 SUB_STEPS, MOST_SUB_STEPS = 8, 64
 """Sub-steps of a whole step, at least, and at most for what turns fast."""
-BEND: float = 1.5e-3
-"""Skins by which the path of a point may bend in a sub-step, over 8: contacts close along straight lines, so bodies enter by as much."""
+BEND: float = 1.5e-2
+"""Skins by which the path of a point may bend in a sub-step, over 8 and over `Accuracy.substep_motion`: contacts close along straight lines,
+so bodies enter by as much."""
 MOTION = 1.0
 """Parts of `Accuracy.substep_motion` that touching bodies move until their contacts are looked for again."""
 GAINED: float = 1e-4
@@ -58,7 +59,7 @@ class JointedStepper:
         stepper, accuracy = self._stepper, self._world.accuracy
         pairs, near = stepper.table.pairs, np.zeros(len(stepper.pressed), bool)
         near[stepper.order[pairs.first]] = near[stepper.order[pairs.second]] = True
-        stray = most_stray(run.state.now, members, near, stepper.reach, stepper.skin, BEND)
+        stray = most_stray(run.state.now, members, near, stepper.reach, stepper.skin, BEND * accuracy.substep_motion)
         pieces = min(max(stray * accuracy.step, SUB_STEPS), MOST_SUB_STEPS)
         return Fineness(accuracy.step / pieces, MOTION * accuracy.substep_motion)
 
