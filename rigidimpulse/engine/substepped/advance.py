@@ -383,12 +383,18 @@ class SubsteppedIslands:
             bare = island_without_contacts(time, np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
             self._bring_in(run, bare, members)
             return [*islands, bare]
-        for island in hit:
-            # An island that is hit is stepped again, with all of its members.
-            labels = self.label[island.members]
-            members = np.union1d(members, np.flatnonzero(np.isin(self.label, labels[labels >= 0])))
-            self._bring_in(run, island, members)
+        # An island that is hit is stepped again, with all of its members; what else is due comes with the first, once.
+        stepped = [np.flatnonzero(np.isin(self.label, self._labels_of(island.members))) for island in hit]
+        rest = np.setdiff1d(members, np.concatenate(stepped)) if hit else members
+        for island, own in zip(hit, stepped, strict=True):
+            self._bring_in(run, island, np.union1d(own, rest))
+            rest = rest[:0]
         return islands
+
+    def _labels_of(self, bodies: np.ndarray) -> np.ndarray:
+        """Sub-stepped islands that some of the bodies are in."""
+        labels = self.label[bodies]
+        return labels[labels >= 0]
 
     def _hand_over(self, run: Run, pair_events: PairEvents, island: Island) -> None:
         """Let an exact island that runs away be sub-stepped from its instant on, and say so.
@@ -451,15 +457,16 @@ class SubsteppedIslands:
             stays[island.members] |= self._jointed[island.members]
             near = island.members[stays[island.members]]
             island.substepped = members = np.union1d(members, near)
-            # What an island connects is one sub-stepped island from here on.
-            self.label[members] = self.label[members].max()
+            # What an island connects is one sub-stepped island from here on; others that are stepped with it stay their own.
+            labels = self._labels_of(near)
+            connected = np.union1d(near, members[np.isin(self.label[members], labels)])
+            self.label[connected] = labels.max() if len(labels) else connected.min(initial=len(self.label))
             pair_events.inside[members] = True
             run.wrench[island.members] = 0.0
             self.asleep[members] = False
             self.sleep_timer[island.members] = 0.0
         fresh = members[~self._taken[members]]
         self._take_in(run, fresh, island.time)
-        self._steps += 1
         self._most = max(self._most, len(members))
         members = members[~self.asleep[members]]
         joints = run.joints.at(members[self._jointed[members]])
@@ -469,6 +476,7 @@ class SubsteppedIslands:
         # In the middle of a step contacts may be kept for longer motion.
         kept = self.stepper.kept if island.time > pair_events.begin else 0.0
         parts = self._solved_together(run, members)
+        self._steps += len(parts)
         outcomes = [self._step(run, part, np.intersect1d(fresh, part), (island.time, end), kept) for part in parts]
         stepped = [out for out in outcomes if out is not None]
         self._outcome, self._outcome_end = joined_outcomes(stepped) if stepped else None, end
