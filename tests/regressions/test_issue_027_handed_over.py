@@ -7,6 +7,7 @@ import pytest
 
 import rigidimpulse as ri
 
+
 def boxes_on_a_plank() -> ri.Scene:
     """Two boxes fall on a plank that hangs on a hinge over the floor."""
     wood = ri.Material(density=700, restitution=0.2, static_friction=0.5, dynamic_friction=0.4)

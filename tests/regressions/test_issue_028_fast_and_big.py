@@ -1,7 +1,7 @@
 """Issue 28: a big fast body that hits small ones in sub-stepped islands.
 
-In a step of 1/60 s the ball comes farther than the 2 inner radii of a brick within which contacts are looked for. It was in no contact until
-the step ended, and 33 mm inside the wall by then.
+In a step of 1/60 s the ball comes farther than the 2 inner radii of a brick within which contacts are looked for. It was in no contact
+until the step ended, and 33 mm inside the wall by then.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Issue 28: islands that are hit at one instant are stepped once each, and stay islands of their own.
 
-Each of k islands that were hit in one instant was stepped with all others: the work grew with the square of k. Ten equal dolls far apart cost
-a hundred times as much as one.
+Each of k islands that were hit in one instant was stepped with all others: the work grew with the square of k. Ten equal dolls far apart
+cost a hundred times as much as one.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ def flails(number: int) -> ri.Recording:
     scene = ri.Scene(bodies=[ri.Body("floor", ri.Shape.half_space(), motion="static", material=WOOD)])
     for k in range(number):
         for side, x in (("left", -0.15), ("right", 0.15)):
-            place = (x, 2.0 * k, 0.4)
-            scene.add(ri.Body(f"{side} {k}", ri.Shape.box((0.28, 0.05, 0.05)), position=place, angular_velocity=(25, 10, 20), material=WOOD))
+            spins = {"position": (x, 2.0 * k, 0.4), "angular_velocity": (25, 10, 20)}
+            scene.add(ri.Body(f"{side} {k}", ri.Shape.box((0.28, 0.05, 0.05)), material=WOOD, **spins))
         scene.add(ri.BallJoint(f"left {k}", f"right {k}", (0.0, 2.0 * k, 0.4)))
     return ri.simulate(scene, 0.8, accuracy="preview")
 

@@ -22,8 +22,8 @@ from rigidimpulse.motion.body_state import BodyState
 SUB_STEPS, MOST_SUB_STEPS = 8, 64
 """Sub-steps of a whole step, at least, and at most for what turns fast."""
 BEND: float = 1.5e-2
-"""Skins by which the path of a point may bend in a sub-step, over 8 and over `Accuracy.substep_motion`: contacts close along straight lines,
-so bodies enter by as much."""
+"""Skins by which the path of a point may bend in a sub-step, over 8 and over `Accuracy.substep_motion`: contacts close along straight
+lines, so bodies enter by as much."""
 MOTION = 1.0
 """Parts of `Accuracy.substep_motion` that touching bodies move until their contacts are looked for again."""
 GAINED: float = 1e-4
