@@ -88,7 +88,7 @@ class Run:
         self.column = np.zeros(n, np.int64)
         self.acceleration = np.zeros((n, 3))
         self.angular_acceleration = np.zeros((n, 3))
-        self.wrench = np.zeros((n, 6))
+        self.wrench, self.wrench_rate = np.zeros((2, n, 6))
         self.motion = Motion(self.state.trajectory, self.state.now, self.state.rotation, self.acceleration, self.angular_acceleration)
         self.box_min = np.empty((n, 3))
         self.box_max = np.empty((n, 3))

@@ -216,7 +216,7 @@ def _start_joints(run: Run) -> None:
 
 
 def _close_and_stop_joints(run: Run) -> None:
-    """Rows of joints at the end of a sub-step."""
+    """Rows of joints at the end of a sub-step, and the switches of limits on the way."""
     island = _jointed_box(run)
     count = int(count_joint_rows.py_func(island.joints, island.which))
     rows = make_rows.py_func(count)

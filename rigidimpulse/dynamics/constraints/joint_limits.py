@@ -95,15 +95,17 @@ def spring_of(joints, k, weight):
 
 
 @jit
-def _reach_time(gap, rate, end, h, overrun):
-    """First root of the parabola of g over (0, h), h if there is none."""
+def _reach_time(gap, rate, end, h, overrun, most):
+    """First root of the parabola of g over (0, most), most if there is none."""
     linear, bend = rate * h, end - gap - rate * h
     # The gap may close and open again within the sub-step.
     dips = bend > 0.0 and 0.0 < -linear < 2.0 * bend and gap - 0.25 * linear * linear / bend < -overrun
-    if end >= -overrun and not dips:
+    if most == h and end >= -overrun and not dips:
         return h
     root = sqrt(max(linear * linear - 4.0 * bend * gap, 0.0))
-    return h * (2.0 * gap / (root - linear) if linear < 0.0 else -0.5 * (linear + root) / bend)
+    time = h * (2.0 * gap / (root - linear) if linear < 0.0 else -0.5 * (linear + root) / bend)
+    # It is no number where the parabola has no root; comparisons with that are false.
+    return time if 0.0 < time < most else most
 
 
 @jit
@@ -140,9 +142,12 @@ def _release_time(k, c, weight, x, u, end, pressed, h):
 
 
 @jit
-def next_switch(joints, which, memory, h, allowed):
-    """Time in (0, h] at which the first limit of the joints listed in `which` is reached or lets go; memory: `JointMemory`."""
-    time = h
+def next_switch(joints, which, memory, span, allowed):
+    """Time at which the first limit of the joints listed in `which` is reached or lets go; memory: `JointMemory`, of a sub-step of h s.
+
+    span: h, and the time up to which the path may go on as it does; that is returned where nothing switches.
+    """
+    h, time = span
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
             side = limit_side(joints, k)
@@ -150,7 +155,7 @@ def next_switch(joints, which, memory, h, allowed):
                 continue
             gap, rate, end = side * memory.start_value[k], side * memory.start_rate[k], side * memory.end_value[k]
             if memory.slack[k]:
-                time = min(time, _reach_time(gap, rate, end, h, OVERRUN * allowed))
+                time = min(time, _reach_time(gap, rate, end, h, OVERRUN * allowed, span[1]))
             elif joints.stiffness[k] < np.inf:
                 stiffness, damping = spring_of(joints, k, memory.weight[k])
                 time = min(time, _release_time(stiffness, damping, memory.weight[k], gap, rate, end, memory.active[k], h))

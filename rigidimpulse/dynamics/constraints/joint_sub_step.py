@@ -39,7 +39,7 @@ from rigidimpulse.dynamics.constraints.slip import RowSolver, solve_with_slip
 from rigidimpulse.dynamics.constraints.softness import end_rate, is_slow, soft_row
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.model.contacts import Contacts
-from rigidimpulse.motion.trajectory import FORCED, begin, pose_at
+from rigidimpulse.motion.trajectory import FORCED, Load, pose_at, take
 
 MAX_ROUNDS = 20
 MOST_FAILURES = 3
@@ -176,14 +176,11 @@ def fill_closing_rows(island, rows, start):
 def _end_values(island, acceleration, wrench, h, value):
     """Write coordinates - targets (s,) after h under the wrenches (n_world, 6)."""
     bodies, members, memory = island.bodies, island.members, island.memory
-    trajectory, q = memory.trial, np.empty(4)
+    trajectory, q, zero, pull = memory.trial, np.empty(4), np.zeros(3), np.empty(3)
     for i in members:
-        trajectory.position[i], trajectory.orientation[i] = bodies.position[i], bodies.orientation[i]
-        trajectory.velocity[i], trajectory.angular_velocity[i] = bodies.velocity[i], bodies.angular_velocity[i]
-        trajectory.acceleration[i] = acceleration[i] + bodies.inv_mass[i] * wrench[i, :3]
-        trajectory.torque[i] = wrench[i, 3:]
-        trajectory.mode[i] = FORCED
-        begin(trajectory, i)
+        for k in range(3):
+            pull[k] = acceleration[i, k] + bodies.inv_mass[i] * wrench[i, k]
+        take(trajectory, i, 0.0, bodies, Load(pull, wrench[i, 3:], zero, zero), FORCED)
         pose_at(trajectory, i, h, memory.end_position[i], q)
         quaternion_to_matrix(q, memory.end_rotation[i])
     joint_values(island.joints, island.which, memory.end_position, memory.end_rotation, memory.angle, value)

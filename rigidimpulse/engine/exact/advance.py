@@ -20,7 +20,7 @@ from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.island import Island
 
-NO_WRENCH = np.zeros(6)
+NOT_HELD = np.zeros(6), np.zeros(6)
 
 
 def arrive(run: Run, islands: list[Island], time: float, bodies: np.ndarray) -> None:
@@ -60,4 +60,4 @@ def let_go(run: Run, pair_events: PairEvents, islands: list[Island], time: float
     left = leaves.nonzero()[0]
     left = left[(state.trajectory.start[left] < time) & ~pair_events.inside[left]]
     for i in left.tolist():
-        begin_trajectory(run, pair_events, i, time, NO_WRENCH, rests=False)
+        begin_trajectory(run, pair_events, i, time, NOT_HELD, rests=False)

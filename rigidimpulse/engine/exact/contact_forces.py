@@ -38,7 +38,7 @@ def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
     """Find the lasting contacts of an island and write the wrenches of its members into run.wrench."""
     state, number = run.state, run.world.num_bodies
     run.contact_log.close(island.members, island.time)
-    run.wrench[island.members] = 0.0
+    run.wrench[island.members] = run.wrench_rate[island.members] = 0.0
     forget_forces(state.memory, number, island.contacts)
     island.held = island.slow()
     inside = leaves_from_inside(pair_events.table.pairs, island.place, island.contacts, island.held)

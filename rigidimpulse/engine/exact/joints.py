@@ -16,6 +16,7 @@ from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, make_memory
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
+from rigidimpulse.engine.exact.joint_flights import JointFlights
 from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.participants import RunJoints
 from rigidimpulse.engine.run import Run
@@ -41,6 +42,10 @@ DRIFT = TOLERANCES.joint.energy_drift
 SHORT = TOLERANCES.joint.short_sub_step
 CENTRED: float = 1e-6
 """Arm of a joint, over the length of its rod or string, up to which the body hangs at its centre."""
+HALF = 0.5
+"""Part of the forces of RATTLE's sub-steps that their end leaves."""
+LANDING: float = 1e-9
+"""Part of a flight by which it may miss the time at which a limit is reached."""
 MOST_CUTS = 20
 """Times a sub-step is cut to end where a limit is reached or lets go."""
 STEEP = 1e3
@@ -54,9 +59,10 @@ class JointState:
         table: the rows of all joints. memory: what kernels remember.
         names: of the joints. whole: (j,) bool, not broken.
         moment: (j, 3) N s, impulse on b at the instant being worked on. shock: (j, 3) N s, by impacts, so far.
-        pull: (j, 3) N, last force on b.
+        pull: (j, 3) N, last force on b, and pull_rate (j, 3) N/s, its change. share: (j,) part of it that the end leaves.
         are_closed: whether the forces found last close the joints.
         drift: (j,) energy gained or lost in the last sub-step without contacts, as a part of the kinetic energy.
+        flights: of islands that nothing touches. lands: (j,) s, end of the present flight, nan if it is none.
         began: (j,) s, start of the present sub-step. length: (j,) s, that of the one before.
         reactions: (time, joint, force (3,) on b) at the ends of sub-steps.
 
@@ -74,7 +80,10 @@ class JointState:
         self.moment = np.zeros((len(joints), 3))
         self.shock = np.zeros((len(joints), 3))
         self._accounted_shock = np.zeros((len(joints), 3))
-        self.pull = np.zeros((len(joints), 3))
+        self.pull, self.pull_rate = np.zeros((2, len(joints), 3))
+        self.share = np.full(len(joints), HALF)
+        self.flights = JointFlights(world, self.table)
+        self.lands = np.full(len(joints), np.nan)
         self.are_closed, self._open_by = True, 0.0
         self.drift = np.zeros(len(joints))
         self._energy = np.full(len(joints), np.nan)
@@ -86,6 +95,7 @@ class JointState:
         held = (self.table.coordinate < RADIUS) & np.isinf(self.table.stiffness) & np.isinf(self.table.lower) & np.isinf(self.table.upper)
         movable = [(i >= 0) & world.dynamic[i] for i in (self.table.body_a, self.table.body_b)]
         held_along = np.bincount(self._joint_of_row[held], minlength=len(joints))
+        self._passive = np.bincount(self._joint_of_row[np.isfinite(self.table.stiffness)], minlength=len(joints)) == 0
         self._pins = (held_along == 3) & ~(movable[0] & movable[1])
         self._slides = (held_along == 1) | (held_along == 2)
         rods = np.where(self.table.coordinate == DISTANCE, self.table.target, 0.0)
@@ -121,8 +131,7 @@ class JointState:
 
     def are_passive(self, which: np.ndarray) -> bool:
         """Whether joints are neither driven nor springs."""
-        rows = np.isin(self._joint_of_row, which)
-        return bool(np.all(np.isinf(self.table.stiffness[rows])))
+        return bool(self._passive[which].all())
 
     def supports_of(self, which: np.ndarray) -> np.ndarray:
         """Ends of the joints that are not dynamic, in order, -1 for the world."""
@@ -146,6 +155,9 @@ class JointState:
         # Sub-steps of the other regime are noted up to their end, and may be cut short.
         elapsed[which] = np.maximum(island.time - self.began[which], 0.0)
         self.moment[which] = 0.0
+        if len(which) and np.all(np.abs(self.lands[which] - island.time) <= 4.0 * np.spacing(island.time)):
+            self._land(run, island, elapsed)
+            return
         before = mechanical_energy(now, run.world.constants, members)
         arrived = np.hstack([now.velocity[members], now.angular_velocity[members]])
         for i in members:
@@ -169,6 +181,16 @@ class JointState:
         run.log.account(island.time, "joints", after - before)
         self._note_drift(which, after, kinetic_energy(now, run.world.constants, members))
 
+    def _land(self, run: Run, island: Island, elapsed: np.ndarray) -> None:
+        """End the island's flight, as it was planned: its joints are closed and stopped already."""
+        which, members = island.joints, island.members
+        self._record_impulses(run, which, island.time)
+        if self._limited:
+            stop_at_limits(self._jointed(run, island), self.shock)
+        self.length[which] = elapsed[which]
+        constants, now = run.world.constants, run.state.now
+        self._note_drift(which, mechanical_energy(now, constants, members), kinetic_energy(now, constants, members))
+
     def _note_drift(self, which: np.ndarray, energy: float, kinetic: float) -> None:
         """What the sub-step that ends has made or lost of the energy that joints keep by themselves."""
         begun, self._energy[which] = self._energy[which], np.nan
@@ -177,12 +199,14 @@ class JointState:
             self.drift[which] = abs(energy - begun[0]) / kinetic
 
     def _record_impulses(self, run: Run, which: np.ndarray, time: float) -> None:
-        """Impulses on b of the sub-steps that end: half of what their forces were, and what stopped the joints."""
+        """Impulses on b of the sub-steps that end: what is left of their forces, and what stopped the joints."""
         for j in which.tolist():
             a, b, cause = int(self.table.body_a[j]), int(self.table.body_b[j]), f"joint {self.names[j]}"
             began = float(self.began[j])
             if time > began:
-                run.impulses.add(cause, a, b, began, time, 0.5 * self.pull[j] + self.moment[j] / (time - began))
+                elapsed = time - began
+                mean = self.pull[j] + 0.5 * elapsed * self.pull_rate[j]
+                run.impulses.add(cause, a, b, began, time, self.share[j] * mean + self.moment[j] / elapsed)
             run.impulses.add_at(cause, a, b, time, self.shock[j] - self._accounted_shock[j])
         self._accounted_shock[which] = self.shock[which]
 
@@ -262,6 +286,8 @@ class JointState:
     ) -> tuple[float, float]:
         """Forces into run.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         state, memory = run.state, self.memory
+        if not len(contacts.gap) and island.free is None and (flown := self._fly(run, island, rest)) > 0.0:
+            return flown, 0.0
         others = self.bodies_of(island.joints)
         others = others[~run.world.dynamic[others]]
         h, cuts = self.sub_step(run, island, rest), 0
@@ -276,6 +302,7 @@ class JointState:
             jointed = self._jointed(run, island)
             residual, worst = hold_jointed(run.solve_rows, problem, jointed, h, force, run.wrench, moment, rolling)
             self.pull[island.joints] = 2.0 * (moment[island.joints] - self.moment[island.joints]) / h
+            self.pull_rate[island.joints], self.share[island.joints], self.lands[island.joints] = 0.0, HALF, np.nan
             shorter = self.sub_step(run, island, h)
             if shorter < 0.5 * h:
                 # Only the forces show how short it has to be.
@@ -283,19 +310,68 @@ class JointState:
                 continue
             if self._break(run, island):
                 continue
-            switch = next_switch(self.table, island.joints, memory, h, self._allowed)
+            switch = next_switch(self.table, island.joints, memory, (h, h), self._allowed)
             if cuts == MOST_CUTS or switch >= h * (1.0 - SHORT):
                 break
             h, cuts = max(switch, SHORT * run.world.accuracy.step), cuts + 1
         self.moment[:] = moment
         self._log(island, h)
-        self.began[island.joints] = island.time
-        if not len(island.contacts.gap) and island.free is None and self.are_passive(island.joints):
-            self._energy[island.joints] = mechanical_energy(state.now, run.world.constants, island.members)
+        self._begin(run, island)
         self._open_by = worst
-        self._report_steep(run, island)
         self.are_closed = worst <= NOT_CLOSED * self._allowed
         return h, residual
+
+    def _fly(self, run: Run, island: Island, rest: float) -> float:
+        """Fly an island that touches nothing over at most `rest`, its forces into run.wrench; returns for how long, 0 if it cannot be."""
+        flight, members = self.flights.flight, island.members
+        waits, frames = self.release_time - island.time, run.recorder.times
+        # What is recorded is exact: flights end at frames. Paths on the way are not as good as ends.
+        next_frame = int(frames.searchsorted(island.time + SHORT * run.world.accuracy.step, "right"))
+        frame = float(frames[next_frame]) - island.time if next_frame < len(frames) else np.inf
+        whole = 0.0
+        for _ in range(MOST_CUTS):
+            which = island.joints
+            if not len(which) or run.world.moving[self.bodies_of(which)].any() or np.any(waits[which] <= 0.0):
+                return 0.0
+            rest = min(rest, frame, float(waits[which].min()))
+            h = self.flights.fly(self._jointed(run, island), run.acceleration, rest, self.sub_step(run, island, rest))
+            if h == 0.0:
+                # Nobody knows how fast they are about to turn.
+                self.drift[which] = np.inf
+                return 0.0
+            self.pull[which], self.pull_rate[which] = flight.start[which], 2.0 * (flight.mean[which] - flight.start[which]) / h
+            self.share[which] = 1.0
+            if self._break(run, island):
+                continue
+            # Where a limit is reached the flight is made shorter, and then longer again by what it was too short.
+            whole = max(whole, h)
+            ends = min(next_switch(self.table, which, self.memory, (h, whole), self._allowed), self._overload_time(which, whole))
+            if abs(ends - h) <= LANDING * h or (h < rest and ends > h):
+                break
+            rest = max(ends, SHORT * run.world.accuracy.step)
+        run.wrench[members], run.wrench_rate[members] = flight.value[members], flight.rate[members]
+        self.memory.wrench[members] = 0.0
+        self.reactions += [(island.time, j, self.pull[j].copy()) for j in which.tolist()]
+        self._begin(run, island)
+        self.lands[which] = island.time + h
+        self._open_by, self.are_closed = 0.0, True
+        return h
+
+    def _overload_time(self, which: np.ndarray, whole: float) -> float:
+        """When the first of these joints has the force that breaks it, within `whole` s; that if none has. Forces grow by their rates."""
+        strong, time = self.break_force[which], whole
+        for j in which[np.linalg.norm(self.pull[which] + whole * self.pull_rate[which], axis=1) > strong].tolist():
+            square, along = float(self.pull_rate[j] @ self.pull_rate[j]), float(self.pull[j] @ self.pull_rate[j])
+            missing = float(self.pull[j] @ self.pull[j]) - self.break_force[j] ** 2
+            time = min(time, (math.sqrt(max(along * along - square * missing, 0.0)) - along) / square)
+        return time
+
+    def _begin(self, run: Run, island: Island) -> None:
+        """A sub-step of an island's joints begins."""
+        self.began[island.joints] = island.time
+        if not len(island.contacts.gap) and island.free is None and self.are_passive(island.joints):
+            self._energy[island.joints] = mechanical_energy(run.state.now, run.world.constants, island.members)
+        self._report_steep(run, island)
 
     def let_go(self, island: Island) -> None:
         """Forget the forces of the island's joints, which are not to be used."""

@@ -43,12 +43,12 @@ def begin_trajectories(run: Run, pair_events: PairEvents, island: Island) -> Non
             or run.wrench[i].any()
             or island.free is not None
         ):
-            begin_trajectory(run, pair_events, i, island.time, run.wrench[i], island.rests)
+            begin_trajectory(run, pair_events, i, island.time, (run.wrench[i], run.wrench_rate[i]), island.rests)
     set_margins(run, pair_events, island)
 
 
-def begin_trajectory(run: Run, pair_events: PairEvents, i: int, time: float, wrench: np.ndarray, rests: bool) -> None:
-    """Body i gets a new trajectory at `time`, from its present state, with a constant wrench (6,)."""
+def begin_trajectory(run: Run, pair_events: PairEvents, i: int, time: float, held: tuple[np.ndarray, np.ndarray], rests: bool) -> None:
+    """Body i gets a new trajectory at `time`, from its present state; held: the wrench (6,) that holds it, and its change (6,) a second."""
     state, world, now = run.state, run.world, run.state.now
     trajectory = state.trajectory
     if not isfinite(float(now.velocity[i].sum() + now.angular_velocity[i].sum())):
@@ -59,14 +59,16 @@ def begin_trajectory(run: Run, pair_events: PairEvents, i: int, time: float, wre
     run.contact_log.close(np.array([i]), time)
     run.forces.log.end(i, time)
     account_contact_work(run, i, time)
-    if run.forces.acts[i] and not rests:
-        total, rate = wrench + run.forces.value[i], run.forces.rate[i]
+    total, rate = held
+    if run.forces.acts[i]:
+        total, rate = total + run.forces.value[i], rate + run.forces.rate[i]
+    if (run.forces.acts[i] or rate.any()) and not rests:
         acceleration, jerk = world.steady_acceleration[i] + world.inv_mass[i] * total[:3], world.inv_mass[i] * rate[:3]
         turned = total[3:].any() or rate[3:].any()
         take(trajectory, i, time, now, Load(acceleration, total[3:], jerk, rate[3:]), FORCED if turned else FREE)
-        pressed = bool(wrench.any())
+        pressed = bool(held[0].any())
     else:
-        pressed = take_steady_load(run.motion, world.constants, i, time, wrench, rests)
+        pressed = take_steady_load(run.motion, world.constants, i, time, total, rests)
     state.under_contact[i] = pressed
     if pressed:
         state.limiter.energy_at_start[i] = mechanical_energy(now, world.constants, np.array([i])) - work_of_forces(run, i)

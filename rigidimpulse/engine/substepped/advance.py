@@ -22,7 +22,7 @@ from rigidimpulse.collision.contact_buffer import Question
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.dynamics.energy import mechanical_energy
-from rigidimpulse.engine.exact.advance import NO_WRENCH
+from rigidimpulse.engine.exact.advance import NOT_HELD
 from rigidimpulse.engine.exact.energy_limit import note_end_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work, begin_trajectory
 from rigidimpulse.engine.pair_events import PairEvents
@@ -493,7 +493,7 @@ class SubsteppedIslands:
         self.solve_count[members] = NEVER
         pair_events.inside[members] = False
         for i in members.tolist():
-            begin_trajectory(run, pair_events, i, time, NO_WRENCH, rests=False)
+            begin_trajectory(run, pair_events, i, time, NOT_HELD, rests=False)
         pair_events.wake[members] = time
 
     def _solved_together(self, run: Run, members: np.ndarray) -> list[np.ndarray]:

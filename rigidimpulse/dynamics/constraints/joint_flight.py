@@ -1,0 +1,469 @@
+"""Joints of an island that touches nothing, over a sub-step: a Runge-Kutta method of order 8.
+
+With x the poses of n bodies, v their velocities, M their mass matrix, F what acts on them besides (constant forces, gyroscopic terms), J
+the Jacobian of the joints' rows and f their forces:
+
+    M v' = F + J^T f,   J v = 0        so that        W f = -(J M^-1 F + c),   W = J M^-1 J^T,   c = (dJ/dt) v
+
+c is the change of the rates u along the present motion, v held constant; with e a time in which bodies turn by LOOK,
+
+    c = (8 (u(e) - u(-e)) - (u(2e) - u(-2e))) / 12 e,   u(s) = J(x at s) v        off by (LOOK)^4 / 30 of itself: round-off
+
+The method takes 12 such accelerations (Prince and Dormand 1981; Hairer, Norsett, Wanner, Solving ODEs I, II.5: DOP853); its coefficients
+are those of scipy. It does not know that joints are closed: at the end poses are closed and velocities stopped by the least change in the
+metric of mass, which is of the order of its error. Two embedded methods say how large that is.
+
+Paths. Bodies go along lines of force and torque (`motion/trajectory.py`) that end where the method ends. With A = (v_1 - v_0) / h and
+B = 2 (x_1 - x_0 - v_0 h) / h^2 the acceleration is 3 B - 2 A at the start and changes by 6 (A - B) / h a second. The moment M_0 of the
+torque is the change of the angular momentum; where the path ends off by the rotation t, the line is turned about its middle,
+
+    tau(s) += d (s - h / 2),   d = -12 I t / h^3,
+
+until it ends there. On the way joints are open by what is of order 4 in h; that is measured in the middle.
+"""
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.quaternion import exponential, product, quaternion_to_matrix
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import turned, turned_back
+from rigidimpulse.dynamics.constraints.joint import is_linear, joint_rows, joint_values, relative_point_velocity
+from rigidimpulse.dynamics.constraints.joint_limits import is_reached, limit_side
+from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
+from rigidimpulse.dynamics.constraints.rows import (
+    BOUNDED,
+    FREE,
+    change_velocities,
+    changes_of,
+    make_rows,
+    move_bodies,
+    multiply_transposed,
+    scaled_wrench,
+)
+from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.motion.body_state import BodyState
+from rigidimpulse.motion.evaluate import gyroscopic_acceleration, refresh_pose, world_inverse_inertia
+from rigidimpulse.motion.trajectory import FORCED, Load, pose_at, take
+from rigidimpulse.scene.joint_coordinates import RADIUS
+
+STAGES = 12
+_STAGE, _END = np.ascontiguousarray(DOP853.A[:STAGES, :STAGES]), np.ascontiguousarray(DOP853.B)
+_THIRD, _FIFTH = np.ascontiguousarray(DOP853.E3), np.ascontiguousarray(DOP853.E5)
+LOOK: float = 1e-3
+"""rad, by which bodies turn from look to look at the rates of joints."""
+RESIDUAL = TOLERANCES.joint.residual
+UNSOLVED = TOLERANCES.joint.unsolved
+STILL = 10.0
+"""Errors of closed joints by which the gap of a taut string may change in a sub-step, and count as none."""
+MOST_TURNS, MOST_CLOSINGS = 12, 3
+"""Times that a line of torque is turned, and that poses are closed."""
+TINY = TOLERANCES.arithmetic.least_divisor
+
+
+class JointedFlight(NamedTuple):
+    """The n bodies of a world on the way of a sub-step, and what was found of its j joints with k rows."""
+
+    bodies: BodyState
+    rotation: np.ndarray  # (n, 3, 3)
+    size: float  # m, of what joints join
+    value: np.ndarray  # (n, 6) N, N m by the joints at the start of the line
+    rate: np.ndarray  # (n, 6) their change a second
+    start: np.ndarray  # (j, 3) N on b at the start
+    mean: np.ndarray  # (j, 3) N on b
+    held: np.ndarray  # (k,) bool, rows that hold; the others carry nothing
+
+
+def make_flight(inv_mass: np.ndarray, size: float, num_joints: int, num_rows: int) -> JointedFlight:
+    """Working memory for n bodies of inverse masses (n,) 1/kg; size: m, of what joints join."""
+    n = len(inv_mass)
+    bodies = BodyState(np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 3)), np.zeros((n, 3)), inv_mass, np.zeros((n, 3, 3)))
+    return JointedFlight(
+        bodies, np.zeros((n, 3, 3)), size, np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((num_joints, 3)), np.zeros((num_joints, 3)),
+        np.zeros(num_rows, bool),
+    )  # fmt: skip
+
+
+@jit_making_arrays
+def fly_jointed(island, flight, steady, h):
+    """Fly the members of a `JointedIsland` for h s under steady accelerations (n, 3); the `JointedFlight` is written.
+
+    Returns its error, as a part of the size, and by how much joints are open on the way, m or rad. The error is inf where the
+    rows cannot be flown with: they are soft, at a limit, or cannot be solved.
+    """
+    joints, which, members, memory, bodies = island.joints, island.which, island.members, island.memory, island.bodies
+    n, count = members.shape[0], count_joint_rows(joints, which)
+    ahead = JointedIsland(joints, which, flight.bodies, flight.rotation, members, island.number, memory, island.allowed)
+    rows, direction, inertia = make_rows(count), np.empty((count, 3)), memory.trial.inertia
+    y, at, slope, error = np.empty((n, 13)), np.empty((n, 13)), np.empty((STAGES, n, 13)), 0.0
+    angles = memory.angle.copy()
+    for k in range(n):
+        island.number[members[k]] = k
+        _read_state(bodies, members[k], y[k])
+    _place_supports(island, flight)
+    for j in which:
+        for r in range(3):
+            flight.start[j, r] = flight.mean[j, r] = 0.0
+    _write_states(ahead, inertia, y)
+    if not _choose_rows(ahead, flight.held, rows, direction, h):
+        return inf, 0.0
+    for stage in range(STAGES):
+        for k in range(n):
+            for c in range(13):
+                step = 0.0
+                for s in range(stage):
+                    step += _STAGE[stage, s] * slope[s, k, c]
+                at[k, c] = y[k, c] + h * step
+        _write_states(ahead, inertia, at)
+        solved = _slopes(ahead, flight, steady, at, rows, direction, slope[stage])
+        if stage == 0:
+            _note_forces(ahead, rows, direction, 1.0, flight.start)
+            _note_wrenches(ahead, rows, flight.value)
+            _remember(joints, which, rows, memory)
+        _note_forces(ahead, rows, direction, _END[stage], flight.mean)
+        if not solved:
+            memory.angle[:] = angles
+            return inf, 0.0
+    for k in range(n):
+        fifth, third = 0.0, 0.0
+        for c in range(13):
+            step, off_5, off_3 = 0.0, 0.0, 0.0
+            for s in range(STAGES):
+                step += _END[s] * slope[s, k, c]
+                off_5 += _FIFTH[s] * slope[s, k, c]
+                off_3 += _THIRD[s] * slope[s, k, c]
+            at[k, c] = y[k, c] + h * step
+            weight = _weight(c, h, flight.size)
+            fifth += (weight * off_5) ** 2
+            third += (weight * off_3) ** 2
+        error = max(error, h * fifth / sqrt(max(fifth + 0.01 * third, TINY)))
+    _write_states(ahead, inertia, at)
+    _end(ahead, flight.held, rows, direction, inertia)
+    _lay_paths(island, flight, steady, h)
+    open_by = _open_by(island, ahead, flight.held, h)
+    memory.angle[:] = angles
+    return error, open_by
+
+
+@jit
+def _weight(c, h, size):
+    """What turns an error of place c of a state, y (13,), into a way relative to the size: velocities move it for h."""
+    if c < 3:
+        return 1.0 / size
+    if c < 7:
+        return 1.0
+    return h / size if c < 10 else h
+
+
+@jit
+def _read_state(bodies, i, y):
+    """Pose and velocities of body i as y (13,)."""
+    for c in range(3):
+        y[c], y[7 + c], y[10 + c] = bodies.position[i, c], bodies.velocity[i, c], bodies.angular_velocity[i, c]
+    for c in range(4):
+        y[3 + c] = bodies.orientation[i, c]
+
+
+@jit
+def _write_states(ahead, inertia, y):
+    """Bring the members to y (n, 13): pose, velocities, inverse inertia."""
+    bodies = ahead.bodies
+    for k in range(ahead.members.shape[0]):
+        i = ahead.members[k]
+        norm = sqrt(y[k, 3] ** 2 + y[k, 4] ** 2 + y[k, 5] ** 2 + y[k, 6] ** 2)
+        for c in range(3):
+            bodies.position[i, c], bodies.velocity[i, c], bodies.angular_velocity[i, c] = y[k, c], y[k, 7 + c], y[k, 10 + c]
+        for c in range(4):
+            bodies.orientation[i, c] = y[k, 3 + c] / norm
+        quaternion_to_matrix(bodies.orientation[i], ahead.rotation[i])
+        world_inverse_inertia(ahead.rotation[i], inertia[i], bodies.inv_inertia[i])
+
+
+@jit
+def _place_supports(island, flight):
+    """What stands at the joints stands where it is."""
+    for j in island.which:
+        for i in (island.joints.body_a[j], island.joints.body_b[j]):
+            if i >= 0:
+                for c in range(3):
+                    flight.bodies.position[i, c] = island.memory.end_position[i, c] = island.bodies.position[i, c]
+                    flight.bodies.velocity[i, c] = flight.bodies.angular_velocity[i, c] = 0.0
+                    for d in range(3):
+                        flight.rotation[i, c, d] = island.memory.end_rotation[i, c, d] = island.rotation[i, c, d]
+
+
+@jit
+def _remember(joints, which, rows, memory):
+    """Keep the forces of the rows."""
+    i = 0
+    for j in which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            memory.force[k] = rows.impulse[i]
+            i += 1
+
+
+@jit_making_arrays
+def _choose_rows(ahead, held, rows, direction, h):
+    """Mark the rows that hold; coordinates and rates at the start are remembered. Returns whether the others carry nothing."""
+    joints, memory, count = ahead.joints, ahead.memory, rows.bias.shape[0]
+    value, u, i = np.empty(count), np.empty(count), 0
+    joint_rows(ahead, rows, np.int64(0), value, direction)
+    relative_point_velocity(ahead, direction, u)
+    for j in ahead.which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            memory.start_value[k], memory.start_rate[k], side = value[i], u[i], limit_side(joints, k)
+            memory.steepness[k] = sqrt(direction[i, 0] ** 2 + direction[i, 1] ** 2 + direction[i, 2] ** 2)
+            hard, taut = joints.stiffness[k] == inf, is_reached(joints, k, value[i], ahead.allowed)
+            # A string that is let loose carries nothing from here on.
+            taut = taut and not (hard and side * u[i] * h > STILL * ahead.allowed)
+            memory.slack[k] = side != 0.0 and not taut
+            held[k] = hard and (taut or (joints.lower[k] == -inf and joints.upper[k] == inf))
+            memory.active[k] = held[k]
+            if not (held[k] or memory.slack[k]) or (taut and abs(u[i]) * h > STILL * ahead.allowed):
+                return False
+            i += 1
+    return True
+
+
+@jit
+def _hold_rows(ahead, held, rows):
+    """Set the kinds of rows: those that hold are free, the others carry nothing."""
+    i = 0
+    for j in ahead.which:
+        for k in range(ahead.joints.first[j], ahead.joints.first[j + 1]):
+            rows.kind[i] = FREE if held[k] else BOUNDED
+            rows.lower[i], rows.upper[i] = (-inf, inf) if held[k] else (0.0, 0.0)
+            i += 1
+
+
+@jit_making_arrays
+def _slopes(ahead, flight, steady, y, rows, direction, slope):
+    """Write the slopes (n, 13) of the state y (n, 13), where the members are; rows.impulse: the forces of the rows, start and answer.
+
+    Returns whether the rows were solved, by forces that they may exert.
+    """
+    joints, bodies, members = ahead.joints, ahead.bodies, ahead.members
+    count, value, change, spin = rows.bias.shape[0], np.empty(rows.bias.shape[0]), np.empty(rows.bias.shape[0]), np.empty(3)
+    _changes_of_rates(ahead, y, change)
+    joint_rows(ahead, rows, np.int64(0), value, direction)
+    _hold_rows(ahead, flight.held, rows)
+    for k in range(members.shape[0]):
+        i, (w0, w1, w2), (q0, q1, q2, q3) = members[k], (y[k, 10], y[k, 11], y[k, 12]), (y[k, 3], y[k, 4], y[k, 5], y[k, 6])
+        gyroscopic_acceleration(ahead.rotation[i], ahead.memory.trial.inertia[i], bodies.angular_velocity[i], (0.0, 0.0, 0.0), spin)
+        d0, d1, d2, d3 = product(0.0, w0, w1, w2, q0, q1, q2, q3)
+        slope[k, 3], slope[k, 4], slope[k, 5], slope[k, 6] = 0.5 * d0, 0.5 * d1, 0.5 * d2, 0.5 * d3
+        for c in range(3):
+            slope[k, c], slope[k, 7 + c], slope[k, 10 + c] = y[k, 7 + c], steady[i, c], spin[c]
+            # Rates of accelerations: the bodies have no other velocities for a moment.
+            bodies.velocity[i, c], bodies.angular_velocity[i, c] = steady[i, c], spin[c]
+    relative_point_velocity(ahead, direction, value)
+    largest = TINY
+    for i in range(count):
+        rows.bias[i] = value[i] + change[i]
+        largest = max(largest, abs(rows.bias[i]))
+    residual = solve_newton(rows, members.shape[0], RESIDUAL * largest)
+    by_joints = changes_of(bodies, members, rows)
+    for k in range(members.shape[0]):
+        for c in range(3):
+            slope[k, 7 + c] += by_joints[k, c]
+            slope[k, 10 + c] += by_joints[k, 3 + c]
+    return residual <= UNSOLVED * largest and _may_pull(joints, ahead.which, flight.held, rows)
+
+
+@jit
+def _may_pull(joints, which, held, rows):
+    """Whether all forces are such as their rows may exert: strings do not push."""
+    i = 0
+    for j in which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            if held[k] and not joints.lower[k] <= rows.impulse[i] <= joints.upper[k]:
+                return False
+            i += 1
+    return True
+
+
+@jit_making_arrays
+def _changes_of_rates(ahead, y, change):
+    """Write c (s,): how the rates of the coordinates change along the present motion of the members, at y (n, 13)."""
+    count, members = change.shape[0], ahead.members
+    rows, value, direction, u = make_rows(count), np.empty(count), np.empty((count, 3)), np.empty(count)
+    change[:] = 0.0
+    fastest = _fastest(ahead)
+    if fastest == 0.0:
+        return
+    e = LOOK / fastest
+    for times, share in ((-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)):
+        for k in range(members.shape[0]):
+            _move_on(ahead, members[k], y[k], times * e)
+        joint_rows(ahead, rows, np.int64(0), value, direction)
+        relative_point_velocity(ahead, direction, u)
+        for i in range(count):
+            change[i] += share * u[i] / (12.0 * e)
+    for k in range(members.shape[0]):
+        _move_on(ahead, members[k], y[k], 0.0)
+
+
+@jit
+def _move_on(ahead, i, y, s):
+    """Place of body i after s, from y (13,) on, with its present velocities."""
+    bodies = ahead.bodies
+    norm = sqrt(y[3] ** 2 + y[4] ** 2 + y[5] ** 2 + y[6] ** 2)
+    e0, e1, e2, e3 = exponential(s * y[10], s * y[11], s * y[12])
+    q = bodies.orientation[i]
+    q[0], q[1], q[2], q[3] = product(e0, e1, e2, e3, y[3] / norm, y[4] / norm, y[5] / norm, y[6] / norm)
+    quaternion_to_matrix(q, ahead.rotation[i])
+    for c in range(3):
+        bodies.position[i, c] = y[c] + s * y[7 + c]
+
+
+@jit_making_arrays
+def _fastest(ahead):
+    """Fastest rate [rad/s] at which directions of rows turn: spins of members, and those of rods and strings."""
+    joints, bodies, fastest = ahead.joints, ahead.bodies, 0.0
+    for i in ahead.members:
+        w = bodies.angular_velocity[i]
+        fastest = max(fastest, sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
+    for j in ahead.which:
+        longest = 0.0
+        for k in range(joints.first[j], joints.first[j + 1]):
+            if RADIUS <= joints.coordinate[k] and is_linear(joints.coordinate[k]):
+                longest = max(longest, abs(ahead.memory.angle[k]))
+        if longest > 0.0:
+            square, a, b = 0.0, joints.body_a[j], joints.body_b[j]
+            for c in range(3):
+                difference = bodies.velocity[b, c] if b >= 0 else 0.0
+                difference -= bodies.velocity[a, c] if a >= 0 else 0.0
+                square += difference * difference
+            fastest = max(fastest, sqrt(square) / longest)
+    return fastest
+
+
+@jit
+def _note_forces(ahead, rows, direction, share, force):
+    """Add a share of the rows' forces, along their directions (s, 3), to those of the joints on b, force (j, 3) N."""
+    joints, i = ahead.joints, 0
+    for j in ahead.which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            if is_linear(joints.coordinate[k]):
+                for c in range(3):
+                    force[j, c] += share * rows.impulse[i] * direction[i, c]
+            i += 1
+
+
+@jit_making_arrays
+def _note_wrenches(ahead, rows, wrench):
+    """Write the wrenches (n, 6) of the rows' forces on the members."""
+    y = np.empty((ahead.members.shape[0], 6))
+    multiply_transposed(rows, rows.impulse, y)
+    for k in range(ahead.members.shape[0]):
+        i = ahead.members[k]
+        wrench[i] = 0.0
+        scaled_wrench(ahead.bodies, i, y[k], wrench[i])
+
+
+@jit_making_arrays
+def _end(ahead, held, rows, direction, inertia):
+    """Close poses and stop velocities of the members at the end."""
+    count, members, bodies = rows.bias.shape[0], ahead.members, ahead.bodies
+    value = np.empty(count)
+    for _ in range(MOST_CLOSINGS):
+        joint_rows(ahead, rows, np.int64(0), value, direction)
+        _hold_rows(ahead, held, rows)
+        worst = 0.0
+        for i in range(count):
+            rows.bias[i], rows.impulse[i] = value[i], 0.0
+            if rows.kind[i] == FREE:
+                worst = max(worst, abs(value[i]))
+        if worst <= 0.1 * ahead.allowed:
+            break
+        solve_newton(rows, members.shape[0], 0.01 * ahead.allowed)
+        move_bodies(bodies, members, rows)
+        refresh_pose(members, bodies, ahead.rotation, inertia)
+    joint_rows(ahead, rows, np.int64(0), value, direction)
+    _hold_rows(ahead, held, rows)
+    relative_point_velocity(ahead, direction, value)
+    largest = TINY
+    for i in range(count):
+        rows.bias[i], rows.impulse[i] = value[i], 0.0
+        if rows.kind[i] == FREE:
+            largest = max(largest, abs(value[i]))
+    solve_newton(rows, members.shape[0], RESIDUAL * largest)
+    change_velocities(bodies, members, rows)
+
+
+@jit_making_arrays
+def _lay_paths(island, flight, steady, h):
+    """Write the lines of force and torque of the members, along which they go from where they are to where the flight ends."""
+    start, end, trial, x, q = island.bodies, flight.bodies, island.memory.trial, np.empty(3), np.empty(4)
+    pull, jerk, torque, torque_rate, best = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(6)
+    for i in island.members:
+        for c in range(3):
+            mean = (end.velocity[i, c] - start.velocity[i, c]) / h
+            bend = 2.0 * (end.position[i, c] - start.position[i, c] - start.velocity[i, c] * h) / (h * h)
+            pull[c], jerk[c] = 3.0 * bend - 2.0 * mean, 6.0 * (mean - bend) / h
+            flight.value[i, c], flight.rate[i, c] = (pull[c] - steady[i, c]) / start.inv_mass[i], jerk[c] / start.inv_mass[i]
+        before = _angular_momentum(island.rotation[i], trial.inertia[i], start.angular_velocity[i])
+        after = _angular_momentum(flight.rotation[i], trial.inertia[i], end.angular_velocity[i])
+        for c in range(3):
+            torque[c] = flight.value[i, 3 + c]
+            torque_rate[c] = 2.0 * ((after[c] - before[c]) / h - torque[c]) / h
+        least = inf
+        for _ in range(MOST_TURNS):
+            take(trial, i, 0.0, start, Load(pull, torque, jerk, torque_rate), FORCED)
+            pose_at(trial, i, h, x, q)
+            q0, q1, q2, q3 = product(*_row_4(end.orientation[i]), q[0], -q[1], -q[2], -q[3])
+            sign = 2.0 if q0 >= 0.0 else -2.0
+            off = sqrt(q1 * q1 + q2 * q2 + q3 * q3)
+            if not off < least:
+                break
+            least = off
+            for c in range(3):
+                best[c], best[3 + c] = torque[c], torque_rate[c]
+            turn = _angular_momentum(flight.rotation[i], trial.inertia[i], (sign * q1, sign * q2, sign * q3))
+            for c in range(3):
+                d = -12.0 * turn[c] / (h * h * h)
+                torque[c] -= 0.5 * h * d
+                torque_rate[c] += d
+        for c in range(3):
+            torque[c], torque_rate[c] = best[c], best[3 + c]
+            flight.value[i, 3 + c], flight.rate[i, 3 + c] = torque[c], torque_rate[c]
+        take(trial, i, 0.0, start, Load(pull, torque, jerk, torque_rate), FORCED)
+
+
+@jit
+def _row_4(q):
+    return q[0], q[1], q[2], q[3]
+
+
+@jit
+def _angular_momentum(rotation, inertia, w):
+    """R diag(I) R^T w of a spin w, three numbers."""
+    x, y, z = turned_back(rotation, w)
+    return turned(rotation, (inertia[0] * x, inertia[1] * y, inertia[2] * z))
+
+
+@jit_making_arrays
+def _open_by(island, ahead, held, h):
+    """By how much joints are open in the middle of the paths; remembers the coordinates at the end."""
+    joints, memory, trial, flown = island.joints, island.memory, island.memory.trial, ahead.bodies
+    value, q, worst, i = np.empty(count_joint_rows(joints, island.which)), np.empty(4), 0.0, 0
+    for m in island.members:
+        pose_at(trial, m, 0.5 * h, memory.end_position[m], q)
+        quaternion_to_matrix(q, memory.end_rotation[m])
+    joint_values(joints, island.which, memory.end_position, memory.end_rotation, memory.angle, value)
+    for j in island.which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            if held[k]:
+                worst = max(worst, abs(value[i]))
+            i += 1
+    joint_values(joints, island.which, flown.position, ahead.rotation, memory.angle, value)
+    i = 0
+    for j in island.which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            memory.end_value[k] = value[i]
+            i += 1
+    return worst

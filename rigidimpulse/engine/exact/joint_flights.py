@@ -1,0 +1,77 @@
+"""Flights of jointed islands that touch nothing: how long they may be (see `dynamics/constraints/joint_flight.py`).
+
+The error of a flight at its end is of order 8, that of the paths on the way of order 4. Each has its bound, and the one that is nearer to
+its bound says how long the next flight is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rigidimpulse.dynamics.constraints.joint_flight import fly_jointed, make_flight
+from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
+from rigidimpulse.model.joint_table import Joints
+from rigidimpulse.model.world import World
+
+AT_END, ON_THE_WAY = 3.0, 1.0
+"""Errors of a flight, relative to the size of what joints join: at its end in tolerances of the accuracy, on the way in roots of them.
+3e-13 and 3e-7 by default."""
+FIRST_TURN = 0.5
+"""rad, how far bodies turn at most in the first flight."""
+SAFETY, LEAST_CHANGE, MOST_CHANGE = 0.9, 0.2, 3.0
+"""How lengths follow errors."""
+WORK, MOST_WORK = 0.1, 3.0
+"""By how much for each body a flight, which solves the joints more often, costs more than a sub-step of the other method; and at most."""
+WORTH = 1.0 / 32.0
+"""Part of the run's step for which a flight is always worth it."""
+PAUSE = 16
+"""Sub-steps that are not flown after a flight that was given up."""
+
+
+class JointFlights:
+    """The flights of a run.
+
+    Attributes:
+        flight: what was found of the last one. turned: whether it was given up for its errors, and not for what joints do.
+
+    """
+
+    def __init__(self, world: World, table: Joints) -> None:
+        """Nothing has flown."""
+        self.flight = make_flight(world.inv_mass, world.joint_size, len(table.body_a), len(table.coordinate))
+        self._at_end, self._on_the_way = AT_END * world.accuracy.tolerance, ON_THE_WAY * world.accuracy.tolerance**0.5 * world.joint_size
+        self._worth = WORTH * world.accuracy.step
+        self._pause = np.zeros(len(table.body_a), np.int64)
+        self._plan = np.full(len(table.body_a), np.inf)
+
+    def fly(self, jointed: JointedIsland, steady: np.ndarray, rest: float, other: float) -> float:
+        """Fly an island over `rest` s at most, under steady accelerations (n, 3); returns for how long.
+
+        0 where that cannot be done, or not for so long that it is worth it; other: s, length of a sub-step of the other method.
+        """
+        which, members, flight = jointed.which, jointed.members, self.flight
+        if self._pause[which].max() > 0:
+            self._pause[which] -= 1
+            return 0.0
+        plan = float(self._plan[which].min())
+        if math.isinf(plan):
+            fastest = float(np.sqrt((jointed.bodies.angular_velocity[members] ** 2).sum(1).max()))
+            plan = FIRST_TURN / fastest if fastest > 0.0 else np.inf
+        least = min(1.0 + WORK * len(members), MOST_WORK) * min(other, self._worth)
+        h = rest / math.ceil(rest / plan) if plan < rest else rest
+        while h >= min(least, rest):
+            error, is_open = fly_jointed(jointed, flight, steady, h)
+            if math.isinf(error):
+                break
+            way = max((error / self._at_end) ** (1.0 / 8.0), (is_open / self._on_the_way) ** 0.25)
+            follows = h * min(max(SAFETY / max(way, 1e-30), LEAST_CHANGE), MOST_CHANGE)
+            if way <= 1.0:
+                # What ended early, at a limit or at the end of the step, says little about how long the next may be.
+                self._plan[which] = max(follows, plan) if h < plan and not math.isinf(plan) else follows
+                return h
+            plan = follows
+            h = rest / math.ceil(rest / plan)
+        self._plan[which], self._pause[which] = np.inf, PAUSE
+        return 0.0
