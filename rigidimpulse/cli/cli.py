@@ -23,6 +23,7 @@ from rigidimpulse.cli.jobs import (
 from rigidimpulse.cli.live import live
 from rigidimpulse.cli.site import gallery as gallery_pages
 from rigidimpulse.cli.studies import compare, hardcases, study
+from rigidimpulse.cli.warmup import warmup
 from rigidimpulse.cli.wedge import wedge
 from rigidimpulse.recording.exporters import export_suffixes, reader_suffixes
 
@@ -218,5 +219,5 @@ def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str
         show(run, head)
 
 
-for command in (hardcases, study, compare, wedge, live, gallery_pages):
+for command in (hardcases, study, compare, wedge, live, gallery_pages, warmup):
     main.add_command(command)

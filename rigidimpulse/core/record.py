@@ -14,6 +14,7 @@ once, and for a tuple and a record apart.
 from __future__ import annotations
 
 import hashlib
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,10 +35,10 @@ class Record:
             TypeError: the tuple holds something else.
 
         """
-        self._kind = RecordType(typeof(record))
+        self._kind = _kind_of(record)
         self._parts = list(record)
         laid_out = [_words(part) for part in record]
-        self._first = np.cumsum([0, *map(len, laid_out)])
+        self._first = list(accumulate(map(len, laid_out), initial=0))
         self._words = np.array([word for part in laid_out for word in part], np.int64)
         self.address = int(self._words.__array_interface__["data"][0])
 
@@ -55,6 +56,27 @@ class Record:
     @property
     def _numba_type_(self) -> Any:
         return self._kind
+
+
+_KINDS: dict[tuple, RecordType] = {}
+"""Types of records by what decides on them: numba takes ten times as long to find the type of a tuple of hundreds of arrays."""
+
+
+def _kind_of(record: Any) -> RecordType:
+    """The type of the record of a tuple."""
+    key = _layout_key(record)
+    if key not in _KINDS:
+        _KINDS[key] = RecordType(typeof(record))
+    return _KINDS[key]
+
+
+def _layout_key(value: Any) -> tuple:
+    """Equal for values that numba has one type for: classes, and of arrays also what they hold, dimensions and order."""
+    if isinstance(value, tuple):
+        return (type(value), *map(_layout_key, value))
+    if isinstance(value, np.ndarray):
+        return (type(value), value.dtype, value.ndim, value.flags.num)
+    return (type(value),)
 
 
 def _words(value: Any) -> list[int]:

@@ -17,6 +17,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from importlib import import_module
+from typing import IO
 
 from rigidimpulse.core.kernels import Kernel, is_cached
 from rigidimpulse.model.world import World
@@ -50,9 +51,7 @@ def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> N
         compile_kernels(world, missing)
 
 
-def kernels_to_compile(
-    world: World, with_events: bool, with_substepped: bool, is_ready: Callable[[Kernel], bool] = is_cached
-) -> list[str]:
+def kernels_to_compile(world: World, with_events: bool, with_substepped: bool, is_ready: Callable[[Kernel], bool] = is_cached) -> list[str]:
     """Kinds of kernels that a run of a world needs and that do not lie in the cache: what is compiled last of each tells.
 
     is_ready: whether a kernel need not be compiled.
@@ -75,7 +74,7 @@ def compile_kernels(world: World, kinds: list[str]) -> None:
     mine, *others = [(kind, part) for kind in kinds for part in range(NUMBER_OF_PARTS[kind])]
     with ExitStack() as processes:
         for kind, part in others:
-            processes.enter_context(_process(kind, str(part), *cylinders))
+            processes.enter_context(start_process(kind, str(part), *cylinders))
         with _without_garbage_collection():
             import_module(PARTS_MODULE).compile_part(*mine, cylinders)
 
@@ -83,14 +82,14 @@ def compile_kernels(world: World, kinds: list[str]) -> None:
 def compile_loop_in_background(world: World) -> None:
     """Start a process that compiles the order of events for worlds like this one; it goes on by itself."""
     rolling = [] if world.rolling is None else [ROLLING]
-    _BACKGROUND.append(_process(LOOP, "0", *([CYLINDERS] if world.cylinders is not None else []), *rolling))
+    _BACKGROUND.append(start_process(LOOP, "0", *([CYLINDERS] if world.cylinders is not None else []), *rolling))
 
 
-def _process(*arguments: str) -> subprocess.Popen:
-    """Start a process that compiles one part."""
+def start_process(*arguments: str, errors: IO[bytes] | None = None) -> subprocess.Popen:
+    """Start a process that compiles one part; what it says of errors goes to a file, or nowhere."""
     quiet = subprocess.DEVNULL
     command = [sys.executable, "-m", PARTS_MODULE, *arguments]
-    return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
+    return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet if errors is None else errors)
 
 
 @contextmanager

@@ -24,7 +24,7 @@ import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.scene.accuracy import Accuracy, resolve_accuracy
-from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.body import Body, number
 from rigidimpulse.scene.scene import Scene
 
 RUN = ("duration", "fps", "accuracy")
@@ -171,7 +171,7 @@ def _part(thing: Any, path: list[str], value: Any, name: str) -> Any:
         return dataclasses.replace(thing, **{path[0]: _part(getattr(thing, path[0]), path[1:], value, name)})
     if path[0] in AXES and len(path) == 1 and np.shape(thing) == (3,):
         array = np.array(thing, float)
-        array[AXES.index(path[0])] = value
+        array[AXES.index(path[0])] = number(value, name, "")
         return tuple(array.tolist())
     raise UnknownParameter(f"{name}: there is no {path[0]!r}", "name a field of the body, of its material, or x, y, z of a vector")
 

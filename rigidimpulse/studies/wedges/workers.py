@@ -72,7 +72,7 @@ def run_pool(jobs: Sequence[TakeJob], processes: int, retries: int) -> Iterator[
 def _run_in(processes: int, jobs: Sequence[TakeJob], retries: int) -> Iterator[Take]:
     """Run takes in one pool; raises BrokenProcessPool when one of its processes dies."""
     attempts = dict.fromkeys([job.number for job in jobs], 0)
-    with _one_thread(), ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+    with one_thread(), ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
         waiting: dict[Future, TakeJob] = {pool.submit(_run_marked, job): job for job in jobs}
         while waiting:
             done = wait(waiting, return_when=FIRST_COMPLETED).done
@@ -122,7 +122,7 @@ def run_dask(jobs: Sequence[TakeJob], scheduler: str, processes: int, retries: i
         from distributed import Client, LocalCluster, as_completed
     except ImportError:
         raise SceneError("a scheduler needs the library distributed", "pip install rigidimpulse[dask]") from None
-    with _one_thread():
+    with one_thread():
         try:
             where: Any = scheduler
             if scheduler == "local":
@@ -143,7 +143,7 @@ def run_dask(jobs: Sequence[TakeJob], scheduler: str, processes: int, retries: i
 
 
 @contextmanager
-def _one_thread() -> Iterator[None]:
+def one_thread() -> Iterator[None]:
     """Have processes that are started use one thread each."""
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(ONE_THREAD)

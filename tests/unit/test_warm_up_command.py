@@ -1,0 +1,86 @@
+"""`rigidimpulse warmup`: it compiles what is missing, once, and Ctrl-C leaves no processes behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numba
+import pytest
+from click.testing import CliRunner
+
+from rigidimpulse.cli.cli import BAD_SCENE, main
+from rigidimpulse.engine.warm_up_all import ALL_PARTS, KernelPart, compile_parts, missing_parts
+
+
+@pytest.fixture
+def empty_cache(tmp_path, monkeypatch):
+    """A machine that has run nothing yet."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def test_where_all_is_compiled_nothing_is_done(empty_cache):
+    assert missing_parts() == list(ALL_PARTS)
+    for part in ALL_PARTS:
+        part.note().touch()
+    before = sorted(empty_cache.rglob("*"))
+    result = CliRunner().invoke(main, ["warmup"])
+    assert result.exit_code == 0
+    assert result.output == "all kernels are compiled: nothing to do\n"
+    assert sorted(empty_cache.rglob("*")) == before
+
+
+def test_a_part_that_is_compiled_is_not_missing_any_more(empty_cache):
+    # A kind that there is not: its process fails at once, as one does whose compiler fails.
+    told: list[float] = []
+    wrong, first = KernelPart("contacts", 7), ALL_PARTS[0]
+    first.note().touch()
+    assert missing_parts() == list(ALL_PARTS[1:])
+    (failed,) = compile_parts([wrong], 2, told.append)
+    assert failed.part == wrong and "IndexError" in failed.reason
+    assert not wrong.note().exists()
+    assert 0.0 <= told[0] <= 1.0 and told[-1] == 1.0 and told == sorted(told)
+
+
+def test_parts_that_lie_in_the_cache_are_loaded_and_noted():
+    part = KernelPart("impacts of balls")
+    part.note().unlink(missing_ok=True)
+    assert compile_parts([part], 1, lambda done: None) == []
+    assert part.note().exists() and part not in missing_parts()
+
+
+def test_control_c_ends_it_and_all_its_processes(empty_cache):
+    warm = subprocess.Popen([sys.executable, "-m", "rigidimpulse", "warmup", "--processes", "2"], stdout=subprocess.PIPE, text=True)
+    deadline, children = time.monotonic() + 60.0, []
+    while len(children) < 2 and time.monotonic() < deadline:
+        time.sleep(0.1)
+        children = processes_below(warm.pid)
+    assert len(children) == 2
+    warm.send_signal(signal.SIGINT)
+    out, _ = warm.communicate(timeout=30)
+    assert warm.returncode == 1 and "once on this machine" in out
+    assert not [child for child in children if is_alive(child)]
+
+
+def test_a_number_of_processes_that_makes_no_sense_is_refused():
+    assert CliRunner().invoke(main, ["warmup", "--processes", "0"]).exit_code == BAD_SCENE
+
+
+def processes_below(process: int) -> list[int]:
+    """Ids of the processes that one has started."""
+    listed = subprocess.run(["ps", "-A", "-o", "pid=,ppid="], capture_output=True, text=True, check=True).stdout
+    return [int(pid) for pid, parent in map(str.split, listed.splitlines()) if int(parent) == process]
+
+
+def is_alive(process: int) -> bool:
+    """Whether there is a process of this id."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
