@@ -82,6 +82,11 @@ class Plan:
         self.forecast = ""
         self._inner = 0.0
 
+    def __repr__(self) -> str:
+        """Return the number of effects, and the names of those that are in."""
+        included = [line.name for line in self.lines if line.included]
+        return f"Plan({len(included)} of {len(self.lines)} effects: {', '.join(included)})"
+
     def _lists(self, verb: str) -> list[Participants]:
         """The lists of a verb: of both regimes where none is named."""
         regime, _, name = verb.rpartition(".")

@@ -101,6 +101,10 @@ class Impulses:
     forces: ForceWork | None
     impacts: np.ndarray
 
+    def __repr__(self) -> str:
+        """Return the numbers of bodies, frames and impacts."""
+        return f"Impulses({len(self.names)} bodies, {len(self.times)} frames, {len(self.impacts)} impacts)"
+
     def of(self, name: str) -> dict[str, np.ndarray]:
         """Impulses (f, 3) N s on a body by cause.
 

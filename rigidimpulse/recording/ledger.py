@@ -50,6 +50,10 @@ class Ledger:
     angular_momentum: np.ndarray
     dissipated: dict[str, np.ndarray]
 
+    def __repr__(self) -> str:
+        """Return the number of frames, and the causes of dissipation."""
+        return f"Ledger({len(self.times)} frames, dissipated by: {', '.join(self.dissipated) or 'nothing'})"
+
     @property
     def total(self) -> np.ndarray:
         """(f,) kinetic plus potential energy, J."""

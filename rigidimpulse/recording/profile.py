@@ -41,6 +41,12 @@ class Profile:
     kernels: dict[str, KernelTime] = field(default_factory=dict)
     preparing: float = 0.0
 
+    def __repr__(self) -> str:
+        """Return the seconds, and the stage that took longest."""
+        longest = max(self.stages, key=lambda name: self.stages[name], default="")
+        most = f", most in {longest!r}: {self._share(self.stages[longest])}" if longest else ""
+        return f"Profile({self.seconds:.3g} s{most}, {len(self.kernels)} kernels)"
+
     def table(self) -> str:
         """Lines for people: stages, then the kernels that took longest."""
         rows = [("stage", "s", "share", "")]

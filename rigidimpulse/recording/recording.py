@@ -80,6 +80,12 @@ class Recording:
     settings: RunSettings | None = None
     choice: Choice | None = None
 
+    def __repr__(self) -> str:
+        """Return the motion's length, the numbers of frames, bodies and impacts, and how the run went."""
+        length = f"{self.times[-1]:g} s" if len(self.times) else "no motion"
+        counts = f"{len(self.times)} frames, {len(self.names)} bodies, {len(self.impacts)} impacts"
+        return f"Recording({length}, {counts}, {self.status!r})"
+
     @cached_property
     def horizon(self) -> dict[str, float]:
         """Time by body until which the run can be trusted, s: it is one of many plausible ones beyond.

@@ -34,6 +34,12 @@ class Status:
     message: str
     events: tuple[Event, ...] = ()
 
+    def __repr__(self) -> str:
+        """Return the first problem, and the number of the others."""
+        first, *others = self.message.splitlines() or [""]
+        rest = f", and {len(others)} more" if others else ""
+        return f"Status({'ok' if self.ok else 'not ok'}: {first}{rest})"
+
     @staticmethod
     def of(events: Sequence[Event]) -> Status:
         """Return the status that the events of a run add up to."""

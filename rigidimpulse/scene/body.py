@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,7 +49,7 @@ class Body:
     name: str
     shape: Shape
     _: KW_ONLY
-    motion: str = "dynamic"
+    motion: Literal["dynamic", "kinematic", "static"] = "dynamic"
     position: ArrayLike = (0.0, 0.0, 0.0)
     orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
     velocity: ArrayLike = (0.0, 0.0, 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from numpy.typing import ArrayLike
 
@@ -18,6 +18,9 @@ from rigidimpulse.scene.mass import masses_of
 
 if TYPE_CHECKING:
     from rigidimpulse.scene.origin import FileOrigin
+
+Thing = TypeVar("Thing", bound=Body | SceneEffect)
+"""What a scene takes; `Scene.add` returns the same kind."""
 
 
 class Scene:
@@ -43,7 +46,7 @@ class Scene:
         for body in bodies:
             self.add(body)
 
-    def add(self, thing: Any) -> Any:
+    def add(self, thing: Thing) -> Thing:
         """Add a body, or an effect (a `SceneEffect`: forces, joints, triggers, soft bodies), and return it.
 
         Raises:

@@ -66,6 +66,11 @@ class Study:
     rows: list[Row] = field(default_factory=list)
     left: list[str] = field(default_factory=list)
 
+    def __repr__(self) -> str:
+        """Return the scene, what the rows were measured against, and their number."""
+        left = f", {len(self.left)} left" if self.left else ""
+        return f"Study({self.name!r}, {self.duration:g} s, {len(self.rows)} rows{left}, reference: {self.reference.kind})"
+
     def front(self, error: str = "position") -> list[Row]:
         """Own rows that no other own row beats in both cost and error, cheapest first; error: a field of `Errors`.
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class Link:
     orientation: np.ndarray
     pieces: list[Piece] = field(default_factory=list)
     weight: Weight | None = None
-    motion: str = "dynamic"
+    motion: Literal["dynamic", "kinematic", "static"] = "dynamic"
     gravity_factor: float = 1.0
     is_between: bool = False
 

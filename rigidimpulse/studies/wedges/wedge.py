@@ -37,6 +37,10 @@ class Wedge:
     takes: list[Take]
     jobs: list[TakeJob]
 
+    def __repr__(self) -> str:
+        """Return the numbers of takes and failures, and the folder."""
+        return f"Wedge({len(self.takes)} takes, {len(self.failed)} failed, in {str(self.folder)!r})"
+
     @property
     def failed(self) -> list[Take]:
         """Takes that did not come to their end."""

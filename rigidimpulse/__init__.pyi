@@ -1,0 +1,60 @@
+"""Types of the public names, for type checkers and editors: at run time they are imported when used (see `__init__.py`)."""
+
+from rigidimpulse.collision.containment import contains as contains
+from rigidimpulse.core.errors import SceneError as SceneError
+from rigidimpulse.dynamics.forces.constant import ConstantForce as ConstantForce
+from rigidimpulse.dynamics.forces.drag import Drag as Drag
+from rigidimpulse.dynamics.forces.energy.force import EnergyForce as EnergyForce
+from rigidimpulse.dynamics.forces.energy.overlap import NoOverlap as NoOverlap
+from rigidimpulse.dynamics.forces.energy.path import Curvature as Curvature
+from rigidimpulse.dynamics.forces.energy.path import PinFrame as PinFrame
+from rigidimpulse.dynamics.forces.energy.path import StayNear as StayNear
+from rigidimpulse.dynamics.forces.energy.path import Velocity as Velocity
+from rigidimpulse.dynamics.forces.energy.path import smooth_path as smooth_path
+from rigidimpulse.dynamics.forces.energy.pin import PinPoints as PinPoints
+from rigidimpulse.dynamics.forces.energy.potential import GravityPotential as GravityPotential
+from rigidimpulse.dynamics.forces.energy.restore import RestoreShape as RestoreShape
+from rigidimpulse.dynamics.forces.energy.surface import PointOnSurface as PointOnSurface
+from rigidimpulse.dynamics.forces.field import ForceField as ForceField
+from rigidimpulse.dynamics.forces.field import PointAttractor as PointAttractor
+from rigidimpulse.dynamics.forces.harmonic import HarmonicForce as HarmonicForce
+from rigidimpulse.dynamics.forces.pd import PDController as PDController
+from rigidimpulse.dynamics.forces.sampled import SampledForce as SampledForce
+from rigidimpulse.dynamics.forces.spring import Spring as Spring
+from rigidimpulse.dynamics.forces.thruster import Thruster as Thruster
+from rigidimpulse.dynamics.soft_body.body import FlexibleBody as FlexibleBody
+from rigidimpulse.engine.compile_scene import compile_scene as compile_scene
+from rigidimpulse.engine.settle import settle as settle
+from rigidimpulse.engine.simulate import simulate as simulate
+from rigidimpulse.engine.triggers import Trigger as Trigger
+from rigidimpulse.io.scene_file import load_scene as load_scene
+from rigidimpulse.recording.cache import Cache as Cache
+from rigidimpulse.recording.recording import Recording as Recording
+from rigidimpulse.recording.recording import load_recording as load_recording
+from rigidimpulse.scene.accuracy import Accuracy as Accuracy
+from rigidimpulse.scene.accuracy_targets import InTime as InTime
+from rigidimpulse.scene.accuracy_targets import Within as Within
+from rigidimpulse.scene.body import Body as Body
+from rigidimpulse.scene.collision_filter import CollisionFilter as CollisionFilter
+from rigidimpulse.scene.joint import BallJoint as BallJoint
+from rigidimpulse.scene.joint import DistanceJoint as DistanceJoint
+from rigidimpulse.scene.joint import FixedJoint as FixedJoint
+from rigidimpulse.scene.joint import HingeJoint as HingeJoint
+from rigidimpulse.scene.joint import Motor as Motor
+from rigidimpulse.scene.joint import SliderJoint as SliderJoint
+from rigidimpulse.scene.joint_six_axis import Drive as Drive
+from rigidimpulse.scene.joint_six_axis import Limit as Limit
+from rigidimpulse.scene.joint_six_axis import SixAxisJoint as SixAxisJoint
+from rigidimpulse.scene.keyframes import Keyframes as Keyframes
+from rigidimpulse.scene.material import Material as Material
+from rigidimpulse.scene.scene import Scene as Scene
+from rigidimpulse.scene.shape import Shape as Shape
+from rigidimpulse.studies.compare import compare as compare
+from rigidimpulse.studies.glance.glance import glance as glance
+from rigidimpulse.studies.live.session import live as live
+from rigidimpulse.studies.wedges.wedge import wedge as wedge
+from rigidimpulse.studies.wedges.workers import Workers as Workers
+from rigidimpulse.studies.work_precision import study as study
+
+__version__: str
+__all__: list[str]
