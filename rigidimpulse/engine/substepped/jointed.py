@@ -28,6 +28,7 @@ MOTION = 1.0
 """Parts of `Accuracy.substep_motion` that touching bodies move until their contacts are looked for again."""
 GAINED: float = 1e-4
 """Part of what moves by which the energy of an island may rise in a step: what the method makes, it takes back; a whip makes ever more."""
+Kept = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 CLOSED, OPEN = TOLERANCES.sub_stepping.joints_closed, TOLERANCES.sub_stepping.joints_open
 
 
@@ -72,10 +73,11 @@ class JointedStepper:
         island = self._island(run, which)
         moment, given = np.zeros((len(self._joints.body_a), 3)), GivenImpulses(stepper)
         stepper.begin_step()
-        worst = self._sub_steps(run, island, moment, given, (end - time) / stepper.sub_steps)
+        kept = self._stiffening, moment, self._driven, np.zeros(1)
+        worst = self._sub_steps(run, island, kept, given, (end - time) / stepper.sub_steps)
         if not worst <= self._open:
             return None
-        stop_island(island, stepper.bodies, stepper.table.arrays, self._world.coefficients, self._stiffening, moment)
+        stop_island(island, stepper.bodies, stepper.table.arrays, self._world.coefficients, stepper.balance, kept)
         self._hand_over(island.members)
         out = stepper.end_step()
         if not (self._driven[island.members].any() or self._keeps_energy(run, out)):
@@ -99,9 +101,9 @@ class JointedStepper:
             self._joints, which, now, stepper.bodies.rotation, members, self._column, run.joints.memory, self._allowed
         )
 
-    def _sub_steps(self, run: Run, island: JointedIsland, moment: np.ndarray, given: GivenImpulses, h: float) -> float:
-        """All sub-steps of h s; returns the worst gap of a joint, m or rad."""
-        stepper, worst, kept = self._stepper, 0.0, (self._stiffening, moment, self._driven)
+    def _sub_steps(self, run: Run, island: JointedIsland, kept: Kept, given: GivenImpulses, h: float) -> float:
+        """All sub-steps of h s; kept: see `step_island`. Returns the worst gap of a joint, m or rad."""
+        stepper, worst = self._stepper, 0.0
         for part, some in enumerate(stepper.sub_steps_of_parts()):
             if part:
                 self._hand_over(island.members)

@@ -7,10 +7,14 @@
     hard row of a joint      u' = -x / h                         x: coordinate less target; what is left is closed by `flight`
     limit not reached        u' >= -x / h                        (u' <= -x / h of an upper one)
     limit overrun            u' >= PUSH |x| / h
-    soft row, drive          p = -h (k (x + h t u') + c (u' - r)),   t = 0 where k W h^2 < SLOW, else 1
+    soft row, drive          p = -g k x - h c (u' - r)              where k W h^2 < SLOW, g: half of this sub-step and of the one before
+                             p = -h (k (x + h u') + c (u' - r))     elsewhere
 
 The soft row is explicit in x where its own oscillation is well resolved, so that it keeps its energy, and implicit where it is not, so that
-any stiffness is stable. With d = h (t h k + c) it reads  u' + p / d = h (c r - k x) / d;  where d = 0 the impulse is known.
+any stiffness is stable. Explicit springs pull for half of a sub-step at each of its ends, as gravity does (Verlet). The pull at the end of
+one and that at the start of the next are one impulse; at the end of a step the last half is given by itself. Without these halves the
+energy at the end of steps was off by w h / 2. With d = h c, or h (h k + c), the row reads  u' + p / d = push / d;  where d = 0
+the impulse is known.
 """
 
 from math import inf, sqrt
@@ -50,10 +54,10 @@ def fill_contact_biases(now, contacts, of_contacts, skins, pull, h):
 
 
 @jit_making_arrays
-def fill_joint_biases(island, rows, start, h):
+def fill_joint_biases(island, rows, start, h, before):
     """Fill the rows of joints from `start` on, with biases, bounds, softness and first impulses; remembers their coordinates.
 
-    Returns their directions (s, 3).
+    before: s, length of the sub-step before in the same step, 0 if this is the first. Returns their directions (s, 3).
     """
     joints, memory = island.joints, island.memory
     count = rows.bias.shape[0] - start
@@ -75,34 +79,45 @@ def fill_joint_biases(island, rows, start, h):
                 rows.lower[r] = rows.upper[r] = rows.impulse[r] = 0.0
             else:
                 stiffness, damping = spring_of(joints, k, weight[i])
-                _soften(rows, r, (stiffness, damping, joints.rate[k]), weight[i], x, h)
+                _soften(rows, r, (stiffness, damping, joints.rate[k]), weight[i], x, (h, before))
             i += 1
     return direction
 
 
 @jit
-def _soften(rows, r, spring, weight, x, h):
-    """Let row r be the spring (stiffness, damping, rate) at the coordinate x; its bounds are there."""
-    stiffness, damping, rate = spring
-    implicit = 1.0 if stiffness * weight * h * h >= SLOW else 0.0
-    d, push = h * (implicit * h * stiffness + damping), h * (damping * rate - stiffness * x)
+def _is_explicit(stiffness, weight, h):
+    """Whether the oscillation of a spring is well resolved by sub-steps of h s."""
+    return stiffness * weight * h * h < SLOW
+
+
+@jit
+def _soften(rows, r, spring, weight, x, sub_steps):
+    """Let row r be the spring (stiffness, damping, rate) at the coordinate x; its bounds are there. sub_steps: this, the one before, s."""
+    (stiffness, damping, rate), (h, before) = spring, sub_steps
+    explicit = _is_explicit(stiffness, weight, h)
+    pulls = 0.5 * (h + before) if explicit else h
+    d, push = h * (damping if explicit else h * stiffness + damping), h * damping * rate - pulls * stiffness * x
     if d <= TINY:
-        rows.lower[r] = rows.upper[r] = rows.impulse[r] = min(max(push, rows.lower[r]), rows.upper[r])
+        share = pulls / h
+        rows.impulse[r] = min(max(push, share * rows.lower[r]), share * rows.upper[r])
+        rows.lower[r] = rows.upper[r] = rows.impulse[r]
         return
     rows.softness[r] = 1.0 / d
     rows.bias[r] -= push / d
 
 
 @jit_making_arrays
-def fill_still_biases(island, contacts, of_contacts, start):
+def fill_still_biases(island, contacts, of_contacts, start, before):
     """Write the biases that make the rates of joints and of closed contacts vanish: at the end of a step, where nothing moves on.
 
-    Soft rows, limits that are not reached, and contacts with a gap carry nothing. Returns the directions of the joints' rows (s, 3).
+    Limits that are not reached, and contacts with a gap, carry nothing; explicit springs pull for half of the last sub-step, `before` s.
+    Returns the directions of the joints' rows (s, 3).
     """
     joints, rows, first_row = island.joints, of_contacts.rows, of_contacts.first_row
     count = rows.bias.shape[0] - start
-    value, direction, u = np.empty(count), np.empty((count, 3)), np.zeros(rows.bias.shape[0])
+    value, direction, u, weight = np.empty(count), np.empty((count, 3)), np.zeros(rows.bias.shape[0]), np.empty(count)
     joint_rows(island, rows, start, value, direction)
+    joint_weights(joints, island.which, rows, start, weight)
     relative_point_velocity(island, direction, u[start:])
     row_velocities(island.bodies, contacts, first_row, of_contacts.frames, u)
     for i in range(u.shape[0]):
@@ -115,7 +130,12 @@ def fill_still_biases(island, contacts, of_contacts, start):
         for k in range(joints.first[j], joints.first[j + 1]):
             r, side = start + i, limit_side(joints, k)
             rows.lower[r], rows.upper[r] = joints.lower[k], joints.upper[k]
-            if joints.stiffness[k] < inf or side * value[i] > 0.0:
+            if side * value[i] > 0.0:
                 rows.lower[r] = rows.upper[r] = 0.0
+            elif joints.stiffness[k] < inf:
+                stiffness, _ = spring_of(joints, k, weight[i])
+                pulls = 0.5 * before if _is_explicit(stiffness, weight[i], before) else 0.0
+                rows.impulse[r] = pulls * min(max(-stiffness * value[i], joints.lower[k]), joints.upper[k])
+                rows.lower[r] = rows.upper[r] = rows.impulse[r]
             i += 1
     return direction

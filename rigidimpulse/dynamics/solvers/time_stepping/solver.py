@@ -46,9 +46,10 @@ def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h
     island: its joints and members by rank, with the velocities; bodies: the solver's bodies, with the poses. table: of contacts. balance:
     its clusters are joined, and it is given the work of drives and moving supports. kept: stiffening (n,) kg m2, which is updated; moment
     (j, 3) N s, to which the impulses of the joints on their b are added; driven (n,) bool, members that drives, springs or moving supports
-    may give energy to. Returns how many sub-steps were halved, and the worst gap of a joint, m or rad.
+    may give energy to; before (1,) s, length of the last sub-step of the step, 0 at its start, which is updated. Returns how many sub-steps
+    were halved, and the worst gap of a joint, m or rad.
     """
-    members, now, stiffening = island.members, island.bodies, kept[0]
+    members, now, stiffening, last = island.members, island.bodies, kept[0], kept[3]
     supports = _supports(bodies)
     left, step, halved, worst = sub_steps * h, h, np.int64(0), 0.0
     begin, spin = np.empty((bodies.part.shape[0], 7)), np.empty((bodies.part.shape[0], 3))
@@ -73,6 +74,7 @@ def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h
         kick(bodies, now, members, 0.5 * step)
         worst = max(worst, gap)
         left -= step
+        last[0] = step
         # After a halved sub-step the next ones may be whole again.
         step = min(2.0 * step, h)
     return halved, worst
@@ -108,23 +110,40 @@ def _take_back(bodies, now, members, begin, before):
         quaternion_to_matrix(bodies.orientation[i], bodies.rotation[i])
 
 
-@jit
-def _kinetic_energy(bodies, now, i):
-    """Kinetic energy of body i with its true inertia, J."""
-    r, w, v = bodies.rotation[i], now.angular_velocity[i], now.velocity[i]
-    total = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) / now.inv_mass[i]
-    for k in range(3):
-        along = r[0, k] * w[0] + r[1, k] * w[1] + r[2, k] * w[2]
-        total += bodies.inertia[i, k] * along * along
-    return 0.5 * total
+@jit_making_arrays
+def _turned(bodies, members):
+    """The orientations (k, 3, 3) of the members."""
+    r = np.empty((members.shape[0], 3, 3))
+    for n in range(members.shape[0]):
+        for k in range(3):
+            for j in range(3):
+                r[n, k, j] = bodies.rotation[members[n], k, j]
+    return r
 
 
 @jit_making_arrays
-def _energies(bodies, now, members):
-    """Kinetic energies (k,) of the members, J."""
+def _falling(bodies, now, members):
+    """Power (k,) of gravity at the members, W."""
+    power = np.empty(members.shape[0])
+    for n in range(members.shape[0]):
+        i = members[n]
+        g, v = bodies.gravity[i], now.velocity[i]
+        power[n] = (g[0] * v[0] + g[1] * v[1] + g[2] * v[2]) / now.inv_mass[i]
+    return power
+
+
+@jit_making_arrays
+def _energies(bodies, now, members, rotation):
+    """Kinetic energies (k,) of the members, with their true inertia, at the orientations (k, 3, 3), J."""
     energy = np.empty(members.shape[0])
-    for k in range(members.shape[0]):
-        energy[k] = _kinetic_energy(bodies, now, members[k])
+    for n in range(members.shape[0]):
+        i, r = members[n], rotation[n]
+        w, v = now.angular_velocity[i], now.velocity[i]
+        total = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) / now.inv_mass[i]
+        for k in range(3):
+            along = r[0, k] * w[0] + r[1, k] * w[1] + r[2, k] * w[2]
+            total += bodies.inertia[i, k] * along * along
+        energy[n] = 0.5 * total
     return energy
 
 
@@ -134,7 +153,7 @@ def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
 
     flight: see `flight.fly`; and the gap up to which things are counted and kept for later: else the caller takes the sub-step back.
     """
-    members, now, (stiffening, moment, driven) = island.members, island.bodies, kept
+    members, now, (stiffening, moment, driven, before) = island.members, island.bodies, kept
     contacts, place = contact_points(bodies, now, table.pairs, table.points, coefficients, h)
     start_of = contact_rows(now, contacts, members, island.number, count_joint_rows(island.joints, island.which))
     rows, start = start_of.rows, start_of.rows.bias.shape[0] - count_joint_rows(island.joints, island.which)
@@ -143,15 +162,18 @@ def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
     for i in members:
         pull = max(pull, np.sqrt(bodies.gravity[i, 0] ** 2 + bodies.gravity[i, 1] ** 2 + bodies.gravity[i, 2] ** 2))
     u = fill_contact_biases(now, contacts, start_of, table.points[place, SKIN], pull, h)
-    direction = fill_joint_biases(island, rows, start, h)
+    direction = fill_joint_biases(island, rows, start, h, before[0])
     scale = max(_fastest(rows), h * pull) + TINY
     _set_friction(start_of, contacts, u, SLIP * scale)
-    given = _energies(bodies, now, members)
+    turned, fell = _turned(bodies, members), _falling(bodies, now, members)
+    given = _energies(bodies, now, members, turned)
     solve_until_slip(None, start_of, members.shape[0], contacts, ACCURATE * scale, SLIP * scale)
     change_velocities(now, members, rows)
-    given = _energies(bodies, now, members) - given
     begin, spin, most = flight
     gap = fly_and_close(island, bodies, rows, start, begin, spin, h)
+    # All that impulses did, those that close joints included: they act at the start. Half of the pull of gravity is in the velocities there
+    # that acts after the flight: its share of the work is not theirs.
+    given = _energies(bodies, now, members, turned) - given - 0.5 * h * (_falling(bodies, now, members) - fell)
     if gap > most:
         return gap
     for k in range(members.shape[0]):
@@ -232,16 +254,22 @@ def _remember_forces(island, rows, start, h):
 
 
 @jit_making_arrays
-def stop_island(island, bodies, table, coefficients, stiffening, moment):
-    """Make the rates of joints and closed contacts vanish at the end of the sub-steps; adds the joints' impulses on b to moment (j, 3)."""
-    members, now = island.members, island.bodies
+def stop_island(island, bodies, table, coefficients, balance, kept):
+    """Make the rates of joints and closed contacts vanish at the end of the sub-steps of a step; arguments as of `step_island`."""
+    members, now, (stiffening, moment, driven, before) = island.members, island.bodies, kept
     set_inertia(bodies, now, members, stiffening)
     contacts, _ = contact_points(bodies, now, table.pairs, table.points, coefficients, 0.0)
     of_contacts = contact_rows(now, contacts, members, island.number, count_joint_rows(island.joints, island.which))
     rows = of_contacts.rows
     start = rows.bias.shape[0] - count_joint_rows(island.joints, island.which)
-    direction = fill_still_biases(island, contacts, of_contacts, start)
+    direction = fill_still_biases(island, contacts, of_contacts, start, before[0])
     scale = _fastest(rows) + TINY
+    turned = _turned(bodies, members)
+    given = _energies(bodies, now, members, turned)
     solve_until_slip(None, of_contacts, members.shape[0], contacts, ACCURATE * scale, SLIP * scale)
     change_velocities(now, members, rows)
+    given = _energies(bodies, now, members, turned) - given
+    for k in range(members.shape[0]):
+        if driven[members[k]]:
+            balance.given[members[k]] += given[k]
     _add_moments(island, rows, start, direction, moment)
