@@ -6,6 +6,8 @@ Parts of one kind take about as long, and share little that would be compiled tw
 
 The order of events of exact contact (`exact/event_loop.py`) takes about a minute to compile, and runs without it give the same bits. So
 nobody waits for it: a process of its own compiles it beside the first runs and after them, and puts it into the cache.
+
+Nothing is compiled twice where two first runs begin at once: the second waits for the first, and finds its kernels in the cache.
 """
 
 from __future__ import annotations
@@ -14,11 +16,14 @@ import gc
 import logging
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
 from typing import IO
 
+from rigidimpulse.core.claim import claim
+from rigidimpulse.core.kernel_cache import note_beside
 from rigidimpulse.core.kernels import Kernel, is_cached
 from rigidimpulse.model.world import World
 
@@ -39,16 +44,41 @@ _BACKGROUND: list[subprocess.Popen] = []
 PARTS_MODULE = "rigidimpulse.engine.warm_up_parts"
 SECONDS = {CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 35, JOINTS: 30, STEPPED_JOINTS: 40}
 """s that compiling each kind takes, about, on two threads of one core."""
+LONGEST_WAIT, LOOK_AGAIN = 10.0, 0.2
+"""How many times as long as compiling takes a process waits for another one that compiles; s, how often it looks whether that has ended."""
 NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 2, STEPPED_JOINTS: 1}
 
 
 def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> None:
     """Compile the kernels that a run needs on several cores, and say so, where this machine has never run these sources."""
     missing = kernels_to_compile(world, with_events, with_substepped)
-    if missing:
-        kinds, seconds = ", ".join(missing), sum(SECONDS[kind] for kind in missing)
-        logger.warning(f"compiling kernels ({kinds}) for the first run on this machine, once: this takes about {seconds} s")
-        compile_kernels(world, missing)
+    if not missing:
+        return
+    with _alone(sum(SECONDS[kind] for kind in missing)):
+        missing = kernels_to_compile(world, with_events, with_substepped)
+        if missing:
+            kinds, seconds = ", ".join(missing), sum(SECONDS[kind] for kind in missing)
+            logger.warning(f"compiling kernels ({kinds}) for the first run on this machine, once: this takes about {seconds} s")
+            compile_kernels(world, missing)
+
+
+@contextmanager
+def _alone(seconds: float) -> Iterator[None]:
+    """Wait until no other process compiles what takes about so many seconds, and let none begin; not for ever, should it hang."""
+    held, begin, said = None, time.monotonic(), False
+    # Where no file can be made, each process compiles for itself.
+    with suppress(OSError):
+        path = note_beside(prepare_kernels, "kinds.lock")
+        while (held := claim(path)) is None and time.monotonic() - begin < LONGEST_WAIT * seconds:
+            if not said:
+                logger.warning("another process compiles kernels for the first run on this machine: waiting for it")
+                said = True
+            time.sleep(LOOK_AGAIN)
+    try:
+        yield
+    finally:
+        if held is not None:
+            held.close()
 
 
 def kernels_to_compile(world: World, with_events: bool, with_substepped: bool, is_ready: Callable[[Kernel], bool] = is_cached) -> list[str]:
@@ -80,9 +110,17 @@ def compile_kernels(world: World, kinds: list[str]) -> None:
 
 
 def compile_loop_in_background(world: World) -> None:
-    """Start a process that compiles the order of events for worlds like this one; it goes on by itself."""
-    rolling = [] if world.rolling is None else [ROLLING]
-    _BACKGROUND.append(start_process(LOOP, "0", *([CYLINDERS] if world.cylinders is not None else []), *rolling))
+    """Start a process that compiles the order of events for worlds like this one, unless one does; it goes on by itself."""
+    features = [*([CYLINDERS] if world.cylinders is not None else []), *([] if world.rolling is None else [ROLLING])]
+    if (held := claim_loop(features)) is not None:
+        # The process takes the claim itself: this one may end before.
+        held.close()
+        _BACKGROUND.append(start_process(LOOP, "0", *features))
+
+
+def claim_loop(features: Sequence[str]) -> IO[bytes] | None:
+    """Claim the order of events for worlds with these features, to compile it; None where another process compiles it."""
+    return claim(note_beside(prepare_kernels, "-".join(["loop", *features, "lock"])))
 
 
 def start_process(*arguments: str, errors: IO[bytes] | None = None) -> subprocess.Popen:

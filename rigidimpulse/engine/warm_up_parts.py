@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Collection
+import time
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -40,7 +41,18 @@ from rigidimpulse.engine.step import step
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.engine.substepped.jointed import JointedStepper
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
-from rigidimpulse.engine.warm_up import CONTACTS, CYLINDERS, EVENTS, JOINTS, LOOP, ROLLING, STEPPED_JOINTS, SUBSTEPPED
+from rigidimpulse.engine.warm_up import (
+    CONTACTS,
+    CYLINDERS,
+    EVENTS,
+    JOINTS,
+    LOOK_AGAIN,
+    LOOP,
+    ROLLING,
+    STEPPED_JOINTS,
+    SUBSTEPPED,
+    claim_loop,
+)
 from rigidimpulse.model.contact_memory import grown, make_memory
 from rigidimpulse.model.contacts import Contacts, Touching
 from rigidimpulse.model.island import empty_contacts
@@ -268,5 +280,15 @@ def compile_part(kind: str, part: int, features: Collection[str]) -> None:
     PARTS[kind][part](_box_on_floor(CYLINDERS in features, kind in (JOINTS, STEPPED_JOINTS), ROLLING in features))
 
 
+def compile_alone(kind: str, part: int, features: Sequence[str]) -> None:
+    """The same in a process of its own. Where another one compiles the order of events, this one waits, and finds it in the cache."""
+    held = None
+    while kind == LOOP and (held := claim_loop(features)) is None:
+        time.sleep(LOOK_AGAIN)
+    compile_part(kind, part, features)
+    if held is not None:
+        held.close()
+
+
 if __name__ == "__main__":
-    compile_part(sys.argv[1], int(sys.argv[2]), sys.argv[3:])
+    compile_alone(sys.argv[1], int(sys.argv[2]), sys.argv[3:])
