@@ -4,5 +4,5 @@ scene_file   scenes by suffix                        pieces   colliders joined t
 motion_file  motion by suffix                        jointed  bodies that touch at a joint
 motion       keys of a whole run                     origin   what is kept of a file
 keys         times and poses of a body's animation   gltf, usd, robots: by format
-table        a recording as text
+table        a recording as text                     named_files  files that a file names
 """

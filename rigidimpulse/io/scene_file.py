@@ -34,7 +34,7 @@ def load_scene(
     Args:
         path: the file.
         gravity: (3,) m/s^2; by default what the file says of it, else 9.81 m/s^2 against its up axis.
-        allow_outside: let files that a glTF file or a robot names lie outside the folder of the file.
+        allow_outside: let files that the file names lie outside its folder, and be named by absolute paths.
         fixed_base: of .urdf: whether the root link stands still; by default it does if it is called "world", or has no mass and
             links move against it.
 
@@ -57,7 +57,7 @@ def load_scene(
     if suffix in USD_SUFFIXES:
         from rigidimpulse.io.usd.load import load_usd
 
-        return load_usd(place, gravity)
+        return load_usd(place, gravity, allow_outside)
     if suffix == ".urdf":
         from rigidimpulse.io.robots.urdf import load_urdf
 

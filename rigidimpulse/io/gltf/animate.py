@@ -119,6 +119,10 @@ class _Locals:
         self.node_of, self._paths, self._origin = node_of, paths, origin
         self.sheared: set[str] = set()
         self._name_of = {node: name for name, node in node_of.items()}
+        if origin is not None:
+            hierarchy = origin.animations.hierarchy
+            self._carried = hierarchy.counted(lambda node: self._name_of.get(node) in paths)
+            self._mirrored = hierarchy.counted(lambda node: bool(np.any(hierarchy.local[node].scale < 0.0)))
 
     def is_keyed(self, name: str, motion: Motion) -> bool:
         """Whether a body has keys: it moves, or it is not where its node is in the file, or all have some."""
@@ -163,7 +167,7 @@ class _Locals:
         scale = np.cbrt(np.abs(np.linalg.det(matrix)))[:, None, None]
         fixed = np.abs(matrix - matrix[0]).max() <= EVEN * float(scale[0, 0, 0])
         even = np.abs(matrix[0] / scale[0] @ (matrix[0] / scale[0]).T - np.eye(3)).max() <= EVEN
-        if fixed and even and np.linalg.det(matrix[0]) > 0.0 and not self._is_mirrored(node, hierarchy):
+        if fixed and even and np.linalg.det(matrix[0]) > 0.0 and not self._mirrored[hierarchy.parent[node]]:
             return multiply(conjugate(from_matrix(matrix[0] / scale[0])), keys.orientations)
         stretch = to_matrix(hierarchy.turn[node]).T @ hierarchy.world[node, :3, :3]
         own = np.linalg.solve(matrix, to_matrix(keys.orientations) @ stretch) / local.scale
@@ -173,30 +177,36 @@ class _Locals:
             self.sheared.add(name)
         return from_matrix(nearest)
 
-    def _is_mirrored(self, node: int, hierarchy: Hierarchy) -> bool:
-        """Whether a scale above a node is negative."""
-        return any(np.any(hierarchy.local[k].scale < 0.0) for k in hierarchy.chain(node)[1:])
-
     def _world(self, node: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Origin (k, 3) and linear part of the world matrix (k, 3, 3) of a node at times."""
+        """Origin (k, 3) and linear part of the world matrix (k, 3, 3) of a node at times: up to what is known, and down again."""
         assert self._origin is not None
         animations = self._origin.animations
-        hierarchy = animations.hierarchy
+        between: list[int] = []
+        while node >= 0 and (self._carried[node] or animations.moves(node)) and not self._moves(node):
+            between.append(node)
+            node = animations.hierarchy.parent[node]
+        x, linear = self._known(node, times)
+        for k in reversed(between):
+            local = animations.local(k, times)
+            x, linear = x + np.einsum("kij,kj->ki", linear, local.translation), linear @ (to_matrix(local.rotation) * local.scale)
+        return x, linear
+
+    def _moves(self, node: int) -> bool:
+        """Whether the run moves the body of a node."""
         name = self._name_of.get(node)
-        if name is not None and self._paths[name].moves:
-            path = self._paths[name].at(times)
-            stretch = to_matrix(hierarchy.turn[node]).T @ hierarchy.world[node, :3, :3]
-            return path.positions, to_matrix(path.orientations) @ stretch
-        above = hierarchy.chain(node)
-        if not any(self._name_of.get(k) in self._paths for k in above) and not animations.moves(node):
-            shape = (len(times), 1, 1)
+        return name is not None and self._paths[name].moves
+
+    def _known(self, node: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Origin and linear part, as `_world`, of a node that stands or that the run moves; of the world for -1."""
+        assert self._origin is not None
+        hierarchy, shape = self._origin.animations.hierarchy, (len(times), 1, 1)
+        if node < 0:
+            return np.zeros((len(times), 3)), np.tile(np.eye(3), shape)
+        if not self._moves(node):
             return np.tile(hierarchy.position(node), (len(times), 1)), np.tile(hierarchy.world[node, :3, :3], shape)
-        local = animations.local(node, times)
-        matrix = to_matrix(local.rotation) * local.scale
-        if hierarchy.parent[node] < 0:
-            return local.translation, matrix
-        x, linear = self._world(hierarchy.parent[node], times)
-        return x + np.einsum("kij,kj->ki", linear, local.translation), linear @ matrix
+        path = self._paths[self._name_of[node]].at(times)
+        stretch = to_matrix(hierarchy.turn[node]).T @ hierarchy.world[node, :3, :3]
+        return path.positions, to_matrix(path.orientations) @ stretch
 
 
 class _Channels:

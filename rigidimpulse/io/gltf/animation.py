@@ -95,6 +95,7 @@ class Animations:
                     self.tracks[node, path] = self._track(number, channel.sampler, PATHS[path])
                     if path == "scale":
                         self.notes.append(f"animation of the scale of node {name!r} is not read: bodies are rigid")
+        self._animated = hierarchy.counted(lambda node: any((node, path) in self.tracks for path in ("translation", "rotation")))
 
     def _track(self, number: int, index: int, width: int) -> Track:
         file = self.hierarchy.file
@@ -120,7 +121,11 @@ class Animations:
 
     def moves(self, node: int) -> bool:
         """Whether a node, or one above it, is animated as a rigid body is."""
-        return any((k, path) in self.tracks for k in self.hierarchy.chain(node) for path in ("translation", "rotation"))
+        return self._animated[node] > 0
+
+    def moves_against(self, node: int, above: int) -> bool:
+        """Whether a node is animated against one above it."""
+        return self._animated[node] > self._animated[above]
 
     def local(self, node: int, times: np.ndarray) -> Local:
         """Transforms of a node against its parent at times: (t, 3), (t, 4), and the scale (3,) at rest."""

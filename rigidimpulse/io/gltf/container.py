@@ -21,6 +21,7 @@ from pydantic import ValidationError
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.io.gltf.schema import LARGEST, Accessor, Document
+from rigidimpulse.io.named_files import named_file
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -68,15 +69,10 @@ class GltfFile:
                 raise self.error(f"{what} has broken base64 data", "export the file again, as .glb") from None
         if "://" in uri:
             raise self.error(f"{what} is at {uri!r}", "download it, and name the local file")
+        place = named_file(self.path.parent, unquote(uri), self.outside, f"{self.path.name!r}, {what}")
         try:
-            folder = self.path.parent.resolve()
-            place = (folder / unquote(uri)).resolve()
-            if not self.outside and not place.is_relative_to(folder):
-                raise self.error(f"{what} lies outside the folder of the scene ({uri!r})", "move it there, or allow it: allow_outside=True")
             return place.read_bytes()
-        except (OSError, ValueError) as error:
-            if isinstance(error, SceneError):
-                raise
+        except OSError:
             raise self.error(f"{what} {uri!r} cannot be read", "keep it beside the scene, or export one .glb file") from None
 
     def error(self, problem: str, remedy: str, where: str = "") -> SceneError:

@@ -90,10 +90,11 @@ class _Loader:
             for node, motion, pieces in plain_pieces(self.hierarchy, self.meshes, self.animations, self.notes):
                 self.owner[node] = node
                 maker.add(node, motion, pieces)
+        self.carrier = self._carriers()
         for thing in (*maker.bodies, *maker.joints):
             scene.add(thing)
         bodies = {body.name: body for body in maker.bodies}
-        joints, lines = read_joints(self.hierarchy, lambda node: maker.name_of.get(self._body_node(node)), bodies)
+        joints, lines = read_joints(self.hierarchy, lambda node: maker.name_of.get(self.carrier[node]), bodies)
         for thing in (*joints, *self._triggers(maker.name_of)):
             scene.add(thing)
         self._report_rest(has_physics)
@@ -108,13 +109,13 @@ class _Loader:
         nodes, names = self.hierarchy.nodes, self.hierarchy.names
         shapes = [part.geometry for node in nodes for part in (node.physics.collider, node.physics.trigger) if part is not None]
         lent = {geometry.node for geometry in shapes if geometry is not None}
-        shown = set(self.hierarchy.order)
-        lost = [names[k] for k, node in enumerate(nodes) if k not in shown | lent and (node.mesh is not None or node.extensions.physics)]
+        told = lent.union(self.hierarchy.order)
+        lost = [names[k] for k, node in enumerate(nodes) if k not in told and (node.mesh is not None or node.extensions.physics)]
         if lost:
             self.notes.append(f"not in the scene that the file shows: {_listed(lost)} are left out")
         if not has_physics:
             return
-        free = [k for k in self.hierarchy.order if nodes[k].mesh is not None and self._body_node(k) < 0]
+        free = [k for k in self.hierarchy.order if nodes[k].mesh is not None and self.carrier[k] < 0]
         drawn = [names[k] for k in free if nodes[k].physics.trigger is None]
         if drawn:
             self.notes.append(f"{_listed(drawn)}: a mesh and no collider: drawn where the file has it, and collides with nothing")
@@ -146,14 +147,17 @@ class _Loader:
             owner[node] = node if moves else (owner[parent] if parent >= 0 else -1)
         return owner
 
-    def _body_node(self, node: int) -> int:
-        """Node of the body that a node belongs to; -1 for none."""
-        if self.owner[node] >= 0:
-            return self.owner[node]
-        for above in self.hierarchy.chain(node):
-            if self.hierarchy.nodes[above].physics.collider is not None or self.owner[above] == above:
-                return above
-        return -1
+    def _carriers(self) -> list[int]:
+        """Node of the body that each node belongs to, itself or above; -1 for none."""
+        carrier = list(self.owner)
+        for node in self.hierarchy.down:
+            if carrier[node] >= 0:
+                continue
+            if self.hierarchy.nodes[node].physics.collider is not None:
+                carrier[node] = node
+            elif self.hierarchy.parent[node] >= 0:
+                carrier[node] = carrier[self.hierarchy.parent[node]]
+        return carrier
 
     def _pieces(self) -> dict[int, list[Piece]]:
         """Colliders by the node of their body, which may have none."""
@@ -172,9 +176,7 @@ class _Loader:
                 filter_ = self.file.entry(self.filters, entry.collider.collision_filter, "collision filter")
             shape = self._placed(entry.collider.geometry, node, body)
             pieces.setdefault(body, []).append(Piece(*shape, material or self._default_material, filter_))
-            path = self.hierarchy.chain(node)
-            inner = path[: path.index(body)]
-            if any((k, p) in self.animations.tracks for k in inner for p in ("translation", "rotation")):
+            if self.animations.moves_against(node, body):
                 self.notes.append(f"collider {self.hierarchy.names[node]!r} is animated against its body: it stays as it is at rest")
         return pieces
 
@@ -207,10 +209,10 @@ class _Loader:
                 self.notes.append(f"trigger {name!r} has no geometry: left out")
                 continue
             filter_ = None if first.collision_filter is None else self.file.entry(self.filters, first.collision_filter, "collision filter")
-            body = name_of.get(self._body_node(node))
+            body = name_of.get(self.carrier[node])
             position, turn = self.hierarchy.position(node), self.hierarchy.turn[node]
             if body is not None:
-                position, turn, _ = self.hierarchy.scale_seen_from(node, self._body_node(node))
+                position, turn, _ = self.hierarchy.scale_seen_from(node, self.carrier[node])
             elif self.animations.moves(node):
                 self.notes.append(f"trigger {name!r} is animated: it stays where it is at rest")
             triggers.append(Trigger(name, _one_shape(parts), body=body, position=position, orientation=turn, collision_filter=filter_))

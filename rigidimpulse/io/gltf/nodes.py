@@ -10,6 +10,7 @@ diagonal where no scale is turned by another; `negative` scales count with their
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +35,7 @@ class Hierarchy:
     """Nodes of a file.
 
     Attributes:
-        parent: (n,) -1 for roots. order: nodes of the scene, parents first.
+        parent: (n,) -1 for roots. order: nodes of the scene, parents first. down: all nodes, parents first.
         local: by node, see `Local`. world: (n, 4, 4) at rest. turn: (n, 4) wxyz, Q. names: by node, unique.
 
     """
@@ -47,10 +48,8 @@ class Hierarchy:
         self.roots = _roots(file, self.parent)
         self.order = self._descend(self.roots)
         self.local = [_local(file, node, index) for index, node in enumerate(nodes)]
-        self.world = np.tile(np.eye(4), (len(nodes), 1, 1))
-        self.turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(nodes), 1))
-        for index in self._descend([k for k in range(len(nodes)) if self.parent[k] < 0]):
-            self._place(index)
+        self.down = self._descend([k for k in range(len(nodes)) if self.parent[k] < 0])
+        self.world, self.turn = self._placed()
         self.names = _unique_names(nodes)
 
     def _descend(self, roots: list[int]) -> list[int]:
@@ -62,17 +61,23 @@ class Hierarchy:
             stack += reversed(self.nodes[index].children)
         return order
 
-    def _place(self, index: int) -> None:
-        local, parent = self.local[index], self.parent[index]
-        matrix = np.eye(4)
-        matrix[:3, :3] = to_matrix(local.rotation) * local.scale
-        matrix[:3, 3] = local.translation
-        self.world[index], self.turn[index] = matrix, local.rotation
-        if parent >= 0:
-            self.world[index] = self.world[parent] @ matrix
-            self.turn[index] = multiply(self.turn[parent], local.rotation)
-        if not np.abs(self.world[index]).max() <= LARGEST:
-            raise self.file.error("its place or scale is beyond all bounds", "correct the transforms", f"node {index}")
+    def _placed(self) -> tuple[np.ndarray, np.ndarray]:
+        """World matrices (n, 4, 4) and turns (n, 4) of all nodes."""
+        count = len(self.nodes)
+        world = np.tile(np.eye(4), (count, 1, 1))
+        turn = np.array([local.rotation for local in self.local]).reshape(count, 4)
+        world[:, :3, :3] = to_matrix(turn) * np.array([local.scale for local in self.local]).reshape(count, 1, 3)
+        world[:, :3, 3] = np.array([local.translation for local in self.local]).reshape(count, 3)
+        for index in self.down:
+            parent = self.parent[index]
+            if parent >= 0:
+                world[index] = world[parent] @ world[index]
+                turn[index] = multiply(turn[parent], turn[index])
+        is_far = ~(np.abs(world).max(axis=(1, 2)) <= LARGEST)
+        if is_far.any():
+            first = next(index for index in self.down if is_far[index])
+            raise self.file.error("its place or scale is beyond all bounds", "correct the transforms", f"node {first}")
+        return world, turn
 
     def position(self, index: int) -> np.ndarray:
         """(3,) m, origin of a node in the world at rest."""
@@ -85,6 +90,14 @@ class Hierarchy:
             chain.append(index)
             index = self.parent[index]
         return chain
+
+    def counted(self, marked: Callable[[int], bool]) -> list[int]:
+        """How many marked nodes there are on the way from a root to each node, itself included; in one pass over the nodes."""
+        count = [0] * len(self.nodes)
+        for index in self.down:
+            above = self.parent[index]
+            count[index] = int(marked(index)) + (count[above] if above >= 0 else 0)
+        return count
 
     def scale_seen_from(self, node: int, body: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Position (3,), quaternion (4,) and K (3, 3) of a node in the rigid frame of another."""

@@ -93,18 +93,12 @@ def _parts(hierarchy: Hierarchy, animations: Animations, notes: list[str]) -> di
             )
             continue
         says = motion is not None or release_of(hierarchy, node) is not None
-        if above >= 0 and not says and not _is_animated_between(hierarchy, animations, node, above):
+        if above >= 0 and not says and not animations.moves_against(node, above):
             parts[above].append(node)
             continue
         parts[node] = []
         carrier[node] = node
     return parts
-
-
-def _is_animated_between(hierarchy: Hierarchy, animations: Animations, node: int, above: int) -> bool:
-    """Whether a node moves against one above it."""
-    chain = hierarchy.chain(node)
-    return any((k, path) in animations.tracks for k in chain[: chain.index(above)] for path in ("translation", "rotation"))
 
 
 def bones_move(hierarchy: Hierarchy, animations: Animations, skin: int) -> bool:

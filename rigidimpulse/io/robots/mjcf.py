@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.io.inertia import nearest_inertia
+from rigidimpulse.io.named_files import named_file
 from rigidimpulse.io.pieces import Piece, Weight, sphere_points
 from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, carried, filters, fixed
 from rigidimpulse.io.robots.xml import read_xml
@@ -38,6 +39,8 @@ BETWEEN = 1e-4
 """Mass and inertia of bodies between the joints of one body, as a share of its own."""
 ALONG = 1e-9
 """Sine of an angle that is none."""
+FOLDERS = ("meshdir", "texturedir", "assetdir", "dir")
+"""Attributes that name folders, in which files may lie."""
 COUNTED = {"nu": "actuators", "ntendon": "tendons", "nflex": "flexible bodies", "nkey": "keyframes", "npair": "contact pairs"}
 
 
@@ -48,7 +51,7 @@ def load_mjcf(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Sce
     if root.tag not in ("mujoco", "mujocoinclude"):
         raise SceneError(f"its root is <{root.tag}>", "give an MJCF file, with <mujoco>", where)
     if not allow_outside:
-        _stay_inside(root, path.resolve().parent, where)
+        _check_names(root, path.parent, where)
     try:
         import mujoco
     except ImportError as error:
@@ -90,13 +93,25 @@ def _with_possible_inertias(mujoco: Any, path: Path, notes: list[str]) -> Any:
         return None
 
 
-def _stay_inside(root: Any, folder: Path, where: str) -> None:
-    """Raise a `SceneError` for files and folders that lie outside the folder of the file."""
-    for entry in root.iter():
-        for key in ("file", "meshdir", "texturedir", "assetdir", "dir"):
-            name = entry.get(key)
-            if name and not (folder / name).resolve().is_relative_to(folder):
-                raise SceneError(f"<{entry.tag}> names {name!r}, outside the folder", "move it there, or give allow_outside=True", where)
+def _check_names(root: Any, folder: Path, where: str) -> None:
+    """Check the files and folders that a file and those that it includes name; raises a `SceneError` for those outside its folder."""
+    waiting, included = [(root, where)], set()
+    named: list[tuple[str, str]] = []
+    folders = {""}
+    while waiting:
+        part, place = waiting.pop()
+        for entry in part.iter():
+            folders.update(name for key in FOLDERS if (name := entry.get(key)))
+            named += [(name, f"{place}, <{entry.tag}>") for key in (*FOLDERS, "file") if (name := entry.get(key))]
+            if entry.tag == "include" and entry.get("file"):
+                name, by = named[-1]
+                found = named_file(folder, name, False, by)
+                if found not in included and found.is_file():
+                    included.add(found)
+                    waiting.append((read_xml(found), f"{where}, {name!r}"))
+    for name, by in named:
+        for below in folders:
+            named_file(folder, name, False, by, folder / below / name)
 
 
 class _Joint(NamedTuple):

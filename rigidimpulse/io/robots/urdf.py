@@ -23,7 +23,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import multiply, quaternion_from_rotation_vector, rotate, to_matrix
 from rigidimpulse.io.pieces import Piece, Weight, joined
 from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, carried, filters, fixed
-from rigidimpulse.io.robots.xml import file_inside, read_xml
+from rigidimpulse.io.robots.xml import read_xml, robot_file
 from rigidimpulse.scene.joint_six_axis import Limit, SixAxisJoint
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.origin import FileOrigin
@@ -210,7 +210,7 @@ class _Reader:
         if given.tag != "mesh":
             raise SceneError(f"its geometry is <{given.tag}>", "give box, cylinder, sphere, capsule or mesh", where)
         scale = _numbers(given.get("scale", "1 1 1"), 3, "scale", where)
-        path = file_inside(self.folder, given.get("filename", ""), self.allow_outside, where)
+        path = robot_file(self.folder, given.get("filename", ""), self.allow_outside, where)
         key = (path, scale.tobytes())
         if key not in self._meshes:
             shape = Shape.from_file(path)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.io.named_files import named_file
 
 
 def read_xml(path: Path) -> Any:
@@ -31,7 +32,7 @@ def read_xml(path: Path) -> Any:
         raise SceneError(f"its XML is refused ({error})", "leave out entities and document types", where) from None
 
 
-def file_inside(folder: Path, name: str, allow_outside: bool, where: str) -> Path:
+def robot_file(folder: Path, name: str, allow_outside: bool, where: str) -> Path:
     """Return the path of a file that another one names, "package://" left out.
 
     Args:
@@ -39,12 +40,12 @@ def file_inside(folder: Path, name: str, allow_outside: bool, where: str) -> Pat
         where: what names it, for messages.
 
     Raises:
-        SceneError: there is none, or it lies outside.
+        SceneError: there is none, or `named_file` refuses it.
 
     """
-    plain = name.removeprefix("file://")
-    ways = [folder / plain]
-    if name.startswith("package://"):
+    if not name.startswith("package://"):
+        ways = [named_file(folder, name.removeprefix("file://"), allow_outside, where)]
+    else:
         package, _, rest = name.removeprefix("package://").partition("/")
         ways = [folder / package / rest, folder / rest]
         if allow_outside:
@@ -54,6 +55,4 @@ def file_inside(folder: Path, name: str, allow_outside: bool, where: str) -> Pat
     if found is None:
         hint = "" if allow_outside else ", or give allow_outside=True where it lies in a folder above"
         raise SceneError(f"there is no file {name!r}", f"put it beside the file that names it{hint}", where)
-    if not allow_outside and not found.resolve().is_relative_to(folder.resolve()):
-        raise SceneError(f"the file {name!r} lies outside the folder", "move it there, or give allow_outside=True", where)
-    return found
+    return named_file(folder, name, allow_outside, where, found)

@@ -7,4 +7,5 @@ joints     joints                                 load       a scene from a file
 origin     what is kept of the file               draw       bodies without a file, as prims
 animate    motion into a file                     plain      bodies of files without physics
 instancing point instancers as prims              skinning   meshes whose bones move
+layers     all layers of a file, checked
 """

@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 from rigidimpulse.core.errors import SceneError
 
 try:
+    from pxr import Ar as _Ar
     from pxr import Gf as _Gf
     from pxr import Sdf as _Sdf
     from pxr import Tf as _Tf
@@ -20,6 +21,7 @@ try:
 except ImportError as error:
     raise SceneError(f"USD files need the package usd-core ({error})", "pip install 'rigidimpulse[usd]'") from None
 
+Ar: Any = _Ar
 Gf: Any = _Gf
 Sdf: Any = _Sdf
 Tf: Any = _Tf

@@ -18,6 +18,7 @@ from rigidimpulse.io.usd.bodies import TRIGGER, BodyReader
 from rigidimpulse.io.usd.frames import Frames
 from rigidimpulse.io.usd.instancing import expand_instancers
 from rigidimpulse.io.usd.joints import JointReader
+from rigidimpulse.io.usd.layers import checked_layers
 from rigidimpulse.io.usd.library import SdfPath, Stage, Tf, Usd, UsdGeom, UsdPhysics, cause_of
 from rigidimpulse.io.usd.origin import UsdOrigin
 from rigidimpulse.io.usd.plain import is_seen, plain_bodies
@@ -32,16 +33,17 @@ MOST_PATHS = 8
 """Paths of prims at most in a line of the report."""
 
 
-def load_usd(path: Path, gravity: ArrayLike | None) -> Scene:
+def load_usd(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Scene:
     """Read a .usda, .usdc, .usd or .usdz file; see `rigidimpulse.load_scene`."""
     where = repr(path.name)
     if not path.is_file():
         raise SceneError(f"there is no such file (looked for {path.absolute()})", "check the path", where)
     try:
+        fresh = {} if allow_outside else checked_layers(path)
         stage = Usd.Stage.Open(str(path))
         # Layers that are open somewhere in the process would be taken as they were; what somebody edits there is left alone.
         for layer in stage.GetUsedLayers():
-            if not layer.anonymous and not layer.dirty:
+            if not layer.anonymous and not layer.dirty and layer.identifier not in fresh:
                 layer.Reload(True)
     except Tf.ErrorException as error:
         raise SceneError(f"it is no readable USD file ({cause_of(error)})", "export it again", where) from None
