@@ -64,7 +64,7 @@ def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> N
 
 @contextmanager
 def _alone(seconds: float) -> Iterator[None]:
-    """Wait until no other process compiles what takes about so many seconds, and let none begin; not for ever, should it hang."""
+    """Wait until no other process compiles, and let none begin; not for ever, should it hang. seconds: what compiling takes, about."""
     held, begin, said = None, time.monotonic(), False
     # Where no file can be made, each process compiles for itself.
     with suppress(OSError):

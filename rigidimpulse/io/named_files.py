@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path, PureWindowsPath
+import ntpath
+from pathlib import Path
 
 from rigidimpulse.core.errors import SceneError
 
@@ -25,7 +26,8 @@ def named_file(folder: Path, name: str, allow_outside: bool, where: str, found: 
         raise SceneError(f"{name!r} is no path of a file ({error})", "correct the name", where) from None
     if allow_outside:
         return place
-    if PureWindowsPath(name).anchor:  # those of other systems, too: what a file may name is the same everywhere
+    drive, rest = ntpath.splitdrive(name)  # absolute on other systems, too: what a file may name is the same everywhere
+    if drive or rest.startswith(("/", "\\")):
         raise SceneError(f"it names {name!r}, an absolute path", "name it by its path in the folder, or give allow_outside=True", where)
     if not is_inside:
         raise SceneError(f"it names {name!r}, which lies outside the folder", "move it there, or give allow_outside=True", where)

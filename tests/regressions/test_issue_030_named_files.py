@@ -80,7 +80,7 @@ def test_usd_names_files_in_its_folder(folder: Path) -> None:
 
 
 def test_usd_looks_at_the_file_as_it_is_on_the_disk(folder: Path) -> None:
-    """A layer that is open in the process may have been written anew since."""
+    """A layer that is open in the process may have been written again since."""
     from pxr import Sdf
 
     root = usd(folder / "in.usda", "references = @ball.usda@")
