@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,9 @@ class Command:
     def __init__(self, file: Path, *options: str) -> None:
         """Start it and wait for the line with the address."""
         arguments = [sys.executable, "-u", "-m", "rigidimpulse", "live", str(file), "--no-open", *options]
-        self.process = subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, start_new_session=True)
+        # Where the tests run in the background of a shell, Ctrl-C is left out for all that they start.
+        hears = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+        self.process = subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=hears)
         assert self.process.stdout is not None
         line = self.process.stdout.readline()
         found = re.search(r"http://\S+", line)
@@ -338,13 +341,9 @@ def test_pictures_come_while_a_run_is_computed_and_ctrl_c_leaves_no_process(tmp_
     try:
         opened = open_page(browser, started.url, 240, 160)
         wait(opened, "r.doing === 'computing' && r.player.count > 60")
-        counts = "[r.page.lots, r.page.pictures, performance.now(), r.doing]"
-        before = opened.do(counts)
-        opened.page.wait_for_timeout(1500)
-        after = opened.do(counts)
-        assert before[3] == after[3] == "computing"
-        assert (after[0] - before[0]) / (after[2] - before[2]) * 1000.0 > 10.0  # lots of frames in a second; 50 where nothing else runs
-        assert after[1] > before[1]  # pictures: without a graphics card they take as long as they take
+        # How fast they come depends on what else runs (50 lots a second where nothing does): that they come is what counts here.
+        lots, pictures = opened.do("[r.page.lots, r.page.pictures]")
+        wait(opened, f"r.doing === 'computing' && r.page.lots >= {lots + 15} && r.page.pictures > {pictures}")
         family = started.family()
         assert len(family) >= 2
         assert started.interrupt() == 0

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import numba
 import pytest
@@ -55,7 +56,10 @@ def test_parts_that_lie_in_the_cache_are_loaded_and_noted():
 
 
 def test_control_c_ends_it_and_all_its_processes(empty_cache):
-    warm = subprocess.Popen([sys.executable, "-m", "rigidimpulse", "warmup", "--processes", "2"], stdout=subprocess.PIPE, text=True)
+    command = [sys.executable, "-m", "rigidimpulse", "warmup", "--processes", "2"]
+    # Where the tests run in the background of a shell, Ctrl-C is left out for all that they start.
+    hears = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    warm = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=hears)
     deadline, children = time.monotonic() + 60.0, []
     while len(children) < 2 and time.monotonic() < deadline:
         time.sleep(0.1)
