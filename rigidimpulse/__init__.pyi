@@ -52,6 +52,9 @@ from rigidimpulse.scene.shape import Shape as Shape
 from rigidimpulse.studies.compare import compare as compare
 from rigidimpulse.studies.glance.glance import glance as glance
 from rigidimpulse.studies.live.session import live as live
+from rigidimpulse.studies.many import FinalState as FinalState
+from rigidimpulse.studies.many import VariedRun as VariedRun
+from rigidimpulse.studies.many import simulate_many as simulate_many
 from rigidimpulse.studies.wedges.wedge import wedge as wedge
 from rigidimpulse.studies.wedges.workers import Workers as Workers
 from rigidimpulse.studies.work_precision import study as study

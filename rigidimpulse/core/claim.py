@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import os
-from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
-_LOCKS: Any = import_module("fcntl") if os.name == "posix" else None
+try:
+    import fcntl
+except ImportError:  # Windows
+    _LOCKS: Any = None
+else:
+    _LOCKS = fcntl
 
 
 def claim(path: Path) -> IO[bytes] | None:

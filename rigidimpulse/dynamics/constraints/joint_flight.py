@@ -92,7 +92,8 @@ def make_flight(inv_mass: np.ndarray, size: float, num_joints: int, num_rows: in
 def fly_jointed(island, flight, steady, h):
     """Fly the members of a `JointedIsland` for h s under steady accelerations (n, 3); the `JointedFlight` is written.
 
-    Returns its error, as a part of the size, and by how much joints are open on the way, m or rad. The error is inf where the
+    Returns its error, as a part of the size, by how much joints are open on the way, m or rad, and by how much paths end elsewhere, rad: a
+    torque that nearly vanishes counts as none, and turns nothing. The error is inf where the
     rows cannot be flown with: they are soft, at a limit, or cannot be solved.
     """
     joints, which, members, memory, bodies = island.joints, island.which, island.members, island.memory, island.bodies
@@ -110,7 +111,7 @@ def fly_jointed(island, flight, steady, h):
             flight.start[j, r] = flight.mean[j, r] = 0.0
     _write_states(ahead, inertia, y)
     if not _choose_rows(ahead, flight.held, rows, direction, h):
-        return inf, 0.0
+        return inf, 0.0, 0.0
     for stage in range(STAGES):
         for k in range(n):
             for c in range(13):
@@ -127,7 +128,7 @@ def fly_jointed(island, flight, steady, h):
         _note_forces(ahead, rows, direction, _END[stage], flight.mean)
         if not solved:
             memory.angle[:] = angles
-            return inf, 0.0
+            return inf, 0.0, 0.0
     for k in range(n):
         fifth, third = 0.0, 0.0
         for c in range(13):
@@ -143,10 +144,10 @@ def fly_jointed(island, flight, steady, h):
         error = max(error, h * fifth / sqrt(max(fifth + 0.01 * third, TINY)))
     _write_states(ahead, inertia, at)
     _end(ahead, flight.held, rows, direction, inertia)
-    _lay_paths(island, flight, steady, h)
+    missed = _lay_paths(island, flight, steady, h)
     open_by = _open_by(island, ahead, flight.held, h)
     memory.angle[:] = angles
-    return error, open_by
+    return error, open_by, missed
 
 
 @jit
@@ -397,9 +398,12 @@ def _end(ahead, held, rows, direction, inertia):
 
 @jit_making_arrays
 def _lay_paths(island, flight, steady, h):
-    """Write the lines of force and torque of the members, along which they go from where they are to where the flight ends."""
+    """Write the lines of force and torque of the members, along which they go from where they are to where the flight ends.
+
+    Returns by how much one of them ends elsewhere, rad.
+    """
     start, end, trial, x, q = island.bodies, flight.bodies, island.memory.trial, np.empty(3), np.empty(4)
-    pull, jerk, torque, torque_rate, best = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(6)
+    pull, jerk, torque, torque_rate, best, missed = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(6), 0.0
     for i in island.members:
         for c in range(3):
             mean = (end.velocity[i, c] - start.velocity[i, c]) / h
@@ -432,6 +436,8 @@ def _lay_paths(island, flight, steady, h):
             torque[c], torque_rate[c] = best[c], best[3 + c]
             flight.value[i, 3 + c], flight.rate[i, 3 + c] = torque[c], torque_rate[c]
         take(trial, i, 0.0, start, Load(pull, torque, jerk, torque_rate), FORCED)
+        missed = max(missed, 2.0 * least)
+    return missed
 
 
 @jit

@@ -26,6 +26,10 @@ WORK, MOST_WORK = 0.1, 3.0
 """By how much for each body a flight, which solves the joints more often, costs more than a sub-step of the other method; and at most."""
 WORTH = 1.0 / 32.0
 """Part of the run's step for which a flight is always worth it."""
+MISSED: float = 1e-11
+"""rad, by which paths may end elsewhere than flights."""
+OTHERWISE = 0.7
+"""Part of the length that is tried next where they do."""
 PAUSE = 16
 """Sub-steps that are not flown after a flight that was given up."""
 
@@ -62,9 +66,13 @@ class JointFlights:
         least = min(1.0 + WORK * len(members), MOST_WORK) * min(other, self._worth)
         h = rest / math.ceil(rest / plan) if plan < rest else rest
         while h >= min(least, rest):
-            error, is_open = fly_jointed(jointed, flight, steady, h)
+            error, is_open, missed = fly_jointed(jointed, flight, steady, h)
             if math.isinf(error):
                 break
+            if missed > MISSED:
+                # At another length its torque is another.
+                h *= OTHERWISE
+                continue
             way = max((error / self._at_end) ** (1.0 / 8.0), (is_open / self._on_the_way) ** 0.25)
             follows = h * min(max(SAFETY / max(way, 1e-30), LEAST_CHANGE), MOST_CHANGE)
             if way <= 1.0:

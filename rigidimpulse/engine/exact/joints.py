@@ -333,7 +333,7 @@ class JointState:
             which = island.joints
             if not len(which) or run.world.moving[self.bodies_of(which)].any() or np.any(waits[which] <= 0.0):
                 return 0.0
-            rest = min(rest, frame, float(waits[which].min()))
+            rest = max(min(rest, frame, float(waits[which].min())), SHORT * run.world.accuracy.step)
             h = self.flights.fly(self._jointed(run, island), run.acceleration, rest, self.sub_step(run, island, rest))
             if h == 0.0:
                 # Nobody knows how fast they are about to turn.

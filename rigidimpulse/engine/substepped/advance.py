@@ -163,7 +163,7 @@ class SubsteppedIslands:
         """Choose the islands of the step: `pair_events.inside` marks their bodies, `pair_events.asleep` the sleepers."""
         last = np.maximum(self.solve_count, 0.0)
         if pair_events.end > self._step_end:
-            self._mean_solves += OF_MEAN * (last - self._mean_solves)
+            self._mean_solves += OF_MEAN * (np.minimum(last, RUNAWAY) - self._mean_solves)
             self.solve_count, self._step_end = self._no_solves(), pair_events.end
         # One step with many events is no reason to leave the exact regime with a mechanism: it stays out of it for long.
         solve_count = np.where(self._jointed, self._mean_solves, last)

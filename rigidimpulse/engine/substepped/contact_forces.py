@@ -84,7 +84,7 @@ MOSTLY = 0.3
 """Part of the bodies that are quick beyond which all count as such."""
 _NO_STEADY = 0, np.zeros(1, np.int64)
 """Patches, and edges of the colours of batches, that were made before the last find_contacts."""
-FINER_STEP, FINER_SUB_STEP, FINER_MOTION = 1.0 / 4.0, 1.0 / 8.0, 1.0 / 10.0
+FINER_STEP, FINER_SUB_STEP, FINER_MOTION = 1.0 / 8.0, 1.0 / 32.0, 1.0 / 10.0
 """Parts of the settings `step` and `substep_motion` that scenes of few bodies are stepped with: they can afford finer ones."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
