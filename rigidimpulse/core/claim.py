@@ -7,7 +7,7 @@ from typing import IO, Any
 
 try:
     import fcntl
-except ImportError:  # Windows
+except ImportError:  # systems without it
     _LOCKS: Any = None
 else:
     _LOCKS = fcntl
