@@ -12,6 +12,7 @@ from rigidimpulse.dynamics.forces import KINDS
 from rigidimpulse.engine.effects import EventKernel, FclNarrowPhase, SubsteppedContact, TriggerVolumes, all_effects
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
 from rigidimpulse.engine.exact.compiled_loop import why_not as why_not_compiled
+from rigidimpulse.engine.exact.joints import JointState
 from rigidimpulse.engine.initial_overlap import resolve_overlaps
 from rigidimpulse.engine.keyframe_paths import KeyframePaths
 from rigidimpulse.engine.regime import only_expensive, why_not_substepped
@@ -73,8 +74,6 @@ def make_run(world: World, plan: Plan, recorder: Recorder, log: EventLog) -> Run
 
         run.narrow_phase = FclContacts(run)
     if world.joints_of_scene:
-        from rigidimpulse.engine.exact.joints import JointState  # scipy's integrators come with it
-
         run.joints = JointState(world)
     if not why_not_substepped(world):
         run.substepped = SubsteppedIslands(world)

@@ -16,7 +16,6 @@ from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, make_memory
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.engine.exact.joint_flights import JointFlights
 from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.participants import RunJoints
 from rigidimpulse.engine.run import Run
@@ -82,6 +81,8 @@ class JointState:
         self._accounted_shock = np.zeros((len(joints), 3))
         self.pull, self.pull_rate = np.zeros((2, len(joints), 3))
         self.share = np.full(len(joints), HALF)
+        from rigidimpulse.engine.exact.joint_flights import JointFlights  # scipy's integrators come with it
+
         self.flights = JointFlights(world, self.table)
         self.lands = np.full(len(joints), np.nan)
         self.are_closed, self._open_by = True, 0.0
