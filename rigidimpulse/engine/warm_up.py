@@ -46,7 +46,7 @@ SECONDS = {CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 35, JOINTS: 30, STEPPED_JOINTS:
 """s that compiling each kind takes, about, on two threads of one core."""
 LONGEST_WAIT, LOOK_AGAIN = 10.0, 0.2
 """How many times as long as compiling takes a process waits for another one that compiles; s, how often it looks whether that has ended."""
-NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 2, STEPPED_JOINTS: 1}
+NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 3, STEPPED_JOINTS: 1}
 
 
 def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> None:

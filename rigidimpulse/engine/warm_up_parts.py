@@ -16,7 +16,9 @@ from rigidimpulse.collision.time_of_impact import bisection
 from rigidimpulse.core.union_find import roots
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
+from rigidimpulse.dynamics.constraints.joint_flight import fly_jointed
 from rigidimpulse.dynamics.constraints.joint_impact import fill_rates, impact_rows
+from rigidimpulse.dynamics.constraints.joint_limits import next_switch
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, fill_closing_rows, start_joint_rows, stop_rows
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
 from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, needs_correction
@@ -228,12 +230,20 @@ def _start_joints(run: Run) -> None:
 
 
 def _close_and_stop_joints(run: Run) -> None:
-    """Rows of joints at the end of a sub-step, and the switches of limits on the way."""
+    """Rows of joints at the end of a sub-step."""
     island = _jointed_box(run)
     count = int(count_joint_rows.py_func(island.joints, island.which))
     rows = make_rows.py_func(count)
     close_at_end(island, run.acceleration, STEP, rows, 0, np.zeros(count), run.wrench)
     stop_rows(island, np.zeros(1))
+
+
+def _fly_on_joints(run: Run) -> None:
+    """Flights of bodies that joints hold, and the switches of limits on the way."""
+    island, joints = _jointed_box(run), run.joints
+    assert isinstance(joints, JointState)
+    fly_jointed(island, joints.flights.flight, run.acceleration, STEP)
+    next_switch(joints.table, island.which, joints.memory, (STEP, STEP), 1.0)
 
 
 def _step_jointed(run: Run) -> None:
@@ -268,7 +278,7 @@ PARTS = {
     CONTACTS: (_respond_and_detect, _move_and_sweep),
     EVENTS: (_fly,),
     SUBSTEPPED: (_find_substepped_contacts, _step_substepped),
-    JOINTS: (_start_joints, _close_and_stop_joints),
+    JOINTS: (_start_joints, _close_and_stop_joints, _fly_on_joints),
     STEPPED_JOINTS: (_step_jointed,),
     LOOP: (_go_from_event_to_event,),
 }

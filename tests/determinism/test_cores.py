@@ -91,8 +91,11 @@ def test_sub_steps_have_the_same_bits_however_much_the_helper_does(alone: str, h
         nonlocal largest
         if kernel is not advance:
             return kernel.together(calls)
-        asked.append(len(calls))
-        largest = max(largest, int(np.diff(calls[0][1].edges).max(initial=0)))
+        batches = int(np.diff(calls[0][1].edges).max(initial=0))
+        largest = max(largest, batches)
+        # Before the first contact there is nothing to help with.
+        if batches:
+            asked.append(len(calls))
         if how == "at once":
             return kernel.together(calls)
         return [kernel(*arguments) for arguments in (calls[:1] if how == "nobody helps" else calls)]

@@ -86,11 +86,14 @@ def test_bodies_that_all_rebound_are_no_substepped_island() -> None:
 
 
 def test_a_body_that_is_let_go_joins_the_substepped_island() -> None:
-    """A lid that is carried above a fall of boxes, and let go when they have long been a pile, comes to rest on them."""
+    """A lid that is carried above a fall of boxes, and let go when they have long been a pile, comes to rest on them.
+
+    Of eight lids, let go up to 3 cm beside each other, seven rest before 2.8 s; this one rocks until 4.1 s.
+    """
     scene = part_of_pit(STONES["boxes"], 12, 24)
     lid = ri.Body("lid", ri.Shape.box((0.5, 0.5, 0.05)), position=(0, 0, 1.0), motion="kinematic", release_time=0.8, material=STONE)
     scene.add(lid)
-    run = ri.simulate(scene, 3.2)
+    run = ri.simulate(scene, 4.6)
     assert run.status.ok and substep_counts(run) > 100
     height = run.position("lid")[:, 2]
     np.testing.assert_array_equal(height[run.times <= 0.8], 1.0)

@@ -179,6 +179,18 @@ def is_linear(code):
     return code < ABOUT
 
 
+@jit
+def add_forces(joints, which, impulse, direction, share, total):
+    """Add a share of the rows' impulses or forces (s,), along their directions (s, 3), to those of the joints on b, total (j, 3)."""
+    i = 0
+    for j in which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            if is_linear(joints.coordinate[k]):
+                for r in range(3):
+                    total[j, r] += share * impulse[i] * direction[i, r]
+            i += 1
+
+
 @jit_making_arrays
 def joint_values(joints, which, position, rotation, angle, value):
     """Fill value with coordinate - target of the rows of the joints listed in `which`; angle (k,): last coordinates."""

@@ -22,7 +22,7 @@ torque is the change of the angular momentum; where the path ends off by the rot
 until it ends there. On the way joints are open by what is of order 4 in h; that is measured in the middle.
 """
 
-from math import inf, sqrt
+from math import inf, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +32,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import exponential, product, quaternion_to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import turned, turned_back
-from rigidimpulse.dynamics.constraints.joint import is_linear, joint_rows, joint_values, relative_point_velocity
+from rigidimpulse.dynamics.constraints.joint import add_forces, is_linear, joint_rows, joint_values, relative_point_velocity
 from rigidimpulse.dynamics.constraints.joint_limits import is_reached, limit_side
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
 from rigidimpulse.dynamics.constraints.rows import (
@@ -93,14 +93,14 @@ def fly_jointed(island, flight, steady, h):
     """Fly the members of a `JointedIsland` for h s under steady accelerations (n, 3); the `JointedFlight` is written.
 
     Returns its error, as a part of the size, by how much joints are open on the way, m or rad, and by how much paths end elsewhere, rad: a
-    torque that nearly vanishes counts as none, and turns nothing. The error is inf where the
-    rows cannot be flown with: they are soft, at a limit, or cannot be solved.
+    torque that nearly vanishes counts as none, and turns nothing. The error is inf where the rows cannot be flown with, being soft or at a
+    limit, and nan where they cannot be solved.
     """
     joints, which, members, memory, bodies = island.joints, island.which, island.members, island.memory, island.bodies
     n, count = members.shape[0], count_joint_rows(joints, which)
     ahead = JointedIsland(joints, which, flight.bodies, flight.rotation, members, island.number, memory, island.allowed)
     rows, direction, inertia = make_rows(count), np.empty((count, 3)), memory.trial.inertia
-    y, at, slope, error = np.empty((n, 13)), np.empty((n, 13)), np.empty((STAGES, n, 13)), 0.0
+    y, at, slope = np.empty((n, 13)), np.empty((n, 13)), np.empty((STAGES, n, 13))
     angles = memory.angle.copy()
     for k in range(n):
         island.number[members[k]] = k
@@ -120,16 +120,29 @@ def fly_jointed(island, flight, steady, h):
                     step += _STAGE[stage, s] * slope[s, k, c]
                 at[k, c] = y[k, c] + h * step
         _write_states(ahead, inertia, at)
-        solved = _slopes(ahead, flight, steady, at, rows, direction, slope[stage])
+        trouble = _slopes(ahead, flight, steady, at, rows, direction, slope[stage])
         if stage == 0:
-            _note_forces(ahead, rows, direction, 1.0, flight.start)
+            add_forces(joints, which, rows.impulse, direction, 1.0, flight.start)
             _note_wrenches(ahead, rows, flight.value)
             _remember(joints, which, rows, memory)
-        _note_forces(ahead, rows, direction, _END[stage], flight.mean)
-        if not solved:
+        add_forces(joints, which, rows.impulse, direction, _END[stage], flight.mean)
+        if trouble != 0.0:
             memory.angle[:] = angles
-            return inf, 0.0, 0.0
-    for k in range(n):
+            return trouble, 0.0, 0.0
+    error = _take_end(y, slope, h, flight.size, at)
+    _write_states(ahead, inertia, at)
+    _end(ahead, flight.held, rows, direction, inertia)
+    missed = _lay_paths(island, flight, steady, h)
+    open_by = _open_by(island, ahead, flight.held, h)
+    memory.angle[:] = angles
+    return error, open_by, missed
+
+
+@jit
+def _take_end(y, slope, h, size, end):
+    """Write the states (n, 13) after h s, from y (n, 13) by the slopes (STAGES, n, 13) of all stages; returns their error."""
+    worst = 0.0
+    for k in range(y.shape[0]):
         fifth, third = 0.0, 0.0
         for c in range(13):
             step, off_5, off_3 = 0.0, 0.0, 0.0
@@ -137,17 +150,12 @@ def fly_jointed(island, flight, steady, h):
                 step += _END[s] * slope[s, k, c]
                 off_5 += _FIFTH[s] * slope[s, k, c]
                 off_3 += _THIRD[s] * slope[s, k, c]
-            at[k, c] = y[k, c] + h * step
-            weight = _weight(c, h, flight.size)
+            end[k, c] = y[k, c] + h * step
+            weight = _weight(c, h, size)
             fifth += (weight * off_5) ** 2
             third += (weight * off_3) ** 2
-        error = max(error, h * fifth / sqrt(max(fifth + 0.01 * third, TINY)))
-    _write_states(ahead, inertia, at)
-    _end(ahead, flight.held, rows, direction, inertia)
-    missed = _lay_paths(island, flight, steady, h)
-    open_by = _open_by(island, ahead, flight.held, h)
-    memory.angle[:] = angles
-    return error, open_by, missed
+        worst = max(worst, h * fifth / sqrt(max(fifth + 0.01 * third, TINY)))
+    return worst
 
 
 @jit
@@ -245,7 +253,7 @@ def _hold_rows(ahead, held, rows):
 def _slopes(ahead, flight, steady, y, rows, direction, slope):
     """Write the slopes (n, 13) of the state y (n, 13), where the members are; rows.impulse: the forces of the rows, start and answer.
 
-    Returns whether the rows were solved, by forces that they may exert.
+    Returns 0, inf if strings would have to push, nan if the rows could not be solved.
     """
     joints, bodies, members = ahead.joints, ahead.bodies, ahead.members
     count, value, change, spin = rows.bias.shape[0], np.empty(rows.bias.shape[0]), np.empty(rows.bias.shape[0]), np.empty(3)
@@ -272,7 +280,9 @@ def _slopes(ahead, flight, steady, y, rows, direction, slope):
         for c in range(3):
             slope[k, 7 + c] += by_joints[k, c]
             slope[k, 10 + c] += by_joints[k, 3 + c]
-    return residual <= UNSOLVED * largest and _may_pull(joints, ahead.which, flight.held, rows)
+    if not residual <= UNSOLVED * largest:
+        return nan
+    return 0.0 if _may_pull(joints, ahead.which, flight.held, rows) else inf
 
 
 @jit
@@ -341,18 +351,6 @@ def _fastest(ahead):
                 square += difference * difference
             fastest = max(fastest, sqrt(square) / longest)
     return fastest
-
-
-@jit
-def _note_forces(ahead, rows, direction, share, force):
-    """Add a share of the rows' forces, along their directions (s, 3), to those of the joints on b, force (j, 3) N."""
-    joints, i = ahead.joints, 0
-    for j in ahead.which:
-        for k in range(joints.first[j], joints.first[j + 1]):
-            if is_linear(joints.coordinate[k]):
-                for c in range(3):
-                    force[j, c] += share * rows.impulse[i] * direction[i, c]
-            i += 1
 
 
 @jit_making_arrays

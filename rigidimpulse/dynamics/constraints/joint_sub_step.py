@@ -18,7 +18,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix, to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import SLIP, ContactProblem, fill_contact_bias, start_contact_impulses
-from rigidimpulse.dynamics.constraints.joint import is_linear, joint_rows, joint_values, relative_point_velocity
+from rigidimpulse.dynamics.constraints.joint import add_forces, joint_rows, joint_values, relative_point_velocity
 from rigidimpulse.dynamics.constraints.joint_limits import is_reached, joint_weights, limit_side, spring_of
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling, count_rolling_rows, fill_rolling_rows
@@ -58,7 +58,7 @@ def stop_joints(island: JointedIsland, elapsed: np.ndarray, moment: np.ndarray) 
     rows, direction, scale = stop_rows(island, elapsed)
     solve_newton(rows, len(island.members), SOLVE_TOLERANCE * scale)
     change_velocities(island.bodies, island.members, rows)
-    _add_moments(island.joints, island.which, rows, 0, direction, moment)
+    add_forces(island.joints, island.which, rows.impulse, direction, 1.0, moment)
 
 
 @jit_making_arrays
@@ -104,18 +104,6 @@ def _spring_impulse(joints, j, k, weight, value, memory, h):
         return -np.inf, np.inf, rate
     own = (rate - memory.start_rate[k] - (a - damping * weight * joints.rate[k]) * h) / weight - 0.5 * h * memory.force[k]
     return own, own, rate
-
-
-@jit
-def _add_moments(joints, which, rows, start, direction, moment):
-    """Add the linear impulse on b of each joint to moment (j, 3)."""
-    i = 0
-    for j in which:
-        for k in range(joints.first[j], joints.first[j + 1]):
-            if is_linear(joints.coordinate[k]):
-                for r in range(3):
-                    moment[j, r] += rows.impulse[start + i] * direction[i, r]
-            i += 1
 
 
 def close_joints(island: JointedIsland, contacts: Contacts) -> bool:
@@ -256,7 +244,7 @@ def _finish(island, rows, first_row, start, h, direction, force, moment):
     y = np.empty((members.shape[0], 6))
     multiply_transposed(rows, rows.impulse, y)
     _write_wrenches(island.bodies, members, y, h, memory.wrench)
-    _add_moments(joints, which, rows, start, direction, moment)
+    add_forces(joints, which, rows.impulse[start:], direction, 1.0, moment)
 
 
 @jit_making_arrays

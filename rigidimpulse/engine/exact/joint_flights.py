@@ -38,17 +38,28 @@ class JointFlights:
     """The flights of a run.
 
     Attributes:
-        flight: what was found of the last one. turned: whether it was given up for its errors, and not for what joints do.
+        flight: what was found of the last one. too_short: whether that was given up for how fast it turns, or bends.
 
     """
 
     def __init__(self, world: World, table: Joints) -> None:
         """Nothing has flown."""
         self.flight = make_flight(world.inv_mass, world.joint_size, len(table.body_a), len(table.coordinate))
-        self._at_end, self._on_the_way = AT_END * world.accuracy.tolerance, ON_THE_WAY * world.accuracy.tolerance**0.5 * world.joint_size
+        self._at_end = AT_END * world.accuracy.tolerance
+        self._on_the_way = ON_THE_WAY * world.accuracy.tolerance**0.5 * world.joint_size
         self._worth = WORTH * world.accuracy.step
+        self.too_short = False
+        joint_of_row = np.repeat(np.arange(len(table.body_a)), np.diff(table.first))
+        holds = np.isinf(table.stiffness) & np.isinf(table.lower) & np.isinf(table.upper)
+        is_limit = (table.lower == 0.0) != (table.upper == 0.0)
+        self._hard = np.bincount(joint_of_row[~(holds | is_limit)], minlength=len(table.body_a)) == 0
         self._pause = np.zeros(len(table.body_a), np.int64)
         self._plan = np.full(len(table.body_a), np.inf)
+
+    def may_fly(self, which: np.ndarray) -> bool:
+        """Whether to try a flight of an island with these joints: no spring or motor is in it, and none was given up just before."""
+        self._pause[which] -= 1
+        return bool(self._hard[which].all()) and int(self._pause[which].max()) < 0
 
     def fly(self, jointed: JointedIsland, steady: np.ndarray, rest: float, other: float) -> float:
         """Fly an island over `rest` s at most, under steady accelerations (n, 3); returns for how long.
@@ -56,18 +67,16 @@ class JointFlights:
         0 where that cannot be done, or not for so long that it is worth it; other: s, length of a sub-step of the other method.
         """
         which, members, flight = jointed.which, jointed.members, self.flight
-        if self._pause[which].max() > 0:
-            self._pause[which] -= 1
-            return 0.0
         plan = float(self._plan[which].min())
         if math.isinf(plan):
             fastest = float(np.sqrt((jointed.bodies.angular_velocity[members] ** 2).sum(1).max()))
             plan = FIRST_TURN / fastest if fastest > 0.0 else np.inf
         least = min(1.0 + WORK * len(members), MOST_WORK) * min(other, self._worth)
         h = rest / math.ceil(rest / plan) if plan < rest else rest
+        error = 0.0
         while h >= min(least, rest):
             error, is_open, missed = fly_jointed(jointed, flight, steady, h)
-            if math.isinf(error):
+            if not math.isfinite(error):
                 break
             if missed > MISSED:
                 # At another length its torque is another.
@@ -81,5 +90,6 @@ class JointFlights:
                 return h
             plan = follows
             h = rest / math.ceil(rest / plan)
+        self.too_short = not math.isinf(error)
         self._plan[which], self._pause[which] = np.inf, PAUSE
         return 0.0

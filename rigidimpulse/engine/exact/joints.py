@@ -45,6 +45,8 @@ HALF = 0.5
 """Part of the forces of RATTLE's sub-steps that their end leaves."""
 LANDING: float = 1e-9
 """Part of a flight by which it may miss the time at which a limit is reached."""
+MOST_HALVED = 5
+"""Times that a sub-step is halved whose joints do not close."""
 MOST_CUTS = 20
 """Times a sub-step is cut to end where a limit is reached or lets go."""
 STEEP = 1e3
@@ -291,7 +293,7 @@ class JointState:
             return flown, 0.0
         others = self.bodies_of(island.joints)
         others = others[~run.world.dynamic[others]]
-        h, cuts = self.sub_step(run, island, rest), 0
+        h, cuts, halved = self.sub_step(run, island, rest), 0, 0
         while True:
             h = load_over(run, island, h)
             for i in others:
@@ -309,6 +311,11 @@ class JointState:
                 # Only the forces show how short it has to be.
                 h = shorter
                 continue
+            self.are_closed = worst <= NOT_CLOSED * self._allowed
+            if not self.are_closed and halved < MOST_HALVED:
+                # What whips round closes over a shorter time.
+                h, halved = 0.5 * h, halved + 1
+                continue
             if self._break(run, island):
                 continue
             switch = next_switch(self.table, island.joints, memory, (h, h), self._allowed)
@@ -319,7 +326,6 @@ class JointState:
         self._log(island, h)
         self._begin(run, island)
         self._open_by = worst
-        self.are_closed = worst <= NOT_CLOSED * self._allowed
         return h, residual
 
     def _fly(self, run: Run, island: Island, rest: float) -> float:
@@ -329,16 +335,21 @@ class JointState:
         # What is recorded is exact: flights end at frames. Paths on the way are not as good as ends.
         next_frame = int(frames.searchsorted(island.time + SHORT * run.world.accuracy.step, "right"))
         frame = float(frames[next_frame]) - island.time if next_frame < len(frames) else np.inf
-        whole = 0.0
+        whole, which = 0.0, island.joints
+        if not self.flights.may_fly(which):
+            return 0.0
         for _ in range(MOST_CUTS):
             which = island.joints
-            if not len(which) or run.world.moving[self.bodies_of(which)].any() or np.any(waits[which] <= 0.0):
+            if not len(which):
+                return 0.0
+            if run.world.moving[self.bodies_of(which)].any() or np.any(waits[which] <= 0.0):
                 return 0.0
             rest = max(min(rest, frame, float(waits[which].min())), SHORT * run.world.accuracy.step)
             h = self.flights.fly(self._jointed(run, island), run.acceleration, rest, self.sub_step(run, island, rest))
             if h == 0.0:
-                # Nobody knows how fast they are about to turn.
-                self.drift[which] = np.inf
+                if self.flights.too_short:
+                    # They turn fast, and what drifts is not known.
+                    self.drift[which] = np.inf
                 return 0.0
             self.pull[which], self.pull_rate[which] = flight.start[which], 2.0 * (flight.mean[which] - flight.start[which]) / h
             self.share[which] = 1.0

@@ -26,7 +26,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.union_find import unite
-from rigidimpulse.dynamics.constraints.joint import is_linear
+from rigidimpulse.dynamics.constraints.joint import add_forces
 from rigidimpulse.dynamics.constraints.jointed_island import count_joint_rows
 from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows
 from rigidimpulse.dynamics.constraints.slip import solve_until_slip
@@ -182,7 +182,7 @@ def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
     keep_for_next(start_of, contacts, table.points, place)
     _connect(balance, island, contacts, start_of)
     own = np.zeros(moment.shape)
-    _add_moments(island, rows, start, direction, own)
+    add_forces(island.joints, island.which, rows.impulse[start:], direction, 1.0, own)
     _remember_forces(island, rows, start, h)
     stiffen(island, stiffening, own, h)
     for j in island.which:
@@ -232,18 +232,6 @@ def _connect(balance, island, contacts, of_contacts):
 
 
 @jit
-def _add_moments(island, rows, start, direction, moment):
-    """Add the linear impulses on b of each joint to moment (j, 3)."""
-    joints, i = island.joints, 0
-    for j in island.which:
-        for k in range(joints.first[j], joints.first[j + 1]):
-            if is_linear(joints.coordinate[k]):
-                for r in range(3):
-                    moment[j, r] += rows.impulse[start + i] * direction[i, r]
-            i += 1
-
-
-@jit
 def _remember_forces(island, rows, start, h):
     """Remember the forces of the rows of joints, from which the next sub-step starts."""
     joints, i = island.joints, start
@@ -272,4 +260,4 @@ def stop_island(island, bodies, table, coefficients, balance, kept):
     for k in range(members.shape[0]):
         if driven[members[k]]:
             balance.given[members[k]] += given[k]
-    _add_moments(island, rows, start, direction, moment)
+    add_forces(island.joints, island.which, rows.impulse[start:], direction, 1.0, moment)
