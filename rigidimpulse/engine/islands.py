@@ -28,6 +28,9 @@ from rigidimpulse.model.island import Island, empty_contacts, island_without_con
 if TYPE_CHECKING:
     from rigidimpulse.engine.pair_events import PairEvents
 
+FASTER = 2.0
+"""Times by which bodies may become faster until something counts as near."""
+
 
 def touching_islands(run: Run, pair_events: PairEvents, time: float, bodies: np.ndarray) -> tuple[list[Island], np.ndarray]:
     """Islands that the given bodies belong to at `time`, and all bodies looked at, which are brought to it."""
@@ -169,3 +172,21 @@ def classify(run: Run, island: Island) -> None:
         island.contact_margin, island.speeds,
     )  # fmt: skip
     island.live |= np.abs(island.approach) <= island.rest_speed
+
+
+def is_alone(run: Run, members: np.ndarray, rest: float) -> bool:
+    """Whether nothing can come near members in `rest` s, that may touch them, however they and all else may turn aside."""
+    world, trajectory = run.world, run.state.trajectory
+    if not world.can_collide:
+        return True
+    speed = np.sqrt((trajectory.velocity**2).sum(1))
+    speed[members] = np.sqrt((run.state.now.velocity[members] ** 2).sum(1))
+    reach = np.where(world.dynamic, rest * (FASTER * speed + rest * np.sqrt((world.steady_acceleration**2).sum(1))), 0.0)[:, None]
+    low, high = run.box_min - reach, run.box_max + reach
+    for i in members.tolist():
+        far, at = reach[i] + world.bound_radius[i] + world.largest_contact_margin, run.state.now.position[i]
+        near = np.flatnonzero(np.all((low <= at + far) & (high >= at - far), axis=1))
+        near = near[near != i]
+        if not world.is_apart(np.minimum(near, i), np.maximum(near, i)).all():
+            return False
+    return True

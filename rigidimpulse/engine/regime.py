@@ -19,7 +19,9 @@ and, where an island begins to be sub-stepped (a body that comes near later is t
 
     alike       no two neighbours of masses beyond RATIO : 1; where joints are, contacts and joints are solved exactly at any ratio
     dull        no restitution above REBOUND, or ELASTIC where joints are: a rebound is found at the end of the step only
-    low         no body more than TALL others above a support: long columns want exact rows; not asked where joints are
+    low         no body more than TALL others above a support: long columns want exact rows; not asked where joints are, nor where bodies
+                were solved more than EXPENSIVE_TALL times, by as much less often as the island has more bodies than SMALL: a column
+                that stands takes a few, a chain of rings that swings takes sixty
 
 In scenes of fewer than SOME movable bodies without joints only what has joints or runs away is sub-stepped. "substepped" takes every island
 that touches something or has joints. A body without joints that moves farther than FAST of its inner radius in a sub-step, or turns by more
@@ -39,7 +41,7 @@ from rigidimpulse.motion.body_state import BodyState
 
 MANY, SOME, FEW, KEPT = 60, 12, 8, 2
 EXPENSIVE_SOLVES = 6.0
-EXPENSIVE_JOINTED, EXPENSIVE_SWING, SMALL = 48.0, 300.0, 8.0
+EXPENSIVE_JOINTED, EXPENSIVE_SWING, EXPENSIVE_TALL, SMALL = 48.0, 300.0, 200.0, 8.0
 RATIO, REBOUND, ELASTIC, TALL = 30.0, 0.5, 0.9, 12
 FAST, SPIN = 0.5, 2.5 / 16.0
 
@@ -99,6 +101,17 @@ def island_roots(number: int, first: np.ndarray, second: np.ndarray, movable: np
     """Root (n,) of each of `number` bodies: the lowest one that links (k,) between movable bodies join it with."""
     joins = movable[first] & movable[second]
     return roots(number, first[joins], second[joins])
+
+
+def solves_in_islands(root: np.ndarray, solve_count: np.ndarray) -> np.ndarray:
+    """How often a body of each island (n,), by its root, was solved in the mean, by as much more as it has more bodies than SMALL.
+
+    root: (n,) of every body, -1 for those in no island; solve_count: (n,) how often the exact solver dealt with each body in a step.
+    """
+    members = np.flatnonzero(root >= 0)
+    size = np.bincount(root[members], minlength=len(root))
+    solves = np.bincount(root[members], weights=solve_count[members], minlength=len(root))
+    return solves / np.maximum(size, 1) * np.maximum(size / SMALL, 1.0)
 
 
 @jit_making_arrays
@@ -174,7 +187,7 @@ def refusals(
     least = np.where(was_substepped, KEPT, np.where(lively_enough, FEW, MANY))
     for r in np.flatnonzero((size > 0) & (size < least) & ~has_joints).tolist():
         out[r] = "few bodies"
-    cheap = solves * np.maximum(size / SMALL, 1.0) <= np.where(touches, EXPENSIVE_JOINTED, EXPENSIVE_SWING) * size
+    cheap = solves_in_islands(root, solve_count) <= np.where(touches, EXPENSIVE_JOINTED, EXPENSIVE_SWING)
     # Sub-steps have no rolling friction.
     stays_exact = np.full(len(root), True) if world.rolling is not None else cheap | (size < KEPT)
     for r in np.flatnonzero(has_joints & ~was_substepped & stays_exact).tolist():

@@ -121,12 +121,53 @@ def test_ball_on_a_string_goes_round_as_a_conical_pendulum() -> None:
     np.testing.assert_allclose(pull, 0.4 * G / np.cos(a), rtol=1e-8)
 
 
-def test_impulse_of_a_joint_is_what_changes_the_momentum() -> None:
+def _wheel(spin: float) -> ri.Scene:
+    """A wheel on a pivot at the end of its axle."""
+    scene, turn = ri.Scene(gravity=(0, 0, -G)), (np.sqrt(0.5), 0, np.sqrt(0.5), 0)
+    wheel = {"position": (0.1, 0, 1), "orientation": turn, "angular_velocity": (spin, 0, 0)}
+    scene.add(ri.Body("wheel", ri.Shape.cylinder(0.1, 0.02), mass=1.0, **wheel))
+    scene.add(ri.BallJoint("wheel", None, (0, 0, 1)))
+    return scene
+
+
+def _beside_a_post(scene: ri.Scene) -> ri.Scene:
+    """A rod stands 1 mm behind the rim of the wheel, which may touch it."""
+    scene.add(ri.Body("post", ri.Shape.cylinder(0.01, 3.0), position=(0.1, 0.0, 2.601), motion="static"))
+    return scene
+
+
+def test_wheel_goes_the_same_way_alone_and_beside_what_it_may_touch() -> None:
+    """Alone it is flown past from frame to frame; beside the post it goes from path to path."""
+    alone, beside = ri.simulate(_wheel(250.0), 0.25), ri.simulate(_beside_a_post(_wheel(250.0)), 0.25)
+    np.testing.assert_allclose(alone.position("wheel"), beside.position("wheel"), atol=1e-10)
+    np.testing.assert_allclose(alone.angular_velocity("wheel"), beside.angular_velocity("wheel"), atol=1e-7)
+    for run in (alone, beside):
+        ledger = run.ledger
+        assert ledger is not None and run.status.ok and len(run.impacts) == 0
+        np.testing.assert_allclose(ledger.total, ledger.total[0], atol=1e-10 * ledger.kinetic[0])
+
+
+def test_ball_hits_a_wheel_when_it_must_though_that_was_alone() -> None:
+    """A ball of 40 m/s comes from 5 m away: it meets the rim between two frames, when it does beside the post."""
+    runs = []
+    for scene in (_wheel(200.0), _beside_a_post(_wheel(200.0))):
+        thrown = {"position": (0.1, -5.0, 1.0), "velocity": (0, 40.0, 0.5)}
+        scene.add(ri.Body("ball", ri.Shape.sphere(0.02), mass=0.1, **thrown))
+        runs.append(ri.simulate(scene, 0.15))
+    first = [run.impacts[0] for run in runs]
+    assert 0.12 < first[0]["time"] < 0.125
+    assert first[0]["time"] == pytest.approx(first[1]["time"], abs=1e-9)
+    np.testing.assert_allclose(first[0]["impulse"], first[1]["impulse"], rtol=1e-5)
+
+
+@pytest.mark.parametrize("spin", [0.0, 120.0])
+def test_impulse_of_a_joint_is_what_changes_the_momentum(spin: float) -> None:
     """The time line of the hinge's impulse, with gravity's, is the change of momentum of the rod from frame to frame."""
     scene = ri.Scene(gravity=(0, 0, -G))
-    scene.add(ri.Body("rod", ri.Shape.box((1.0, 0.04, 0.07)), position=(0.5, 0, 2), mass=1.7))
+    rod = {"position": (0.5, 0, 2), "angular_velocity": (spin, 0, 0)}
+    scene.add(ri.Body("rod", ri.Shape.box((1.0, 0.04, 0.07)), mass=1.7, **rod))
     scene.add(ri.BallJoint(None, "rod", (0, 0, 2), name="pin"))
-    run = ri.simulate(scene, 1.5)
+    run = ri.simulate(scene, 1.5 if spin == 0.0 else 0.4)
     given = run.impulses("rod")
     assert set(given) >= {"gravity", "joint pin"}
     change = 1.7 * (run.velocity("rod") - run.velocity("rod")[0])

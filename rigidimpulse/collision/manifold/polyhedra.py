@@ -123,48 +123,50 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | No
     planes: list[np.ndarray] = []
     loops: list[list[int]] = []
     corners: list[np.ndarray] = []
-    firsts: tuple[list[int], ...] = ([0], [0])
+    corner_first, face_first = [0], [0]
     for s, is_convex in enumerate(convex):
         p = int(geometry.shape_first[s])
         if geometry.shape_first[s + 1] == p + 1 and geometry.kind[p] == HALF_SPACE:
             half_space[s] = geometry.frame[p, :4]
         vertex = geometry.vertex[int(geometry.vertex_first[p]) : int(geometry.vertex_first[p + 1])]
-        if bare is not None and bare[s]:
+        if is_convex or (bare is not None and bare[s]):
             corners.append(vertex)
+            corner_first.append(corner_first[-1] + len(vertex))
+        else:
+            corner_first.append(corner_first[-1])
         if is_convex:
-            before = sum(map(len, corners))
+            before = corner_first[-2]
             for normal, loop in _faces(geometry, p):
                 planes.append(np.append(normal, (vertex[loop] @ normal).max()))
                 loops.append([before + v for v in loop])
-            corners.append(vertex)
             size = vertex.max(0)
             # Eight corners at +- the same lengths: a box along the principal axes, which has kernels of its own.
             if len(vertex) == 8 and np.allclose(np.abs(vertex), size, rtol=1e-12, atol=0.0):
                 half[s] = size
-        for first, number in zip(firsts, (sum(map(len, corners)), len(planes)), strict=True):
-            first.append(number)
+        face_first.append(len(planes))
     return Polyhedra(
-        half=half, corner_first=np.array(firsts[0]), corner=np.concatenate([*corners, np.zeros((0, 3))]), face_first=np.array(firsts[1]),
-        plane=np.array(planes).reshape(-1, 4), loop_first=np.cumsum([0, *map(len, loops)]),
+        half=half, corner_first=np.array(corner_first), corner=np.concatenate([*corners, np.zeros((0, 3))]),
+        face_first=np.array(face_first), plane=np.array(planes).reshape(-1, 4), loop_first=np.cumsum([0, *map(len, loops)]),
         loop=np.array([v for loop in loops for v in loop], np.int64), half_space=half_space,
     )  # fmt: skip
 
 
 def _faces(geometry: Geometry, p: int) -> list[tuple[np.ndarray, list[int]]]:
     """Unit normals and corners, counted from the primitive's first vertex, of the faces of a convex primitive."""
-    low = int(geometry.vertex_first[p])
-    left, out = list(range(int(geometry.triangle_first[p]), int(geometry.triangle_first[p + 1]))), []
-    while left:
-        normal = geometry.triangle_normal[left[0]]
-        flat = [t for t in left if float(geometry.triangle_normal[t] @ normal) > 1.0 - 1e-10]
-        left = [t for t in left if t not in flat]
-        out.append((normal, _loop(flat, geometry, low)))
+    low, first, last = int(geometry.vertex_first[p]), int(geometry.triangle_first[p]), int(geometry.triangle_first[p + 1])
+    normals, triangles = geometry.triangle_normal[first:last], geometry.triangle[first:last] - low
+    left, out = np.arange(last - first), []
+    while len(left):
+        normal = normals[left[0]]
+        flat = normals[left] @ normal > 1.0 - 1e-10
+        out.append((normal, _loop(triangles[left[flat]].tolist())))
+        left = left[~flat]
     return out
 
 
-def _loop(flat: list[int], geometry: Geometry, low: int) -> list[int]:
+def _loop(triangles: list[list[int]]) -> list[int]:
     """Corners of the polygon that triangles of one plane make, in order."""
-    halves = {(int(t[k]) - low, int(t[(k + 1) % 3]) - low) for t in geometry.triangle[flat] for k in range(3)}
+    halves = {(t[k], t[(k + 1) % 3]) for t in triangles for k in range(3)}
     following = {tail: head for tail, head in halves if (head, tail) not in halves}
     start = min(following)
     loop, v = [start], following[start]

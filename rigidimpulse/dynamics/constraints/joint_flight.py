@@ -22,7 +22,7 @@ torque is the change of the angular momentum; where the path ends off by the rot
 until it ends there. On the way joints are open by what is of order 4 in h; that is measured in the middle.
 """
 
-from math import inf, nan, sqrt
+from math import ceil, inf, isfinite, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -60,8 +60,10 @@ RESIDUAL = TOLERANCES.joint.residual
 UNSOLVED = TOLERANCES.joint.unsolved
 STILL = 10.0
 """Errors of closed joints by which the gap of a taut string may change in a sub-step, and count as none."""
-MOST_TURNS, MOST_CLOSINGS = 12, 3
-"""Times that a line of torque is turned, and that poses are closed."""
+MOST_TURNS, MOST_CLOSINGS, MOST_TRIALS = 12, 3, 8
+"""Times that a line of torque is turned, that poses are closed, and that a step is made shorter."""
+SAFETY, LEAST_CHANGE, MOST_CHANGE = 0.9, 0.2, 3.0
+"""How lengths follow errors."""
 TINY = TOLERANCES.arithmetic.least_divisor
 
 
@@ -96,12 +98,73 @@ def fly_jointed(island, flight, steady, h):
     torque that nearly vanishes counts as none, and turns nothing. The error is inf where the rows cannot be flown with, being soft or at a
     limit, and nan where they cannot be solved.
     """
+    angles = island.memory.angle.copy()
+    error, missed, open_by = _step(island, flight, steady, h), 0.0, 0.0
+    if isfinite(error):
+        missed, open_by = _lay_paths(island, flight, steady, h), _open_by(island, flight, h)
+    island.memory.angle[:] = angles
+    return error, open_by, missed
+
+
+@jit_making_arrays
+def fly_past(island, flight, steady, span, allowed, plan):
+    """Fly the members of a `JointedIsland` for `span` s, in as many steps as their errors ask for: nobody looks at them on the way.
+
+    steady: (n, 3) m/s2. allowed: error of a step, as a part of the size. plan: s, length of the first step. The bodies are moved, and
+    flight.mean is written. Returns for how long they were flown, less than `span` where a step cannot be taken, and the length that the
+    next step may have.
+    """
+    bodies, ahead, which, flown, trials = island.bodies, flight.bodies, island.which, 0.0, 0
+    total, value = np.zeros_like(flight.mean), np.empty(count_joint_rows(island.joints, island.which))
+    angles = np.empty_like(island.memory.angle)
+    while flown < span and trials < MOST_TRIALS:
+        pieces = ceil((span - flown) / plan)
+        h = (span - flown) / pieces
+        angles[:] = island.memory.angle
+        error = _step(island, flight, steady, h)
+        if not isfinite(error):
+            island.memory.angle[:] = angles
+            break
+        way = (error / allowed) ** (1.0 / 8.0)
+        follows = length_that_follows(h, way)
+        if way > 1.0:
+            island.memory.angle[:] = angles
+            plan, trials = follows, trials + 1
+            continue
+        plan, trials = max(follows, plan) if h < plan else follows, 0
+        for i in island.members:
+            for c in range(3):
+                bodies.position[i, c], bodies.velocity[i, c] = ahead.position[i, c], ahead.velocity[i, c]
+                bodies.angular_velocity[i, c] = ahead.angular_velocity[i, c]
+            bodies.orientation[i] = ahead.orientation[i]
+        refresh_pose(island.members, bodies, island.rotation, island.memory.trial.inertia)
+        joint_values(island.joints, which, bodies.position, island.rotation, island.memory.angle, value)
+        for j in which:
+            for c in range(3):
+                total[j, c] += h * flight.mean[j, c]
+        # The last one ends at the span, whatever was rounded.
+        flown = span if pieces == 1 else flown + h
+    if flown > 0.0:
+        for j in which:
+            for c in range(3):
+                flight.mean[j, c] = total[j, c] / flown
+    return flown, plan
+
+
+@jit
+def length_that_follows(h, way):
+    """Length of the step after one of h s whose error is `way` of the bound, as a length: 1 at the bound."""
+    return h * min(max(SAFETY / max(way, TINY), LEAST_CHANGE), MOST_CHANGE)
+
+
+@jit_making_arrays
+def _step(island, flight, steady, h):
+    """One step of h s: flight.bodies are moved, from where the members are; returns its error, see `fly_jointed`."""
     joints, which, members, memory, bodies = island.joints, island.which, island.members, island.memory, island.bodies
     n, count = members.shape[0], count_joint_rows(joints, which)
     ahead = JointedIsland(joints, which, flight.bodies, flight.rotation, members, island.number, memory, island.allowed)
     rows, direction, inertia = make_rows(count), np.empty((count, 3)), memory.trial.inertia
     y, at, slope = np.empty((n, 13)), np.empty((n, 13)), np.empty((STAGES, n, 13))
-    angles = memory.angle.copy()
     for k in range(n):
         island.number[members[k]] = k
         _read_state(bodies, members[k], y[k])
@@ -111,7 +174,7 @@ def fly_jointed(island, flight, steady, h):
             flight.start[j, r] = flight.mean[j, r] = 0.0
     _write_states(ahead, inertia, y)
     if not _choose_rows(ahead, flight.held, rows, direction, h):
-        return inf, 0.0, 0.0
+        return inf
     for stage in range(STAGES):
         for k in range(n):
             for c in range(13):
@@ -127,15 +190,11 @@ def fly_jointed(island, flight, steady, h):
             _remember(joints, which, rows, memory)
         add_forces(joints, which, rows.impulse, direction, _END[stage], flight.mean)
         if trouble != 0.0:
-            memory.angle[:] = angles
-            return trouble, 0.0, 0.0
+            return trouble
     error = _take_end(y, slope, h, flight.size, at)
     _write_states(ahead, inertia, at)
     _end(ahead, flight.held, rows, direction, inertia)
-    missed = _lay_paths(island, flight, steady, h)
-    open_by = _open_by(island, ahead, flight.held, h)
-    memory.angle[:] = angles
-    return error, open_by, missed
+    return error
 
 
 @jit
@@ -451,9 +510,9 @@ def _angular_momentum(rotation, inertia, w):
 
 
 @jit_making_arrays
-def _open_by(island, ahead, held, h):
+def _open_by(island, flight, h):
     """By how much joints are open in the middle of the paths; remembers the coordinates at the end."""
-    joints, memory, trial, flown = island.joints, island.memory, island.memory.trial, ahead.bodies
+    joints, memory, trial, flown, held = island.joints, island.memory, island.memory.trial, flight.bodies, flight.held
     value, q, worst, i = np.empty(count_joint_rows(joints, island.which)), np.empty(4), 0.0, 0
     for m in island.members:
         pose_at(trial, m, 0.5 * h, memory.end_position[m], q)
@@ -464,7 +523,7 @@ def _open_by(island, ahead, held, h):
             if held[k]:
                 worst = max(worst, abs(value[i]))
             i += 1
-    joint_values(joints, island.which, flown.position, ahead.rotation, memory.angle, value)
+    joint_values(joints, island.which, flown.position, flight.rotation, memory.angle, value)
     i = 0
     for j in island.which:
         for k in range(joints.first[j], joints.first[j + 1]):

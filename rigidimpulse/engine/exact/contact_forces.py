@@ -58,7 +58,8 @@ def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
     else:
         held = _hold_contacts(run, island, problem, turning, forces, rest)
         h, residual = held.length, held.residual
-    run.log.account(island.time, "stick", kinetic_energy(now, constants, island.members) - before)
+    if len(subset):
+        run.log.account(island.time, "stick", kinetic_energy(now, constants, island.members) - before)
     failed = residual > UNSOLVED or (len(island.joints) > 0 and not run.joints.are_closed)
     if failed and len(island.joints) and run.substepped.may_take(island.members):
         # Sub-steps hold them from here on: the island is looked at again at this instant.
@@ -92,7 +93,8 @@ def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
     island.rests = may_sleep(run, island, problem, h)
     if island.rests and len(island.joints):
         run.joints.log_rest(island)
-    if h < rest and not island.rests:
+    # What joints hold may have been flown past by now.
+    if h < pair_events.end - island.time and not island.rests:
         pair_events.wake[island.members] = island.time + h
     pair_events.look_around(island.members, island.time, island.shift)
 

@@ -2,6 +2,9 @@
 
 The error of a flight at its end is of order 8, that of the paths on the way of order 4. Each has its bound, and the one that is nearer to
 its bound says how long the next flight is.
+
+Where nothing can come near an island, nobody asks for the paths on the way. Then all that is left of the time, but the last flight, is
+flown past in steps of the method, inside one kernel.
 """
 
 from __future__ import annotations
@@ -10,7 +13,7 @@ import math
 
 import numpy as np
 
-from rigidimpulse.dynamics.constraints.joint_flight import fly_jointed, make_flight
+from rigidimpulse.dynamics.constraints.joint_flight import fly_jointed, fly_past, length_that_follows, make_flight
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
 from rigidimpulse.model.joint_table import Joints
 from rigidimpulse.model.world import World
@@ -20,8 +23,6 @@ AT_END, ON_THE_WAY = 3.0, 1.0
 3e-13 and 3e-7 by default."""
 FIRST_TURN = 0.5
 """rad, how far bodies turn at most in the first flight."""
-SAFETY, LEAST_CHANGE, MOST_CHANGE = 0.9, 0.2, 3.0
-"""How lengths follow errors."""
 WORK, MOST_WORK = 0.1, 3.0
 """By how much for each body a flight, which solves the joints more often, costs more than a sub-step of the other method; and at most."""
 WORTH = 1.0 / 32.0
@@ -54,12 +55,26 @@ class JointFlights:
         is_limit = (table.lower == 0.0) != (table.upper == 0.0)
         self._hard = np.bincount(joint_of_row[~(holds | is_limit)], minlength=len(table.body_a)) == 0
         self._pause = np.zeros(len(table.body_a), np.int64)
-        self._plan = np.full(len(table.body_a), np.inf)
+        self._plan, self._step = np.full((2, len(table.body_a)), np.inf)
 
     def may_fly(self, which: np.ndarray) -> bool:
         """Whether to try a flight of an island with these joints: no spring or motor is in it, and none was given up just before."""
         self._pause[which] -= 1
         return bool(self._hard[which].all()) and int(self._pause[which].max()) < 0
+
+    def is_longer(self, which: np.ndarray, rest: float) -> bool:
+        """Whether `rest` s takes the island of these joints several flights."""
+        return rest > 2.0 * float(self._plan[which].min())
+
+    def fly_past(self, jointed: JointedIsland, steady: np.ndarray, rest: float) -> float:
+        """Move the bodies of an island that is alone to the start of the last flight of `rest` s; returns how far that is away, s.
+
+        steady: (n, 3) m/s2. flight.mean has the mean forces on the way.
+        """
+        which = jointed.which
+        last, plan = float(self._plan[which].min()), float(self._step[which].min())
+        flown, self._step[which] = fly_past(jointed, self.flight, steady, rest - last, self._at_end, last if math.isinf(plan) else plan)
+        return flown
 
     def fly(self, jointed: JointedIsland, steady: np.ndarray, rest: float, other: float) -> float:
         """Fly an island over `rest` s at most, under steady accelerations (n, 3); returns for how long.
@@ -83,7 +98,7 @@ class JointFlights:
                 h *= OTHERWISE
                 continue
             way = max((error / self._at_end) ** (1.0 / 8.0), (is_open / self._on_the_way) ** 0.25)
-            follows = h * min(max(SAFETY / max(way, 1e-30), LEAST_CHANGE), MOST_CHANGE)
+            follows = length_that_follows(h, way)
             if way <= 1.0:
                 # What ended early, at a limit or at the end of the step, says little about how long the next may be.
                 self._plan[which] = max(follows, plan) if h < plan and not math.isinf(plan) else follows

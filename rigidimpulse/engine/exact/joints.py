@@ -16,6 +16,8 @@ from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, make_memory
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
+from rigidimpulse.engine.exact.trajectories import account_contact_work
+from rigidimpulse.engine.islands import is_alone
 from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.participants import RunJoints
 from rigidimpulse.engine.run import Run
@@ -104,7 +106,9 @@ class JointState:
         rods = np.where(self.table.coordinate == DISTANCE, self.table.target, 0.0)
         self._rod = np.zeros(len(joints))
         np.maximum.at(self._rod, self._joint_of_row, rods)
-        self._limited = bool(np.any((self.table.lower == 0.0) != (self.table.upper == 0.0)))
+        limits = self._joint_of_row[(self.table.lower == 0.0) != (self.table.upper == 0.0)]
+        self._has_limit = np.bincount(limits, minlength=len(joints)) > 0
+        self._limited = bool(self._has_limit.any())
         self._dynamic = world.dynamic
         self._of_body: dict[int, list[int]] = {}
         for j, pair in enumerate(zip(self.table.body_a.tolist(), self.table.body_b.tolist(), strict=True)):
@@ -338,6 +342,9 @@ class JointState:
         whole, which = 0.0, island.joints
         if not self.flights.may_fly(which):
             return 0.0
+        end = island.time + rest
+        past = self._fly_past(run, island, min(rest, frame))
+        rest, frame = end - island.time, frame - past
         for _ in range(MOST_CUTS):
             which = island.joints
             if not len(which):
@@ -368,6 +375,29 @@ class JointState:
         self.lands[which] = island.time + h
         self._open_by, self.are_closed = 0.0, True
         return h
+
+    def _fly_past(self, run: Run, island: Island, rest: float) -> float:
+        """Move an island that is alone to the start of its last flight of `rest` s, where nothing else can happen to it; returns how far.
+
+        What is recorded of the way is its mean force, and the work of the joints on each body.
+        """
+        which, members, time = island.joints, island.members, island.time
+        eventful = self._has_limit[which] | np.isfinite(self.break_force[which]) | np.isfinite(self.release_time[which])
+        watched = bool(run.plan.observe) or run.soft_bodies.moves or run.world.moving[self.bodies_of(which)].any()
+        if watched or eventful.any() or not self.flights.is_longer(which, rest) or not is_alone(run, members, rest):
+            return 0.0
+        now, constants = run.state.now, run.world.constants
+        before = [mechanical_energy(now, constants, members[k : k + 1]) for k in range(len(members))]
+        for i in members.tolist():
+            account_contact_work(run, i, time)
+        past = self.flights.fly_past(self._jointed(run, island), run.acceleration, rest)
+        for i, begun in zip(members.tolist(), before, strict=True):
+            run.log.add_stretch(time, time + past, i, begun, mechanical_energy(now, constants, np.array([i])) - begun)
+        for j in which.tolist():
+            bodies = int(self.table.body_a[j]), int(self.table.body_b[j])
+            run.impulses.add(f"joint {self.names[j]}", *bodies, time, time + past, self.flights.flight.mean[j])
+        island.time = time + past
+        return past
 
     def _overload_time(self, which: np.ndarray, whole: float) -> float:
         """When the first of these joints has the force that breaks it, within `whole` s; that if none has. Forces grow by their rates."""

@@ -88,10 +88,11 @@ def overlap_depths(record: RunRecord) -> Depths:
     shapes = _Shapes(world)
     kinds, number = np.unique(np.column_stack([world.shape_of_body[a], world.shape_of_body[b]]), axis=0, return_inverse=True)
     order = np.argsort(number, kind="stable")
+    # All at once: scenes of many shapes have few candidates of each kind.
+    posed_a, posed_b = _posed(record, frame, a, b), _posed(record, frame, b, a)
     for (shape_a, shape_b), those in zip(kinds.tolist(), np.split(order, np.flatnonzero(np.diff(number[order])) + 1), strict=True):
-        for mine, other, shapes_of in ((a, b, (shape_a, shape_b)), (b, a, (shape_b, shape_a))):
-            probe, solid = shapes.probe(shapes_of[0]), shapes.solid(shapes_of[1])
-            posed = _posed(record, frame[those], mine[those], other[those])
+        for all_posed, mine, other in ((posed_a, shape_a, shape_b), (posed_b, shape_b, shape_a)):
+            probe, solid, posed = shapes.probe(mine), shapes.solid(other), all_posed.part(those)
             near = np.flatnonzero(~surely_apart(solid, probe, posed))
             those, posed = those[near], posed.part(near)
             length = max(AT_ONCE // max(_work(probe, solid), 1), 1)

@@ -28,6 +28,7 @@ from rigidimpulse.engine.exact.trajectories import account_contact_work, begin_t
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.pair_table import NEVER, RUNAWAY
 from rigidimpulse.engine.regime import (
+    EXPENSIVE_TALL,
     FAST,
     REBOUND,
     SPIN,
@@ -38,6 +39,7 @@ from rigidimpulse.engine.regime import (
     may_begin,
     only_expensive,
     refusals,
+    solves_in_islands,
     support_levels,
 )
 from rigidimpulse.engine.run import Run
@@ -211,7 +213,8 @@ class SubsteppedIslands:
         refused.update(dict.fromkeys(np.unique(root[member & self._open]).tolist(), "joints that sub-steps do not close"))
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         # Tall columns are found from contacts, so only in islands that are not refused yet.
-        chosen = self._low(run, pair_events, chosen, root, joined, refused)
+        exempt = joined | (solves_in_islands(root, solve_count) > EXPENSIVE_TALL)[root]
+        chosen = self._low(run, pair_events, chosen, root, exempt, refused)
         for reason in refused.values():
             self._refused[reason] = self._refused.get(reason, 0) + 1
         self.label[member & ~chosen] = -1
@@ -253,10 +256,10 @@ class SubsteppedIslands:
         return np.flatnonzero(resting & mates)
 
     def _low(
-        self, run: Run, pair_events: PairEvents, chosen: np.ndarray, root: np.ndarray, joined: np.ndarray, refused: dict[int, str]
+        self, run: Run, pair_events: PairEvents, chosen: np.ndarray, root: np.ndarray, exempt: np.ndarray, refused: dict[int, str]
     ) -> np.ndarray:
-        """Leave out islands that begin as tall columns; joined (n,) bool: bodies with joints, whose islands may be."""
-        begins = chosen & (self.label < 0) & ~np.isin(root, root[joined])
+        """Leave out islands that begin as tall columns; exempt (n,) bool: bodies whose islands may be."""
+        begins = chosen & (self.label < 0) & ~np.isin(root, root[exempt])
         if not self._auto or not begins.any():
             return chosen
         begins &= ~np.isin(root, np.unique(root[chosen & ~begins]))
