@@ -67,6 +67,7 @@ class Solid:
     """What may be entered, in the shape's frame."""
 
     convex: list[np.ndarray]  # (m, 4) outward normals and offsets
+    boxes: list[np.ndarray]  # (2, 3) m, lowest and highest corner of each of these
     rounded: list[tuple[np.ndarray, np.ndarray, float]]  # ends (3,) of a segment, and its radius, m
     cylinders: list[Primitive]
     surface: np.ndarray  # (t, 3, 3) m, triangles of closed surfaces that are not convex
@@ -114,10 +115,11 @@ def probe_of(shape: CompiledShape, planes: list[np.ndarray | None]) -> Probe:
 
 def solid_of(shape: CompiledShape, planes: list[np.ndarray | None], geometry: Geometry | None = None, index: int = 0) -> Solid:
     """What of a shape may be entered; open surfaces may not. geometry, index: where the shape is compiled already, if it is."""
-    solid, hollow = Solid([], [], [], np.zeros((0, 3, 3)), np.zeros((0, 4)), None, _bounds(shape)), []
+    solid, hollow = Solid([], [], [], [], np.zeros((0, 3, 3)), np.zeros((0, 4)), None, _bounds(shape)), []
     for primitive, faces in zip(shape.primitives, planes, strict=True):
         if primitive.kind == HALF_SPACE:
             solid.convex.append(primitive.frame[None, :4])
+            solid.boxes.append(np.array([[-np.inf], [np.inf]]) * np.ones(3))
         elif primitive.kind == CYLINDER:
             solid.cylinders.append(primitive)
         elif not len(primitive.faces):
@@ -126,6 +128,7 @@ def solid_of(shape: CompiledShape, planes: list[np.ndarray | None], geometry: Ge
             hollow.append(primitive)
         else:
             solid.convex.append(faces)
+            solid.boxes.append(np.array([primitive.vertices.min(axis=0), primitive.vertices.max(axis=0)]))
     if len(shape.primitives) == 1 and solid.convex and len(solid.convex[0]) <= MOST_BOUNDS:
         return replace(solid, bounds=np.vstack([solid.bounds, solid.convex[0]]))
     if not hollow:
@@ -150,11 +153,14 @@ def depth_in(solid: Solid, probe: Probe, posed: Posed) -> np.ndarray:
     """Depth (c,) m by which probes at c poses in the frame of a solid are inside it; 0 where nothing is known to be."""
     depth = np.zeros(len(posed.translation))
     centres, edges = posed.points(probe.centres), posed.points(probe.edges)
-    for planes in solid.convex:
+    lowest, highest = edges.min(axis=2), edges.max(axis=2)
+    for planes, box in zip(solid.convex, solid.boxes, strict=True):
         if len(probe.centres):
             np.maximum(depth, _balls_in_planes(planes, centres, probe.radii), out=depth)
-        if len(probe.edges):
-            np.maximum(depth, _edges_in_planes(planes, edges), out=depth)
+        # Of bodies of many parts few edges are near one part: all with all took most of the time of a run.
+        pose, edge = np.nonzero(np.all((lowest <= box[1]) & (highest >= box[0]), axis=2))
+        if len(pose):
+            np.maximum.at(depth, pose, _edges_in_planes(planes, edges[pose, edge]))
     points = np.concatenate([centres, *(edges[:, :, 0] + s * (edges[:, :, 1] - edges[:, :, 0]) for s in ALONG)], axis=1)
     radii = np.concatenate([probe.radii, np.zeros(points.shape[1] - len(probe.radii))])
     for first, last, radius in solid.rounded:
@@ -186,19 +192,19 @@ def _balls_in_planes(planes: np.ndarray, centres: np.ndarray, radii: np.ndarray)
 
 
 def _edges_in_planes(planes: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Depth (c,) of edges (c, e, 2, 3) behind planes (m, 4): the largest at both ends and in the middle of what is behind all."""
+    """Depth (e,) of edges (e, 2, 3) behind planes (m, 4): the largest at both ends and in the middle of what is behind all."""
     height = edges @ planes[:, :3].T - planes[:, 3]
-    at_p, at_q = height[:, :, 0], height[:, :, 1]
+    at_p, at_q = height[:, 0], height[:, 1]
     slope = at_q - at_p
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = -at_p / slope
-    begin = np.where(slope < 0.0, crossing, 0.0).max(axis=2, initial=0.0)
-    end = np.where(slope > 0.0, crossing, 1.0).min(axis=2, initial=1.0)
-    depth = np.zeros(begin.shape)
+    begin = np.where(slope < 0.0, crossing, 0.0).max(axis=1, initial=0.0)
+    end = np.where(slope > 0.0, crossing, 1.0).min(axis=1, initial=1.0)
+    depth = np.zeros(len(edges))
     for place in (begin, 0.5 * (begin + end), end):
-        np.maximum(depth, -(at_p + place[:, :, None] * slope).max(axis=2), out=depth)
+        np.maximum(depth, -(at_p + place[:, None] * slope).max(axis=1), out=depth)
     # Edges in a plane of which they are in front have no crossing: the heights tell.
-    return np.where(begin <= end, depth, 0.0).max(axis=1, initial=0.0)
+    return np.where(begin <= end, depth, 0.0)
 
 
 def _distance_to_segment(points: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
