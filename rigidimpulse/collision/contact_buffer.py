@@ -11,6 +11,8 @@ from rigidimpulse.collision.manifold.contact_points import Contacts
 from rigidimpulse.collision.manifold.dispatch import PairQuery, contacts_of_pairs
 
 CONTACT_CAPACITY, PAIR_CAPACITY = 1024, 4096
+ALL = np.int64(0)
+"""All contacts are kept: which of them carry is known when their points are on the true bodies (`contact_update`)."""
 
 
 class PosedBodies(Protocol):
@@ -46,10 +48,10 @@ class ContactBuffer:
 
     def find(self, question: Question) -> int:
         """Find the contacts of pairs; returns their number."""
-        count = contacts_of_pairs(*question, self.contacts)
+        count = contacts_of_pairs(*question, self.contacts, ALL)
         while count < 0:
             self.grow(-count)
-            count = contacts_of_pairs(*question, self.contacts)
+            count = contacts_of_pairs(*question, self.contacts, ALL)
         return count
 
     def grow(self, needed: int) -> None:
@@ -67,7 +69,7 @@ class ContactBuffer:
 def find_together(buffers: list[ContactBuffer], questions: list[Question]) -> list[int]:
     """Numbers of contacts found for each question, each in its own buffer; on several cores."""
     asked = list(zip(buffers, questions, strict=True))
-    counts = contacts_of_pairs.together([(*question, buffer.contacts) for buffer, question in asked])
+    counts = contacts_of_pairs.together([(*question, buffer.contacts, ALL) for buffer, question in asked])
     for k, (buffer, question) in enumerate(asked):
         if counts[k] < 0:
             buffer.grow(-counts[k])

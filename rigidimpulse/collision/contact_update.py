@@ -24,8 +24,9 @@ from rigidimpulse.collision.manifold.rounding import only_primitive, side_radius
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.vector import turned_by
 
-PER_NORMAL = np.int64(4)
-"""Contacts kept of one normal, in addition to the deepest."""
+PER_NORMAL, GAP_WEIGHT = np.int64(4), 20.0
+"""Contacts kept of one normal, in addition to the deepest; and, see `reduce`, how far out those with a gap count: bodies tilt by a
+twentieth at most until they are looked at again."""
 FARTHER = 1.5
 """Distance of the search in margins: a pair without contacts is then known to be apart for some time."""
 
@@ -130,8 +131,9 @@ def store_contacts(smaller, bodies, table, searched, found, count, order, coeffi
         a, b = pairs.first[p], pairs.second[p]
         first = c
         while c < count and integer[c, 0] == order[a] and integer[c, 1] == order[b]:
+            put_back(smaller, bodies, a, b, real, integer, c)
             c += 1
-        last = reduce_contacts(real, integer, first, c, PER_NORMAL)
+        last = reduce_contacts(real, integer, first, c, PER_NORMAL, GAP_WEIGHT)
         new = used
         size = min(bodies.inner[a], bodies.inner[b])
         if pairs.count[p] == 0:
@@ -145,7 +147,6 @@ def store_contacts(smaller, bodies, table, searched, found, count, order, coeffi
                 separation = _write(geometry, bodies, pairs, p, (deep, s, 1.0, 1.0), coefficients, points, used)
                 ids[used] = deep_ids[s]
             else:
-                put_back(smaller, bodies, a, b, real, integer, first + s)
                 contact = (real, first + s, factor[a], factor[b])
                 separation = _write(geometry, bodies, pairs, p, contact, coefficients, points, used)
                 ids[used] = integer[first + s, 2:]

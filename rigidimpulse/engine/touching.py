@@ -22,6 +22,7 @@ import numpy as np
 from rigidimpulse.collision.distance.simplices import CORNER
 from rigidimpulse.collision.manifold.contact_points import Contacts as ContactBuffers
 from rigidimpulse.collision.manifold.dispatch import PairQuery, contacts_of_pairs
+from rigidimpulse.collision.manifold.reduce import MAX_PER_NORMAL
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.union_find import root_of, unite
@@ -110,7 +111,7 @@ def contacts_at(shapes, motion, table, places, margin, found, count):
         pair = table.pairs[p]
         a[0], b[0], reach[0] = pair.a, pair.b, margin * pair.contact_margin
         rest = ContactBuffers(buffers.real[count:], buffers.integer[count:], buffers.scratch)
-        more = contacts_of_pairs(shapes, motion.now, motion.rotation, PairQuery(a, b, reach), rest)
+        more = contacts_of_pairs(shapes, motion.now, motion.rotation, PairQuery(a, b, reach), rest, MAX_PER_NORMAL)
         if more < 0 or count + more >= len(found.place):
             return -(count + abs(more) + 1)
         for c in range(count, count + more):

@@ -12,6 +12,7 @@ from time import perf_counter
 from typing import Any
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.providers import provider
 from rigidimpulse.model.effect import EXACT, STAGES, SUBSTEPPED, VERBS, Bound, Effect, Line, Skip
 from rigidimpulse.model.world import World
 
@@ -86,6 +87,10 @@ class Plan:
         """Return the number of effects, and the names of those that are in."""
         included = [line.name for line in self.lines if line.included]
         return f"Plan({len(included)} of {len(self.lines)} effects: {', '.join(included)})"
+
+    def _repr_html_(self) -> str:
+        """Return the table of `explain`, for a cell of a notebook."""
+        return str(provider("cell of plan")(self))
 
     def _lists(self, verb: str) -> list[Participants]:
         """The lists of a verb: of both regimes where none is named."""

@@ -86,6 +86,10 @@ class Recording:
         counts = f"{len(self.times)} frames, {len(self.names)} bodies, {len(self.impacts)} impacts"
         return f"Recording({length}, {counts}, {self.status!r})"
 
+    def _repr_html_(self) -> str:
+        """Return the player, for a cell of a notebook."""
+        return str(provider("cell of recording")(self))
+
     @cached_property
     def horizon(self) -> dict[str, float]:
         """Time by body until which the run can be trusted, s: it is one of many plausible ones beyond.

@@ -116,6 +116,10 @@ class Scene:
         """Return the numbers of bodies and effects."""
         return f"Scene({len(self._bodies)} bodies, {len(self._effects)} effects)"
 
+    def _repr_html_(self) -> str:
+        """Return a picture of the start, for a cell of a notebook."""
+        return str(provider("cell of scene")(self))
+
 
 def _check_name(name: object, what: str = "body") -> None:
     """Raise a `SceneError` for a name that is no text, or one that some file could not hold."""

@@ -25,6 +25,7 @@ import numpy as np
 
 from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.files import write_renamed
+from rigidimpulse.core.providers import provider
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.fingerprint import fingerprint
 from rigidimpulse.gallery.record import GalleryScene
@@ -70,6 +71,10 @@ class Study:
         """Return the scene, what the rows were measured against, and their number."""
         left = f", {len(self.left)} left" if self.left else ""
         return f"Study({self.name!r}, {self.duration:g} s, {len(self.rows)} rows{left}, reference: {self.reference.kind})"
+
+    def _repr_html_(self) -> str:
+        """Return the table, for a cell of a notebook."""
+        return str(provider("cell of study")(self))
 
     def front(self, error: str = "position") -> list[Row]:
         """Own rows that no other own row beats in both cost and error, cheapest first; error: a field of `Errors`.

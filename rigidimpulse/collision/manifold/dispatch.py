@@ -48,7 +48,7 @@ from rigidimpulse.collision.manifold.cylinder import (
 from rigidimpulse.collision.manifold.mesh_mesh import round_round_contacts
 from rigidimpulse.collision.manifold.plane import round_half_space_contacts, round_half_space_gap, sphere_sphere_contacts
 from rigidimpulse.collision.manifold.polyhedra import polyhedron_half_space_contacts
-from rigidimpulse.collision.manifold.reduce import MAX_PER_NORMAL, reduce_contacts
+from rigidimpulse.collision.manifold.reduce import reduce_contacts
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.vector import moved, relative_pose, turned
 
@@ -275,10 +275,10 @@ def pair_contacts(shapes, a, b, margin, contacts, count):
 
 
 @jit
-def contacts_of_pairs(shapes, bodies, rotation, query, contacts):
-    """Find the reduced manifolds of the pairs of a `PairQuery`; returns the number of contacts, or -(needed) if the buffers are too small.
+def contacts_of_pairs(shapes, bodies, rotation, query, contacts, per_normal):
+    """Find the manifolds of the pairs of a `PairQuery`; returns the number of contacts, or -(needed) if the buffers are too small.
 
-    bodies: a record with `position` (n, 3) m; rotation (n, 3, 3).
+    bodies: a record with `position` (n, 3) m; rotation (n, 3, 3); per_normal: contacts kept of one normal, see `reduce`; 0: all are.
     """
     # Not a literal: that would compile everything below twice.
     count = np.int64(0)
@@ -292,7 +292,8 @@ def contacts_of_pairs(shapes, bodies, rotation, query, contacts):
         # The caller makes the buffers as large as needed and calls again.
         if count < 0:
             return count
-        count = reduce_contacts(real, integer, first, count, MAX_PER_NORMAL)
+        if per_normal > 0:
+            count = reduce_contacts(real, integer, first, count, per_normal)
         for c in range(first, count):
             integer[c, 0] = a
             integer[c, 1] = b

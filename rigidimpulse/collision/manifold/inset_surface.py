@@ -124,7 +124,7 @@ def _directions(x: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 @jit
 def put_back(smaller, bodies, a, b, real, integer, c):
-    """Move the points of contact c of bodies a and b from the inset surfaces to the true bodies, along the normal.
+    """Move the points of contact c of bodies a and b from the inset surfaces to the true bodies, along the normal, with its gap.
 
     smaller: `contact_update.SmallerShapes`; real (k, 10), in the world, and integer (k, 5): contacts.
     """
@@ -154,6 +154,7 @@ def put_back(smaller, bodies, a, b, real, integer, c):
                 rise = _rise(back, f, n) if feature % 3 == 0 else _rise_of_edge(geometry, back, f, p, n)
         for k in range(3):
             real[c, at + k] += sign * rise * real[c, 6 + k]
+        real[c, 9] -= rise
 
 
 @jit

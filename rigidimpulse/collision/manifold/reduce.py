@@ -2,6 +2,9 @@
 
 A load spread over contacts of one normal is carried just as well by the corners of their convex hull. The extreme contacts in
 MAX_PER_NORMAL directions stand for these corners. The deepest contact stays in any case.
+
+Contacts with a gap carry nothing until the bodies have tilted by about gap / place. Where contacts are looked for far ahead, those far out
+and wide open must not take the place of those that carry now: each counts as less far out, by its gap times `gap_weight`.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from rigidimpulse.core.kernels import jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import along, cross, dot, row
 
-MAX_PER_NORMAL = 8
+MAX_PER_NORMAL = np.int64(8)
 """Directions in which the extreme contacts of one normal are kept."""
 SAME_PATCH = 0.999
 """Cosine of the angle between normals above which contacts belong to one patch."""
@@ -45,8 +48,8 @@ def _tangents(normal):
 
 
 @inner
-def _extreme(real, integer, patch, label, first, direction):
-    """Return the contact of a patch that lies farthest along a direction; of equal ones that of the least features."""
+def _extreme(real, integer, patch, label, first, direction, gap_weight):
+    """Return the contact of a patch that lies farthest along a direction; of equal ones that of the least features; see the head."""
     best = -1
     farthest = 0.0
     for i in range(len(patch)):
@@ -54,6 +57,8 @@ def _extreme(real, integer, patch, label, first, direction):
             continue
         at = first + i
         place = dot(row(real, at), direction)
+        if gap_weight > 0.0:
+            place -= gap_weight * real[at, 9]
         tie = TIE * (abs(place) + abs(farthest))
         earlier = best >= 0 and (integer[at, 3], integer[at, 4]) < (integer[best, 3], integer[best, 4])
         if best < 0 or place > farthest + tie or (place >= farthest - tie and earlier):
@@ -63,11 +68,12 @@ def _extreme(real, integer, patch, label, first, direction):
 
 
 @jit_making_arrays
-def reduce_contacts(real, integer, first, count, max_per_normal=MAX_PER_NORMAL):
+def reduce_contacts(real, integer, first, count, max_per_normal=MAX_PER_NORMAL, gap_weight=0.0):
     """Keep the contacts that carry load, of contacts [first, count), which belong to one pair of bodies.
 
     Contacts whose normals agree (`SAME_PATCH`) form a patch. Of a patch with more than `max_per_normal` contacts the
-    deepest and the extreme ones in that many directions stay, unchanged and in their order. Returns the new count.
+    deepest and the extreme ones in that many directions stay, unchanged and in their order; gap_weight: see the head. Returns the new
+    count.
     """
     if count - first <= max_per_normal:
         return count
@@ -96,7 +102,7 @@ def reduce_contacts(real, integer, first, count, max_per_normal=MAX_PER_NORMAL):
             for k in range(max_per_normal):
                 angle = 2.0 * pi * k / max_per_normal
                 direction = along((cos(angle) * u[0], cos(angle) * u[1], cos(angle) * u[2]), sin(angle), v)
-                kept[_extreme(real, integer, patch, label, first, direction) - first] = True
+                kept[_extreme(real, integer, patch, label, first, direction, gap_weight) - first] = True
         label += 1
     end = first
     for i in range(len(patch)):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rigidimpulse.core.providers import provider
 from rigidimpulse.engine.simulate import frame_times
 from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.model.world import World
@@ -45,6 +46,10 @@ class Glance:
     finished: bool = False
     truth: Recording | None = None
     _figures: dict[str, Figures] = field(default_factory=dict)
+
+    def _repr_html_(self) -> str:
+        """Return the page, for a cell of a notebook."""
+        return str(provider("cell of glance")(self))
 
     def take_reference(self, reference: Reference, run: Recording) -> None:
         """Compare with a reference from now on, whose motion is that of a run."""

@@ -47,9 +47,7 @@ PAGE, SIDECAR = "study.html", "study.js"
 
 def write_page(known: Glance, folder: Path) -> Path:
     """Write the page of a glance into a folder, and beside it what an open page asks for; a finished study has the page alone."""
-    index, block = contents(known)
-    packed = base64.b64encode(gzip.compress(block, compresslevel=6, mtime=0)).decode("ascii")
-    told = json.dumps(index, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+    told, packed = _told(known)
     page = _page(told, packed, known.name)
     path = write_renamed(folder / PAGE, lambda target: target.write_text(page, encoding="utf-8"))
     if known.finished:
@@ -58,6 +56,18 @@ def write_page(known: Glance, folder: Path) -> Path:
         text = f'rigidimpulseStudy({told},"{packed}");'
         write_renamed(folder / SIDECAR, lambda target: target.write_text(text, encoding="utf-8"))
     return path
+
+
+def page_of(known: Glance) -> str:
+    """Return the page of a glance as it is now."""
+    return _page(*_told(known), known.name)
+
+
+def _told(known: Glance) -> tuple[str, str]:
+    """Return the index as JSON, and the packed block."""
+    index, block = contents(known)
+    packed = base64.b64encode(gzip.compress(block, compresslevel=6, mtime=0)).decode("ascii")
+    return json.dumps(index, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"), packed
 
 
 def contents(known: Glance) -> tuple[dict[str, Any], bytes]:

@@ -13,6 +13,7 @@ from typing import Any
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import make_folder, plain_cell, write_renamed
 from rigidimpulse.core.json_text import json_text
+from rigidimpulse.core.providers import provider
 from rigidimpulse.recording.recording import Recording, load_recording
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.job import DEFAULT_DURATION, DEFAULT_FPS, find_job
@@ -40,6 +41,10 @@ class Wedge:
     def __repr__(self) -> str:
         """Return the numbers of takes and failures, and the folder."""
         return f"Wedge({len(self.takes)} takes, {len(self.failed)} failed, in {str(self.folder)!r})"
+
+    def _repr_html_(self) -> str:
+        """Return the table, for a cell of a notebook."""
+        return str(provider("cell of wedge")(self))
 
     @property
     def failed(self) -> list[Take]:
