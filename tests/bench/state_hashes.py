@@ -6,7 +6,7 @@
     python tests/bench/state_hashes.py --loop compiled             with the compiled order of events, or with the loop in `python`
     python tests/bench/state_hashes.py --duration 0.2              of the beginning of each, s
 
-A hash depends neither on the processor nor on versions of the libraries (`tests/determinism/test_gallery_hashes.py`).
+On what a hash depends, and on what not, stands in `tests/determinism/test_gallery_hashes.py`.
 A scene without a hash (an error, or the limit of time) is counted apart: it is not compared, even where both trees say the same.
 """
 

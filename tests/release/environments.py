@@ -113,7 +113,8 @@ def make_environment(uv: Path, python: Interpreter, dependencies: str, wheel: Pa
     run([uv, "venv", "--quiet", "--python", python.path, folder])
     into = ["--quiet", "--python", str(folder)]
     if dependencies == PLAIN:
-        run([uv, "pip", "install", *into, *WHEELS_ONLY, wheel])
+        # As pip does, with the bytecode of all modules.
+        run([uv, "pip", "install", *into, *WHEELS_ONLY, "--compile-bytecode", wheel])
     else:
         # Of a wheel, uv would take the newest: the oldest are asked for by the bounds of the project itself.
         extras = [word for extra in EXTRAS for word in ("--extra", extra)]
