@@ -6,8 +6,8 @@ purpose writes the file again:
 
     python tests/bench/state_hashes.py --duration 0.2 NAMES
 
-One thing is left that depends on the processor: BLAS. Its library (OpenBLAS) chooses code by the processor, which rounds otherwise. With
-the code for processors without AVX, 14 of 51 scenes have other hashes.
+Two libraries are left that choose code by the processor, which rounds otherwise: BLAS (OpenBLAS), and the library of functions (libm) in
+`crowd_momentum`. With their code for processors without AVX, 14 of 51 scenes have other hashes.
 """
 
 from __future__ import annotations

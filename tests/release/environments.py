@@ -133,3 +133,9 @@ def clean_variables(home: Path | None, **more: str) -> dict[str, str]:
     """Variables for a program in a clean environment: those of this process that say nothing of Python, with another home or none."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(HEAR_NOTHING_OF) and name != "HOME"}
     return {**kept, **({} if home is None else {"HOME": str(home)}), "PYTHONNOUSERSITE": "1", **more}
+
+
+def said(work: Path) -> str:
+    """What was typed to run the script, with WORK for the folder of the work."""
+    words = ["WORK" if Path(word).resolve() == work else word for word in sys.argv[1:]]
+    return " ".join(["python", Path(sys.argv[0]).resolve().relative_to(ROOT).as_posix(), *words])

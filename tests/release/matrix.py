@@ -37,6 +37,7 @@ from environments import (
     find_uv,
     make_environment,
     run,
+    said,
 )
 
 SMOKE, HASHES = Path(__file__).with_name("smoke.py"), ROOT / "tests" / "bench" / "state_hashes.py"
@@ -246,18 +247,18 @@ def main() -> int:
     for row in rows:
         print(*row, sep=" | ")
     if options.keep:
-        keep(rows)
+        keep(rows, said(work))
     failed = [row for row in matrix.rows if row.wrong or matrix.differing(row)]
     print(f"{len(matrix.rows) - len(failed)} passed, {len(failed)} failed")
     return bool(failed)
 
 
-def keep(rows: list[tuple[object, ...]]) -> None:
-    """Write the table to the data of the results pages, with machine and commit."""
+def keep(rows: list[tuple[object, ...]], command: str) -> None:
+    """Write the table to the data of the results pages, with machine, commit and command."""
     path = RESULTS / "data" / "release_matrix.csv"
     with path.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
-    run([sys.executable, RESULTS / "provenance.py", path, "python tests/release/matrix.py WORK --keep"])
+    run([sys.executable, RESULTS / "provenance.py", path, command])
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from environments import NEWEST, PLAIN, Environment, build_wheel, clean_variables, find_pythons, find_uv, make_environment, run
+from environments import NEWEST, PLAIN, Environment, build_wheel, clean_variables, find_pythons, find_uv, make_environment, run, said
 from matrix import DURATION, HASHES, PINNED, RESULTS, SMOKE, versions
 
 TIMES = 3
@@ -122,16 +122,16 @@ def main() -> int:
     if differing:
         print("other hashes than the pinned ones:", *differing)
     if options.keep:
-        keep(row)
+        keep(row, said(work))
     return bool(differing or told["compiled"])
 
 
-def keep(row: dict[str, object]) -> None:
-    """Write the numbers to the data of the results pages, with machine and commit."""
+def keep(row: dict[str, object], command: str) -> None:
+    """Write the numbers to the data of the results pages, with machine, commit and command."""
     path = RESULTS / "data" / "ready_wheel.csv"
     with path.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows([row, row.values()])
-    run([sys.executable, RESULTS / "provenance.py", path, "python tests/release/ready_wheel.py WORK --keep"])
+    run([sys.executable, RESULTS / "provenance.py", path, command])
 
 
 if __name__ == "__main__":
