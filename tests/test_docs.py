@@ -150,7 +150,7 @@ def test_terms_of_the_glossary_are_defined_once() -> None:
     assert len(set(terms)) == len(terms)
 
 
-GENERATED = ("accuracy", "hard_cases", "validation", "what_accuracy_costs", "narrow_phases", "speed", "tosses")
+GENERATED = ("accuracy", "hard_cases", "validation", "what_accuracy_costs", "narrow_phases", "speed", "tosses", "release")
 """Pages of docs/results that a script writes."""
 
 

@@ -1,7 +1,7 @@
 """Write the pages of docs/results/ from their data: `python docs/results/make_results.py [PAGE ...]`.
 
-Pages: accuracy, hard_cases, validation, what_accuracy_costs, narrow_phases, speed, tosses; none: all. No number is typed here: each comes
-from a file of data, and the page says which machine, commit and command made it. The table in README.md is written, too.
+Pages: accuracy, hard_cases, validation, what_accuracy_costs, narrow_phases, speed, tosses, release; none: all. No number is typed here:
+each comes from a file of data, and the page says which machine, commit and command made it. The table in README.md is written, too.
 """
 
 from __future__ import annotations
@@ -33,6 +33,15 @@ NARROW_PHASES = DATA / "narrow_phases.csv"
 GALLERY, HARD = DATA / "gallery_checks.csv", DATA / "hard_checks.csv"
 BENCH = ROOT / "tests" / "bench"
 TOSSES = BENCH / "tosses"
+MATRIX, READY = DATA / "release_matrix.csv", DATA / "ready_wheel.csv"
+READY_WORDS = {
+    "wheel": "wheel", "megabytes": "size, MB", "megabytes_installed": "kernels when installed, MB",
+    "plain_megabytes": "size without kernels, MB",
+    "dependencies": "dependencies", "processor": "compiled for", "seconds": "first picture, s",
+    "processor_seconds": "its processor time, s", "compiled": "kernels that it compiled",
+    "hashes": "hashes of the gallery that are the same",
+}  # fmt: skip
+"""What the columns of the table of the wheel with ready kernels are called."""
 README_CHECKS = (
     ("bounce", "energy, relative change"), ("disks_in_a_box", "error of final positions"), ("wing_nut", "error of the attitude"),
     ("galperin_3", "impacts"), ("superball", "error of the final place"), ("spot", "error of the ledger"),
@@ -417,10 +426,40 @@ def readme() -> str:
     return before + begin + table(("scene", "quantity", "value", "bound", "law"), lines) + end + after
 
 
+def release() -> str:
+    """The wheel in clean environments, and the wheel with ready kernels."""
+    rows, ready = read(MATRIX), read(READY)
+    good = sum(row["result"] == "ok" and not row["hashes"].startswith("other") for row in rows)
+    parts = [
+        "The wheel is built, installed in clean environments and run outside of the clone. Each run makes the first picture. "
+        "Others throw a die,\nsave, load, export, use a cache, the command line, a robot, USD and a quadratic program, and repeat "
+        "pinned hashes of the gallery.\n",
+        origin(MATRIX),
+        f"{good} of {len(rows)} runs do all that and have the same hashes.\n",
+        "Hashes still depend on code that two libraries choose by the processor, OpenBLAS and, in one scene (`crowd_momentum`), the "
+        "library of functions:\nwithout AVX 14 of 51 scenes of the gallery have others. Kernels may be compiled for any processor.\n",
+        "## Environments\n\nSeconds are those of `rigidimpulse demo spot` with its page, with all that is compiled for it. "
+        "Processor seconds are of all its\nprocesses. Compiled and loaded are kernels of the process of the demo. Others compile for "
+        "it, too.\n",
+    ]
+    columns = {"dependencies": "dependencies", "conditions": "conditions", "seconds": "s", "processor_seconds": "processor s"}
+    columns |= {name: name for name in ("compiled", "loaded", "hashes", "result")}
+    for version in dict.fromkeys(row["python"] for row in rows):
+        lines = [[row[name] for name in columns] for row in rows if row["python"] == version]
+        parts += [f"### Python {version}\n", table(list(columns.values()), lines)]
+    parts += [
+        "## A wheel with ready kernels\n\nThe same wheel with all kernels that `rigidimpulse warmup` and the gallery need, compiled "
+        "for a class of processors.\nThe first picture is made in a clean environment where nothing has run before.\n",
+        origin(READY),
+        table(("", "value"), [(READY_WORDS[name], value) for name, value in ready[0].items()]),
+    ]
+    return page("Release", *parts)
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "narrow_phases": narrow_phases, "accuracy": accuracy, "hard_cases": hard_cases, "validation": validation,
     "what_accuracy_costs": what_accuracy_costs, "speed": speed,
-    "tosses": tosses,
+    "tosses": tosses, "release": release,
 }  # fmt: skip
 
 

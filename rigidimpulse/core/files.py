@@ -153,6 +153,8 @@ def load_mesh(path: Path, where: str) -> Trimesh:
         raise SceneError(f"{reason} (looked for {path.absolute()})", "check the path", where)
     import trimesh
 
+    if not hasattr(trimesh, "load_scene"):
+        raise SceneError(f"trimesh {trimesh.__version__} is too old to read it", "pip install --upgrade trimesh (4.6 or newer)", where)
     try:
         # `process=False` keeps trimesh from joining vertices by an absolute distance, which would spoil small meshes.
         scene = trimesh.load_scene(str(path), process=False)

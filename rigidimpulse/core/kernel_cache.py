@@ -3,7 +3,11 @@
 Numba's own cache knows only the file that a function stands in, not those of the functions it calls, nor those of the tuples it is given.
 Here the name of the folder is a digest of the sources of all modules that a kernel's module imports, directly or not, and of all named
 tuples of the package. So no kernel ever runs with an old version of another one inside it, and what was kept for an older version of a
-tuple is never read. Numba is told of the folder in the public way, by `numba.config.CACHE_DIR`.
+tuple is never read. Numba is told of the folder in the public way, by `numba.config.CACHE_DIR`. Each Python, and each processor that is
+compiled for, has folders of its own.
+
+Numba has one folder for reading and writing. Kernels that lie compiled in a folder that is only read, of the package
+(`ready_kernels.py`) or of an administrator (`kernel_places.py`), are copied to that one when they are first used.
 """
 
 from __future__ import annotations
@@ -11,10 +15,11 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import secrets
 import shutil
-import tempfile
+import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -22,17 +27,24 @@ from typing import Any
 
 import numba
 
+from rigidimpulse.core.kernel_places import FOR_ALL_TO_READ, OF_THIS_PROCESS, PACKAGE, other_roots, writable_root
+from rigidimpulse.core.processor import target_processor
+from rigidimpulse.core.ready_kernels import compile_for_ready_kernels, ready_folder
+
 _numba: Any = numba
-_PACKAGE = Path(__file__).parent.parent
 _IMPORT = re.compile(rb"^\s*from rigidimpulse\.?([\w.]*) import (?:\(|([\w, ]+))", re.MULTILINE)
 _NAMED_TUPLE = re.compile(rb"^class \w+\(NamedTuple\):\n(?:[ \t].*\n|\n)*", re.MULTILINE)
 _DIGITS = 16
 """Of a digest that are in the name of a folder."""
 _KEPT = 4
-"""Folders of a module that are kept: one for each of its latest states."""
-OF_THIS_PROCESS = "rigidimpulse_kernels_"
-"""Begins the name of a folder that other processes do not know of."""
+"""Folders of a module that are kept for a Python and a processor: one for each of its latest states."""
+_INDEX, _KERNEL = ".nbi", ".nbc"
+"""Suffixes of numba's files: which kernels there are of a function, and a kernel."""
+OF_A_PROCESS = (".lock", ".begun")
+"""Suffixes of files that say what processes do just now."""
 _configuration = threading.Lock()
+# Before the first kernel: numba asks but once what to compile for.
+compile_for_ready_kernels()
 
 
 @cache
@@ -40,7 +52,7 @@ def _imported(path: Path) -> frozenset[Path]:
     """Modules of the package that a module imports."""
     found = set()
     for module, names in _IMPORT.findall(path.read_bytes()):
-        base = _PACKAGE.joinpath(*module.decode().split(".")) if module else _PACKAGE
+        base = PACKAGE.joinpath(*module.decode().split(".")) if module else PACKAGE
         candidates = [base.with_suffix(".py"), *(base / f"{name.split(' as ')[0].strip()}.py" for name in names.decode().split(","))]
         found.update(candidate for candidate in candidates if candidate.is_file())
     return frozenset(found)
@@ -63,62 +75,101 @@ def source_digest(path: Path) -> str:
     while frontier:
         frontier = set().union(*(_imported(module) for module in frontier)) - reached
         reached |= frontier
-    digest = hashlib.sha256(numba.__version__.encode() + _digest_of_tuples(_PACKAGE))
+    digest = hashlib.sha256(numba.__version__.encode() + _digest_of_tuples(PACKAGE))
     for module in sorted(reached):
         digest.update(module.read_bytes())
     return digest.hexdigest()
 
 
-@cache
-def _root(chosen: str) -> Path:
-    """The folder that holds the others: of those that can be written, what the user has chosen for numba, the package's, or the user's."""
-    of_user = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or os.path.expanduser("~/.cache")
-    for place in (*([chosen] if chosen else []), _PACKAGE / "__pycache__", of_user):
-        root = Path(place) / "rigidimpulse_kernels"
-        try:
-            root.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=root).close()
-        except OSError:
-            continue
-        return root
-    return Path(tempfile.mkdtemp(prefix=OF_THIS_PROCESS))
+def _name_of_states(path: Path) -> str:
+    """Name of the folder with the states of a module, for this Python and the processor that is compiled for."""
+    what = "\n".join([str(path), sys.implementation.cache_tag or "", target_processor()])
+    return f"{path.stem}-{hashlib.sha256(os.fsencode(what)).hexdigest()[:_DIGITS]}"
 
 
 @cache
-def _folder(path: Path, chosen: str) -> Path:
-    """The folder of the kernels of a module as it is now. Those of its states of long ago are removed when it is made."""
-    states = _root(chosen) / f"{path.stem}-{hashlib.sha256(bytes(path)).hexdigest()[:_DIGITS]}"
+def kernel_folder(path: Path, chosen: str) -> Path:
+    """Return the folder of the kernels of a module as it is now. Those of its states of long ago are removed when it is made.
+
+    chosen: the folder that the user has named for numba, "" for none.
+    """
+    states = writable_root(chosen) / _name_of_states(path)
     folder = states / source_digest(path)[:_DIGITS]
     if not folder.is_dir():
-        folder.mkdir(parents=True, exist_ok=True)
+        states.mkdir(FOR_ALL_TO_READ, exist_ok=True)
+        folder.mkdir(FOR_ALL_TO_READ, exist_ok=True)
         with suppress(OSError):  # Another process may remove them at the same time.
             for old in sorted(states.iterdir(), key=os.path.getmtime)[:-_KEPT]:
                 shutil.rmtree(old, ignore_errors=True)
+        for place in _read_only_folders(path, chosen):
+            _copy((file for file in place.iterdir() if _is_note(file)), folder)
     return folder
+
+
+def _read_only_folders(path: Path, chosen: str) -> Iterator[Path]:
+    """Folders that are only read, with compiled kernels of a module as it is now."""
+    digest = source_digest(path)[:_DIGITS]
+    ready = ready_folder(path, digest)
+    places = [root / _name_of_states(path) / digest for root in other_roots(chosen)]
+    yield from (place for place in (*([ready] if ready else []), *places) if place.is_dir())
+
+
+def _is_note(file: Path) -> bool:
+    """Whether a file was made by `note_beside`, for good."""
+    return file.is_file() and file.suffix not in (_INDEX, _KERNEL, *OF_A_PROCESS)
+
+
+def _compiled(folder: Path, path: Path, function: Callable[..., Any]) -> list[Path]:
+    """What numba has put into a folder of a function, kernels before the index that names them."""
+    return sorted(folder.rglob(f"{path.stem}.{function.__qualname__}-*.nb[ic]"), key=lambda file: file.suffix)
+
+
+def _copy(files: Iterator[Path] | list[Path], folder: Path) -> None:
+    """Copy files into a folder, whole or not at all; those that are there stay as they are."""
+    with suppress(OSError):  # What is not there is compiled.
+        for file in files:
+            target, part = folder / file.name, folder / f"{file.name}.{secrets.token_hex(4)}"
+            if not target.exists():
+                shutil.copyfile(file, part)
+                part.replace(target)
 
 
 def jit_with_cache(function: Callable[..., Any], **options: Any) -> Any:
     """Make numba's dispatcher of a function, which keeps what it compiles in the function's folder; options: of numba."""
     with _configuration:
         chosen = _numba.config.CACHE_DIR
-        _numba.config.CACHE_DIR = str(_folder(Path(function.__code__.co_filename), chosen))
+        path = Path(function.__code__.co_filename)
+        _numba.config.CACHE_DIR = str(kernel_folder(path, chosen))
         try:
-            return _numba.njit(cache=True, **options)(function)
+            made = _numba.njit(cache=True, **options)(function)
         finally:
             _numba.config.CACHE_DIR = chosen
+    for place in _read_only_folders(path, chosen):
+        _copy(_compiled(place, path, function), Path(made.stats.cache_path))
+    return made
 
 
 def is_in_cache(function: Callable[..., Any]) -> bool:
-    """Whether a kernel of these sources lies in the cache on disk, for whatever types: numba keeps an index (`.nbi`) of each."""
-    path = Path(function.__code__.co_filename)
-    return any(_folder(path, _numba.config.CACHE_DIR).rglob(f"{path.stem}.{function.__qualname__}-*.nbi"))
+    """Whether a kernel of these sources lies compiled on disk, for whatever types: numba keeps an index of each."""
+    path, chosen = Path(function.__code__.co_filename), _numba.config.CACHE_DIR
+    places = (kernel_folder(path, chosen), *_read_only_folders(path, chosen))
+    return any(file.suffix == _INDEX for place in places for file in _compiled(place, path, function))
 
 
 def note_beside(function: Callable[..., Any], name: str) -> Path:
     """A file in the folder of a kernel of these sources, for what is to be known of it by other processes."""
-    return _folder(Path(function.__code__.co_filename), _numba.config.CACHE_DIR) / name
+    return kernel_folder(Path(function.__code__.co_filename), _numba.config.CACHE_DIR) / name
 
 
 def is_kept() -> bool:
     """Whether other processes will find what this one compiles."""
-    return not _root(_numba.config.CACHE_DIR).name.startswith(OF_THIS_PROCESS)
+    return not _root_of_this_process().parent.name.startswith(OF_THIS_PROCESS)
+
+
+def variables_to_share_kernels() -> dict[str, str]:
+    """Return environment variables for a process that is to put its kernels where this one finds them."""
+    return dict(os.environ) if is_kept() else {**os.environ, "NUMBA_CACHE_DIR": str(_root_of_this_process().parent)}
+
+
+def _root_of_this_process() -> Path:
+    return writable_root(_numba.config.CACHE_DIR)

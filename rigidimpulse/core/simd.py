@@ -16,13 +16,13 @@ import operator
 from functools import cache
 from typing import Any
 
-import llvmlite.binding
 import numpy as np
 from llvmlite import ir
 from numba import extending, types
 from numba.extending import NativeValue, lower_builtin, models, register_model, type_callable, typeof_impl, unbox
 
 from rigidimpulse.core.memory import reserve
+from rigidimpulse.core.processor import target_features
 
 ROW = 8
 """Doubles in a row."""
@@ -43,9 +43,9 @@ class Simd:
 
 @cache
 def machine_simd() -> Simd:
-    """Return the width of this machine's widest vector unit."""
-    features = llvmlite.binding.get_host_cpu_features()
-    return Simd(8 if features.get("avx512f") else 4 if features.get("avx2") else 2)
+    """Return the width of the widest vector unit of the processor that is compiled for."""
+    features = target_features()
+    return Simd(8 if "avx512f" in features else 4 if "avx2" in features else 2)
 
 
 def aligned(rows: int) -> np.ndarray:

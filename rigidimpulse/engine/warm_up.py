@@ -23,7 +23,7 @@ from importlib import import_module
 from typing import IO
 
 from rigidimpulse.core.claim import claim
-from rigidimpulse.core.kernel_cache import note_beside
+from rigidimpulse.core.kernel_cache import is_kept, note_beside, variables_to_share_kernels
 from rigidimpulse.core.kernels import Kernel, is_cached
 from rigidimpulse.model.world import World
 
@@ -58,7 +58,8 @@ def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> N
         missing = kernels_to_compile(world, with_events, with_substepped)
         if missing:
             kinds, seconds = ", ".join(missing), sum(SECONDS[kind] for kind in missing)
-            logger.warning(f"compiling kernels ({kinds}) for the first run on this machine, once: this takes about {seconds} s")
+            once = "for the first run on this machine, once" if is_kept() else "for this process alone, as no folder keeps them"
+            logger.warning(f"compiling kernels ({kinds}) {once}: this takes about {seconds} s")
             compile_kernels(world, missing)
 
 
@@ -120,14 +121,15 @@ def compile_loop_in_background(world: World) -> None:
 
 def claim_loop(features: Sequence[str]) -> IO[bytes] | None:
     """Claim the order of events for worlds with these features, to compile it; None where another process compiles it."""
-    return claim(note_beside(prepare_kernels, "-".join(["loop", *features, "lock"])))
+    return claim(note_beside(prepare_kernels, f"{'-'.join(['loop', *features])}.lock"))
 
 
 def start_process(*arguments: str, errors: IO[bytes] | None = None) -> subprocess.Popen:
     """Start a process that compiles one part; what it says of errors goes to a file, or nowhere."""
     quiet = subprocess.DEVNULL
     command = [sys.executable, "-m", PARTS_MODULE, *arguments]
-    return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet if errors is None else errors)
+    variables = variables_to_share_kernels()
+    return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet if errors is None else errors, env=variables)
 
 
 @contextmanager

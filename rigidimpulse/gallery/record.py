@@ -13,6 +13,8 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 
 if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
     from rigidimpulse.recording.recording import Recording
     from rigidimpulse.scene.accuracy import Accuracy
     from rigidimpulse.scene.scene import Scene
@@ -54,6 +56,14 @@ def at_least(what: str, value: float, bound: float, law: str) -> Check:
 def equal(what: str, value: float, expected: float, law: str) -> Check:
     """Return the check that a count is the expected one."""
     return Check(what, float(value), float(expected), bool(value == expected), law, "equal to")
+
+
+def rotations(orientations: np.ndarray) -> Rotation:
+    """Return scipy's rotations of quaternions (n, 4) wxyz: they are computed apart from the library's."""
+    from scipy.spatial.transform import Rotation
+
+    # Its own option for this order came with scipy 1.14.
+    return Rotation.from_quat(np.roll(orientations, -1, axis=-1))
 
 
 def figure(value: float | None) -> str:

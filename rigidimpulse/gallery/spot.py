@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from rigidimpulse.gallery.record import Check, GalleryScene, asset_path, at_most
+from rigidimpulse.gallery.record import Check, GalleryScene, asset_path, at_most, rotations
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.material import Material
@@ -100,14 +100,12 @@ def _cone_excess(run: Recording) -> float:
 
 def _depths(run: Recording, vertices: np.ndarray) -> tuple[float, float]:
     """Return how deep the cow's vertices get below the floor and into the torus, m, over all frames."""
-    from scipy.spatial.transform import Rotation
-
     # The faceted torus lies inside the round one; its faces lie outside the torus of this tube radius.
     inscribed = TUBE_RADIUS * math.cos(math.pi / TUBE_SECTIONS) - RING_RADIUS * (
         1.0 - math.cos(math.pi / RING_SECTIONS)
     )
     lowest = inside = -math.inf
-    turns = Rotation.from_quat(run.orientation("spot"), scalar_first=True)
+    turns = rotations(run.orientation("spot"))
     for turn, position in zip(turns, run.position("spot"), strict=True):
         x, y, z = (turn.apply(vertices) + position).T
         lowest = max(lowest, -float(z.min()))

@@ -23,7 +23,7 @@ import math
 
 import numpy as np
 
-from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most, equal
+from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most, equal, rotations
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.scene import Scene
@@ -66,12 +66,10 @@ def exact(times: np.ndarray) -> Exact:
 
 def check(run: Recording) -> list[Check]:
     """Compare with elliptic functions."""
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_quat(run.orientation("wing nut"), scalar_first=True)
+    turn = rotations(run.orientation("wing nut"))
     spin = turn.apply(run.angular_velocity("wing nut"), inverse=True)
     expected = _spin(run.times)
-    error = (turn * Rotation.from_quat(_attitude(run.times), scalar_first=True).inv()).magnitude()
+    error = (turn * rotations(_attitude(run.times)).inv()).magnitude()
     momentum = run.ledger.angular_momentum if run.ledger else np.full((1, 3), np.nan)
     kinetic = run.ledger.kinetic if run.ledger else np.array([np.nan])
     _, _, rate, quarter, _ = _constants()

@@ -4,14 +4,16 @@
     python tests/bench/state_hashes.py --against before.txt        the same, and which differ from a file that was written before
     python tests/bench/state_hashes.py spot pile --seeds 0 20      some
     python tests/bench/state_hashes.py --loop compiled             with the compiled order of events, or with the loop in `python`
+    python tests/bench/state_hashes.py --duration 0.2              of the beginning of each, s
 
-A hash depends on the processor, on numpy and on numba, so two files are compared only where both were written on one machine.
+On what a hash depends, and on what not, stands in `tests/determinism/test_gallery_hashes.py`.
 A scene without a hash (an error, or the limit of time) is counted apart: it is not compared, even where both trees say the same.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import multiprocessing
 import multiprocessing.connection
 import resource
@@ -34,8 +36,11 @@ LENGTH = 16
 """Characters of a hash that are printed."""
 
 
-def hash_of(name: str, loop: str = "") -> tuple[str, str, float]:
-    """Name, state hash or error, and processor seconds of one scene; loop: "compiled" or "python", "" for what a user gets."""
+def hash_of(name: str, loop: str = "", longest: float = math.inf) -> tuple[str, str, float]:
+    """Name, state hash or error, and processor seconds of one scene.
+
+    loop: "compiled" or "python", "" for what a user gets. longest: s of motion.
+    """
     start = process_time()
     try:
         if name.startswith(SEED):
@@ -44,6 +49,7 @@ def hash_of(name: str, loop: str = "") -> tuple[str, str, float]:
         else:
             entry = gallery.load(name)
             scene, duration, fps, accuracy = entry.scene(), entry.duration, entry.fps, entry.accuracy
+        duration = min(duration, longest)
         run = prepare(scene, frame_times(duration, fps), accuracy)
         if loop:
             uses = loop == "compiled" and not why_not(run.world, run.plan)
@@ -54,13 +60,13 @@ def hash_of(name: str, loop: str = "") -> tuple[str, str, float]:
     return name, result, process_time() - start
 
 
-def _answer(sender, name: str, limit: int, loop: str) -> None:
+def _answer(sender, name: str, limit: int, loop: str, longest: float) -> None:
     """Send the hash of a scene from a process that the system ends after `limit` s of processor time."""
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
-    sender.send(hash_of(name, loop))
+    sender.send(hash_of(name, loop, longest))
 
 
-def hashes(names: list[str], jobs: int, limit: int, loop: str = "") -> Iterator[tuple[str, str, float]]:
+def hashes(names: list[str], jobs: int, limit: int, loop: str = "", longest: float = math.inf) -> Iterator[tuple[str, str, float]]:
     """The hashes of scenes, each from a process of its own, in the order in which they end."""
     context = multiprocessing.get_context("fork")
     waiting, running = list(names), []
@@ -68,7 +74,7 @@ def hashes(names: list[str], jobs: int, limit: int, loop: str = "") -> Iterator[
         while waiting and len(running) < jobs:
             receiver, sender = context.Pipe(duplex=False)
             name = waiting.pop(0)
-            process = context.Process(target=_answer, args=(sender, name, limit, loop))
+            process = context.Process(target=_answer, args=(sender, name, limit, loop, longest))
             process.start()
             sender.close()
             running.append((name, process, receiver))
@@ -97,6 +103,7 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--limit", type=int, default=300, help="s of processor time that a scene may take")
     parser.add_argument("--loop", choices=("compiled", "python"), default="", help="which of both loops deals with exact contact")
+    parser.add_argument("--duration", type=float, default=math.inf, help="s of motion at most")
     options = parser.parse_args()
     names = options.names or ([] if options.seeds else [*gallery.names(), *gallery.hard_names()])
     names = names + [f"{SEED}{seed}" for seed in range(*(options.seeds or (0, 0)))]
@@ -104,7 +111,7 @@ def main() -> int:
     if options.against:
         before = dict(line.split()[:2] for line in options.against.read_text().splitlines())
     differ, without = [], []
-    for name, result, seconds in hashes(names, options.jobs, options.limit, options.loop):
+    for name, result, seconds in hashes(names, options.jobs, options.limit, options.loop, options.duration):
         changed = name in before and before[name] != result
         print(f"{name:32} {result:16} {seconds:8.2f}{f'  was {before[name]}' if changed else ''}", flush=True)
         differ += [name] if changed else []
