@@ -13,6 +13,7 @@ from rigidimpulse.cli.jobs import (
     BAD_SCENE,
     CHECK_FAILED,
     Head,
+    end_if_partial,
     given_options,
     print_table,
     recording_with_shapes,
@@ -120,12 +121,14 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, c
     job = job_of(entry)._replace(**given_options(settings))
     click.echo(f"{entry.name}: {entry.description}")
     run = run_job(job, output, profile, cache)
-    checks = entry.check(run) if job.duration == entry.duration else []
-    if job.duration == entry.duration:
+    is_whole = job.duration == entry.duration and not run.status.is_partial
+    checks = entry.check(run) if is_whole else []
+    if is_whole:
         _print_checks(checks)
     else:
         click.echo(f"checks left out: they are for the scene's own duration, {entry.duration:g} s")
     _hand_over(run, output, view, keys, Head(entry.description, tuple(checks)))
+    end_if_partial(run)
     if not all(check.passed for check in checks):
         sys.exit(CHECK_FAILED)
 
@@ -142,7 +145,9 @@ def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, cac
     keys = _export_settings(settings)
     job = find_job(scene)._replace(**given_options(settings))
     head = None if job.entry is None else Head(job.entry.description)
-    _hand_over(run_job(job, output, profile, cache), output, view, keys, head)
+    run = run_job(job, output, profile, cache)
+    _hand_over(run, output, view, keys, head)
+    end_if_partial(run)
 
 
 @main.command()
@@ -182,6 +187,7 @@ def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
     told = forecast(world, plan, job.duration).text(job.duration)
     if duration is not None:
         run = run_job(job, ())
+        end_if_partial(run)
         assert run.plan is not None and run.profile is not None
         remember(world, plan, job.duration, run.profile.seconds - run.profile.preparing)
         plan, told = run.plan, forecast(world, plan, job.duration).text(job.duration)

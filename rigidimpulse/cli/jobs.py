@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 
 PATIENCE = 0.5
 """s of work before a progress bar appears."""
-CHECK_FAILED, BAD_SCENE = 1, 2
-"""Exit codes, besides 0 for success."""
+CHECK_FAILED, BAD_SCENE, STOPPED_BY_USER = 1, 2, 130
+"""Exit codes, besides 0 for success; the last is what shells give for Ctrl-C."""
 
 
 def given_options(settings: dict[str, Any]) -> dict[str, Any]:
@@ -79,11 +80,17 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str |
     num_impacts = len(run.impacts)
     impacts = f"{num_impacts} {'impact' if num_impacts == 1 else 'impacts'}"
     rest = f"; {cache} already had the beginning, or all of it" if begun else ""
-    click.echo(f"{job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s{rest}")
+    click.echo(f"{run.times[-1] if run.status.is_partial else job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s{rest}")
     click.echo(f"status: {run.status.message}")
     if profile and run.profile is not None:
         click.echo(run.profile.table())
     return run
+
+
+def end_if_partial(run: Recording) -> None:
+    """End the program with an exit code of its own after a run that Ctrl-C stopped."""
+    if run.status.is_partial:
+        sys.exit(STOPPED_BY_USER)
 
 
 def print_table(rows: Sequence[tuple[str, ...]], right: tuple[int, ...]) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rigidimpulse.cli.jobs import CHECK_FAILED, given_options, print_table, recording_with_shapes, run_job, show, size_of
+from rigidimpulse.cli.jobs import CHECK_FAILED, end_if_partial, given_options, print_table, recording_with_shapes, run_job, show, size_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -163,7 +163,10 @@ def compare(first: str, second: str, scene: str, output: str | None, view: bool,
     for run in recorded.values():
         job = job._replace(**comparison.frames_of(run))
     job = job._replace(**given_options(settings))
-    runs = [recorded[word] if word in recorded else run_job(job._replace(accuracy=word), ()) for word in words]
+    runs = []
+    for word in words:
+        runs.append(recorded[word] if word in recorded else run_job(job._replace(accuracy=word), ()))
+        end_if_partial(runs[-1])
     result = comparison.compare(runs[0], runs[1], comparison.labels_of(words), comparison.common_horizon(runs))
     click.echo(result.table())
     if output:

@@ -94,6 +94,9 @@ class NoSoftBodies:
         """The step is as long as it was."""
         return end
 
+    def keep(self, _count: int) -> None:
+        """There are no frames."""
+
     def tracks(self) -> list[FlexibleTrack]:
         """No soft body leaves a track."""
         return []
@@ -177,3 +180,6 @@ class _NoForceLog:
 
     def end(self, _body: int, _time: float) -> None:
         """Nothing is recorded."""
+
+    def keep(self, _count: int) -> None:
+        """There are no frames."""

@@ -142,6 +142,10 @@ class RunForceLog(Protocol):
         """The lines that act on body i end at `time`, if there are any."""
         ...
 
+    def keep(self, count: int, /) -> None:
+        """Leave the first `count` frames only."""
+        ...
+
 
 class RunForces(Protocol):
     """The varying forces of a run: `VaryingForces`, or `NoForces`. What follows `finish` is asked for bodies that they act on."""
@@ -204,6 +208,10 @@ class RunSoftBodies(Protocol):
 
     def advance(self, run: Any, end: float, /) -> float:
         """Step the soft bodies to `end` [s] or less far; returns how far."""
+        ...
+
+    def keep(self, count: int, /) -> None:
+        """Leave the first `count` frames only."""
         ...
 
     def tracks(self) -> list[FlexibleTrack]:

@@ -17,7 +17,7 @@ from rigidimpulse.recording.events import impact_table
 from rigidimpulse.recording.impulses import Impulses
 from rigidimpulse.recording.ledger import Masses, make_ledger
 from rigidimpulse.recording.recording import Recording
-from rigidimpulse.recording.status import Status
+from rigidimpulse.recording.status import STOPPED, Status
 from rigidimpulse.scene.frames import own_frames
 
 if TYPE_CHECKING:
@@ -30,6 +30,17 @@ def finish_run(run: Run, duration: float) -> Recording:
     run.substepped.finish(run)
     run.recorder.finish(run.state.trajectory)
     return make_recording(run, duration)
+
+
+def finish_early(run: Run, duration: float) -> Recording:
+    """Return the recording of a run that was stopped between two steps, before its end at `duration` [s]: the frames until then."""
+    time = run.state.time
+    run.keep(int(np.searchsorted(run.recorder.times, time, side="right")))
+    run.log.report(
+        time, STOPPED, (),
+        f"the recording is partial: it ends at {time:.6g} s of {duration:g} s; simulate with a cache to go on from there next time",
+    )
+    return finish_run(run, time)
 
 
 def finish_sub_steps(run: Run, end: float) -> None:

@@ -109,6 +109,11 @@ class Run:
         pose_at(self.state.trajectory, i, time, x, q)
         return x, to_matrix(q)
 
+    def keep(self, count: int) -> None:
+        """Leave the first `count` frames only: the run ends before its time."""
+        for part in (self.recorder, self.impulses, self.contact_log, self.forces.log, self.soft_bodies):
+            part.keep(count)
+
     def quarantine(self, i: int, time: float) -> None:
         """Freeze a body whose state stopped being finite where its trajectory last was, and report it."""
         now, trajectory = self.state.now, self.state.trajectory

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from contextlib import closing
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,10 @@ from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.providers import provider
 from rigidimpulse.engine.begin import begin_run, make_plan
 from rigidimpulse.engine.compile_scene import compile_scene
+from rigidimpulse.engine.early_end import Stopped, interruptible, memory_told
 from rigidimpulse.engine.effects import EventKernel
 from rigidimpulse.engine.loop import run_to_end
-from rigidimpulse.engine.recording_of import finish_run
+from rigidimpulse.engine.recording_of import finish_early, finish_run
 from rigidimpulse.engine.run import Run
 from rigidimpulse.recording.profile import Stopwatch
 from rigidimpulse.recording.recording import Recording, RunSettings
@@ -52,11 +53,13 @@ def simulate(
         effects: effects to enable (True) or to leave out (False), by their names in `run.plan.explain()`. The status names an effect that
             is left out although the scene calls for it.
         progress: called with the simulated time in s after every step, or once for many steps in which only impacts of balls happened.
+            It may raise KeyboardInterrupt to stop the run there.
         cache: an .h5 file that is written while the run goes on, with a checkpoint every few seconds; see `Cache`. If the file exists, the
             run continues from its last checkpoint and ends with the same bits; a finished run is read. Needs the extra `cache`.
 
     Returns:
-        The recording, with round(duration * fps) + 1 frames; the first is the initial state.
+        The recording, with round(duration * fps) + 1 frames; the first is the initial state. Ctrl-C stops the run after the step that it is
+        in: the recording has the frames until then, and its status is not ok and says "partial". A second Ctrl-C raises KeyboardInterrupt.
 
     Raises:
         SceneError: the scene cannot be simulated as it is; names the body, the value and the remedy. Or an effect is unknown, cannot be
@@ -64,34 +67,68 @@ def simulate(
 
     """
     if isinstance(accuracy, str | Accuracy):
-        return _simulate(scene, duration, fps, accuracy, effects, progress, cache)
+        return _simulate(_Asked(scene, duration, fps, accuracy, effects), progress, cache, interruptible)
     if cache is not None:
         raise SceneError("a cache for an accuracy that is still to be chosen", "choose it first, and give run.choice.accuracy")
     return provider("simulate to target")(scene, duration, fps, accuracy, effects, progress)
 
 
-def _simulate(
+def simulate_whole(
     scene: Scene,
     duration: float,
-    fps: float,
-    accuracy: str | Accuracy,
-    effects: Mapping[str, bool] | None,
-    progress: Callable[[float], None] | None,
+    fps: float = 60.0,
+    *,
+    accuracy: str | Accuracy = "standard",
+    effects: Mapping[str, bool] | None = None,
+    progress: Callable[[float], None] | None = None,
     cache: str | os.PathLike[str] | Cache | None = None,
 ) -> Recording:
-    """See `simulate`."""
-    stopwatch = Stopwatch()
-    run = prepare(scene, frame_times(duration, fps), accuracy, effects)
-    settings = RunSettings(float(duration), float(fps), run.world.accuracy, dict(effects or {}))
-    if cache is None:
-        recording = complete(run, duration, progress)
-    else:
-        with closing(provider("checkpoints")(cache, settings, run)) as checkpointer:
-            run_to_end(checkpointer.run, duration, lambda time: checkpointer.look(time, progress))
-            checkpointer.write(float(duration))
-            recording = finish_run(checkpointer.run, duration)
-            checkpointer.finish(recording)
+    """Simulate a scene to its end, as `simulate` does: Ctrl-C raises KeyboardInterrupt, for those who have no use for a part of a run."""
+    return _simulate(_Asked(scene, duration, fps, accuracy, effects), progress, cache, nullcontext)
+
+
+class _Asked(NamedTuple):
+    """What `simulate` is asked for."""
+
+    scene: Scene
+    duration: float
+    fps: float
+    accuracy: str | Accuracy
+    effects: Mapping[str, bool] | None
+
+
+def _simulate(
+    asked: _Asked,
+    progress: Callable[[float], None] | None,
+    cache: str | os.PathLike[str] | Cache | None,
+    listening: Callable[[Callable[[float], None] | None], AbstractContextManager[Callable[[float], None] | None]],
+) -> Recording:
+    """See `simulate`; listening: to Ctrl-C, or not."""
+    stopwatch, duration, times = Stopwatch(), float(asked.duration), frame_times(asked.duration, asked.fps)
+    with memory_told(len(times), len(asked.scene.bodies)):
+        run = prepare(asked.scene, times, asked.accuracy, asked.effects)
+        settings = RunSettings(duration, float(asked.fps), run.world.accuracy, dict(asked.effects or {}))
+        with listening(progress) as look:
+            if cache is None:
+                recording = complete(run, duration, look)
+            else:
+                with closing(provider("checkpoints")(cache, settings, run)) as checkpointer:
+                    recording = _complete_in_cache(checkpointer, duration, look)
     return replace(recording, profile=stopwatch.read(run.plan), settings=settings)
+
+
+def _complete_in_cache(checkpointer: Any, duration: float, progress: Callable[[float], None] | None) -> Recording:
+    """As `complete`, from the last checkpoint on."""
+    run = checkpointer.run
+    try:
+        run_to_end(run, duration, lambda time: checkpointer.look(time, progress))
+    except Stopped:
+        checkpointer.write(run.state.time)
+        return finish_early(run, duration)
+    checkpointer.write(duration)
+    recording = finish_run(run, duration)
+    checkpointer.finish(recording)
+    return recording
 
 
 def prepare(
@@ -106,8 +143,11 @@ def prepare(
 
 
 def complete(run: Run, duration: float, progress: Callable[[float], None] | None = None) -> Recording:
-    """Step a run to its end at `duration` [s]; hand back what was recorded."""
-    run_to_end(run, duration, progress)
+    """Step a run to its end at `duration` [s], or until `progress` raises `Stopped`; hand back what was recorded."""
+    try:
+        run_to_end(run, duration, progress)
+    except Stopped:
+        return finish_early(run, duration)
     return finish_run(run, duration)
 
 

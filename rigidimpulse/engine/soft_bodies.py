@@ -72,6 +72,10 @@ class RunningSoftBodies:
         self._report(run, time, done)
         return end
 
+    def keep(self, count: int) -> None:
+        """Leave the first `count` frames only."""
+        self._times, self._frames = self._times[:count], self._frames[:count]
+
     def tracks(self) -> list[FlexibleTrack]:
         """Frames of each flexible body."""
         soft_bodies = self._table.soft_bodies

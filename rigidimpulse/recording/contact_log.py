@@ -146,6 +146,10 @@ class ContactLog:
             size *= 2
         self.buffers = self.buffers._replace(rows=longer(rows, size - len(rows)))
 
+    def keep(self, count: int) -> None:
+        """Leave the first `count` frames only."""
+        self.buffers = self.buffers._replace(times=self.buffers.times[:count])
+
     def table(self) -> np.ndarray:
         """All contacts that a frame sees, in order of their start. Those that last carry their forces to the last frame."""
         self._take_out_ended()

@@ -60,6 +60,11 @@ class ImpulseAccounts:
         """An impulse (3,) N s of a cause on b, the opposite on a, at `time`."""
         self._gain(cause, a, b)[np.searchsorted(self._times, time, side="left")] += impulse
 
+    def keep(self, count: int) -> None:
+        """Leave the first `count` frames only."""
+        self._times = self._times[:count]
+        self._gains = {key: gain[: count + 1] for key, gain in self._gains.items()}
+
     def _gain(self, cause: str, a: int, b: int) -> np.ndarray:
         """What is gained since the frame before (f + 1, 3); the last row is after all frames."""
         key = (cause, a, b)

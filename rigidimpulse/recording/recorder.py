@@ -134,6 +134,12 @@ class Recorder:
         """Write the frames of all these bodies before `time`, as `flush` does."""
         self._write(trajectory, bodies, int(np.searchsorted(self.times, time, side="left")))
 
+    def keep(self, count: int) -> None:
+        """Leave the first `count` frames only."""
+        self.times, self.position, self.orientation = self.times[:count], self.position[:count], self.orientation[:count]
+        self.velocity, self.angular_velocity = self.velocity[:count], self.angular_velocity[:count]
+        self.written = np.minimum(self.written, count)
+
     def finish(self, trajectory: Trajectories) -> None:
         """Write what is left of all bodies."""
         for last in range(int(self.written.min(initial=0)), len(self.times), AT_ONCE):

@@ -13,9 +13,14 @@ from typing import Any
 from rigidimpulse.recording.events import Event
 
 
+STOPPED = "stopped"
+"""Kind of the event of a run that was stopped before its end."""
+
+
 def line(event: Event) -> str:
     """Return an event as a line of text: time, kind, bodies, and what to change."""
-    text = f"t = {event.time:.6g} s, {event.kind} ({', '.join(event.bodies)}): {event.message}"
+    bodies = f" ({', '.join(event.bodies)})" if event.bodies else ""
+    text = f"t = {event.time:.6g} s, {event.kind}{bodies}: {event.message}"
     return " ".join(text.splitlines())
 
 
@@ -55,6 +60,11 @@ class Status:
     def problems(self) -> tuple[Event, ...]:
         """The events that are problems."""
         return tuple(event for event in self.events if event.is_problem)
+
+    @property
+    def is_partial(self) -> bool:
+        """Whether the run was stopped before its end, or still goes on: the recording has the frames until then."""
+        return any(event.kind == STOPPED for event in self.events)
 
     def later(self, shift: float) -> Status:
         """Return the status of the same run with a clock that is `shift` s ahead."""

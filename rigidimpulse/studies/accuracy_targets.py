@@ -21,7 +21,7 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.compile_scene import compile_scene
-from rigidimpulse.engine.simulate import simulate
+from rigidimpulse.engine.simulate import simulate_whole
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.choice import UNKNOWN, Choice, Estimate, Try
 from rigidimpulse.recording.events import Event
@@ -53,7 +53,7 @@ def simulate_to_target(
         raise SceneError(f"accuracy {target!r}", "give 'preview', 'standard', 'exact', an Accuracy, Within(...) or InTime(...)")
 
     def run(setting: Setting, end: float, given: Scene = scene) -> Recording:
-        return simulate(given, end, fps, accuracy=setting.accuracy, effects=effects, progress=progress)
+        return simulate_whole(given, end, fps, accuracy=setting.accuracy, effects=effects, progress=progress)
 
     chosen, choice = _within(run, scene, duration, target) if isinstance(target, Within) else _in_time(run, scene, duration, target)
     events = chosen.status.events

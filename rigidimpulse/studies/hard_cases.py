@@ -169,11 +169,11 @@ def _end(process: subprocess.Popen) -> None:
 
 def run_case(name: str) -> CaseResult:
     """Run a case in this process."""
-    from rigidimpulse.engine.simulate import simulate
+    from rigidimpulse.engine.simulate import simulate_whole
 
     entry = gallery.load(name)
     start = perf_counter()
-    run = simulate(entry.scene(), entry.duration, entry.fps, accuracy=entry.accuracy)
+    run = simulate_whole(entry.scene(), entry.duration, entry.fps, accuracy=entry.accuracy)
     checks = [as_plain(check) for check in entry.check(run)]
     seconds = perf_counter() - start
     if entry.cheaper is not None:
@@ -187,12 +187,12 @@ def run_case(name: str) -> CaseResult:
 
 def cheaper_fails(entry: GalleryScene) -> Check:
     """Return the check that the scene's cheaper settings are not enough: the option makes the difference."""
-    from rigidimpulse.engine.simulate import simulate
+    from rigidimpulse.engine.simulate import simulate_whole
     from rigidimpulse.gallery.record import at_least
     from rigidimpulse.scene.accuracy import Accuracy
 
     assert entry.cheaper is not None
-    run = simulate(entry.scene(), entry.duration, entry.fps, accuracy=entry.cheaper)
+    run = simulate_whole(entry.scene(), entry.duration, entry.fps, accuracy=entry.cheaper)
     failed = sum(not check.passed for check in entry.check(run))
     default = Accuracy()
     named = ", ".join(f"{key} {value}" for key, value in entry.cheaper if value != getattr(default, key))

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from rigidimpulse.engine.compile_scene import compile_scene
-from rigidimpulse.engine.simulate import simulate
+from rigidimpulse.engine.simulate import simulate_whole
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.studies.deviation import agree_until, deviation
@@ -31,7 +31,7 @@ def find_horizon(run: Recording) -> dict[str, float]:
     assert run.scene is not None and run.settings is not None
     duration, fps, accuracy, effects = run.settings
     pair = [
-        simulate(perturbed(run.scene, sign), duration, fps, accuracy=beside(accuracy, sign), effects=effects or None)
+        simulate_whole(perturbed(run.scene, sign), duration, fps, accuracy=beside(accuracy, sign), effects=effects or None)
         for sign in (1.0, -1.0)
     ]
     world = compile_scene(run.scene)

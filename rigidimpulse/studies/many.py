@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rigidimpulse.core.errors import RigidImpulseError, SceneError, unknown_name
-from rigidimpulse.engine.simulate import prepare, simulate
+from rigidimpulse.engine.simulate import prepare, simulate_whole
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.recording.status import Status
 from rigidimpulse.scene.accuracy import Accuracy
@@ -95,7 +95,7 @@ class Task:
         """Run a variation; whatever goes wrong is in the result."""
         try:
             settings = run_settings(self.settings, _checked(parameters))
-            run = simulate(make_scene(self.scene, dict(parameters)), **settings, effects=self.effects)
+            run = simulate_whole(make_scene(self.scene, dict(parameters)), **settings, effects=self.effects)
             return VariedRun(number, parameters, self.keep(run))
         except SceneError as error:
             return VariedRun(number, parameters, error=error.within(f"variation {number}"))

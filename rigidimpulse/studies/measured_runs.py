@@ -8,7 +8,7 @@ from time import perf_counter, process_time
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.engine.simulate import simulate
+from rigidimpulse.engine.simulate import simulate_whole
 from rigidimpulse.model.effect import STAGES
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.recording import Recording
@@ -91,7 +91,7 @@ class MeasuredRuns:
             if perf_counter() > deadline:
                 raise TimeUp
 
-        run = simulate(self.scene, self.duration, self.fps, accuracy=setting.accuracy, progress=watch)
+        run = simulate_whole(self.scene, self.duration, self.fps, accuracy=setting.accuracy, progress=watch)
         if setting.family == "presets":
             self.usual = max(self.usual, perf_counter() - start)
         profile = run.profile

@@ -25,7 +25,7 @@ from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.pair_table import MARGIN, append_pairs, pair_bodies
 from rigidimpulse.engine.participants import NarrowPhase
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.simulate import simulate
+from rigidimpulse.engine.simulate import simulate_whole
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
 from rigidimpulse.recording.recording import Recording
@@ -118,7 +118,7 @@ def compare_narrow_phases(scene: Scene, duration: float, fps: float = 60.0, accu
     reason = why_not_fcl(compile_scene(scene, fcl))
     if reason:
         raise SceneError(reason, "compare narrow phases of a scene in which two meshes, boxes or hulls may meet")
-    run_own, run_fcl = (simulate(scene, duration, fps, accuracy=accuracy) for accuracy in (own, fcl))
+    run_own, run_fcl = (simulate_whole(scene, duration, fps, accuracy=accuracy) for accuracy in (own, fcl))
     begins_own, begins_fcl = _first_impacts(run_own), _first_impacts(run_fcl)
     meshes = _Instant(scene, fcl)
     impacts = [
@@ -189,7 +189,7 @@ class _Instant:
         world = compile_scene(self._scene, self._accuracy)
         if time > 0.0:
             own = Accuracy(**{**self._accuracy.model_dump(), "narrow_phase": "exact"})
-            until = simulate(self._scene, time, 1.0 / time, accuracy=own)
+            until = simulate_whole(self._scene, time, 1.0 / time, accuracy=own)
             world.position = until.positions[-1] + rotate(until.orientations[-1], world.offset)
             world.orientation = multiply(until.orientations[-1], world.turn)
         run = make_run(world, make_plan(world), Recorder(np.array([0.0]), world.num_bodies), EventLog())

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.engine.simulate import simulate
+from rigidimpulse.engine.simulate import simulate_whole
 from rigidimpulse.gallery.record import GalleryScene
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.recording import Recording
@@ -101,7 +101,7 @@ def exact_reference(entry: GalleryScene, world: World, times: np.ndarray) -> Ref
     for values, target in ((law.position, position), (law.orientation, orientation)):
         for name, value in values.items():
             target[:, names.index(name)] = value
-    run = simulate(world.scene, float(times[-1]), 1.0 / float(times[1] - times[0]))
+    run = simulate_whole(world.scene, float(times[-1]), 1.0 / float(times[1] - times[0]))
     truth = Truth(times, position, orientation, law.energy, mechanical_energy(world, run)[1], law.impacts)
     extent = float(np.nanmax(np.abs(position), initial=0.0))
     horizon = {name: float(times[-1]) for name in law.position}
@@ -125,7 +125,7 @@ def converged_reference(
         tell(f"reference, step {accuracy.step:.2g} s")
         begin = perf_counter()
         try:
-            runs.append(simulate(scene, duration, fps, accuracy=accuracy))
+            runs.append(simulate_whole(scene, duration, fps, accuracy=accuracy))
         except SceneError as error:
             return Reference(NONE, f"the reference cannot be run: {error}", None, {}, np.nan)
         spent = perf_counter() - begin
@@ -139,7 +139,7 @@ def converged_reference(
     tell("reference, started off by rounding")
     settings = runs[-1].settings
     assert settings is not None
-    twin = simulate(perturbed(scene), duration, fps, accuracy=settings.accuracy)
+    twin = simulate_whole(perturbed(scene), duration, fps, accuracy=settings.accuracy)
     return reference_of(world, times, runs[-1], [runs[-2] if len(runs) > 1 else twin, twin], note)
 
 

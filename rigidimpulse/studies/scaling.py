@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.engine.simulate import simulate
+from rigidimpulse.engine.simulate import simulate_whole
 from rigidimpulse.gallery.pile import pile
 from rigidimpulse.model.effect import STAGES
 from rigidimpulse.recording.recording import Recording
@@ -70,7 +70,7 @@ def gas(number: int) -> Scene:
 
 
 def _gas_point(number: int) -> Point:
-    run = simulate(gas(number), max(4.0, BALL_SECONDS / number), fps=1.0)
+    run = simulate_whole(gas(number), max(4.0, BALL_SECONDS / number), fps=1.0)
     return _point(number, run, len(run.impacts))
 
 
@@ -83,7 +83,7 @@ def _point(number: int, run: Recording, count: int) -> Point:
 
 def _pile_point(number: int) -> Point:
     steps: list[float] = []
-    run = simulate(pile(number, LAYERS), PILED, fps=1.0, progress=steps.append)
+    run = simulate_whole(pile(number, LAYERS), PILED, fps=1.0, progress=steps.append)
     return _point(number, run, len(steps))
 
 

@@ -101,12 +101,12 @@ def _run_apart(folder: Path, name: str, limit: float) -> CaseResult:
 
 def run_scene(entry: GalleryScene, folder: Path) -> CaseResult:
     """Run a scene in this process and write its page, its still and, last, its result."""
-    from rigidimpulse.engine.simulate import simulate
+    from rigidimpulse.engine.simulate import simulate_whole
     from rigidimpulse.view.page import write_html
     from rigidimpulse.view.picture import draw_picture, png
 
     start, name = perf_counter(), entry.name
-    run = simulate(entry.scene(), entry.duration, entry.fps, accuracy=entry.accuracy)
+    run = simulate_whole(entry.scene(), entry.duration, entry.fps, accuracy=entry.accuracy)
     found = entry.check(run)
     checks = [as_plain(check) for check in found]
     seconds = perf_counter() - start

@@ -142,6 +142,11 @@ class ForceLog:
         self.work[i] += self._total[rows, 6].sum() - before
         self._begun[i] = time
 
+    def keep(self, count: int) -> None:
+        """Leave the first `count` frames only."""
+        self._times, self.at_frames = self._times[:count], self.at_frames[:count]
+        self._written = np.minimum(self._written, count)
+
     def finish(self) -> None:
         """Write the frames that are left."""
         for i, rows in self._rows.items():

@@ -11,9 +11,9 @@ from rigidimpulse.dynamics.soft_body.track import tracks_in
 from rigidimpulse.io.cache.layout import Content, Header
 from rigidimpulse.io.cache.read import REMEDY, read
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
-from rigidimpulse.recording.events import impact_table
+from rigidimpulse.recording.events import Event, impact_table
 from rigidimpulse.recording.recording import Recording
-from rigidimpulse.recording.status import Status, restored
+from rigidimpulse.recording.status import STOPPED, Status, restored
 from rigidimpulse.scene.frames import own_frames
 
 
@@ -50,5 +50,5 @@ def _status(path: Path, header: Header, content: Content) -> Status:
             return restored(content.tables["status"])
         except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise SceneError(f"its status cannot be read: {error}", REMEDY, f"cache {str(path)!r}") from None
-    so_far = f"{content.time:.6g} s of {header.duration:g} s: the run was stopped, or still goes on"
-    return Status(False, f"{so_far}; simulate the scene with this cache again to go on from there")
+    so_far = f"the recording is partial: it ends at {content.time:.6g} s of {header.duration:g} s; the run was stopped, or still goes on"
+    return Status.of([Event(content.time, STOPPED, (), f"{so_far}; simulate the scene with this cache again to go on from there")])

@@ -17,7 +17,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import make_folder
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.forecast import remember
-from rigidimpulse.engine.simulate import simulate
+from rigidimpulse.engine.simulate import simulate_whole
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.scene import Scene
@@ -109,9 +109,9 @@ def _remember_cost(known: Glance) -> None:
 
 def _first_duration(scene: Scene, duration: float, fps: float) -> float:
     """Time of the motion that a preview computes in PILOT s, in whole frames, at most the duration."""
-    simulate(scene, min(2.0 / fps, duration), fps, accuracy="preview")  # loads kernels
+    simulate_whole(scene, min(2.0 / fps, duration), fps, accuracy="preview")  # loads kernels
     try:
-        simulate(scene, duration, fps, accuracy="preview", progress=watch(PILOT))
+        simulate_whole(scene, duration, fps, accuracy="preview", progress=watch(PILOT))
     except GivenUp as reached:
         return min(max(math.floor(reached.args[0] * fps), 2) / fps, duration)
     return duration
@@ -199,12 +199,12 @@ class _Pass:
         """Take the last run for the reference, as far as the others and a perturbed one agree with it."""
         known, settings = self.known, runs[-1].settings
         assert settings is not None
-        twin = simulate(perturbed(known.scene), known.duration, known.fps, accuracy=settings.accuracy)
+        twin = simulate_whole(perturbed(known.scene), known.duration, known.fps, accuracy=settings.accuracy)
         step = f"a step of 1/{round(1.0 / settings.accuracy.step)} s"
         known.take_reference(reference_of(known.world, known.times, runs[-1], [*runs[:-1], twin], f"{step}, {note}"), runs[-1])
 
     def _fine(self, rate: int) -> Recording:
-        return simulate(self.known.scene, self.known.duration, self.known.fps, accuracy=Accuracy(step=1.0 / rate, tolerance=TIGHT))
+        return simulate_whole(self.known.scene, self.known.duration, self.known.fps, accuracy=Accuracy(step=1.0 / rate, tolerance=TIGHT))
 
     def _seconds(self, name: str) -> float:
         return next((played.seconds for played in self.known.runs if played.candidate.name == name), 0.0)

@@ -9,7 +9,7 @@ from time import perf_counter
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.kernels import KERNELS
 from rigidimpulse.core.providers import load_function
-from rigidimpulse.engine.simulate import simulate
+from rigidimpulse.engine.simulate import simulate_whole
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.glance.candidates import PEER, Candidate
@@ -68,7 +68,7 @@ class Player:
         """Wall-clock time, s, and the motion."""
         if candidate.accuracy is None:
             return self._run_engine(candidate, limit)
-        run = simulate(self.scene, self.duration, self.fps, accuracy=candidate.accuracy, progress=watch(limit))
+        run = simulate_whole(self.scene, self.duration, self.fps, accuracy=candidate.accuracy, progress=watch(limit))
         assert run.profile is not None
         return run.profile.seconds - run.profile.preparing, run
 

@@ -96,7 +96,7 @@ def run_take(job: TakeJob) -> Take:
 
 def _run(job: TakeJob) -> Take:
     from rigidimpulse.engine.fingerprint import fingerprint
-    from rigidimpulse.engine.simulate import simulate
+    from rigidimpulse.engine.simulate import simulate_whole
 
     start = perf_counter()
     settings = run_settings(job.settings, job.parameters)
@@ -105,7 +105,7 @@ def _run(job: TakeJob) -> Take:
     known = read_take(job.stem)
     if known is not None and known.fingerprint == mark:
         return known
-    run = simulate(scene, settings["duration"], settings["fps"], accuracy=settings["accuracy"], cache=job.stem.with_suffix(".h5"))
+    run = simulate_whole(scene, settings["duration"], settings["fps"], accuracy=settings["accuracy"], cache=job.stem.with_suffix(".h5"))
     run.export(job.stem.with_suffix(".html"))
     moving = [i for i, body in enumerate(scene.bodies) if body.motion == "dynamic"]
     ways = np.linalg.norm(run.positions[-1, moving] - run.positions[0, moving], axis=1)

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from rigidimpulse.core.errors import SceneError
@@ -16,6 +15,9 @@ from rigidimpulse.studies.wedges.take import FAILED, Take, TakeJob, run_take
 
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 """Workers share the cores among themselves."""
+_SPAWN = multiprocessing.get_context("spawn")
+_MARKS: list[Any] = []
+"""In a worker process: the marks of the takes that run, in memory that all processes of a pool share."""
 
 
 class Workers(NamedTuple):
@@ -57,22 +59,21 @@ def run_pool(jobs: Sequence[TakeJob], processes: int, retries: int) -> Iterator[
     """
     left = {job.number: job for job in jobs}
     while left:
-        for job in left.values():
-            _mark(job).unlink(missing_ok=True)
+        marks = _SPAWN.RawArray("b", 1 + max(left))
         try:
-            for take in _run_in(processes, list(left.values()), retries):
+            for take in _run_in(processes, list(left.values()), retries, marks):
                 del left[take.number]
                 yield take
         except BrokenProcessPool:
-            for job in [job for job in left.values() if _mark(job).exists()]:
+            for job in [job for job in left.values() if marks[job.number]]:
                 del left[job.number]
                 yield _run_alone(job, retries)
 
 
-def _run_in(processes: int, jobs: Sequence[TakeJob], retries: int) -> Iterator[Take]:
-    """Run takes in one pool; raises BrokenProcessPool when one of its processes dies."""
+def _run_in(processes: int, jobs: Sequence[TakeJob], retries: int, marks: Any) -> Iterator[Take]:
+    """Run takes in one pool; raises BrokenProcessPool when one of its processes dies. marks: of the takes that run, by their numbers."""
     attempts = dict.fromkeys([job.number for job in jobs], 0)
-    with one_thread(), ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+    with one_thread(), ProcessPoolExecutor(processes, _SPAWN, _begin, (marks,)) as pool:
         waiting: dict[Future, TakeJob] = {pool.submit(_run_marked, job): job for job in jobs}
         while waiting:
             done = wait(waiting, return_when=FIRST_COMPLETED).done
@@ -92,23 +93,25 @@ def _run_alone(job: TakeJob, retries: int) -> Take:
     error = BrokenProcessPool()
     for _ in range(retries):
         try:
-            return next(_run_in(1, [job], retries))
+            return next(_run_in(1, [job], retries, _SPAWN.RawArray("b", 1 + job.number)))
         except BrokenProcessPool as broken:
             error = broken
     return _failed(job, error)
 
 
+def _begin(marks: Any) -> None:
+    """Prepare a worker process."""
+    _MARKS.append(marks)
+
+
 def _run_marked(job: TakeJob) -> Take:
-    """Run a take; a mark tells that it was running if the process dies."""
-    _mark(job).touch()
+    """Run a take in a worker process; a mark tells that it was running if the process dies."""
+    marks = _MARKS[0]
+    marks[job.number] = True
     try:
         return run_take(job)
     finally:
-        _mark(job).unlink(missing_ok=True)
-
-
-def _mark(job: TakeJob) -> Path:
-    return job.stem.with_suffix(".running")
+        marks[job.number] = False
 
 
 def run_dask(jobs: Sequence[TakeJob], scheduler: str, processes: int, retries: int) -> Iterator[Take]:
