@@ -1,7 +1,7 @@
 """Runs that end before their time: by Ctrl-C, or because there is no more memory.
 
-The first Ctrl-C ends the run after the step that it is in: what was computed until then is whole. The second ends it at once, as everywhere.
-Only the main thread of a program hears of Ctrl-C. A program that deals with it in its own way keeps its own way.
+The first Ctrl-C ends the run after the step that it is in: what was computed until then is whole. The second ends it at once, as
+everywhere. Only the main thread of a program hears of Ctrl-C. A program that deals with it in its own way keeps its own way.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class _Interruption:
 
 @contextmanager
 def interruptible(progress: Callable[[float], None] | None) -> Iterator[Callable[[float], None]]:
-    """Hear Ctrl-C; give what is to be called with the time of the run after each step in the place of `progress`, and may raise `Stopped`."""
+    """Hear Ctrl-C; give what is to be called after each step in the place of `progress`, and may raise `Stopped`."""
     interruption = _Interruption(progress)
     is_free = threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if is_free:
@@ -69,5 +69,5 @@ def memory_told(num_frames: int, num_bodies: int) -> Iterator[None]:
     except MemoryError:
         raise SceneError(
             f"there is not enough memory for {num_frames} frames of {num_bodies} bodies",
-            "lower the fps or the duration, use simpler meshes, or close other programs; a run with a cache goes on from its last checkpoint",
+            "lower the fps or the duration, use simpler meshes, or close programs; a run with a cache goes on from its last checkpoint",
         ) from None

@@ -265,6 +265,8 @@ class SubsteppedContact:
         if reason:
             return Skip(reason)
         when = f"once the exact regime gets expensive: fewer than {MANY} bodies" if only_expensive(world) else "bodies may pile up"
+        if world.accuracy.contact_solver == "cheapest":
+            when = "where that takes less time than the exact regime"
         verbs: dict[str, Callable[..., Any]] = {
             "substepped.contact_forces": substep_contacts, "substepped.trajectories": begin_substepped_trajectories
         }  # fmt: skip

@@ -23,9 +23,10 @@ and, where an island begins to be sub-stepped (a body that comes near later is t
                 were solved more than EXPENSIVE_TALL times, by as much less often as the island has more bodies than SMALL: a column
                 that stands takes a few, a chain of rings that swings takes sixty
 
-In scenes of fewer than SOME movable bodies without joints only what has joints or runs away is sub-stepped. "substepped" takes every island
-that touches something or has joints. A body without joints that moves farther than FAST of its inner radius in a sub-step, or turns by more
-than SPIN rad, is swept instead.
+In scenes of fewer than SOME movable bodies without joints only what has joints or runs away is sub-stepped. "cheapest" asks what islands
+cost, and nothing else of the above: see `cheapest.py`. "substepped" takes every island that touches something or has joints.
+
+A body without joints that moves farther than FAST of its inner radius in a sub-step, or turns by more than SPIN rad, is swept instead.
 """
 
 from __future__ import annotations
@@ -51,12 +52,14 @@ def why_not_substepped(world: World) -> str:
     solver = world.accuracy.contact_solver
     if "sub-stepped islands" in world.left_out:
         return "left out by the caller"
-    if solver not in ("auto", "substepped"):
+    if solver not in ("auto", "cheapest", "substepped"):
         return f"contact_solver is {solver!r}"
     if not world.joints_of_scene and not (world.can_collide and world.can_press):
         return "nothing presses bodies together"
     if world.force_tables:
         return "forces vary"
+    if solver == "cheapest" and world.rolling is not None:
+        return "rolling friction is exact only"
     if solver == "substepped":
         # Everything that touches would be stepped, and roll for ever.
         return "rolling friction is exact only" if world.rolling is not None else ""
@@ -80,7 +83,7 @@ def may_begin(world: World, joined: np.ndarray, solve_count: np.ndarray) -> bool
 
 def only_expensive(world: World) -> bool:
     """Whether islands are sub-stepped only where the exact regime has become expensive: the scene has not MANY bodies."""
-    return world.accuracy.contact_solver == "auto" and _number(world) < MANY
+    return world.accuracy.contact_solver in ("auto", "cheapest") and _number(world) < MANY
 
 
 def jointed(world: World) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.geometry import CompiledShape, Geometry, Shapes, cylinders_of
+from rigidimpulse.collision.manifold.shrunk_shapes import convex_depths
 from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.frames import own_pose
 from rigidimpulse.scene.joint import Joint
@@ -110,6 +111,11 @@ class World:
     def num_bodies(self) -> int:
         """Number of bodies."""
         return len(self.names)
+
+    @cached_property
+    def convex_depths(self) -> np.ndarray:
+        """See `collision.manifold.shrunk_shapes.convex_depths`."""
+        return convex_depths(self.geometry)
 
     @cached_property
     def compiled_shapes(self) -> Shapes:

@@ -12,7 +12,6 @@ from typing import Any
 
 from rigidimpulse.recording.events import Event
 
-
 STOPPED = "stopped"
 """Kind of the event of a run that was stopped before its end."""
 

@@ -15,8 +15,9 @@ Slots
                     allows), or in steps of one length, where forces vary and nothing collides by impulses: "runge_kutta" (of order 4),
                     "semi_implicit" (Euler's, of order 1)
     contact_solver  how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for large islands:
-                    see docs/theory/sub_stepping.md), "qp" (the exact laws by a convex solver library: a reference), or "auto":
-                    newton, and sub-stepped for large islands of bodies that may touch in a step
+                    see docs/theory/sub_stepping.md), "qp" (the exact laws by a convex solver library: a reference), "auto":
+                    newton, and sub-stepped for large islands of bodies that may touch in a step, or "cheapest": newton, and
+                    sub-stepped where that takes less time
     substep_motion  how far touching bodies of a sub-stepped island may move past each other until their contacts are searched
                     again, as a fraction of the distance from the centre of mass to the nearest face
     step            s; contact forces are constant over it, impacts are found inside it at any time
@@ -51,7 +52,7 @@ class Accuracy(BaseModel):
     penalty_stiffness: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     penalty_damping: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
     integrator: Literal["exact", "semi_implicit", "runge_kutta"] = "exact"
-    contact_solver: Literal["auto", "newton", "substepped", "qp"] = "auto"
+    contact_solver: Literal["auto", "cheapest", "newton", "substepped", "qp"] = "auto"
     substep_motion: float = Field(default=0.1, gt=0.0, le=1.0, allow_inf_nan=False)
     step: float = Field(default=1.0 / 60.0, gt=0.0, allow_inf_nan=False)
     tolerance: float = Field(default=1e-13, gt=0.0, le=1e-2, allow_inf_nan=False)
@@ -83,7 +84,7 @@ def _named(error: Any) -> str:
 
 
 PRESETS: dict[str, dict[str, Any]] = {
-    "preview": {"impact_time": "conservative", "tolerance": 1e-7, "substep_motion": 0.3, "contact_solver": "substepped"},
+    "preview": {"impact_time": "conservative", "tolerance": 1e-7, "substep_motion": 0.3, "contact_solver": "cheapest"},
     "standard": {},
     "exact": {"step": 1.0 / 240.0, "tolerance": 1e-15, "iterations": 100000},
     "classic": {"narrow_phase": "fcl", "impact_time": "bisection", "response": "sequential"},

@@ -7,9 +7,6 @@ is reported by its own status or takes longer than the limit, and a summary. The
 from __future__ import annotations
 
 import argparse
-import multiprocessing
-import resource
-import signal
 import sys
 from collections import Counter
 from pathlib import Path
@@ -17,12 +14,11 @@ from time import perf_counter
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "invariants"))
 
+from apart import apart
 from scene_laws import broken_laws
 from scene_plans import Dice, make_plan, make_scene
 
 import rigidimpulse as ri
-
-PROCESSES = multiprocessing.get_context("fork")
 
 
 def verdicts(seed: int, twice: bool) -> tuple[list[str], list[str]]:
@@ -38,26 +34,10 @@ def verdicts(seed: int, twice: bool) -> tuple[list[str], list[str]]:
     return broken, [event.kind for event in run.status.events if event.is_problem]
 
 
-def answer(sender, seed: int, limit: int, twice: bool) -> None:
-    """Send the verdicts of a seed from a process that the system ends after `limit` s of processor time."""
-    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
-    sender.send(verdicts(seed, twice))
-
-
 def verdicts_apart(seed: int, limit: int, twice: bool) -> tuple[list[str], list[str]]:
-    """The verdicts of a seed, from a process of its own: one that hangs or crashes is a failure like others."""
-    receiver, sender = PROCESSES.Pipe(duplex=False)
-    process = PROCESSES.Process(target=answer, args=(sender, seed, limit, twice))
-    process.start()
-    sender.close()
-    try:
-        return receiver.recv()
-    except EOFError:
-        process.join()
-        ended = process.exitcode in (-signal.SIGXCPU, -signal.SIGKILL)
-        return [f"not done after {limit} s" if ended else f"crashed, exit code {process.exitcode}"], []
-    finally:
-        process.join()
+    """The verdicts of a seed, from a process of its own."""
+    found = apart(verdicts, seed, twice, seconds=limit)
+    return ([found], []) if isinstance(found, str) else found
 
 
 def main() -> int:

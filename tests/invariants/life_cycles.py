@@ -7,7 +7,7 @@ outside what a run of it must not do.
 from __future__ import annotations
 
 import numpy as np
-from scene_plans import Dice
+from scene_plans import Source
 
 import rigidimpulse as ri
 from rigidimpulse.core.quaternion import rotate
@@ -22,9 +22,9 @@ CLOSED = (ri.BallJoint, ri.HingeJoint, ri.FixedJoint)
 JOINTS = (*CLOSED, ri.SliderJoint, ri.DistanceJoint)
 
 
-def make_life_cycle(seed: int) -> ri.Scene:
-    """The scene of a seed."""
-    dice, scene = Dice(seed), ri.Scene()
+def make_life_cycle(dice: Source) -> ri.Scene:
+    """The scene that the dice choose."""
+    scene = ri.Scene()
     material = ri.Material(restitution=dice.pick((0.0, 0.3)), static_friction=0.5, dynamic_friction=0.4)
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=material))
     for k in range(dice.pick((0, 0, 4, 12))):
@@ -36,7 +36,7 @@ def make_life_cycle(seed: int) -> ri.Scene:
     return scene
 
 
-def _ends(dice: Dice) -> dict[str, float]:
+def _ends(dice: Source) -> dict[str, float]:
     """How a joint ends: never, at a time, by a force, or by the first of both."""
     ends = {}
     if dice.integer(0, 1):
@@ -46,11 +46,11 @@ def _ends(dice: Dice) -> dict[str, float]:
     return ends
 
 
-def _shape(dice: Dice) -> ri.Shape:
+def _shape(dice: Source) -> ri.Shape:
     return dice.pick((ri.Shape.box((0.1, 0.12, 0.14)), ri.Shape.sphere(0.07), ri.Shape.capsule(0.05, 0.1), ri.Shape.cylinder(0.06, 0.1)))
 
 
-def _chain(scene: ri.Scene, dice: Dice, k: int, material: ri.Material) -> None:
+def _chain(scene: ri.Scene, dice: Source, k: int, material: ri.Material) -> None:
     """Two to four bodies in a row, the first one of which may hang on the world."""
     before, x = None, -0.5
     for n in range(dice.integer(2, 4)):
@@ -65,7 +65,7 @@ def _chain(scene: ri.Scene, dice: Dice, k: int, material: ri.Material) -> None:
         before = name
 
 
-def _plank(scene: ri.Scene, dice: Dice, k: int, material: ri.Material) -> None:
+def _plank(scene: ri.Scene, dice: Source, k: int, material: ri.Material) -> None:
     """A plank on a hinge, with a limit or without, and a body that is held above it."""
     y = 0.4 * k - 0.4
     scene.add(ri.Body(f"plank {k}", ri.Shape.box((0.8, 0.2, 0.04)), position=(0.0, y, 0.7), material=material))
@@ -77,7 +77,7 @@ def _plank(scene: ri.Scene, dice: Dice, k: int, material: ri.Material) -> None:
     scene.add(ri.FixedJoint(f"above {k}", dice.pick((None, f"plank {k}")), **_ends(dice)))
 
 
-def _held(scene: ri.Scene, dice: Dice, k: int, material: ri.Material) -> None:
+def _held(scene: ri.Scene, dice: Source, k: int, material: ri.Material) -> None:
     """Two bodies that a joint holds together, one of which another joint holds in the world."""
     y = 0.4 * k - 0.4
     scene.add(ri.Body(f"upper {k}", _shape(dice), position=(0.1, y, 1.6), material=material))

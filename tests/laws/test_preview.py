@@ -92,3 +92,44 @@ def test_machines_with_springs_and_drives_are_ok(name: str) -> None:
     assert run.ledger is not None
     made = run.ledger.dissipated.get("sub-stepping", np.zeros(1))
     assert abs(made).max() < 1e-3 * run.ledger.kinetic.max()
+
+
+COSTS = {"bounce": 0, "incline": 0, "tippe_top": 60, "ladder": 0, "stack_10": 0, "spot": 0}
+"""Scenes of one body, or of bodies that stand, which exact contact does at a fraction of what sub-steps cost; sub-steps in 1 s at most."""
+
+
+@pytest.mark.parametrize("name", COSTS)
+def test_what_is_cheap_stays_exact(name: str) -> None:
+    """A preview must not be slower than "standard": these took 5 to 100 times as long, in 60 sub-stepped steps a second or more."""
+    entry = gallery.load(name)
+    duration = min(entry.duration, 1.0)
+    run = ri.simulate(entry.scene(), duration, accuracy="preview")
+    assert run.status.ok, run.status.message
+    assert steps(run) <= COSTS[name] * duration
+    if not COSTS[name]:
+        exact = ri.simulate(entry.scene(), duration, accuracy="standard")
+        # The same motion, except for the time of impact, which "preview" finds to 1e-7 of the size.
+        np.testing.assert_allclose(run.positions, exact.positions, atol=1e-4 * np.abs(exact.positions).max())
+
+
+def test_what_is_expensive_is_sub_stepped() -> None:
+    """A disk that rings down is solved eighty times a step; sub-steps hold it at a tenth of the cost, and it goes on to turn as it did."""
+    run = ri.simulate(gallery.load("euler_disk").scene(), 1.0, accuracy="preview")
+    assert steps(run) > 30
+    assert run.status.ok, run.status.message
+
+
+def test_costs_repeat() -> None:
+    """The choice follows counts and no clock: another run has the same bits."""
+    entry = gallery.load("tippe_top")
+    first, second = (ri.simulate(entry.scene(), 0.7, accuracy="preview") for _ in range(2))
+    assert steps(first) == steps(second)
+    assert first.state_hash() == second.state_hash()
+
+
+def test_what_runs_away_stays_in_sub_steps() -> None:
+    """Thirteen bodies that come to contact again and again are handed over at most once for each time they come apart."""
+    run = ri.simulate(gallery.load("dominoes").scene(), 1.5, accuracy="preview")
+    line = run.plan.line("sub-stepped islands")
+    assert line.counts["steps"] > 30
+    assert line.counts.get("refused: sub-steps cost more", 0) <= 2

@@ -22,6 +22,7 @@ import numpy as np
 from rigidimpulse.collision.distance.epa import Polytope, make_polytope
 from rigidimpulse.collision.distance.gjk import Simplex, make_simplex
 from rigidimpulse.collision.geometry import HALF_SPACE, Geometry
+from rigidimpulse.collision.manifold.hull_faces import faces
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import turned_by
@@ -135,9 +136,9 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | No
         else:
             corner_first.append(corner_first[-1])
         if is_convex:
-            before = corner_first[-2]
-            for normal, loop in _faces(geometry, p):
-                planes.append(np.append(normal, (vertex[loop] @ normal).max()))
+            before, first, last = corner_first[-2], int(geometry.triangle_first[p]), int(geometry.triangle_first[p + 1])
+            for normal, loop in faces(geometry.triangle_normal[first:last], geometry.triangle[first:last] - int(geometry.vertex_first[p])):
+                planes.append(np.append(normal, max((vertex[loop] @ normal).tolist())))
                 loops.append([before + v for v in loop])
             size = vertex.max(0)
             # Eight corners at +- the same lengths: a box along the principal axes, which has kernels of its own.
@@ -149,31 +150,6 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | No
         face_first=np.array(face_first), plane=np.array(planes).reshape(-1, 4), loop_first=np.cumsum([0, *map(len, loops)]),
         loop=np.array([v for loop in loops for v in loop], np.int64), half_space=half_space,
     )  # fmt: skip
-
-
-def _faces(geometry: Geometry, p: int) -> list[tuple[np.ndarray, list[int]]]:
-    """Unit normals and corners, counted from the primitive's first vertex, of the faces of a convex primitive."""
-    low, first, last = int(geometry.vertex_first[p]), int(geometry.triangle_first[p]), int(geometry.triangle_first[p + 1])
-    normals, triangles = geometry.triangle_normal[first:last], geometry.triangle[first:last] - low
-    left, out = np.arange(last - first), []
-    while len(left):
-        normal = normals[left[0]]
-        flat = normals[left] @ normal > 1.0 - 1e-10
-        out.append((normal, _loop(triangles[left[flat]].tolist())))
-        left = left[~flat]
-    return out
-
-
-def _loop(triangles: list[list[int]]) -> list[int]:
-    """Corners of the polygon that triangles of one plane make, in order."""
-    halves = {(t[k], t[(k + 1) % 3]) for t in triangles for k in range(3)}
-    following = {tail: head for tail, head in halves if (head, tail) not in halves}
-    start = min(following)
-    loop, v = [start], following[start]
-    while v != start:
-        loop.append(v)
-        v = following[v]
-    return loop
 
 
 @inlined

@@ -14,21 +14,32 @@ from rigidimpulse.core.tolerances import TOLERANCES
 
 SHRINK = 1.5 * TOLERANCES.sub_stepping.skin
 """Part of their lengths by which convex bodies are shrunk for the search."""
+FACES_AT_ONCE = 64
+"""Faces whose planes are compared with all vertices at once: few, since the first ones tell that most meshes are not convex."""
 
 
-def inner_radii(geometry: Geometry) -> np.ndarray:
+def convex_depths(geometry: Geometry) -> np.ndarray:
+    """Distance (s,) from the centre of mass of each convex shape to its nearest face, m; 0 for other shapes, and half spaces."""
+    out = np.zeros(len(geometry.shape_first) - 1)
+    for s in range(len(out)):
+        p = int(geometry.shape_first[s])
+        if geometry.shape_first[s + 1] == p + 1 and geometry.kind[p] != HALF_SPACE:
+            out[s] = _convex_depth(geometry, p)
+    return out
+
+
+def inner_radii(geometry: Geometry, depths: np.ndarray) -> np.ndarray:
     """Distance (s,) from the centre of mass of each shape to its nearest face, m; inf for half spaces.
 
-    For shapes that are not one convex piece it is a tenth of the radius that encloses them.
+    For shapes that are not one convex piece it is a tenth of the radius that encloses them. depths: `convex_depths`.
     """
     out = np.full(len(geometry.shape_first) - 1, np.inf)
     for s in range(len(out)):
         first, last = int(geometry.shape_first[s]), int(geometry.shape_first[s + 1])
         if np.all(geometry.kind[first:last] == HALF_SPACE):
             continue
-        depth = _convex_depth(geometry, first) if last == first + 1 else 0.0
         reach = np.linalg.norm(geometry.bound_centre[first:last], axis=1) + geometry.bound_radius[first:last]
-        out[s] = depth if depth > 0.0 else 0.1 * float(reach[np.isfinite(reach)].max())
+        out[s] = depths[s] if depths[s] > 0.0 else 0.1 * float(reach[np.isfinite(reach)].max())
     return out
 
 
@@ -45,27 +56,30 @@ def _convex_depth(geometry: Geometry, p: int) -> float:
         # A ball or a capsule.
         return float(geometry.radius[p]) if np.abs(vertices.sum(0)).max() <= 1e-9 * geometry.bound_radius[p] else 0.0
     depth = np.einsum("ij,ij->i", normals, geometry.vertex[geometry.triangle[faces, 0]])
+    if depth.min() <= 0.0:
+        return 0.0
     size = float(geometry.bound_radius[p])
-    for n, d in zip(normals, depth, strict=True):
-        if d <= 0.0 or float((vertices @ n).max()) > d + 1e-9 * size:
+    for first in range(0, len(depth), FACES_AT_ONCE):
+        some = slice(first, first + FACES_AT_ONCE)
+        if np.any((vertices @ normals[some].T).max(axis=0) > depth[some] + 1e-9 * size):
             return 0.0
     return float(depth.min() + geometry.radius[p])
 
 
-def convex_polyhedra(geometry: Geometry) -> np.ndarray:
-    """Which shapes (s,) bool are one convex polyhedron around their centre of mass, with sharp edges."""
+def convex_polyhedra(geometry: Geometry, depths: np.ndarray) -> np.ndarray:
+    """Which shapes (s,) bool are one convex polyhedron around their centre of mass, with sharp edges; depths: `convex_depths`."""
     out = np.zeros(len(geometry.shape_first) - 1, bool)
     for s in range(len(out)):
         p = int(geometry.shape_first[s])
         single = geometry.shape_first[s + 1] == p + 1 and geometry.kind[p] == ROUND and geometry.radius[p] == 0.0
-        out[s] = single and _convex_depth(geometry, p) > 0.0
+        out[s] = single and depths[s] > 0.0
     return out
 
 
-def shrunk_geometry(geometry: Geometry, dynamic_shapes: np.ndarray) -> tuple[Geometry, np.ndarray]:
+def shrunk_geometry(geometry: Geometry, depths: np.ndarray, dynamic_shapes: np.ndarray) -> tuple[Geometry, np.ndarray]:
     """The shapes for the search, and the factor (s,) of their lengths; 1 where a shape is unchanged.
 
-    dynamic_shapes (s,) bool: shapes of bodies that move freely.
+    depths (s,) m: `convex_depths`, of the shapes without inset surfaces; dynamic_shapes (s,) bool: shapes of bodies that move freely.
     """
     factor = np.ones(len(geometry.shape_first) - 1)
     vertex, frame, radius = geometry.vertex.copy(), geometry.frame.copy(), geometry.radius.copy()
@@ -74,7 +88,7 @@ def shrunk_geometry(geometry: Geometry, dynamic_shapes: np.ndarray) -> tuple[Geo
     for s in np.flatnonzero(dynamic_shapes):
         p = int(geometry.shape_first[s])
         rounded = geometry.kind[p] == ROUND and geometry.radius[p] > 0.0
-        if geometry.shape_first[s + 1] != p + 1 or geometry.kind[p] == HALF_SPACE or rounded or _convex_depth(geometry, p) <= 0.0:
+        if rounded or depths[s] <= 0.0:
             continue
         factor[s] = 1.0 - SHRINK
         vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]] *= factor[s]

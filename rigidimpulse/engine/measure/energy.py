@@ -103,7 +103,7 @@ def allowed_rise(record: RunRecord, moved: float) -> np.ndarray:
         dynamic = world.dynamic
         weight = world.mass[dynamic, None] * world.steady_acceleration[dynamic]
         strength = np.linalg.norm(weight, axis=1)
-        inner = inner_radii(world.geometry)[world.shape_of_body[dynamic]]
+        inner = inner_radii(world.geometry, world.convex_depths)[world.shape_of_body[dynamic]]
         stored = -np.einsum("fnk,nk->fn", record.frames.position[:, dynamic], weight)
         height = np.divide(stored, strength, out=np.zeros_like(stored), where=strength > 0.0)
         allowed += GAP * (0.5 * (height - height.min(axis=1, keepdims=True)) + inner) @ strength

@@ -22,6 +22,7 @@ from rigidimpulse.collision.contact_buffer import Question
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.dynamics.energy import mechanical_energy
+from rigidimpulse.engine.cheapest import CheapestRegime
 from rigidimpulse.engine.exact.advance import NOT_HELD
 from rigidimpulse.engine.exact.energy_limit import note_end_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work, begin_trajectory
@@ -105,13 +106,16 @@ class SubsteppedIslands:
 
         """
         self._sharing, self._rest = sharing, rest
-        self._world, self._only_expensive, self._movable = world, only_expensive(world), world.dynamic.copy()
+        solver = world.accuracy.contact_solver
+        self._world, self._movable = world, world.dynamic.copy()
+        self._finer = solver == "auto" and only_expensive(world)
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.sleep_timer = np.zeros(world.num_bodies)
         self.asleep = np.zeros(world.num_bodies, bool)
         self._stood = np.full((world.num_bodies, 7), np.inf)
         self._taken = np.zeros(world.num_bodies, bool)
-        self._auto = world.accuracy.contact_solver == "auto"
+        self._auto = solver == "auto"
+        self._cheapest = CheapestRegime(world.num_bodies) if solver == "cheapest" else None
         self._jointed = jointed(world)
         self._joint_stepper: JointedStepper | None = None
         self._mean_solves, self._open = np.zeros(world.num_bodies), np.zeros(world.num_bodies, bool)
@@ -128,11 +132,11 @@ class SubsteppedIslands:
     def stepper(self) -> ContactStepper:
         """The solver and its contacts; its kernels are compiled here where they were not needed at the start."""
         prepare_kernels(self._world, with_events=False, with_substepped=True)
-        return ContactStepper(self._world, self._movable, self._only_expensive, self._sharing)
+        return ContactStepper(self._world, self._movable, self._finer, self._sharing)
 
     def _no_solves(self) -> np.ndarray:
-        """Counts (n,) at the start of a step; nothing is handed over unless the planner may choose."""
-        return np.full(self._world.num_bodies, 0.0 if self._auto else NEVER)
+        """Counts (n,) at the start of a step; nothing is handed over where everything is sub-stepped."""
+        return np.full(self._world.num_bodies, 0.0 if self._auto or self._cheapest else NEVER)
 
     def is_idle(self) -> bool:
         """Whether no island is sub-stepped and none may begin to be."""
@@ -140,8 +144,11 @@ class SubsteppedIslands:
 
     def _is_idle(self, solve_count: np.ndarray) -> bool:
         """The same for these counts (n,) of solves in the last step."""
-        begins = not self._auto or may_begin(self._world, self._jointed, solve_count)
-        return not begins and bool(np.all(self.label < 0))
+        if np.any(self.label >= 0):
+            return False
+        if self._cheapest is not None:
+            return not self._cheapest.may_begin(solve_count, int(np.count_nonzero(self._world.dynamic)), self._jointed)
+        return self._auto and not may_begin(self._world, self._jointed, solve_count)
 
     def may_take(self, bodies: np.ndarray) -> bool:
         """Whether islands of bodies that no impulse keeps apart are handed over; they are, when they are looked at next."""
@@ -168,7 +175,7 @@ class SubsteppedIslands:
             self._mean_solves += OF_MEAN * (np.minimum(last, RUNAWAY) - self._mean_solves)
             self.solve_count, self._step_end = self._no_solves(), pair_events.end
         # One step with many events is no reason to leave the exact regime with a mechanism: it stays out of it for long.
-        solve_count = np.where(self._jointed, self._mean_solves, last)
+        solve_count = np.where(self._jointed & self._auto, self._mean_solves, last)
         idle = self._is_idle(solve_count)
         if idle:
             return
@@ -197,7 +204,9 @@ class SubsteppedIslands:
             run.angular_acceleration,
         )  # fmt: skip
         run.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
+        before = member.copy()
         self._leave_out_fast(run, member)
+        member |= self.stepper.inside_others(run, before & ~member & (self.label >= 0))
         a, b, touch = self._near(run, member, ahead)
         # A member may touch a sleeping island, whose bodies then touch others.
         while len(woken := self._touched(run, member, a, b)):
@@ -209,7 +218,14 @@ class SubsteppedIslands:
         moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
         joined = np.zeros_like(member)
         joined[run.joints.bodies_of(run.joints.at(np.flatnonzero(member & self._jointed)))] = True
-        refused = refusals(world, root, self.label >= 0, joined, moves, solve_count, (a, b), self._auto)
+        if self._cheapest is not None:
+            touches = np.zeros(world.num_bodies, bool)
+            touches[np.where(root[a] >= 0, root[a], root[b])] = True
+            refused = self._cheapest.refusals(root, self.label >= 0, joined, touches, solve_count)
+        else:
+            refused = refusals(world, root, self.label >= 0, joined, moves, solve_count, (a, b), self._auto)
+        inside = self.stepper.inside_others(run, member & (self.label >= 0) & np.isin(root, list(refused)))
+        refused = {r: reason for r, reason in refused.items() if r not in root[inside]}
         refused.update(dict.fromkeys(np.unique(root[member & self._open]).tolist(), "joints that sub-steps do not close"))
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         # Tall columns are found from contacts, so only in islands that are not refused yet.
@@ -406,13 +422,16 @@ class SubsteppedIslands:
         """
         members, rebound = island.members, float(island.contacts.restitution.max(initial=0.0))
         stuck, pressed = bool(np.isposinf(self.solve_count[members]).any()), bool(pair_events.pressed()[members].any())
-        if pressed or self._open[members].any() or (rebound > REBOUND and not stuck):
+        bounces = self._cheapest is None and rebound > REBOUND and not stuck
+        if pressed or self._open[members].any() or bounces:
             # Looked at, and left to the exact regime until the end of the step.
             self.solve_count[members] = NEVER
             if pressed and stuck:
                 pair_events.report_squeezed(island)
             return
         self.solve_count[members] = 0.0
+        if self._cheapest is not None:
+            self._cheapest.handed_over(members, RUNAWAY)
         self.label[members] = members.min()
         names = tuple(run.world.names[i] for i in members.tolist())
         if names not in self._handed:
@@ -521,6 +540,8 @@ class SubsteppedIslands:
                 change = mechanical_energy(run.state.now, run.world.constants, fresh) - before
                 run.log.account(time, "position correction", change)
             out = self.stepper.step(run, time, end)
+        if self._cheapest is not None:
+            self._cheapest.note(members, self.stepper.parts)
         if out is None:
             return None
         amounts = np.zeros((3, run.world.num_bodies))
@@ -563,7 +584,7 @@ class SubsteppedIslands:
     def _end_of_trajectories(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray, step: float) -> float:
         """The same without what joints ask for; step: that is stepped at once at most, s."""
         stepper = self.stepper
-        allowed, pressed = STRAY * stepper.motion, stepper.pressed | self._only_expensive
+        allowed, pressed = STRAY * stepper.motion, stepper.pressed | self._finer
         stray = most_stray(run.state.now, members, pressed, stepper.reach, stepper.skin, allowed)
         spans = max(math.ceil(step / stepper.span(members, step) - 1e-9), 1)
         pieces = max(min(math.ceil(stray * step), MOST_PIECES * spans), spans)
