@@ -11,7 +11,7 @@ FOLDER = ROOT / ".venv"
 OLDEST_PYTHON = (3, 11)
 
 
-def prepare(extras=""):
+def prepare(extras: str = "") -> Path:
     """Make the environment if need be, install the package from the clone, and return the environment's Python.
 
     Args:
@@ -37,7 +37,7 @@ def prepare(extras=""):
     return python
 
 
-def run(command, remedy):
+def run(command: list[str], remedy: str) -> None:
     """Run a command; end the program with the remedy if it fails."""
     code = subprocess.call(command)
     if code:

@@ -9,7 +9,7 @@ import rigidimpulse as ri
 SOFT = ri.Material(density=800, restitution=0.3, static_friction=0.5, dynamic_friction=0.4)
 
 
-def scene():
+def scene() -> ri.Scene:
     """Return the scene."""
     corners = [(0.3, 0, 0), (-0.2, 0.25, 0), (-0.2, -0.25, 0), (0, 0, 0.4), (0, 0, -0.2)]
     wedge = ([(0, 0, 0), (0.5, 0, 0), (0, 0.4, 0), (0, 0, 0.3)], [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])

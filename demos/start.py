@@ -13,7 +13,7 @@ from pathlib import Path
 import environment
 
 
-def main(arguments):
+def main(arguments: list[str]) -> int:
     """Run the demo; return its exit code."""
     name = arguments[0] if arguments else "spot"
     page = Path.cwd() / f"{name}.html"

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from rigidimpulse.gallery.record import Check
     from rigidimpulse.recording.recording import Recording
+    from rigidimpulse.scene.accuracy import Accuracy, Preset
+    from rigidimpulse.scene.accuracy_targets import AccuracyTarget
     from rigidimpulse.studies.compare import Comparison
     from rigidimpulse.studies.job import Job
 
@@ -75,7 +77,8 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str |
         def progress(time: float) -> None:
             bar.update(min(time, job.duration) - bar.n)
 
-        run = run_scene(scene, job.duration, job.fps, accuracy=job.accuracy, progress=progress, cache=cache)
+        accuracy = cast("Preset | Accuracy | AccuracyTarget", job.accuracy)  # another name is refused there
+        run = run_scene(scene, job.duration, job.fps, accuracy=accuracy, progress=progress, cache=cache)
     seconds = perf_counter() - start
     num_impacts = len(run.impacts)
     impacts = f"{num_impacts} {'impact' if num_impacts == 1 else 'impacts'}"

@@ -16,7 +16,7 @@ from rigidimpulse.model.world import World
 from rigidimpulse.recording.events import impact_table
 from rigidimpulse.recording.impulses import Impulses
 from rigidimpulse.recording.ledger import Masses, make_ledger
-from rigidimpulse.recording.recording import Recording
+from rigidimpulse.recording.recording import SimulatedRecording
 from rigidimpulse.recording.status import STOPPED, Status
 from rigidimpulse.scene.frames import own_frames
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force_log import ForceWork
 
 
-def finish_run(run: Run, duration: float) -> Recording:
+def finish_run(run: Run, duration: float) -> SimulatedRecording:
     """End the sub-steps and trajectories that last beyond the end, and return the recording."""
     finish_sub_steps(run, run.state.time)
     run.substepped.finish(run)
@@ -32,7 +32,7 @@ def finish_run(run: Run, duration: float) -> Recording:
     return make_recording(run, duration)
 
 
-def finish_early(run: Run, duration: float) -> Recording:
+def finish_early(run: Run, duration: float) -> SimulatedRecording:
     """Return the recording of a run that was stopped between two steps, before its end at `duration` [s]: the frames until then."""
     time = run.state.time
     run.keep(int(np.searchsorted(run.recorder.times, time, side="right")))
@@ -83,7 +83,7 @@ def impulses_by_cause(run: Run, times: np.ndarray, impacts: np.ndarray, work: Fo
     )
 
 
-def make_recording(run: Run, duration: float) -> Recording:
+def make_recording(run: Run, duration: float) -> SimulatedRecording:
     """Body-frame poses, impacts and ledger from what the recorder holds."""
     world, recorder, times = run.world, run.recorder, run.recorder.times
     position, orientation = own_frames(recorder.position, recorder.orientation, world.offset, world.turn)
@@ -96,7 +96,7 @@ def make_recording(run: Run, duration: float) -> Recording:
     contacts = run.contact_log.table()
     by_cause = impulses_by_cause(run, times, impacts, work)
     report_measured(record_of(world, recorder.frames._replace(times=times), ledger, by_cause), run.log)
-    return Recording(
+    return SimulatedRecording(
         times=times,
         names=list(world.names),
         positions=position,

@@ -20,8 +20,8 @@ from rigidimpulse.engine.loop import run_to_end
 from rigidimpulse.engine.recording_of import finish_early, finish_run
 from rigidimpulse.engine.run import Run
 from rigidimpulse.recording.profile import Stopwatch
-from rigidimpulse.recording.recording import Recording, RunSettings
-from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.recording.recording import RunSettings, SimulatedRecording
+from rigidimpulse.scene.accuracy import Accuracy, Preset
 from rigidimpulse.scene.frame_times import frame_times
 from rigidimpulse.scene.scene import Scene
 
@@ -38,11 +38,11 @@ def simulate(
     duration: float,
     fps: float = 60.0,
     *,
-    accuracy: str | Accuracy | AccuracyTarget = "standard",
+    accuracy: Preset | Accuracy | AccuracyTarget = "standard",
     effects: Mapping[str, bool] | None = None,
     progress: Callable[[float], None] | None = None,
     cache: str | os.PathLike[str] | Cache | None = None,
-) -> Recording:
+) -> SimulatedRecording:
     """Simulate a scene and record it. Deterministic: the same scene gives the same bits, at any frame rate.
 
     Args:
@@ -82,7 +82,7 @@ def simulate_whole(
     effects: Mapping[str, bool] | None = None,
     progress: Callable[[float], None] | None = None,
     cache: str | os.PathLike[str] | Cache | None = None,
-) -> Recording:
+) -> SimulatedRecording:
     """Simulate a scene to its end, as `simulate` does: Ctrl-C raises KeyboardInterrupt, for those who have no use for a part of a run."""
     return _simulate(_Asked(scene, duration, fps, accuracy, effects), progress, cache, nullcontext)
 
@@ -102,7 +102,7 @@ def _simulate(
     progress: Callable[[float], None] | None,
     cache: str | os.PathLike[str] | Cache | None,
     listening: Callable[[Callable[[float], None] | None], AbstractContextManager[Callable[[float], None] | None]],
-) -> Recording:
+) -> SimulatedRecording:
     """See `simulate`; listening: to Ctrl-C, or not."""
     stopwatch, duration, times = Stopwatch(), float(asked.duration), frame_times(asked.duration, asked.fps)
     with memory_told(len(times), len(asked.scene.bodies)):
@@ -117,7 +117,7 @@ def _simulate(
     return replace(recording, profile=stopwatch.read(run.plan), settings=settings)
 
 
-def _complete_in_cache(checkpointer: Any, duration: float, progress: Callable[[float], None] | None) -> Recording:
+def _complete_in_cache(checkpointer: Any, duration: float, progress: Callable[[float], None] | None) -> SimulatedRecording:
     """As `complete`, from the last checkpoint on."""
     run = checkpointer.run
     try:
@@ -142,7 +142,7 @@ def prepare(
     return begin_run(world, make_plan(world, effects), times, left_out)
 
 
-def complete(run: Run, duration: float, progress: Callable[[float], None] | None = None) -> Recording:
+def complete(run: Run, duration: float, progress: Callable[[float], None] | None = None) -> SimulatedRecording:
     """Step a run to its end at `duration` [s], or until `progress` raises `Stopped`; hand back what was recorded."""
     try:
         run_to_end(run, duration, progress)

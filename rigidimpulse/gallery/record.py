@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
     from rigidimpulse.recording.recording import Recording
-    from rigidimpulse.scene.accuracy import Accuracy
+    from rigidimpulse.scene.accuracy import Accuracy, Preset
     from rigidimpulse.scene.scene import Scene
 
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -117,7 +117,7 @@ class GalleryScene:
     check: Callable[[Recording], list[Check]]
     duration: float
     fps: float = 60.0
-    accuracy: str | Accuracy = "standard"
+    accuracy: Preset | Accuracy = "standard"
     cheaper: Accuracy | None = None
     elsewhere: str = ""
     exact: Callable[[np.ndarray], Exact] | None = None

@@ -15,6 +15,7 @@ from rigidimpulse.core.files import write_renamed
 from rigidimpulse.core.providers import provider
 from rigidimpulse.recording.contacts import CONTACT_DTYPE, forces_on
 from rigidimpulse.recording.exporters import ExportOptions, ExportTarget, export_suffixes, find_exporter, find_reader
+from rigidimpulse.recording.profile import Profile
 from rigidimpulse.recording.status import Status
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from rigidimpulse.recording.choice import Choice
     from rigidimpulse.recording.impulses import Impulses
     from rigidimpulse.recording.ledger import Ledger
-    from rigidimpulse.recording.profile import Profile
     from rigidimpulse.scene.accuracy import Accuracy
     from rigidimpulse.scene.scene import Scene
 
@@ -292,6 +292,21 @@ class Recording:
     def _need_scene(self, what: str) -> None:
         if self.scene is None:
             raise SceneError(f"{what} needs the shapes of the scene", "simulate the scene, then export or show that run")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulatedRecording(Recording):
+    """What `simulate` returns: a recording that has all that a run knows.
+
+    Attributes:
+        ledger, plan, scene, profile: see `Recording`; never None here.
+
+    """
+
+    ledger: Ledger = field(kw_only=True)
+    plan: Plan = field(kw_only=True)
+    scene: Scene = field(kw_only=True)
+    profile: Profile = field(kw_only=True, default_factory=Profile)
 
 
 def load_recording(path: str | os.PathLike) -> Recording:

@@ -89,6 +89,8 @@ PRESETS: dict[str, dict[str, Any]] = {
     "exact": {"step": 1.0 / 240.0, "tolerance": 1e-15, "iterations": 100000},
     "classic": {"narrow_phase": "fcl", "impact_time": "bisection", "response": "sequential"},
 }
+Preset = Literal["preview", "standard", "exact", "classic"]
+"""Their names, for type checkers."""
 LADDER = ("preview", "standard", "exact")
 """Presets from fast to accurate; "classic" is as accurate as "standard", by another way."""
 

@@ -25,7 +25,7 @@ from rigidimpulse.engine.simulate import simulate_whole
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.choice import UNKNOWN, Choice, Estimate, Try
 from rigidimpulse.recording.events import Event
-from rigidimpulse.recording.recording import Recording, Status
+from rigidimpulse.recording.recording import Recording, SimulatedRecording, Status
 from rigidimpulse.scene.accuracy_targets import InTime, Within
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.deviation import deviation
@@ -42,7 +42,7 @@ FLOOR = 8.0 * float(np.finfo(float).eps)
 
 def simulate_to_target(
     scene: Scene, duration: float, fps: float, target: object, effects: Mapping[str, bool] | None, progress: Callable[[float], None] | None
-) -> Recording:
+) -> SimulatedRecording:
     """Choose a setting and return its run; see `simulate`.
 
     Raises:
@@ -52,7 +52,7 @@ def simulate_to_target(
     if not isinstance(target, Within | InTime):
         raise SceneError(f"accuracy {target!r}", "give 'preview', 'standard', 'exact', an Accuracy, Within(...) or InTime(...)")
 
-    def run(setting: Setting, end: float, given: Scene = scene) -> Recording:
+    def run(setting: Setting, end: float, given: Scene = scene) -> SimulatedRecording:
         return simulate_whole(given, end, fps, accuracy=setting.accuracy, effects=effects, progress=progress)
 
     chosen, choice = _within(run, scene, duration, target) if isinstance(target, Within) else _in_time(run, scene, duration, target)
@@ -70,7 +70,7 @@ def _complaint(target: Within | InTime) -> str:
     return "no setting meets the target; give larger bounds, or an earlier `until` (chaos has no remedy: see run.horizon)"
 
 
-def _within(run: Callable[..., Recording], scene: Scene, duration: float, target: Within) -> tuple[Recording, Choice]:
+def _within(run: Callable[..., SimulatedRecording], scene: Scene, duration: float, target: Within) -> tuple[SimulatedRecording, Choice]:
     """Return the cheapest rung whose estimated error is within the bounds, and its run."""
     until = duration if target.until is None else min(target.until, duration)
     settings = [rung(0)]
@@ -101,7 +101,7 @@ def _within(run: Callable[..., Recording], scene: Scene, duration: float, target
     return (runs[best] if until == duration else run(settings[best], duration)), choice
 
 
-def _in_time(run: Callable[..., Recording], scene: Scene, duration: float, target: InTime) -> tuple[Recording, Choice]:
+def _in_time(run: Callable[..., SimulatedRecording], scene: Scene, duration: float, target: InTime) -> tuple[SimulatedRecording, Choice]:
     """Return the finest rung whose frames take no longer than the target allows, and its run."""
     settings, runs, steps = [], [], []
     for level in range(LAST_RUNG + 1):

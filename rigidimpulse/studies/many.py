@@ -16,7 +16,7 @@ from rigidimpulse.core.errors import RigidImpulseError, SceneError, unknown_name
 from rigidimpulse.engine.simulate import prepare, simulate_whole
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.recording.status import Status
-from rigidimpulse.scene.accuracy import Accuracy
+from rigidimpulse.scene.accuracy import Accuracy, Preset
 from rigidimpulse.scene.frame_times import frame_times
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.wedges.take import make_scene
@@ -114,7 +114,7 @@ def simulate_many(
     duration: float,
     fps: float = 60.0,
     *,
-    accuracy: str | Accuracy = "standard",
+    accuracy: Preset | Accuracy = "standard",
     effects: Mapping[str, bool] | None = None,
     keep: Callable[[Recording], Any] = final_state,
     processes: int | None = 1,

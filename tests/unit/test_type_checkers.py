@@ -31,6 +31,8 @@ SLIPS = (
     "ri.Material(densty=3)",
     'scene.add("a ball")',
     "ri.simulate(scene)",
+    'ri.simulate(scene, 1.0, accuracy="exakt")',
+    "run.ledger.kinetik",
     "run.impact",
     "run.export(3)",
     "run.position(0)",
@@ -80,6 +82,30 @@ def test_a_correct_program_passes_and_every_slip_is_found(checker, tmp_path: Pat
     found = checker(tmp_path)
     assert found["correct.py"] == set()
     assert found["slips.py"] == set(range(FIRST_SLIP, FIRST_SLIP + len(SLIPS)))
+
+
+def pages() -> dict[str, str]:
+    """Programs by file name: the demos, and of each page of the docs all blocks of Python together, as its reader would type them."""
+    programs = {path.name: path.read_text(encoding="utf-8") for path in sorted((ROOT / "demos").glob("*.py"))}
+    for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
+        blocks = re.findall(r"^```python\n(.*?)^```", path.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+        if blocks:
+            programs[path.relative_to(ROOT).with_suffix("").as_posix().replace("/", "_") + ".py"] = "\n".join(blocks)
+    return programs
+
+
+def test_demos_and_examples_of_the_docs_are_strictly_typed(tmp_path: Path) -> None:
+    """What people copy passes `mypy --strict` as it is."""
+    programs = pages()
+    assert len(programs) > 25
+    for name, text in programs.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    (tmp_path / "mypy.ini").write_text(
+        f"[mypy]\nmypy_path = {ROOT}\n[mypy-rigidimpulse.*]\nignore_errors = True\n[mypy-pxr.*]\nignore_missing_imports = True\n"
+    )
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", "mypy.ini", *programs]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
 
 
 @pytest.mark.parametrize(
