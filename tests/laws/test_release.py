@@ -113,8 +113,8 @@ def test_the_same_bits_with_a_cache_that_is_gone_on_with(tmp_path):
         return progress
 
     for end in (0.3, 0.7):
-        with pytest.raises(KeyboardInterrupt):
-            ri.simulate(scene, 2.0, cache=ri.Cache(tmp_path / "run.h5", every=0.0), progress=stop_after(end))
+        part = ri.simulate(scene, 2.0, cache=ri.Cache(tmp_path / "run.h5", every=0.0), progress=stop_after(end))
+        assert part.status.is_partial
     whole = ri.simulate(scene, 2.0)
     assert ri.simulate(scene, 2.0, cache=tmp_path / "run.h5").state_hash() == whole.state_hash()
 

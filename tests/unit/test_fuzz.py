@@ -40,7 +40,7 @@ PLANTED = Kind("planted", draw, faults, has_choices=True, seconds=5)
 
 
 def test_planted_fault_is_found_shrunk_and_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is left of the case is a length and one number that is just too large."""
+    """Each test has the case that failed, or a simpler one, and says what is wrong."""
     monkeypatch.setattr(fuzz, "KINDS", {"planted": PLANTED})
     tests = fuzz.search([PLANTED], 1.5, 0, tmp_path)
     assert tests
@@ -49,9 +49,15 @@ def test_planted_fault_is_found_shrunk_and_kept(tmp_path: Path, monkeypatch: pyt
         exec(compile(path.read_text().replace("from fuzz_kinds import KINDS", ""), str(path), "exec"), space)
         case = space["CASE"]
         assert isinstance(case, list)
-        assert len(case) <= 3
-        assert sum(value > 0.0 for value in case[1:]) == 1
+        assert fuzz.faults_apart(PLANTED, case)
         assert "there is" in path.read_text() or "crashed" in path.read_text()
+
+
+def test_what_is_left_is_as_simple_as_can_be() -> None:
+    """A length, and one number that is just too large."""
+    case = smallest([5, 2.5, -7.25, 8.255, 1.0, 6.0], lambda chosen: bool(faults(chosen)), lambda: True)
+    assert len(case) <= 3
+    assert sum(value > 0.0 for value in case[1:]) == 1
 
 
 def test_written_tests_run(tmp_path: Path) -> None:
