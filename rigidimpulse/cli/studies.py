@@ -163,10 +163,11 @@ def compare(first: str, second: str, scene: str, output: str | None, view: bool,
     for run in recorded.values():
         job = job._replace(**comparison.frames_of(run))
     job = job._replace(**given_options(settings))
-    runs = []
-    for word in words:
-        runs.append(recorded[word] if word in recorded else run_job(job._replace(accuracy=word), ()))
-        end_if_partial(runs[-1])
+    for word in dict.fromkeys(words):
+        if word not in recorded:
+            recorded[word] = run_job(job._replace(accuracy=word), ())
+            end_if_partial(recorded[word])
+    runs = [recorded[word] for word in words]
     result = comparison.compare(runs[0], runs[1], comparison.labels_of(words), comparison.common_horizon(runs))
     click.echo(result.table())
     if output:

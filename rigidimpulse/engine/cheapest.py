@@ -36,11 +36,12 @@ def exact_cost(solves: Any, size: Any) -> Any:
 class CheapestRegime:
     """What is known of the costs of both regimes, of n bodies."""
 
-    def __init__(self, num_bodies: int) -> None:
-        """Nothing is known yet."""
-        self._limit = np.full(num_bodies, FIRST)
-        self._exact = np.zeros(num_bodies)
-        self._pieces, self._looks = np.zeros((2, num_bodies))
+    def __init__(self, joined: np.ndarray) -> None:
+        """Nothing is known yet; joined (n,) bool: bodies with joints."""
+        self._first = np.where(joined, FIRST_JOINTED, FIRST)
+        self._limit = self._first.copy()
+        self._exact = np.zeros(len(joined))
+        self._pieces, self._looks = np.zeros((2, len(joined)))
 
     def note(self, members: np.ndarray, looks: int) -> None:
         """Members were stepped together over a piece of a step, with this number of looks at their contacts."""
@@ -84,7 +85,7 @@ class CheapestRegime:
             if together.any():
                 out.update(self._refused(together, root, cost, was_substepped, bool(has_joints[together].any())))
         self._pieces[:] = self._looks[:] = 0.0
-        self._limit = np.maximum(FADING * self._limit, np.where(joined, FIRST_JOINTED, FIRST))
+        self._limit = np.maximum(FADING * self._limit, self._first)
         return out
 
     def _refused(self, together: np.ndarray, root: np.ndarray, cost: np.ndarray, was: np.ndarray, jointed: bool) -> dict[int, str]:

@@ -15,6 +15,7 @@ import pytest
 
 import rigidimpulse as ri
 from rigidimpulse import gallery
+from rigidimpulse.scene.accuracy import Preset
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.studies.many import simulate_many
 
@@ -93,18 +94,51 @@ def test_second_signal_ends_at_once() -> None:
     assert ri.simulate(falling(), 1.0, progress=press).status.is_partial
 
 
-@pytest.mark.parametrize("name", ["dominoes", "arm", "pool_break"])
-def test_cache_goes_on_from_the_stop(name: str, tmp_path: Path) -> None:
-    """A run that is stopped has its last step in its cache, and ends with the same bits."""
+@pytest.mark.parametrize(
+    ("name", "accuracy"), [*((name, "standard") for name in ("dominoes", "arm", "pool_break")), ("dominoes", "preview"), ("arm", "preview")]
+)
+def test_cache_goes_on_from_the_stop(name: str, accuracy: Preset, tmp_path: Path) -> None:
+    """A run that is stopped has its last step in its cache, and ends with the same bits; what "preview" knows of costs is in it, too."""
     scene, duration, file = gallery.load(name).scene(), SCENES[name], tmp_path / "run.h5"
-    part = ri.simulate(scene, duration, cache=file, progress=stop_at(0.5 * duration))
+    part = ri.simulate(scene, duration, accuracy=accuracy, cache=file, progress=stop_at(0.5 * duration))
     stored = ri.load_recording(file)
     assert stored.status.is_partial
     assert len(stored.times) >= len(part.times) - 1
     begun: list[float] = []
-    whole = ri.simulate(scene, duration, cache=file, progress=begun.append)
+    whole = ri.simulate(scene, duration, accuracy=accuracy, cache=file, progress=begun.append)
     assert begun[0] > part.times[-1]
-    assert whole.state_hash() == ri.simulate(scene, duration).state_hash()
+    assert whole.state_hash() == ri.simulate(scene, duration, accuracy=accuracy).state_hash()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of memory as Linux has them")
+def test_lack_of_memory_is_told(tmp_path: Path) -> None:
+    """A run that asks for more than there is ends with a `SceneError`, and a cache that was begun can be read."""
+    program = f"""
+import resource
+from pathlib import Path
+import rigidimpulse as ri
+from rigidimpulse import gallery
+scene, cache = gallery.load("dominoes").scene(), {str(tmp_path / "run.h5")!r}
+ri.simulate(scene, 0.1)
+def hoard(now):
+    kept.append(bytearray(2**28))
+kept = []
+used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (used + 2**30, used + 2**30))
+every_step = ri.Cache(cache, every=0.0)
+for ask in (lambda: ri.simulate(scene, 1000.0, fps=10000.0), lambda: ri.simulate(scene, 1.0, cache=every_step, progress=hoard)):
+    try:
+        ask()
+    except ri.SceneError as error:
+        kept.clear()
+        print(error)
+print(ri.load_recording(cache).status.is_partial)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    first, second, third = done.stdout.splitlines()
+    assert "not enough memory for 10000001 frames of " in first
+    assert "not enough memory for 61 frames of " in second
+    assert third == "True"
 
 
 def test_many_runs_stop() -> None:

@@ -115,7 +115,7 @@ class SubsteppedIslands:
         self._stood = np.full((world.num_bodies, 7), np.inf)
         self._taken = np.zeros(world.num_bodies, bool)
         self._auto = solver == "auto"
-        self._cheapest = CheapestRegime(world.num_bodies) if solver == "cheapest" else None
+        self._cheapest = CheapestRegime(jointed(world)) if solver == "cheapest" else None
         self._jointed = jointed(world)
         self._joint_stepper: JointedStepper | None = None
         self._mean_solves, self._open = np.zeros(world.num_bodies), np.zeros(world.num_bodies, bool)
