@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 PACKAGE = "rigidimpulse."
 HOMES = (
     "core.simd", "scene.mass", "scene.joint", "scene.joint_six_axis", "collision", "motion", "model", "dynamics", "engine.exact",
-    "engine.substepped", "engine.spheres", "engine.absent", "engine.cheapest", "engine.islands", "engine.finder", "engine.touching", "engine.narrow_phase",
-    "engine.fcl_contacts", "engine.keyframe_paths", "engine.pair_events", "engine.pair_table", "engine.regime", "engine.run",
-    "engine.soft_bodies", "engine.triggers", "engine.varying_forces", "recording.contact_log", "recording.contacts", "recording.events",
-    "recording.impulses", "recording.recorder",
+    "engine.substepped", "engine.spheres", "engine.absent", "engine.cheapest", "engine.islands", "engine.finder", "engine.touching",
+    "engine.narrow_phase", "engine.fcl_contacts", "engine.keyframe_paths", "engine.pair_events", "engine.pair_table", "engine.regime",
+    "engine.run", "engine.soft_bodies", "engine.triggers", "engine.varying_forces", "recording.contact_log", "recording.contacts",
+    "recording.events", "recording.impulses", "recording.recorder",
 )  # fmt: skip
 """Packages and modules whose classes a state is made of: nothing in them reads or runs files."""
 FUNCTIONS = {
