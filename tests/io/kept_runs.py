@@ -71,7 +71,8 @@ def run(name: str, duration: float, cache: str | None) -> ri.Recording:
 
 def main(name: str, duration: str, cache: str, seed: str) -> None:
     """See the head of the file."""
-    run(name, 0.05, None)  # kernels are there, so that what is killed is the run
+    # All kernels are there, so that what is killed is the run: a child that is killed while it compiles begins to compile again.
+    run(name, float(duration), None)
     random_numbers = random.Random(int(seed))
     kills = 0
     while True:
