@@ -53,6 +53,9 @@ class NoJoints:
         """No joint moves."""
         return NONE
 
+    def carry_on(self, _run: Any, _earlier: Any) -> None:
+        """No joint goes on."""
+
     movable_end = are_passive = will_let_go = supports_of = project_velocities = impact_block = hold = let_go = log_rest = _ask_nobody
     begin_sub_steps = note_sub_steps = account_sub_steps = report_open = break_at = next_release = _ask_nobody
 
@@ -78,6 +81,9 @@ class NoForces:
     def finish(self, *_recorded: Any) -> None:
         """No force did any work."""
 
+    def carry_on(self, _earlier: Any) -> None:
+        """Nothing is to be left out."""
+
     let_act = present = may_rest = fly = load = _ask_nobody
 
 
@@ -100,6 +106,9 @@ class NoSoftBodies:
     def tracks(self) -> list[FlexibleTrack]:
         """No soft body leaves a track."""
         return []
+
+    def carry_on(self, _run: Any, _earlier: Any) -> None:
+        """No soft body goes on."""
 
     def add_to(self, _ledger: Ledger) -> None:
         """Nothing is added to the ledger."""
@@ -129,6 +138,9 @@ class NoSubstepping:
 
     def finish(self, _run: Any) -> None:
         """There is nothing to end."""
+
+    def carry_on(self, _earlier: Any, _old: np.ndarray, _new: np.ndarray) -> None:
+        """Nobody will ask."""
 
     contact_forces = begin_trajectories = _ask_nobody
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from rigidimpulse.core.kernels import INTERPRETED
 from rigidimpulse.dynamics.forces import KINDS
+from rigidimpulse.engine.earlier_run import EarlierRun
 from rigidimpulse.engine.effects import EventKernel, FclNarrowPhase, SubsteppedContact, TriggerVolumes, all_effects
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
 from rigidimpulse.engine.exact.compiled_loop import why_not as why_not_compiled
@@ -16,13 +17,12 @@ from rigidimpulse.engine.exact.joints import JointState
 from rigidimpulse.engine.initial_overlap import resolve_overlaps
 from rigidimpulse.engine.keyframe_paths import KeyframePaths
 from rigidimpulse.engine.regime import only_expensive, why_not_substepped
-from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.run import Run, start_trajectories
 from rigidimpulse.engine.substepped.advance import SubsteppedIslands
 from rigidimpulse.engine.tight_fits import make_space
 from rigidimpulse.engine.warm_up import compile_loop_in_background, prepare_kernels
 from rigidimpulse.model.plan import Plan
 from rigidimpulse.model.world import World
-from rigidimpulse.motion.trajectory import FIXED, FREE, PRESCRIBED, begin
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
 
@@ -32,22 +32,27 @@ def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:
     return Plan(world, all_effects(world), chosen)
 
 
-def begin_run(world: World, plan: Plan, times: np.ndarray, left_out: Mapping[str, str]) -> Run:
-    """A run at its start: kernels compiled, participants bound, bodies apart.
+def begin_run(world: World, plan: Plan, times: np.ndarray, left_out: Mapping[str, str], earlier: EarlierRun | None = None) -> Run:
+    """A run at its start, the time of its first frame: kernels compiled, participants bound, bodies apart.
 
     Args:
         world: the compiled scene.
         plan: of its effects.
         times: (f,) s, of the frames.
         left_out: effects that the caller leaves out though the scene calls for them, and why it does.
+        earlier: a run before a change of the scene, in whose middle this one begins.
 
     """
     with_substepped = plan.includes(SubsteppedContact.name) and not only_expensive(world)
     prepare_kernels(world, plan.includes(EventKernel.name), with_substepped)
     run = _start(world, plan, times)
     fitting = make_space(run)
-    if fitting is not world:
+    if earlier is not None:
+        run = _start(earlier.placed(fitting), plan, times)
+        earlier.carry_on(run)
+    elif fitting is not world:
         run = _start(fitting, plan, times)
+    run.recorder.start(run.state.trajectory)
     for name, reason in left_out.items():
         run.log.report(0.0, "effect left out", (name,), f"the scene calls for it: {reason}")
     resolve_overlaps(run)
@@ -62,7 +67,6 @@ def _start(world: World, plan: Plan, times: np.ndarray) -> Run:
     _bind_forces(run, times)
     run.keyframes = KeyframePaths(world)
     start_trajectories(run)
-    run.recorder.start(run.state.trajectory)
     return run
 
 
@@ -118,15 +122,3 @@ def _bind_observers(run: Run) -> None:
         from rigidimpulse.engine.spheres.run import EventRun
 
         run.flight = EventRun(run)
-
-
-def start_trajectories(run: Run) -> None:
-    """Give every body its first trajectory."""
-    world, trajectory = run.world, run.state.trajectory
-    trajectory.position[:], trajectory.orientation[:] = world.position, world.orientation
-    trajectory.velocity[:], trajectory.angular_velocity[:] = world.velocity, world.angular_velocity
-    trajectory.acceleration[:] = np.where(world.dynamic[:, None], world.steady_acceleration, 0.0)
-    trajectory.inertia[:] = world.inertia
-    trajectory.mode[:] = np.where(world.dynamic, FREE, np.where(world.moving, PRESCRIBED, FIXED))
-    for i in range(world.num_bodies):
-        begin(trajectory, i)

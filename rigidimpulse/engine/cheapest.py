@@ -43,6 +43,11 @@ class CheapestRegime:
         self._exact = np.zeros(len(joined))
         self._pieces, self._looks = np.zeros((2, len(joined)))
 
+    def carry_on(self, earlier: CheapestRegime, old: np.ndarray, new: np.ndarray) -> None:
+        """Know of bodies `new` (k,) what is known there of `old` (k,)."""
+        for name in ("_limit", "_exact", "_pieces", "_looks"):
+            getattr(self, name)[new] = getattr(earlier, name)[old]
+
     def note(self, members: np.ndarray, looks: int) -> None:
         """Members were stepped together over a piece of a step, with this number of looks at their contacts."""
         self._pieces[members] += 1.0

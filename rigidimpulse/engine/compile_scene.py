@@ -42,7 +42,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
     shapes, shape_of_body = _compile_shapes(bodies, masses)
     geometry = build_geometry(shapes)
     size, radius = _extents(geometry, shape_of_body)
-    low, high = _world_boxes(geometry, shape_of_body, start["position"], start["orientation"])
+    low, high = world_boxes(geometry, shape_of_body, start["position"], start["orientation"])
     material_of_body, coefficients, rolling = _materials(bodies)
     mass = np.array([m.mass for m in masses], float)
     inv_mass = np.where(dynamic, 1.0 / mass, 0.0)
@@ -216,10 +216,10 @@ def _extents(geometry: Geometry, shape_of_body: np.ndarray) -> tuple[np.ndarray,
     return np.array(size)[shape_of_body], np.array(radius)[shape_of_body]
 
 
-def _world_boxes(
+def world_boxes(
     geometry: Geometry, shape_of_body: np.ndarray, position: np.ndarray, orientation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Lows and highs (n, 3) m of the boxes of all bodies; position (n, 3) m and orientation (n, 4) of their principal frames."""
+    """Return the lows and highs (n, 3) m of the boxes of all bodies; position (n, 3) m and orientation (n, 4) of their principal frames."""
     low = np.full((len(shape_of_body), 3), np.inf)
     high = -low
     for i, shape in enumerate(shape_of_body):

@@ -64,7 +64,7 @@ def resolve_overlaps(run: Run) -> None:
         return
     for demand in demands.values():
         run.log.report(
-            0.0, "overlap at the start", (world.names[demand.a], world.names[demand.b]),
+            run.state.time, "overlap at the start", (world.names[demand.a], world.names[demand.b]),
             f"the bodies are inside each other by {demand.way:.4g} m; where there is space they are moved apart before the "
             "first step, without a change of velocity: move them apart in the scene to see no jump",
         )
@@ -72,7 +72,7 @@ def resolve_overlaps(run: Run) -> None:
     stuck = sorted(search.overlapping())
     for a, b in stuck:
         run.log.report(
-            0.0, "overlap not resolved", (world.names[a], world.names[b]),
+            run.state.time, "overlap not resolved", (world.names[a], world.names[b]),
             "there is no space to move the bodies apart, or joints hold them: in this run they do not touch each other; "
             "give them space",
         )
@@ -82,7 +82,7 @@ def resolve_overlaps(run: Run) -> None:
     moved = search.position - world.position
     gained = -float(np.sum(np.where(world.dynamic, world.mass, 0.0)[:, None] * world.steady_acceleration * moved))
     # Frame 0 is the state as given: the ledger changes right after it.
-    run.log.account(float(np.nextafter(0.0, 1.0)), "overlap", gained)
+    run.log.account(float(np.nextafter(run.state.time, np.inf)), "overlap", gained)
 
 
 def _take_apart(search: _Search, demands: dict[tuple[int, int], _Demand]) -> None:

@@ -66,6 +66,10 @@ class RunJoints(Protocol):
         """Bodies (l, 2) that whole joints join."""
         ...
 
+    def carry_on(self, run: Any, earlier: Any, /) -> None:
+        """Begin at the time of the run, where the joints of an earlier run are."""
+        ...
+
     def project_velocities(self, run: Any, island: Island, /) -> None:
         """End the sub-step of an island's joints: velocities are projected."""
         ...
@@ -165,6 +169,10 @@ class RunForces(Protocol):
         """Bodies (l, 2) that forces tie together."""
         ...
 
+    def carry_on(self, earlier: Any, /) -> None:
+        """Leave out what broke in an earlier run."""
+        ...
+
     def finish(self, world: World, times: np.ndarray, recorder: Recorder, /) -> ForceWork | None:
         """What the forces did until the frames; None where there are none."""
         ...
@@ -218,6 +226,10 @@ class RunSoftBodies(Protocol):
         """Frames of each flexible body."""
         ...
 
+    def carry_on(self, run: Any, earlier: Any, /) -> None:
+        """Begin at the time of the run, where the soft bodies of an earlier run are."""
+        ...
+
     def add_to(self, ledger: Ledger, /) -> None:
         """Give the ledger their energy and momenta."""
         ...
@@ -243,6 +255,10 @@ class Substepping(Protocol):
 
     def is_idle(self) -> bool:
         """Whether no island is sub-stepped and none may begin to be."""
+        ...
+
+    def carry_on(self, earlier: Any, old: np.ndarray, new: np.ndarray, /) -> None:
+        """Know of bodies `new` (k,) what an earlier run knew of them as `old` (k,)."""
         ...
 
     def finish(self, run: Any, /) -> None:

@@ -39,7 +39,7 @@ from rigidimpulse.engine.touching import Motion
 from rigidimpulse.model.plan import Plan
 from rigidimpulse.model.state import State
 from rigidimpulse.model.world import World
-from rigidimpulse.motion.trajectory import pose_at
+from rigidimpulse.motion.trajectory import FIXED, FREE, PRESCRIBED, begin, pose_at
 from rigidimpulse.recording.contact_log import ContactLog
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.impulses import ImpulseAccounts
@@ -71,11 +71,11 @@ class Run:
     """
 
     def __init__(self, world: World, plan: Plan, recorder: Recorder, log: EventLog) -> None:
-        """A run at its start, without participants."""
+        """A run at its start, the time of its first frame, without participants."""
         n = world.num_bodies
         self.world = world
         self.plan = plan
-        self.state = State(world)
+        self.state = State(world, float(recorder.times[0]))
         self.recorder = recorder
         self.log = log
         self.impulses = ImpulseAccounts(recorder.times)
@@ -123,3 +123,22 @@ class Run:
             time, "not finite", (self.world.names[i],),
             NOT_FINITE_REMEDY,
         )
+
+
+def start_trajectories(run: Run) -> None:
+    """Give every body its first trajectory."""
+    start_bodies(run, np.arange(run.world.num_bodies))
+
+
+def start_bodies(run: Run, bodies: np.ndarray) -> None:
+    """Give bodies (k,) their first trajectories, from the time of the run on."""
+    world, trajectory = run.world, run.state.trajectory
+    trajectory.start[bodies] = run.state.time
+    trajectory.position[bodies], trajectory.orientation[bodies] = world.position[bodies], world.orientation[bodies]
+    trajectory.velocity[bodies], trajectory.angular_velocity[bodies] = world.velocity[bodies], world.angular_velocity[bodies]
+    dynamic, moving = world.dynamic[bodies], world.moving[bodies]
+    trajectory.acceleration[bodies] = np.where(dynamic[:, None], world.steady_acceleration[bodies], 0.0)
+    trajectory.inertia[bodies] = world.inertia[bodies]
+    trajectory.mode[bodies] = np.where(dynamic, FREE, np.where(moving, PRESCRIBED, FIXED))
+    for i in bodies.tolist():
+        begin(trajectory, i)

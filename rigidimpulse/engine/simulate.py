@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -14,11 +14,13 @@ from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.providers import provider
 from rigidimpulse.engine.begin import begin_run, make_plan
 from rigidimpulse.engine.compile_scene import compile_scene
+from rigidimpulse.engine.earlier_run import EarlierRun
 from rigidimpulse.engine.early_end import Stopped, interruptible, memory_told
 from rigidimpulse.engine.effects import EventKernel
 from rigidimpulse.engine.loop import run_to_end
 from rigidimpulse.engine.recording_of import finish_early, finish_run
 from rigidimpulse.engine.run import Run
+from rigidimpulse.recording.joined import joined_runs
 from rigidimpulse.recording.profile import Stopwatch
 from rigidimpulse.recording.recording import RunSettings, SimulatedRecording
 from rigidimpulse.scene.accuracy import Accuracy, Preset
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
     from rigidimpulse.recording.cache import Cache
     from rigidimpulse.scene.accuracy_targets import AccuracyTarget
 
+Progress: TypeAlias = Callable[[float], None]
+Listening: TypeAlias = Callable[[Progress | None], AbstractContextManager[Progress | None]]
 MOST_POSES = 1_000_000_000
 """Frames times bodies that are refused as a slip of the keyboard (about 100 GB)."""
 
@@ -42,6 +46,7 @@ def simulate(
     effects: Mapping[str, bool] | None = None,
     progress: Callable[[float], None] | None = None,
     cache: str | os.PathLike[str] | Cache | None = None,
+    from_frame: int | None = None,
 ) -> SimulatedRecording:
     """Simulate a scene and record it. Deterministic: the same scene gives the same bits, at any frame rate.
 
@@ -56,6 +61,9 @@ def simulate(
             It may raise KeyboardInterrupt to stop the run there.
         cache: an .h5 file that is written while the run goes on, with a checkpoint every few seconds; see `Cache`. If the file exists, the
             run continues from its last checkpoint and ends with the same bits; a finished run is read. Needs the extra `cache`.
+        from_frame: go on from this frame of the run that the cache has, with this scene, which may be another one from there on: frames
+            before are those of the cache. The cache keeps both takes. Bodies that the change does not reach go on with the same bits,
+            where they are free or in exact contact; see docs/guide/caches.md.
 
     Returns:
         The recording, with round(duration * fps) + 1 frames; the first is the initial state. Ctrl-C stops the run after the step that it is
@@ -67,7 +75,7 @@ def simulate(
 
     """
     if isinstance(accuracy, str | Accuracy):
-        return _simulate(_Asked(scene, duration, fps, accuracy, effects), progress, cache, interruptible)
+        return _simulate(_Asked(scene, duration, fps, accuracy, effects, from_frame), progress, cache, interruptible)
     if cache is not None:
         raise SceneError("a cache for an accuracy that is still to be chosen", "choose it first, and give run.choice.accuracy")
     return provider("simulate to target")(scene, duration, fps, accuracy, effects, progress)
@@ -95,19 +103,23 @@ class _Asked(NamedTuple):
     fps: float
     accuracy: str | Accuracy
     effects: Mapping[str, bool] | None
+    from_frame: int | None = None
 
 
 def _simulate(
     asked: _Asked,
-    progress: Callable[[float], None] | None,
+    progress: Progress | None,
     cache: str | os.PathLike[str] | Cache | None,
-    listening: Callable[[Callable[[float], None] | None], AbstractContextManager[Callable[[float], None] | None]],
+    listening: Listening,
 ) -> SimulatedRecording:
     """See `simulate`; listening: to Ctrl-C, or not."""
     stopwatch, duration, times = Stopwatch(), float(asked.duration), frame_times(asked.duration, asked.fps)
     with memory_told(len(times), len(asked.scene.bodies)):
+        if asked.from_frame is not None:
+            recording = _go_on(asked, progress, cache, listening)
+            return replace(recording, profile=stopwatch.read(recording.plan))
         run = prepare(asked.scene, times, asked.accuracy, asked.effects)
-        settings = RunSettings(duration, float(asked.fps), run.world.accuracy, dict(asked.effects or {}))
+        settings = _settings(asked, run)
         with listening(progress) as look:
             if cache is None:
                 recording = complete(run, duration, look)
@@ -115,6 +127,27 @@ def _simulate(
                 with closing(provider("checkpoints")(cache, settings, run)) as checkpointer:
                     recording = _complete_in_cache(checkpointer, duration, look)
     return replace(recording, profile=stopwatch.read(run.plan), settings=settings)
+
+
+def _settings(asked: _Asked, run: Run) -> RunSettings:
+    """The settings of a run that was asked for."""
+    return RunSettings(float(asked.duration), float(asked.fps), run.world.accuracy, dict(asked.effects or {}))
+
+
+def _go_on(
+    asked: _Asked, progress: Progress | None, cache: str | os.PathLike[str] | Cache | None, listening: Listening
+) -> SimulatedRecording:
+    """A run from a frame of a cache on; its recording has the frames before, too."""
+    if cache is None:
+        raise SceneError("from_frame without a cache", "give the cache of the run that is to go on")
+    start = provider("later start")(cache, asked.scene, float(asked.fps), asked.from_frame)
+    times = frame_times(asked.duration, asked.fps)[asked.from_frame :]
+    if len(times) < 2:
+        raise SceneError(f"from_frame = {asked.from_frame!r} of {asked.duration:g} s", "give an earlier frame, or a longer duration")
+    run = prepare(asked.scene, times, asked.accuracy, asked.effects, start.earlier)
+    with listening(progress) as look, closing(provider("checkpoints")(cache, _settings(asked, run), run, start.change)) as checkpointer:
+        then = _complete_in_cache(checkpointer, float(asked.duration), look)
+    return joined_runs(start.first, then)
 
 
 def _complete_in_cache(checkpointer: Any, duration: float, progress: Callable[[float], None] | None) -> SimulatedRecording:
@@ -132,14 +165,18 @@ def _complete_in_cache(checkpointer: Any, duration: float, progress: Callable[[f
 
 
 def prepare(
-    scene: Scene, times: np.ndarray, accuracy: str | Accuracy = "standard", effects: Mapping[str, bool] | None = None
+    scene: Scene,
+    times: np.ndarray,
+    accuracy: str | Accuracy = "standard",
+    effects: Mapping[str, bool] | None = None,
+    earlier: EarlierRun | None = None,
 ) -> Run:
-    """A run of a scene at its start, with frames at times (f,) s, for `complete`."""
+    """A run of a scene at its start, with frames at times (f,) s, for `complete`; earlier: the run in whose middle it begins, if any."""
     left_out = chosen_out(scene, accuracy, effects)
     world = compile_scene(scene, accuracy, frozenset(left_out))
     if len(times) * world.num_bodies > MOST_POSES:
         raise SceneError(f"{len(times)} frames of {world.num_bodies} bodies", "lower the fps or the duration")
-    return begin_run(world, make_plan(world, effects), times, left_out)
+    return begin_run(world, make_plan(world, effects), times, left_out, earlier)
 
 
 def complete(run: Run, duration: float, progress: Callable[[float], None] | None = None) -> SimulatedRecording:

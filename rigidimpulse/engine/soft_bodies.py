@@ -76,6 +76,12 @@ class RunningSoftBodies:
         """Leave the first `count` frames only."""
         self._times, self._frames = self._times[:count], self._frames[:count]
 
+    def carry_on(self, run: Run, earlier: Run) -> None:
+        """Begin at the time of the run; bodies that an earlier run had, too, are where they are there."""
+        before = earlier.soft_bodies
+        self._table.begin_at(run.state.time, before._table.soft_bodies if isinstance(before, RunningSoftBodies) else None)
+        self._frames[:] = self._table.soft_bodies.position
+
     def tracks(self) -> list[FlexibleTrack]:
         """Frames of each flexible body."""
         soft_bodies = self._table.soft_bodies

@@ -114,7 +114,7 @@ class Triggers:
                 may[body] = False
             reach, thick = _reach(trigger.shape), _thickness(trigger.shape)
             self._watched.append(_Watched(trigger, body, len(world.shapes) + number, reach, thick, np.flatnonzero(may)))
-        self.look(0.0, 0.0)
+        self.look(run.state.time, run.state.time)
 
     def look(self, begin: float, end: float) -> None:
         """Look at what happened in the step from `begin` to `end` [s]."""

@@ -103,6 +103,13 @@ class VaryingForces:
         if self.flow is not None:
             self.flow.weigh(bodies, time)
 
+    def carry_on(self, earlier: Run) -> None:
+        """Leave out what broke in an earlier run."""
+        before = {table.kind: table for table in earlier.world.force_tables}
+        for table in self._tables:
+            if table.kind in before:
+                table.carry_on(before[table.kind])
+
     def links(self) -> np.ndarray:
         """Bodies (l, 2) that forces tie together: each with the first one of those that hang together by forces."""
         return self._links

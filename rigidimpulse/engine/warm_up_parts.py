@@ -26,7 +26,7 @@ from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
 from rigidimpulse.dynamics.constraints.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
-from rigidimpulse.engine.begin import make_plan, make_run, start_trajectories
+from rigidimpulse.engine.begin import make_plan, make_run
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
 from rigidimpulse.engine.exact.impacts import respond
@@ -36,7 +36,7 @@ from rigidimpulse.engine.exact.trajectories import set_impact_margins
 from rigidimpulse.engine.islands import touching_islands
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.regime import TALL, island_roots, refusals, support_levels
-from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.run import Run, start_trajectories
 from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still
 from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.step import step

@@ -16,4 +16,5 @@ register_exporter(
 register_reader((".npz",), "rigidimpulse.io.npz:read_npz")
 register_reader((".h5", ".hdf5"), "rigidimpulse.io.cache.load:load_cache")
 provide("write scene", "rigidimpulse.io.scene_file:write_scene")
+provide("later start", "rigidimpulse.io.cache.later:later_start")
 provide("checkpoints", "rigidimpulse.io.cache.checkpointer:Checkpointer")

@@ -263,6 +263,38 @@ def any_short_rebound(memory, number, rows):
     return False
 
 
+def held_pairs(memory: ContactMemory, start: np.ndarray) -> np.ndarray:
+    """Pairs (k, 2) whose contacts carry forces; start: (n,) s, of the trajectories."""
+    places = np.flatnonzero(memory.row >= 0)
+    pairs = np.column_stack(np.divmod(memory.key[places], len(start)))
+    held = memory.held[memory.row[places]]
+    since = memory.force["time"][np.where(held["count"] > 0, held["first"], 0)]
+    return pairs[(held["count"] > 0) & (since >= start[pairs].max(axis=1, initial=-np.inf))]
+
+
+def carried_memory(memory: ContactMemory, index: np.ndarray, carried: np.ndarray, number: int) -> ContactMemory:
+    """The memory of the same pairs among other bodies, `number` of them.
+
+    index: (n,) of each body there, -1 for those that are not there. carried: (n,) bool, bodies whose contacts still carry their forces.
+    """
+    copied = make_memory(len(memory.key), len(memory.held), len(memory.force))
+    for place in np.flatnonzero(memory.key >= 0).tolist():
+        pair = np.array(divmod(int(memory.key[place]), len(index)))
+        a, b = index[pair].tolist()
+        if min(a, b) < 0 or a > b:
+            continue
+        at = claimed_place(copied, a * number + b)
+        copied.time[at], copied.speed[at], copied.count[at] = memory.time[place], memory.speed[place], memory.count[place]
+        if memory.row[place] >= 0 and carried[pair].all():
+            held = memory.held[memory.row[place]]
+            first, row, entry = int(held["first"]), int(copied.used[HELD_PAIRS]), int(copied.used[FORCES])
+            copied.held[row], copied.row[at] = held, row
+            copied.held[row]["first"] = entry
+            copied.force[entry : entry + held["count"]] = memory.force[first : first + held["count"]]
+            copied.used[HELD_PAIRS], copied.used[FORCES] = row + 1, entry + held["capacity"]
+    return copied
+
+
 def grown(memory: ContactMemory, contacts: int) -> ContactMemory:
     """A memory of the same contents with space for `contacts` more; stretches that were given up are dropped."""
     pairs, held, forces = len(memory.key), len(memory.held), len(memory.force)

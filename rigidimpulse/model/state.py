@@ -69,9 +69,9 @@ class State:
         sub_step: (n,) s, length of the last one of an island whose contacts turn, at its first body.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, time: float) -> None:
         n = world.num_bodies
-        self.time = 0.0
+        self.time = time
         self.trajectory: Trajectories = make_trajectories(n)
         self.now = BodyState(
             position=world.position.copy(),

@@ -113,6 +113,18 @@ def replace_contacts(buffers, bodies, time, contacts, position, force):
             buffers.stretch[i] = first
 
 
+def _closed_up(rows: np.ndarray, lasts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows (m,) without those that do not last, (m,) bool; by the first row of a stretch, or -1: its first row now, and whether it has one.
+
+    Of a stretch, the first row that is left takes over.
+    """
+    left, number = rows[lasts], np.append(np.cumsum(lasts) - lasts, 0)
+    stays = np.zeros(len(rows) + 1, bool)
+    stays[left["stretch"]] = True
+    left["stretch"] = number[left["stretch"]]
+    return left, number, stays
+
+
 class ContactLog:
     """Collects contact forces while a run goes on; those that no frame sees are dropped."""
 
@@ -150,6 +162,28 @@ class ContactLog:
         """Leave the first `count` frames only."""
         self.buffers = self.buffers._replace(times=self.buffers.times[:count])
 
+    def lasting_pairs(self) -> np.ndarray:
+        """Pairs (k, 2) of bodies whose contacts last."""
+        rows = self.buffers.rows[: self.buffers.counts[0]]
+        rows = rows[np.isinf(rows["end"])]
+        return np.column_stack([rows["body_a"], rows["body_b"]])
+
+    def carry_on(self, earlier: ContactLog, index: np.ndarray, time: float) -> None:
+        """Let the contacts of an earlier log that last begin here at `time` [s]; index (n,): of its bodies here, -1 for those left out."""
+        rows, stretch = earlier.buffers.rows[: earlier.buffers.counts[0]], earlier.buffers.stretch
+        lasts = np.isinf(rows["end"]) & (index[rows["body_a"]] >= 0) & (index[rows["body_b"]] >= 0)
+        left, first_of, here = _closed_up(rows, lasts)
+        left["start"], left["visit"], left["place"] = time, -1, -1
+        for name in ("body_a", "body_b"):
+            left[name] = index[left[name]]
+        buffers = self.buffers
+        buffers.counts[2] = len(left)
+        if not has_contact_capacity.py_func(buffers, len(left)):
+            self.grow()
+        self.buffers.rows[: len(left)], self.buffers.counts[0] = left, len(left)
+        bodies = np.flatnonzero(index >= 0)
+        self.buffers.stretch[index[bodies]] = np.where(here[stretch[bodies]], first_of[stretch[bodies]], -1)
+
     def table(self) -> np.ndarray:
         """All contacts that a frame sees, in order of their start. Those that last carry their forces to the last frame."""
         self._take_out_ended()
@@ -173,12 +207,8 @@ class ContactLog:
         ended = ended[np.argsort(ended["place"], kind="stable")]
         self._keep(ended)
         self._count(ended, ended["end"])
-        left, number = rows[lasts], np.cumsum(lasts) - lasts
-        stays = np.zeros(len(rows) + 1, bool)
-        stays[left["stretch"]] = True
-        # Of a stretch, the first row that is left takes over.
-        stretch[:] = np.where(stays[stretch], np.append(number, 0)[stretch], -1)
-        left["stretch"] = number[left["stretch"]]
+        left, first_of, stays = _closed_up(rows, lasts)
+        stretch[:] = np.where(stays[stretch], first_of[stretch], -1)
         rows[: len(left)] = left
         counts[0] = len(left)
 

@@ -164,6 +164,10 @@ class EventLog:
         """Impacts (k, ROW_LENGTH); `impact_table` gives the columns names."""
         return self.buffers.impacts[: self.buffers.counts[2]]
 
+    def forget(self) -> None:
+        """Drop the impacts, changes of energy and trajectories that were kept."""
+        self.buffers.counts[:] = 0
+
     def grow(self) -> None:
         """Make space for the rows that `has_capacity` was last asked about: buffers that are too small double."""
         energy, stretches, impacts, counts = self.buffers

@@ -142,7 +142,7 @@ class Impulses:
             share = self.forces.mass_share[:, i]
         # Mass at the frames over that at the end of the run, in the middle between frames; and the part of that time in which it counts.
         middle = 0.5 * (share + np.concatenate([share[:1], share[:-1]]))
-        counted = np.clip(self.times - self.release[i], 0.0, np.diff(self.times, prepend=0.0))
+        counted = np.clip(self.times - self.release[i], 0.0, np.diff(self.times, prepend=self.times[:1]))
         gain = np.diff(self.velocity[:, i], axis=0, prepend=self.velocity[:1, i])
         weight = (counted > 0.0) * middle * self.mass[i]
         return np.cumsum(counted * middle), np.cumsum(weight[:, None] * gain, axis=0)

@@ -299,11 +299,12 @@ class SimulatedRecording(Recording):
     """What `simulate` returns: a recording that has all that a run knows.
 
     Attributes:
-        ledger, plan, scene, profile: see `Recording`; never None here.
+        ledger, by_cause, plan, scene, profile: see `Recording`; never None here.
 
     """
 
     ledger: Ledger = field(kw_only=True)
+    by_cause: Impulses = field(kw_only=True)
     plan: Plan = field(kw_only=True)
     scene: Scene = field(kw_only=True)
     profile: Profile = field(kw_only=True, default_factory=Profile)

@@ -18,13 +18,13 @@ import numpy as np
 from rigidimpulse.collision.distance.fcl_trees import TriangleTrees
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import multiply, rotate, to_matrix
-from rigidimpulse.engine.begin import make_plan, make_run, start_trajectories
+from rigidimpulse.engine.begin import make_plan, make_run
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.narrow_phase import OwnContacts, mesh_bodies, why_not_fcl
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.pair_table import MARGIN, append_pairs, pair_bodies
 from rigidimpulse.engine.participants import NarrowPhase
-from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.run import Run, start_trajectories
 from rigidimpulse.engine.simulate import simulate_whole
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder

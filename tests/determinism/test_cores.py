@@ -79,8 +79,13 @@ def alone() -> str:
 
 
 def crowded(sharing: Sharing) -> str:
-    """The hash of a pile with colours of many batches."""
-    return shared(cloud([ri.Shape.box(0.2)], 396, 0.24), 0.1, sharing)
+    """The hash of a block of boxes, a millimetre apart, with colours of many batches."""
+    scene, random = ri.Scene(), np.random.default_rng(7)
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
+    for k in range(396):
+        place = 0.201 * np.array([k % 6, k // 6 % 6, k // 36 + 0.5])
+        scene.add(ri.Body(f"body {k}", ri.Shape.box(0.2), position=place, velocity=random.normal(0.0, 0.5, 3), material=ROUGH))
+    return shared(scene, 0.1, sharing)
 
 
 @pytest.mark.parametrize("how", ["at once", "nobody helps", "help comes too late"])

@@ -88,6 +88,10 @@ class ForceTable(ABC):
         """Forces that end at `time` since they are too large, by their present rows (k, 6); they are gone from now on."""
         return []
 
+    def carry_on(self, _earlier: Self) -> None:
+        """Leave out what broke in a table of an earlier run."""
+        return
+
     def share_until_break(self, value: np.ndarray, change: np.ndarray) -> float:
         """Share of a step after which one becomes too large, 1 if none does; rows start with value (k, 6) and change by (k, 6)."""
         return 1.0

@@ -109,7 +109,7 @@ class ForceLog:
         self._times, self._trajectory = times, trajectory
         self._rows = {int(i): np.flatnonzero(body == i) for i in np.unique(body)}
         self._value, self._rate, self._total = np.zeros((len(body), 6)), np.zeros((len(body), 6)), np.zeros((len(body), 7))
-        self._begun = np.zeros(n)
+        self._begun = np.full(n, times[0])
         self._written = np.zeros(n, np.int64)
 
     def begin(self, members: np.ndarray, time: float, value: np.ndarray, change: np.ndarray, length: np.ndarray) -> None:

@@ -177,6 +177,13 @@ class SpringForces(ForceTable):
         self._limit[broken], self._table[broken, :2], self._broke[broken] = np.inf, 0.0, time
         return broken
 
+    def carry_on(self, earlier: Self) -> None:
+        """Springs that broke in an earlier run are broken, by their names."""
+        gone = [name for name, broke in zip(earlier.names, earlier._broke, strict=True) if np.isfinite(broke)]
+        broken = np.isin(self.names, gone)
+        self._limit[broken], self._table[broken, :2] = np.inf, 0.0
+        self._broke[broken] = [earlier._broke[earlier.names.index(name)] for name in np.array(self.names)[broken].tolist()]
+
     def share_until_break(self, value: np.ndarray, change: np.ndarray) -> float:
         """Where |F + s dF| first is the limit: the root of a quadratic."""
         limit = self._limit[self.cause]

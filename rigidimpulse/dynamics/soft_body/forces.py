@@ -47,6 +47,13 @@ class SoftBodyForces(ForceTable):
         self._value, self._rate = np.zeros((2, len(self.body), 6))
         self.sums = [self._sums()]
 
+    def begin_at(self, time: float, earlier: Flexibles | None) -> None:
+        """Begin at `time` [s]; bodies that are the same in an earlier run are where they are there, and move as there."""
+        if earlier is not None:
+            self.soft_bodies.carry_on(earlier)
+        self._start = self._end = time
+        self.sums = [self._sums()]
+
     def wrench(self, at: Instant, rows: np.ndarray) -> np.ndarray:
         """Force and torque (r, 6) of rows."""
         return self._value[rows] + self._rate[rows] * (at.time[self.body[rows]] - self._start)[:, None]

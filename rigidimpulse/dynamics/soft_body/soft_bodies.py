@@ -123,6 +123,15 @@ class Flexibles:
         self._load = np.zeros((world.num_bodies, 3))
         self.energy_taken = 0.0
 
+    def carry_on(self, earlier: Flexibles) -> None:
+        """Put bodies that are the same in an earlier run where they are there, with their velocities; the same: name and vertices."""
+        place = {body.name: k for k, body in enumerate(earlier.bodies)}
+        for mine, body in enumerate(self.bodies):
+            k = place.get(body.name, -1)
+            if k >= 0 and earlier.first[k + 1] - earlier.first[k] == self.first[mine + 1] - self.first[mine]:
+                here, there = slice(self.first[mine], self.first[mine + 1]), slice(earlier.first[k], earlier.first[k + 1])
+                self.position[here], self.velocity[here] = earlier.position[there], earlier.velocity[there]
+
     def _fasten(self, world: World) -> None:
         """Sort fastened vertices: held ones follow what is immovable, the others are in contact with a dynamic body for good."""
         vertex, body = [], []

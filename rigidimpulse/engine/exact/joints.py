@@ -17,6 +17,7 @@ from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, make
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work
+from rigidimpulse.engine.fingerprint import digest_of
 from rigidimpulse.engine.islands import is_alone
 from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.participants import RunJoints
@@ -115,6 +116,20 @@ class JointState:
             for i in pair:
                 if i >= 0 and world.dynamic[i]:
                     self._of_body.setdefault(i, []).append(j)
+
+    def carry_on(self, run: Run, earlier: Run) -> None:
+        """Begin at the time of the run: turns of joints that an earlier run has, too, are counted on, and those that broke stay broken."""
+        self.began[:] = run.state.time
+        before = earlier.joints
+        if not isinstance(before, JointState):
+            return
+        known = {digest_of(joint): k for k, joint in enumerate(earlier.world.joints_of_scene)}
+        for j, joint in enumerate(run.world.joints_of_scene):
+            k = known.get(digest_of(joint))
+            if k is not None:
+                self.whole[j] = before.whole[k]
+                mine, others = (slice(table.first[n], table.first[n + 1]) for table, n in ((self.table, j), (before.table, k)))
+                self.memory.angle[mine] = before.memory.angle[others]
 
     def at(self, bodies: Iterable[int]) -> np.ndarray:
         """Whole joints at any of the given dynamic bodies, in order."""

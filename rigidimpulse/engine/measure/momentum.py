@@ -92,9 +92,9 @@ def momentum_drifts(record: RunRecord) -> Drifts:
     order = np.argsort(number, kind="stable")
     order = order[np.count_nonzero(number < 0) :]
     looked_at = _looked_at(record)
-    times = record.frames.times[looked_at, None]
+    since = record.frames.times[looked_at, None] - record.frames.times[0]
     if not len(order):
-        return Drifts([], np.zeros((len(times), 0)), np.zeros((len(times), 0)))
+        return Drifts([], np.zeros((len(since), 0)), np.zeros((len(since), 0)))
     first = np.flatnonzero(np.diff(number[order], prepend=-1))
     x, q, v, w = (part[np.ix_(looked_at, order)] for part in record.frames[1:])
     world = record.world
@@ -103,9 +103,9 @@ def momentum_drifts(record: RunRecord) -> Drifts:
     steady = np.add.reduceat(mass[:, None] * pull, first)
     total = np.add.reduceat(momenta, first, axis=1)
     still = mass * record.unseen_speed[order]
-    moves = np.add.reduceat(np.linalg.norm(momenta, axis=2), first, axis=1).max(axis=0) + times * np.linalg.norm(steady, axis=1)
+    moves = np.add.reduceat(np.linalg.norm(momenta, axis=2), first, axis=1).max(axis=0) + since * np.linalg.norm(steady, axis=1)
     moves += np.add.reduceat(still, first)
-    momentum = np.linalg.norm(total - total[:1] - times[:, :, None] * steady, axis=2)
+    momentum = np.linalg.norm(total - total[:1] - since[:, :, None] * steady, axis=2)
     whole = np.add.reduceat(mass, first)
     count = np.diff(np.append(first, len(order)))
     centre = np.add.reduceat(mass[:, None] * x, first, axis=1) / whole[:, None]

@@ -28,6 +28,7 @@ from rigidimpulse.engine.exact.energy_limit import note_end_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work, begin_trajectory
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.pair_table import NEVER, RUNAWAY
+from rigidimpulse.engine.participants import Substepping
 from rigidimpulse.engine.regime import (
     EXPENSIVE_TALL,
     FAST,
@@ -137,6 +138,14 @@ class SubsteppedIslands:
     def _no_solves(self) -> np.ndarray:
         """Counts (n,) at the start of a step; nothing is handed over where everything is sub-stepped."""
         return np.full(self._world.num_bodies, 0.0 if self._auto or self._cheapest else NEVER)
+
+    def carry_on(self, earlier: Substepping, old: np.ndarray, new: np.ndarray) -> None:
+        """Know of exact bodies `new` (k,) what an earlier run knew of them as `old` (k,)."""
+        self.solve_count[new] = earlier.solve_count[old]
+        if isinstance(earlier, SubsteppedIslands):
+            self._mean_solves[new], self._open[new] = earlier._mean_solves[old], earlier._open[old]
+            if self._cheapest is not None and earlier._cheapest is not None:
+                self._cheapest.carry_on(earlier._cheapest, old, new)
 
     def is_idle(self) -> bool:
         """Whether no island is sub-stepped and none may begin to be."""

@@ -7,33 +7,38 @@ written again. A run that goes on is prepared like any other, and then takes the
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable
-from pathlib import Path
+from dataclasses import replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.version import VERSION
-from rigidimpulse.engine.absent import NoCompiledLoop
-from rigidimpulse.engine.begin import bind_compiled_loop
 from rigidimpulse.engine.fingerprint import fingerprint
-from rigidimpulse.io.cache.arrays import Damaged
-from rigidimpulse.io.cache.constants import Constants
-from rigidimpulse.io.cache.decode import REMEDY, thaw
 from rigidimpulse.io.cache.encode import freeze
 from rigidimpulse.io.cache.file import CacheFile
-from rigidimpulse.io.cache.layout import FRAMES, SUFFIXES, Content, Header
-from rigidimpulse.io.cache.likeness import check_alike
-from rigidimpulse.io.cache.read import read
+from rigidimpulse.io.cache.layout import FRAMES, Content, Header, Take
+from rigidimpulse.io.cache.origin import Origin, frozen
+from rigidimpulse.io.cache.read import read, read_headers
+from rigidimpulse.io.cache.recall import constants_of, path_of, recalled
 from rigidimpulse.recording.cache import Cache
 from rigidimpulse.recording.recorder import sample_paths
 from rigidimpulse.recording.recording import Recording, RunSettings
 
 if TYPE_CHECKING:
     from rigidimpulse.engine.run import Run
+
+class Change(NamedTuple):
+    """Where a run of a changed scene begins: frame of another take, and the number and the fingerprint of that."""
+
+    frame: int
+    base: int
+    fingerprint: str
+
 
 EXPENSIVE = 20.0
 """How many times longer than the last checkpoint took the run goes on before the next, unless one is wanted after every step."""
@@ -47,66 +52,60 @@ class Checkpointer:
 
     """
 
-    def __init__(self, cache: Cache | str | os.PathLike[str], settings: RunSettings, run: Run) -> None:
-        """Take the state of a run's last checkpoint, if there is one, and begin to write; run: the same run at its start.
+    def __init__(
+        self, cache: Cache | str | os.PathLike[str], settings: RunSettings, run: Run, change: Change | None = None
+    ) -> None:
+        """Take the state of a run's last checkpoint, if there is one, and begin to write.
+
+        Args:
+            cache: where.
+            settings: of the run.
+            run: the same run at its start.
+            change: of the scene of another take, in whose middle the run begins.
 
         Raises:
             SceneError: another suffix, a file that is no cache, or one of another scene, of other settings or of another version.
 
         """
         self._cache = cache if isinstance(cache, Cache) else Cache(cache)
-        self._path = Path(self._cache.path)
-        where = f"cache {self._path.name!r}"
-        if self._path.suffix not in SUFFIXES:
-            raise SceneError("it has another suffix", f"use a name that ends in {' or '.join(SUFFIXES)}", where)
+        self._path = path_of(self._cache)
         if not self._cache.every >= 0.0:
-            raise SceneError(f"every = {self._cache.every!r}", "give the seconds between checkpoints, >= 0", where)
-        world, recorder = run.world, run.recorder
-        duration, fps, accuracy, effects = settings
-        mark = fingerprint(world.scene, duration, fps, accuracy, effects)
-        header = Header(mark, VERSION, duration, fps, list(world.names), recorder.times, world.offset, world.turn)
-        stored = self._look_up(header)
+            remedy = "give the seconds between checkpoints, >= 0"
+            raise SceneError(f"every = {self._cache.every!r}", remedy, f"cache {self._path.name!r}")
+        origin = frozen(Origin(run.world.scene, settings))
+        header, stored = self._look_up(_header(run, settings, change), change)
+        header = replace(header, take=header.take._replace(origin=hashlib.sha256(origin).hexdigest()))
         self._frames = self._impacts = 0
         self._state = b""
         self.run = run if stored is None or stored.state is None else self._recall(run, stored)
         self._written = self.run.recorder.written.copy()
         complete = stored is not None and stored.complete
-        self._file = None if complete else CacheFile(self._path, header, stored)
+        self._file = None if complete else CacheFile(self._path, header, stored, origin)
         self._last, self._cost = perf_counter(), 0.0
         if stored is None or stored.state is None:
             try:
-                self.write(0.0)  # a state that cannot be written is better known at once
+                self.write(run.state.time)  # a state that cannot be written is better known at once
             except BaseException:
                 self.close()
                 raise
 
-    def _look_up(self, header: Header) -> Content | None:
-        """Return what the file has of this run, None without a file."""
+    def _look_up(self, header: Header, change: Change | None) -> tuple[Header, Content | None]:
+        """Say which take of the file the run is, and return what the file has of it, None where it is a new one."""
         if not self._path.exists():
-            return None
-        known, content = read(self._path, alone=True)
-        if (known.fingerprint, known.names) != (header.fingerprint, header.names) or not np.array_equal(known.times, header.times):
-            raise SceneError(_difference(known, header), "delete it, or give another name", f"cache {str(self._path)!r}")
-        return content
+            return header, None
+        known = read_headers(self._path)
+        for other in known:
+            same = (other.fingerprint, other.names) == (header.fingerprint, header.names)
+            if same and np.array_equal(other.times, header.times):
+                return replace(header, take=other.take), read(self._path, alone=True, take=other.take.number)[1]
+        if change is None:
+            raise SceneError(_difference(known[0], header), "delete it, or give another name", f"cache {str(self._path)!r}")
+        return replace(header, take=Take(1 + max(other.take.number for other in known), change.base, change.frame)), None
 
     def _recall(self, run: Run, stored: Content) -> Run:
         """The run as its checkpoint left it."""
-        recorder, log = run.recorder, run.log
-        for name, frames in stored.frames.items():
-            getattr(recorder, name)[: len(frames)] = frames
-        log.buffers = log.buffers._replace(impacts=np.concatenate([stored.impacts, log.buffers.impacts]))
         self._frames, self._impacts = len(stored.frames["position"]), len(stored.impacts)
-        try:
-            constants = _constants(run)
-            known = thaw(stored.state or b"", constants)
-            check_alike(known, run, constants)
-        except SceneError as error:
-            raise error.within(f"cache {str(self._path)!r}") from None
-        except Damaged as error:
-            raise SceneError(f"the checkpoint is none of this run: {error}", REMEDY, f"cache {str(self._path)!r}") from None
-        known.compiled = NoCompiledLoop()  # that of the other process is gone with its memory
-        bind_compiled_loop(known)
-        return known
+        return recalled(run, stored, f"cache {str(self._path)!r}")
 
     def look(self, time: float, more: Callable[[float], None] | None = None) -> None:
         """Write a checkpoint if it is time to; call `more` with the time of the run [s]."""
@@ -127,7 +126,7 @@ class Checkpointer:
         first = min(int(self._written[changed].min(initial=self._frames)), self._frames)
         last = max(int(np.searchsorted(recorder.times, time, side="left")), self._frames)
         self._fill_in(first, last)
-        state = freeze(self.run, _constants(run))
+        state = freeze(self.run, constants_of(run))
         content = self._content(last, time, state)
         self._file.commit(content, first, self._impacts)
         self._state, self._frames, self._impacts = state, last, len(content.impacts)
@@ -161,13 +160,12 @@ class Checkpointer:
             self._file.close()
 
 
-def _constants(run: Run) -> Constants:
-    """Return the parts of a run that its checkpoints do not hold."""
-    world, recorder = run.world, run.recorder
-    own = [run.plan, recorder.times, *(getattr(recorder, name) for name in FRAMES), run.log.buffers.impacts]
-    made_again = [run.compiled, run.narrow_phase, run.triggers.narrowphase]
-    roots = [world.scene, world.scene.bodies, world.scene.effects, world.shapes, world.geometry, world.accuracy, *own, *made_again]
-    return Constants(roots)
+def _header(run: Run, settings: RunSettings, change: Change | None) -> Header:
+    """What a file says of a run; the number of its take is still to be found."""
+    world, (duration, fps, accuracy, effects) = run.world, settings
+    since = () if change is None else (change.frame, change.fingerprint)
+    mark = fingerprint(world.scene, duration, fps, accuracy, effects, *since)
+    return Header(mark, VERSION, duration, fps, list(world.names), run.recorder.times, world.offset, world.turn)
 
 
 def _difference(known: Header, header: Header) -> str:

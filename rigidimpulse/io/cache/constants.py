@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Self
 
 ATOMS = (str, bytes, int, float, bool, complex, type(None), type)
 
@@ -28,6 +28,14 @@ class Constants:
             self._number[id(thing)] = len(self.objects)
             self.objects.append(thing)
             waiting.extend(_parts(thing)[::-1])
+
+    @classmethod
+    def of(cls, objects: Iterable[Any]) -> Self:
+        """Just these objects, not what they consist of."""
+        constants = cls(())
+        constants.objects = list(objects)
+        constants._number = {id(thing): number for number, thing in enumerate(constants.objects)}
+        return constants
 
     def number(self, thing: Any) -> int | None:
         """Number of a constant, None for anything else."""

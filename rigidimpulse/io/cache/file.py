@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
@@ -20,9 +20,24 @@ import numpy as np
 
 from rigidimpulse.core.files import unwritable, write_renamed
 from rigidimpulse.io.cache.disk import Disk
-from rigidimpulse.io.cache.layout import CHECK, COMMIT, FORMAT, FRAMES, Content, Header, check_words, digest_of, empty, library, seal_of
+from rigidimpulse.io.cache.layout import (
+    CHECK,
+    COMMIT,
+    FORMAT,
+    FRAMES,
+    Content,
+    Header,
+    Kept,
+    check_words,
+    digest_of,
+    empty,
+    library,
+    seal_of,
+)
 from rigidimpulse.recording.events import ROW_LENGTH
 
+MOST_KEPT, MOST_KEPT_BYTES = 32, 2**26
+"""Earlier checkpoints that are kept: every second one is dropped where there are more."""
 SPARE = 2
 """Capacity over what is stored, for impacts and for bytes of a state."""
 LEAST_IMPACTS = 256
@@ -33,9 +48,10 @@ VERSION_OF_HDF5 = "v108"
 class CacheFile:
     """A file that is written."""
 
-    def __init__(self, path: Path, header: Header, content: Content | None) -> None:
-        """Begin the file, in the place of any of its name, with what there is already."""
-        self._path, self._header, self._number = path, header, 0
+    def __init__(self, path: Path, header: Header, content: Content | None, origin: bytes = b"") -> None:
+        """Begin the file with what there is already, and with the other takes of a file of this name; origin: see `origin.frozen`."""
+        self._path, self._header, self._number, self._origin = path, header, 0, origin
+        self._kept = _KeptCheckpoints(content.kept if content else ())
         self._file = self._make(content or empty(len(header.names)))
 
     def _make(self, content: Content) -> _Open:
@@ -47,6 +63,7 @@ class CacheFile:
                 _lay_out(made.file, self._header, max(SPARE * len(content.impacts), LEAST_IMPACTS), SPARE * len(data))
                 made.file.attrs["seal"] = seal_of(self._header, False, {})
                 self._commit(made, content, 0, 0, data)
+                self._write_rest(made.file)
 
         with _told(self._path):
             write_renamed(self._path, create)
@@ -69,6 +86,16 @@ class CacheFile:
             with _told(self._path):
                 self._commit(self._file, content, first_frame, first_impact, data)
 
+    def _write_rest(self, file: Any) -> None:
+        """Write what does not change while the file is there: the origin, earlier checkpoints and the other takes."""
+        file["origin"] = np.frombuffer(self._origin, np.uint8)
+        file["kept/commits"] = np.array([kept.commit for kept in self._kept.rows], COMMIT)
+        file["kept/states"] = np.frombuffer(b"".join(kept.data for kept in self._kept.rows), np.uint8)
+        file.create_group("takes")
+        if self._path.exists():
+            with library().File(self._path, "r", locking=False) as before:
+                copy_takes(before, file, self._header.take.number)
+
     def _commit(self, opened: _Open, content: Content, first_frame: int, first_impact: int, data: bytes) -> None:
         file = opened.file
         count = len(content.frames["position"])
@@ -88,6 +115,7 @@ class CacheFile:
         commit["digest"] = digest_of(commit, data)
         file["checkpoint/commits"][slot] = commit
         opened.sync()
+        self._kept.add(Kept(commit, data))
 
     def close(self) -> None:
         """End writing."""
@@ -106,6 +134,7 @@ class CacheFile:
                 self._commit(made, content, 0, 0, data)
                 for name, table in tables.items():
                     file[f"tables/{name}"] = table
+                self._write_rest(file)
                 file.attrs["complete"] = True
                 file.attrs["seal"] = seal_of(self._header, True, tables)
 
@@ -114,11 +143,45 @@ class CacheFile:
         self.close()
 
 
+class _KeptCheckpoints:
+    """The checkpoints of a run, spread over it: the more there are, the fewer of them are kept."""
+
+    def __init__(self, rows: Sequence[Kept]) -> None:
+        """Begin with some."""
+        self.rows = list(rows)
+        self._stride, self._seen = 1, 0
+
+    def add(self, kept: Kept) -> None:
+        """Keep a checkpoint that is later than all others, or leave it out."""
+        if self.rows and kept.commit["time"] <= self.rows[-1].commit["time"]:
+            return
+        self._seen += 1
+        if self._seen % self._stride:
+            return
+        self.rows.append(kept)
+        while len(self.rows) > MOST_KEPT or (len(self.rows) > 1 and sum(len(row.data) for row in self.rows) > MOST_KEPT_BYTES):
+            self.rows, self._stride = self.rows[::2], 2 * self._stride
+
+
+def copy_takes(source: Any, target: Any, number: int) -> None:
+    """Copy all takes of a file but that of a number into the group `takes` of another file."""
+    for group in (source, *source["takes"].values()):
+        take = int(group.attrs["take"])
+        if take != number:
+            copied = target.create_group(f"takes/{take}")
+            copied.attrs.update(group.attrs)
+            for name in group:
+                if name != "takes":
+                    group.copy(name, copied)
+
+
 def _lay_out(file: Any, header: Header, impacts: int, size: int) -> None:
     """Give a new file its tables, with the capacity for `impacts` impacts and for states of `size` bytes."""
     h5py = library()
     told = {"format": FORMAT, "fingerprint": header.fingerprint, "version": header.version, "complete": False}
+    number, base, first_frame, origin = header.take
     file.attrs.update(told | {"duration": header.duration, "fps": header.fps})
+    file.attrs.update({"take": number, "base": base, "first_frame": first_frame, "origin": origin})
     file["names"] = np.bytes_(json.dumps(header.names).encode())
     file["times"], file["body/offset"], file["body/turn"] = header.times, header.offset, header.turn
     file["checkpoint/commits"] = np.zeros(2, COMMIT)

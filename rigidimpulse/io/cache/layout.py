@@ -1,6 +1,7 @@
 """What lies where in the HDF5 file of a run, and the checks that tell damage from content.
 
-    attributes      format, fingerprint, version, duration [s], fps, complete, seal: `seal_of` what does not change while the run goes on
+    attributes      format, fingerprint, version, duration [s], fps, complete, seal: `seal_of` what does not change while the run goes on;
+                    take, base, first_frame, origin: see `Take`
     names           of the bodies, a list in JSON
     times           (f,) s, of all frames of the run
     body            offset (n, 3) m and turn (n, 4): centre of mass and principal axes in body frames
@@ -10,6 +11,11 @@
     checks          frames (f,) and impacts (m,): `check_words` of each row
     checkpoint      two slots of bytes, and commits (2,): number, time, frames, impacts, size, length (unpacked) and digest of each
     tables          of a finished run: contacts, status (JSON), and vertices and faces of flexible bodies
+    origin          bytes of the scene and the settings (`origin.frozen`)
+    kept            earlier checkpoints, from which a changed scene may go on: commits (k,), and states, the bytes of all in a row
+    takes           the other takes by their numbers, each laid out like the file itself
+
+The file itself is the take that was written last. Times and frames of a take begin at its first frame.
 
 Names are no attribute, because attributes hold 64 kB. Seal, checks and digests find damage. They are no signature: who forges a cache makes
 them, too.
@@ -19,7 +25,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
 from typing import Any, NamedTuple
@@ -29,7 +35,7 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.recording.events import ROW_LENGTH
 
-FORMAT = "rigidimpulse cache 2"
+FORMAT = "rigidimpulse cache 3"
 FIRST_FORMAT = "rigidimpulse cache 1"
 """The format whose checkpoints are pickles."""
 SUFFIXES = (".h5", ".hdf5")
@@ -55,9 +61,25 @@ def library() -> Any:
     return h5py
 
 
+class Take(NamedTuple):
+    """Which run of a file it is.
+
+    number: from 1 on. base: number of the take before the change of the scene, 0 for one that begins at time 0. first_frame: that of the
+    change. origin: digest of the bytes of scene and settings.
+    """
+
+    number: int = 1
+    base: int = 0
+    first_frame: int = 0
+    origin: str = hashlib.sha256().hexdigest()
+
+
+ONLY_TAKE = Take()
+
+
 @dataclass(frozen=True)
 class Header:
-    """What a file says of its run: fingerprint, version, duration [s], fps, names (n,), frame times (f,) s, frames of the bodies."""
+    """What a file says of a run: fingerprint, version, duration [s], fps, names (n,), times (f,) s, frames of the bodies, its take."""
 
     fingerprint: str
     version: str
@@ -67,12 +89,20 @@ class Header:
     times: np.ndarray
     offset: np.ndarray
     turn: np.ndarray
+    take: Take = ONLY_TAKE
+
+
+class Kept(NamedTuple):
+    """A checkpoint: its commit (a row of COMMIT), and the bytes of the state, packed."""
+
+    commit: np.void | np.ndarray
+    data: bytes
 
 
 class Content(NamedTuple):
     """What a file holds: frames by name (k, n, ...), impacts (m, 15), until when they go [s], the state there, whether that is all.
 
-    tables: what only a finished run has, by name.
+    tables: what only a finished run has, by name. kept: earlier checkpoints.
     """
 
     frames: dict[str, np.ndarray]
@@ -81,6 +111,7 @@ class Content(NamedTuple):
     state: bytes | None
     complete: bool
     tables: dict[str, Any]
+    kept: Sequence[Kept] = ()
 
 
 def empty(n: int) -> Content:
@@ -106,7 +137,7 @@ def digest_of(commit: np.void | np.ndarray, data: bytes) -> bytes:
 
 def seal_of(header: Header, complete: bool, tables: Mapping[str, Any]) -> str:
     """Return a hash of what a file says of its run, and of what only a finished run has."""
-    told = [header.fingerprint, header.version, header.duration, header.fps, header.names, complete, sorted(tables)]
+    told = [header.fingerprint, header.version, header.duration, header.fps, header.names, header.take, complete, sorted(tables)]
     digest = hashlib.sha256(json.dumps(told).encode())
     for table in (header.times, header.offset, header.turn, *(tables[name] for name in sorted(tables))):
         digest.update(np.ascontiguousarray(table).tobytes())

@@ -12,6 +12,7 @@ from rigidimpulse.io.cache.layout import Content, Header
 from rigidimpulse.io.cache.read import REMEDY, read
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.events import Event, impact_table
+from rigidimpulse.recording.joined import cut, joined_frames
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.recording.status import STOPPED, Status, restored
 from rigidimpulse.scene.frames import own_frames
@@ -25,6 +26,19 @@ def load_cache(path: Path) -> Recording:
 
     """
     header, content = read(path)
+    run = recording_of(path, header, content)
+    while header.take.base:
+        first, before = header.take.first_frame, header.take
+        header, content = read(path, take=before.base)
+        if header.take.first_frame >= first:
+            raise SceneError("its takes are none", REMEDY, f"cache {str(path)!r}")
+        earlier = recording_of(path, header, content)
+        run = joined_frames(cut(earlier, first - header.take.first_frame), run)
+    return run
+
+
+def recording_of(path: Path, header: Header, content: Content) -> Recording:
+    """Return the recording of one take alone."""
     frames = content.frames
     position, orientation = own_frames(frames["position"], frames["orientation"], header.offset, header.turn)
     impacts = impact_table(content.impacts)

@@ -5,12 +5,15 @@ Only tables whose bytes lie in the file in one piece are read: no links to other
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import re
 import zlib
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,6 +28,8 @@ from rigidimpulse.io.cache.layout import (
     FRAMES,
     Content,
     Header,
+    Kept,
+    Take,
     check_words,
     digest_of,
     empty,
@@ -36,25 +41,59 @@ from rigidimpulse.recording.events import ROW_LENGTH
 
 REMEDY = "delete it, and run again"
 LONGEST_TEXT = 1000
+Answer = TypeVar("Answer")
 TRIES = 3
 """A run that goes on may write both checkpoints while one of them is read."""
 
 
-def read(path: Path, alone: bool = False) -> tuple[Header, Content]:
-    """Return what the file holds as of its last commit; alone: refuse a file that somebody writes to.
+def read(path: Path, alone: bool = False, take: int | None = None) -> tuple[Header, Content]:
+    """Return what the file holds of a take as of its last commit.
+
+    Args:
+        path: of the file.
+        alone: refuse a file that somebody writes to.
+        take: its number; None: the one that was written last.
 
     Raises:
         SceneError: no such file, no cache, one that is damaged, or one that is written to.
 
     """
+    return _tried(path, alone, lambda file, size: _whole(_take(file, take), size))
+
+
+def read_headers(path: Path) -> list[Header]:
+    """Return what the file says of its takes, the one that was written last first; see `read` for what it raises."""
+
+    def headers(file: Any, size: int) -> list[Header]:
+        groups = [file, *(_take(file, number) for number in _numbers(file))]
+        return [_Reader(group, size).header() for group in groups]
+
+    return _tried(path, True, headers)
+
+
+def read_origin(path: Path, take: int) -> bytes:
+    """Return the bytes of the scene and the settings of a take; see `read` for what it raises."""
+
+    def origin(file: Any, size: int) -> bytes:
+        reader = _Reader(_take(file, take), size)
+        data = reader.table("origin", np.uint8, (None,))[()].tobytes()
+        if hashlib.sha256(data).hexdigest() != reader.header().take.origin:
+            raise Damaged("the scene of its run has been changed")
+        return data
+
+    return _tried(path, True, origin)
+
+
+def _tried(path: Path, alone: bool, ask: Callable[[Any, int], Answer]) -> Answer:
+    """What the file, of a size in bytes, says; see `read` for what it raises."""
     where = f"cache {str(path)!r}"
     if not path.is_file():
         raise SceneError("there is no such file", "check the path", where)
     try:
         for _ in range(TRIES - 1):
             with suppress(Damaged):
-                return _read(path, alone, where)
-        return _read(path, alone, where)
+                return _read(path, alone, where, ask)
+        return _read(path, alone, where, ask)
     except BlockingIOError:
         raise SceneError("another run writes to it", "wait until that ends, or give another name", where) from None
     except SceneError:
@@ -63,15 +102,15 @@ def read(path: Path, alone: bool = False) -> tuple[Header, Content]:
         raise SceneError(f"it cannot be read: {str(error) or type(error).__name__}", REMEDY, where) from None
 
 
-def _read(path: Path, alone: bool, where: str) -> tuple[Header, Content]:
-    """What the file holds at this moment."""
+def _read(path: Path, alone: bool, where: str, ask: Callable[[Any, int], Answer]) -> Answer:
+    """What the file says at this moment."""
     with _opened(path, alone) as file:
         kind = file.attrs.get("format")
         if isinstance(kind, str) and kind == FIRST_FORMAT:
             raise SceneError("it is of an older version of the library, whose checkpoints could hold programs", REMEDY, where)
         if not isinstance(kind, str) or kind != FORMAT:
             raise SceneError("it is no cache of this version", "give another name, or delete it", where)
-        return _whole(file, os.fstat(file.id.get_vfd_handle()).st_size)
+        return ask(file, os.fstat(file.id.get_vfd_handle()).st_size)
 
 
 def _opened(path: Path, alone: bool) -> Any:
@@ -85,9 +124,30 @@ def _opened(path: Path, alone: bool) -> Any:
         return h5py.File(path, "r", locking=False)
 
 
-def _whole(file: Any, size: int) -> tuple[Header, Content]:
-    """What a file of `size` bytes holds."""
-    reader = _Reader(file, size)
+def _numbers(file: Any) -> list[int]:
+    """Numbers of the takes that were not written last."""
+    takes: Any = file.get("takes") if isinstance(file.get("takes", getlink=True), library().HardLink) else None
+    names = list(takes) if isinstance(takes, library().Group) else [""]
+    if not all(re.fullmatch("[1-9][0-9]{0,8}", name) for name in names):
+        raise Damaged("its takes are none")
+    return sorted(map(int, names))
+
+
+def _take(file: Any, number: int | None) -> Any:
+    """The file itself, or the group of a take."""
+    if number is None or file.attrs.get("take") == number:
+        return file
+    if number not in _numbers(file):
+        raise Damaged(f"it has no take {number}")
+    name = f"takes/{number}"
+    if not isinstance(file.get(name, getlink=True), library().HardLink) or file[name].attrs.get("take") != number:
+        raise Damaged(f"its take {number} is another one")
+    return file[name]
+
+
+def _whole(group: Any, size: int) -> tuple[Header, Content]:
+    """What a take in a file of `size` bytes holds."""
+    reader = _Reader(group, size)
     header, complete = reader.header(), bool(reader.attribute("complete", np.bool_))
     tables = reader.tables(len(header.names)) if complete else {}
     if seal_of(header, complete, tables) != reader.text("seal"):
@@ -100,8 +160,22 @@ def _plain(table: Any) -> Any:
     return table.decode() if isinstance(table, bytes) else table
 
 
+def unpacked_state(kept: Kept) -> bytes | None:
+    """Return the bytes of the state of a checkpoint, None where it does not agree with its commit."""
+    commit, data = kept
+    size, length = len(data), int(commit["length"])
+    if digest_of(commit, data) != commit["digest"]:
+        return None
+    if length > MOST_UNPACKED * size + LEAST_UNPACKED:
+        raise Damaged(f"a state of {length} bytes in {size}")
+    unpacked = zlib.decompressobj().decompress(data, length + 1)
+    if len(unpacked) != length:
+        raise Damaged(f"a state of another length than {length} bytes")
+    return unpacked
+
+
 class _Reader:
-    """An open file of `size` bytes."""
+    """A take in an open file of `size` bytes."""
 
     def __init__(self, file: Any, size: int) -> None:
         self._file, self._size = file, size
@@ -124,6 +198,13 @@ class _Reader:
         """A number > 0 among the attributes."""
         value = float(self.attribute(name, np.floating))
         if not 0.0 < value < np.inf:
+            raise Damaged(f"its {name} is {value}")
+        return value
+
+    def count(self, name: str) -> int:
+        """A whole number >= 0 among the attributes."""
+        value = int(self.attribute(name, np.integer))
+        if value < 0:
             raise Damaged(f"its {name} is {value}")
         return value
 
@@ -158,7 +239,10 @@ class _Reader:
         if not np.all(np.isfinite(offset)) or not np.all(np.isfinite(turn)):
             raise Damaged("the frames of its bodies are no finite numbers")
         known = self.text("fingerprint"), self.text("version"), self.number("duration"), self.number("fps")
-        return Header(*known, names, times, offset, turn)
+        take = Take(self.count("take"), self.count("base"), self.count("first_frame"), self.text("origin"))
+        if take.number < 1 or take.base == take.number or (take.base > 0) != (take.first_frame > 0):
+            raise Damaged("its takes are none")
+        return Header(*known, names, times, offset, turn, take)
 
     def content(self, header: Header, complete: bool) -> Content:
         """What the last commit counts that agrees with its digest."""
@@ -180,26 +264,29 @@ class _Reader:
             bodies = impacts[:, 1:3]
             if not np.all((bodies >= 0.0) & (bodies < len(header.names))):
                 raise Damaged("its impacts are of bodies that it does not have")
-            return Content(frames, impacts, time, state, complete, {})
+            return Content(frames, impacts, time, state, complete, {}, self.kept(counts))
         if complete or np.all(commits["number"] > 0):
             raise Damaged("no checkpoint agrees with its digest")
         return empty(len(header.names))
 
     def _state(self, slot: int, commit: np.void) -> bytes | None:
         """The state in a slot, None where it does not agree with its commit."""
-        stored = self.table(f"checkpoint/{slot}", np.uint8, (None,))
-        size, length = int(commit["size"]), int(commit["length"])
+        stored, size = self.table(f"checkpoint/{slot}", np.uint8, (None,)), int(commit["size"])
         if commit["number"] == 0 or size > len(stored):
             return None
-        data = stored[:size].tobytes()
-        if digest_of(commit, data) != commit["digest"]:
-            return None
-        if length > MOST_UNPACKED * size + LEAST_UNPACKED:
-            raise Damaged(f"a state of {length} bytes in {size}")
-        unpacked = zlib.decompressobj().decompress(data, length + 1)
-        if len(unpacked) != length:
-            raise Damaged(f"a state of another length than {length} bytes")
-        return unpacked
+        return unpacked_state(Kept(commit, stored[:size].tobytes()))
+
+    def kept(self, counts: dict[str, int]) -> list[Kept]:
+        """Earlier checkpoints, in order of time, none beyond what is counted."""
+        commits, states = self.table("kept/commits", COMMIT, (None,))[()], self.table("kept/states", np.uint8, (None,))
+        ends = np.cumsum(commits["size"].astype(float))
+        in_order = np.all(np.isfinite(commits["time"])) and np.all(np.diff(commits["time"]) > 0.0)
+        if not in_order or np.append(0.0, ends)[-1] != len(states):
+            raise Damaged("its earlier checkpoints are none")
+        if any(np.any(commits[name] > count) for name, count in counts.items()):
+            raise Damaged("an earlier checkpoint counts more than the last one")
+        places = [(int(end) - int(commit["size"]), int(end)) for commit, end in zip(commits, ends, strict=True)]
+        return [Kept(commit, states[first:end].tobytes()) for commit, (first, end) in zip(commits, places, strict=True)]
 
     def _rows(self, name: str, shape: tuple[int | None, ...], count: int) -> np.ndarray:
         """The first rows of a table of numbers."""
