@@ -20,6 +20,7 @@ from rigidimpulse.cli.jobs import (
     run_job,
     show,
     size_of,
+    storage_of,
 )
 from rigidimpulse.cli.live import live
 from rigidimpulse.cli.site import gallery as gallery_pages
@@ -74,6 +75,7 @@ def run_options(command: Callable) -> Callable:
     for option in (
         click.option("--view", is_flag=True, help="Open the result in the browser."),
         click.option("--cache", type=click.Path(), help="Keep the run in this .h5 file while it goes on; go on from there if it is there."),
+        click.option("--from-frame", type=int, help="Go on from this frame of the run in --cache, with SCENE as it is now."),
         click.option("--profile", is_flag=True, help="Print where the time went, by stage and by kernel."),
         click.option("--fps", type=float, help="Frames per second; changes what is recorded, never what happens."),
         click.option("--duration", type=float, help="Time to simulate, s."),
@@ -105,7 +107,7 @@ def export_options(command: Callable) -> Callable:
 @click.option("-o", "--output", multiple=True, help=f"Write the recording: a name that ends in {OUTPUT_SUFFIXES}.")
 @export_options
 @run_options
-def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, cache: str | None, **settings: Any) -> None:
+def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:
     """Run a gallery scene and its checks; without NAME, list the scenes."""
     from rigidimpulse import gallery
     from rigidimpulse.studies.job import job_of
@@ -117,10 +119,10 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, c
             for entry_name in known:
                 click.echo(f"  {entry_name.ljust(width)}  {gallery.load(entry_name).description}")
         return
-    entry, keys = gallery.load(name), _export_settings(settings)
+    entry, keys, storage = gallery.load(name), _export_settings(settings), storage_of(settings)
     job = job_of(entry)._replace(**given_options(settings))
     click.echo(f"{entry.name}: {entry.description}")
-    run = run_job(job, output, profile, cache)
+    run = run_job(job, output, profile, storage)
     is_whole = job.duration == entry.duration and not run.status.is_partial
     checks = entry.check(run) if is_whole else []
     if is_whole:
@@ -138,14 +140,14 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, c
 @click.option("-o", "--output", multiple=True, required=True, help=f"Where to write: a name that ends in {OUTPUT_SUFFIXES}.")
 @export_options
 @run_options
-def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, cache: str | None, **settings: Any) -> None:
+def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, **settings: Any) -> None:
     """Simulate SCENE and write the recording."""
     from rigidimpulse.studies.job import find_job
 
-    keys = _export_settings(settings)
+    keys, storage = _export_settings(settings), storage_of(settings)
     job = find_job(scene)._replace(**given_options(settings))
     head = None if job.entry is None else Head(job.entry.description)
-    run = run_job(job, output, profile, cache)
+    run = run_job(job, output, profile, storage)
     _hand_over(run, output, view, keys, head)
     end_if_partial(run)
 

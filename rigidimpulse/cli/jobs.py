@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import click
 
@@ -50,7 +50,22 @@ def given_options(settings: dict[str, Any]) -> dict[str, Any]:
     return given
 
 
-def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str | None = None) -> Recording:
+class Storage(NamedTuple):
+    """Where a run is kept while it goes on, and the frame of the run there from which on the scene is another one; None: neither."""
+
+    cache: str | None = None
+    from_frame: int | None = None
+
+
+NOT_KEPT = Storage()
+
+
+def storage_of(settings: dict[str, Any]) -> Storage:
+    """Take the options of storage out of the settings of a command."""
+    return Storage(settings.pop("cache"), settings.pop("from_frame"))
+
+
+def run_job(job: Job, output: Sequence[str], profile: bool = False, storage: Storage = NOT_KEPT) -> Recording:
     """Simulate with a progress bar, kept in a cache if one is named, and print the summary; outputs are looked at first."""
     from rigidimpulse.core.errors import SceneError
     from rigidimpulse.core.files import check_target
@@ -66,7 +81,8 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str |
     from rigidimpulse.engine.simulate import simulate as run_scene
 
     scene = job.make()
-    begun = cache is not None and Path(cache).exists()
+    cache, from_frame = storage
+    begun = cache is not None and from_frame is None and Path(cache).exists()
     start = perf_counter()
     # disable=None: no bar where the output is no terminal.
     with tqdm(
@@ -78,7 +94,7 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, cache: str |
             bar.update(min(time, job.duration) - bar.n)
 
         accuracy = cast("Preset | Accuracy | AccuracyTarget", job.accuracy)  # another name is refused there
-        run = run_scene(scene, job.duration, job.fps, accuracy=accuracy, progress=progress, cache=cache)
+        run = run_scene(scene, job.duration, job.fps, accuracy=accuracy, progress=progress, cache=cache, from_frame=from_frame)
     seconds = perf_counter() - start
     num_impacts = len(run.impacts)
     impacts = f"{num_impacts} {'impact' if num_impacts == 1 else 'impacts'}"

@@ -50,9 +50,9 @@ def begin_run(world: World, plan: Plan, times: np.ndarray, left_out: Mapping[str
     if earlier is not None:
         run = _start(earlier.placed(fitting), plan, times)
         earlier.carry_on(run)
-    elif fitting is not world:
-        run = _start(fitting, plan, times)
-    run.recorder.start(run.state.trajectory)
+    else:
+        run = _start(fitting, plan, times) if fitting is not world else run
+        run.recorder.start(run.state.trajectory)
     for name, reason in left_out.items():
         run.log.report(0.0, "effect left out", (name,), f"the scene calls for it: {reason}")
     resolve_overlaps(run)

@@ -18,11 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.collision.geometry import build_geometry
+from rigidimpulse.core.content_digest import digest_of
 from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.core.union_find import roots
 from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.engine.compile_scene import world_boxes
-from rigidimpulse.engine.fingerprint import digest_of
 from rigidimpulse.engine.run import Run, start_bodies
 from rigidimpulse.model.contact_memory import carried_memory, held_pairs
 from rigidimpulse.model.world import World
@@ -78,11 +79,25 @@ class EarlierRun:
             if stays["velocity"]:
                 # The velocity is that of the centre of mass, which may be elsewhere in the body now.
                 velocity[j] = v + cross_arrays(w, position[j] - self.state.position[0, i]) if stays["position"] else v
+        world = self._with_known_shapes(world, both)
         low, high = world_boxes(world.geometry, world.shape_of_body, position, orientation)
         return replace(
             world, position=position, orientation=orientation, velocity=velocity, angular_velocity=angular_velocity,
             static_min=low, static_max=high,
         )  # fmt: skip
+
+    def _with_known_shapes(self, world: World, both: _Both) -> World:
+        """The world with the shapes of the earlier run, and its own behind them: contacts are known by the numbers of corners and edges."""
+        earlier, stays = self.run.world, ~_other_bodies(self.run.world, world, both)
+        old, new = both.old[stays], both.new[stays]
+        shape_of_body, size, radius = world.shape_of_body.copy(), world.size.copy(), world.bound_radius.copy()
+        own = np.delete(np.arange(world.num_bodies), new)
+        which, place = np.unique(shape_of_body[own], return_inverse=True)
+        shapes = [*earlier.shapes, *(world.shapes[k] for k in which.tolist())]
+        shape_of_body[own] = len(earlier.shapes) + place
+        shape_of_body[new], size[new], radius[new] = earlier.shape_of_body[old], earlier.size[old], earlier.bound_radius[old]
+        geometry = build_geometry(shapes)
+        return replace(world, shapes=shapes, geometry=geometry, shape_of_body=shape_of_body, size=size, bound_radius=radius)
 
     def carry_on(self, run: Run) -> None:
         """Let the bodies of a run of the placed world that the change does not reach go on as they were."""
@@ -141,9 +156,13 @@ def _changed(earlier: Run, run: Run, both: _Both) -> np.ndarray:
     before, now = earlier.world, run.world
     if before.accuracy != now.accuracy or before.left_out != now.left_out:
         return np.ones(len(both.old), bool)
+    return _other_bodies(before, now, both) | np.any(before.steady_acceleration[both.old] != now.steady_acceleration[both.new], axis=1)
+
+
+def _other_bodies(before: World, now: World, both: _Both) -> np.ndarray:
+    """Which bodies (k,) bool of both scenes are written in another way than before."""
     bodies = [(before.scene.bodies[i], now.scene.bodies[j]) for i, j in zip(both.old.tolist(), both.new.tolist(), strict=True)]
-    other = np.array([a is not b and digest_of(a) != digest_of(b) for a, b in bodies], bool)
-    return other | np.any(before.steady_acceleration[both.old] != now.steady_acceleration[both.new], axis=1)
+    return np.array([a is not b and digest_of(a) != digest_of(b) for a, b in bodies], bool)
 
 
 def _reached(seeds: np.ndarray, links: np.ndarray, dynamic: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ AT_REST = ("velocities", "angular_velocities")
 
 def joined_frames(first: Recording, then: Recording) -> Recording:
     """Return the frames, impacts, contacts and status of both; first: its last frame is at the time of the first one of `then`."""
-    time = float(then.times[0])
+    time = float(first.times[-1])
     index = np.array([then.names.index(name) if name in then.names else -1 for name in first.names], np.int64)
     impacts, contacts = _renumbered(first.impacts, index), _renumbered(first.contacts, index)
     contacts = contacts[contacts["start"] < time]
@@ -98,9 +98,9 @@ def _renumbered(table: np.ndarray, index: np.ndarray) -> np.ndarray:
 def _frames(first: Recording, then: Recording, index: np.ndarray, name: str) -> np.ndarray:
     """One kind of frames of both (f, n, ...)."""
     before, after = getattr(first, name)[:-1], getattr(then, name)
-    rows = np.repeat(after[:1], len(before), axis=0)
-    if name in AT_REST:
-        rows[:] = 0.0
+    rows = np.zeros((len(before), *after.shape[1:]))
+    if name not in AT_REST:
+        rows[:] = after[:1]
     rows[:, index[index >= 0]] = before[:, index >= 0]
     return np.concatenate([rows, after])
 

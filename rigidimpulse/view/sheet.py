@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.core.content_digest import digest_of
 from rigidimpulse.core.json_text import json_text
-from rigidimpulse.engine.fingerprint import digest_of
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.shape import rotation_matrix
 from rigidimpulse.view.camera import Path as Way

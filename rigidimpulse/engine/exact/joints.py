@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from rigidimpulse.core.content_digest import digest_of
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.joint_impact import JointBlock, impact_rows, stop_at_limits
@@ -17,7 +18,6 @@ from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, make
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work
-from rigidimpulse.engine.fingerprint import digest_of
 from rigidimpulse.engine.islands import is_alone
 from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.participants import RunJoints

@@ -84,7 +84,9 @@ def _at(path: Path, headers: list[Header], header: Header, scene: Scene, frame: 
     if here >= len(content.frames["position"]):
         raise SceneError(f"it has no frame {frame} yet", "let its run go on, or give an earlier frame", where)
     times = frame_times(settings.duration, settings.fps)[begin:]
-    run = _brought_to(prepare(origin.scene, times, settings.accuracy, settings.effects), content, float(times[here]), where)
+    before = _at(path, headers, _base_of(headers, header, where), scene, begin) if begin else None
+    run = prepare(origin.scene, times, settings.accuracy, settings.effects, before[1] if before else None)
+    run = _brought_to(run, content, float(times[here]), where)
     ended = thawed_run(run, freeze(run, constants_of(run)))
     ended.keep(here + 1)
     part, stored = finish_run(ended, float(times[here])), recording_of(path, header, content)
@@ -93,12 +95,15 @@ def _at(path: Path, headers: list[Header], header: Header, scene: Scene, frame: 
         getattr(part, name)[:here] = getattr(stored, name)[:here]
     frames = ended.recorder.frames
     state = Frames(*(rows[-1:] for rows in frames))
-    if begin:
-        before = next((other for other in headers if other.take.number == header.take.base), None)
-        if before is None or before.take.first_frame >= begin:
-            raise SceneError("the take before the change is not in it", REMEDY, where)
-        part = joined_runs(_at(path, headers, before, scene, begin)[0], part)
-    return part, EarlierRun(run, state)
+    return joined_runs(before[0], part) if before else part, EarlierRun(run, state)
+
+
+def _base_of(headers: list[Header], header: Header, where: str) -> Header:
+    """The take in whose middle another one begins."""
+    base = next((other for other in headers if other.take.number == header.take.base), None)
+    if base is None or base.take.first_frame >= header.take.first_frame:
+        raise SceneError("the take before the change is not in it", REMEDY, where)
+    return base
 
 
 def _brought_to(run: Run, content: Content, time: float, where: str) -> Run:

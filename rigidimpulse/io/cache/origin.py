@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rigidimpulse.core.content_digest import digest_of
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.engine.fingerprint import digest_of
 from rigidimpulse.io.cache.arrays import Damaged
 from rigidimpulse.io.cache.constants import ATOMS, Constants
 from rigidimpulse.io.cache.decode import thaw
