@@ -257,7 +257,7 @@ def test_frames_between_steps_of_the_run_and_a_longer_run(tmp_path: Path) -> Non
     assert run.status.ok
 
 
-def test_a_sub_stepped_heap_goes_on(tmp_path: Path) -> None:
+def test_a_sub_stepped_crowd_goes_on(tmp_path: Path) -> None:
     def crowd(**changes: Any) -> ri.Scene:
         scene, random = ri.Scene(), np.random.default_rng(3)
         scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static"))
