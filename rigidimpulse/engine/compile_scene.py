@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from rigidimpulse.scene.material import combine, combine_rolling
 from rigidimpulse.scene.scene import Scene, validate
 
 if TYPE_CHECKING:
-    from rigidimpulse.dynamics.forces.force import ForceTable
+    from rigidimpulse.dynamics.forces.force import Force, ForceTable
 
 
 def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out: frozenset[str] = frozenset()) -> World:
@@ -82,18 +83,25 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         left_out=left_out,
     )
     world.joints = compile_joints(joints, world)
-    world.force_tables = _compile_forces(world)
+    world.force_tables = compile_forces(world, [(world, varying_forces(world))])
     if not world.force_tables or world.can_collide or joints:
         _refuse_fixed_steps(world.accuracy)
     return world
 
 
-def _compile_forces(world: World) -> list[ForceTable]:
-    """The forces that vary, by class."""
+def varying_forces(world: World) -> list[Force]:
+    """Return the forces of a scene that vary."""
     steady = _steady_forces(world.scene)
     forces = [effect for effect in world.scene.effects if effect.stage == "forces" and effect not in steady]
-    classes = dict.fromkeys(type(force) for force in forces if force.kind not in world.left_out)
-    tables = [c.compile([force for force in forces if type(force) is c], world) for c in classes]
+    return [force for force in forces if force.kind not in world.left_out]
+
+
+def compile_forces(world: World, fastened: Sequence[tuple[World, Sequence[Force]]]) -> list[ForceTable]:
+    """Return the tables of forces that vary, by class; fastened: forces, and the world with bodies where they are fastened to these."""
+    tables: list[ForceTable] = []
+    for where, forces in fastened:
+        classes = dict.fromkeys(type(force) for force in forces)
+        tables += [c.compile([force for force in forces if type(force) is c], where) for c in classes]
     if world.accuracy.response == "penalty":
         from rigidimpulse.dynamics.penalty.penalty import penalty_tables
 

@@ -7,14 +7,17 @@ The earlier run stands between two steps, at the time T of a frame. From T on th
                     bodies goes on from step to step: in sub-stepped islands, at joints, under forces that vary
     is carried on   everywhere else: its trajectory, the forces of its lasting contacts and its rebounds go on to the last bit
 
+Joints and forces that are new are fastened to bodies where these are at T: their anchors are places in the world at T. Those of both scenes
+stay fastened where they were, whatever else of them changes.
+
 What a scene says of the start of a body (pose, velocities) counts for bodies that are new at T, and where the change is in just that: a
 body that is given another position is there from T on.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,9 +26,11 @@ from rigidimpulse.core.content_digest import digest_of
 from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.core.union_find import roots
 from rigidimpulse.core.vector import cross_arrays
-from rigidimpulse.engine.compile_scene import world_boxes
+from rigidimpulse.dynamics.soft_body.body import FlexibleBody
+from rigidimpulse.engine.compile_scene import compile_forces, varying_forces, world_boxes
 from rigidimpulse.engine.run import Run, start_bodies
 from rigidimpulse.model.contact_memory import carried_memory, held_pairs
+from rigidimpulse.model.joint_table import compile_joints
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import LINEAR, PRESCRIBED, pose_at
 from rigidimpulse.recording.recorder import Frames
@@ -33,6 +38,9 @@ from rigidimpulse.scene.body import Body
 
 STARTS = ("position", "orientation", "velocity", "angular_velocity")
 """What a scene says of the start of a body."""
+
+FASTENED_BY = frozenset({"a", "b", "body", "anchor", "anchor_a", "anchor_b", "axis", "axes", "axes_b", "point", "direction"})
+"""What joints and forces say of where they are fastened."""
 
 
 class _Both(NamedTuple):
@@ -56,14 +64,24 @@ class EarlierRun:
 
     """
 
-    def __init__(self, run: Run, state: Frames) -> None:
-        """state: of one frame, at the time of the run: velocities at the end of the sub-steps under way."""
-        self.run, self.state = run, state
+    def __init__(self, run: Run, state: Frames, before: EarlierRun | None = None) -> None:
+        """state: of one frame, at the time of the run: velocities at the end of the sub-steps under way; before: where it began itself."""
+        self.run, self.state, self._before = run, state, before
+        self._known = {_fastening(effect) for effect in run.world.scene.effects}
 
     def placed(self, world: World) -> World:
         """The world of the changed scene with its bodies where they are now."""
+        placed = self._posed(self._with_known_shapes(world, self._both(world)))
+        low, high = world_boxes(placed.geometry, placed.shape_of_body, placed.position, placed.orientation)
+        placed.static_min[:], placed.static_max[:] = low, high
+        self._fasten(world, placed)
+        return placed
+
+    def _posed(self, world: World) -> World:
+        """A world with its bodies where those of the earlier run are, and with their velocities."""
         both, earlier = self._both(world), self.run.world
-        position, orientation, velocity, angular_velocity = (getattr(world, name).copy() for name in STARTS)
+        starts = {name: getattr(world, name).copy() for name in STARTS}
+        position, orientation, velocity, angular_velocity = starts.values()
         for i, j in zip(both.old.tolist(), both.new.tolist(), strict=True):
             before, now = earlier.scene.bodies[i], world.scene.bodies[j]
             stays = {name: digest_of(getattr(before, name)) == digest_of(getattr(now, name)) for name in STARTS}
@@ -79,12 +97,38 @@ class EarlierRun:
             if stays["velocity"]:
                 # The velocity is that of the centre of mass, which may be elsewhere in the body now.
                 velocity[j] = v + cross_arrays(w, position[j] - self.state.position[0, i]) if stays["position"] else v
-        world = self._with_known_shapes(world, both)
-        low, high = world_boxes(world.geometry, world.shape_of_body, position, orientation)
-        return replace(
-            world, position=position, orientation=orientation, velocity=velocity, angular_velocity=angular_velocity,
-            static_min=low, static_max=high,
-        )  # fmt: skip
+        return replace(world, **starts, static_min=world.static_min.copy(), static_max=world.static_max.copy())
+
+    def _fasten(self, world: World, placed: World) -> None:
+        """Fasten joints and forces of the placed world where they belong; world: with bodies where they start."""
+        links: dict[EarlierRun | None, World] = {None: world, self: placed}
+
+        def where(effect: Any) -> World:
+            link = self._fastened_at(_fastening(effect))
+            if link is not None and link not in links:
+                links[link] = link._posed(world)
+            return links[link]
+
+        joints, forces = placed.joints_of_scene, varying_forces(world)
+        places = [where(joint) for joint in joints]
+        for other in {id(place): place for place in places if place is not world}.values():
+            these = np.array([place is other for place in places])
+            now, changed = compile_joints(joints, other), placed.joints._asdict()
+            for name in ("anchor_a", "anchor_b", "frame_a", "frame_b"):
+                changed[name] = np.where(these.reshape(-1, *[1] * (changed[name].ndim - 1)), getattr(now, name), changed[name])
+            placed.joints = type(now)(**changed)
+        groups: dict[int, tuple[World, list[Any]]] = {}
+        for force in forces:
+            at = world if isinstance(force, FlexibleBody) else where(force)
+            groups.setdefault(id(at), (at, []))[1].append(force)
+        if len(groups) > 1 or id(world) not in groups:
+            placed.force_tables = compile_forces(world, list(groups.values()))
+
+    def _fastened_at(self, key: tuple[type, str]) -> EarlierRun | None:
+        """The run at whose end an effect was fastened, None for the start."""
+        if key not in self._known:
+            return self
+        return None if self._before is None else self._before._fastened_at(key)
 
     def _with_known_shapes(self, world: World, both: _Both) -> World:
         """The world with the shapes of the earlier run, and its own behind them: contacts are known by the numbers of corners and edges."""
@@ -138,6 +182,11 @@ class EarlierRun:
         links = [held_pairs(earlier.state.memory, earlier.state.trajectory.start), earlier.contact_log.lasting_pairs()]
         links += [earlier.joints.links(), earlier.forces.links()]
         return _reached(again, np.concatenate(links), earlier.world.dynamic)
+
+
+def _fastening(effect: Any) -> tuple[type, str]:
+    """Where a joint or force is fastened: its class, and a digest of what it says of that."""
+    return type(effect), digest_of({field.name: getattr(effect, field.name) for field in fields(effect) if field.name in FASTENED_BY})
 
 
 def _is_due(body: Body, time: float) -> bool:

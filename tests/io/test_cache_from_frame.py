@@ -291,3 +291,57 @@ def test_the_command_line_goes_on_from_a_frame(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     run = ri.load_recording(cache)
     np.testing.assert_allclose(run.velocity("ball")[[14, 15], 0], (1.0, 4.0))
+
+
+def fastened(*things: Any) -> ri.Scene:
+    """A ball that falls, held by what is given."""
+    scene = ri.Scene()
+    scene.add(ri.Body("ball", ri.Shape.sphere(0.2), position=(0, 0, 3), velocity=(0.5, 0, 0)))
+    for thing in things:
+        scene.add(thing)
+    return scene
+
+
+def test_new_joints_and_springs_are_fastened_where_bodies_are(tmp_path: Path) -> None:
+    whole = ri.simulate(fastened(), 1.0, cache=tmp_path / "run.h5")
+    anchor = np.array([0.0, 0.0, 2.0])
+    joint = ri.BallJoint("ball", None, anchor)
+    arm = np.linalg.norm(whole.position("ball")[30] - anchor)
+    first = ri.simulate(fastened(joint), 1.0, cache=tmp_path / "run.h5", from_frame=30)
+    # A change of the changed run: the joint stays where it is.
+    for run in (first, ri.simulate(fastened(joint, ri.Drag(0.1)), 1.0, cache=tmp_path / "run.h5", from_frame=45)):
+        np.testing.assert_allclose(np.linalg.norm(run.position("ball")[30:] - anchor, axis=1), arm, rtol=1e-9)
+        # It hangs by its point at the anchor: it turns with its arm, at v = w x r.
+        lever = run.position("ball")[50] - anchor
+        np.testing.assert_allclose(np.cross(run.angular_velocity("ball")[50], lever), run.velocity("ball")[50], atol=1e-3)
+    # A spring from the ball's centre at that frame, unstretched there: adding it adds no energy. Fastened where the ball began, it would
+    # be stretched by some decimetres, and hold kilojoules.
+    place = whole.position("ball")[20]
+    spring = ri.Spring("ball", None, place, place + (0, 0, 1.0), stiffness=1e5)
+    run = ri.simulate(fastened(spring), 1.0, cache=tmp_path / "run.h5", from_frame=20)
+    assert abs(run.ledger.dissipated.get("change of the scene", np.zeros(1))[-1]) < 1e-6
+    assert run.position("ball")[-1, 2] > whole.position("ball")[-1, 2] + 1.0
+
+
+def test_a_joint_that_changes_stays_where_it_is_fastened(tmp_path: Path) -> None:
+    def arm(speed: float) -> ri.Scene:
+        scene = ri.Scene()
+        scene.add(ri.Body("upper", ri.Shape.box((0.4, 0.1, 0.1)), position=(0.2, 0, 3)))
+        scene.add(ri.Body("lower", ri.Shape.box((0.4, 0.1, 0.1)), position=(0.6, 0, 3)))
+        scene.add(ri.HingeJoint("upper", None, (0, 0, 3), (0, 1, 0)))
+        scene.add(ri.HingeJoint("upper", "lower", (0.4, 0, 3), (0, 1, 0), motor=ri.Motor(velocity=speed, damping=50.0)))
+        return scene
+
+    whole = ri.simulate(arm(0.0), 1.0, cache=tmp_path / "run.h5")
+    run = ri.simulate(arm(2.0), 1.0, cache=tmp_path / "run.h5", from_frame=20)
+    assert np.linalg.norm(whole.position("upper")[20] - whole.position("upper")[0]) > 0.1
+    ends = [run.position(name) + sign * 0.2 * axis(run.orientation(name)) for name, sign in (("upper", 1.0), ("lower", -1.0))]
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
+    spins = run.angular_velocity("lower")[:, 1] - run.angular_velocity("upper")[:, 1]
+    np.testing.assert_allclose((spins[15], abs(spins[-1])), (0.0, 2.0), atol=0.05)
+
+
+def axis(orientation: np.ndarray) -> np.ndarray:
+    """The x axes (f, 3) of a body."""
+    w, x, y, z = orientation.T
+    return np.column_stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)])

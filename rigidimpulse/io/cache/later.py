@@ -95,7 +95,7 @@ def _at(path: Path, headers: list[Header], header: Header, scene: Scene, frame: 
         getattr(part, name)[:here] = getattr(stored, name)[:here]
     frames = ended.recorder.frames
     state = Frames(*(rows[-1:] for rows in frames))
-    return joined_runs(before[0], part) if before else part, EarlierRun(run, state)
+    return joined_runs(before[0], part) if before else part, EarlierRun(run, state, before[1] if before else None)
 
 
 def _base_of(headers: list[Header], header: Header, where: str) -> Header:
