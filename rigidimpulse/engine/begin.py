@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidimpulse.core.kernels import INTERPRETED
 from rigidimpulse.dynamics.forces import KINDS
-from rigidimpulse.engine.earlier_run import EarlierRun
 from rigidimpulse.engine.effects import EventKernel, FclNarrowPhase, SubsteppedContact, TriggerVolumes, all_effects
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
 from rigidimpulse.engine.exact.compiled_loop import why_not as why_not_compiled
@@ -25,6 +25,9 @@ from rigidimpulse.model.plan import Plan
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
+
+if TYPE_CHECKING:
+    from rigidimpulse.engine.earlier_run import EarlierRun
 
 
 def make_plan(world: World, chosen: Mapping[str, bool] | None = None) -> Plan:

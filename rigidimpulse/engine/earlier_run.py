@@ -16,7 +16,7 @@ body that is given another position is there from T on.
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,12 +117,12 @@ class EarlierRun:
             for name in ("anchor_a", "anchor_b", "frame_a", "frame_b"):
                 changed[name] = np.where(these.reshape(-1, *[1] * (changed[name].ndim - 1)), getattr(now, name), changed[name])
             placed.joints = type(now)(**changed)
-        groups: dict[int, tuple[World, list[Any]]] = {}
+        by_place: dict[int, tuple[World, list[Any]]] = {}
         for force in forces:
             at = world if isinstance(force, FlexibleBody) else where(force)
-            groups.setdefault(id(at), (at, []))[1].append(force)
-        if len(groups) > 1 or id(world) not in groups:
-            placed.force_tables = compile_forces(world, list(groups.values()))
+            by_place.setdefault(id(at), (at, []))[1].append(force)
+        if len(by_place) > 1 or id(world) not in by_place:
+            placed.force_tables = compile_forces(world, list(by_place.values()))
 
     def _fastened_at(self, key: tuple[type, str]) -> EarlierRun | None:
         """The run at whose end an effect was fastened, None for the start."""
@@ -178,7 +178,8 @@ class EarlierRun:
         again[both.old] |= run.forces.acts[both.new]
         for joints, indices in ((earlier.world.joints, None), (run.world.joints, both)):
             if joints is not None:
-                again[_ends(joints.body_a, joints.body_b, indices)] = True
+                ends = _ends(joints.body_a, joints.body_b, indices)
+                again[ends[earlier.world.dynamic[ends]]] = True  # what stands at a joint holds others, too
         links = [held_pairs(earlier.state.memory, earlier.state.trajectory.start), earlier.contact_log.lasting_pairs()]
         links += [earlier.joints.links(), earlier.forces.links()]
         return _reached(again, np.concatenate(links), earlier.world.dynamic)
@@ -186,7 +187,7 @@ class EarlierRun:
 
 def _fastening(effect: Any) -> tuple[type, str]:
     """Where a joint or force is fastened: its class, and a digest of what it says of that."""
-    return type(effect), digest_of({field.name: getattr(effect, field.name) for field in fields(effect) if field.name in FASTENED_BY})
+    return type(effect), digest_of({name: getattr(effect, name) for name in sorted(FASTENED_BY) if hasattr(effect, name)})
 
 
 def _is_due(body: Body, time: float) -> bool:

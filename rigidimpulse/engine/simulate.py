@@ -14,7 +14,6 @@ from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.providers import provider
 from rigidimpulse.engine.begin import begin_run, make_plan
 from rigidimpulse.engine.compile_scene import compile_scene
-from rigidimpulse.engine.earlier_run import EarlierRun
 from rigidimpulse.engine.early_end import Stopped, interruptible, memory_told
 from rigidimpulse.engine.effects import EventKernel
 from rigidimpulse.engine.loop import run_to_end
@@ -28,6 +27,7 @@ from rigidimpulse.scene.frame_times import frame_times
 from rigidimpulse.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from rigidimpulse.engine.earlier_run import EarlierRun
     from rigidimpulse.recording.cache import Cache
     from rigidimpulse.scene.accuracy_targets import AccuracyTarget
 
@@ -76,7 +76,7 @@ def simulate(
     """
     if isinstance(accuracy, str | Accuracy):
         return _simulate(_Asked(scene, duration, fps, accuracy, effects, from_frame), progress, cache, interruptible)
-    if cache is not None:
+    if cache is not None or from_frame is not None:
         raise SceneError("a cache for an accuracy that is still to be chosen", "choose it first, and give run.choice.accuracy")
     return provider("simulate to target")(scene, duration, fps, accuracy, effects, progress)
 
@@ -141,7 +141,7 @@ def _go_on(
     if cache is None:
         raise SceneError("from_frame without a cache", "give the cache of the run that is to go on")
     start = provider("later start")(cache, asked.scene, float(asked.fps), asked.from_frame)
-    times = frame_times(asked.duration, asked.fps)[asked.from_frame :]
+    times = frame_times(asked.duration, asked.fps)[start.change.frame :]
     if len(times) < 2:
         raise SceneError(f"from_frame = {asked.from_frame!r} of {asked.duration:g} s", "give an earlier frame, or a longer duration")
     run = prepare(asked.scene, times, asked.accuracy, asked.effects, start.earlier)

@@ -103,7 +103,7 @@ class Recording:
 
         """
         if self.scene is None or self.settings is None:
-            raise SceneError("a loaded recording cannot be run again", "ask the run that simulate() returned")
+            raise SceneError("a loaded recording, or one from a frame on, cannot be run again", "ask a whole run of simulate()")
         return provider("horizon")(self)
 
     def index(self, name: str) -> int:

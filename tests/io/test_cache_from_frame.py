@@ -233,7 +233,7 @@ def test_functions_are_those_of_the_program(tmp_path: Path) -> None:
 
 
 def test_what_cannot_go_on_is_refused(kept: Kept, tmp_path: Path) -> None:
-    for frame in (0, -3, 72, 100):
+    for frame in (0, -3, 40.5, 72, 100):
         with pytest.raises(ri.SceneError, match="give a frame from 1 to 71"):
             ri.simulate(yard(), DURATION, cache=kept.path, from_frame=frame)
     with pytest.raises(ri.SceneError, match="give fps=60"):

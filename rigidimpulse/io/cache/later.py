@@ -53,8 +53,8 @@ def later_start(cache: Cache | str | os.PathLike[str], scene: Scene, fps: float,
     base = _take_at(headers, frame, where)
     if base.fps != fps:
         raise SceneError(f"its frames are at {base.fps:g} fps, asked for is {fps:g}", f"give fps={base.fps:g}", where)
-    first, earlier = _at(path, headers, base, scene, frame)
-    return LaterStart(first, earlier, Change(frame, base.take.number, base.fingerprint))
+    first, earlier = _at(path, headers, base, scene, int(frame))
+    return LaterStart(first, earlier, Change(int(frame), base.take.number, base.fingerprint))
 
 
 def _take_at(headers: list[Header], frame: int, where: str) -> Header:
@@ -65,7 +65,7 @@ def _take_at(headers: list[Header], frame: int, where: str) -> Header:
         seen.add(base.take.number)
         base = by_number[base.take.base]
     last = base.take.first_frame + len(base.times) - 1
-    if not base.take.first_frame < frame < last:
+    if int(frame) != frame or not base.take.first_frame < frame < last:
         raise SceneError(f"from_frame = {frame!r}", f"give a frame from 1 to {last - 1}: the run goes on from there", where)
     return base
 
@@ -85,7 +85,12 @@ def _at(path: Path, headers: list[Header], header: Header, scene: Scene, frame: 
         raise SceneError(f"it has no frame {frame} yet", "let its run go on, or give an earlier frame", where)
     times = frame_times(settings.duration, settings.fps)[begin:]
     before = _at(path, headers, _base_of(headers, header, where), scene, begin) if begin else None
-    run = prepare(origin.scene, times, settings.accuracy, settings.effects, before[1] if before else None)
+    try:
+        run = prepare(origin.scene, times, settings.accuracy, settings.effects, before[1] if before else None)
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        if isinstance(error, SceneError):
+            raise
+        raise SceneError(f"the scene of its run cannot be prepared: {error}", REMEDY, where) from error
     run = _brought_to(run, content, float(times[here]), where)
     ended = thawed_run(run, freeze(run, constants_of(run)))
     ended.keep(here + 1)
