@@ -35,12 +35,10 @@ from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import LINEAR, PRESCRIBED, pose_at
 from rigidimpulse.recording.recorder import Frames
 from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.fastening import fastening
 
 STARTS = ("position", "orientation", "velocity", "angular_velocity")
 """What a scene says of the start of a body."""
-
-FASTENED_BY = frozenset({"a", "b", "body", "anchor", "anchor_a", "anchor_b", "axis", "axes", "axes_b", "point", "direction"})
-"""What joints and forces say of where they are fastened."""
 
 
 class _Both(NamedTuple):
@@ -67,7 +65,7 @@ class EarlierRun:
     def __init__(self, run: Run, state: Frames, before: EarlierRun | None = None) -> None:
         """state: of one frame, at the time of the run: velocities at the end of the sub-steps under way; before: where it began itself."""
         self.run, self.state, self._before = run, state, before
-        self._known = {_fastening(effect) for effect in run.world.scene.effects}
+        self._known = {fastening(effect) for effect in run.world.scene.effects}
 
     def placed(self, world: World) -> World:
         """The world of the changed scene with its bodies where they are now."""
@@ -104,7 +102,7 @@ class EarlierRun:
         links: dict[EarlierRun | None, World] = {None: world, self: placed}
 
         def where(effect: Any) -> World:
-            link = self._fastened_at(_fastening(effect))
+            link = self._fastened_at(fastening(effect))
             if link is not None and link not in links:
                 links[link] = link._posed(world)
             return links[link]
@@ -183,11 +181,6 @@ class EarlierRun:
         links = [held_pairs(earlier.state.memory, earlier.state.trajectory.start), earlier.contact_log.lasting_pairs()]
         links += [earlier.joints.links(), earlier.forces.links()]
         return _reached(again, np.concatenate(links), earlier.world.dynamic)
-
-
-def _fastening(effect: Any) -> tuple[type, str]:
-    """Where a joint or force is fastened: its class, and a digest of what it says of that."""
-    return type(effect), digest_of({name: getattr(effect, name) for name in sorted(FASTENED_BY) if hasattr(effect, name)})
 
 
 def _is_due(body: Body, time: float) -> bool:

@@ -189,14 +189,14 @@ def test_a_take_that_is_stopped_goes_on(kept: Kept, stop: float) -> None:
     assert kept.unchanged(whole) == {"floor", "shelf", "rest", "slide", "ball"}
 
 
-def mechanism(**changes: Any) -> ri.Scene:
-    """A wheel that a hinge lets turn up to ten turns, one on a joint that breaks, and a cloth."""
+def mechanism(upper: float = 1.0, release: float = 0.2, **changes: Any) -> ri.Scene:
+    """A wheel that a hinge lets turn by 20 rad, one on a joint that lets go, and a cloth."""
     scene = ri.Scene()
     disk = ri.Shape.cylinder(0.2, 0.1)
     for k, name in enumerate(("wheel", "loose")):
         scene.add(ri.Body(name, disk, position=(2.0 * k, 0, 3), angular_velocity=(0, 0, 40.0)))
-    scene.add(ri.HingeJoint("wheel", None, (0, 0, 3), (0, 0, 1), lower=-20.0, upper=1.0))
-    scene.add(ri.BallJoint("loose", None, (2, 0, 3), release_time=0.2))
+    scene.add(ri.HingeJoint("wheel", None, (0, 0, 3), (0, 0, 1), lower=-20.0, upper=upper))
+    scene.add(ri.BallJoint("loose", None, (2, 0, 3), release_time=release))
     scene.add(ri.Body("far", ri.Shape.sphere(0.1), position=(9, 0, 5), **changes))
     corners = np.array([(-3 + 0.2 * x, 0.2 * y, 3) for x in range(4) for y in range(4)])
     faces = [(4 * x + y, 4 * x + y + 5 - k, 4 * x + y + (5 if k else 1)) for x in range(3) for y in range(3) for k in (0, 1)]
@@ -214,6 +214,14 @@ def test_joints_and_soft_bodies_go_on_from_where_they_are(tmp_path: Path) -> Non
     np.testing.assert_allclose(run.soft_body("cloth")[0], whole.soft_body("cloth")[0], atol=1e-9)
     assert abs(run.angular_velocity("wheel")[24, 2] - 40.0) < 1e-9
     assert run.angular_velocity("wheel")[-1, 2] < 1.0
+
+
+def test_joints_that_change_count_their_turns_on_and_stay_broken(tmp_path: Path) -> None:
+    whole = ri.simulate(mechanism(), 0.7, cache=tmp_path / "run.h5")
+    run = ri.simulate(mechanism(upper=2.0, release=5.0), 0.7, cache=tmp_path / "run.h5", from_frame=24)
+    # It meets its limit of 20 rad at 0.5 s, not three turns later, and what fell goes on falling.
+    np.testing.assert_allclose(run.angular_velocity("wheel"), whole.angular_velocity("wheel"), atol=1e-6)
+    np.testing.assert_allclose(run.position("loose"), whole.position("loose"), atol=1e-9)
 
 
 def blown(strength: float, **changes: Any) -> ri.Scene:
@@ -272,8 +280,8 @@ def test_a_sub_stepped_crowd_goes_on(tmp_path: Path) -> None:
     run = ri.simulate(crowd(mass=3.0), 1.0, accuracy=accuracy, cache=tmp_path / "run.h5", from_frame=30)
     np.testing.assert_array_equal(run.positions[:30], whole.positions[:30])
     assert run.status.ok
-    # The crowd begins again where it is: it settles at most some millimetres elsewhere.
-    assert np.abs(run.positions[-1, 1:-1] - whole.positions[-1, 1:-1]).max() < 0.02
+    # The boxes begin again where they are, without what the solver knew of their contacts: they settle 3.4 mm elsewhere, of 200.
+    assert np.abs(run.positions[-1, 1:-1] - whole.positions[-1, 1:-1]).max() < 0.005
 
 
 def test_the_command_line_goes_on_from_a_frame(tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rigidimpulse.core.content_digest import digest_of
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.joint_impact import JointBlock, impact_rows, stop_at_limits
@@ -28,6 +27,7 @@ from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.evaluate import refresh_pose
 from rigidimpulse.motion.trajectory import FIXED
+from rigidimpulse.scene.fastening import fastening
 from rigidimpulse.scene.joint import Joint
 from rigidimpulse.scene.joint_coordinates import DISTANCE, RADIUS
 
@@ -118,18 +118,24 @@ class JointState:
                     self._of_body.setdefault(i, []).append(j)
 
     def carry_on(self, run: Run, earlier: Run) -> None:
-        """Begin at the time of the run: turns of joints that an earlier run has, too, are counted on, and those that broke stay broken."""
+        """Begin at the time of the run: turns of joints that an earlier run has, too, are counted on, and those that broke stay broken.
+
+        They are the same joints if they are fastened at the same places; motors, limits and the like may be others.
+        """
         self.began[:] = run.state.time
         before = earlier.joints
         if not isinstance(before, JointState):
             return
-        known = {digest_of(joint): k for k, joint in enumerate(earlier.world.joints_of_scene)}
+        known = {fastening(joint): k for k, joint in enumerate(earlier.world.joints_of_scene)}
         for j, joint in enumerate(run.world.joints_of_scene):
-            k = known.get(digest_of(joint))
-            if k is not None:
-                self.whole[j] = before.whole[k]
-                mine, others = (slice(table.first[n], table.first[n + 1]) for table, n in ((self.table, j), (before.table, k)))
-                self.memory.angle[mine] = before.memory.angle[others]
+            k = known.get(fastening(joint))
+            if k is None:
+                continue
+            self.whole[j] = before.whole[k]
+            others = range(before.table.first[k], before.table.first[k + 1])
+            angle = {int(before.table.coordinate[row]): float(before.memory.angle[row]) for row in others}
+            for row in range(self.table.first[j], self.table.first[j + 1]):
+                self.memory.angle[row] = angle.get(int(self.table.coordinate[row]), 0.0)
 
     def at(self, bodies: Iterable[int]) -> np.ndarray:
         """Whole joints at any of the given dynamic bodies, in order."""

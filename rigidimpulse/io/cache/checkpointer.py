@@ -32,6 +32,7 @@ from rigidimpulse.recording.recording import Recording, RunSettings
 if TYPE_CHECKING:
     from rigidimpulse.engine.run import Run
 
+
 class Change(NamedTuple):
     """Where a run of a changed scene begins: frame of another take, and the number and the fingerprint of that."""
 
