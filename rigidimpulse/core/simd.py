@@ -74,9 +74,15 @@ class _VectorModel(models.PrimitiveModel):
         super().__init__(manager, kind, ir.VectorType(_DOUBLE, kind.width))
 
 
+@cache
+def _simd_type(width: int) -> _SimdType:
+    """The type of a width, made once: each call of a kernel asks for it."""
+    return _SimdType(width)
+
+
 @typeof_impl.register(Simd)
 def _type_of_simd(simd: Simd, _context: Any) -> types.Type:
-    return _SimdType(simd.width)
+    return _simd_type(simd.width)
 
 
 @unbox(_SimdType)

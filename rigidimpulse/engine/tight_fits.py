@@ -2,10 +2,7 @@
 
 Lasting contacts are held at a gap d, the contact margin. Cubes that fill a box have no space for it: where four cubes in a row fill it,
 five gaps ask for 5 d. Files rounded to single precision even lack some 1e-7 of the size. Such demands contradict
-each other. Displacements D of the bodies that meet them as well as can be have
-
-    min sum of m |D|^2 / 2 + s p^2 / 2    with    0 <= p _|_ g + n.(D_b - D_a) - d + s p >= 0,    s small, for all contacts,
-
+each other. Least displacements that meet them as well as can be (`constraints.displacement`, d - g asked for at a gap g) have pushes p,
 and what a contact lacks is s p. Where this is more than a part of d, the smaller movable body of the pair is scaled about its centre of
 mass by 1 - x. Its surface then withdraws by x n.r at the contact, r from the centre; x is such that this is a little more than what is
 lacking. Mass and inertia stay.
@@ -19,8 +16,7 @@ import numpy as np
 
 from rigidimpulse.collision.geometry import CompiledShape, Primitive, build_geometry
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.solvers.newton import solve_newton
-from rigidimpulse.engine.initial_overlap import displacement_rows
+from rigidimpulse.dynamics.constraints.displacement import displacement_rows, solve_displacements
 from rigidimpulse.engine.islands import near_contacts
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
@@ -64,7 +60,7 @@ def lacking(world: World, contacts: Contacts, margin: np.ndarray) -> np.ndarray:
     # Displacements do not depend on the unit of mass.
     inv_mass, pair = world.inv_mass / world.inv_mass.max(), (contacts.body_a, contacts.body_b)
     rows = displacement_rows(inv_mass, pair, contacts.normal, margin - contacts.gap, SOFTNESS)
-    solve_newton(rows, world.num_bodies, RESIDUAL * float(margin.min()))
+    solve_displacements(rows, world.num_bodies, RESIDUAL * float(margin.min()))
     return rows.softness * rows.impulse
 
 
