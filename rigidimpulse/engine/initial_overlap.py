@@ -16,14 +16,14 @@ collide in that run.
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
 from rigidimpulse.core.quaternion import rotate
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.displacement import displacement_rows, solve_displacements
+from rigidimpulse.dynamics.constraints.displacement import displacement_rows, sweep
+from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.ways_out import EQUAL, Demand, WaysOut
@@ -33,8 +33,12 @@ from rigidimpulse.motion.trajectory import begin
 MAX_ROUNDS = 40
 SOFTNESS = TOLERANCES.initial_overlap.softness
 SURE = 1.0 + TOLERANCES.initial_overlap.surely_apart
+SWEPT = 0.1
+"""Part of the residual asked for that a sweep may change: what it changes after a demand is not in the residual of that one."""
 STALLED = 5
 """Rounds without a smaller overlap after which the search gives up."""
+MOST_PLANES = 4
+"""Demands that do not last of one pair: the last ones are kept."""
 
 
 def resolve_overlaps(run: Run) -> None:
@@ -46,7 +50,7 @@ def resolve_overlaps(run: Run) -> None:
     search.add_demands()
     if not search.demands:
         return
-    for demand in search.demands.values():
+    for demand in search.of_all_pairs():
         run.log.report(
             run.state.time, "overlap at the start", (world.names[demand.a], world.names[demand.b]),
             f"the bodies are inside each other by {search.way(demand):.4g} m; where there is space they are moved apart before the "
@@ -71,15 +75,15 @@ def resolve_overlaps(run: Run) -> None:
 
 def _take_apart(search: _Search) -> None:
     """Move the bodies until no pair overlaps, or it does not get better any more."""
-    least, stalled = np.inf, 0
+    least, stalled, number = np.inf, 0, 0
     for _ in range(MAX_ROUNDS):
         search.move_to(search.least_displacement())
-        fresh = search.add_demands()
-        worst = max(search.way(d) / search.ways_out.size(d.a, d.b) for d in search.demands.values())
-        if not fresh and worst <= 0.5 * search.world.contact_margin:
+        changed = search.add_demands()
+        worst = max(search.way(d) / search.ways_out.size(d.a, d.b) for d in search.of_all_pairs())
+        if not changed and worst <= 0.5 * search.world.contact_margin:
             return
-        stalled = 0 if fresh or worst < 0.99 * least else stalled + 1
-        least = min(least, worst)
+        stalled = 0 if len(search.demands) > number or worst < 0.99 * least else stalled + 1
+        least, number = min(least, worst), len(search.demands)
         if stalled == STALLED:
             return
 
@@ -89,7 +93,7 @@ class _Search:
 
     Attributes:
         position: (n, 3) m, centres of mass.
-        demands: of pairs a < b that overlap, or did so before they were moved apart.
+        demands: of each pair a < b that overlaps, or did so before it was moved apart: one that lasts, or some that do not.
         cluster: (n,) bodies that joints join have the same number. inv_mass: (k,) 1/kg of the clusters, 0 if one cannot move.
 
     """
@@ -99,32 +103,60 @@ class _Search:
         self.world = run.world
         self.position = run.world.position.copy()
         self.ways_out = WaysOut(run.world)
-        self.demands: dict[tuple[int, int], Demand] = {}
+        self.demands: dict[tuple[int, int], list[Demand]] = {}
         self.cluster, self.inv_mass = _clusters(run.world)
+
+    def of_all_pairs(self) -> list[Demand]:
+        """All demands."""
+        return [demand for demands in self.demands.values() for demand in demands]
 
     def way(self, demand: Demand) -> float:
         """The way that is left, m: negative if the bodies are farther apart than is asked, inf if none is known."""
-        return demand.level - float(demand.direction @ (self.position[demand.b] - self.position[demand.a]))
+        return demand.level - float(demand.direction @ self._beside(demand.a, demand.b))
 
-    def overlapping(self, known: Collection[tuple[int, int]] = ()) -> list[tuple[int, int]]:
-        """Pairs that overlap and are not known, in order."""
+    def overlapping(self) -> list[tuple[int, int]]:
+        """Pairs that overlap, in order."""
+        return [(a, b) for a, b in self._near() if self.ways_out.overlaps(a, b, self._beside(a, b))]
+
+    def add_demands(self) -> bool:
+        """Add demands of pairs that overlap: those that have none, and those whose demands do not last; returns whether there are any."""
+        changed = False
+        for (a, b), known in self.demands.items():
+            if known[0].lasting:
+                continue
+            before, c = self._beside_as_given(a, b), self._beside(a, b)
+            if not self.ways_out.meets(a, b, c):
+                for demand in known:
+                    # Where they are is allowed.
+                    demand.level = min(demand.level, float(demand.direction @ c))
+                continue
+            # A wedge has several planes.
+            new, changed = self.ways_out.again(a, b, before, c, len(known)), True
+            known[:] = [new] if new.lasting else [*known[-MOST_PLANES + 1 :], new]
+        for a, b in self._near():
+            if (a, b) in self.demands or not self.ways_out.meets(a, b, self._beside(a, b)):
+                continue
+            before, c = self._beside_as_given(a, b), self._beside(a, b)
+            if not self.ways_out.meets(a, b, before):
+                self.demands[a, b], changed = [self.ways_out.on_its_side(a, b, before, c)], True
+            elif self.ways_out.overlaps(a, b, c):
+                self.demands[a, b], changed = [self.ways_out.least(a, b, c)], True
+        return changed
+
+    def _beside(self, a: int, b: int) -> np.ndarray:
+        """From a to b, (3,) m."""
+        return self.position[b] - self.position[a]
+
+    def _beside_as_given(self, a: int, b: int) -> np.ndarray:
+        return self.world.position[b] - self.world.position[a]
+
+    def _near(self) -> list[tuple[int, int]]:
+        """Pairs that may overlap, in order."""
         pair_events = PairEvents(self.run, self.run.state.time)
         pair_events.find_pairs()
         a, b = pair_events.pairs["a"], pair_events.pairs["b"]
         near = ~self._surely_apart(a, b)
-        pairs = set(zip(a[near].tolist(), b[near].tolist(), strict=True)).difference(known)
-        return [(i, j) for i, j in sorted(pairs) if self.ways_out.overlaps(i, j, self.position[j] - self.position[i])]
-
-    def add_demands(self) -> bool:
-        """Bring the demands up to date, and add those of overlapping pairs that have none; returns whether there are any."""
-        for demand in self.demands.values():
-            self.ways_out.renew(demand, self.position[demand.b] - self.position[demand.a])
-        fresh, given = self.overlapping(self.demands), self.world.position
-        for a, b in fresh:
-            before, c = given[b] - given[a], self.position[b] - self.position[a]
-            overlapped = not self.demands or self.ways_out.overlaps(a, b, before)
-            self.demands[a, b] = self.ways_out.least(a, b, c) if overlapped else self.ways_out.on_its_side(a, b, before, c)
-        return bool(fresh)
+        return sorted(set(zip(a[near].tolist(), b[near].tolist(), strict=True)))
 
     def _surely_apart(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Which pairs have bounding spheres apart, or one apart from the half space that is all of the other body."""
@@ -142,17 +174,20 @@ class _Search:
 
     def least_displacement(self) -> np.ndarray:
         """D (n, 3) of all bodies from where they were given."""
-        given = [d for d in self.demands.values() if self.cluster[d.a] != self.cluster[d.b] and np.isfinite(d.level)]
+        given = [d for d in self.of_all_pairs() if self.cluster[d.a] != self.cluster[d.b] and np.isfinite(d.level)]
         given = [d for d in given if self.inv_mass[self.cluster[d.a]] + self.inv_mass[self.cluster[d.b]] > 0.0]
         a, b = (np.array([getattr(d, side) for d in given], int) for side in "ab")
         n = np.array([d.direction for d in given]).reshape(-1, 3)
         asked = np.array([d.level for d in given]) - ((self.world.position[b] - self.world.position[a]) * n).sum(axis=1)
         first, second = self.cluster[a], self.cluster[b]
         rows = displacement_rows(self.inv_mass, (first, second), n, asked, SOFTNESS)
-        # What was asked for before is nearly right.
+        # What was pushed before is nearly right; what softness took of it is asked for once more.
         rows.impulse[:] = [d.push for d in given]
+        rows.bias[:] -= rows.softness * rows.impulse
         if len(given):
-            solve_displacements(rows, len(self.inv_mass), EQUAL * min(self.ways_out.size(d.a, d.b) for d in given))
+            target = EQUAL * min(self.ways_out.size(d.a, d.b) for d in given)
+            sweep(rows, len(self.inv_mass), SWEPT * target)
+            solve_newton(rows, len(self.inv_mass), target)
         for demand, push in zip(given, rows.impulse.tolist(), strict=True):
             demand.push = push
         shift = np.zeros((len(self.inv_mass), 3))

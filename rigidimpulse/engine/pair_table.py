@@ -34,6 +34,8 @@ MAX_TRIES = 30
 RUNAWAY, NEVER = 300.0, -np.inf
 """Times in a step that a body is dealt with, from which its island costs more than it advances and is handed to sub-steps; the count of a
 body that is not handed over, however often that is."""
+LARGE = 64
+"""Bodies of an island from which that is the case the earlier, the more bodies it has: each event deals with all of them."""
 FIRST_ROWS = 64
 USED, SHORT = np.arange(2)
 """Places in `PairTable.number`."""

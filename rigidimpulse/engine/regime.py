@@ -10,10 +10,10 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
     or joints   an island with joints, each body of which the exact regime solved more than EXPENSIVE_JOINTED times a step, in the mean
                 of the last ones, or EXPENSIVE_SWING times where nothing is near it: by as much less often as it has more bodies than
                 SMALL. A body that hangs alone stays exact, and so does what rolling friction may act on
-    or runaway  in the middle of a step, an island of which a body was solved more than RUNAWAY times in the step: it costs more than it
-                advances. So do islands in which two bodies come to contact again and again and no impulse keeps them apart. They are handed
-                over at that instant, whatever they are made of. Contacts that rebound by more than REBOUND are no runaways: many impacts
-                are what such scenes are about
+    or runaway  in the middle of a step, an island of which a body was solved more than RUNAWAY times in the step, or by as much less
+                often as it has more bodies than LARGE: it costs more than it advances. So do islands in which two bodies come to contact
+                again and again and no impulse keeps them apart. They are handed over at that instant, whatever they are made of.
+                Contacts that rebound by more than REBOUND are no runaways: many impacts are what such scenes are about
 
 and, where an island begins to be sub-stepped (a body that comes near later is taken in):
 
@@ -21,7 +21,8 @@ and, where an island begins to be sub-stepped (a body that comes near later is t
     dull        no restitution above REBOUND, or ELASTIC where joints are: a rebound is found at the end of the step only
     low         no body more than TALL others above a support: long columns want exact rows; not asked where joints are, nor where bodies
                 were solved more than EXPENSIVE_TALL times, by as much less often as the island has more bodies than SMALL: a column
-                that stands takes a few, a chain of rings that swings takes sixty
+                that stands takes a few, a chain of rings that swings takes sixty. Nor of a CROWD
+                of more than PAIRS pairs a body, more than layers of bricks have: one exact solution takes as long as seconds of sub-steps
 
 In scenes of fewer than SOME movable bodies without joints only what has joints or runs away is sub-stepped. "cheapest" asks what islands
 cost, and nothing else of the above: see `cheapest.py`. "substepped" takes every island that touches something or has joints.
@@ -44,6 +45,7 @@ MANY, SOME, FEW, KEPT = 60, 12, 8, 2
 EXPENSIVE_SOLVES = 6.0
 EXPENSIVE_JOINTED, EXPENSIVE_SWING, EXPENSIVE_TALL, SMALL = 48.0, 300.0, 200.0, 8.0
 RATIO, REBOUND, ELASTIC, TALL = 30.0, 0.5, 0.9, 12
+CROWD, PAIRS = 128, 4.0
 FAST, SPIN = 0.5, 2.5 / 16.0
 
 
@@ -115,6 +117,12 @@ def solves_in_islands(root: np.ndarray, solve_count: np.ndarray) -> np.ndarray:
     size = np.bincount(root[members], minlength=len(root))
     solves = np.bincount(root[members], weights=solve_count[members], minlength=len(root))
     return solves / np.maximum(size, 1) * np.maximum(size / SMALL, 1.0)
+
+
+def crowded(root: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Which islands (n,) bool, by their root, are crowds; root: (n,) of every body, -1 for those in none; first: body (k,) of each pair."""
+    size, pairs = (np.bincount(of[of >= 0], minlength=len(root)) for of in (root, root[first]))
+    return (size > CROWD) & (pairs > PAIRS * size)
 
 
 @jit_making_arrays

@@ -16,7 +16,8 @@ import numpy as np
 
 from rigidimpulse.collision.geometry import CompiledShape, Primitive, build_geometry
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.dynamics.constraints.displacement import displacement_rows, solve_displacements
+from rigidimpulse.dynamics.constraints.displacement import displacement_rows
+from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.engine.islands import near_contacts
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
@@ -60,7 +61,7 @@ def lacking(world: World, contacts: Contacts, margin: np.ndarray) -> np.ndarray:
     # Displacements do not depend on the unit of mass.
     inv_mass, pair = world.inv_mass / world.inv_mass.max(), (contacts.body_a, contacts.body_b)
     rows = displacement_rows(inv_mass, pair, contacts.normal, margin - contacts.gap, SOFTNESS)
-    solve_displacements(rows, world.num_bodies, RESIDUAL * float(margin.min()))
+    solve_newton(rows, world.num_bodies, RESIDUAL * float(margin.min()))
     return rows.softness * rows.impulse
 
 

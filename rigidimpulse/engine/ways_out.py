@@ -11,10 +11,11 @@ search descends: it takes the normal where the bodies then touch, as long as tha
 equally good directions the one nearest to the line of the centres is taken, else the first axis of a.
 
 Bodies that are not convex may be apart without such a plane. There the way is that along n to the first place, coming from afar, where the
-gap is d; it holds for the present places of the bodies only.
+gap is d; it holds for the present places of the bodies only. Bodies that overlap again and again all the same, as the links of a chain do
+that were put into each other, take the plane, if the way to it is no longer than the smaller body.
 
-Bodies that were apart before they were moved stay on their sides: n and level are those of the place where they first touch on the
-straight way from the old places to the new ones.
+Bodies that were apart as given stay on their sides: n and level are those of the place where they first touch on the straight way from the
+places given to the present ones.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.collision.distance.fcl import Narrowphase, Separation
-from rigidimpulse.collision.geometry import CYLINDER
+from rigidimpulse.collision.manifold.penetrating import supports
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.model.world import World
@@ -36,6 +37,10 @@ MAX_APPROACHES = 40
 MAX_DESCENTS = 4
 MOST_FACES = 256
 """Faces of a body whose normals are tried: of more, the descent finds the best."""
+COARSE = 1e-3
+"""Error of ways that are compared, relative to the size of the smaller body."""
+PATIENCE = 3
+"""Demands that do not last from which a pair takes a plane."""
 
 
 @dataclass
@@ -46,7 +51,7 @@ class Demand:
         direction: n, (3,) unit; zeros where no way is known.
         level: m; inf where no way is known.
         lasting: whether this holds wherever the bodies move.
-        push: sum of masses times displacements that this demand has asked for, kg m.
+        push: what it has displaced its bodies by, kg m.
 
     """
 
@@ -74,36 +79,45 @@ class WaysOut:
         """Size of the smaller body of a pair, m."""
         return float(min(self._world.size[a], self._world.size[b]))
 
+    def meets(self, a: int, b: int, c: np.ndarray) -> bool:
+        """Whether b at c (3,) m beside a has a point in common with it."""
+        (shape_a, shape_b), (turn_a, turn_b) = self._shapes(a, b), self._world.orientation[[a, b]]
+        return self._narrowphase.overlap(shape_a, (np.zeros(3), turn_a), shape_b, (c, turn_b))
+
     def overlaps(self, a: int, b: int, c: np.ndarray) -> bool:
-        """Whether b overlaps a from c (3,) m beside it: not if it is free when it is moved by DEPTH of its size along one of the axes."""
+        """Whether b at c (3,) m beside a overlaps it: not if it is free when it is moved by DEPTH of its size along one of the axes."""
         moved = DEPTH * self.size(a, b)
-        shape_a, shape_b, (turn_a, turn_b) = *self._shapes(a, b), self._world.orientation[[a, b]]
-        return all(
-            self._narrowphase.overlap(shape_a, (np.zeros(3), turn_a), shape_b, (c + moved * step, turn_b))
-            for step in np.vstack([np.zeros(3), DIRECTIONS])
-        )
+        return self.meets(a, b, c) and all(self.meets(a, b, c + moved * step) for step in DIRECTIONS)
 
     def least(self, a: int, b: int, c: np.ndarray) -> Demand:
         """The least way out of an overlap of b, which is c (3,) m beside a."""
         if self._endless[a] or self._endless[b]:
             return self._out_of_half_space(a, b, c)
-        lasting = bool(self._convex[a] and self._convex[b])
+        if self._convex[a] and self._convex[b]:
+            return self._least_plane(a, b, c)
+        coarse = COARSE * self.size(a, b)
         tried = self._directions(a, b, c)
-        ways = self._levels(a, b, tried) - tried @ c if lasting else np.array([self._way(a, b, c, n) for n in tried])
-        equal = EQUAL * self.size(a, b)
-        good = np.flatnonzero(ways <= ways.min() + equal)
-        along = tried[good] @ c
-        best = good[np.flatnonzero(along >= along.max() - equal)[0]]
-        n, way = tried[best], float(ways[best])
+        n, way = _least_of(tried, np.array([self._way(a, b, c, n, coarse) for n in tried]), c, coarse)
+        for _ in range(MAX_DESCENTS):
+            other = self._separation(a, b, c + (way + coarse) * n).normal
+            reached = self._way(a, b, c, other, coarse) if np.all(np.isfinite(other)) else np.inf
+            if not reached < way - coarse:
+                break
+            n, way = other, reached
+        way = self._way(a, b, c, n, 0.1 * self._margin(a, b))
+        return Demand(a, b, n, way + float(n @ c), lasting=False) if np.isfinite(way) else _nothing(a, b)
+
+    def _least_plane(self, a: int, b: int, c: np.ndarray) -> Demand:
+        """The plane of the least way for b at c (3,) m beside a."""
+        tried, equal = self._directions(a, b, c), EQUAL * self.size(a, b)
+        n, way = _least_of(tried, self._levels(a, b, tried) - tried @ c, c, equal)
         for _ in range(MAX_DESCENTS):
             other = self._separation(a, b, c + (way + equal) * n).normal
-            if not np.all(np.isfinite(other)):
-                break
-            reached = float(self._levels(a, b, other[None])[0] - other @ c) if lasting else self._way(a, b, c, other)
+            reached = float(self._levels(a, b, other[None])[0] - other @ c) if np.all(np.isfinite(other)) else np.inf
             if not reached < way - equal:
                 break
             n, way = other, reached
-        return Demand(a, b, n, way + float(n @ c), lasting) if np.isfinite(way) else _nothing(a, b)
+        return Demand(a, b, n, way + float(n @ c), lasting=True)
 
     def on_its_side(self, a: int, b: int, before: np.ndarray, c: np.ndarray) -> Demand:
         """The way back of b, which was apart from a while `before` (3,) m beside it, and overlaps it while c beside it."""
@@ -114,18 +128,19 @@ class WaysOut:
         if not (found.gap > gap and np.all(np.isfinite(found.normal))):
             # They touched.
             demand = self.least(a, b, before)
-            self.renew(demand, c)
+            if not demand.lasting and np.isfinite(demand.level):
+                demand.level = self._way(a, b, c, demand.direction, 0.1 * gap) + float(demand.direction @ c)
             return demand
         for _ in range(MAX_APPROACHES):
-            closing = -float(found.normal @ path)
-            if found.gap <= 2.0 * gap or closing <= 0.0:
+            if found.gap <= 2.0 * gap:
                 break
             # Not all of the gap: bodies that touch have no normal.
-            ahead = part + (found.gap - gap) / closing
-            further = self._separation(a, b, before + ahead * path)
+            closing, safe = -float(found.normal @ path), part + (found.gap - gap) / float(np.linalg.norm(path))
+            ahead = part + (found.gap - gap) / closing if closing > 0.0 else np.inf
+            further = self._separation(a, b, before + ahead * path) if ahead < 1.0 else found
             if not (ahead < 1.0 and np.all(np.isfinite(further.normal))):
                 # Past the touch, which concave bodies do not forgive: the gap itself is always safe.
-                ahead = part + (found.gap - gap) / float(np.linalg.norm(path))
+                ahead = safe
                 further = self._separation(a, b, before + ahead * path)
             if not np.all(np.isfinite(further.normal)):
                 break
@@ -135,15 +150,13 @@ class WaysOut:
         level = float(self._levels(a, b, n[None])[0]) if lasting else float(n @ (before + part * path)) - found.gap + gap
         return Demand(a, b, n, level, lasting)
 
-    def renew(self, demand: Demand, c: np.ndarray) -> None:
-        """Bring the level of a demand that does not last up to date for b at c (3,) m beside a."""
-        if demand.lasting or not np.any(demand.direction):
-            return
-        if self._endless[demand.a] or self._endless[demand.b]:
-            found = self._out_of_half_space(demand.a, demand.b, c)
-            demand.direction, demand.level = found.direction, found.level
-        else:
-            demand.level = self._way(demand.a, demand.b, c, demand.direction) + float(demand.direction @ c)
+    def again(self, a: int, b: int, before: np.ndarray, c: np.ndarray, known: int) -> Demand:
+        """One more demand of a pair that overlaps with b at c (3,) m beside a, though a number of known ones are met that do not last."""
+        if known >= PATIENCE and not (self._endless[a] or self._endless[b]):
+            plane = self._least_plane(a, b, c)
+            if plane.level - float(plane.direction @ c) <= self.size(a, b):
+                return plane
+        return self.least(a, b, c) if self.overlaps(a, b, before) else self.on_its_side(a, b, before, c)
 
     def _shapes(self, a: int, b: int) -> tuple[int, int]:
         return int(self._world.shape_of_body[a]), int(self._world.shape_of_body[b])
@@ -171,14 +184,10 @@ class WaysOut:
         return self._support(a, n) + self._support(b, -n) + self._margin(a, b)
 
     def _support(self, i: int, n: np.ndarray) -> np.ndarray:
-        """Support function (k,) m of a body of one finite primitive for directions n (k, 3)."""
-        geometry, p = self._world.geometry, int(self._world.geometry.shape_first[self._world.shape_of_body[i]])
-        n = n @ self._rotation[i]
-        if geometry.kind[p] == CYLINDER:
-            centre, axis, half = geometry.frame[p, :3], geometry.frame[p, 3:6], geometry.frame[p, 6]
-            return n @ centre + half * np.abs(n @ axis) + geometry.radius[p] * np.linalg.norm(np.cross(n, axis), axis=1)
-        vertices = geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]]
-        return (n @ vertices.T).max(axis=1) + geometry.radius[p]
+        """Support function (k,) m of a finite body for directions n (k, 3)."""
+        out = np.empty(len(n))
+        supports(self._world.geometry, self._world.shape_of_body[i], np.zeros(3), self._rotation[i], np.ascontiguousarray(n), out)
+        return out
 
     def _directions(self, a: int, b: int, c: np.ndarray) -> np.ndarray:
         """Directions to try (k, 3): of the centres, which is enough for two balls, of the axes of both bodies, and of their faces."""
@@ -199,8 +208,8 @@ class WaysOut:
         normals = geometry.triangle_normal[geometry.triangle_first[p] : geometry.triangle_first[p + 1]]
         return normals[: MOST_FACES if normals.any() else 0] @ self._rotation[i].T
 
-    def _way(self, a: int, b: int, c: np.ndarray, n: np.ndarray) -> float:
-        """How far b has to move along n from c until it is apart from a; inf where that cannot be found."""
+    def _way(self, a: int, b: int, c: np.ndarray, n: np.ndarray, fine: float) -> float:
+        """How far b has to move along n from c until it is apart from a, to `fine` m; inf where that cannot be found."""
         reach = float(self._world.bound_radius[a] + self._world.bound_radius[b])
         way, gap = reach - float(n @ c), self._margin(a, b)
         free, careful = np.inf, False
@@ -217,9 +226,17 @@ class WaysOut:
             rate = float(n @ found.normal)
             # Along a surface that is nearly parallel to n the rate tells nothing: steps of 1e10 m came of it.
             way -= left if careful or abs(left) >= 2.0 * reach * rate else left / rate
-            if abs(left) <= 0.1 * gap:
+            if abs(left) <= fine:
                 break
         return way
+
+
+def _least_of(tried: np.ndarray, ways: np.ndarray, c: np.ndarray, equal: float) -> tuple[np.ndarray, float]:
+    """Direction and way of the least of the ways (k,) along those tried (k, 3); of equal ones, that nearest to c (3,), else the first."""
+    good = np.flatnonzero(ways <= ways.min() + equal)
+    along = tried[good] @ c
+    best = good[np.flatnonzero(along >= along.max() - equal)[0]]
+    return tried[best], float(ways[best])
 
 
 def _nothing(a: int, b: int) -> Demand:

@@ -52,7 +52,7 @@ def _prism(geometry: Geometry, p: int) -> CompiledShape:
 
 @jit
 def support(geometry, p, x, r, n, sign):
-    """Largest sign n.x over the polyhedron or cylinder p at the pose x, r."""
+    """Largest sign n.x over the finite primitive p at the pose x, r."""
     a = sign * (r[0, 0] * n[0] + r[1, 0] * n[1] + r[2, 0] * n[2])
     b = sign * (r[0, 1] * n[0] + r[1, 1] * n[1] + r[2, 1] * n[2])
     c = sign * (r[0, 2] * n[0] + r[1, 2] * n[1] + r[2, 2] * n[2])
@@ -64,7 +64,18 @@ def support(geometry, p, x, r, n, sign):
         best = a * f[p, 0] + b * f[p, 1] + c * f[p, 2] + f[p, 6] * abs(along) + across
     for v in range(geometry.vertex_first[p], geometry.vertex_first[p + 1]):
         best = max(best, a * geometry.vertex[v, 0] + b * geometry.vertex[v, 1] + c * geometry.vertex[v, 2])
+    if geometry.kind[p] == ROUND:
+        best += geometry.radius[p]
     return best + sign * (n[0] * x[0] + n[1] * x[1] + n[2] * x[2])
+
+
+@jit
+def supports(geometry, s, x, r, n, out):
+    """Largest n.x over the finite shape s at the pose x, r, for each direction n (k, 3), into out (k,)."""
+    for k in range(n.shape[0]):
+        out[k] = -inf
+        for p in range(geometry.shape_first[s], geometry.shape_first[s + 1]):
+            out[k] = max(out[k], support(geometry, p, x, r, n[k], 1.0))
 
 
 @jit

@@ -43,6 +43,7 @@ from rigidimpulse.engine.exact.step_size import ErrorEstimate, Forces, StepLimit
 from rigidimpulse.engine.exact.trajectories import set_impact_margins, take_steady_load
 from rigidimpulse.engine.exact.velocity_projection import ProjectionScratch, project
 from rigidimpulse.engine.pair_table import (
+    LARGE,
     MARGIN,
     NEVER,
     RUNAWAY,
@@ -352,12 +353,15 @@ def _give_up(loop, kind, time, places):
 
 
 @jit
-def _hand_over(loop, members, time):
+def _hand_over(loop, islands, time):
     """Leave members that run away to the loop in Python, at once."""
-    for i in members:
-        if loop.solve_count[i] > RUNAWAY:
-            loop.elsewhere[i] = True
-            loop.table.wake[i] = min(loop.table.wake[i], time)
+    for k in range(len(islands.record)):
+        first, last = islands.member_first[k], islands.member_first[k + 1]
+        often = RUNAWAY / max((last - first) / LARGE, 1.0)
+        for i in islands.member[first:last]:
+            if loop.solve_count[i] > often:
+                loop.elsewhere[i] = True
+                loop.table.wake[i] = min(loop.table.wake[i], time)
 
 
 @jit_making_arrays
@@ -382,7 +386,7 @@ def _react(loop, found, count, time, end):
     given_up = np.empty(table.number[USED], np.int64)
     stuck = settle_pairs(table, time, dynamic, given_up)
     _give_up(loop, NOT_RESOLVED, time, given_up[:stuck])
-    _hand_over(loop, islands.member, time)
+    _hand_over(loop, islands, time)
 
 
 @jit_making_arrays

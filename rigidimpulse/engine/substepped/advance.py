@@ -27,7 +27,7 @@ from rigidimpulse.engine.exact.advance import NOT_HELD
 from rigidimpulse.engine.exact.energy_limit import note_end_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work, begin_trajectory
 from rigidimpulse.engine.pair_events import PairEvents
-from rigidimpulse.engine.pair_table import NEVER, RUNAWAY
+from rigidimpulse.engine.pair_table import LARGE, NEVER, RUNAWAY
 from rigidimpulse.engine.participants import Substepping
 from rigidimpulse.engine.regime import (
     EXPENSIVE_TALL,
@@ -35,6 +35,7 @@ from rigidimpulse.engine.regime import (
     REBOUND,
     SPIN,
     TALL,
+    crowded,
     island_roots,
     jointed,
     lively,
@@ -238,7 +239,7 @@ class SubsteppedIslands:
         refused.update(dict.fromkeys(np.unique(root[member & self._open]).tolist(), "joints that sub-steps do not close"))
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         # Tall columns are found from contacts, so only in islands that are not refused yet.
-        exempt = joined | (solves_in_islands(root, solve_count) > EXPENSIVE_TALL)[root]
+        exempt = joined | (solves_in_islands(root, solve_count) > EXPENSIVE_TALL)[root] | crowded(root, a[touch > 0])[root]
         chosen = self._low(run, pair_events, chosen, root, exempt, refused)
         for reason in refused.values():
             self._refused[reason] = self._refused.get(reason, 0) + 1
@@ -399,7 +400,8 @@ class SubsteppedIslands:
         if pair_events.end <= pair_events.begin:  # the end of the run: there is no time to step over
             return [island for island in islands if np.all(self.label[island.members] < 0)]
         for island in islands:
-            if np.any(self.solve_count[island.members] > RUNAWAY) and np.all(self.label[island.members] < 0):
+            often = RUNAWAY / max(len(island.members) / LARGE, 1.0)
+            if np.any(self.solve_count[island.members] > often) and np.all(self.label[island.members] < 0):
                 self._hand_over(run, pair_events, island)
         lost = self._lost(pair_events, islands)
         pair_events.inside[lost] = True
