@@ -49,16 +49,17 @@ def begin_run(world: World, plan: Plan, times: np.ndarray, left_out: Mapping[str
     with_substepped = plan.includes(SubsteppedContact.name) and not only_expensive(world)
     prepare_kernels(world, plan.includes(EventKernel.name), with_substepped)
     run = _start(world, plan, times)
-    fitting = make_space(run)
+    placed = make_space(run) if earlier is None else earlier.placed(make_space(run))
+    run = run if placed is world else _start(placed, plan, times)
     if earlier is not None:
-        run = _start(earlier.placed(fitting), plan, times)
-        earlier.carry_on(run)
-    else:
-        run = _start(fitting, plan, times) if fitting is not world else run
-        run.recorder.start(run.state.trajectory)
+        earlier.follow_keyframes(run)
+    run.recorder.start(run.state.trajectory)
     for name, reason in left_out.items():
         run.log.report(0.0, "effect left out", (name,), f"the scene calls for it: {reason}")
     resolve_overlaps(run)
+    if earlier is not None:
+        # After it: what is moved apart does not go on as it was.
+        earlier.carry_on(run)
     _bind_observers(run)
     bind_compiled_loop(run)
     return run

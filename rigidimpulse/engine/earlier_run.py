@@ -141,16 +141,29 @@ class EarlierRun:
         geometry = build_geometry(shapes)
         return replace(world, shapes=shapes, geometry=geometry, shape_of_body=shape_of_body, size=size, bound_radius=radius)
 
+    @staticmethod
+    def follow_keyframes(run: Run) -> None:
+        """Put bodies with keyframes where they are at the start of a run of the placed world, and let those go whose time has come."""
+        world, trajectory, time = run.world, run.state.trajectory, run.state.time
+        waiting = ~world.dynamic
+        run.keyframes.start_segments(run, time)
+        run.log.forget()  # what was let go before is in the ledger of the earlier run
+        let_go = np.flatnonzero(waiting & world.dynamic)
+        start_bodies(run, let_go)
+        for i in np.flatnonzero(trajectory.mode == PRESCRIBED).tolist():
+            pose_at(trajectory, i, time, world.position[i], world.orientation[i])
+
     def carry_on(self, run: Run) -> None:
         """Let the bodies of a run of the placed world that the change does not reach go on as they were."""
         time, earlier, number = run.state.time, self.run, self.run.world.num_bodies
-        _follow_keyframes(run, time)
         both = self._both(run.world)
         again = self._begin_again(run, both)
         index = both.index(number)
         carried = (index >= 0) & ~again
         rows = _Both(np.flatnonzero(carried), index[carried])
         _carry_state(earlier, run, rows)
+        # Their first frame is on the paths that they have now: the last bits of a place depend on where a path began.
+        run.recorder.written[rows.new] = 0
         run.state.memory = carried_memory(earlier.state.memory, index, carried, run.world.num_bodies)
         run.contact_log.carry_on(earlier.contact_log, np.where(carried, index, -1), time)
         run.substepped.carry_on(earlier.substepped, *rows)
@@ -169,7 +182,7 @@ class EarlierRun:
         earlier, number = self.run, self.run.world.num_bodies
         again = np.zeros(number, bool)
         again[np.setdiff1d(np.arange(number), both.old)] = True  # what is gone held others
-        again[both.old] = _changed(earlier, run, both)
+        again[both.old] = _changed(earlier, run, both) | _moved(run)[both.new]
         if not np.all(np.diff(both.new) > 0):
             again |= earlier.state.under_contact  # contacts have a first and a second body, by their order
         again |= (earlier.substepped.label >= 0) | (earlier.state.trajectory.mode == LINEAR) | earlier.forces.acts
@@ -202,6 +215,11 @@ def _changed(earlier: Run, run: Run, both: _Both) -> np.ndarray:
     return _other_bodies(before, now, both) | np.any(before.steady_acceleration[both.old] != now.steady_acceleration[both.new], axis=1)
 
 
+def _moved(run: Run) -> np.ndarray:
+    """Which bodies (n,) bool of a run at its start are not where its scene has them: they were moved apart."""
+    return run.world.dynamic & np.any(run.state.trajectory.position != run.world.position, axis=1)
+
+
 def _other_bodies(before: World, now: World, both: _Both) -> np.ndarray:
     """Which bodies (k,) bool of both scenes are written in another way than before."""
     bodies = [(before.scene.bodies[i], now.scene.bodies[j]) for i, j in zip(both.old.tolist(), both.new.tolist(), strict=True)]
@@ -217,18 +235,6 @@ def _reached(seeds: np.ndarray, links: np.ndarray, dynamic: np.ndarray) -> np.nd
     inner = links[np.all(dynamic[links], axis=1)]
     root = roots(len(seeds), np.ascontiguousarray(inner[:, 0]), np.ascontiguousarray(inner[:, 1]))
     return seeds | (dynamic & np.isin(root, root[seeds & dynamic]))
-
-
-def _follow_keyframes(run: Run, time: float) -> None:
-    """Put bodies with keyframes where they are at `time` [s], and let those go whose time has come."""
-    world, trajectory = run.world, run.state.trajectory
-    waiting = ~world.dynamic
-    run.keyframes.start_segments(run, time)
-    run.log.forget()  # what was let go before is in the ledger of the earlier run
-    let_go = np.flatnonzero(waiting & world.dynamic)
-    start_bodies(run, let_go)
-    for i in np.flatnonzero(trajectory.mode == PRESCRIBED).tolist():
-        pose_at(trajectory, i, time, world.position[i], world.orientation[i])
 
 
 def _carry_state(earlier: Run, run: Run, rows: _Both) -> None:

@@ -197,9 +197,9 @@ class _Search:
 
     def move_to(self, displacement: np.ndarray) -> None:
         """Put the bodies where they were given plus D (n, 3)."""
-        trajectory = self.run.state.trajectory
+        trajectory, before = self.run.state.trajectory, self.position
         self.position = self.world.position + displacement
-        for i in np.flatnonzero(np.any(trajectory.position != self.position, axis=1)).tolist():
+        for i in np.flatnonzero(np.any(self.position != before, axis=1)).tolist():
             trajectory.position[i] = self.position[i]
             begin(trajectory, i)
 
