@@ -9,7 +9,16 @@ A pair that was s apart is still at least s - m apart. It needs no search while 
 are used again while m is below a part of the smaller inner radius. Their points are fixed in the bodies, so that separations stay exact.
 Their normals are fixed in the carrier.
 
-The margin is the distance that the pair may come closer in the step (speculative contacts): contacts are known before they close.
+The margin is the distance that the pair may come closer in the step (speculative contacts): contacts are known before they close. Bodies
+that fall one behind the other do not come closer until the first of them is stopped. So a pair may also come closer as fast as contacts
+with others may change the velocity of one of its bodies until the next search. With s the closing speed of a pair that may meet until then,
+w the inverse masses and e the restitution, body i changes by at most
+
+    (1 + e) s                     where it moves, and the other is held: it is at rest, or is itself stopped by what is held
+    (1 + e) s w_i / (w_i + w_j)   else,
+
+and s is as large as the change of the other one. A pair closes as fast as either changes; what moves already, faster by the smaller of both
+changes; and faster by half of what gravity adds. Layers of a falling heap went 13 % of their size into each other without it.
 """
 
 from __future__ import annotations
@@ -20,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.contact_matching import NEAR, Points, Source, match_contacts, set_contact_margin, write_point
-from rigidimpulse.collision.contact_records import IMPULSE, POINT_FIELDS, UNKNOWN, closing_speed, in_play
+from rigidimpulse.collision.contact_records import IMPULSE, INVERSE_MASS, OUTSIDE, POINT_FIELDS, UNKNOWN, closing_speed, in_play
 from rigidimpulse.collision.distance.epa import make_polytope
 from rigidimpulse.collision.distance.gjk import closest, make_simplex
 from rigidimpulse.collision.manifold.convex_convex import seen_from
@@ -39,6 +48,10 @@ FAR = 4.0
 """Distance, in margins, up to which the gap of convex bodies is measured."""
 BLOCK = 64
 """Pairs that go to one share together."""
+CHAIN = 8
+"""Contacts in a row along which bodies may stop each other until the next search, at most."""
+GROWN = 0.1
+"""Part of the speed that the least margin allows by which a change must grow to count."""
 
 
 class Convex(NamedTuple):
@@ -64,6 +77,7 @@ class Limits(NamedTuple):
     ahead: float  # s, until the next search
     same: float  # inner radii, relative motion within which touching pairs keep their contacts
     kept: float  # the same until the next search, in the middle of a step; 0 at its start
+    fall: float  # m/s, half of what steady forces may add to a speed until the next search
 
 
 class Workspace(NamedTuple):
@@ -133,6 +147,69 @@ def note_seen(bodies, pairs, p):
     pairs.known[p] = True
 
 
+@inlined
+def _can_meet(bodies, pairs, p, far):
+    """Whether a pair may come closer by `far` m without being known to stay apart."""
+    a, b = pairs.first[p], pairs.second[p]
+    x, reach = bodies.position, bodies.radius[a] + bodies.radius[b] + far
+    dx, dy, dz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+    if dx * dx + dy * dy + dz * dz > reach * reach:
+        return False
+    if not pairs.known[p] or pairs.count[p] > 0:
+        return True
+    carrier, other = (b, a) if pairs.carrier[p] else (a, b)
+    place, turn = _relative_pose(x, bodies.orientation, bodies.rotation, carrier, other)
+    return pairs.apart[p] - _motion(pairs.seen, p, pairs.round[p], bodies.reach[other], place, turn) <= far
+
+
+@inlined
+def _may_close(bodies, a, b, speed, fall):
+    """How fast a pair may close until the next search, m/s, if it closes at a speed now."""
+    one, other = bodies.change[a], bodies.change[b]
+    return max(speed + min(one, other), one, other) + fall
+
+
+@inlined
+def _is_slow(bodies, i, ahead):
+    """Whether a body moves by less than the least margin in `ahead` s."""
+    v, k, most = bodies.velocity, 8 * i, AHEAD * bodies.inner[i]
+    return ahead * ahead * (v[k] * v[k] + v[k + 1] * v[k + 1] + v[k + 2] * v[k + 2]) <= most * most
+
+
+@jit
+def note_changes(bodies, pairs, ahead, fall, coefficients):
+    """Estimate how much contacts may change the velocity of each body in `ahead` s, m/s: writes `bodies.change`, and who is `held`.
+
+    fall: see `Limits`.
+    """
+    part, change, held, mass, material = bodies.part, bodies.change, bodies.held, bodies.mass, bodies.material
+    for i in range(part.shape[0] - 1):
+        change[i] = 0.0
+        held[i] = part[i] != OUTSIDE and _is_slow(bodies, i, ahead)
+    for _ in range(CHAIN):
+        grown = False
+        for p in range(pairs.first.shape[0]):
+            a, b = pairs.first[p], pairs.second[p]
+            if not in_play(part, a, b):
+                continue
+            speed = closing_speed(bodies.position, bodies.velocity, bodies.reach, a, b, pairs.carrier[p])
+            closing, least = max(speed, change[a], change[b]), AHEAD * min(bodies.inner[a], bodies.inner[b])
+            if ahead * closing <= least or not _can_meet(bodies, pairs, p, ahead * (closing + fall)):
+                continue
+            for i, j in ((a, b), (b, a)):
+                own, other = mass[8 * i + INVERSE_MASS], mass[8 * j + INVERSE_MASS]
+                if own == 0.0:
+                    continue
+                stopped = held[j] and not _is_slow(bodies, i, ahead)
+                share = 1.0 if stopped else own / (own + other)
+                most = (1.0 + coefficients[material[i], material[j], 0]) * share * max(speed, change[j])
+                if ahead * (most - change[i]) > GROWN * least:
+                    change[i], grown = most, True
+                held[i] = held[i] or stopped
+        if not grown:
+            break
+
+
 @jit
 def most_motion(bodies, pairs, ahead):
     """Greatest relative motion, in inner radii, in `ahead` s of the pairs that take part and have contacts."""
@@ -146,14 +223,15 @@ def most_motion(bodies, pairs, ahead):
 
 
 @jit
-def most_approach(bodies, pairs, ahead):
+def most_approach(bodies, pairs, ahead, fall):
     """Greatest relative motion in `ahead` s of the pairs that may meet in that time, in the farthest that contacts are looked for."""
     part, x, radius, most = bodies.part, bodies.position, bodies.radius, 0.0
     for p in range(pairs.first.shape[0]):
         a, b = pairs.first[p], pairs.second[p]
         if not in_play(part, a, b):
             continue
-        motion = ahead * closing_speed(x, bodies.velocity, bodies.reach, a, b, pairs.carrier[p])
+        speed = closing_speed(x, bodies.velocity, bodies.reach, a, b, pairs.carrier[p])
+        motion = ahead * _may_close(bodies, a, b, speed, fall)
         far = radius[a] + radius[b] + motion
         dx, dy, dz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
         if dx * dx + dy * dy + dz * dz <= far * far:
@@ -175,7 +253,7 @@ def review(bodies, pairs, share, limits):
     the places and margins of the share begin and end.
     """
     number, shares, places, margins = share
-    ahead, same, kept = limits
+    ahead, same, kept, fall = limits
     part, position, orientation, rotation, velocity = bodies.part, bodies.position, bodies.orientation, bodies.rotation, bodies.velocity
     inner, skin, radius, reach, quick = bodies.inner, bodies.skin, bodies.radius, bodies.reach, bodies.quick
     seen, known, count, apart = pairs.seen, pairs.known, pairs.count, pairs.apart
@@ -189,7 +267,7 @@ def review(bodies, pairs, share, limits):
                 continue
             size = min(inner[a], inner[b])
             general = pairs.kind[p] == GENERAL
-            speed = closing_speed(position, velocity, reach, a, b, is_second)
+            speed = _may_close(bodies, a, b, closing_speed(position, velocity, reach, a, b, is_second), fall)
             # Contacts that may close until the next look are found before they do (speculative contacts).
             margin = min(skin[a], skin[b]) + min(max(speed * ahead, (AHEAD_GENERAL if general else AHEAD) * size), FARTHEST * size)
             far = radius[a] + radius[b] + margin

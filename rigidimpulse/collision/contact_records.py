@@ -5,8 +5,9 @@ rank. So scenes whose bodies were added in another order give the same bits. Pai
 [start[p], start[p] + count[p]) of the contact table.
 
 Kernels get a record of bodies by rank. They read these of its fields: `shape` and `material`; `inner`, `skin`, `reach` and `radius`, m;
-`part`, one of OUTSIDE, MEMBER and SUPPORT; `quick`; the poses `position`, `orientation` and `rotation`; and `velocity`, of which body i has
-the 6 numbers (v, w) from 8 i on. The solver's record of bodies has these fields and more.
+`part`, one of OUTSIDE, MEMBER and SUPPORT; `quick`; the poses `position`, `orientation` and `rotation`; `velocity`, of which body i has the
+6 numbers (v, w) from 8 i on; and `mass`, of which it has 1/m at 8 i + INVERSE_MASS. They write `change` and `held`. The solver's record of
+bodies has these fields and more.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ A point is three lines of 8 numbers. The solver writes the last of them. Point 0
 
 UNKNOWN = -1
 """Kind of a new pair."""
+INVERSE_MASS = 6
+"""Place of 1/m among the 8 numbers of a body in `mass`."""
 OUTSIDE, MEMBER, SUPPORT = 0, 1, 2
 """Part of a body in a step: outside of it, a member that is stepped, a support that is near and does not move."""
 

@@ -3,6 +3,7 @@
     scenes       2 to 8 bodies (`scene_plans`): a broken law (`scene_laws`), an error, another run with other bits, too much time
     life_cycles  joints that break and let go (`life_cycles`): a broken promise, an error, too much time
     gltf         good files with something wrong in them (`broken_files`): another error than a `SceneError`, too much time or memory
+    changes      scenes that change in the middle (`late_changes`): other frames before, other bits where none belong, books that are off
     caches       caches of a stopped run with bytes replaced or cut: another error than a `SceneError`, other bits
     kills        runs that are killed again and again, with a checkpoint after every step: other bits at the end
 
@@ -24,6 +25,7 @@ from typing import Any
 import kept_runs
 from broken_files import broken
 from choices import Recorded, Replayed
+from late_changes import broken_promises_later, make_late_change
 from life_cycles import broken_promises, make_life_cycle
 from scene_laws import broken_laws
 from scene_plans import make_plan, make_scene
@@ -89,6 +91,14 @@ def _faults_of_life_cycle(chosen: list[float]) -> list[str]:
         return broken_promises(ri.simulate(make_life_cycle(Replayed(chosen)), LIFE))
     except Exception as error:
         return [f"{type(error).__name__}: {error}"]
+
+
+def _faults_of_change(chosen: list[float]) -> list[str]:
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            return broken_promises_later(make_late_change(Replayed(chosen)), Path(folder))
+        except Exception as error:
+            return [f"{type(error).__name__}: {error}"]
 
 
 def _faults_of_gltf(content: bytes) -> list[str]:
@@ -170,6 +180,7 @@ KINDS = {
     for kind in (
         Kind("scenes", _chosen(make_plan), _faults_of_scene, has_choices=True, warm=_warm_scene),
         Kind("life_cycles", _chosen(make_life_cycle), _faults_of_life_cycle, has_choices=True, warm=_warm_scene),
+        Kind("changes", _chosen(make_late_change), _faults_of_change, has_choices=True, warm=_warm_scene),
         Kind("gltf", broken, _faults_of_gltf, seconds=5, memory=GIGABYTE),
         Kind("caches", lambda seed: seed, _faults_of_cache, warm=_whole),
         Kind("kills", lambda seed: (random.Random(seed).choice(sorted(kept_runs.SCENES)), seed), _faults_of_kills, seconds=600),

@@ -17,6 +17,7 @@ from rigidimpulse.collision.contact_cache import (
     make_workspace,
     most_approach,
     most_motion,
+    note_changes,
     share_of,
 )
 from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
@@ -199,7 +200,7 @@ class ContactStepper:
         self._special = self._all_quick or bool(world.coefficients[:, :, 0].any())
         self.pressed = np.zeros(n, bool)
         self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
-        self.members, self.ahead, self.parts, self.sub_steps = np.zeros(0, np.int64), 0.0, 1, 1
+        self.members, self.ahead, self.parts, self.sub_steps, self._pull = np.zeros(0, np.int64), 0.0, 1, 1, 0.0
 
     def _make_bodies(self) -> SolverBodies:
         """Rows of all bodies by rank, and one of none."""
@@ -215,7 +216,7 @@ class ContactStepper:
             reach=by_rank(self.reach, 0.0), radius=by_rank(world.bound_radius, 0.0), part=np.zeros(n + 1, np.int64),
             position=np.zeros((n + 1, 3)), orientation=np.zeros((n + 1, 4)), rotation=np.zeros((n + 1, 3, 3)),
             gravity=np.zeros((n + 1, 3)), velocity=aligned(n + 1), before=aligned(n + 1), moved=aligned(n + 1), drift=aligned(n + 1),
-            quick=np.zeros(n + 1, bool), mass=aligned(n + 1),
+            quick=np.zeros(n + 1, bool), mass=aligned(n + 1), change=np.zeros(n + 1), held=np.zeros(n + 1, bool),
         )  # fmt: skip
 
     def sub_step(self, members: np.ndarray) -> float:
@@ -258,15 +259,25 @@ class ContactStepper:
         self._part[:] = OUTSIDE
         self._part[supports], self._part[members] = SUPPORT, MEMBER
         load_bodies(self.bodies, self.order, run.state.now, run.acceleration, self.world.inv_mass, self._part)
+        self._pull = float(self.world.steady_strength[members].max(initial=0.0))
+        self._note_changes(ahead)
         motion = most_motion(self.bodies, self.table.pairs, ahead)
         # Fast bodies are looked at more often, with enough sub-steps between the looks. So are those that come from farther than
         # contacts are looked for: a big ball met small bricks only when it was a third inside of them (issue 28).
-        needed = max(math.ceil(motion / COARSEST), math.ceil(most_approach(self.bodies, self.table.pairs, ahead)))
+        needed = max(math.ceil(motion / COARSEST), math.ceil(most_approach(self.bodies, self.table.pairs, ahead, self._fall(ahead))))
         self.sub_steps = max(math.ceil(ahead / fineness.sub_step - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
         most = max(self.sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
         self.parts = min(max(math.ceil(motion / fineness.motion), needed, 1), most)
         self.ahead = ahead / self.parts
         self._look(run, kept)
+
+    def _fall(self, ahead: float) -> float:
+        """Half of what steady forces may add to a speed in `ahead` s, m/s."""
+        return 0.5 * ahead * self._pull
+
+    def _note_changes(self, ahead: float) -> None:
+        """Note how much contacts may change velocities in `ahead` s."""
+        note_changes(self.bodies, self.table.pairs, ahead, self._fall(ahead), self.world.coefficients)
 
     def _look(self, run: Run, kept: float) -> None:
         """Look at the contacts of all pairs in play, on several cores where the last look had much to do; kept: see `review`."""
@@ -276,7 +287,8 @@ class ContactStepper:
         if capacity > len(self._places):
             self._places, self._margins = reserve((2 * capacity,), np.int64), reserve((2 * capacity,), np.float64)
         while True:
-            convex, limits = Convex(self.shapes, self._solids, self._inset), Limits(self.ahead, SAME * self.motion, kept)
+            convex = Convex(self.shapes, self._solids, self._inset)
+            limits = Limits(self.ahead, SAME * self.motion, kept, self._fall(self.ahead))
             outcome = self._sharing.call(find_contacts, [
                 (
                     convex, self.bodies, table.arrays, Share(share, shares, self._places, self._margins), limits, self.world.coefficients,
@@ -368,6 +380,7 @@ class ContactStepper:
         all_quick = self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY
         if all_quick:
             bodies.quick[:] = True
+        self._note_changes(self.ahead)
         self._look(run, self.kept)
         # All batches are made again: what has drifted counts from here.
         if all_quick:
@@ -437,6 +450,7 @@ class ContactStepper:
 
     def look_again_at_all(self, run: Run) -> None:
         """Find the contacts of all bodies again in the middle of a step."""
+        self._note_changes(self.ahead)
         self._look(run, self.kept)
 
     def end_step(self) -> Outcome:

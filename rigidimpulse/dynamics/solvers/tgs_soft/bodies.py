@@ -11,12 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE
+from rigidimpulse.collision.contact_records import INVERSE_MASS, MEMBER, OUTSIDE
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
-
-INVERSE_MASS = 6
-"""Place of 1/m among the 8 numbers of a body in `mass`."""
 
 
 class SolverBodies(NamedTuple):
@@ -41,6 +38,8 @@ class SolverBodies(NamedTuple):
     drift: np.ndarray  # (8 (n+1),) the same since the batches of slow bodies were made
     quick: np.ndarray  # (n+1,) bool, its contacts are in none of those batches
     mass: np.ndarray  # (8 (n+1),)
+    change: np.ndarray  # (n+1,) m/s, how much contacts may change its velocity until they are looked for again
+    held: np.ndarray  # (n+1,) bool, it stops what meets it
 
 
 @jit
