@@ -12,13 +12,14 @@ Their normals are fixed in the carrier.
 The margin is the distance that the pair may come closer in the step (speculative contacts): contacts are known before they close. Bodies
 that fall one behind the other do not come closer until the first of them is stopped. So a pair may also come closer as fast as contacts
 with others may change the velocity of one of its bodies until the next search. With s the closing speed of a pair that may meet until then,
-w the inverse masses and e the restitution, body i changes by at most
+w the inverse masses and e the largest restitution of body i, it changes by at most 1 + e times
 
-    (1 + e) s                     where it moves, and the other is held: it is at rest, or is itself stopped by what is held
-    (1 + e) s w_i / (w_i + w_j)   else,
+    s                     where it moves, and the other is held: it is at rest, or is itself stopped by what is held
+    s w_i / (w_i + w_j)   else,
 
-and s is as large as the change of the other one. A pair closes as fast as either changes; what moves already, faster by the smaller of both
-changes; and faster by half of what gravity adds. Layers of a falling heap went 13 % of their size into each other without it.
+and s is as large as the change of the other one without the rebound. A pair closes as fast as either changes; if it closes already, faster
+by the smaller of both changes; and faster by half of what gravity adds. Layers of a falling heap went 13 % of their size into each other
+without it.
 """
 
 from __future__ import annotations
@@ -202,12 +203,19 @@ def note_changes(bodies, pairs, ahead, fall, coefficients):
                     continue
                 stopped = held[j] and not _is_slow(bodies, i, ahead)
                 share = 1.0 if stopped else own / (own + other)
-                most = (1.0 + coefficients[material[i], material[j], 0]) * share * max(speed, change[j])
+                most = share * max(speed, change[j])
                 if ahead * (most - change[i]) > GROWN * least:
                     change[i], grown = most, True
                 held[i] = held[i] or stopped
         if not grown:
             break
+    # Once, and not in each contact of a row: two bodies between which a change goes back and forth would make it grow without end.
+    for i in range(part.shape[0] - 1):
+        if change[i] > 0.0:
+            rebound = 0.0
+            for k in range(coefficients.shape[0]):
+                rebound = max(rebound, coefficients[material[i], k, 0])
+            change[i] *= 1.0 + rebound
 
 
 @jit
