@@ -18,7 +18,7 @@ w the inverse masses and e the largest restitution of body i, it changes by at m
     s w_i / (w_i + w_j)   else,
 
 and s is as large as the change of the other one without the rebound. A pair closes as fast as either changes; if it closes already, faster
-by the smaller of both changes; and faster by half of what gravity adds. Layers of a falling heap went 13 % of their size into each other
+by the smaller of both changes; and faster by half of what gravity adds. Layers of a falling pile went 13 % of their size into each other
 without it.
 """
 

@@ -1,4 +1,4 @@
-"""Layers of a heap that fall one behind the other, and are stopped one after the other in the same step, do not go into each other.
+"""Layers of a pile that fall one behind the other, and are stopped one after the other in the same step, do not go into each other.
 
 Law: each layer comes to the one below while that is stopped in the same step of 1/60 s, or the next. The gap of two layers is never less
 than minus the skin, 0.8 % of the inner radius. Where only what closes at the start of the step was looked for, layers of 0.1 m went 12.8 mm
@@ -16,7 +16,7 @@ LAYERS, SIDE = 7, 0.1
 SKIN = 0.008 * 0.5 * SIDE
 
 
-def heap(gap: float, kind: str) -> ri.Scene:
+def pile(gap: float, kind: str) -> ri.Scene:
     """4 x 4 columns of bodies with gaps between all of them."""
     shape = ri.Shape.box(SIDE) if kind == "boxes" else ri.Shape.convex_hull(np.array(list(np.ndindex(2, 2, 2))) * SIDE - 0.5 * SIDE)
     scene = ri.Scene(bodies=[ri.Body("floor", ri.Shape.half_space(), motion="static")])
@@ -28,7 +28,7 @@ def heap(gap: float, kind: str) -> ri.Scene:
 
 @pytest.mark.parametrize(("gap", "kind"), [(0.02, "boxes"), (0.005, "boxes"), (0.05, "boxes"), (0.02, "hulls")])
 def test_layers_stay_apart(gap: float, kind: str) -> None:
-    run = ri.simulate(heap(gap, kind), 0.5, 60.0)
+    run = ri.simulate(pile(gap, kind), 0.5, 60.0)
     assert any(line.name == "sub-stepped islands" and line.counts["steps"] > 0 for line in run.plan.lines)
     heights = run.positions[:, 1:, 2].reshape(len(run.times), LAYERS, 16)
     gaps = np.diff(heights, axis=1, prepend=-0.5 * SIDE) - SIDE
