@@ -93,9 +93,9 @@ def test_pairs_that_have_not_moved_are_not_looked_at_again():
     before = table.points.copy()
     for moved, looked in ((0.0, 0), (5e-4, 0), (7e-4, 1)):
         bodies.position[1, 0] += moved
-        assert review(bodies, table.pairs, Share(0, 1, places, margins), Limits(1.0 / 60.0, 2e-3, 0.0)) == (0, looked)
+        assert review(bodies, table.pairs, Share(0, 1, places, margins), Limits(1.0 / 60.0, 2e-3, 0.0, 0.0)) == (0, looked)
         bodies.position[1, 0] -= moved
     np.testing.assert_array_equal(table.points, before)
     bodies.position[1] += bodies.position[1] - bodies.position[0]
-    assert review(bodies, table.pairs, Share(0, 1, places, margins), Limits(1.0 / 60.0, 2e-3, 0.0)) == (0, 0)
+    assert review(bodies, table.pairs, Share(0, 1, places, margins), Limits(1.0 / 60.0, 2e-3, 0.0, 0.0)) == (0, 0)
     assert table.pairs.count[0] == 0
