@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.broad_phase import overlapping_with
-from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.memory import rows_of
 from rigidimpulse.core.sorted_values import is_among
 from rigidimpulse.core.tolerances import TOLERANCES
@@ -86,6 +86,12 @@ class PairTable(NamedTuple):
 def make_pairs(capacity: int) -> np.ndarray:
     """Rows (c,) PAIR of a table."""
     return rows_of(capacity, PAIR)
+
+
+@inlined
+def most_solves(number):
+    """Times in a step that the bodies of an island of a number of bodies may be dealt with; more often they run away."""
+    return RUNAWAY / max(number / LARGE, 1.0)
 
 
 @jit_making_arrays

@@ -98,6 +98,8 @@ class WaysOut:
         coarse = COARSE * self.size(a, b)
         tried = self._directions(a, b, c)
         n, way = _least_of(tried, np.array([self._way(a, b, c, n, coarse) for n in tried]), c, coarse)
+        if not np.isfinite(way):
+            return _nothing(a, b)
         for _ in range(MAX_DESCENTS):
             other = self._separation(a, b, c + (way + coarse) * n).normal
             reached = self._way(a, b, c, other, coarse) if np.all(np.isfinite(other)) else np.inf
@@ -105,7 +107,7 @@ class WaysOut:
                 break
             n, way = other, reached
         way = self._way(a, b, c, n, 0.1 * self._margin(a, b))
-        return Demand(a, b, n, way + float(n @ c), lasting=False) if np.isfinite(way) else _nothing(a, b)
+        return Demand(a, b, n, way + float(n @ c), lasting=False)
 
     def _least_plane(self, a: int, b: int, c: np.ndarray) -> Demand:
         """The plane of the least way for b at c (3,) m beside a."""

@@ -43,10 +43,8 @@ from rigidimpulse.engine.exact.step_size import ErrorEstimate, Forces, StepLimit
 from rigidimpulse.engine.exact.trajectories import set_impact_margins, take_steady_load
 from rigidimpulse.engine.exact.velocity_projection import ProjectionScratch, project
 from rigidimpulse.engine.pair_table import (
-    LARGE,
     MARGIN,
     NEVER,
-    RUNAWAY,
     SHORT,
     USED,
     PairBodies,
@@ -55,6 +53,7 @@ from rigidimpulse.engine.pair_table import (
     look_around,
     mark_live,
     mark_met,
+    most_solves,
     next_time,
     renew_pairs,
     settle_pairs,
@@ -357,7 +356,7 @@ def _hand_over(loop, islands, time):
     """Leave members that run away to the loop in Python, at once."""
     for k in range(len(islands.record)):
         first, last = islands.member_first[k], islands.member_first[k + 1]
-        often = RUNAWAY / max((last - first) / LARGE, 1.0)
+        often = most_solves(last - first)
         for i in islands.member[first:last]:
             if loop.solve_count[i] > often:
                 loop.elsewhere[i] = True

@@ -27,7 +27,7 @@ from rigidimpulse.engine.exact.advance import NOT_HELD
 from rigidimpulse.engine.exact.energy_limit import note_end_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work, begin_trajectory
 from rigidimpulse.engine.pair_events import PairEvents
-from rigidimpulse.engine.pair_table import LARGE, NEVER, RUNAWAY
+from rigidimpulse.engine.pair_table import NEVER, RUNAWAY, most_solves
 from rigidimpulse.engine.participants import Substepping
 from rigidimpulse.engine.regime import (
     EXPENSIVE_TALL,
@@ -400,7 +400,7 @@ class SubsteppedIslands:
         if pair_events.end <= pair_events.begin:  # the end of the run: there is no time to step over
             return [island for island in islands if np.all(self.label[island.members] < 0)]
         for island in islands:
-            often = RUNAWAY / max(len(island.members) / LARGE, 1.0)
+            often = most_solves.py_func(len(island.members))
             if np.any(self.solve_count[island.members] > often) and np.all(self.label[island.members] < 0):
                 self._hand_over(run, pair_events, island)
         lost = self._lost(pair_events, islands)
