@@ -75,6 +75,7 @@ def run_options(command: Callable) -> Callable:
     for option in (
         click.option("--view", is_flag=True, help="Open the result in the browser."),
         click.option("--cache", type=click.Path(), help="Keep the run in this .h5 file while it goes on; go on from there if it is there."),
+        click.option("--trust-cache", is_flag=True, help="Go on from --cache though another user, or another machine, has written it."),
         click.option("--from-frame", type=int, help="Go on from this frame of the run in --cache, with SCENE as it is now."),
         click.option("--profile", is_flag=True, help="Print where the time went, by stage and by kernel."),
         click.option("--fps", type=float, help="Frames per second; changes what is recorded, never what happens."),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import click
 
+from rigidimpulse.recording.cache import Cache
 from rigidimpulse.recording.exporters import export_suffixes
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def given_options(settings: dict[str, Any]) -> dict[str, Any]:
 class Storage(NamedTuple):
     """Where a run is kept while it goes on, and the frame of the run there from which on the scene is another one; None: neither."""
 
-    cache: str | None = None
+    cache: Cache | None = None
     from_frame: int | None = None
 
 
@@ -62,7 +63,8 @@ NOT_KEPT = Storage()
 
 def storage_of(settings: dict[str, Any]) -> Storage:
     """Take the options of storage out of the settings of a command."""
-    return Storage(settings.pop("cache"), settings.pop("from_frame"))
+    path, trust = settings.pop("cache"), settings.pop("trust_cache")
+    return Storage(None if path is None else Cache(path, trust=trust), settings.pop("from_frame"))
 
 
 def run_job(job: Job, output: Sequence[str], profile: bool = False, storage: Storage = NOT_KEPT) -> Recording:
@@ -82,7 +84,7 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, storage: Sto
 
     scene = job.make()
     cache, from_frame = storage
-    begun = cache is not None and from_frame is None and Path(cache).exists()
+    begun = f"; {cache.path} already had the beginning, or all of it" if cache and from_frame is None and Path(cache.path).exists() else ""
     start = perf_counter()
     # disable=None: no bar where the output is no terminal.
     with tqdm(
@@ -98,8 +100,7 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, storage: Sto
     seconds = perf_counter() - start
     num_impacts = len(run.impacts)
     impacts = f"{num_impacts} {'impact' if num_impacts == 1 else 'impacts'}"
-    rest = f"; {cache} already had the beginning, or all of it" if begun else ""
-    click.echo(f"{run.times[-1] if run.status.is_partial else job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s{rest}")
+    click.echo(f"{run.times[-1] if run.status.is_partial else job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s{begun}")
     click.echo(f"status: {run.status.message}")
     if profile and run.profile is not None:
         click.echo(run.profile.table())

@@ -71,7 +71,7 @@ def simulate(
 
     Raises:
         SceneError: the scene cannot be simulated as it is; names the body, the value and the remedy. Or an effect is unknown, cannot be
-            enabled or cannot be left out. Or the cache is of another scene, of other settings or of another version.
+            enabled or cannot be left out. Or the cache is of another scene, of other settings, of another version or of another user.
 
     """
     if isinstance(accuracy, str | Accuracy):

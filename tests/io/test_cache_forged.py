@@ -1,4 +1,4 @@
-"""A cache from elsewhere runs nothing: whatever a forged checkpoint names is refused with a SceneError."""
+"""A cache from elsewhere runs nothing, even one that is trusted: whatever a forged checkpoint names is refused with a SceneError."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def test_pickles_of_older_caches_run_nothing(stopped: bytes, tmp_path: Path) -> 
     cache.write_bytes(stopped)
     put_state(cache, forged)
     with pytest.raises(ri.SceneError, match="delete the cache, and run again"):
-        ri.simulate(pile(), 0.1, 100.0, cache=cache)
+        ri.simulate(pile(), 0.1, 100.0, cache=ri.Cache(cache, trust=True))
     with h5py.File(cache, "r+") as file:
         file.attrs["format"] = "rigidimpulse cache 1"
     for look in (ri.load_recording, lambda path: ri.simulate(pile(), 0.1, 100.0, cache=path)):
@@ -172,7 +172,7 @@ def test_a_state_that_is_none_of_a_run_is_refused(stopped: bytes, tmp_path: Path
         cache.write_bytes(stopped)
         put_state(cache, content)
         with pytest.raises(ri.SceneError, match="the checkpoint"):
-            ri.simulate(pile(), 0.1, 100.0, cache=cache)
+            ri.simulate(pile(), 0.1, 100.0, cache=ri.Cache(cache, trust=True))
 
 
 FIELDS = {
@@ -202,7 +202,7 @@ def test_a_state_with_fields_of_other_kinds_is_refused(what: str, stopped: bytes
         run[2][name] = child
     put_state(cache, packed(json.dumps([number, root, nodes]).encode(), known[-arrays_size:]))
     with pytest.raises(ri.SceneError, match=rf"run\.h5.*engine\.run\.{told}.*delete the cache"):
-        ri.simulate(pile(), 0.1, 100.0, cache=cache)
+        ri.simulate(pile(), 0.1, 100.0, cache=ri.Cache(cache, trust=True))
 
 
 @pytest.mark.parametrize(

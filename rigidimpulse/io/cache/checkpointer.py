@@ -24,7 +24,7 @@ from rigidimpulse.io.cache.file import CacheFile
 from rigidimpulse.io.cache.layout import FRAMES, Content, Header, Take
 from rigidimpulse.io.cache.origin import Origin, frozen
 from rigidimpulse.io.cache.read import read, read_headers
-from rigidimpulse.io.cache.recall import constants_of, path_of, recalled
+from rigidimpulse.io.cache.recall import check_writer, constants_of, path_of, recalled
 from rigidimpulse.recording.cache import Cache
 from rigidimpulse.recording.recorder import sample_paths
 from rigidimpulse.recording.recording import Recording, RunSettings
@@ -65,7 +65,8 @@ class Checkpointer:
             change: of the scene of another take, in whose middle the run begins.
 
         Raises:
-            SceneError: another suffix, a file that is no cache, or one of another scene, of other settings or of another version.
+            SceneError: another suffix, a file that is no cache, or one of another scene, of other settings, of another version or of
+                another user.
 
         """
         self._cache = cache if isinstance(cache, Cache) else Cache(cache)
@@ -78,7 +79,7 @@ class Checkpointer:
         header = replace(header, take=header.take._replace(origin=hashlib.sha256(origin).hexdigest()))
         self._frames = self._impacts = 0
         self._state = b""
-        self.run = run if stored is None or stored.state is None else self._recall(run, stored)
+        self.run = run if stored is None or stored.state is None else self._recall(run, header, stored)
         self._written = self.run.recorder.written.copy()
         complete = stored is not None and stored.complete
         self._file = None if complete else CacheFile(self._path, header, stored, origin)
@@ -103,10 +104,13 @@ class Checkpointer:
             raise SceneError(_difference(known[0], header), "delete it, or give another name", f"cache {str(self._path)!r}")
         return replace(header, take=Take(1 + max(other.take.number for other in known), change.base, change.frame)), None
 
-    def _recall(self, run: Run, stored: Content) -> Run:
+    def _recall(self, run: Run, header: Header, stored: Content) -> Run:
         """The run as its checkpoint left it."""
+        where = f"cache {str(self._path)!r}"
+        if not self._cache.trust:
+            check_writer(header, stored, where)
         self._frames, self._impacts = len(stored.frames["position"]), len(stored.impacts)
-        return recalled(run, stored, f"cache {str(self._path)!r}")
+        return recalled(run, stored, where)
 
     def look(self, time: float, more: Callable[[float], None] | None = None) -> None:
         """Write a checkpoint if it is time to; call `more` with the time of the run [s]."""

@@ -34,6 +34,7 @@ from rigidimpulse.io.cache.layout import (
     library,
     seal_of,
 )
+from rigidimpulse.io.cache.signature import CHECKPOINT, ORIGIN, signature
 from rigidimpulse.recording.events import ROW_LENGTH
 
 MOST_KEPT, MOST_KEPT_BYTES = 32, 2**26
@@ -89,6 +90,7 @@ class CacheFile:
     def _write_rest(self, file: Any) -> None:
         """Write what does not change while the file is there: the origin, earlier checkpoints and the other takes."""
         file["origin"] = np.frombuffer(self._origin, np.uint8)
+        file.attrs["origin_signature"] = signature(ORIGIN, self._header.fingerprint, self._header.take.origin.encode()).decode()
         file["kept/commits"] = np.array([kept.commit for kept in self._kept.rows], COMMIT)
         file["kept/states"] = np.frombuffer(b"".join(kept.data for kept in self._kept.rows), np.uint8)
         file.create_group("takes")
@@ -110,9 +112,10 @@ class CacheFile:
         slot = self._number % 2
         file[f"checkpoint/{slot}"][: len(data)] = np.frombuffer(data, np.uint8)
         opened.sync()
-        told = (self._number, content.time, count, len(content.impacts), len(data), len(content.state), b"")
+        told = (self._number, content.time, count, len(content.impacts), len(data), len(content.state), b"", b"")
         commit = np.array(told, COMMIT)
-        commit["digest"] = digest_of(commit, data)
+        commit["digest"] = digest = digest_of(commit, data)
+        commit["signature"] = signature(CHECKPOINT, self._header.fingerprint, digest)
         file["checkpoint/commits"][slot] = commit
         opened.sync()
         self._kept.add(Kept(commit, data))

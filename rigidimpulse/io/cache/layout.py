@@ -9,16 +9,17 @@
                     angular_velocity (f, n, 3)
     impacts         (m, 15), columns as in `recording.events.IMPACT_DTYPE`
     checks          frames (f,) and impacts (m,): `check_words` of each row
-    checkpoint      two slots of bytes, and commits (2,): number, time, frames, impacts, size, length (unpacked) and digest of each
+    checkpoint      two slots of bytes, and commits (2,): number, time, frames, impacts, size, length (unpacked), digest and signature of
+                    each
     tables          of a finished run: contacts, status (JSON), and vertices and faces of flexible bodies
-    origin          bytes of the scene and the settings (`origin.frozen`)
+    origin          bytes of the scene and the settings (`origin.frozen`); its signature is the attribute origin_signature
     kept            earlier checkpoints, from which a changed scene may go on: commits (k,), and states, the bytes of all in a row
     takes           the other takes by their numbers, each laid out like the file itself
 
 The file itself is the take that was written last. Times and frames of a take begin at its first frame.
 
-Names are no attribute, because attributes hold 64 kB. Seal, checks and digests find damage. They are no signature: who forges a cache makes
-them, too.
+Names are no attribute, because attributes hold 64 kB. Seal, checks and digests find damage. Who forges a cache makes them, too, but has no
+key for the signatures (`signature`).
 """
 
 from __future__ import annotations
@@ -35,13 +36,14 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.recording.events import ROW_LENGTH
 
-FORMAT = "rigidimpulse cache 3"
+FORMAT = "rigidimpulse cache 4"
 FIRST_FORMAT = "rigidimpulse cache 1"
 """The format whose checkpoints are pickles."""
 SUFFIXES = (".h5", ".hdf5")
 FRAMES = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3}
 COMMIT = np.dtype([
     ("number", "<u8"), ("time", "<f8"), ("frames", "<u8"), ("impacts", "<u8"), ("size", "<u8"), ("length", "<u8"), ("digest", "S64"),
+    ("signature", "S64"),
 ])  # fmt: skip
 CHECK = np.dtype("<u8")
 _ODD = 0x9E3779B97F4A7C15
@@ -102,7 +104,7 @@ class Kept(NamedTuple):
 class Content(NamedTuple):
     """What a file holds: frames by name (k, n, ...), impacts (m, 15), until when they go [s], the state there, whether that is all.
 
-    tables: what only a finished run has, by name. kept: earlier checkpoints.
+    tables: what only a finished run has, by name. kept: earlier checkpoints. commit: that of the state, a row of COMMIT.
     """
 
     frames: dict[str, np.ndarray]
@@ -112,6 +114,7 @@ class Content(NamedTuple):
     complete: bool
     tables: dict[str, Any]
     kept: Sequence[Kept] = ()
+    commit: np.void | np.ndarray | None = None
 
 
 def empty(n: int) -> Content:
@@ -131,7 +134,7 @@ def check_words(*tables: np.ndarray) -> np.ndarray:
 
 def digest_of(commit: np.void | np.ndarray, data: bytes) -> bytes:
     """Return the digest of a commit and the bytes of its slot."""
-    told = [commit[name].tobytes() for name in COMMIT.names or () if name != "digest"]
+    told = [commit[name].tobytes() for name in COMMIT.names or () if name not in ("digest", "signature")]
     return hashlib.sha256(b"".join([*told, data])).hexdigest().encode()
 
 

@@ -71,15 +71,15 @@ def read_headers(path: Path) -> list[Header]:
     return _tried(path, True, headers)
 
 
-def read_origin(path: Path, take: int) -> bytes:
-    """Return the bytes of the scene and the settings of a take; see `read` for what it raises."""
+def read_origin(path: Path, take: int) -> tuple[bytes, bytes]:
+    """Return the bytes of the scene and the settings of a take, and their signature; see `read` for what it raises."""
 
-    def origin(file: Any, size: int) -> bytes:
+    def origin(file: Any, size: int) -> tuple[bytes, bytes]:
         reader = _Reader(_take(file, take), size)
         data = reader.table("origin", np.uint8, (None,))[()].tobytes()
         if hashlib.sha256(data).hexdigest() != reader.header().take.origin:
             raise Damaged("the scene of its run has been changed")
-        return data
+        return data, reader.text("origin_signature").encode()
 
     return _tried(path, True, origin)
 
@@ -264,7 +264,7 @@ class _Reader:
             bodies = impacts[:, 1:3]
             if not np.all((bodies >= 0.0) & (bodies < len(header.names))):
                 raise Damaged("its impacts are of bodies that it does not have")
-            return Content(frames, impacts, time, state, complete, {}, self.kept(counts))
+            return Content(frames, impacts, time, state, complete, {}, self.kept(counts), commits[slot])
         if complete or np.all(commits["number"] > 0):
             raise Damaged("no checkpoint agrees with its digest")
         return empty(len(header.names))

@@ -13,8 +13,9 @@ from rigidimpulse.engine.begin import bind_compiled_loop
 from rigidimpulse.io.cache.arrays import Damaged
 from rigidimpulse.io.cache.constants import Constants
 from rigidimpulse.io.cache.decode import REMEDY, thaw
-from rigidimpulse.io.cache.layout import FRAMES, SUFFIXES, Content
+from rigidimpulse.io.cache.layout import FRAMES, SUFFIXES, Content, Header
 from rigidimpulse.io.cache.likeness import check_alike
+from rigidimpulse.io.cache.signature import CHECKPOINT, check_signature
 from rigidimpulse.recording.cache import Cache
 
 if TYPE_CHECKING:
@@ -32,6 +33,17 @@ def path_of(cache: Cache) -> Path:
     if path.suffix not in SUFFIXES:
         raise SceneError("it has another suffix", f"use a name that ends in {' or '.join(SUFFIXES)}", f"cache {path.name!r}")
     return path
+
+
+def check_writer(header: Header, stored: Content, where: str) -> None:
+    """Check that this user has written the state of a content; where: how a message names the file.
+
+    Raises:
+        SceneError: somebody else has, or nobody knows.
+
+    """
+    assert stored.commit is not None
+    check_signature(bytes(stored.commit["signature"]), CHECKPOINT, header.fingerprint, bytes(stored.commit["digest"]), where)
 
 
 def recalled(run: Run, stored: Content, where: str) -> Run:
