@@ -34,6 +34,10 @@ class Surface(NamedTuple):
         return self.num_open_edges == 0 and self.num_twisted_edges == 0
 
 
+FARTHEST = 1e60
+"""m. Inertia goes with the fifth power of a length, and is a number up to there."""
+
+
 def check_triangles(vertices: np.ndarray, faces: np.ndarray) -> None:
     """Raise a `SceneError` if the arrays are no triangle surface: wrong form, empty, not finite, bad indices."""
     if vertices.ndim != 2 or vertices.shape[1] != 3:
@@ -50,6 +54,12 @@ def check_triangles(vertices: np.ndarray, faces: np.ndarray) -> None:
         raise SceneError(
             f"vertex {bad[0]} is not finite: {vertices[bad[0]].tolist()} ({len(bad)} such vertices)",
             "remove or repair these vertices",
+        )
+    bad = np.flatnonzero((np.abs(vertices) > FARTHEST).any(axis=1))
+    if len(bad):
+        raise SceneError(
+            f"vertex {bad[0]} is at {vertices[bad[0]].tolist()} m, farther than {FARTHEST:g} m ({len(bad)} such vertices)",
+            "repair these vertices, or scale the mesh",
         )
     bad = np.flatnonzero(((faces < 0) | (faces >= len(vertices))).any(axis=1))
     if len(bad):

@@ -1,4 +1,4 @@
-"""Look for faults for a while, and write a regression test for each: `python tests/bench/fuzz.py SECONDS [--seed N] [--kind NAME ...]`.
+"""Look for faults for a while, and write a regression test for each: `python tests/bench/fuzz.py SECONDS [--cases N] [--seed N] [--kind NAME ...]`.
 
 Cases of all kinds come in turn, each with a seed of its own, and each in a process of its own. What fails is made simpler for a while. A
 test of it is written to tests/regressions (or --output), which fails as long as the fault is there. The exit code is 1 if anything failed.
@@ -9,6 +9,7 @@ fault.
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections import Counter
 from pathlib import Path
@@ -71,12 +72,13 @@ def write_test(kind: Kind, seed: int, case: Any, told: list[str], folder: Path) 
     return path
 
 
-def search(kinds: list[Kind], seconds: float, seed: int, folder: Path) -> list[Path]:
-    """Try cases for some time; return the tests that were written."""
+def search(kinds: list[Kind], seconds: float, seed: int, folder: Path, cases: float = math.inf) -> list[Path]:
+    """Try cases for some time, or so many of each kind; return the tests that were written."""
     start, count, tests = perf_counter(), Counter[str](), list[Path]()
     for kind in kinds:
         kind.warm()
-    while perf_counter() - start < seconds:
+    first = seed
+    while perf_counter() - start < seconds and seed - first < cases:
         for kind in kinds:
             case = kind.draw(seed)
             told = faults_apart(kind, case)
@@ -99,10 +101,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("seconds", type=float)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--cases", type=float, default=math.inf, help="of each kind, at most")
     parser.add_argument("--kind", nargs="+", choices=KINDS, default=list(KINDS))
     parser.add_argument("--output", type=Path, default=REGRESSIONS, help="folder for the tests")
     arguments = parser.parse_args()
-    return int(bool(search([KINDS[name] for name in arguments.kind], arguments.seconds, arguments.seed, arguments.output)))
+    kinds = [KINDS[name] for name in arguments.kind]
+    return int(bool(search(kinds, arguments.seconds, arguments.seed, arguments.output, arguments.cases)))
 
 
 if __name__ == "__main__":

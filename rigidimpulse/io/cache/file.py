@@ -21,6 +21,7 @@ import numpy as np
 from rigidimpulse.core.files import unwritable, write_renamed
 from rigidimpulse.io.cache.disk import Disk
 from rigidimpulse.io.cache.layout import (
+    ATTRIBUTES,
     CHECK,
     COMMIT,
     FORMAT,
@@ -28,11 +29,13 @@ from rigidimpulse.io.cache.layout import (
     Content,
     Header,
     Kept,
+    attribute_of,
     check_words,
     digest_of,
     empty,
     library,
     seal_of,
+    set_attributes,
 )
 from rigidimpulse.io.cache.signature import CHECKPOINT, ORIGIN, signature
 from rigidimpulse.recording.events import ROW_LENGTH
@@ -62,7 +65,7 @@ class CacheFile:
         def create(target: Path) -> None:
             with _Open(target, new=True) as made:
                 _lay_out(made.file, self._header, max(SPARE * len(content.impacts), LEAST_IMPACTS), SPARE * len(data))
-                made.file.attrs["seal"] = seal_of(self._header, False, {})
+                set_attributes(made.file, seal=seal_of(self._header, False, {}))
                 self._commit(made, content, 0, 0, data)
                 self._write_rest(made.file)
 
@@ -90,7 +93,8 @@ class CacheFile:
     def _write_rest(self, file: Any) -> None:
         """Write what does not change while the file is there: the origin, earlier checkpoints and the other takes."""
         file["origin"] = np.frombuffer(self._origin, np.uint8)
-        file.attrs["origin_signature"] = signature(ORIGIN, self._header.fingerprint, self._header.take.origin.encode()).decode()
+        signed = signature(ORIGIN, self._header.fingerprint, self._header.take.origin.encode())
+        set_attributes(file, origin_signature=signed.decode())
         file["kept/commits"] = np.array([kept.commit for kept in self._kept.rows], COMMIT)
         file["kept/states"] = np.frombuffer(b"".join(kept.data for kept in self._kept.rows), np.uint8)
         file.create_group("takes")
@@ -138,8 +142,7 @@ class CacheFile:
                 for name, table in tables.items():
                     file[f"tables/{name}"] = table
                 self._write_rest(file)
-                file.attrs["complete"] = True
-                file.attrs["seal"] = seal_of(self._header, True, tables)
+                set_attributes(file, complete=True, seal=seal_of(self._header, True, tables))
 
         with _told(self._path):
             write_renamed(self._path, create)
@@ -169,10 +172,10 @@ class _KeptCheckpoints:
 def copy_takes(source: Any, target: Any, number: int) -> None:
     """Copy all takes of a file but that of a number into the group `takes` of another file."""
     for group in (source, *source["takes"].values()):
-        take = int(group.attrs["take"])
+        take = int(attribute_of(group, "take"))
         if take != number:
             copied = target.create_group(f"takes/{take}")
-            copied.attrs.update(group.attrs)
+            set_attributes(copied, **{name: attribute_of(group, name) for name in ATTRIBUTES})
             for name in group:
                 if name != "takes":
                     group.copy(name, copied)
@@ -181,10 +184,11 @@ def copy_takes(source: Any, target: Any, number: int) -> None:
 def _lay_out(file: Any, header: Header, impacts: int, size: int) -> None:
     """Give a new file its tables, with the capacity for `impacts` impacts and for states of `size` bytes."""
     h5py = library()
-    told = {"format": FORMAT, "fingerprint": header.fingerprint, "version": header.version, "complete": False}
     number, base, first_frame, origin = header.take
-    file.attrs.update(told | {"duration": header.duration, "fps": header.fps})
-    file.attrs.update({"take": number, "base": base, "first_frame": first_frame, "origin": origin})
+    set_attributes(
+        file, format=FORMAT, fingerprint=header.fingerprint, version=header.version, complete=False, duration=header.duration,
+        fps=header.fps, take=number, base=base, first_frame=first_frame, origin=origin,
+    )  # fmt: skip
     file["names"] = np.bytes_(json.dumps(header.names).encode())
     file["times"], file["body/offset"], file["body/turn"] = header.times, header.offset, header.turn
     file["checkpoint/commits"] = np.zeros(2, COMMIT)

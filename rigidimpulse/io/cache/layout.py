@@ -18,7 +18,7 @@
 
 The file itself is the take that was written last. Times and frames of a take begin at its first frame.
 
-Names are no attribute, because attributes hold 64 kB. Seal, checks and digests find damage. Who forges a cache makes them, too, but has no
+Texts among the attributes have a fixed length (`attribute_of`). Names are none, because attributes hold 64 kB. Seal, checks and digests find damage. Who forges a cache makes them, too, but has no
 key for the signatures (`signature`).
 """
 
@@ -37,8 +37,9 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.recording.events import ROW_LENGTH
 
 FORMAT = "rigidimpulse cache 4"
-FIRST_FORMAT = "rigidimpulse cache 1"
-"""The format whose checkpoints are pickles."""
+ATTRIBUTES = (
+    "format", "fingerprint", "version", "duration", "fps", "complete", "seal", "take", "base", "first_frame", "origin", "origin_signature",
+)  # fmt: skip
 SUFFIXES = (".h5", ".hdf5")
 FRAMES = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3}
 COMMIT = np.dtype([
@@ -47,6 +48,27 @@ COMMIT = np.dtype([
 ])  # fmt: skip
 CHECK = np.dtype("<u8")
 _ODD = 0x9E3779B97F4A7C15
+
+
+def attribute_of(group: Any, name: str) -> Any:
+    """Return an attribute of a group, a text as str; None where it has none of this name, or one that is no number and no text of fixed length.
+
+    Texts of variable length lie in a heap without checks: HDF5 reads some damaged heaps for ever.
+    """
+    if name not in group.attrs:
+        return None
+    types, kind = library().h5t, group.attrs.get_id(name).get_type()
+    if not isinstance(kind, types.TypeIntegerID | types.TypeFloatID | types.TypeEnumID | types.TypeStringID):
+        return None
+    if isinstance(kind, types.TypeStringID) and kind.is_variable_str():
+        return None
+    value = group.attrs[name]
+    return value.decode() if isinstance(value, bytes) else value
+
+
+def set_attributes(group: Any, **values: Any) -> None:
+    """Give a group attributes; texts have a fixed length."""
+    group.attrs.update({name: np.bytes_(value.encode()) if isinstance(value, str) else value for name, value in values.items()})
 
 
 def library() -> Any:

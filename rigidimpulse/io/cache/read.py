@@ -23,13 +23,13 @@ from rigidimpulse.io.cache.arrays import Damaged
 from rigidimpulse.io.cache.layout import (
     CHECK,
     COMMIT,
-    FIRST_FORMAT,
     FORMAT,
     FRAMES,
     Content,
     Header,
     Kept,
     Take,
+    attribute_of,
     check_words,
     digest_of,
     empty,
@@ -105,11 +105,9 @@ def _tried(path: Path, alone: bool, ask: Callable[[Any, int], Answer]) -> Answer
 def _read(path: Path, alone: bool, where: str, ask: Callable[[Any, int], Answer]) -> Answer:
     """What the file says at this moment."""
     with _opened(path, alone) as file:
-        kind = file.attrs.get("format")
-        if isinstance(kind, str) and kind == FIRST_FORMAT:
-            raise SceneError("it is of an older version of the library, whose checkpoints could hold programs", REMEDY, where)
+        kind = attribute_of(file, "format")
         if not isinstance(kind, str) or kind != FORMAT:
-            raise SceneError("it is no cache of this version", "give another name, or delete it", where)
+            raise SceneError("it is a cache of another version of the library, or none", "give another name, or delete it, and run again", where)
         return ask(file, os.fstat(file.id.get_vfd_handle()).st_size)
 
 
@@ -135,12 +133,12 @@ def _numbers(file: Any) -> list[int]:
 
 def _take(file: Any, number: int | None) -> Any:
     """The file itself, or the group of a take."""
-    if number is None or file.attrs.get("take") == number:
+    if number is None or attribute_of(file, "take") == number:
         return file
     if number not in _numbers(file):
         raise Damaged(f"it has no take {number}")
     name = f"takes/{number}"
-    if not isinstance(file.get(name, getlink=True), library().HardLink) or file[name].attrs.get("take") != number:
+    if not isinstance(file.get(name, getlink=True), library().HardLink) or attribute_of(file[name], "take") != number:
         raise Damaged(f"its take {number} is another one")
     return file[name]
 
@@ -182,7 +180,7 @@ class _Reader:
 
     def attribute(self, name: str, kind: type) -> Any:
         """An attribute of just this type."""
-        value = self._file.attrs[name]
+        value = attribute_of(self._file, name)
         if not isinstance(value, kind):
             raise Damaged(f"its {name} is a {type(value).__name__}")
         return value

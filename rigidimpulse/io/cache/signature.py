@@ -27,6 +27,7 @@ VARIABLE = "RIGIDIMPULSE_CACHE_KEY"
 LENGTH = 32
 """Bytes of a key."""
 FOR_THE_USER = 0o600
+NO_KEY = b"none"
 CHECKPOINT, ORIGIN = "checkpoint", "origin"
 """What signatures are of."""
 REMEDY = (
@@ -36,9 +37,9 @@ REMEDY = (
 
 
 def signature(kind: str, fingerprint: str, digest: bytes) -> bytes:
-    """Return the signature of a digest, in hexadecimal digits; none where this user has no key."""
+    """Return the signature of a digest, in hexadecimal digits, or the word `NO_KEY` where this user has none."""
     key = _key()
-    return b"" if key is None else _signed(key, kind, fingerprint, digest)
+    return NO_KEY if key is None else _signed(key, kind, fingerprint, digest)
 
 
 def check_signature(found: bytes, kind: str, fingerprint: str, digest: bytes, where: str) -> None:

@@ -10,6 +10,8 @@ from rigidimpulse.io.usd.library import Ar, Layer, Sdf, Tf, UsdUtils
 
 EXPRESSION = "`"
 """Asset paths that are computed from variables begin so."""
+TEXT = "usda"
+"""The format of layers that are parsed, and are whole where they are read at all."""
 
 
 def checked_layers(path: Path) -> dict[str, Layer]:
@@ -18,7 +20,7 @@ def checked_layers(path: Path) -> dict[str, Layer]:
     What is open in the process and was edited there is left as it is.
 
     Raises:
-        SceneError: one of them names a layer, a texture or a clip outside the folder of the file, or by an absolute path.
+        SceneError: one of them names a layer, a texture or a clip outside the folder of the file, or by an absolute path; or it is not whole.
         Tf.ErrorException: the file is broken. Layers below it that are missing or broken are left to the stage, which tells them.
 
     """
@@ -34,6 +36,8 @@ def checked_layers(path: Path) -> dict[str, Layer]:
         if not layer.dirty:
             layer.Reload(True)
         where = repr(path.name) if layer == root else f"{path.name!r}, layer {_shown(layer, folder)!r}"
+        if layer.GetFileFormat().formatId != TEXT and not _is_whole(layer):
+            raise SceneError("prims that it counts are not in it", "export it again", where)
         composed = list(layer.GetCompositionAssetDependencies())
         for name in composed:
             if name.startswith(EXPRESSION):
@@ -52,6 +56,19 @@ def _place(layer: Layer, name: str, folder: Path) -> Path:
     if Ar.IsPackageRelativePath(found):
         found = Ar.SplitPackageRelativePathOuter(found)[0]
     return folder / found
+
+
+def _is_whole(layer: Layer) -> bool:
+    """Whether all prims of a layer are there that other prims have for children: usd-core ends the process that asks for one that is not."""
+    waiting = list(layer.rootPrims)
+    while waiting:
+        prim = waiting.pop()
+        if prim is None:
+            return False
+        waiting += prim.nameChildren
+        for variants in prim.variantSets.values():
+            waiting += [variant.primSpec if variant else None for variant in variants.variants.values()]
+    return True
 
 
 def _below(layer: Layer, name: str) -> Layer | None:

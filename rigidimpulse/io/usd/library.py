@@ -47,5 +47,8 @@ Prim: TypeAlias = Any
 
 def cause_of(error: Exception) -> str:
     """The cause of an error in one line; of several errors of usd-core the first, which has the line of the file."""
-    text = getattr(error.args[0], "commentary", "") if error.args else ""
+    try:
+        text = getattr(error.args[0], "commentary", "") if error.args else ""
+    except UnicodeDecodeError:  # it quotes the file
+        text = "there are bytes in it that are no text in UTF-8"
     return ((text or str(error)).strip() or type(error).__name__).splitlines()[-1][:200]

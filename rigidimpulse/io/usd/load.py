@@ -45,7 +45,7 @@ def load_usd(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Scen
         for layer in stage.GetUsedLayers():
             if not layer.anonymous and not layer.dirty and layer.identifier not in fresh:
                 layer.Reload(True)
-    except Tf.ErrorException as error:
+    except (Tf.ErrorException, UnicodeDecodeError) as error:
         raise SceneError(f"it is no readable USD file ({cause_of(error)})", "export it again", where) from None
     try:
         # Transforms and points are looked at after they are computed, so what overflows here is no number that a message could miss.
