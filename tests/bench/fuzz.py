@@ -1,4 +1,6 @@
-"""Look for faults for a while, and write a regression test for each: `python tests/bench/fuzz.py SECONDS [--cases N] [--seed N] [--kind NAME ...]`.
+"""Look for faults for a while, and write a regression test for each.
+
+    python tests/bench/fuzz.py SECONDS [--cases N] [--seed N] [--kind NAME ...]
 
 Cases of all kinds come in turn, each with a seed of its own, and each in a process of its own. What fails is made simpler for a while. A
 test of it is written to tests/regressions (or --output), which fails as long as the fault is there. The exit code is 1 if anything failed.

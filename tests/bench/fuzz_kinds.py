@@ -28,8 +28,8 @@ import kept_runs
 import numpy as np
 from broken_files import broken
 from choices import Recorded, Replayed
-from late_changes import broken_promises_later, make_late_change
 from forged_states import put_state
+from late_changes import broken_promises_later, make_late_change
 from life_cycles import broken_promises, make_life_cycle
 from mutated_files import mutated, read_all
 from mutated_files import read as read_file

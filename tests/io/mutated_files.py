@@ -23,7 +23,8 @@ NUMBER, WORD = re.compile(rb"-?\d+\.?\d*(?:e-?\d+)?"), re.compile(rb"[A-Za-z_]\w
 URDF = """<robot name="arm">
 <link name="base"><collision><geometry><box size="0.2 0.2 0.1"/></geometry></collision>
 <inertial><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+<link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="1"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><origin xyz="0 0 -0.5" rpy="0 0.1 0"/><geometry><cylinder radius="0.05" length="1"/></geometry></collision></link>
 <link name="tip"><collision><geometry><mesh filename="cube.obj" scale="0.1 0.1 0.1"/></geometry></collision></link>
 <joint name="swing" type="revolute"><parent link="base"/><child link="rod"/><origin xyz="0 0 1"/><axis xyz="0 1 0"/>
@@ -34,8 +35,10 @@ MJCF = """<mujoco model="legs"><compiler angle="degree"/><option gravity="0 0 -9
 <asset><mesh name="cube" file="cube.obj" scale="0.1 0.1 0.1"/></asset>
 <worldbody><geom type="plane" size="5 5 0.1"/>
 <body name="trunk" pos="0 0 1"><freejoint/><geom type="capsule" size="0.1" fromto="0 0 0 0 0 0.5"/>
-<body name="leg" pos="0 0 0"><joint name="hip" type="hinge" axis="0 1 0" range="-40 40" damping="0.1"/><geom type="box" size="0.05 0.05 0.2" pos="0 0 -0.2"/>
-<body name="foot" pos="0 0 -0.4"><joint name="slide" type="slide" axis="0 0 1" range="-0.1 0.1"/><geom type="mesh" mesh="cube" mass="0.3"/></body>
+<body name="leg" pos="0 0 0"><joint name="hip" type="hinge" axis="0 1 0" range="-40 40" damping="0.1"/>
+<geom type="box" size="0.05 0.05 0.2" pos="0 0 -0.2"/>
+<body name="foot" pos="0 0 -0.4"><joint name="slide" type="slide" axis="0 0 1" range="-0.1 0.1"/>
+<geom type="mesh" mesh="cube" mass="0.3"/></body>
 </body></body></worldbody><equality><weld body1="trunk" body2="leg" active="false"/></equality></mujoco>"""
 
 
@@ -163,7 +166,9 @@ def _swapped(content: bytes, numbers: random.Random) -> bytes:
     return content[:first] + content[begin:end] + content[last:]
 
 
-MUTATIONS = (_flipped, _cut, _without, _doubled, _zeroed, _replaced(NUMBER, NUMBERS), _replaced(NUMBER, NUMBERS), _replaced(WORD, WORDS), _swapped)
+MUTATIONS = (
+    _flipped, _cut, _without, _doubled, _zeroed, _replaced(NUMBER, NUMBERS), _replaced(NUMBER, NUMBERS), _replaced(WORD, WORDS), _swapped,
+)  # fmt: skip
 
 
 def read(name: str, content: bytes) -> list[str]:

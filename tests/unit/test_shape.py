@@ -205,6 +205,7 @@ def test_solids_that_touch_along_an_edge_are_closed():
         (Shape.mesh(BOX.vertices, [[0, 1, -1]]), "face 0"),
         (Shape.mesh(BOX.vertices, [[0, 1, 2, 3]]), "triangles"),
         (Shape.mesh(BOX.vertices * [1, np.nan, 1], BOX.faces), "vertex 0 is not finite"),
+        (Shape.mesh(BOX.vertices * [1, 1e200, 1], BOX.faces), r"vertex 0 is at .* farther than 1e\+60 m \(8 such vertices\)"),
         (Shape.mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]), "area"),
         (Shape.compound([]), "no parts"),
         (Shape.compound([(Shape.sphere(1), (0, 0), NO_TURN)]), "part 0: position"),

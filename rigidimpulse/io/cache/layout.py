@@ -18,8 +18,8 @@
 
 The file itself is the take that was written last. Times and frames of a take begin at its first frame.
 
-Texts among the attributes have a fixed length (`attribute_of`). Names are none, because attributes hold 64 kB. Seal, checks and digests find damage. Who forges a cache makes them, too, but has no
-key for the signatures (`signature`).
+Texts among the attributes have a fixed length (`attribute_of`). Names are none of them, because attributes hold 64 kB. Seal, checks and
+digests find damage. Who forges a cache makes them, too, but has no key for the signatures (`signature`).
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _ODD = 0x9E3779B97F4A7C15
 
 
 def attribute_of(group: Any, name: str) -> Any:
-    """Return an attribute of a group, a text as str; None where it has none of this name, or one that is no number and no text of fixed length.
+    """Return an attribute of a group, a text as str; None where it has none of this name that is a number or a text of fixed length.
 
     Texts of variable length lie in a heap without checks: HDF5 reads some damaged heaps for ever.
     """

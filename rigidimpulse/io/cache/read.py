@@ -107,7 +107,8 @@ def _read(path: Path, alone: bool, where: str, ask: Callable[[Any, int], Answer]
     with _opened(path, alone) as file:
         kind = attribute_of(file, "format")
         if not isinstance(kind, str) or kind != FORMAT:
-            raise SceneError("it is a cache of another version of the library, or none", "give another name, or delete it, and run again", where)
+            remedy = "give another name, or delete it, and run again"
+            raise SceneError("it is a cache of another version of the library, or none", remedy, where)
         return ask(file, os.fstat(file.id.get_vfd_handle()).st_size)
 
 

@@ -20,7 +20,7 @@ def checked_layers(path: Path) -> dict[str, Layer]:
     What is open in the process and was edited there is left as it is.
 
     Raises:
-        SceneError: one of them names a layer, a texture or a clip outside the folder of the file, or by an absolute path; or it is not whole.
+        SceneError: one of them names a layer, a texture or a clip outside the folder of the file, or by an absolute path, or is not whole.
         Tf.ErrorException: the file is broken. Layers below it that are missing or broken are left to the stage, which tells them.
 
     """
@@ -59,7 +59,7 @@ def _place(layer: Layer, name: str, folder: Path) -> Path:
 
 
 def _is_whole(layer: Layer) -> bool:
-    """Whether all prims of a layer are there that other prims have for children: usd-core ends the process that asks for one that is not."""
+    """Whether all prims of a layer are there that others have for children: usd-core ends the process that asks for one that is not."""
     waiting = list(layer.rootPrims)
     while waiting:
         prim = waiting.pop()
