@@ -6,6 +6,7 @@ import functools
 import random
 import re
 import tempfile
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -173,7 +174,8 @@ MUTATIONS = (
 
 def read(name: str, content: bytes) -> list[str]:
     """Read a file as a user does; return what is wrong: another error than a `SceneError`, or something left behind."""
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.filterwarnings("error", module=r"rigidimpulse\.")
         (Path(folder) / "cube.obj").write_bytes(trimesh.creation.box().export(file_type="obj").encode())
         path = Path(folder) / name
         path.write_bytes(content)

@@ -497,12 +497,15 @@ def _slow(island, speeds):
 def _arrive(loop, islands, touch, reached, time):
     """End the sub-steps of all bodies reached (n,) bool, and measure the islands' contacts (see `exact.advance.arrive`)."""
     motion, memory, limiter, constants = loop.motion, loop.memory, loop.limiter, loop.bodies.constants
-    scratch = ProjectionScratch(loop.number, limiter.correction)
+    scratch = ProjectionScratch(loop.number, limiter.correction, limiter.under_contact, constants)
     for k in range(len(islands.record)):
         members = islands.member[islands.member_first[k] : islands.member_first[k + 1]]
         mine = _part(touch, islands.contact_first[k], islands.contact_first[k + 1])
         _classify(loop, mine, members)
-        if project(memory, motion, mine.contacts, mine.touching, _slow(islands.record[k], mine.speeds), time, members, scratch):
+        slow = _slow(islands.record[k], mine.speeds)
+        ended, change = project(memory, motion, mine.contacts, mine.touching, slow, time, members, scratch)
+        if ended:
+            log_energy(loop.log, time, STICK, change)
             _classify(loop, mine, members)
         _keep_speeds(touch, mine, islands.contact_first[k])
     bodies = np.empty(len(reached), np.int64)

@@ -20,19 +20,23 @@ from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import SLIP, SOLVE_TOLERANCE
 from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows, row_velocities
 from rigidimpulse.dynamics.constraints.slip import solve_with_slip
+from rigidimpulse.dynamics.energy import kinetic_energy
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.contact_memory import find_force, held_row
 from rigidimpulse.model.contacts import select
 from rigidimpulse.model.island import Island
+from rigidimpulse.model.world import BodyConstants
 
 TINY = TOLERANCES.arithmetic.least_divisor
 
 
 class ProjectionScratch(NamedTuple):
-    """Arrays of n bodies that a projection writes into."""
+    """Arrays of n bodies that a projection writes into, and what it asks of them."""
 
     number: np.ndarray  # (n,) working memory: the number of each member among the members
-    correction: np.ndarray  # (n, 6) change of velocity and spin that a body got at the end of its sub-step
+    correction: np.ndarray  # (n, 6) change of velocity and spin that a body under contact got at the end of its sub-step
+    under_contact: np.ndarray  # (n,) bool, bodies whose trajectories carry contact forces
+    constants: BodyConstants
 
 
 @jit
@@ -105,26 +109,38 @@ def take_back_and_stop(memory, motion, contacts, touching, held, time, members, 
 
 @jit_making_arrays
 def project(memory, motion, contacts, touching, held, time, members, scratch):
-    """The same, and what it changed of velocities and spins, into scratch.correction (n, 6); scratch: `ProjectionScratch`."""
+    """The same, for an island with bodies that no force pressed in its sub-step; scratch: `ProjectionScratch`.
+
+    Returns whether sub-steps ended, and the energy [J] that bodies got which flew freely until now: the others have theirs in the work of
+    their contacts, and their frames on the way have their share of the change.
+    """
     bodies, k = motion.now, members.shape[0]
-    before = np.empty((k, 6))
+    before, free, count = np.empty((k, 6)), np.empty(k, np.int64), np.int64(0)
     for s in range(k):
+        if not scratch.under_contact[members[s]]:
+            free[count] = members[s]
+            count += 1
         for j in range(3):
             before[s, j], before[s, 3 + j] = bodies.velocity[members[s], j], bodies.angular_velocity[members[s], j]
+    flying = kinetic_energy(bodies, scratch.constants, free[:count])
     if not take_back_and_stop(memory, motion, contacts, touching, held, time, members, scratch.number):
-        return False
+        return False, 0.0
     for s in range(k):
-        for j in range(3):
-            scratch.correction[members[s], j] = bodies.velocity[members[s], j] - before[s, j]
-            scratch.correction[members[s], 3 + j] = bodies.angular_velocity[members[s], j] - before[s, 3 + j]
-    return True
+        if scratch.under_contact[members[s]]:
+            for j in range(3):
+                scratch.correction[members[s], j] = bodies.velocity[members[s], j] - before[s, j]
+                scratch.correction[members[s], 3 + j] = bodies.angular_velocity[members[s], j] - before[s, 3 + j]
+    return True, kinetic_energy(bodies, scratch.constants, free[:count]) - flying
 
 
 def project_velocities(run: Run, island: Island) -> bool:
     """End the sub-steps of the island's pairs; returns whether there were any."""
     if not len(island.place):
         return False
-    return project(
-        run.state.memory, run.motion, island.contacts, island.touching, island.slow(), island.time, island.members,
-        ProjectionScratch(run.column, run.state.correction),
-    )
+    state = run.state
+    ended, change = project(
+        state.memory, run.motion, island.contacts, island.touching, island.slow(), island.time, island.members,
+        ProjectionScratch(run.column, state.correction, state.under_contact, run.world.constants),
+    )  # fmt: skip
+    run.log.account(island.time, "stick", change)
+    return ended

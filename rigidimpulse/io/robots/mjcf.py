@@ -42,6 +42,11 @@ ALONG = 1e-9
 FOLDERS = ("meshdir", "texturedir", "assetdir", "dir")
 """Attributes that name folders, in which files may lie."""
 COUNTED = {"nu": "actuators", "ntendon": "tendons", "nflex": "flexible bodies", "nkey": "keyframes", "npair": "contact pairs"}
+FIGURES = (
+    "body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "geom_pos", "geom_quat", "geom_size", "jnt_axis",
+    "jnt_pos",
+)  # fmt: skip
+"""Arrays of a compiled model that say where things are and how heavy."""
 
 
 def load_mjcf(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Scene:
@@ -63,6 +68,9 @@ def load_mjcf(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Sce
         model = _with_possible_inertias(mujoco, path, notes)
         if model is None:
             raise SceneError(f"MuJoCo does not compile it: {error}", "correct it at that line", where) from None
+    for name in FIGURES:
+        if not np.all(np.isfinite(getattr(model, name))):
+            raise SceneError(f"there are numbers in it that are not finite ({name} of the compiled model)", "correct them", where)
     data = mujoco.MjData(model)  # pyright: ignore[reportAttributeAccessIssue]
     mujoco.mj_kinematics(model, data)  # pyright: ignore[reportAttributeAccessIssue]
     try:
