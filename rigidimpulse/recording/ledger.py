@@ -96,8 +96,8 @@ def make_ledger(frames: Frames, masses: Masses, log: EventLog, work: ForceWork |
         changes = energy[energy["cause"] == number]
         sums = np.concatenate([[0.0], np.cumsum(-changes["change"])])
         count = np.searchsorted(changes["time"], times, side="right")
-        # The frame at time 0 is the state as it is given: what happens at that time shows from the next on.
-        count[times == 0.0] = 0
+        # The first frame is the state as it is given: what happens at that time shows from the next on.
+        count[times == times[0]] = 0
         dissipated[cause] = sums[count]
     for start, end, cause, change in log.spans:
         done = np.clip((times - start) / (end - start), 0.0, 1.0)
