@@ -57,7 +57,7 @@ class NoJoints:
         """No joint goes on."""
 
     movable_end = are_passive = will_let_go = supports_of = project_velocities = impact_block = hold = let_go = log_rest = _ask_nobody
-    begin_sub_steps = note_sub_steps = account_sub_steps = report_open = break_at = next_release = _ask_nobody
+    begin_sub_steps = note_sub_steps = account_sub_steps = report_open = break_at = next_release = follow = _ask_nobody
 
 
 class NoForces:

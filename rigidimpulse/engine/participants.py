@@ -74,6 +74,10 @@ class RunJoints(Protocol):
         """End the sub-step of an island's joints: velocities are projected."""
         ...
 
+    def follow(self, run: Any, island: Island, contacts: Contacts, /) -> None:
+        """Move what hangs on bodies that a position correction has moved as far."""
+        ...
+
     def impact_block(self, run: Any, island: Island, /) -> JointBlock:
         """Rows of an island's joints at an impact."""
         ...

@@ -75,7 +75,7 @@ def write_test(kind: Kind, seed: int, case: Any, told: list[str], folder: Path) 
 
 
 def search(kinds: list[Kind], seconds: float, seed: int, folder: Path, cases: float = math.inf) -> list[Path]:
-    """Try cases for some time, or so many of each kind; return the tests that were written."""
+    """Try cases for some time, or a number of each kind; return the tests that were written."""
     start, count, tests = perf_counter(), Counter[str](), list[Path]()
     for kind in kinds:
         kind.warm()

@@ -163,7 +163,7 @@ def test_attributes_of_wrong_values_are_refused(name: str, value: Any, told: str
 
 
 def test_a_cache_has_no_texts_of_variable_length(finished: bytes) -> None:
-    """They lie in a heap (GCOL) without checks. HDF5 reads it for ever where the size of a text in it is 0."""
+    """They lie in a place of their own (GCOL) without checks. HDF5 reads it for ever where the size of a text in it is 0."""
     assert b"GCOL" not in finished
 
 

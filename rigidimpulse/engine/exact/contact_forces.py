@@ -195,6 +195,8 @@ def _correct_positions(run: Run, pair_events: PairEvents, island: Island, leaves
     mark_same(island.contacts, island.touching, leaves, around, touching, inside)
     correct_positions(now, around, Sunk(lifted, inside, contact_margin), members, run.column)
     refresh_pose(members, now, state.rotation, state.trajectory.inertia)
+    if len(island.joints):
+        run.joints.follow(run, island, near_contacts(run, pair_events, members, island.time)[0])
     run.log.account(island.time, "position correction", mechanical_energy(now, constants, members) - before)
     supports, passive = _other_supports(run, island)
     if passive:

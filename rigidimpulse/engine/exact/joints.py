@@ -249,6 +249,14 @@ class JointState:
             self.table, island.joints, state.now, state.rotation, island.members, run.column, self.memory, self._allowed
         )
 
+    def follow(self, run: Run, island: Island, contacts: Contacts) -> None:
+        """Move what hangs on bodies that a position correction has moved as far: their joints are closed again.
+
+        Forces would close them else, and their work on the way would be energy that nothing gave.
+        """
+        if close_joints(self._jointed(run, island), contacts):
+            refresh_pose(island.members, run.state.now, run.state.rotation, run.state.trajectory.inertia)
+
     def sub_step(self, run: Run, island: Island, h: float) -> float:
         """Length of the next sub-step: h, the rest of the step, or a part of it. Very short rests are planned as longer ones."""
         world, now = run.world, run.state.now

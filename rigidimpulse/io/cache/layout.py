@@ -53,7 +53,7 @@ _ODD = 0x9E3779B97F4A7C15
 def attribute_of(group: Any, name: str) -> Any:
     """Return an attribute of a group, a text as str; None where it has none of this name that is a number or a text of fixed length.
 
-    Texts of variable length lie in a heap without checks: HDF5 reads some damaged heaps for ever.
+    Texts of variable length lie in a place of their own without checks, which HDF5 reads for ever if it is damaged.
     """
     if name not in group.attrs:
         return None
