@@ -183,7 +183,7 @@ def _faults_of_forged_state(seed: int) -> list[str]:
         try:
             _run_in(path)
         except ri.SceneError as error:
-            return [] if "another user" in str(error) else [f"not known for forged: {error}"]
+            return [] if "not written by this user" in str(error) else [f"not known for forged: {error}"]
         except Exception as error:
             return [f"{type(error).__name__}: {error}"]
         return ["the run went on from a forged checkpoint"]

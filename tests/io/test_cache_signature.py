@@ -77,7 +77,7 @@ def test_a_cache_of_another_user_is_shown_and_goes_on_only_where_it_is_trusted(
     path = stopped(tmp_path / "run.h5")
     monkeypatch.setenv("HOME", str(tmp_path / "other"))
     (tmp_path / "other").mkdir()
-    with pytest.raises(ri.SceneError, match=r"run\.h5.*written by another user.*trust=True.*delete it"):
+    with pytest.raises(ri.SceneError, match=r"run\.h5.*not written by this user.*trust=True.*delete it"):
         go_on(path)
     assert ri.load_recording(path).status.is_partial
     assert go_on(path, trust=True) == whole
@@ -90,7 +90,7 @@ def test_a_finished_cache_of_another_user_is_refused_too(monkeypatch: pytest.Mon
     ri.simulate(gas(), DURATION, 100.0, cache=path)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     for frame in (None, 3):
-        with pytest.raises(ri.SceneError, match="written by another user"):
+        with pytest.raises(ri.SceneError, match="not written by this user"):
             ri.simulate(gas(), DURATION, 100.0, cache=path, from_frame=frame)
     assert ri.load_recording(path).state_hash() == whole
     assert ri.simulate(gas(), DURATION, 100.0, cache=ri.Cache(path, trust=True), from_frame=3).state_hash() == whole
@@ -105,7 +105,7 @@ def test_forged_checkpoints_with_right_digests_are_refused(tmp_path: Path) -> No
         forged[numbers.randrange(len(forged))] ^= 1 << numbers.randrange(8)
         path.write_bytes(content)
         put_state(path, bytes(forged))
-        with pytest.raises(ri.SceneError, match="written by another user"):
+        with pytest.raises(ri.SceneError, match="not written by this user"):
             go_on(path)
     # The same way of putting a state there is read where it is trusted.
     path.write_bytes(content)
@@ -127,7 +127,7 @@ def test_a_scene_that_is_put_into_a_cache_is_refused(tmp_path: Path) -> None:
             else:
                 file.attrs[name] = source.attrs[name]
         # Signed, too, it is one of another run: the signature has the fingerprint in it.
-        with pytest.raises(ri.SceneError, match="written by another user"):
+        with pytest.raises(ri.SceneError, match="not written by this user"):
             ri.simulate(gas(), DURATION, 100.0, cache=path, from_frame=3)
 
 
@@ -154,7 +154,7 @@ def test_machines_share_a_key_that_a_variable_names(monkeypatch: pytest.MonkeyPa
     monkeypatch.setenv("HOME", str(tmp_path / "nowhere"))
     assert go_on(path) == whole
     shutil.rmtree(tmp_path / "shared")
-    with pytest.raises(ri.SceneError, match="written by another user"):
+    with pytest.raises(ri.SceneError, match="not written by this user"):
         go_on(path)
 
 

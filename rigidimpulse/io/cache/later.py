@@ -5,6 +5,7 @@ It begins at its last checkpoint that is kept before the frame. Its scene is in 
 
 from __future__ import annotations
 
+import hashlib
 import os
 from pathlib import Path
 from typing import NamedTuple
@@ -85,7 +86,7 @@ def _at(takes: _Takes, header: Header, scene: Scene, frame: int) -> tuple[Simula
     path, where, begin = takes.path, takes.where, header.take.first_frame
     data, signature = read_origin(path, header.take.number)
     if not takes.trust:
-        check_signature(signature, ORIGIN, header.fingerprint, header.take.origin.encode(), where)
+        check_signature(signature, ORIGIN, header.fingerprint, hashlib.sha256(data).hexdigest().encode(), where)
     try:
         origin = thawed(data, scene)
     except Damaged as error:

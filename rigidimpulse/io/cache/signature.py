@@ -53,7 +53,7 @@ def check_signature(found: bytes, kind: str, fingerprint: str, digest: bytes, wh
     if key is None:
         raise SceneError(f"it cannot be seen who wrote its checkpoints: {_why_not()}", REMEDY, where)
     if not hmac.compare_digest(found, _signed(key, kind, fingerprint, digest)):
-        raise SceneError("its checkpoints were written by another user, on another machine, or by nobody's run", REMEDY, where)
+        raise SceneError("its checkpoints were not written by this user on this machine", REMEDY, where)
 
 
 def _signed(key: bytes, kind: str, fingerprint: str, digest: bytes) -> bytes:
@@ -111,4 +111,4 @@ def _why_not() -> str:
         return "this user has no home in which a key could be kept"
     if not place.exists():
         return f"the key {str(place)!r} cannot be written"
-    return f"the key {str(place)!r} is none that only this user can read (chmod 600)"
+    return f"{str(place)!r} is no key of {LENGTH} bytes that only this user can read (chmod 600, or delete it)"
