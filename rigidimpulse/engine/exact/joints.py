@@ -21,7 +21,7 @@ from rigidimpulse.engine.islands import is_alone
 from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.participants import RunJoints
 from rigidimpulse.engine.run import Run
-from rigidimpulse.model.contacts import Contacts
+from rigidimpulse.model.contacts import Contacts, select
 from rigidimpulse.model.island import Island, island_without_contacts
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
@@ -252,9 +252,13 @@ class JointState:
     def follow(self, run: Run, island: Island, contacts: Contacts) -> None:
         """Move what hangs on bodies that a position correction has moved as far: their joints are closed again.
 
-        Forces would close them else, and their work on the way would be energy that nothing gave.
+        Forces would close them else, and their work on the way would be energy that nothing gave. Of the contacts around, those with bodies
+        that move outside of the island are left to the next correction.
         """
-        if close_joints(self._jointed(run, island), contacts):
+        known = run.state.now.inv_mass == 0.0
+        known[island.members] = True
+        mine = select(contacts, np.flatnonzero(known[contacts.body_a] & known[contacts.body_b]))
+        if close_joints(self._jointed(run, island), mine):
             refresh_pose(island.members, run.state.now, run.state.rotation, run.state.trajectory.inertia)
 
     def sub_step(self, run: Run, island: Island, h: float) -> float:
