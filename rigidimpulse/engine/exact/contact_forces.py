@@ -200,7 +200,7 @@ def _correct_positions(run: Run, pair_events: PairEvents, island: Island, leaves
     run.log.account(island.time, "position correction", mechanical_energy(now, constants, members) - before)
     supports, passive = _other_supports(run, island)
     if passive:
-        # Joints carry a lift far: nothing of it is left to them.
+        # Joints carry a displacement far: nothing of what it gains is left to them.
         way, depth = now.position[members] - place, 0.0 if len(island.joints) else float(contact_margin.max())
         change = limit_correction_energy(now, constants, around, members, supports, way, depth)
         run.log.account(island.time, "energy correction", change)
