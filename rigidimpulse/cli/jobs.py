@@ -84,7 +84,7 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, storage: Sto
 
     scene = job.make()
     cache, from_frame = storage
-    begun = f"; {cache.path} already had the beginning, or all of it" if cache and from_frame is None and Path(cache.path).exists() else ""
+    begun = cache is not None and from_frame is None and Path(cache.path).exists()
     start = perf_counter()
     # disable=None: no bar where the output is no terminal.
     with tqdm(
@@ -100,7 +100,8 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, storage: Sto
     seconds = perf_counter() - start
     num_impacts = len(run.impacts)
     impacts = f"{num_impacts} {'impact' if num_impacts == 1 else 'impacts'}"
-    click.echo(f"{run.times[-1] if run.status.is_partial else job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s{begun}")
+    rest = f"; {cache.path} already had the beginning, or all of it" if cache is not None and begun else ""
+    click.echo(f"{run.times[-1] if run.status.is_partial else job.duration:g} s of motion, {impacts}, computed in {seconds:.2f} s{rest}")
     click.echo(f"status: {run.status.message}")
     if profile and run.profile is not None:
         click.echo(run.profile.table())

@@ -66,3 +66,17 @@ def test_a_vertex_as_far_as_numbers_go(tmp_path: Path) -> None:
     scene = ri.Scene(bodies=[ri.Body("it", ri.Shape.from_file(path), motion="static")])
     with pytest.raises(ri.SceneError, match=r"'it'.*far\.stl.*farther than 1e\+60 m"):
         ri.simulate(scene, 0.1)
+
+
+def test_warnings_of_mujoco_are_in_the_report_and_in_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """MuJoCo writes MUJOCO_LOG.TXT to the current folder where nobody takes its warnings."""
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "it.xml"
+    body = '<body pos="0 0 {0}"><freejoint/><geom size="0.1"/></body>'
+    path.write_text(f"<mujoco><worldbody>{body.format('nan')}</worldbody></mujoco>")
+    with pytest.raises(ri.SceneError, match=r"it\.xml.*not finite"):
+        ri.load_scene(path)
+    path.write_text(f"<mujoco><custom><numeric name='it' data='nan'/></custom><worldbody>{body.format(1)}</worldbody></mujoco>")
+    assert any("MuJoCo warns" in line for line in ri.load_scene(path).report)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["it.xml"]

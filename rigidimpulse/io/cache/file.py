@@ -175,7 +175,8 @@ def copy_takes(source: Any, target: Any, number: int) -> None:
         take = int(attribute_of(group, "take"))
         if take != number:
             copied = target.create_group(f"takes/{take}")
-            set_attributes(copied, **{name: attribute_of(group, name) for name in ATTRIBUTES})
+            found = {name: attribute_of(group, name) for name in ATTRIBUTES}
+            set_attributes(copied, **{name: value for name, value in found.items() if value is not None})
             for name in group:
                 if name != "takes":
                     group.copy(name, copied)

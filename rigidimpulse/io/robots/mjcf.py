@@ -13,6 +13,7 @@ Sources: MuJoCo documentation, XML reference and computation.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -62,8 +63,26 @@ def load_mjcf(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Sce
     except ImportError as error:
         raise SceneError(f"MJCF files need the package mujoco ({error})", "pip install 'rigidimpulse[robot]'", where) from None
     notes: list[str] = []
+    with _warnings_in(notes, mujoco):
+        return _read(path, gravity, notes, mujoco)
+
+
+@contextmanager
+def _warnings_in(notes: list[str], mujoco: Any) -> Iterator[None]:
+    """Take the warnings of MuJoCo as notes: it writes them to a file in the current folder else."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: notes.append(f"MuJoCo warns: {text}"))
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))  # pyright: ignore[reportAttributeAccessIssue]
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _read(path: Path, gravity: ArrayLike | None, notes: list[str], mujoco: Any) -> Scene:
+    """The scene of a file that may be read."""
+    where = repr(path.name)
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         model = _with_possible_inertias(mujoco, path, notes)
         if model is None:
@@ -71,8 +90,8 @@ def load_mjcf(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Sce
     for name in FIGURES:
         if not np.all(np.isfinite(getattr(model, name))):
             raise SceneError(f"there are numbers in it that are not finite ({name} of the compiled model)", "correct them", where)
-    data = mujoco.MjData(model)  # pyright: ignore[reportAttributeAccessIssue]
-    mujoco.mj_kinematics(model, data)  # pyright: ignore[reportAttributeAccessIssue]
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
     try:
         return _Reader(model, data, notes).scene(gravity)
     except SceneError as error:
