@@ -436,8 +436,9 @@ def release() -> str:
         "pinned hashes of the gallery.\n",
         origin(MATRIX),
         f"{good} of {len(rows)} runs do all that and have the same hashes.\n",
-        "Hashes still depend on code that two libraries choose by the processor, OpenBLAS and, in one scene (`crowd_momentum`), the "
-        "library of functions:\nwithout AVX 14 of 51 scenes of the gallery have others. Kernels may be compiled for any processor.\n",
+        "Kernels may be compiled for any processor, and what leads to a motion calls no function of a library that chooses its code by "
+        "the processor.\nLAPACK is left: three of 51 scenes of the gallery, in which energies are minimised, have other hashes with "
+        "OpenBLAS's code for other processors.\n",
         "## Environments\n\nSeconds are those of `rigidimpulse demo spot` with its page, with all that is compiled for it. "
         "Processor seconds are of all its\nprocesses. Compiled and loaded are kernels of the process of the demo. Others compile for "
         "it, too.\n",

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigidimpulse.core.portable import dot, matmul
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.triangles import unique_edges
 
@@ -197,8 +198,8 @@ def compile_shape(shape: Shape, center_of_mass: ArrayLike, principal_rotation: A
     axes = np.asarray(principal_rotation, dtype=np.float64)
     primitives = []
     for part in shape.parts_flat():
-        rotation = axes.T @ part.rotation
-        position = axes.T @ (part.position - centre)
+        rotation = matmul(axes.T, part.rotation)
+        position = dot(axes.T, part.position - centre)
         primitives.append(_place(part.shape, rotation, position))
     return CompiledShape(tuple(primitives))
 
@@ -207,8 +208,8 @@ def _place(shape: Shape, rotation: np.ndarray, position: np.ndarray) -> Primitiv
     """Return the primitive of a single shape moved by a rotation, then a translation."""
     if shape.kind == "half_space":
         normal, offset = shape.plane()
-        normal = rotation @ normal
-        return Primitive(HALF_SPACE, frame=np.array([*normal, offset + normal @ position, 0.0, 0.0, 0.0]))
+        normal = dot(rotation, normal)
+        return Primitive(HALF_SPACE, frame=np.array([*normal, offset + dot(normal, position), 0.0, 0.0, 0.0]))
     if shape.kind == "sphere":
         return Primitive(ROUND, shape.radius, vertices=position[None, :])
     half_axis = rotation[:, 2] * (0.5 * shape.height)
@@ -217,7 +218,7 @@ def _place(shape: Shape, rotation: np.ndarray, position: np.ndarray) -> Primitiv
     if shape.kind == "cylinder":
         return Primitive(CYLINDER, shape.radius, frame=np.array([*position, *rotation[:, 2], 0.5 * shape.height]))
     surface = shape.surface()
-    return Primitive(ROUND, vertices=surface.vertices @ rotation.T + position, faces=surface.faces)
+    return Primitive(ROUND, vertices=matmul(surface.vertices, rotation.T) + position, faces=surface.faces)
 
 
 def _surface(primitive: Primitive) -> _Surface:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.portable import arctangent2, cosine, sine
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import cross_arrays
 
@@ -144,25 +145,27 @@ def quaternion_from_axis_angle(axis: ArrayLike, angle: ArrayLike) -> np.ndarray:
     length = np.linalg.norm(axis, axis=-1, keepdims=True)
     if not (np.all(np.isfinite(length)) and np.all(length > 0.0)):
         raise ValueError("the axis of a rotation must be finite and not zero")
-    vector = np.sin(half) * (axis / length)
-    return np.concatenate([np.broadcast_to(np.cos(half), (*vector.shape[:-1], 1)), vector], axis=-1)
+    vector = sine(half) * (axis / length)
+    return np.concatenate([np.broadcast_to(cosine(half), (*vector.shape[:-1], 1)), vector], axis=-1)
 
 
 def quaternion_from_rotation_vector(vector: ArrayLike) -> np.ndarray:
     """Quaternions (..., 4) of rotations by vectors (..., 3): the angle in rad times the unit axis."""
     vector = np.asarray(vector, dtype=float)
     half = 0.5 * np.linalg.norm(vector, axis=-1, keepdims=True)
-    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * vector], axis=-1)
+    # The limit of sin(half) / half at no rotation is 1.
+    factor = np.divide(sine(half), half, out=np.ones_like(half), where=half > 0.0)
+    return np.concatenate([cosine(half), 0.5 * factor * vector], axis=-1)
 
 
 def rotation_vector(q: ArrayLike) -> np.ndarray:
     """Rotation vectors (..., 3), rad, length at most pi, of unit quaternions (..., 4)."""
     q = np.asarray(q, dtype=float)
     q = np.where(q[..., :1] < 0.0, -q, q)
-    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-    angle = 2.0 * np.arctan2(sine, q[..., :1])
+    size = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * arctangent2(size, q[..., :1])
     # The limit of angle / sine at no rotation is 2.
-    factor = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 0.0)
+    factor = np.divide(angle, size, out=np.full_like(size, 2.0), where=size > 0.0)
     return factor * q[..., 1:]
 
 
@@ -191,7 +194,7 @@ def from_matrix(R: ArrayLike) -> np.ndarray:
 def angle_between(q_a: ArrayLike, q_b: ArrayLike) -> np.ndarray:
     """Angles (...) in rad, from 0 to pi, between orientations (..., 4); exact to round-off for tiny angles too."""
     difference = multiply(conjugate(q_a), q_b)
-    return 2.0 * np.arctan2(np.linalg.norm(difference[..., 1:], axis=-1), np.abs(difference[..., 0]))
+    return 2.0 * arctangent2(np.linalg.norm(difference[..., 1:], axis=-1), np.abs(difference[..., 0]))
 
 
 def quaternion_continuity(q: ArrayLike) -> np.ndarray:

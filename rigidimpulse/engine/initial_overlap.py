@@ -20,6 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rigidimpulse.core.portable import dot
 from rigidimpulse.core.quaternion import rotate
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.displacement import displacement_rows, sweep
@@ -112,7 +113,7 @@ class _Search:
 
     def way(self, demand: Demand) -> float:
         """The way that is left, m: negative if the bodies are farther apart than is asked, inf if none is known."""
-        return demand.level - float(demand.direction @ self._beside(demand.a, demand.b))
+        return demand.level - float(dot(demand.direction, self._beside(demand.a, demand.b)))
 
     def overlapping(self) -> list[tuple[int, int]]:
         """Pairs that overlap, in order."""
@@ -128,7 +129,7 @@ class _Search:
             if not self.ways_out.meets(a, b, c):
                 for demand in known:
                     # Where they are is allowed.
-                    demand.level = min(demand.level, float(demand.direction @ c))
+                    demand.level = min(demand.level, float(dot(demand.direction, c)))
                 continue
             # A wedge has several planes.
             new, changed = self.ways_out.again(a, b, before, c, len(known)), True

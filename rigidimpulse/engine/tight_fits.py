@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigidimpulse.collision.geometry import CompiledShape, Primitive, build_geometry
+from rigidimpulse.core.portable import dot
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.displacement import displacement_rows
 from rigidimpulse.dynamics.solvers.newton import solve_newton
@@ -71,7 +72,7 @@ def _shrink(world: World, contacts: Contacts, lacks: np.ndarray, margin: np.ndar
     for c in np.flatnonzero(lacks > LACKING * margin).tolist():
         a, b = int(contacts.body_a[c]), int(contacts.body_b[c])
         of_a = world.dynamic[a] and not (world.dynamic[b] and world.size[b] < world.size[a])
-        body, reach = (a, contacts.arm_a[c] @ contacts.normal[c]) if of_a else (b, -contacts.arm_b[c] @ contacts.normal[c])
+        body, reach = (a, dot(contacts.arm_a[c], contacts.normal[c])) if of_a else (b, -dot(contacts.arm_b[c], contacts.normal[c]))
         if SPARE * lacks[c] < MOST * reach:
             shrink[body] = max(shrink[body], SPARE * lacks[c] / reach)
     return shrink

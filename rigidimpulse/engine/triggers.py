@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from rigidimpulse.collision.distance.fcl import Narrowphase
 from rigidimpulse.collision.geometry import compile_shape
 from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.portable import length, matmul
 from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.run import Run
@@ -197,7 +198,7 @@ class Triggers:
         """Principal frame of a body."""
         x, q = np.empty(3), np.empty(4)
         pose_at(self._run.state.trajectory, i, max(time, float(self._run.state.trajectory.start[i])), x, q)
-        return x, q / np.linalg.norm(q)
+        return x, q / length(q)
 
     def _pose(self, watched: _Watched, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Frame of a trigger."""
@@ -219,7 +220,7 @@ def _corners(shape: Shape) -> tuple[np.ndarray, np.ndarray] | None:
         else:
             half = 0.0 if part.shape.kind == "sphere" else 0.5 * part.shape.height
             points, grown = np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), part.shape.radius
-        points = part.position + points @ part.rotation.T
+        points = part.position + matmul(points, part.rotation.T)
         low, high = np.minimum(low, points.min(axis=0) - grown), np.maximum(high, points.max(axis=0) + grown)
     return low, high
 

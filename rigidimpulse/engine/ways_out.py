@@ -26,6 +26,7 @@ import numpy as np
 
 from rigidimpulse.collision.distance.fcl import Narrowphase, Separation
 from rigidimpulse.collision.manifold.penetrating import supports
+from rigidimpulse.core.portable import dot, length, matmul
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.model.world import World
@@ -107,19 +108,19 @@ class WaysOut:
                 break
             n, way = other, reached
         way = self._way(a, b, c, n, 0.1 * self._margin(a, b))
-        return Demand(a, b, n, way + float(n @ c), lasting=False)
+        return Demand(a, b, n, way + float(dot(n, c)), lasting=False)
 
     def _least_plane(self, a: int, b: int, c: np.ndarray) -> Demand:
         """The plane of the least way for b at c (3,) m beside a."""
         tried, equal = self._directions(a, b, c), EQUAL * self.size(a, b)
-        n, way = _least_of(tried, self._levels(a, b, tried) - tried @ c, c, equal)
+        n, way = _least_of(tried, self._levels(a, b, tried) - dot(tried, c), c, equal)
         for _ in range(MAX_DESCENTS):
             other = self._separation(a, b, c + (way + equal) * n).normal
-            reached = float(self._levels(a, b, other[None])[0] - other @ c) if np.all(np.isfinite(other)) else np.inf
+            reached = float(self._levels(a, b, other[None])[0] - dot(other, c)) if np.all(np.isfinite(other)) else np.inf
             if not reached < way - equal:
                 break
             n, way = other, reached
-        return Demand(a, b, n, way + float(n @ c), lasting=True)
+        return Demand(a, b, n, way + float(dot(n, c)), lasting=True)
 
     def on_its_side(self, a: int, b: int, before: np.ndarray, c: np.ndarray) -> Demand:
         """The way back of b, which was apart from a while `before` (3,) m beside it, and overlaps it while c beside it."""
@@ -131,13 +132,13 @@ class WaysOut:
             # They touched.
             demand = self.least(a, b, before)
             if not demand.lasting and np.isfinite(demand.level):
-                demand.level = self._way(a, b, c, demand.direction, 0.1 * gap) + float(demand.direction @ c)
+                demand.level = self._way(a, b, c, demand.direction, 0.1 * gap) + float(dot(demand.direction, c))
             return demand
         for _ in range(MAX_APPROACHES):
             if found.gap <= 2.0 * gap:
                 break
             # Not all of the gap: bodies that touch have no normal.
-            closing, safe = -float(found.normal @ path), part + (found.gap - gap) / float(np.linalg.norm(path))
+            closing, safe = -float(dot(found.normal, path)), part + (found.gap - gap) / float(length(path))
             ahead = part + (found.gap - gap) / closing if closing > 0.0 else np.inf
             further = self._separation(a, b, before + ahead * path) if ahead < 1.0 else found
             if not (ahead < 1.0 and np.all(np.isfinite(further.normal))):
@@ -149,14 +150,14 @@ class WaysOut:
             part, found = ahead, further
         n = found.normal
         lasting = bool(self._convex[a] and self._convex[b])
-        level = float(self._levels(a, b, n[None])[0]) if lasting else float(n @ (before + part * path)) - found.gap + gap
+        level = float(self._levels(a, b, n[None])[0]) if lasting else float(dot(n, before + part * path)) - found.gap + gap
         return Demand(a, b, n, level, lasting)
 
     def again(self, a: int, b: int, before: np.ndarray, c: np.ndarray, known: int) -> Demand:
         """One more demand of a pair that overlaps with b at c (3,) m beside a, though a number of known ones are met that do not last."""
         if known >= PATIENCE and not (self._endless[a] or self._endless[b]):
             plane = self._least_plane(a, b, c)
-            if plane.level - float(plane.direction @ c) <= self.size(a, b):
+            if plane.level - float(dot(plane.direction, c)) <= self.size(a, b):
                 return plane
         return self.least(a, b, c) if self.overlaps(a, b, before) else self.on_its_side(a, b, before, c)
 
@@ -175,7 +176,7 @@ class WaysOut:
             return _nothing(a, b)
         pieces = np.diff(self._world.geometry.shape_first)[self._world.shape_of_body[[a, b]]]
         lasting = bool(np.all(pieces[self._endless[[a, b]]] == 1))
-        return Demand(a, b, found.normal, float(found.normal @ c) + self._margin(a, b) - found.gap, lasting)
+        return Demand(a, b, found.normal, float(dot(found.normal, c)) + self._margin(a, b) - found.gap, lasting)
 
     def _margin(self, a: int, b: int) -> float:
         """The gap of lasting contacts, m."""
@@ -193,7 +194,7 @@ class WaysOut:
 
     def _directions(self, a: int, b: int, c: np.ndarray) -> np.ndarray:
         """Directions to try (k, 3): of the centres, which is enough for two balls, of the axes of both bodies, and of their faces."""
-        distance = float(np.linalg.norm(c))
+        distance = float(length(c))
         tried = [c[None] / distance] if distance > EQUAL * self.size(a, b) else []
         if tried and self._world.ball[a] and self._world.ball[b]:
             return tried[0]
@@ -208,12 +209,12 @@ class WaysOut:
         """Normals (k, 3) of the faces of a body of one primitive, if they are few."""
         geometry, p = self._world.geometry, int(self._world.geometry.shape_first[self._world.shape_of_body[i]])
         normals = geometry.triangle_normal[geometry.triangle_first[p] : geometry.triangle_first[p + 1]]
-        return normals[: MOST_FACES if normals.any() else 0] @ self._rotation[i].T
+        return matmul(normals[: MOST_FACES if normals.any() else 0], self._rotation[i].T)
 
     def _way(self, a: int, b: int, c: np.ndarray, n: np.ndarray, fine: float) -> float:
         """How far b has to move along n from c until it is apart from a, to `fine` m; inf where that cannot be found."""
         reach = float(self._world.bound_radius[a] + self._world.bound_radius[b])
-        way, gap = reach - float(n @ c), self._margin(a, b)
+        way, gap = reach - float(dot(n, c)), self._margin(a, b)
         free, careful = np.inf, False
         for _ in range(MAX_APPROACHES):
             found = self._separation(a, b, c + way * n)
@@ -225,7 +226,7 @@ class WaysOut:
                     return np.inf
                 continue
             free = way
-            rate = float(n @ found.normal)
+            rate = float(dot(n, found.normal))
             # Along a surface that is nearly parallel to n the rate tells nothing: steps of 1e10 m came of it.
             way -= left if careful or abs(left) >= 2.0 * reach * rate else left / rate
             if abs(left) <= fine:
@@ -236,7 +237,7 @@ class WaysOut:
 def _least_of(tried: np.ndarray, ways: np.ndarray, c: np.ndarray, equal: float) -> tuple[np.ndarray, float]:
     """Direction and way of the least of the ways (k,) along those tried (k, 3); of equal ones, that nearest to c (3,), else the first."""
     good = np.flatnonzero(ways <= ways.min() + equal)
-    along = tried[good] @ c
+    along = dot(tried[good], c)
     best = good[np.flatnonzero(along >= along.max() - equal)[0]]
     return tried[best], float(ways[best])
 

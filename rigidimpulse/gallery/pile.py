@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from rigidimpulse.core.quaternion import normalize
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.regime import TALL
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
@@ -42,7 +43,7 @@ def pile(num_boxes: int = NUM_BOXES, layers: int = LAYERS) -> Scene:
         place = PITCH * (k % side + 0.5) - half, PITCH * (k // side % side + 0.5) - half, 0.6 + k // side**2
         q = random.normal(size=4)
         scene.add(
-            Body(f"box {k + 1}", box, position=place, orientation=q / np.linalg.norm(q), velocity=(*random.normal(0.0, 1.5, 2), 0.0),
+            Body(f"box {k + 1}", box, position=place, orientation=normalize(q), velocity=(*random.normal(0.0, 1.5, 2), 0.0),
                  angular_velocity=random.normal(0.0, 2.0, 3), material=MATERIAL)
         )  # fmt: skip
     return scene

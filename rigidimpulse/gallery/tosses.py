@@ -49,6 +49,8 @@ INERTIA = 8.1e-4
 """About any axis, as the makers state it, kg m^2."""
 TOUCH = 1e-3
 """Height of the lowest corner below which it may touch, m."""
+DIGITS = 9
+"""Decimals of the state at the start of a roll-out."""
 LEAD = 3
 """Frames from the start to the first that may touch."""
 NOISE = 6e-5
@@ -138,6 +140,8 @@ def flight(toss: Toss) -> Flight:
 
     turned = rotation_vector(multiply(measured[-1], conjugate(measured[0]))) / float(t[-1, 0] - t[0, 0])
     unknown = least_squares(residual, np.concatenate([np.zeros(3), turned])).x
+    # Least squares call LAPACK, whose last digits depend on the processor; the data have six.
+    unknown, position, velocity = (np.round(values, DIGITS) for values in (unknown, position, velocity))
     return Flight(start, position, path(unknown)[start], velocity, unknown[3:])
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.portable import dot, length, matmul
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.scene.joint import HARD, Joint, Motor, Row
 
@@ -75,14 +76,14 @@ def compile_joints(joints: list[Joint], world: World) -> Joints:
         try:
             anchor_a, anchor_b, axis = joint.points(world)
             frames = joint.frames(axis)
-            rows = _soften(joint, joint.rows(float(np.linalg.norm(anchor_b - anchor_a))))
+            rows = _soften(joint, joint.rows(float(length(anchor_b - anchor_a))))
         except SceneError as error:
             raise error.within(joint.label) from None
         ends = zip("ab", (anchor_a, anchor_b), frames, sides, strict=True)
         for side, anchor, frame, (i, turn, origin) in ends:
             columns[f"body_{side}"].append(i)
-            columns[f"anchor_{side}"].append(turn.T @ (anchor - origin))
-            columns[f"frame_{side}"].append(turn.T @ frame)
+            columns[f"anchor_{side}"].append(dot(turn.T, anchor - origin))
+            columns[f"frame_{side}"].append(matmul(turn.T, frame))
         for row in rows:
             for field in ("coordinate", "target", "lower", "upper", "stiffness", "damping", "rate", "per_mass"):
                 columns[field].append(getattr(row, field))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.portable import length
 from rigidimpulse.scene.body import vector
 from rigidimpulse.scene.effect import SceneEffect
 from rigidimpulse.scene.joint_coordinates import ABOUT, ACROSS, ALONG, DISTANCE, SWING, TWIST
@@ -250,10 +251,10 @@ class DistanceJoint(Joint):
 
 def _frame(axis: np.ndarray) -> np.ndarray:
     """Right-handed axes (3, 3) in columns, the first one along `axis`."""
-    size = float(np.linalg.norm(axis))
+    size = float(length(axis))
     if size == 0.0:
         raise SceneError("the axis is (0, 0, 0)", "give a direction")
     first = axis / size
     second = np.cross(first, np.eye(3)[int(np.argmin(np.abs(first)))])
-    second /= np.linalg.norm(second)
+    second /= length(second)
     return np.column_stack([first, second, np.cross(first, second)])

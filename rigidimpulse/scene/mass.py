@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.portable import matmul
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.solid import parallel_axes
@@ -174,7 +175,7 @@ def _jacobi_rotate(tensor: np.ndarray, axes: np.ndarray, p: int, q: int, r: int)
     entry_p, entry_q = float(tensor[r, p]), float(tensor[r, q])
     tensor[r, p] = tensor[p, r] = cosine * entry_p - sine * entry_q
     tensor[r, q] = tensor[q, r] = sine * entry_p + cosine * entry_q
-    axes[:, [p, q]] = axes[:, [p, q]] @ np.array([[cosine, sine], [-sine, cosine]])
+    axes[:, [p, q]] = matmul(axes[:, [p, q]], np.array([[cosine, sine], [-sine, cosine]]))
 
 
 def _equalized(moments: np.ndarray) -> np.ndarray:

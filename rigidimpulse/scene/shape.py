@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import load_mesh
+from rigidimpulse.core.portable import dot, length, matmul
 from rigidimpulse.scene.solid import Solid, compute_solid
 from rigidimpulse.scene.surface import Surface, clean_surface
 
@@ -159,7 +160,7 @@ class Shape:
             if shape.kind in ("sphere", "box", "capsule", "cylinder"):
                 return shape
             shape.check()
-            points = np.concatenate([part.position + _corners(part.shape) @ part.rotation.T
+            points = np.concatenate([part.position + matmul(_corners(part.shape), part.rotation.T)
                                      for part in shape.parts_flat()])  # fmt: skip
         else:
             points = _array("points", points_or_shape)
@@ -249,8 +250,8 @@ class Shape:
             raise SceneError(f"normal is {self.normal.tolist()}", "give three finite numbers, not all zero")
         if not np.isfinite(self.offset):
             raise SceneError(f"offset is {self.offset}", "give a finite distance in metres")
-        length = float(np.linalg.norm(self.normal))
-        return self.normal / length, self.offset / length
+        size = float(length(self.normal))
+        return self.normal / size, self.offset / size
 
     def parts_flat(self) -> list[Part]:
         """Return the single shapes of a compound, nested ones included; of any other shape the shape itself."""
@@ -260,7 +261,7 @@ class Shape:
         for shape, position, orientation in self.parts:
             rotation = rotation_matrix(orientation)
             for part in shape.parts_flat():
-                flat.append(Part(part.shape, position + rotation @ part.position, rotation @ part.rotation))
+                flat.append(Part(part.shape, position + dot(rotation, part.position), matmul(rotation, part.rotation)))
         return flat
 
     @cached_property

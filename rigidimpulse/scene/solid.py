@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.portable import dot, matmul
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.scene.surface import Surface
 
@@ -92,12 +93,12 @@ def _mesh(shape: Shape) -> Solid:
 def _compound(shape: Shape) -> Solid:
     solids = [(part.shape.solid(), part.position, part.rotation) for part in shape.parts_flat()]
     volume = math.fsum(solid.volume for solid, _, _ in solids)
-    centroids = [position + rotation @ solid.centroid for solid, position, rotation in solids]
+    centroids = [position + dot(rotation, solid.centroid) for solid, position, rotation in solids]
     reference = centroids[0]
     moment = [solid.volume * (c - reference) for (solid, _, _), c in zip(solids, centroids, strict=True)]
     centroid = reference + _exact_sum(np.array(moment)) / volume
     tensors = [
-        parallel_axes(rotation @ solid.inertia @ rotation.T, solid.volume, c - centroid)
+        parallel_axes(matmul(matmul(rotation, solid.inertia), rotation.T), solid.volume, c - centroid)
         for (solid, _, rotation), c in zip(solids, centroids, strict=True)
     ]
     inertia = _exact_sum(np.array(tensors).reshape(-1, 9)).reshape(3, 3)
@@ -153,14 +154,14 @@ def _polyhedron(surface: Surface) -> Solid:
     corners = corners - offset
     signed = np.sum(corners[:, 0] * np.cross(corners[:, 1], corners[:, 2]), axis=1) / 6.0
     points = np.concatenate([corners, corners.sum(axis=1, keepdims=True)], axis=1)  # (f, 4, 3): a, b, c, s
-    moments = _exact_sum((signed[:, None, None] * np.swapaxes(points, 1, 2) @ points).reshape(-1, 9)) / 20.0
+    moments = _exact_sum(matmul(signed[:, None, None] * np.swapaxes(points, 1, 2), points).reshape(-1, 9)) / 20.0
     second = moments.reshape(3, 3)
     return Solid(volume, middle + offset, np.trace(second) * np.eye(3) - 0.5 * (second + second.T))
 
 
 def parallel_axes(inertia: np.ndarray, mass: float, offset: np.ndarray) -> np.ndarray:
     """Return an inertia about the centre of mass moved to a point `offset` away (parallel axes)."""
-    return inertia + mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+    return inertia + mass * (dot(offset, offset) * np.eye(3) - np.outer(offset, offset))
 
 
 def _exact_sum(rows: np.ndarray) -> np.ndarray:

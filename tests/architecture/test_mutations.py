@@ -73,8 +73,8 @@ MUTATIONS = (
     Mutation(
         "parallel axes: inertia grows away from the centre of mass",
         "scene/solid.py",
-        "return inertia + mass * (offset @ offset",
-        "return inertia - mass * (offset @ offset",
+        "return inertia + mass * (dot(offset, offset)",
+        "return inertia - mass * (dot(offset, offset)",
         ("unit/test_mass.py::test_compound_of_two_halves_is_the_whole", "unit/test_mass.py::test_given_centre_moves_the_inertia_along"),
     ),
     Mutation(

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import KDTree
 
+from rigidimpulse.core.portable import dot
+
 ONE_PLANE: float = 1e-10
 """By how much less than 1 the cosine between the normals of triangles of one plane may be."""
 
@@ -29,7 +31,7 @@ def faces(normals: np.ndarray, triangles: np.ndarray) -> list[tuple[np.ndarray, 
         plane = [k]
         if k in neighbours:
             others = np.array(sorted(neighbours[k]))
-            plane += others[~taken[others] & (normals[others] @ normals[k] > 1.0 - ONE_PLANE)].tolist()
+            plane += others[~taken[others] & (dot(normals[others], normals[k]) > 1.0 - ONE_PLANE)].tolist()
             taken[plane] = True
         out.append((normals[k], alone if len(plane) == 1 else _loop(triangles[plane].tolist())))
     return out

@@ -7,7 +7,7 @@ some s is above 0, and the contacts of bodies that are apart have such a normal.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, sqrt
+from math import cos, inf, pi, sqrt
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Geom
 from rigidimpulse.collision.manifold.convex_convex import hull_contacts
 from rigidimpulse.collision.manifold.polyhedra import Pair, Polyhedra, Query, make_polyhedra
 from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.portable import cosine, length, sine
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.scene.shape import Shape
 
 FLUSH = 0.02
@@ -33,7 +35,7 @@ def solids(
     first = geometry.shape_first
     single, kind, radius = np.diff(first) == 1, geometry.kind[first[:-1]], geometry.radius[first[:-1]]
     drum, ball = single & (kind == CYLINDER), single & (kind == ROUND) & (radius > 0.0)
-    inset = np.where(drum, (1.0 - np.cos(np.pi / SIDES)) * radius, np.where(ball, radius, 0.0))
+    inset = np.where(drum, (1.0 - cos(pi / SIDES)) * radius, np.where(ball, radius, 0.0))
     if not inset.any():
         return polyhedra, drum, inset
     none = compile_shape(Shape.box(1.0), np.zeros(3), np.eye(3))
@@ -44,9 +46,10 @@ def solids(
 def _prism(geometry: Geometry, p: int) -> CompiledShape:
     """The prism of SIDES in a cylinder."""
     centre, axis, half = geometry.frame[p, :3], geometry.frame[p, 3:6], geometry.frame[p, 6]
-    u, v = np.linalg.svd(axis[None])[2][1:]
+    u = cross_arrays(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    u /= length(u)
     turn = 2.0 * np.pi * np.arange(SIDES)[:, None] / SIDES
-    rim = centre + geometry.radius[p] * (np.cos(turn) * u + np.sin(turn) * v)
+    rim = centre + geometry.radius[p] * (cosine(turn) * u + sine(turn) * cross_arrays(axis, u))
     return compile_shape(Shape.convex_hull(np.vstack([rim - half * axis, rim + half * axis])), np.zeros(3), np.eye(3))
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from rigidimpulse.collision.bvh import STACK_ROWS
 from rigidimpulse.collision.geometry import CYLINDER, EDGE_CAPSULE, EDGE_HIDDEN, ROUND, CompiledShape, Geometry, Primitive, build_geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.portable import cosine, length, sine
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import along, dot, row, subtract
 
@@ -35,9 +36,9 @@ def _prism(cylinder: Primitive) -> Primitive:
     """Prism inside a cylinder."""
     centre, axis, half = cylinder.frame[:3], cylinder.frame[3:6], cylinder.frame[6]
     u = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    u /= np.linalg.norm(u)
+    u /= length(u)
     angle, k = 2.0 * np.pi * np.arange(SIDES) / SIDES, np.arange(SIDES)
-    rim = cylinder.radius * (np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * np.cross(axis, u))
+    rim = cylinder.radius * (cosine(angle)[:, None] * u + sine(angle)[:, None] * np.cross(axis, u))
     following, zero = (k + 1) % SIDES, np.zeros(SIDES - 2, np.int64)
     side = [np.stack([k, following, following + SIDES], 1), np.stack([k, following + SIDES, k + SIDES], 1)]
     bottom, top = np.stack([zero, k[2:], k[1:-1]], 1), np.stack([zero, k[1:-1], k[2:]], 1) + SIDES

@@ -24,6 +24,7 @@ from rigidimpulse.collision.distance.gjk import Simplex, make_simplex
 from rigidimpulse.collision.geometry import HALF_SPACE, Geometry
 from rigidimpulse.collision.manifold.hull_faces import faces
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
+from rigidimpulse.core.portable import dot
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import turned_by
 
@@ -138,7 +139,7 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | No
         if is_convex:
             before, first, last = corner_first[-2], int(geometry.triangle_first[p]), int(geometry.triangle_first[p + 1])
             for normal, loop in faces(geometry.triangle_normal[first:last], geometry.triangle[first:last] - int(geometry.vertex_first[p])):
-                planes.append(np.append(normal, max((vertex[loop] @ normal).tolist())))
+                planes.append(np.append(normal, dot(vertex[loop], normal).max()))
                 loops.append([before + v for v in loop])
             size = vertex.max(0)
             # Eight corners at +- the same lengths: a box along the principal axes, which has kernels of its own.

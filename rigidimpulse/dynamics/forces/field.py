@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.portable import power
 from rigidimpulse.dynamics.forces.force import (
     Force,
     ForceTable,
@@ -162,7 +163,7 @@ class AttractorForces(ForceTable):
         k = self._line[rows]
         r = self._arm(k, at.bodies.position)
         distance = (r**2).sum(axis=-1) + self._square[k]
-        pull = self._mass[self._pulled[k]] * self._strength[k] * distance ** (-0.5 * (self._power[k] + 1.0))
+        pull = self._mass[self._pulled[k]] * self._strength[k] * power(distance, -0.5 * (self._power[k] + 1.0))
         return np.hstack([-(self._sign[rows] * pull)[:, None] * r, np.zeros((len(rows), 3))])
 
     def potential(self, times: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
@@ -171,7 +172,7 @@ class AttractorForces(ForceTable):
         distance = (self._arm(k, position) ** 2).sum(axis=-1) + self._square
         p = np.where(self._power == 1.0, 2.0, self._power)
         energy = np.where(
-            self._power == 1.0, 0.5 * np.log(distance), -(distance ** (0.5 * (1.0 - p))) / (p - 1.0)
+            self._power == 1.0, 0.5 * np.log(distance), -(power(distance, 0.5 * (1.0 - p))) / (p - 1.0)
         )
         total = np.zeros((len(self.names), len(times)))
         np.add.at(total, self.cause[k], (self._mass[self._pulled] * self._strength * energy).T)

@@ -13,6 +13,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigidimpulse.core.portable import sine
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.force import Force, body_point, checked_direction, checked_number, checked_vector, dynamic_body, named
 from rigidimpulse.dynamics.forces.timed import TimedForces
@@ -70,4 +71,4 @@ class HarmonicForce(Force):
 
 def _strength(a: np.ndarray, w: np.ndarray, phi: np.ndarray, time: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """a sin(w t + phi) of rows, (r, 3) N."""
-    return np.sin(w[rows] * time + phi[rows])[:, None] * a[rows]
+    return sine(w[rows] * time + phi[rows])[:, None] * a[rows]

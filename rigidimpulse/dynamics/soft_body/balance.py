@@ -19,7 +19,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigidimpulse.core.portable import dot
 from rigidimpulse.core.vector import cross_arrays
+from rigidimpulse.scene.mass import principal_axes
+
+LINE: float = 1e-12
+"""Moment about a line, over the largest one, up to which points lie on it."""
 
 
 def lever_place(position: np.ndarray, velocity: np.ndarray, end_position: np.ndarray, h: float) -> np.ndarray:
@@ -33,10 +38,13 @@ def lever_place(position: np.ndarray, velocity: np.ndarray, end_position: np.nda
 def rigid_motion(mass: np.ndarray, x: np.ndarray, momentum: np.ndarray, angular_momentum: np.ndarray) -> np.ndarray:
     """Velocities (k, 3) m/s of k points as of one rigid body with this momentum (3,) and angular momentum (3,) about the origin."""
     total = mass.sum()
-    centre = mass @ x / total
+    centre = dot(x.T, mass) / total
     arm = x - centre
-    inertia = np.eye(3) * float(mass @ np.einsum("ij,ij->i", arm, arm)) - np.einsum("i,ij,ik->jk", mass, arm, arm)
-    spin = np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ (angular_momentum - cross_arrays(centre, momentum))
+    inertia = np.eye(3) * float(dot(mass, dot(arm, arm))) - np.einsum("i,ij,ik->jk", mass, arm, arm)
+    moments, axes = principal_axes(inertia)
+    # Points on a line have no inertia about it.
+    inverse = np.divide(1.0, moments, out=np.zeros(3), where=moments > LINE * moments.max())
+    spin = dot(axes, inverse * dot(axes.T, angular_momentum - cross_arrays(centre, momentum)))
     return momentum / total + cross_arrays(spin, arm)
 
 
@@ -45,7 +53,7 @@ def set_momenta(
 ) -> None:
     """Bring the momenta of points to the given ones, about the origin, by a rigid velocity, in place; twice, against round-off."""
     for _ in range(2):
-        lacking = momentum - mass @ velocity
+        lacking = momentum - dot(velocity.T, mass)
         lacking_angular = angular_momentum - (mass[:, None] * cross_arrays(x, velocity)).sum(0)
         if np.any(lacking) or np.any(lacking_angular):
             velocity += rigid_motion(mass, x, lacking, lacking_angular)
@@ -56,10 +64,10 @@ def take_energy(mass: np.ndarray, x: np.ndarray, velocity: np.ndarray, pieces: l
     inner = []
     for piece in pieces:
         m, place, v = mass[piece], x[piece], velocity[piece]
-        centre = m @ place / m.sum()
+        centre = dot(place.T, m) / m.sum()
         arm = place - centre
-        rigid = rigid_motion(m, arm, m @ v, (m[:, None] * cross_arrays(arm, v)).sum(0))
-        inner.append((piece, rigid, v - rigid, 0.5 * float(m @ np.einsum("ij,ij->i", v - rigid, v - rigid))))
+        rigid = rigid_motion(m, arm, dot(v.T, m), (m[:, None] * cross_arrays(arm, v)).sum(0))
+        inner.append((piece, rigid, v - rigid, 0.5 * float(dot(m, dot(v - rigid, v - rigid)))))
     # The motion relative to the rigid one carries neither momentum nor angular momentum.
     there = sum(part[3] for part in inner)
     kept = np.sqrt(max(0.0, 1.0 - excess / there)) if there > 0.0 else 1.0

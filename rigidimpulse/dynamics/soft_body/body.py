@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.portable import matmul
 from rigidimpulse.core.triangles import unique_edges
 from rigidimpulse.dynamics.soft_body.mass_spring import SpringMesh, sheet
 from rigidimpulse.scene.body import DEFAULT_MATERIAL, number, vector
@@ -118,7 +119,7 @@ class FlexibleBody(SceneEffect):
         except SceneError as error:
             raise error.within(self.label) from None
         rotation, origin = rotation_matrix(self.orientation), np.asarray(self.position, float)
-        placed = vertices @ rotation.T + origin
+        placed = matmul(vertices, rotation.T) + origin
         return sheet(placed, faces, mass, stiffness, bending, inner, damping)
 
     def start_velocity(self, placed: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 from rigidimpulse.collision.distance.point import STACK, first_contact, first_contact_with_triangle
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, Geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.portable import cosine, length, sine
 from rigidimpulse.core.vector import dot, row, subtract
 
 RIM_POINTS = 16
@@ -217,7 +218,7 @@ def sample_points(geometry: Geometry, shape: int) -> tuple[np.ndarray, np.ndarra
 def _rim_points(frame: np.ndarray, radius: float) -> np.ndarray:
     centre, axis, half = frame[:3], frame[3:6], frame[6]
     across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    across /= np.linalg.norm(across)
+    across /= length(across)
     angle = 2.0 * np.pi * np.arange(RIM_POINTS) / RIM_POINTS
-    rim = radius * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * np.cross(axis, across))
+    rim = radius * (cosine(angle)[:, None] * across + sine(angle)[:, None] * np.cross(axis, across))
     return np.concatenate([centre + half * axis + rim, centre - half * axis + rim])

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.core.portable import dot
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.soft_body.conjugate_gradients import LinearSystem, conjugate_gradients, diagonal_inverses
@@ -64,7 +65,7 @@ def value_of(p: Problem, contacts: SoftContacts, z: np.ndarray) -> float:
     n = len(p.free)
     away = z[:n] - p.goal
     push = z[n:].reshape(-1, 6)
-    inertia = 0.5 / p.h**2 * float(p.soft_body.mass @ np.einsum("ij,ij->i", away, away))
+    inertia = 0.5 / p.h**2 * float(dot(p.soft_body.mass, dot(away, away)))
     bodies = 0.5 * float(np.einsum("bi,bij,bj->", push, p.rigid, push))
     return inertia + bodies + p.soft_body.energy(z[:n]) + contact_energy(z, n, contacts)
 

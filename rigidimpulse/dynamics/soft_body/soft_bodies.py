@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.portable import dot, length, matmul
 from rigidimpulse.core.quaternion import quaternion_from_rotation_vector, to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.union_find import roots
@@ -141,7 +142,7 @@ class Flexibles:
                 body.append(b)
         vertices, owners = np.array(vertex, np.int64), np.array(body, np.int64)
         start = [to_matrix(q) for q in world.orientation]
-        place = [self.position[v] if b < 0 else start[b].T @ (self.position[v] - world.position[b]) for v, b in zip(vertices, owners)]
+        place = [self.position[v] if b < 0 else dot(start[b].T, self.position[v] - world.position[b]) for v, b in zip(vertices, owners)]
         places = np.array(place, float).reshape(-1, 3)
         follows = np.array([b < 0 or not world.dynamic[b] for b in owners], bool)
         self._held = (vertices[follows], owners[follows], places[follows])
@@ -177,7 +178,7 @@ class Flexibles:
 
     def energy(self) -> float:
         """Kinetic and elastic energy in J."""
-        return 0.5 * float(self.soft_body.mass @ np.einsum("ij,ij->i", self.velocity, self.velocity)) + self.soft_body.energy(self.position)
+        return 0.5 * float(dot(self.soft_body.mass, dot(self.velocity, self.velocity))) + self.soft_body.energy(self.position)
 
     def vertices(self, name: str) -> np.ndarray:
         """Vertices (v, 3) m of a flexible body now."""
@@ -197,12 +198,12 @@ class Flexibles:
         low, high = self.position.min(axis=0), self.position.max(axis=0)
         limit = np.inf
         for b, radius in enumerate(self._surfaces.radius):
-            spin = float(np.linalg.norm(rigid.angular_velocity[b])) * radius if np.isfinite(radius) else 0.0
+            spin = float(length(rigid.angular_velocity[b])) * radius if np.isfinite(radius) else 0.0
             speeds = np.linalg.norm(self.velocity - rigid.velocity[b], axis=1) + spin
             speed = float(speeds.max(initial=0.0))
             apart = np.maximum(0.0, np.maximum(low - rigid.position[b], rigid.position[b] - high))
             # Bodies that are too far away to come near `within` s set no limit.
-            if speed > 0.0 and float(np.linalg.norm(apart)) - radius <= within * speed:
+            if speed > 0.0 and float(length(apart)) - radius <= within * speed:
                 limit = min(limit, self._edge / speed)
         return limit
 
@@ -261,7 +262,7 @@ class Flexibles:
         lacks &= self._free[touches.node[:, 0]]
         for c in np.flatnonzero(lacks):
             way = CORRECTION * (self._surfaces.gap - touches.distance[c])
-            correction[touches.node[c, 0]] += way * (rigid.rotation[touches.body[c]] @ touches.normal[c])
+            correction[touches.node[c, 0]] += way * dot(rigid.rotation[touches.body[c]], touches.normal[c])
             touches.target[c] = min(self._surfaces.gap, touches.distance[c] + way)
         return correction
 
@@ -289,7 +290,7 @@ class Flexibles:
         mass = self.soft_body.mass
         speeds = np.einsum("ij,ij->i", self.velocity, self.velocity) + np.einsum("ij,ij->i", goal - start, goal - start) / span**2
         speeds[held] = np.einsum("ij,ij->i", z[held] - start[held], z[held] - start[held]) / span**2
-        speed = float(np.sqrt(mass @ speeds / mass.sum()))
+        speed = float(np.sqrt(dot(mass, speeds) / mass.sum()))
         problem = Problem(self.soft_body.damped(start, span), span, goal, self._free, M / span**2, speed)
         set_penalties(problem, contacts, z[: len(start)])
         # The better of two starts: where vertices are, and where their velocities take them.
@@ -312,14 +313,14 @@ class Flexibles:
             known = self._force_of.get(key)
             if known is not None:
                 contacts.force[c] = known
-                contacts.radius[c] = contacts.friction[c] * max(0.0, float(known @ contacts.normal[c]))
+                contacts.radius[c] = contacts.friction[c] * max(0.0, float(dot(known, contacts.normal[c])))
 
     def _moved(self, rigid: RigidMotion, solution: Solution, slots: np.ndarray) -> RigidMotion:
         """The rigid bodies with what the soft bodies add to their way."""
         position, rotation = rigid.end_position.copy(), rigid.end_rotation.copy()
         for b, (way, turn) in zip(slots, solution.z[len(self.position) :].reshape(-1, 2, 3), strict=True):
             position[b] += way
-            rotation[b] = to_matrix(quaternion_from_rotation_vector(turn)) @ rotation[b]
+            rotation[b] = matmul(to_matrix(quaternion_from_rotation_vector(turn)), rotation[b])
         return rigid._replace(end_position=position, end_rotation=rotation)
 
     def _missing(self, known: FoundContacts, end: np.ndarray, start: np.ndarray, rigid: RigidMotion, moved: RigidMotion) -> FoundContacts:
@@ -334,7 +335,7 @@ class Flexibles:
         fresh, first = [], {}
         keys, nodes_of = found.key.tolist(), found.node.tolist()
         for c in np.argsort(found.time, kind="stable").tolist():
-            if all(float(found.normal[c] @ normal) < ALIKE for normal in covered.get((keys[c], *nodes_of[c]), [])):
+            if all(float(dot(found.normal[c], normal)) < ALIKE for normal in covered.get((keys[c], *nodes_of[c]), [])):
                 if found.time[c] <= first.setdefault(keys[c], float(found.time[c])) + AT_ONCE:
                     fresh.append(c)
         return FoundContacts(*(column[np.array(sorted(fresh), np.int64)] for column in found))
@@ -359,16 +360,16 @@ class Flexibles:
         # The force that keeps held vertices where they are; its work counts, too.
         hold = np.where(free[:, None], 0.0, soft_body.mass[:, None] * (velocity - before) / h + elastic - acting)
         work = float(np.sum((acting + hold) * way))
-        kinetic = 0.5 * float(soft_body.mass @ (np.einsum("ij,ij->i", velocity, velocity) - np.einsum("ij,ij->i", before, before)))
+        kinetic = 0.5 * float(dot(soft_body.mass, dot(velocity, velocity) - dot(before, before)))
         excess = kinetic + soft_body.energy(end) - soft_body.energy(x0) - work
         if np.any(start != x0):  # the energy of the position correction is no motion's to give
             excess -= soft_body.energy(start) - soft_body.energy(x0)
-        if midpoint and excess > MIDPOINT_EXCESS * float(soft_body.mass @ np.einsum("ij,ij->i", velocity, velocity)):
+        if midpoint and excess > MIDPOINT_EXCESS * float(dot(soft_body.mass, dot(velocity, velocity))):
             return None
         taken, made = 0.0, 0.0
         if excess > 0.0:
             made = take_energy(soft_body.mass, end, velocity, self._pieces or [np.flatnonzero(free)], excess)
-            if midpoint and made > MIDPOINT_MADE * float(soft_body.mass @ np.einsum("ij,ij->i", velocity, velocity)):
+            if midpoint and made > MIDPOINT_MADE * float(dot(soft_body.mass, dot(velocity, velocity))):
                 return None
             taken = excess - made
         self.energy_taken += taken
@@ -395,16 +396,16 @@ class Flexibles:
         place[on] = lever[contacts.body[on]] + contacts.arm[on]
         for piece in self._pieces:
             m, x0 = mass[piece], start[piece]
-            origin = m @ x0 / m.sum()
+            origin = dot(x0.T, m) / m.sum()
             mine = np.isin(contacts.node[:, 0], piece)
             fall = h * (m[:, None] * self._gravity[piece]).sum(0)
-            momentum = m @ before[piece] + fall + impulse[mine].sum(0)
+            momentum = dot(before[piece].T, m) + fall + impulse[mine].sum(0)
             angular = (m[:, None] * cross_arrays(self.position[piece] - origin, before[piece])).sum(0)
             angular += cross_arrays(place[mine] - origin, impulse[mine]).sum(0)
             if midpoint:  # its centre follows the parabola: gravity acts at the mean of its places, not at the first
-                angular += 0.5 * h * cross_arrays(m @ before[piece], fall) / m.sum()
-            went = 0.5 * h * (momentum + m @ before[piece]) if midpoint else h * momentum
-            end[piece] += origin + went / m.sum() - m @ end[piece] / m.sum()
+                angular += 0.5 * h * cross_arrays(dot(before[piece].T, m), fall) / m.sum()
+            went = 0.5 * h * (momentum + dot(before[piece].T, m)) if midpoint else h * momentum
+            end[piece] += origin + went / m.sum() - dot(end[piece].T, m) / m.sum()
             v = velocity[piece]
             set_momenta(m, end[piece] - origin, v, momentum, angular)
             velocity[piece] = v

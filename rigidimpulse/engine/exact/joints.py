@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from rigidimpulse.core.portable import dot, length
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.joint_impact import JointBlock, impact_rows, stop_at_limits
@@ -192,7 +193,7 @@ class JointState:
             # A body whose only joint let go in the last sub-step has none any more.
             held = memory.wrench[i] * elapsed[self.at([i])].max(initial=0.0)
             now.velocity[i] -= now.inv_mass[i] * held[:3]
-            now.angular_velocity[i] -= now.inv_inertia[i] @ held[3:]
+            now.angular_velocity[i] -= dot(now.inv_inertia[i], held[3:])
         jointed = self._jointed(run, island)
         if close_joints(jointed, island.contacts):
             refresh_pose(members, now, state.rotation, state.trajectory.inertia)
@@ -270,11 +271,11 @@ class JointState:
         for j in island.joints.tolist():
             a, b = int(self.table.body_a[j]), int(self.table.body_b[j])
             spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
-            fastest = max(fastest, float(np.linalg.norm(spins[1] - spins[0])))
+            fastest = max(fastest, float(length(spins[1] - spins[0])))
             if self._rod[j] > 0.0:
                 # A string or rod turns without its bodies.
                 speeds = [now.velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
-                fastest = max(fastest, float(np.linalg.norm(speeds[1] - speeds[0])) / self._rod[j])
+                fastest = max(fastest, float(length(speeds[1] - speeds[0])) / self._rod[j])
             if self._slides[j] and min(a, b) >= 0:
                 fastest = max(fastest, _slide_rate(now, a, b, world.accuracy.step))
         waits = self.release_time[island.joints] - island.time
@@ -436,8 +437,8 @@ class JointState:
         """When the first of these joints has the force that breaks it, within `whole` s; that if none has. Forces grow by their rates."""
         strong, time = self.break_force[which], whole
         for j in which[np.linalg.norm(self.pull[which] + whole * self.pull_rate[which], axis=1) > strong].tolist():
-            square, along = float(self.pull_rate[j] @ self.pull_rate[j]), float(self.pull[j] @ self.pull_rate[j])
-            missing = float(self.pull[j] @ self.pull[j]) - self.break_force[j] ** 2
+            square, along = float(dot(self.pull_rate[j], self.pull_rate[j])), float(dot(self.pull[j], self.pull_rate[j]))
+            missing = float(dot(self.pull[j], self.pull[j])) - self.break_force[j] ** 2
             time = min(time, (math.sqrt(max(along * along - square * missing, 0.0)) - along) / square)
         return time
 
@@ -487,7 +488,7 @@ class JointState:
         if not len(which) or load.max() <= 1.0:
             return -1
         j = int(which[np.argmax(load)])
-        return self._take_out(run, j, time, "joint broke", f": {np.linalg.norm(self.pull[j]):.6g} N")
+        return self._take_out(run, j, time, "joint broke", f": {length(self.pull[j]):.6g} N")
 
     def _take_out(self, run: Run, j: int, time: float, kind: str, why: str) -> int:
         """The joint is gone."""
@@ -550,8 +551,8 @@ def _slide_rate(now: BodyState, a: int, b: int, step: float) -> float:
     u: what it may be at the end of a step, by w^2 r.
     """
     spin, between = now.angular_velocity[a], now.position[b] - now.position[a]
-    turn, distance = float(np.linalg.norm(spin)), float(np.linalg.norm(between))
-    slide = float(np.linalg.norm(now.velocity[b] - now.velocity[a] - np.cross(spin, between))) + turn * turn * distance * step
+    turn, distance = float(length(spin)), float(length(between))
+    slide = float(length(now.velocity[b] - now.velocity[a] - np.cross(spin, between))) + turn * turn * distance * step
     return math.sqrt(turn * min(turn, slide / distance)) if distance > 0.0 else turn
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SKELETON_B
+from rigidimpulse.core.portable import dot, length
 from rigidimpulse.core.vector import tangents
 from rigidimpulse.dynamics.solvers.tgs_soft.records import normal_of
 from rigidimpulse.dynamics.solvers.time_stepping.contact_points import GIVEN
@@ -49,8 +50,8 @@ class GivenImpulses:
         some = np.flatnonzero(impulse.any(axis=1))
         for k in some.tolist():
             a, b, r = int(at.first[k]), int(at.second[k]), int(at.row[k])
-            size = float(np.linalg.norm(impulse[k]))
-            place = bodies.position[b] + bodies.rotation[b] @ table[r, SKELETON_B : SKELETON_B + 3]
+            size = float(length(impulse[k]))
+            place = bodies.position[b] + dot(bodies.rotation[b], table[r, SKELETON_B : SKELETON_B + 3])
             normal = normal_of(bodies.position, bodies.rotation, table, r, a, b, at.carrier[k])
             self._sums[a, b] = self._sums.get((a, b), 0.0) + np.array([*impulse[k], *(size * place), *(size * np.array(normal)), size])
 
@@ -62,12 +63,12 @@ class GivenImpulses:
             total, (a, b) = self._sums[first, second], (int(order[first]), int(order[second]))
             sign = 1.0 if a < b else -1.0
             a, b = min(a, b), max(a, b)
-            normal, t1, t2 = sign * total[6:9] / np.linalg.norm(total[6:9]), np.empty(3), np.empty(3)
+            normal, t1, t2 = sign * total[6:9] / length(total[6:9]), np.empty(3), np.empty(3)
             tangents(normal, t1, t2)
             contacts.body_a[k], contacts.body_b[k], contacts.normal[k] = a, b, normal
             place = total[3:6] / total[9]
             contacts.arm_a[k], contacts.arm_b[k] = place - now.position[a], place - now.position[b]
-            force[k] = np.array([normal, t1, t2]) @ (sign * total[:3]) / (end - time)
+            force[k] = dot(np.array([normal, t1, t2]), sign * total[:3]) / (end - time)
         run.contact_log.replace(members, time, contacts, now.position, force)
 
 

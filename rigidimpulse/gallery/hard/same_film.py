@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import conjugate, multiply, rotate
+from rigidimpulse.core.portable import dot
+from rigidimpulse.core.quaternion import conjugate, multiply, normalize, rotate
 from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.gallery.hard.parts import GRAVITY, dull, finite
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
@@ -41,7 +42,7 @@ HERE, NONE = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 def scene(scale: float = 1.0, shift: np.ndarray = HERE, turn: np.ndarray = NONE, renamed: bool = False, reordered: bool = False) -> Scene:
     """Return a floor, a box, a ball, a hull and a capsule that fall, bounce and meet; changed as asked for."""
     material = dull(0.4, 0.5)
-    q = turn / np.linalg.norm(turn)
+    q = normalize(turn)
     up = rotate(q, np.array([0.0, 0.0, 1.0]))
     scene = Scene(gravity=-GRAVITY * scale * up)
     corners = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1.2], [0, 0, -0.8]]) * 0.6 * SIZE * scale
@@ -52,7 +53,7 @@ def scene(scale: float = 1.0, shift: np.ndarray = HERE, turn: np.ndarray = NONE,
         ("hull", Shape.convex_hull(corners), (-1.1, 0.3, 2.4), (1.5, 0.0, 0.0), (-1.0, 0.3, 0.7)),
         ("capsule", Shape.capsule(0.25 * SIZE * scale, 0.8 * SIZE * scale), (0.2, -0.2, 3.1), (0.0, 0.3, 0.0), (2.0, 0.4, 0.0)),
     ]
-    bodies = [Body("floor", Shape.half_space(normal=up, offset=float(up @ shift)), motion="static", material=material)]
+    bodies = [Body("floor", Shape.half_space(normal=up, offset=float(dot(up, shift))), motion="static", material=material)]
     for name, shape, place, velocity, spin in plan:
         start = shift + rotate(q, np.array(place)) * SIZE * scale
         bodies.append(
@@ -73,7 +74,7 @@ def new_name(name: str) -> str:
 
 def film(run: Recording, name: str, scale: float, shift: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return positions (f, 3) in sizes and orientations (f, 4) of a body, as they would be without the change."""
-    back = conjugate(turn / np.linalg.norm(turn))
+    back = conjugate(normalize(turn))
     return rotate(back, run.position(name) - shift) / (SIZE * scale), multiply(back, run.orientation(name))
 
 

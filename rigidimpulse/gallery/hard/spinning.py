@@ -29,6 +29,7 @@ import math
 
 import numpy as np
 
+from rigidimpulse.core.portable import matmul
 from rigidimpulse.core.quaternion import rotate
 from rigidimpulse.gallery.hard.parts import GRAVITY, above_floor, dull, energy_never_grows, finite, floor_scene, turned, undisturbed
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
@@ -175,7 +176,7 @@ def rattleback() -> Scene:
     height = -float(np.asarray(ball.vertices)[:, 2].min()) * c
     scene.add(
         Body("back", shape, position=(0.0, 0.0, height), orientation=turned((1.0, 0.0, 0.0), 0.01),
-             angular_velocity=(WOBBLE, WOBBLE, BACK_SPIN), mass=mass, inertia=skew @ np.diag(moments) @ skew.T,
+             angular_velocity=(WOBBLE, WOBBLE, BACK_SPIN), mass=mass, inertia=matmul(skew * moments, skew.T),
              center_of_mass=(0.0, 0.0, -0.3 * c), material=dull(0.9))
     )  # fmt: skip
     return scene

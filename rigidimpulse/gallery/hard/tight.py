@@ -16,6 +16,8 @@ import math
 
 import numpy as np
 
+from rigidimpulse.core.portable import length
+from rigidimpulse.core.quaternion import normalize
 from rigidimpulse.gallery.hard.parts import GRAVITY, above_floor, apart, dull, energy_never_grows, finite, floor_scene, last_speed
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
 from rigidimpulse.recording.recording import Recording
@@ -50,7 +52,7 @@ def _star() -> Shape:
     faces = []
     for a, b, c in np.asarray(base.faces):
         tip = vertices[a] + vertices[b] + vertices[c]
-        vertices.append(SPIKE * tip / np.linalg.norm(tip))
+        vertices.append(SPIKE * tip / length(tip))
         n = len(vertices) - 1
         faces += [(a, b, n), (b, c, n), (c, a, n)]
     return Shape.mesh(vertices, faces)
@@ -110,7 +112,7 @@ def pit() -> Scene:
     for k in range(NUM_TETRAHEDRA):
         place = (0.5 * (k % 2) - 0.25, 0.5 * (k // 2 % 2) - 0.25, 0.4 + 0.45 * (k // 4))
         q = random.normal(size=4)
-        scene.add(Body(f"tetrahedron {k + 1}", shape, position=place, orientation=q / np.linalg.norm(q), material=material))
+        scene.add(Body(f"tetrahedron {k + 1}", shape, position=place, orientation=normalize(q), material=material))
     return scene
 
 
