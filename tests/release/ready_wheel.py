@@ -98,11 +98,12 @@ def main() -> int:
     plain = build_wheel(uv, work / "dist")
     builder = make_environment(uv, python, NEWEST, plain, work / "builder")
     place = work / "building"
-    for old in ("home", "kernels"):
-        shutil.rmtree(place / old, ignore_errors=True)
+    # What an earlier version of the package left there, a cache of a run for one, would be refused. Only compiled code may stay.
+    cache = work / "compiled"
+    shutil.rmtree(place, ignore_errors=True)
     (place / "home").mkdir(parents=True)
     for_baseline = {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": features}
-    variables = clean_variables(place / "home", NUMBA_CACHE_DIR=str(place / "cache"), **for_baseline)
+    variables = clean_variables(place / "home", NUMBA_CACHE_DIR=str(cache), **for_baseline)
     hashes = compile_all(builder, variables, place)
     run([builder.python, COLLECT, place / "kernels"], env=variables, cwd=place)
     short = "".join(python.version.split(".")[:2])
