@@ -7,6 +7,7 @@ joint does is a list of `Row`s: coordinates (see `joint_coordinates`) with a tar
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar, Protocol
@@ -108,7 +109,7 @@ def bounds(coordinate: int, lower: float | None, upper: float | None, stiffness:
 
 
 @dataclass(frozen=True, eq=False)
-class Joint(SceneEffect):
+class Joint(SceneEffect, ABC):
     """Base of all joints: `a` and `b` are names of bodies, None is the world.
 
     Attributes:
@@ -135,18 +136,18 @@ class Joint(SceneEffect):
     collide: bool = False
     stage: ClassVar[str] = "constrain"
 
-    def points(self, _world: PlacedBodies) -> Anchors:
+    @abstractmethod
+    def points(self, world: PlacedBodies) -> Anchors:
         """Anchor on a, anchor on b and first axis, (3,) each, in the world at the start."""
-        raise NotImplementedError
 
     def frames(self, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Axes of the joint's frame on a and on b (3, 3), in columns, in the world at the start."""
         frame = _frame(axis)
         return frame, frame
 
-    def rows(self, _distance: float) -> list[Row]:
-        """Rows of the joint, hard; `_distance` m is that of its anchors at the start."""
-        raise NotImplementedError
+    @abstractmethod
+    def rows(self, distance: float) -> list[Row]:
+        """Rows of the joint, hard; `distance` m is that of its anchors at the start."""
 
     @property
     def label(self) -> str:
