@@ -137,11 +137,17 @@ class _Pass:
         coarse = candidates.fixed_step(candidates.FIXED_RATE)
         coarse_engines = [candidates.other_engine(engine, round(self.known.fps)) for engine in engines]
         later = [coarse, *coarse_engines, candidates.penalty()]
-        known.waiting = [each.name for each in (*candidates.presets(), *later)]
-        for candidate in candidates.presets():
+        *cheap, exact = candidates.presets()
+        known.waiting = [each.name for each in (*cheap, exact, *later)]
+        for candidate in cheap:
             self.play(candidate)
+        if not known.pile:
+            self.play(exact)
         self.make_reference(sentence)
         self.tell_now()
+        if known.pile:
+            # Of a pile no finer run is a reference, and an exact one may take longer than all others: the sentence does not wait for it.
+            self.play(exact)
         for candidate in (coarse, *coarse_engines):
             played = self.play(candidate)
             rate = self._same_cost(played)
