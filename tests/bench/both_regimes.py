@@ -4,8 +4,8 @@ A scene has 12 to 60 bodies of one restitution and one friction, drawn by its se
 of the scenes concave corners. They fall on a floor, or into a tray. Each runs with contact_solver "newton" and "substepped". Compared are
 
     lost     E(0) - E(t), the energy of motion and place that is lost until the first body rests in the exact run
-    depth    of bodies inside each other at FRAMES frames of the sub-stepped run, by the measure that runs end with, of the skin: the gap
-             at which sub-stepped contacts are kept, 0.8 % of the inner radius of the smaller body
+    depth    of bodies inside each other in the sub-stepped run, at frames that are chosen evenly, by the measure that runs end with; of the
+             skin, the gap at which sub-stepped contacts are kept: 0.8 % of the inner radius of the smaller body
 
 A line says both. The exit code is 1 if energies differ by more than LOST, or a body is deeper than the skin. A scene whose exact run is not
 done after the limit of processor time is left out, and said: another seed takes its place.
@@ -28,13 +28,12 @@ from rigidimpulse.engine.measure.measure import record_of_recording
 from rigidimpulse.engine.measure.overlap import overlap_depths
 
 SCENES = 30
-FRAMES = 20
 LOST = 0.05
 """Part by which the energies that are lost may differ."""
 REBOUND = 0.5
 """Bodies that rebound by more are sub-stepped only where all must be, see `engine.regime`."""
 AT_REST = 0.02
-"""A body rests from where its speed stays below this part of sqrt(g s), s: its size."""
+"""A body rests from where its speed stays below this part of sqrt(g s), s = 0.15 m: the size of a body."""
 DURATION = 1.5
 """s."""
 

@@ -63,7 +63,7 @@ def broken_laws(plan: ScenePlan, run: ri.Recording) -> list[str]:
 def _overlaps(plan: ScenePlan, run: ri.Recording) -> list[str]:
     """The pair that is first inside each other; pairs that a joint joins do not touch."""
     world = ri.compile_scene(make_scene(plan, inscribed=True))
-    narrowphase = Narrowphase(world.shapes)
+    narrowphase, share = Narrowphase(world.shapes), SOFT_DEPTH if _is_soft(run) else DEPTH
     joined = {(joint.body - 1, joint.body) for joint in plan.joints if not joint.to_world}
     a, b = np.triu_indices(world.num_bodies, 1)
     wanted = world.dynamic[a] & np.array([(i, j) not in joined for i, j in zip(a.tolist(), b.tolist(), strict=True)])
@@ -73,7 +73,7 @@ def _overlaps(plan: ScenePlan, run: ri.Recording) -> list[str]:
         axes = multiply(run.orientations[f], world.turn)
         near = np.linalg.norm(centers[b] - centers[a], axis=1) < world.bound_radius[a] + world.bound_radius[b]
         for i, j in zip(a[near].tolist(), b[near].tolist(), strict=True):
-            moved = (SOFT_DEPTH if _is_soft(run) else DEPTH) * min(world.size[i], world.size[j])
+            moved = share * min(world.size[i], world.size[j])
             poses = [(centers[j] + moved * way, axes[j]) for way in np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])]
             shapes = int(world.shape_of_body[i]), int(world.shape_of_body[j])
             if all(narrowphase.overlap(shapes[0], (centers[i], axes[i]), shapes[1], pose) for pose in poses):

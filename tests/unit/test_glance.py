@@ -117,8 +117,11 @@ def test_a_pile_is_measured_by_depth() -> None:
     for k in range(64):
         place = (0.52 * (k % 4), 0.52 * (k // 4 % 4), 0.251 + 0.503 * (k // 16))
         scene.add(ri.Body(f"box {k}", ri.Shape.box(0.5), position=place, velocity=random.normal(0.0, 0.5, 3), material=WOOD))
-    known = ri.glance(scene, 0.3, budget=6.0, peers=())
+    told = []
+    known = ri.glance(scene, 0.3, budget=6.0, peers=(), changed=lambda now: told.append((len(now.runs), now.verdict is not None)))
     verdict = known.verdict
+    assert next(number for number, said in told if said) == 2  # the sentence does not wait for the exact run
+    assert [run.candidate.name for run in known.runs[:3]] == ["preview", "standard", "exact"]
     assert known.measure == DEPTH and verdict is not None
     assert "inside another" in verdict.headline and "chaotic" in verdict.trust
     assert wrong_claims(known) == []

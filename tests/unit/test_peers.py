@@ -6,11 +6,14 @@ or a sign that is wrong is off by the size of the bodies and more.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
 
 import rigidimpulse as ri
+from rigidimpulse import gallery
 from rigidimpulse.core.quaternion import angle_between
 from rigidimpulse.studies.peers import PEERS, load_peer, run_peer
 
@@ -98,3 +101,12 @@ def test_what_adapters_do_not_know_is_refused() -> None:
         soft.add(ri.BallJoint(None, "ball", (0, 0, 1), stiffness=10.0))
         with pytest.raises(ri.SceneError, match="BallJoint"):
             load_peer(peer, soft, 0.01)
+
+
+def test_a_run_that_mujoco_begins_again_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 1/60 s a heavy chain gets numbers that are none; MuJoCo says so in a file in the current folder, and goes on from the start."""
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ri.SceneError, match=r"peer 'mujoco'.*unstable.*smaller step"):
+        run_peer("mujoco", gallery.load("chain_swinging").scene(), 1.0, 60.0, 1)
+    assert list(tmp_path.iterdir()) == []

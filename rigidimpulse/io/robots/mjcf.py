@@ -63,13 +63,13 @@ def load_mjcf(path: Path, gravity: ArrayLike | None, allow_outside: bool) -> Sce
     except ImportError as error:
         raise SceneError(f"MJCF files need the package mujoco ({error})", "pip install 'rigidimpulse[robot]'", where) from None
     notes: list[str] = []
-    with _warnings_in(notes, mujoco):
+    with warnings_in(notes, mujoco):
         return _read(path, gravity, notes, mujoco)
 
 
 @contextmanager
-def _warnings_in(notes: list[str], mujoco: Any) -> Iterator[None]:
-    """Take the warnings of MuJoCo as notes: it writes them to a file in the current folder else."""
+def warnings_in(notes: list[str], mujoco: Any) -> Iterator[None]:
+    """Take the warnings of MuJoCo as notes: it writes them to a file in the current folder else. mujoco: the module."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: notes.append(f"MuJoCo warns: {text}"))
     try:

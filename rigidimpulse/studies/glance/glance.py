@@ -136,24 +136,25 @@ class _Pass:
         known = self.known
         coarse = candidates.fixed_step(candidates.FIXED_RATE)
         coarse_engines = [candidates.other_engine(engine, round(self.known.fps)) for engine in engines]
-        later = [coarse, *coarse_engines, candidates.penalty()]
+        others = [coarse, *coarse_engines, candidates.penalty()]
         *cheap, exact = candidates.presets()
-        known.waiting = [each.name for each in (*cheap, exact, *later)]
+        known.waiting = [each.name for each in (*cheap, exact, *others)]
         for candidate in cheap:
             self.play(candidate)
-        if not known.pile:
-            self.play(exact)
+        # Of a pile no finer run is a reference, and an exact one may take longer than all others: the sentence does not wait for it.
+        soon, late = ([], [exact]) if known.pile else ([exact], [])
+        for candidate in soon:
+            self.play(candidate)
         self.make_reference(sentence)
         self.tell_now()
-        if known.pile:
-            # Of a pile no finer run is a reference, and an exact one may take longer than all others: the sentence does not wait for it.
-            self.play(exact)
+        for candidate in late:
+            self.play(candidate)
         for candidate in (coarse, *coarse_engines):
             played = self.play(candidate)
             rate = self._same_cost(played)
             if rate is not None:
                 self.play(candidates.other_engine(candidate.engine, rate) if candidate.engine else candidates.fixed_step(rate))
-        self.play(later[-1])
+        self.play(others[-1])
         self.make_reference(REFERENCE_SHARE * (self.deadline - self.start))
 
     def play(self, candidate: Candidate) -> Played:

@@ -17,6 +17,7 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import conjugate, from_matrix, rotate
 from rigidimpulse.core.vector import cross_arrays
+from rigidimpulse.io.robots.mjcf import warnings_in
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Part
 from rigidimpulse.studies.peers.common import PeerBody, PeerJoint, read_scene
@@ -71,8 +72,12 @@ class MujocoPeer:
         mujoco.mj_forward(self._model, data)
 
     def advance(self, count: int) -> None:
-        """See `Peer`."""
-        mujoco.mj_step(self._model, self._data, nstep=count)
+        """See `Peer`; raises `SceneError` where MuJoCo warns: after numbers that are none it begins again with the start."""
+        notes: list[str] = []
+        with warnings_in(notes, mujoco):
+            mujoco.mj_step(self._model, self._data, nstep=count)
+        if notes:
+            raise SceneError(notes[0], "use a smaller step, or leave the peer out", "peer 'mujoco'")
 
     def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """See `Peer`."""
