@@ -27,9 +27,8 @@ DEPTH, SOFT_DEPTH = 1e-6, 1e-2
 """The second is half of what the status allows such runs (`engine.measure.overlap`); 3.3e-3 is the most that 2,400 random scenes had."""
 ENERGY, JOINT_ENERGY = 1e-6, 1e-3
 """Of the energy moved. Joints are of second order: some (w h)^2, 1e-3 for a radian in ten steps."""
-MOMENTUM, SOFT_MOMENTUM = 1e-10, 1e-7
-"""Of the sum of m |v|: some thousand impulses, each to rounding or to the solver's 1e-12. In sub-stepped islands a body that rises out of
-another pays for that from its own speed: 1e-7 is what the status allows of momentum (`engine.measure.momentum`)."""
+MOMENTUM = 1e-10
+"""Of the sum of m |v|: some thousand impulses, each to rounding or to the solver's 1e-12."""
 FLOOR = 1e3
 """Times that, for what the floor gives, which lasting contacts make a sum of many forces."""
 ANGULAR = 1e-4
@@ -103,7 +102,7 @@ def _momentum(plan: ScenePlan, run: ri.Recording, mass, acceleration) -> list[st
     assert run.ledger is not None
     given = run.ledger.momentum - run.ledger.momentum[0] - run.times[:, None] * (mass @ acceleration)
     moved = float((mass * np.linalg.norm(run.velocities[:, : len(mass)], axis=2)).sum(axis=1).max())
-    allowed = (SOFT_MOMENTUM if _is_soft(run) else MOMENTUM) * moved
+    allowed = MOMENTUM * moved
     if any(joint.to_world for joint in plan.joints):
         return []
     pressed = bool({"contact", "stick"} & set(run.ledger.dissipated)) or bool(plan.joints) or bool(np.any(acceleration))

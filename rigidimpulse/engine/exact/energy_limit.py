@@ -23,8 +23,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.symmetric import inverse, solved, symmetric_at, times
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import along, cross, dot, length, row, scaled, subtract
+from rigidimpulse.dynamics.common_motion import add_turning
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 
 PARALLEL = TOLERANCES.contact_forces.same_direction
@@ -211,7 +213,7 @@ def take_off(bodies, mass, members, energy, ground):
     available = 0.0
     for i in members:
         dv, dw = _against(bodies, i, X, V, W)
-        available += mass[i] * dot(dv, dv) + dot(dw, _solved(_matrix(bodies.inv_inertia, i), dw))
+        available += mass[i] * dot(dv, dv) + dot(dw, solved(symmetric_at(bodies.inv_inertia, i), dw))
     available *= 0.5
     if not available > 0.0:
         return
@@ -246,9 +248,9 @@ def _common_motion(bodies, mass, members, ground):
         return X, scaled(axis, dot(axis, P) / M), AT_REST
     L, J = _turning(bodies, mass, members, X)
     if ground.rank == 1:
-        turn = dot(axis, L) / dot(axis, _times(J, axis))
+        turn = dot(axis, L) / dot(axis, times(J, axis))
         return X, scaled(along(P, -dot(axis, P), axis), 1.0 / M), scaled(axis, turn)
-    return X, scaled(P, 1.0 / M), _solved(J, L)
+    return X, scaled(P, 1.0 / M), solved(J, L)
 
 
 @jit
@@ -256,52 +258,6 @@ def _turning(bodies, mass, members, X):
     """Return the angular momentum about X and the inertia of the members as one body, a symmetric matrix."""
     L, J = AT_REST, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in members:
-        m, r = mass[i], subtract(row(bodies.position, i), X)
-        inverse = _matrix(bodies.inv_inertia, i)
-        L = along(along(L, m, cross(r, row(bodies.velocity, i))), 1.0, _solved(inverse, row(bodies.angular_velocity, i)))
-        x, y = _solved(inverse, (1.0, 0.0, 0.0)), _solved(inverse, (0.0, 1.0, 0.0))
-        z = _solved(inverse, (0.0, 0.0, 1.0))
-        J = (
-            J[0] + x[0] + m * (r[1] * r[1] + r[2] * r[2]),
-            J[1] + x[1] - m * r[0] * r[1],
-            J[2] + x[2] - m * r[0] * r[2],
-            J[3] + y[1] + m * (r[0] * r[0] + r[2] * r[2]),
-            J[4] + y[2] - m * r[1] * r[2],
-            J[5] + z[2] + m * (r[0] * r[0] + r[1] * r[1]),
-        )
+        A, v, w = symmetric_at(bodies.inv_inertia, i), row(bodies.velocity, i), row(bodies.angular_velocity, i)
+        L, J = add_turning(L, J, mass[i], subtract(row(bodies.position, i), X), v, solved(A, w), inverse(A))
     return L, J
-
-
-# -- symmetric matrices of three dimensions: xx, xy, xz, yy, yz, zz ----------------------------------------------------
-
-
-@jit
-def _matrix(matrices, i):
-    """Return matrices[i] of an array (n, 3, 3)."""
-    return (matrices[i, 0, 0], matrices[i, 0, 1], matrices[i, 0, 2], matrices[i, 1, 1], matrices[i, 1, 2], matrices[i, 2, 2])
-
-
-@jit
-def _times(A, b):
-    """Return A b."""
-    return (
-        A[0] * b[0] + A[1] * b[1] + A[2] * b[2],
-        A[1] * b[0] + A[3] * b[1] + A[4] * b[2],
-        A[2] * b[0] + A[4] * b[1] + A[5] * b[2],
-    )
-
-
-@jit
-def _solved(A, b):
-    """Return x, A x = b, of a positive definite A = C C^T, by Cholesky's factor C."""
-    xx = sqrt(A[0])
-    yx, zx = A[1] / xx, A[2] / xx
-    yy = sqrt(A[3] - yx * yx)
-    zy = (A[4] - zx * yx) / yy
-    zz = sqrt(A[5] - zx * zx - zy * zy)
-    p = b[0] / xx
-    q = (b[1] - yx * p) / yy
-    r = (b[2] - zx * p - zy * q) / zz
-    z = r / zz
-    y = (q - zy * z) / yy
-    return (p - yx * y - zx * z) / xx, y, z

@@ -546,9 +546,9 @@ class SubsteppedIslands:
         else:
             self._set_up(run, members, time, end - time, kept)
             if len(fresh):
-                before = mechanical_energy(run.state.now, run.world.constants, fresh)
+                before = mechanical_energy(run.state.now, run.world.constants, members)
                 self.stepper.move_apart(run, fresh, time)
-                change = mechanical_energy(run.state.now, run.world.constants, fresh) - before
+                change = mechanical_energy(run.state.now, run.world.constants, members) - before
                 run.log.account(time, "position correction", change)
             out = self.stepper.step(run, time, end)
         if self._cheapest is not None:

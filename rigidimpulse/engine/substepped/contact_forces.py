@@ -417,12 +417,12 @@ class ContactStepper:
         before = bodies.position.copy()
         if not move_apart(bodies, self.table.pairs, self.table.points, mine):
             return
-        slowed = pay_for_rise(bodies, self._weights, bodies.position - before, at)
+        slowed = pay_for_rise(self.balance, bodies, self._weights, self.table.pairs, bodies.position - before, at)
         for i in fresh[slowed].tolist():
             run.log.report(time, "motion taken in a sub-stepped island", (self.world.names[i],), MOTION_TAKEN_REMEDY)
         now.position[fresh], now.orientation[fresh] = bodies.position[at], bodies.orientation[at]
-        velocity = bodies.velocity.reshape(-1, ROW)[at]
-        now.velocity[fresh], now.angular_velocity[fresh] = velocity[:, :3], velocity[:, 3:6]
+        velocity = bodies.velocity.reshape(-1, ROW)[self.rank[self.members]]
+        now.velocity[self.members], now.angular_velocity[self.members] = velocity[:, :3], velocity[:, 3:6]
         refresh_pose(fresh, now, run.state.rotation, self.world.inertia)
 
     def step(self, run: Run, time: float, end: float) -> Outcome:

@@ -212,21 +212,28 @@ def _set_friction(of_contacts, contacts, u, slow):
 
 
 @jit
+def _connect_pair(balance, inv_mass, a, b):
+    """Make one cluster of a and b, if both give way; -1 is the world."""
+    gives_a, gives_b = a >= 0 and inv_mass[a] > 0.0, b >= 0 and inv_mass[b] > 0.0
+    if gives_a and gives_b:
+        unite(balance.parent, a, b)
+    elif gives_a or gives_b:
+        balance.held[a if gives_a else b] = True
+
+
+@jit
 def _connect(balance, island, contacts, of_contacts):
     """Join the clusters of members that joints and bearing contacts connect."""
     joints, inv_mass, touched = island.joints, island.bodies.inv_mass, False
     for c in range(contacts.gap.shape[0]):
         if of_contacts.rows.impulse[of_contacts.first_row[c]] > 0.0:
             a, b, touched = contacts.body_a[c], contacts.body_b[c], True
-            if inv_mass[a] > 0.0 and inv_mass[b] > 0.0:
-                unite(balance.parent, a, b)
+            _connect_pair(balance, inv_mass, a, b)
     if not touched:
         # What only joints hold keeps its energy by the method: nothing is taken off it.
         return
     for j in island.which:
-        a, b = joints.body_a[j], joints.body_b[j]
-        if a >= 0 and b >= 0 and inv_mass[a] > 0.0 and inv_mass[b] > 0.0:
-            unite(balance.parent, a, b)
+        _connect_pair(balance, inv_mass, joints.body_a[j], joints.body_b[j])
     for i in island.members:
         balance.touched[i] = True
 
