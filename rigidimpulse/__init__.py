@@ -57,6 +57,7 @@ _HOMES = {
     "Trigger": "engine.triggers",
     "VariedRun": "studies.many",
     "Velocity": "dynamics.forces.energy.path",
+    "Visual": "scene.visual",
     "Within": "scene.accuracy_targets",
     "Workers": "studies.wedges.workers",
     "compare": "studies.compare",

@@ -49,6 +49,7 @@ from rigidimpulse.scene.keyframes import Keyframes as Keyframes
 from rigidimpulse.scene.material import Material as Material
 from rigidimpulse.scene.scene import Scene as Scene
 from rigidimpulse.scene.shape import Shape as Shape
+from rigidimpulse.scene.visual import Visual as Visual
 from rigidimpulse.studies.compare import compare as compare
 from rigidimpulse.studies.glance.glance import glance as glance
 from rigidimpulse.studies.live.session import live as live

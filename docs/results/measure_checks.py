@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -25,6 +26,8 @@ COLUMNS = ("scene", "what", "value", "relation", "bound", "passed", "law", "seco
 
 def main() -> None:
     """Run what is asked for and write the table."""
+    # Processes of scenes are this script as a module.
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).resolve().parent), os.environ.get("PYTHONPATH", "")])
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("which", choices=("gallery", "hard"))
     parser.add_argument("--limit", type=float, default=3.0 * LIMIT, help="s for a scene")

@@ -11,17 +11,17 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.mesh_colors import colors_of_trimesh, joined_colors
 
 try:
     import fcntl
 except ImportError:  # no POSIX
     fcntl = None
-
-if TYPE_CHECKING:
-    from trimesh import Trimesh
 
 TOKEN = 8
 """Characters of each mark in a temporary name."""
@@ -146,7 +146,15 @@ def _is_locked(path: Path) -> bool:
     return False
 
 
-def load_mesh(path: Path, where: str) -> Trimesh:
+class LoadedMesh(NamedTuple):
+    """Triangles of a file: vertices (v, 3), faces (f, 3), and colours (f, 3, 3) of their corners in [0, 1], if they have some."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    colors: np.ndarray | None
+
+
+def load_mesh(path: Path, where: str) -> LoadedMesh:
     """Load a file of any format that trimesh reads as one mesh; a `SceneError` says why not, and `where`."""
     if not path.is_file():
         reason = "it is a folder" if path.is_dir() else "there is no such file"
@@ -158,7 +166,15 @@ def load_mesh(path: Path, where: str) -> Trimesh:
     try:
         # `process=False` keeps trimesh from joining vertices by an absolute distance, which would spoil small meshes.
         scene = trimesh.load_scene(str(path), process=False)
-        mesh = scene.to_mesh()
+        placed = [scene.graph[node] for node in scene.graph.nodes_geometry]
+        # Copies lose colours of vertices beside a material: those of the geometries themselves are read.
+        pieces: list[Any] = []
+        colors: list[np.ndarray | None] = []
+        for piece, (matrix, name) in zip(scene.dump(), placed, strict=True):
+            if len(getattr(piece, "faces", ())):
+                found = colors_of_trimesh(scene.geometry[name])
+                pieces.append(piece)
+                colors.append(found[:, ::-1] if found is not None and np.linalg.det(matrix[:3, :3]) < 0.0 else found)
     except ImportError as error:
         raise SceneError(
             f"{path.suffix} files need a package that is missing ({error})", "install it, or convert to .obj", where
@@ -169,6 +185,11 @@ def load_mesh(path: Path, where: str) -> Trimesh:
             "check that it is a complete mesh file and that its suffix says its format, or export it again as .obj",
             where,
         ) from error
-    if len(getattr(mesh, "faces", ())) == 0:
+    if not pieces:
         raise SceneError("there are no triangles in it", "export the surface as triangles", where)
-    return mesh
+    starts = np.cumsum([0] + [len(piece.vertices) for piece in pieces[:-1]])
+    return LoadedMesh(
+        np.concatenate([np.asarray(piece.vertices, np.float64) for piece in pieces]),
+        np.concatenate([np.asarray(piece.faces) + start for piece, start in zip(pieces, starts, strict=True)]),
+        joined_colors(colors, [len(piece.faces) for piece in pieces]),
+    )

@@ -14,12 +14,14 @@ from functools import partial
 
 import numpy as np
 
+from rigidimpulse.gallery.looks import STEEL
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most, equal
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
+from rigidimpulse.scene.visual import Visual
 
 NUM_BALLS = 5
 RADIUS = 0.03125
@@ -48,7 +50,7 @@ def scene(num_in: int) -> Scene:
         comes_in = k < num_in
         x = 2.0 * RADIUS * k - (FREE if comes_in else 0.0)
         speed = SPEED if comes_in else 0.0
-        scene.add(Body(f"ball {k}", ball, position=(x, 0, 0), velocity=(speed, 0, 0), material=steel))
+        scene.add(Body(f"ball {k}", ball, position=(x, 0, 0), velocity=(speed, 0, 0), material=steel, visual=Visual(color=STEEL)))
     return scene
 
 

@@ -17,12 +17,14 @@ from typing import Any
 import numpy as np
 
 from rigidimpulse.gallery.event_driven import DisksInRectangle
+from rigidimpulse.gallery.looks import CLOTH, CUSHION, pool_ball
 from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_most, equal
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
+from rigidimpulse.scene.visual import Visual
 
 RADIUS = 0.5 * 57.15e-3
 MASS = 0.17
@@ -59,14 +61,16 @@ def scene() -> Scene:
     resin = Material(restitution=BALL_RESTITUTION, **smooth)
     scene = Scene(gravity=(0.0, 0.0, 0.0))
     for name, (size, place) in CUSHIONS.items():
-        scene.add(Body(name, Shape.box(size), motion="static", position=place, material=rubber))
+        scene.add(Body(name, Shape.box(size), motion="static", position=place, material=rubber, visual=Visual(color=CUSHION)))
     bed = Shape.box((LENGTH + 2.0 * RAIL, WIDTH + 2.0 * RAIL, RAIL))
-    scene.add(Body("bed", bed, motion="static", position=(0.0, 0.0, -RADIUS - BED_GAP - 0.5 * RAIL), material=rubber))
+    place, cloth = (0.0, 0.0, -RADIUS - BED_GAP - 0.5 * RAIL), Visual(color=CLOTH)
+    scene.add(Body("bed", bed, motion="static", position=place, material=rubber, visual=cloth))
     ball = Shape.sphere(RADIUS)
     for k, (x, y) in enumerate(_places()):
         speed = CUE_SPEED if k == 0 else 0.0
         name = f"ball {k}" if k else "cue ball"
-        scene.add(Body(name, ball, position=(x, y, 0.0), velocity=(speed, 0.0, 0.0), mass=MASS, material=resin))
+        look = pool_ball(k, RADIUS)
+        scene.add(Body(name, ball, position=(x, y, 0.0), velocity=(speed, 0.0, 0.0), mass=MASS, material=resin, visual=look))
     return scene
 
 

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigidimpulse.gallery.looks import CLOTH, CUSHION, WOOD, pool_ball
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
+from rigidimpulse.scene.visual import Visual
 
 CUE, OBJECT = "cue ball", "object ball"
 RADIUS, MASS = 0.5 * 57.15e-3, 0.17
@@ -39,11 +41,15 @@ def table(gravity: float, friction: float) -> Scene:
     )
     rubber, felt = Material(restitution=RESTITUTION, **SMOOTH), Material(restitution=0.0, static_friction=0.5, rolling_friction=0.02)
     scene.add(Body("floor", Shape.half_space(offset=-DEPTH - BED), motion="static", material=felt))
-    # Kinematic without a motion: it stays where it is, and is painted, where static bodies are grey.
-    scene.add(Body("cloth", _bed(), motion="kinematic", material=cloth))
-    scene.add(Body("cushions", _rails(), motion="static", material=rubber))
-    scene.add(Body("frame", _frame(), motion="static", material=felt))
+    # Kinematic without a motion, as ever: whatever stands rests on it with the same bits.
+    scene.add(Body("cloth", _bed(), motion="kinematic", material=cloth, visual=Visual(color=CLOTH)))
+    scene.add(Body("cushions", _rails(), motion="static", material=rubber, visual=Visual(color=CUSHION)))
+    scene.add(Body("frame", _frame(), motion="static", material=felt, visual=Visual(color=WOOD)))
     return scene
+
+
+NUMBERS = {CUE: 0, OBJECT: 1}
+"""Of the balls by name; any other is the black one."""
 
 
 def add_ball(scene: Scene, name: str, place: np.ndarray, velocity: np.ndarray | None = None, rolling: np.ndarray | None = None) -> None:
@@ -61,8 +67,11 @@ def add_ball(scene: Scene, name: str, place: np.ndarray, velocity: np.ndarray | 
     # q = R w x z
     spin = (-q[1] / RADIUS, q[0] / RADIUS, 0.0)
     scene.add(
-        Body(name, Shape.sphere(RADIUS), position=(*place, RADIUS), velocity=(*v, 0.0), angular_velocity=spin, mass=MASS, material=resin)
-    )
+        Body(
+            name, Shape.sphere(RADIUS), position=(*place, RADIUS), velocity=(*v, 0.0), angular_velocity=spin, mass=MASS, material=resin,
+            visual=pool_ball(NUMBERS.get(name, 8), RADIUS),
+        )
+    )  # fmt: skip
 
 
 def in_pocket(place: np.ndarray, pocket: str) -> bool:

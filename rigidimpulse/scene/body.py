@@ -13,6 +13,7 @@ from rigidimpulse.scene.collision_filter import CollisionFilter
 from rigidimpulse.scene.keyframes import Keyframes
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.shape import Shape, check_orientation, normalized_quaternion
+from rigidimpulse.scene.visual import Visual
 
 MOTIONS = ("dynamic", "kinematic", "static")
 """Ways a body moves: by forces and impacts, along a given path, not at all."""
@@ -43,6 +44,7 @@ class Body:
         release_time: s, > 0, from when on a kinematic body is dynamic: let go with the pose and the velocity that it has then. None: never.
         gravity_factor: scales the scene's gravity for this body.
         collision_filter: which other bodies it touches; None: all.
+        visual: what is seen of it, a colour or another shape; None: its shape, in its own colours or in one that the library chooses.
 
     """
 
@@ -62,10 +64,21 @@ class Body:
     release_time: float | None = None
     gravity_factor: float = 1.0
     collision_filter: CollisionFilter | None = None
+    visual: Visual | None = None
 
     def unit_orientation(self) -> np.ndarray:
         """Return the normalised orientation (4,)."""
         return normalized_quaternion(self.orientation)
+
+    @property
+    def drawn_shape(self) -> Shape:
+        """The shape that is seen: that of the visual, if it has one, else the body's own."""
+        return self.shape if self.visual is None or self.visual.shape is None else self.visual.shape
+
+    @property
+    def shows_own_colors(self) -> bool:
+        """Whether the colours of its shape are seen, if that has some."""
+        return self.visual is None or self.visual.color is None
 
     @property
     def becomes_dynamic(self) -> bool:
@@ -82,6 +95,8 @@ class Body:
             if self.keyframes is not None:
                 self.keyframes.check()
             self.shape.check()
+            if self.visual is not None:
+                self.visual.check()
         except SceneError as error:
             raise error.within(f"body {self.name!r}") from None
 
@@ -95,6 +110,8 @@ class Body:
             raise SceneError(f"material is a {type(self.material).__name__}", "give a Material")
         if not isinstance(self.collision_filter, CollisionFilter | None):
             raise SceneError(f"collision_filter is a {type(self.collision_filter).__name__}", "give a CollisionFilter")
+        if not isinstance(self.visual, Visual | None):
+            raise SceneError(f"visual is a {type(self.visual).__name__}", 'give a Visual, such as Visual(color="#2f7fb8")')
         if self.motion not in MOTIONS:
             raise SceneError(f"motion is {self.motion!r}", f"give one of {', '.join(map(repr, MOTIONS))}")
         if self.keyframes is not None:

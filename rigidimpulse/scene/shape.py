@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigidimpulse.core.colors import bytes_of
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import load_mesh
+from rigidimpulse.core.mesh_colors import colors_of_trimesh
 from rigidimpulse.core.portable import dot, length, matmul
 from rigidimpulse.scene.solid import Solid, compute_solid
 from rigidimpulse.scene.surface import Surface, clean_surface
@@ -57,6 +59,7 @@ class Shape:
     offset: float = 0.0
     vertices: np.ndarray | None = None
     faces: np.ndarray | None = None
+    colors: np.ndarray | None = None
     parts: tuple[tuple[Shape, np.ndarray, np.ndarray], ...] = ()
     source: str = ""
 
@@ -96,12 +99,14 @@ class Shape:
         return Shape("cylinder", radius=_number("radius", radius), height=_number("height", height))
 
     @staticmethod
-    def mesh(vertices: ArrayLike, faces: ArrayLike) -> Shape:
+    def mesh(vertices: ArrayLike, faces: ArrayLike, colors: ArrayLike | None = None) -> Shape:
         """Return a triangle mesh, convex or not, of one or several pieces.
 
         Args:
             vertices: (v, 3) m.
             faces: (f, 3) indices, counter-clockwise seen from outside.
+            colors: (f, 3) of each face, or (f, 3, 3) of each corner of each face: red, green, blue in [0, 1], as people see them (sRGB).
+                They are only drawn. None: the mesh has no colours of its own.
 
         Vertices at the same place are joined when the mesh is used. A body whose mass is asked for needs a closed
         mesh; a static or kinematic one may be open.
@@ -112,13 +117,17 @@ class Shape:
             raise SceneError("faces are not whole numbers", "give vertex indices, an integer array (f, 3)", "mesh")
         faces_read_only = index.astype(np.int64)
         faces_read_only.setflags(write=False)
-        return Shape("mesh", vertices=_array("vertices", vertices), faces=faces_read_only)
+        return Shape(
+            "mesh", vertices=_array("vertices", vertices), faces=faces_read_only,
+            colors=None if colors is None else _corner_colors(colors, len(faces_read_only)),
+        )  # fmt: skip
 
     @staticmethod
     def from_file(path: str | os.PathLike[str], scale: float = 1.0) -> Shape:
         """Return the mesh in a file of any format that trimesh reads (.obj, .stl, .ply, .glb, ...).
 
-        All geometries of the file are taken together, each at its place; seams of texture or normals are joined.
+        All geometries of the file are taken together, each at its place; seams of texture or normals are joined. Colours of its
+        vertices, faces and materials are drawn, and textures as they are at the vertices; `Body.visual` draws others.
 
         Args:
             path: the file.
@@ -133,17 +142,17 @@ class Shape:
         if not (np.isfinite(factor) and factor > 0.0):
             raise SceneError(f"scale is {scale}", "give metres per unit of the file, > 0", where)
         mesh = load_mesh(Path(path), where)
-        shape = Shape.mesh(np.asarray(mesh.vertices, dtype=np.float64) * factor, mesh.faces)
-        return Shape("mesh", vertices=shape.vertices, faces=shape.faces, source=os.fspath(path))
+        shape = Shape.mesh(mesh.vertices * factor, mesh.faces, mesh.colors)
+        return replace(shape, source=os.fspath(path))
 
     @staticmethod
     def from_trimesh(mesh: Trimesh) -> Shape:
-        """Return the mesh of a `trimesh.Trimesh`, in metres; a `trimesh.Scene` is taken as one mesh."""
+        """Return the mesh of a `trimesh.Trimesh`, in metres, with its colours; a `trimesh.Scene` is taken as one mesh."""
         if hasattr(mesh, "to_mesh"):
             mesh = mesh.to_mesh()  # pyright: ignore[reportAttributeAccessIssue]
         if not (hasattr(mesh, "vertices") and hasattr(mesh, "faces")):
             raise SceneError(f"a {type(mesh).__name__} is no trimesh", "give a trimesh.Trimesh", "mesh")
-        return Shape.mesh(mesh.vertices, mesh.faces)
+        return Shape.mesh(mesh.vertices, mesh.faces, colors_of_trimesh(mesh))
 
     @staticmethod
     def convex_hull(points_or_shape: ArrayLike | Shape) -> Shape:
@@ -199,7 +208,7 @@ class Shape:
 
     @cached_property
     def key(self) -> bytes:
-        """A digest of all data of the shape except the file it is from: the same for shapes that are alike."""
+        """A digest of all data of the shape except its colours and the file it is from: the same for shapes that collide alike."""
         from hashlib import blake2b
 
         digest = blake2b(f"{self.kind} {self.radius!r} {self.height!r} {self.offset!r}".encode(), digest_size=16)
@@ -209,6 +218,16 @@ class Shape:
             arrays += [position, orientation]
         for array in arrays:
             digest.update(b"none" if array is None else repr(array.shape).encode() + array.tobytes())
+        return digest.digest()
+
+    @cached_property
+    def drawn_key(self) -> bytes:
+        """The same for shapes that look alike as well, colours included."""
+        from hashlib import blake2b
+
+        digest = blake2b(self.key, digest_size=16)
+        for part in self.parts_flat():
+            digest.update(b"none" if part.shape.colors is None else part.shape.colors.tobytes())
         return digest.digest()
 
     @property
@@ -373,6 +392,20 @@ def _number(name: str, value: object) -> float:
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise SceneError(f"{name} is {value!r}", "give a number", "shape") from None
+
+
+def _corner_colors(colors: ArrayLike, num_faces: int) -> np.ndarray:
+    """Return the colours of faces or of their corners as those of corners (f, 3, 3), uint8, read-only."""
+    values = _array("colors", colors)
+    if values.shape not in ((num_faces, 3), (num_faces, 3, 3)):
+        raise SceneError(
+            f"colors have the form {values.shape}", f"give (f, 3) or (f, 3, 3) with f = {num_faces}; of vertices: colors[faces]", "mesh"
+        )
+    if not np.all((values >= 0.0) & (values <= 1.0)):
+        raise SceneError("colors are not all from 0 to 1", "divide whole numbers of 0..255 by 255", "mesh")
+    corners = np.broadcast_to(bytes_of(values if values.ndim == 3 else values[:, None]), (num_faces, 3, 3)).copy()
+    corners.setflags(write=False)
+    return corners
 
 
 def _array(name: str, value: ArrayLike) -> np.ndarray:

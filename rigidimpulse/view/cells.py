@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import html
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,9 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.recording.events import IMPACT_DTYPE
 from rigidimpulse.recording.status import Status
+from rigidimpulse.scene.mass import body_mass
 from rigidimpulse.scene.scene import Scene
+from rigidimpulse.scene.shape import rotation_matrix
 from rigidimpulse.view.page import render_page
 from rigidimpulse.view.picture import draw_picture, png
 
@@ -38,6 +40,7 @@ class _Start:
     status: Status
     soft_bodies: tuple[()] = ()
     ledger: None = None
+    reactions: dict[str, np.ndarray] = field(default_factory=dict)
 
     def position(self, name: str, /) -> np.ndarray:
         """Origin of a body (1, 3), m."""
@@ -50,8 +53,11 @@ class _Start:
         return (body.unit_orientation() if body.keyframes is None else body.keyframes.arrays(body.orientation)[2][0])[None]
 
     def center_of_mass(self, name: str, /) -> np.ndarray:
-        """The origin stands for it: nothing spins."""
-        return self.position(name)
+        """Where it is (1, 3), m; of a body that is not dynamic the origin."""
+        body = self.scene[name]
+        if body.motion != "dynamic":
+            return self.position(name)
+        return self.position(name) + rotation_matrix(self.orientation(name)[0]) @ body_mass(body).center_of_mass
 
 
 def scene_cell(scene: Scene) -> str:

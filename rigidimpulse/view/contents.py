@@ -28,11 +28,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
+from rigidimpulse.core.colors import linear_of
 from rigidimpulse.recording.exporters import ExportOptions, ExportTarget
 from rigidimpulse.scene.shape import rotation_matrix
 from rigidimpulse.view.arrows import arrow_rows, arrow_scale, fade_time, longest_arrow
@@ -67,7 +67,7 @@ SOFT_BODY_MARGIN = 0.03
 """Margin about the vertices of a flexible body in the picture, relative to its extent."""
 
 
-DrawnMeshes = Callable[[Any, dict[str, DisplayMesh]], dict[str, DisplayMesh]]
+DrawnMeshes = Callable[[Any, dict[str, DisplayMesh], int], dict[str, DisplayMesh]]
 """Finds what is drawn of the bodies of a scene in the place of their shapes, see `rendered_meshes`."""
 
 
@@ -91,17 +91,16 @@ def page_contents(
         raise ValueError("the recording has no frames; simulate at least one")
     bodies = list(recording.scene.bodies)
     poses = [finite_poses(recording, body.name) for body in bodies]
-    numbers, meshes = _shared_meshes(bodies)
-    rendered, meshes = _with_rendered(bodies, numbers, meshes, partial(drawn_of, recording.scene))
+    numbers, meshes, segments = _shared_meshes(bodies)
+    rendered, meshes = _with_rendered(bodies, numbers, meshes, lambda shown: drawn_of(recording.scene, shown, segments))
     up = up_axis(recording.scene.gravity)
     soft_bodies = list(recording.soft_bodies)
     framed = poses if other is None else [_both(pose, finite_poses(other, body.name)) for body, pose in zip(bodies, poses, strict=True)]
     runs = [run for run in (recording, other) if run is not None]
     soft_body_paths = [_soft_body_path(*tracks) for tracks in zip(*(run.soft_bodies for run in runs), strict=True)]
-    anchors = [Path(name, place, 0.0, moves=False, surface=place) for name, place in fixed_anchors(recording)]
-    framing = frame_action(_paths(bodies, framed, numbers, meshes) + soft_body_paths + anchors, up)
+    framing = frame_action(_paths(bodies, framed, numbers, meshes) + soft_body_paths + _anchor_paths(fixed_anchors(recording)), up)
     framing = replace(framing, movers=[name for name in framing.movers if name not in {track.name for track in soft_bodies}])
-    entries = _entries(recording, bodies, poses, numbers, rendered)
+    entries = _entries(recording, poses, (numbers, rendered), meshes)
     num_coloured = sum(body.motion != "static" for body in bodies)
     radius = float(np.linalg.norm(framing.half))
     dynamic = [body.motion == "dynamic" for body in bodies]
@@ -149,18 +148,19 @@ def page_contents(
 
 
 def _entries(
-    recording: RecordingLike, bodies: list[Any], poses: list[tuple[np.ndarray, np.ndarray]], numbers: list[int], rendered: list[int]
+    recording: RecordingLike, poses: list[tuple[np.ndarray, np.ndarray]], places: tuple[list[int], list[int]], meshes: list[DisplayMesh]
 ) -> list[dict[str, Any]]:
-    """Return what the manifest says of the bodies."""
-    up = up_axis(recording.scene.gravity)
+    """Return what the manifest says of the bodies; places: of the mesh that collides and of the one that is drawn, for each body."""
+    up, (numbers, rendered) = up_axis(recording.scene.gravity), places
     entries, num_coloured = [], 0
-    for index, body in enumerate(bodies):
+    for index, body in enumerate(recording.scene.bodies):
         position, orientation = poses[index]
-        planes = _plane_entries(body, orientation[0], up)
+        seen = rendered[index] if rendered[index] >= 0 else numbers[index]
+        planes = [] if rendered[index] >= 0 else _plane_entries(body, orientation[0], up)
         group, key = "ground" if planes and numbers[index] < 0 else "bodies", _path_key(index, body.name)
         entry = {"name": body.name, "group": group, "key": key, "planes": planes, "shape": numbers[index]}
         entry |= {"rendered": rendered[index], "faceted": all(part.shape.kind not in ROUND_KINDS for part in body.shape.parts_flat())}
-        entry["surface"] = surface(num_coloured, body)
+        entry["surface"] = surface(num_coloured, body, meshes[seen] if seen >= 0 else None)
         num_coloured += body.motion != "static"
         entry["position"] = position[0].tolist()
         entry["quaternion"] = quaternion_keys(orientation[:1])[0].tolist()
@@ -213,8 +213,14 @@ def glb_file(recording: Any) -> bytes:
         return path.read_bytes()
 
 
-def page_scene(recording: RecordingLike) -> tuple[Framing, list[tuple[Any, DisplayMesh | None, dict[str, Any], list[dict[str, Any]]]]]:
+def page_scene(
+    recording: RecordingLike, anchors: Iterable[tuple[str, np.ndarray]] = ()
+) -> tuple[Framing, list[tuple[Any, DisplayMesh | None, dict[str, Any], list[dict[str, Any]]]]]:
     """Return the framing of a recording, and of each body itself, the mesh that is drawn of it, how it is painted and its half spaces.
+
+    Args:
+        recording: the motion.
+        anchors: names and places (1, 3) m that the picture must hold as well.
 
     Raises:
         ValueError: the recording has no frames, or a pose is not finite.
@@ -224,11 +230,12 @@ def page_scene(recording: RecordingLike) -> tuple[Framing, list[tuple[Any, Displ
         raise ValueError("the recording has no frames; simulate at least one")
     bodies = list(recording.scene.bodies)
     poses = [finite_poses(recording, body.name) for body in bodies]
-    numbers, meshes = _shared_meshes(bodies)
-    rendered, meshes = _with_rendered(bodies, numbers, meshes, partial(rendered_meshes, recording.scene))
+    numbers, meshes, segments = _shared_meshes(bodies)
+    rendered, meshes = _with_rendered(bodies, numbers, meshes, lambda shown: rendered_meshes(recording.scene, shown, segments))
     paths = _paths(bodies, poses, numbers, meshes) + [_soft_body_path(track) for track in recording.soft_bodies]
+    paths += _anchor_paths(anchors)
     framing, drawn = frame_action(paths, up_axis(recording.scene.gravity)), []
-    for entry, body in zip(_entries(recording, bodies, poses, numbers, rendered), bodies, strict=True):
+    for entry, body in zip(_entries(recording, poses, (numbers, rendered), meshes), bodies, strict=True):
         number = entry["rendered"] if entry["rendered"] >= 0 else entry["shape"]
         drawn.append((body, meshes[number] if number >= 0 else None, entry["surface"], entry["planes"]))
     return framing, drawn
@@ -250,10 +257,13 @@ def finite_poses(recording: RecordingLike, name: str) -> tuple[np.ndarray, np.nd
     return position, orientation
 
 
-def _shared_meshes(bodies: list[Any]) -> tuple[list[int], list[DisplayMesh]]:
-    """Return for each body the number of its display mesh, -1 for none, and the meshes; equal shapes share one."""
+def _shared_meshes(bodies: list[Any]) -> tuple[list[int], list[DisplayMesh], int]:
+    """Return for each body the number of its display mesh, -1 for none, the meshes, and the corners of a full turn of round ones.
+
+    Equal shapes share one mesh.
+    """
     different: dict[Any, Any] = {}
-    keys = [body.shape.key for body in bodies]
+    keys = [body.shape.drawn_key for body in bodies]
     for key, body in zip(keys, bodies, strict=True):
         different.setdefault(key, body.shape)
     num_round = sum(part.shape.kind in ROUND_KINDS for body in bodies for part in body.shape.parts_flat())
@@ -267,7 +277,7 @@ def _shared_meshes(bodies: list[Any]) -> tuple[list[int], list[DisplayMesh]]:
         number_of[key] = -1 if mesh is None else len(meshes)
         if mesh is not None:
             meshes.append(mesh)
-    return [number_of[key] for key in keys], meshes
+    return [number_of[key] for key in keys], meshes, segments
 
 
 def _with_rendered(
@@ -276,8 +286,10 @@ def _with_rendered(
     """Return for each body the number of the mesh that is drawn where it is not the one that collides, else -1, and all meshes."""
     collision = {body.name: meshes[number] for body, number in zip(bodies, numbers, strict=True) if number >= 0}
     drawn = drawn_of(collision)
-    place = {name: len(meshes) + k for k, name in enumerate(drawn)}
-    return [place.get(body.name, -1) for body in bodies], meshes + list(drawn.values())
+    different = {id(mesh): mesh for mesh in drawn.values()}
+    place = {key: len(meshes) + k for k, key in enumerate(different)}
+    rendered = [place[id(drawn[body.name])] if body.name in drawn else -1 for body in bodies]
+    return rendered, meshes + list(different.values())
 
 
 def _center(position: np.ndarray, orientation: np.ndarray, center: np.ndarray) -> list[float]:
@@ -302,6 +314,11 @@ def _paths(
     return paths
 
 
+def _anchor_paths(anchors: Iterable[tuple[str, np.ndarray]]) -> list[Path]:
+    """Return places of anchors, which stand, as paths."""
+    return [Path(name, place, 0.0, moves=False, surface=place) for name, place in anchors]
+
+
 def _soft_body_path(*tracks: SoftBodyLike) -> Path:
     """Return the places of all vertices of a flexible body in all frames of its tracks, as a path."""
     vertices = np.concatenate([np.asarray(track.vertices, dtype=np.float64) for track in tracks])
@@ -317,11 +334,12 @@ def _soft_body_entry(track: SoftBodyLike, index: int, colour: int) -> dict[str, 
 
 
 def _plane_entries(body: Any, orientation: np.ndarray, up: np.ndarray) -> list[dict[str, Any]]:
-    """Return the half spaces of a body for the manifest: normal, offset, and whether it is level ground."""
+    """Return the half spaces of a body for the manifest: normal, offset, whether it is level ground, and the colour, if it has one."""
     entries = []
     for normal, offset in display_planes(body.shape):
         level = bool(up @ rotation_matrix(orientation) @ normal > LEVEL)
-        entries.append({"normal": normal.tolist(), "offset": offset, "level": level})
+        chosen = None if body.visual is None else body.visual.hex_color()
+        entries.append({"normal": normal.tolist(), "offset": offset, "level": level, "color": chosen})
     return entries
 
 
@@ -370,6 +388,8 @@ def _shape_message(number: int, mesh: DisplayMesh) -> dict[str, Any]:
 
     geometry, material = f"geometry {number}", f"material {number}"
     attributes = {"position": mesh.vertices, "normal": mesh.normals}
+    if mesh.colors is not None:
+        attributes["color"] = linear_of(mesh.colors / 255.0)  # three.js takes those of vertices as light
     return {
         "type": "set_object",
         "path": f"/shapes/{number}",

@@ -19,6 +19,8 @@ SEGMENTS = 64
 """Corners of a full turn."""
 LARGEST_FAN = 512
 """Faces around one vertex above which its corners are not smoothed: their comparison grows with the square."""
+PLAIN = 217
+"""Grey, of 255, of what has no colour in a mesh that has some."""
 NORMAL_STEPS = 2.0**12
 """Corners of a vertex share it if their normals agree to one part in this many."""
 
@@ -29,6 +31,7 @@ class DisplayMesh(NamedTuple):
     vertices: np.ndarray  # (v, 3) m
     faces: np.ndarray  # (f, 3)
     normals: np.ndarray  # (v, 3) unit, outward
+    colors: np.ndarray | None = None  # (v, 3) uint8 as people see them, None: of one colour that is chosen elsewhere
 
 
 def display_mesh(shape: Shape, segments: int = SEGMENTS) -> DisplayMesh | None:
@@ -43,15 +46,30 @@ def display_mesh(shape: Shape, segments: int = SEGMENTS) -> DisplayMesh | None:
     for part in shape.parts_flat():
         if part.shape.kind != "half_space":
             mesh = _single(part.shape, segments)
-            meshes.append((part.position + mesh.vertices @ part.rotation.T, mesh.faces, mesh.normals @ part.rotation.T))
-    if not meshes:
-        return None
-    starts = np.cumsum([0] + [len(vertices) for vertices, _, _ in meshes[:-1]])
+            turned = mesh._replace(vertices=part.position + mesh.vertices @ part.rotation.T, normals=mesh.normals @ part.rotation.T)
+            meshes.append(turned)
+    return joined_meshes(meshes) if meshes else None
+
+
+def joined_meshes(meshes: list[DisplayMesh]) -> DisplayMesh:
+    """Return several meshes, at least one, as one; those without colours are `PLAIN` beside those with some."""
+    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+    painted = any(mesh.colors is not None for mesh in meshes)
     return DisplayMesh(
-        np.concatenate([vertices for vertices, _, _ in meshes]),
-        np.concatenate([faces + start for (_, faces, _), start in zip(meshes, starts, strict=True)]),
-        np.concatenate([normals for _, _, normals in meshes]),
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+        np.concatenate([_colors_or_plain(mesh) for mesh in meshes]) if painted else None,
     )
+
+
+def _colors_or_plain(mesh: DisplayMesh) -> np.ndarray:
+    return np.full(mesh.vertices.shape, PLAIN, np.uint8) if mesh.colors is None else mesh.colors
+
+
+def has_one_color(mesh: DisplayMesh) -> bool:
+    """Whether a mesh has no colours of its own, or the same everywhere."""
+    return mesh.colors is None or bool(np.all(mesh.colors == mesh.colors[0]))
 
 
 def display_planes(shape: Shape) -> list[tuple[np.ndarray, float]]:
@@ -82,6 +100,9 @@ def _single(shape: Shape, segments: int) -> DisplayMesh:
         profile = np.array([[0.0, -z], [r, -z], [r, -z], [r, z], [r, z], [0.0, z]])
         normal = np.array([[0.0, -1.0], [0.0, -1.0], [1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
         return _lathe(profile, normal, segments)
+    if shape.colors is not None:
+        assert shape.vertices is not None and shape.faces is not None
+        return shade_pieces([(shape.vertices, shape.faces, shape.colors)])
     surface = shape.surface()
     return shade(np.asarray(surface.vertices, dtype=np.float64), np.asarray(surface.faces))
 
@@ -110,8 +131,28 @@ def _lathe(profile: np.ndarray, normal: np.ndarray, segments: int) -> DisplayMes
     return DisplayMesh(turned(profile), kept, turned(normal))
 
 
-def shade(vertices: np.ndarray, faces: np.ndarray) -> DisplayMesh:
-    """Return the triangles (f, 3) of the vertices (v, 3) with normals; a vertex on a crease becomes several."""
+def shade_pieces(pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray | None]]) -> DisplayMesh:
+    """Return meshes (vertices, faces, colours of corners or None) as one; its normals are smooth across their seams."""
+    starts = np.cumsum([0] + [len(vertices) for vertices, _, _ in pieces[:-1]])
+    faces = np.concatenate([faces + start for (_, faces, _), start in zip(pieces, starts, strict=True)])
+    unique, index = np.unique(np.concatenate([vertices for vertices, _, _ in pieces]), axis=0, return_inverse=True)
+    faces = index.reshape(-1)[faces]
+    proper = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    if all(colors is None for _, _, colors in pieces):
+        return shade(unique, faces[proper])
+    painted = [np.full((len(own), 3, 3), PLAIN, np.uint8) if colors is None else colors for _, own, colors in pieces]
+    return shade(unique, faces[proper], np.concatenate(painted)[proper])
+
+
+def shade(vertices: np.ndarray, faces: np.ndarray, colors: np.ndarray | None = None) -> DisplayMesh:
+    """Return the triangles (f, 3) of the vertices (v, 3) with normals; a vertex on a crease, or of several colours, becomes several.
+
+    Args:
+        vertices: (v, 3) m.
+        faces: (f, 3).
+        colors: (f, 3, 3) uint8 of the corners, None: none.
+
+    """
     corners = vertices[faces]
     sides = np.roll(corners, -1, axis=1) - corners
     face_normal = _unit(np.cross(sides[:, 0], -sides[:, 2]))
@@ -126,9 +167,11 @@ def shade(vertices: np.ndarray, faces: np.ndarray) -> DisplayMesh:
         total[:, axis] = np.bincount(own, weight[other] * normal[other, axis], minlength=len(normal))
     total = np.where(np.any(total != 0.0, axis=1)[:, None], _unit(total), normal)
     rounded = np.round(total * NORMAL_STEPS).astype(np.int64)
-    key = np.column_stack([faces.ravel(), rounded])
+    painted = [] if colors is None else [colors.reshape(-1, 3)]
+    key = np.column_stack([faces.ravel(), rounded, *painted])
     _, first, index = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    return DisplayMesh(vertices[faces.ravel()[first]], index.reshape(-1, 3), total[first])
+    shades = None if colors is None else painted[0][first]
+    return DisplayMesh(vertices[faces.ravel()[first]], index.reshape(-1, 3), total[first], shades)
 
 
 def _corner_pairs(faces: np.ndarray, num_vertices: int) -> tuple[np.ndarray, np.ndarray]:

@@ -28,8 +28,8 @@ class _Start:
 
 def joint_entries(recording: Any) -> list[dict[str, Any]]:
     """Return what the manifest says of each joint and spring of a recording with its scene."""
-    names = list(recording.names)
-    start = _Start(names, recording.centers[0])
+    names = [body.name for body in recording.scene.bodies]
+    start = _Start(names, np.array([recording.center_of_mass(name)[0] for name in names]).reshape(-1, 3))
     entries, num_joints = [], 0
     for effect in recording.scene.effects:
         if isinstance(effect, Joint):

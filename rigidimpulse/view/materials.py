@@ -1,9 +1,12 @@
-"""Surfaces to the eye: one colour per body, and a finish that follows from its physical material."""
+"""Surfaces to the eye: the colours a body has, or one of the palette, and a finish that follows from its physical material."""
 
 from __future__ import annotations
 
 import colorsys
 from typing import Any
+
+from rigidimpulse.core.colors import hex_of, seen_of_hex
+from rigidimpulse.view.display import DisplayMesh, has_one_color
 
 PALETTE = (
     "#2f7fb8",  # blue
@@ -29,17 +32,26 @@ ROUND_KINDS = frozenset({"sphere", "capsule", "cylinder"})
 """Kinds of shape on which a plain colour would hide the spin."""
 
 
-def surface(index: int, body: Any) -> dict[str, Any]:
+def surface(index: int, body: Any, mesh: DisplayMesh | None) -> dict[str, Any]:
     """Return how the page paints a body.
 
     Args:
-        index: number of the body among the moving ones; chooses the colour.
-        body: its shape, motion and material are looked at.
+        index: number of the body among the moving ones; chooses the colour of one that has none.
+        body: its shape, motion, material and visual are looked at.
+        mesh: what is drawn of it, None: nothing but half spaces.
 
     Returns:
-        color (#rrggbb), roughness, metalness and clearcoat in [0, 1], octants (paint round bodies in two tones).
+        color (#rrggbb; the mean one of a body that is painted), painted (the mesh has colours of its own, which are shown), roughness,
+        metalness and clearcoat in [0, 1], octants (round bodies that the library colours are in two tones).
 
     """
+    chosen = None if body.visual is None else body.visual.hex_color()
+    colors = None if mesh is None else mesh.colors
+    painted = body.shows_own_colors and colors is not None
+    if painted and colors is not None:
+        chosen = hex_of(colors.mean(axis=0) / 255.0)
+    # A colour that somebody has chosen is left as it is; a file gives everything some.
+    hides_spin = body.visual is None and (mesh is None or has_one_color(mesh)) and getattr(body.shape, "kind", "") in ROUND_KINDS
     moves = body.motion != "static"
     density = getattr(body.material, "density", None) or 1000.0
     friction = getattr(body.material, "dynamic_friction", None)
@@ -47,25 +59,26 @@ def surface(index: int, body: Any) -> dict[str, Any]:
     metal = moves and density >= METAL_DENSITY
     roughness = 0.22 + 0.14 * min(friction, 1.0) if metal else 0.32 + 0.4 * min(friction, 1.0)
     return {
-        "color": color(index) if moves else STATIC_COLOR,
+        "color": chosen or (color(index) if moves else STATIC_COLOR),
+        "painted": painted,
         "roughness": round(roughness if moves else 0.85, 3),
         "metalness": 0.75 if metal else 0.0,
         "clearcoat": 0.0 if metal or not moves else round(0.5 * (1.0 - min(friction, 1.0)), 3),
-        "octants": moves and getattr(body.shape, "kind", "") in ROUND_KINDS,
+        "octants": moves and hides_spin,
     }
 
 
 def soft_body_surface(index: int, closed: bool) -> dict[str, Any]:
     """Return how the page paints a flexible body: cloth is dull, what is closed shines like jelly; see `surface`."""
     roughness, clearcoat = (0.3, 0.6) if closed else (0.75, 0.0)
-    return {"color": color(index), "roughness": roughness, "metalness": 0.0, "clearcoat": clearcoat, "octants": False}
+    finish = {"roughness": roughness, "metalness": 0.0, "clearcoat": clearcoat}
+    return {"color": color(index), "painted": False, **finish, "octants": False}
 
 
 def color(index: int) -> str:
     """Return the colour of the moving body `index`: the palette, then the palette lighter and darker."""
     lap, place = divmod(index, len(PALETTE))
-    red, green, blue = (int(PALETTE[place][k : k + 2], 16) / 255.0 for k in (1, 3, 5))
-    hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
+    hue, lightness, saturation = colorsys.rgb_to_hls(*seen_of_hex(PALETTE[place]))
     shade = (lap + 1) // 2 % NUM_SHADES * LAP_SHADE * (1.0 if lap % 2 else -1.0)
     lightness = lightness + shade * (1.0 - lightness if shade > 0.0 else lightness)
-    return "#" + "".join(f"{round(255.0 * part):02x}" for part in colorsys.hls_to_rgb(hue, lightness, saturation))
+    return hex_of(colorsys.hls_to_rgb(hue, lightness, saturation))

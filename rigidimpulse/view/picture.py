@@ -1,4 +1,4 @@
-"""A still picture of a recording, drawn without a browser: triangles in a depth buffer, a light, the ground with shadows, trails.
+"""A still picture of a recording, drawn without a browser: triangles in a depth buffer, a light, the ground with shadows, trails, strings.
 
 A point p of the scene, in the turned frame (Y up) of `camera`, is seen from the eye c with axes right r, over o and back b at
 
@@ -16,10 +16,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rigidimpulse.core.colors import seen_of_hex
 from rigidimpulse.scene.shape import rotation_matrix
 from rigidimpulse.view.camera import Framing, stage_rotation, up_axis
 from rigidimpulse.view.contents import page_scene
 from rigidimpulse.view.display import shade
+from rigidimpulse.view.joints import fixed_anchors, joint_entries
 
 HALF_TALL = np.tan(np.radians(17.5))
 """Tangent of half the field of view, up and down."""
@@ -28,6 +30,10 @@ SUPERSAMPLING = 2
 LIGHT = np.array([-0.55, 1.0, 0.42]) / np.linalg.norm([-0.55, 1.0, 0.42])
 SKY, HORIZON, NADIR = np.array([176, 203, 233]) / 255.0, np.array([244, 240, 233]) / 255.0, np.array([196, 200, 204]) / 255.0
 GROUND, LINES = np.array([205, 209, 213]) / 255.0, np.array([150, 160, 170]) / 255.0
+STRING = np.array([74, 84, 94]) / 255.0
+"""Colour of strings, rods and springs."""
+DARKER = 0.75
+"""Lines on ground that has a colour of its own, against it."""
 CELLS = 12
 """Cells of the ground's grid, about, across the action."""
 SOFT_BODY_COLOURS = np.array([[63, 157, 132], [140, 107, 177]]) / 255.0
@@ -37,6 +43,10 @@ SHADOW = 0.3
 """Share of the light that shadows on the ground take."""
 TRAIL_SECONDS = 1.0
 PIXELS_AT_ONCE = 4_000_000
+
+
+Level = tuple[float, str | None]
+"""Level ground: its height in m, and its colour if it has one."""
 
 
 class Camera(NamedTuple):
@@ -57,7 +67,7 @@ class Camera(NamedTuple):
 
 
 class Mesh(NamedTuple):
-    """Triangles to draw in the turned frame: vertices and normals (v, 3), faces (t, 3), colour (3,).
+    """Triangles to draw in the turned frame: vertices and normals (v, 3), faces (t, 3), colour (3,) or one of each vertex (v, 3).
 
     `local` (v, 3) are the vertices in the body's frame, of round bodies, which are painted in octants; `nearer` is a factor of 1 / w.
     """
@@ -84,7 +94,7 @@ def draw_picture(recording: Any, width: int = 640, height: int = 400, frame: int
 
     """
     frame = telling_frame(recording) if frame is None else frame
-    framing, drawn = page_scene(recording)
+    framing, drawn = page_scene(recording, fixed_anchors(recording))
     rotation = stage_rotation(up_axis(recording.scene.gravity))
     if framing.follow:
         middle = np.mean([recording.position(name)[frame] for name in framing.movers], axis=0)
@@ -98,6 +108,7 @@ def draw_picture(recording: Any, width: int = 640, height: int = 400, frame: int
     for mesh in meshes:
         _draw_mesh(picture, depth, camera, mesh)
     _draw_trails(picture, depth, camera, recording, drawn, rotation, frame)
+    _draw_strings(picture, depth, camera, recording, rotation, frame)
     small = picture.reshape(height, SUPERSAMPLING, width, SUPERSAMPLING, 3).mean(axis=(1, 3))
     return np.clip(np.round(255.0 * small), 0, 255).astype(np.uint8)
 
@@ -145,24 +156,21 @@ def _camera(framing: Framing, width: int, height: int) -> Camera:
     return Camera(centre + distance * back, np.stack([right, over, back]), width, height)
 
 
-def _meshes(recording: Any, drawn: list[Any], rotation: np.ndarray, frame: int) -> tuple[list[Mesh], list[float]]:
-    """Return what there is to draw at a frame, and the heights of level half spaces."""
+def _meshes(recording: Any, drawn: list[Any], rotation: np.ndarray, frame: int) -> tuple[list[Mesh], list[Level]]:
+    """Return what there is to draw at a frame, and the level half spaces."""
     meshes, levels = [], []
     for body, mesh, paint, planes in drawn:
         turn = rotation @ rotation_matrix(recording.orientation(body.name)[frame])
         place = rotation @ recording.position(body.name)[frame]
-        levels += [plane["offset"] + float(place[1]) for plane in planes if plane["level"]]
+        levels += [(plane["offset"] + float(place[1]), plane["color"]) for plane in planes if plane["level"]]
         if mesh is not None:
             local = mesh.vertices if paint["octants"] else None
-            meshes.append(Mesh(mesh.vertices @ turn.T + place, mesh.normals @ turn.T, mesh.faces, _colour(paint["color"]), local))
+            colour = mesh.colors / 255.0 if paint["painted"] else seen_of_hex(paint["color"])
+            meshes.append(Mesh(mesh.vertices @ turn.T + place, mesh.normals @ turn.T, mesh.faces, colour, local))
     for number, track in enumerate(recording.soft_bodies):
         surface = shade(track.vertices[frame] @ rotation.T, track.faces)
         meshes.append(Mesh(surface.vertices, surface.normals, surface.faces, SOFT_BODY_COLOURS[number % 2], nearer=DRAPE))
     return meshes, levels
-
-
-def _colour(text: str) -> np.ndarray:
-    return np.array([int(text[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
 
 
 def _background(camera: Camera) -> np.ndarray:
@@ -182,10 +190,12 @@ def _rays(camera: Camera) -> np.ndarray:
     return rays / np.linalg.norm(rays, axis=2, keepdims=True)
 
 
-def _draw_ground(picture: np.ndarray, camera: Camera, level: float, framing: Framing, meshes: list[Mesh]) -> None:
+def _draw_ground(picture: np.ndarray, camera: Camera, ground: Level, framing: Framing, meshes: list[Mesh]) -> None:
     """Draw a level plane with its grid and the shadows on it, into the horizon."""
     from scipy.ndimage import gaussian_filter
 
+    level, chosen = ground
+    face, lines = (GROUND, LINES) if chosen is None else (seen_of_hex(chosen), DARKER * seen_of_hex(chosen))
     rays, radius = _rays(camera), float(np.linalg.norm(framing.half))
     down = rays[..., 1] < -1e-6
     way = np.where(down, (level - camera.eye[1]) / np.where(down, rays[..., 1], -1.0), 0.0)
@@ -198,7 +208,7 @@ def _draw_ground(picture: np.ndarray, camera: Camera, level: float, framing: Fra
     line *= np.clip(1.5 - 4.0 * footprint / spacing, 0.0, 1.0)
     away = np.linalg.norm(place - np.array(framing.centre)[[0, 2]], axis=-1) / max(8.0 * radius, 1e-12)
     strength = np.where(down & (way > 0.0), np.clip(1.1 - away, 0.0, 1.0) ** 1.5, 0.0)
-    colour = GROUND + (LINES - GROUND) * (0.55 * line * np.clip(1.0 - 2.0 * away, 0.0, 1.0))[..., None]
+    colour = face + (lines - face) * (0.55 * line * np.clip(1.0 - 2.0 * away, 0.0, 1.0))[..., None]
     mask = np.zeros(camera.width * camera.height)
     for mesh in meshes:
         height = mesh.vertices[:, 1] - level
@@ -261,7 +271,7 @@ def _draw_mesh(picture: np.ndarray, depth: np.ndarray, camera: Camera, mesh: Mes
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     normal *= np.where(np.einsum("kj,kj->k", normal, ahead) < 0.0, -1.0, 1.0)[:, None]  # of cloth one sees the inside, too
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    colour = np.tile(mesh.colour, (len(pixels), 1))
+    colour = np.tile(mesh.colour, (len(pixels), 1)) if mesh.colour.ndim == 1 else np.einsum("kc,kcj->kj", weights, mesh.colour[corners])
     if mesh.local is not None:
         pale = np.prod(np.einsum("kc,kcj->kj", weights, mesh.local[corners]), axis=1) > 0.0
         colour[pale] += 0.72 * (0.93 - colour[pale])
@@ -278,24 +288,46 @@ def _draw_trails(
     """Draw the paths of the last `TRAIL_SECONDS` of the centres of mass, fainter the longer ago."""
     times = recording.times
     first = int(np.searchsorted(times, times[frame] - TRAIL_SECONDS))
-    flat, disc = picture.reshape(-1, 3), np.arange(-SUPERSAMPLING, SUPERSAMPLING + 1)
+    strength = 0.75 * (1.0 - 0.8 * (times[frame] - times[first : frame + 1]) / TRAIL_SECONDS)
     for body, mesh, paint, _ in drawn:
         path = recording.center_of_mass(body.name)[first : frame + 1]
-        if mesh is None or len(path) < 2 or not np.any(path != path[0]):
-            continue
-        place, away = camera.seen(path @ rotation.T)
-        if away.min() <= 0.0:
-            continue
-        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1))])
-        along = np.arange(0.0, length[-1], 1.0)
-        x, y, near, age = (np.interp(along, length, values) for values in (*place.T, 1.0 / away, times[frame] - times[first : frame + 1]))
-        columns = (x[:, None, None] + disc[None, :, None] + 0 * disc).astype(np.int64).ravel()
-        rows = (y[:, None, None] + disc[None, None, :] + 0 * disc[:, None]).astype(np.int64).ravel()
-        strength = np.repeat(0.75 * (1.0 - 0.8 * age / TRAIL_SECONDS), len(disc) ** 2)
-        inside = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
-        pixels = rows[inside] * camera.width + columns[inside]
-        strength = np.where(np.repeat(near, len(disc) ** 2)[inside] >= depth[pixels], strength[inside], 0.0)
-        most = np.zeros(len(depth))
-        np.maximum.at(most, pixels, strength)
-        touched = np.flatnonzero(most)
-        flat[touched] += most[touched, None] * (_colour(paint["color"]) - flat[touched])
+        if mesh is not None and len(path) > 1 and np.any(path != path[0]):
+            _draw_line(picture, depth, camera, path @ rotation.T, seen_of_hex(paint["color"]), strength, SUPERSAMPLING)
+
+
+def _draw_strings(picture: np.ndarray, depth: np.ndarray, camera: Camera, recording: Any, rotation: np.ndarray, frame: int) -> None:
+    """Draw distance joints and springs that hold, as lines between their ends."""
+    for entry in joint_entries(recording):
+        if entry["kind"] in ("distance", "spring") and (entry["until"] is None or recording.times[frame] <= entry["until"]):
+            ends = [_end(recording, entry[side], entry[anchor], frame) for side, anchor in (("a", "anchorA"), ("b", "anchorB"))]
+            _draw_line(picture, depth, camera, np.array(ends) @ rotation.T, STRING, np.ones(2), SUPERSAMPLING // 2)
+
+
+def _end(recording: Any, name: str | None, anchor: list[float], frame: int) -> np.ndarray:
+    """Return where an anchor in the frame of a body, or of the world, is at a frame (3,) m."""
+    if name is None:
+        return np.asarray(anchor)
+    return recording.position(name)[frame] + rotation_matrix(recording.orientation(name)[frame]) @ np.asarray(anchor)
+
+
+def _draw_line(
+    picture: np.ndarray, depth: np.ndarray, camera: Camera, path: np.ndarray, colour: np.ndarray, strength: np.ndarray, half: int
+) -> None:
+    """Draw a line through points (k, 3) of the turned frame, each as strong (k,) as given, where nothing is nearer; half: its width."""
+    place, away = camera.seen(path)
+    if away.min() <= 0.0:
+        return
+    flat, disc = picture.reshape(-1, 3), np.arange(-half, half + 1)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1))])
+    along = np.arange(0.0, length[-1], 1.0)
+    x, y, near, shown = (np.interp(along, length, values) for values in (*place.T, 1.0 / away, strength))
+    columns = (x[:, None, None] + disc[None, :, None] + 0 * disc).astype(np.int64).ravel()
+    rows = (y[:, None, None] + disc[None, None, :] + 0 * disc[:, None]).astype(np.int64).ravel()
+    seen = np.repeat(shown, len(disc) ** 2)
+    inside = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
+    pixels = rows[inside] * camera.width + columns[inside]
+    seen = np.where(np.repeat(near, len(disc) ** 2)[inside] >= depth[pixels], seen[inside], 0.0)
+    most = np.zeros(len(depth))
+    np.maximum.at(most, pixels, seen)
+    touched = np.flatnonzero(most)
+    flat[touched] += most[touched, None] * (colour - flat[touched])

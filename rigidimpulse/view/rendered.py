@@ -1,4 +1,4 @@
-"""Meshes that are drawn of bodies whose shape is another one: those of the file that a scene was read from.
+"""Meshes that are drawn of bodies whose shape is another one: that of their `Visual`, or those of the file that a scene was read from.
 
 A node's vertices v, in its own space, lie in the rigid frame (x, Q) of its body at
 
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.view.display import DisplayMesh, shade
+from rigidimpulse.view.display import DisplayMesh, display_mesh, has_one_color, shade_pieces
 
 if TYPE_CHECKING:
     from rigidimpulse.io.gltf.geometry import Meshes
@@ -27,14 +27,27 @@ AREA = 0.02
 """Relative difference of the areas of meshes that are alike."""
 
 
-def rendered_meshes(scene: Any, collision: dict[str, DisplayMesh]) -> dict[str, DisplayMesh]:
-    """Return what is drawn of bodies, in their frames, by name; bodies that look as they collide are not in it.
+def rendered_meshes(scene: Any, collision: dict[str, DisplayMesh], segments: int) -> dict[str, DisplayMesh]:
+    """Return what is drawn of bodies, in their frames, by name; bodies that look as they collide are not in it. Equal ones share a mesh.
 
     Args:
         scene: of the recording.
         collision: what the shapes of bodies look like, by name.
+        segments: corners of a full turn of round shapes.
 
     """
+    drawn, shared = _of_file(scene, collision), {}
+    for body in scene.bodies:
+        if body.drawn_shape is not body.shape:
+            key = body.drawn_shape.drawn_key
+            if key not in shared:
+                shared[key] = display_mesh(body.drawn_shape, segments)
+            drawn[body.name] = shared[key]
+    return drawn
+
+
+def _of_file(scene: Any, collision: dict[str, DisplayMesh]) -> dict[str, DisplayMesh]:
+    """Return what the file of a scene draws of bodies, where it is something else than their shapes."""
     origin = getattr(scene, "origin", None)
     if origin is None:
         return {}
@@ -50,39 +63,34 @@ def rendered_meshes(scene: Any, collision: dict[str, DisplayMesh]) -> dict[str, 
             continue
         pieces = _pieces(meshes, node, bodies)
         if pieces:
-            mesh = _joined(pieces)
-            if not _alike(mesh, collision[name]):
+            mesh = shade_pieces(pieces)
+            if not _alike(mesh, collision[name]) or not has_one_color(mesh):
                 drawn[name] = mesh
+            elif mesh.colors is not None:
+                # The shape's own mesh is finer where that is round.
+                drawn[name] = collision[name]._replace(colors=np.tile(mesh.colors[0], (len(collision[name].vertices), 1)))
     return drawn
 
 
-def _pieces(meshes: Meshes, body: int, bodies: set[int]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Vertices (v, 3) in the frame of a body and faces of all meshes at and below its node, without those of other bodies."""
+def _pieces(meshes: Meshes, body: int, bodies: set[int]) -> list[tuple[np.ndarray, np.ndarray, np.ndarray | None]]:
+    """Vertices (v, 3) in the frame of a body, faces and colours of all meshes at and below its node, without those of other bodies."""
     hierarchy, pieces, stack = meshes.hierarchy, [], [body]
     while stack:
         node = stack.pop()
         stack += [child for child in hierarchy.nodes[node].children if child not in bodies]
         try:
             vertices, faces = meshes.of_node(node)
+            colors = meshes.colors_of_node(node)
         except SceneError:  # no mesh, or none that can be read: the loader has said so where it matters
             continue
         from rigidimpulse.core.quaternion import to_matrix
 
         position, rotation, stretch = hierarchy.scale_seen_from(node, body)
         linear = to_matrix(rotation) @ stretch
-        pieces.append((vertices @ linear.T + position, faces[:, ::-1] if np.linalg.det(linear) < 0.0 else faces))
+        mirrored = np.linalg.det(linear) < 0.0
+        turned = colors[:, ::-1] if mirrored and colors is not None else colors
+        pieces.append((vertices @ linear.T + position, faces[:, ::-1] if mirrored else faces, turned))
     return pieces
-
-
-def _joined(pieces: list[tuple[np.ndarray, np.ndarray]]) -> DisplayMesh:
-    """One mesh with vertices at the same place taken together, so that its normals are smooth across seams of the file."""
-    starts = np.cumsum([0] + [len(vertices) for vertices, _ in pieces[:-1]])
-    vertices = np.concatenate([vertices for vertices, _ in pieces])
-    faces = np.concatenate([faces + start for (_, faces), start in zip(pieces, starts, strict=True)])
-    unique, index = np.unique(vertices, axis=0, return_inverse=True)
-    faces = index.reshape(-1)[faces]
-    proper = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return shade(unique, faces[proper])
 
 
 def _alike(drawn: DisplayMesh, shape: DisplayMesh) -> bool:

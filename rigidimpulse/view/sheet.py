@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.core.colors import linear_of
 from rigidimpulse.core.content_digest import digest_of
 from rigidimpulse.core.json_text import json_text
 from rigidimpulse.recording.recording import Recording
@@ -114,12 +115,18 @@ def write_sheet(path: Path, cards: Sequence[Card], title: str) -> None:
     index = {
         "framing": asdict(frame_action(ways, up_axis(gravity))),
         "shapes": [
-            [block.add(array.astype(kind)) for array, kind in ((mesh.vertices, "f4"), (mesh.normals, "f4"), (mesh.faces, "u4"))]
+            [block.add(array.astype(kind)) for array, kind in _arrays(mesh)]
             for mesh in shapes.meshes
         ],
         "cards": entries,
     }
     path.write_text(_page(index, bytes(block.bytes), title), encoding="utf-8")
+
+
+def _arrays(mesh: DisplayMesh) -> list[tuple[np.ndarray, str]]:
+    """The arrays of a mesh in the block, and how they are kept."""
+    colors = [] if mesh.colors is None else [(linear_of(mesh.colors / 255.0), "f4")]
+    return [(mesh.vertices, "f4"), (mesh.normals, "f4"), (mesh.faces, "u4"), *colors]
 
 
 def _page(index: dict[str, Any], block: bytes, title: str) -> str:
@@ -149,12 +156,12 @@ def motion_entry(recording: Recording, shapes: Shapes, block: Block, frames: int
     chosen = np.unique(np.linspace(0, len(recording.times) - 1, frames).round().astype(int))
     entries, ways, number_of_movers = [], [], 0
     for i, body in enumerate(bodies):
-        number = shapes.number(body.shape)
+        number = shapes.number(body.drawn_shape)
         position, orientation = recording.positions[:, i], recording.orientations[:, i]
-        planes = [[*normal.tolist(), offset] for normal, offset in display_planes(body.shape)]
+        planes = [[*normal.tolist(), offset] for normal, offset in display_planes(body.drawn_shape)]
         entries.append({
             "shape": number, "planes": planes, "track": movers.index(i) if i in movers else -1,
-            "surface": surface(number_of_movers, body), "position": position[0].tolist(),
+            "surface": surface(number_of_movers, body, shapes.meshes[number] if number >= 0 else None), "position": position[0].tolist(),
             "quaternion": orientation[0, [1, 2, 3, 0]].tolist(),
         })  # fmt: skip
         number_of_movers += i in movers

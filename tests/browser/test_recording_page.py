@@ -51,7 +51,7 @@ def shared(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Opened:
     """The page of `full_run`, opened once from its file."""
     path = tmp_path_factory.mktemp("page") / "run.html"
     drawn = display_mesh(ri.Shape.box((0.7, 0.2, 0.1)))
-    path.write_text(render_page(full_run(), drawn_of=lambda scene, collision: {STRANGE_NAME: drawn}), encoding="utf-8")
+    path.write_text(render_page(full_run(), drawn_of=lambda scene, collision, segments: {STRANGE_NAME: drawn}), encoding="utf-8")
     page = open_page(browser, path.as_uri(), WIDTH, HEIGHT)
     page.page.keyboard.press("p")  # so low a window has the plots put away
     return page

@@ -18,7 +18,7 @@ def drawn(path: Path) -> dict[str, np.ndarray]:
     """Vertices of the meshes that are drawn in the place of shapes, by body."""
     scene = ri.load_scene(path)
     collision = {body.name: display_mesh(body.shape) for body in scene.bodies}
-    found = rendered_meshes(scene, {name: mesh for name, mesh in collision.items() if mesh is not None})
+    found = rendered_meshes(scene, {name: mesh for name, mesh in collision.items() if mesh is not None}, 64)
     for mesh in found.values():
         corners = mesh.vertices[mesh.faces]
         # Outward faces of a closed mesh have a positive volume, also below a mirror.

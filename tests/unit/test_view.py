@@ -289,12 +289,12 @@ class TestSurfaces:
         assert len({color(k) for k in range(5 * len(PALETTE))}) == 5 * len(PALETTE)
 
     def test_finish_follows_the_material(self) -> None:
-        steel = surface(0, Body("a", Shape.sphere(1), material=Material(density=7800, dynamic_friction=0.2)))
-        rubber = surface(0, Body("b", Shape.box(1), material=Material(density=1100, dynamic_friction=0.9)))
+        steel = surface(0, Body("a", Shape.sphere(1), material=Material(density=7800, dynamic_friction=0.2)), None)
+        rubber = surface(0, Body("b", Shape.box(1), material=Material(density=1100, dynamic_friction=0.9)), None)
         assert steel["metalness"] > 0.5 > rubber["metalness"]
         assert steel["roughness"] < rubber["roughness"]
         assert steel["octants"] and not rubber["octants"]
-        assert surface(0, Body("c", Shape.sphere(1), motion="static"))["octants"] is False
+        assert surface(0, Body("c", Shape.sphere(1), motion="static"), None)["octants"] is False
 
 
 class TestPage:

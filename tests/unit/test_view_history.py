@@ -84,13 +84,16 @@ class TestRenderedMeshes:
         scene = self.scene(tmp_path, shape)
         collision = {body.name: display_mesh(body.shape) for body in scene.bodies}
         assert all(mesh is not None for mesh in collision.values())
-        assert rendered_meshes(scene, collision) == {}  # type: ignore[arg-type]
+        for name, mesh in rendered_meshes(scene, collision, 64).items():  # type: ignore[arg-type]
+            # The file gives it a colour, and that is all.
+            assert mesh.colors is not None and len(np.unique(mesh.colors, axis=0)) == 1
+            assert mesh.vertices is collision[name].vertices  # type: ignore[union-attr]
 
     def test_the_mesh_of_the_node_is_drawn_in_the_frame_of_the_body(self, tmp_path: Path) -> None:
         scene = self.scene(tmp_path, Shape.box((1, 2, 3)))
         ball = display_mesh(Shape.sphere(1.0))
         assert ball is not None
-        (mesh,) = rendered_meshes(scene, {scene.names[0]: ball}).values()
+        (mesh,) = rendered_meshes(scene, {scene.names[0]: ball}, 64).values()
         # The corners of the box, although its node lies elsewhere and turned: half the edges away from the body's origin.
         assert np.allclose(np.abs(mesh.vertices), [0.5, 1.0, 1.5], rtol=0, atol=1e-6)
         assert np.einsum("ij,ij->i", mesh.vertices, mesh.normals).min() > 0.0

@@ -597,7 +597,7 @@ def _respond(loop, island, touch, members):
         return
     force, constants = np.empty((contacts.gap.shape[0], 3)), loop.bodies.constants
     read_forces(memory, motion.trajectory.start, contacts, touch.touching, force)
-    response = Response(SEQUENTIAL, live.collapse or bear_each_other(contacts, constants.dynamic, force))
+    response = Response(SEQUENTIAL, live.collapse or bear_each_other(contacts, constants, force))
     done = resolve_impacts(now, constants, members, live, response, loop.number, None, loop.impacts)
     if has_log_capacity(log, ENERGIES, NO_ROWS, done.count):
         log_impacts(log, island.time, contacts, now.position, done.log, done.count)

@@ -33,6 +33,8 @@ WITHOUT_REBOUND_REMEDY = "too many impacts at one instant; try response='simulta
 # Approach speed that counts as none, relative to the speed of the island, and to the speed below which contacts are held.
 APPROACH = TOLERANCES.contact.approach
 SLOW = TOLERANCES.contact.slow_approach
+# Force of a contact that bears, relative to the weight of the lighter body.
+BEARING: float = 1e-4
 # Calls with a full log before an island is given up.
 MAX_CALLS = 1000
 # Impacts in a row, without a gap worth the name between them, after which a pair no longer rebounds; after which an elastic pair does not.
@@ -75,7 +77,7 @@ def respond(run: Run, _pair_events: PairEvents, island: Island) -> None:
     island.zero_speed, island.scale = live.rule.tolerance, live.rule.scale
     if not live.approach:
         return
-    together = live.collapse or bear_each_other(contacts, run.world.dynamic, forces_of(run, contacts, island.touching))
+    together = live.collapse or bear_each_other(contacts, run.world.constants, forces_of(run, contacts, island.touching))
     done = resolve_impacts(
         state.now, run.world.constants, island.members, live, Response(RESPONSES[accuracy.response], together), run.column,
         run.joints.impact_block(run, island) if len(island.joints) else None, run.impact_log,
@@ -169,11 +171,18 @@ def _with_capacity(log, count, size):
 
 
 @jit
-def bear_each_other(contacts, dynamic, force):
-    """Whether a contact between two movable bodies carried load before; dynamic (n,) bool; force (m, 3) N, in the contacts' frames."""
+def bear_each_other(contacts, constants, force):
+    """Whether a contact between two movable bodies carried load before; force (m, 3) N, in the contacts' frames.
+
+    Bodies that hang side by side and just touch, as in Newton's cradle, press on each other with 1e-7 of their weight: by what holding
+    joints and gaps leaves over. Impulses pass through those one after the other.
+    """
     for c in range(force.shape[0]):
-        if force[c, 0] > 0.0 and dynamic[contacts.body_a[c]] and dynamic[contacts.body_b[c]]:
-            return True
+        a, b = contacts.body_a[c], contacts.body_b[c]
+        if force[c, 0] > 0.0 and constants.dynamic[a] and constants.dynamic[b]:
+            weight = min(constants.mass[a] * constants.steady_strength[a], constants.mass[b] * constants.steady_strength[b])
+            if force[c, 0] > BEARING * weight:
+                return True
     return False
 
 

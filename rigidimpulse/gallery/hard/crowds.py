@@ -25,6 +25,7 @@ import numpy as np
 from rigidimpulse.core.quaternion import rotate
 from rigidimpulse.engine.simulate import simulate
 from rigidimpulse.gallery.hard.parts import above_floor, apart, dull, energy_never_grows, finite, floor_scene, turned
+from rigidimpulse.gallery.looks import domino
 from rigidimpulse.gallery.record import Check, GalleryScene, at_least, at_most, equal
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.body import Body
@@ -134,7 +135,10 @@ def dominoes() -> Scene:
         push = (0.0, 8.0, 0.0) if k == 0 else (0.0, 0.0, 0.0)
         speed = (8.0 * 0.5 * DOMINO[2], 0.0, 8.0 * 0.5 * DOMINO[0]) if k == 0 else (0.0, 0.0, 0.0)
         place = (k * SPACING, 0.0, 0.5 * DOMINO[2])
-        scene.add(Body(f"domino {k + 1}", shape, position=place, velocity=speed, angular_velocity=push, material=material))
+        look = domino(DOMINO, 1 + k % 6, 1 + k // 6 % 6)
+        scene.add(
+            Body(f"domino {k + 1}", shape, position=place, velocity=speed, angular_velocity=push, material=material, visual=look)
+        )  # fmt: skip
     return scene
 
 

@@ -32,11 +32,13 @@ import numpy as np
 from rigidimpulse.core.portable import matmul
 from rigidimpulse.core.quaternion import rotate
 from rigidimpulse.gallery.hard.parts import GRAVITY, above_floor, dull, energy_never_grows, finite, floor_scene, turned, undisturbed
+from rigidimpulse.gallery.looks import GOLD
 from rigidimpulse.gallery.record import Check, GalleryScene, at_most
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
+from rigidimpulse.scene.visual import Visual
 
 DISK, THICKNESS = 0.0381, 0.0128
 """m: the toy sold under this name."""
@@ -107,7 +109,7 @@ def coin() -> Scene:
     height = COIN * math.cos(0.05) + 0.5 * COIN_THICKNESS * math.sin(0.05)
     scene.add(
         Body("coin", Shape.cylinder(COIN, COIN_THICKNESS), position=(0.0, 0.0, height + 1e-4), orientation=turn,
-             angular_velocity=(0.0, 0.0, 40.0), material=dull(0.3, 0.2, 7000.0))
+             angular_velocity=(0.0, 0.0, 40.0), material=dull(0.3, 0.2, 7000.0), visual=Visual(color=GOLD))
     )  # fmt: skip
     return scene
 

@@ -24,11 +24,13 @@ from functools import partial
 import numpy as np
 
 from rigidimpulse.gallery.hard.parts import dull, energy_never_grows, farthest, finite, floor_scene, turned, undisturbed
+from rigidimpulse.gallery.looks import BRICK_COLOR, IVORY, STONE, card, shade_of
 from rigidimpulse.gallery.record import Check, Exact, GalleryScene, at_least, at_most
 from rigidimpulse.recording.recording import Recording
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
+from rigidimpulse.scene.visual import Visual
 
 STILL = "statics: forces in the cones balance every block"
 BRICK = (0.24, 0.115, 0.071)
@@ -77,9 +79,11 @@ def wall() -> Scene:
         shifted = layer % 2 == 1
         places = [(k + (1.0 if shifted else 0.5)) * length for k in range(BRICKS - shifted)]
         for k, x in enumerate(places):
-            scene.add(Body(f"layer {layer + 1} brick {k + 1}", brick, position=(x, 0.0, z), material=material))
+            look = shade_of(BRICK_COLOR, 7 * layer + k)
+            scene.add(Body(f"layer {layer + 1} brick {k + 1}", brick, position=(x, 0.0, z), material=material, visual=look))
         for name, x in (("left", 0.25 * length), ("right", (BRICKS - 0.25) * length)) if shifted else ():
-            scene.add(Body(f"layer {layer + 1} {name}", half, position=(x, 0.0, z), material=material))
+            look = shade_of(BRICK_COLOR, 7 * layer + (5 if name == "left" else 6))
+            scene.add(Body(f"layer {layer + 1} {name}", half, position=(x, 0.0, z), material=material, visual=look))
     return scene
 
 
@@ -102,7 +106,8 @@ def arch(thickness: float) -> Scene:
         points = np.array(ring)
         points[np.abs(points[:, 2]) < 1e-15, 2] = 0.0
         center = points.mean(axis=0)
-        scene.add(Body(f"voussoir {k + 1}", Shape.convex_hull(points - center), position=center, material=material))
+        stone, look = Shape.convex_hull(points - center), shade_of(STONE, k)
+        scene.add(Body(f"voussoir {k + 1}", stone, position=center, material=material, visual=look))
     return scene
 
 
@@ -141,11 +146,13 @@ def house() -> Scene:
             for side, name in ((1.0, "right"), (-1.0, "left")):
                 place = (middle + side * inward, 0.0, base + height)
                 turn = turned((0.0, 1.0, 0.0), -side * LEAN)
-                scene.add(Body(f"card {storey + 1}.{k + 1} {name}", Shape.box(CARD), position=place, orientation=turn, material=material))
+                name = f"card {storey + 1}.{k + 1} {name}"
+                scene.add(Body(name, Shape.box(CARD), position=place, orientation=turn, material=material, visual=card(CARD)))
         base += 2.0 * height
         if num_pairs > 1:
             deck = Shape.box((num_pairs * pitch, width, DECK))
-            scene.add(Body(f"deck {storey + 1}", deck, position=(0.0, 0.0, base + 0.5 * DECK), material=material))
+            place = (0.0, 0.0, base + 0.5 * DECK)
+            scene.add(Body(f"deck {storey + 1}", deck, position=place, material=material, visual=Visual(color=IVORY)))
             base += DECK
     return scene
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 PACKAGE = "rigidimpulse."
 HOMES = (
     "core.simd", "scene.body", "scene.collision_filter", "scene.joint", "scene.joint_six_axis", "scene.keyframes", "scene.mass",
-    "scene.material", "scene.shape", "collision", "motion", "model", "dynamics", "engine.exact",
+    "scene.material", "scene.shape", "scene.visual", "collision", "motion", "model", "dynamics", "engine.exact",
     "engine.substepped", "engine.spheres", "engine.absent", "engine.cheapest", "engine.islands", "engine.finder", "engine.touching",
     "engine.narrow_phase", "engine.fcl_contacts", "engine.keyframe_paths", "engine.pair_events", "engine.pair_table", "engine.regime",
     "engine.run", "engine.soft_bodies", "engine.triggers", "engine.varying_forces", "recording.contact_log", "recording.contacts",

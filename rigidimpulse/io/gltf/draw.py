@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.core.colors import linear_of, seen_of_hex
 from rigidimpulse.core.quaternion import from_matrix
 from rigidimpulse.io.gltf.container import Builder
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.shape import Shape
 from rigidimpulse.view.camera import stage_rotation, up_axis
-from rigidimpulse.view.display import display_mesh, display_planes
+from rigidimpulse.view.display import DisplayMesh, display_mesh, display_planes, joined_meshes
 from rigidimpulse.view.materials import PALETTE, surface
 
 SEGMENTS = 32
@@ -56,56 +57,59 @@ class Drawing:
     def __init__(self, builder: Builder, half: float) -> None:
         """half: m, half side of squares for half spaces."""
         self.builder, self.half = builder, max(half, LEAST_SQUARE)
-        self._geometry: dict[Any, dict[str, Any]] = {}
+        self._geometry: dict[Any, tuple[dict[str, Any], DisplayMesh]] = {}
         self._meshes: dict[Any, int] = {}
         self._paints: dict[str, int] = {}
 
     def mesh(self, body: Body, index: int, shape: Shape | None = None) -> int:
-        """Return the mesh of a body, or of a part of its shape, in the colour of the moving body `index`."""
-        shape = body.shape if shape is None else shape
-        paint = surface(index % len(PALETTE), body)
-        key = (shape.key, str(paint))
+        """Return the mesh of a body, or of a part of its shape, in the colours of the body, or that of the moving body `index`."""
+        shape = body.drawn_shape if shape is None else shape
+        geometry, drawn = self._geometry_of(shape)
+        paint = surface(index % len(PALETTE), body, drawn)
+        key = (shape.drawn_key, str(paint))
         if key not in self._meshes:
-            primitive = {**self._primitive(shape), "material": self.paint(paint)}
+            attributes = dict(geometry["attributes"])
+            if not paint["painted"]:
+                attributes.pop("COLOR_0", None)
+            primitive = {**geometry, "attributes": attributes, "material": self.paint(paint)}
             self._meshes[key] = self.builder.add("meshes", {"primitives": [primitive]})
         return self._meshes[key]
 
-    def _primitive(self, shape: Shape) -> dict[str, Any]:
-        key = shape.key
+    def _geometry_of(self, shape: Shape) -> tuple[dict[str, Any], DisplayMesh]:
+        """Return the triangles of a shape, in the file and as they are."""
+        key = shape.drawn_key
         if key not in self._geometry:
             pieces = [_square(normal, offset, self.half) for normal, offset in display_planes(shape)]
-            drawn = display_mesh(shape, SEGMENTS)
-            if drawn is not None:
-                pieces.append((drawn.vertices, drawn.normals, drawn.faces))
-            starts = np.cumsum([0] + [len(piece[0]) for piece in pieces[:-1]])
-            vertices, normals = (np.concatenate([piece[k] for piece in pieces]) for k in range(2))
-            faces = np.concatenate([piece[2] + start for piece, start in zip(pieces, starts, strict=True)])
-            normals = normals.astype(np.float32).astype(float)
+            mesh = display_mesh(shape, SEGMENTS)
+            drawn = joined_meshes(pieces if mesh is None else [*pieces, mesh])
+            normals = drawn.normals.astype(np.float32).astype(float)
             builder = self.builder
             attributes = {
-                "POSITION": builder.array(vertices, "VEC3", bounds=True, target=VERTICES),
+                "POSITION": builder.array(drawn.vertices, "VEC3", bounds=True, target=VERTICES),
                 "NORMAL": builder.array(normals / np.linalg.norm(normals, axis=1, keepdims=True), "VEC3", target=VERTICES),
             }
-            index = builder.array(faces.ravel().astype(np.uint32), "SCALAR", target=INDICES)
-            self._geometry[key] = {"attributes": attributes, "indices": index}
+            if drawn.colors is not None:
+                attributes["COLOR_0"] = builder.array(linear_of(drawn.colors / 255.0), "VEC3", target=VERTICES)
+            index = builder.array(drawn.faces.ravel().astype(np.uint32), "SCALAR", target=INDICES)
+            self._geometry[key] = {"attributes": attributes, "indices": index}, drawn
         return self._geometry[key]
 
     def paint(self, paint: dict[str, Any]) -> int:
         """Return the material of a surface."""
         key = str(paint)
         if key not in self._paints:
-            shade = np.array([int(paint["color"][k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
-            linear = np.where(shade <= 0.04045, shade / 12.92, ((shade + 0.055) / 1.055) ** 2.4)
+            # What is painted has its colours at the vertices, which multiply that of the material.
+            linear = np.ones(3) if paint["painted"] else linear_of(seen_of_hex(paint["color"]))
             finish = {"baseColorFactor": [*linear.tolist(), 1.0]}
             finish |= {"metallicFactor": paint["metalness"], "roughnessFactor": paint["roughness"]}
             self._paints[key] = self.builder.add("materials", {"pbrMetallicRoughness": finish, "doubleSided": True})
         return self._paints[key]
 
 
-def _square(normal: np.ndarray, offset: float, half: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices, normals and faces of a square in a plane."""
+def _square(normal: np.ndarray, offset: float, half: float) -> DisplayMesh:
+    """A square in a plane."""
     across = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
     across /= np.linalg.norm(across)
     along = np.cross(normal, across)
     corners = [offset * normal + half * (a * across + b * along) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    return np.array(corners), np.tile(normal, (4, 1)), np.array([[0, 1, 2], [0, 2, 3]])
+    return DisplayMesh(np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]), np.tile(normal, (4, 1)))

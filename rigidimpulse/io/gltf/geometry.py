@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigidimpulse.io.gltf.colors import Colors
 from rigidimpulse.io.gltf.container import COMPRESSION, GltfFile
 from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.schema import LARGEST, Primitive
@@ -22,6 +23,7 @@ class Meshes:
         """Nothing is read before it is asked for."""
         self.hierarchy, self.file = hierarchy, hierarchy.file
         self.notes: list[str] = []
+        self.colors = Colors(self.file)
         self._known: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def of_node(self, node: int) -> tuple[np.ndarray, np.ndarray]:
@@ -61,6 +63,19 @@ class Meshes:
         if plain:
             self._known[entry.mesh] = vertices, faces
         return vertices, faces
+
+    def colors_of_node(self, node: int) -> np.ndarray | None:
+        """Colours (f, 3, 3) of the corners of the faces of a node's mesh, uint8, None if it has none. `of_node` has read it."""
+        index = self.hierarchy.nodes[node].mesh
+        assert index is not None
+        mesh, pieces = self.file.entry(self.file.document.meshes, index, "mesh"), []
+        for number, primitive in enumerate(mesh.primitives):
+            faces = self._faces(primitive, f"mesh {index}, primitive {number}")
+            if faces is not None:
+                pieces.append((faces, self.colors.of(primitive, faces)))
+        if all(colors is None for _, colors in pieces):
+            return None
+        return np.concatenate([np.full((len(faces), 3, 3), 255, np.uint8) if colors is None else colors for faces, colors in pieces])
 
     def _faces(self, primitive: Primitive, where: str) -> np.ndarray | None:
         """Triangles (f, 3), None for points and lines."""

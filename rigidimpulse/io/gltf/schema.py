@@ -290,6 +290,7 @@ class Primitive(Part):
 
     attributes: dict[str, Index]
     indices: Index | None = None
+    material: Any = None
     mode: int = 4
     targets: list[dict[str, Index]] = []
     extensions: dict[str, Any] = {}

@@ -101,7 +101,13 @@ class _Writer:
         collider = {"physicsMaterial": self._entry("physicsMaterials", body.material, material)}
         if body.collision_filter is not None:
             collider["collisionFilter"] = self._filter(body.collision_filter)
-        parts = body.shape.parts_flat()
+        parts, looks_else = body.shape.parts_flat(), body.drawn_shape is not body.shape
+        if looks_else and any(part.shape.kind == "mesh" for part in parts):
+            # The mesh of a collider is that of its node, which is seen.
+            self.left_out.append(f"body {body.name!r}: its visual shape, beside a mesh that collides")
+            looks_else = False
+        if looks_else:
+            self.builder.tree["nodes"][self._child(body.name, {"name": f"{body.name} visual"})]["mesh"] = self.drawing.mesh(body, number)
         for k, part in enumerate(parts):
             place, turn, geometry, shape = self._geometry(part)
             if body.motion == "static" and (len(parts) > 1 or np.any(place) or np.any(turn[1:])):
@@ -113,7 +119,8 @@ class _Writer:
             if geometry is None:
                 geometry = {"node": where}
             self._physics(where)["collider"] = {"geometry": geometry, **collider}
-            self.builder.tree["nodes"][where]["mesh"] = self.drawing.mesh(body, number, shape)
+            if not looks_else:
+                self.builder.tree["nodes"][where]["mesh"] = self.drawing.mesh(body, number, shape)
 
     def _geometry(self, part: Part) -> tuple[np.ndarray, np.ndarray, dict[str, Any] | None, Shape]:
         """Place, turn, geometry (None: the mesh of the node) and what is seen of a part, in glTF's axes."""

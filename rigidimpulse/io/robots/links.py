@@ -19,6 +19,7 @@ import numpy as np
 from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.io.inertia import with_possible_inertia
 from rigidimpulse.io.pieces import GHOST, Piece, Weight, fill_mass, joined
+from rigidimpulse.io.robots.looks import Look, visual_of
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.collision_filter import CollisionFilter
 from rigidimpulse.scene.joint_six_axis import Drive, Limit, SixAxisJoint
@@ -33,7 +34,8 @@ LEAST_MASS = 1e-3
 class Link:
     """A link: name, pose in the world at the start, colliders in its frame, and its mass properties where they are given.
 
-    motion, gravity_factor: as of `Body`. is_between: whether it stands for nothing in the file.
+    motion, gravity_factor: as of `Body`. is_between: whether it stands for nothing in the file. looks: what is seen of it; none: its
+    colliders.
     """
 
     name: str
@@ -44,14 +46,16 @@ class Link:
     motion: Literal["dynamic", "kinematic", "static"] = "dynamic"
     gravity_factor: float = 1.0
     is_between: bool = False
+    looks: list[Look] = field(default_factory=list)
 
     def take(self, other: Link) -> None:
-        """Make the colliders of another link parts of this one."""
+        """Make the colliders and the looks of another link parts of this one."""
         back = self.orientation * [1.0, -1.0, -1.0, -1.0]
         way, turn = rotate(back, other.position - self.position), multiply(back, other.orientation)
-        for piece in other.pieces:
-            place = way + rotate(turn, piece.position)
-            self.pieces.append(piece._replace(position=place, orientation=multiply(turn, piece.orientation)))
+        for mine, its in ((self.pieces, other.pieces), (self.looks, other.looks)):
+            mine += [
+                each._replace(position=way + rotate(turn, each.position), orientation=multiply(turn, each.orientation)) for each in its
+            ]  # fmt: skip
 
     def body(self, filter_: CollisionFilter | None, notes: list[str]) -> Body:
         """Return the body of the link; notes: lines of the report."""
@@ -68,7 +72,7 @@ class Link:
             fill_mass(self.name, shape, values, notes)
         made = Body(
             self.name, shape, motion=self.motion, position=self.position, orientation=self.orientation, material=pieces[0].material,
-            gravity_factor=self.gravity_factor, collision_filter=filter_, **values,
+            gravity_factor=self.gravity_factor, collision_filter=filter_, visual=visual_of(self.looks, pieces), **values,
         )  # fmt: skip
         return with_possible_inertia(made, notes)
 

@@ -26,6 +26,7 @@ from rigidimpulse.io.inertia import nearest_inertia
 from rigidimpulse.io.named_files import named_file
 from rigidimpulse.io.pieces import Piece, Weight, sphere_points
 from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, carried, filters, fixed
+from rigidimpulse.io.robots.looks import Look
 from rigidimpulse.io.robots.xml import read_xml
 from rigidimpulse.scene.joint import BallJoint
 from rigidimpulse.scene.joint_six_axis import AXES, Drive, Limit, SixAxisJoint
@@ -38,6 +39,8 @@ FREE, BALL, SLIDE, HINGE = range(4)
 PLANE, FIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)
 BETWEEN = 1e-4
 """Mass and inertia of bodies between the joints of one body, as a share of its own."""
+GREY, HIDDEN_GROUP = 0.5, 3
+"""Colour that stands for none; groups of geoms from this one on are not shown."""
 ALONG = 1e-9
 """Sine of an angle that is none."""
 FOLDERS = ("meshdir", "texturedir", "assetdir", "dir")
@@ -159,6 +162,7 @@ class _Reader:
         self.model, self.data, self.notes = model, data, notes
         self._used: set[str] = set()
         self._meshes: dict[int, Shape] = {}
+        self._drawn: dict[int, Shape] = {}
         self._chained: list[tuple[str, str]] = []
         self._only_seen: list[str] = []
         self.names = [self._name("body", k, model.body(k).name) if k else "world" for k in range(model.nbody)]
@@ -222,12 +226,13 @@ class _Reader:
             weight = Weight(float(model.body_mass[k]), np.array(model.body_ipos[k]), axes @ np.diag(model.body_inertia[k]) @ axes.T)
         geoms = range(int(model.body_geomadr[k]), int(model.body_geomadr[k] + model.body_geomnum[k]))
         pieces = [piece for g in geoms if (piece := self._piece(g, np.array(model.geom_pos[g]), np.array(model.geom_quat[g]))) is not None]
+        looks = [look for g in geoms if (look := self._look(g, np.array(model.geom_pos[g]), np.array(model.geom_quat[g]))) is not None]
         bits = {self._bits(g) for g in geoms if self._bits(g) != (0, 0)}
         if len(bits) > 1:
             self.notes.append(f"body {self.names[k]!r} has geoms with several contype and conaffinity: it collides where one of them does")
         return Link(
             self.names[k], np.array(data.xpos[k]), np.array(data.xquat[k]), pieces, weight,
-            gravity_factor=1.0 - float(model.body_gravcomp[k]),
+            gravity_factor=1.0 - float(model.body_gravcomp[k]), looks=looks,
         )  # fmt: skip
 
     def _bits(self, geom: int) -> tuple[int, int]:
@@ -241,13 +246,17 @@ class _Reader:
             piece = self._piece(g, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
             if piece is not None:
                 name = self._name("geom", g, model.geom(g).name)
-                made.append(Link(name, np.array(model.geom_pos[g]), np.array(model.geom_quat[g]), [piece], motion="static"))
+                look = self._look(g, piece.position, piece.orientation)
+                looks = [] if look is None else [look]
+                made.append(Link(name, np.array(model.geom_pos[g]), np.array(model.geom_quat[g]), [piece], motion="static", looks=looks))
                 self.ground_bits[name] = self._bits(g)
         return made
 
     def _piece(self, g: int, position: np.ndarray, orientation: np.ndarray) -> Piece | None:
         """Return a geom that collides as a piece, None for one that does not, or is not read."""
         if self._bits(g) == (0, 0):
+            if self.model.geom_bodyid[g] and self._is_seen(g):
+                return None
             self._only_seen.append(repr(self.model.geom(g).name or f"geom{g}"))
             return None
         shape = self._shape(g)
@@ -263,6 +272,31 @@ class _Reader:
             spinning_friction=spin if condim >= 4 else None, rolling_friction=roll if condim >= 6 else None,
         )  # fmt: skip
         return Piece(shape, position, orientation, material, None)
+
+    def _is_seen(self, g: int) -> bool:
+        """Whether MuJoCo's viewer shows a geom, if nobody changes that."""
+        return int(self.model.geom_group[g]) < HIDDEN_GROUP and float(self.model.geom_rgba[g][3]) > 0.0
+
+    def _look(self, g: int, position: np.ndarray, orientation: np.ndarray) -> Look | None:
+        """Return what is seen of a geom, None for one that is not seen, or not read."""
+        model = self.model
+        shape = self._drawn_mesh(int(model.geom_dataid[g])) if int(model.geom_type[g]) == MESH else self._shape(g)
+        if shape is None or not self._is_seen(g):
+            return None
+        color, material = np.array(model.geom_rgba[g][:3], float), int(model.geom_matid[g])
+        if np.all(color == GREY):
+            color = np.array(model.mat_rgba[material][:3], float) if material >= 0 else None
+        return Look(shape, position, orientation, None if color is None else np.clip(color, 0.0, 1.0))
+
+    def _drawn_mesh(self, mesh: int) -> Shape:
+        """Return the triangles of a mesh, of which only the hull collides."""
+        if mesh not in self._drawn:
+            model = self.model
+            first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+            start, number = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+            vertices = np.array(model.mesh_vert[first : first + count], float)
+            self._drawn[mesh] = Shape.mesh(vertices, np.array(model.mesh_face[start : start + number]))
+        return self._drawn[mesh]
 
     def _shape(self, g: int) -> Shape | None:
         """Return the shape of a geom, None for one that is not read."""

@@ -23,6 +23,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import multiply, quaternion_from_rotation_vector, rotate, to_matrix
 from rigidimpulse.io.pieces import Piece, Weight, joined
 from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, carried, filters, fixed
+from rigidimpulse.io.robots.looks import Look
 from rigidimpulse.io.robots.xml import read_xml, robot_file
 from rigidimpulse.scene.joint_six_axis import Limit, SixAxisJoint
 from rigidimpulse.scene.material import Material
@@ -59,6 +60,8 @@ class _Reader:
         self.links = _named(root, "link")
         self.joints = _named(root, "joint")
         self.joint_of = self._tree()
+        named = [*root.findall("material"), *root.iterfind("link/visual/material")]
+        self._colors = {entry.get("name"): color for entry in named if (color := entry.find("color")) is not None}
         others = Counter(entry.tag for entry in root if entry.tag not in ("link", "joint", "material"))
         self.notes += [f"<{tag}>, {count} times, is not read" for tag, count in sorted(others.items())]
 
@@ -103,9 +106,6 @@ class _Reader:
         joints, carrier = self._join(made, self._is_fixed(made) if fixed_base is None else fixed_base)
         kept = [name for name in self.order if carrier[name] == name]
         self.notes += carried({name: other for name, other in carrier.items() if name != WORLD or other is not None})
-        seen = [name for name, entry in self.links.items() if entry.find("visual") is not None and entry.find("collision") is not None]
-        if seen:
-            self.notes.append(f"<visual> of links {', '.join(map(repr, seen))} is not read: what is drawn is their collision")
         apart = self._overlaps([made[name] for name in kept], joints)
         barred = filters(kept, apart)
         scene = Scene(gravity)
@@ -175,7 +175,29 @@ class _Reader:
             drawn = entry.findall("visual")
             self.notes.append(f"{where} has no collision: what is seen of it collides")
         pieces = [Piece(self._shape(part, where), *_origin(part, where), Material(), None) for part in drawn]
-        return Link(name, position, orientation, pieces, self._weight(entry.find("inertial"), where))
+        weight, looks = self._weight(entry.find("inertial"), where), self._looks(entry, where)
+        return Link(name, position, orientation, pieces, weight, looks=looks)
+
+    def _looks(self, entry: Any, where: str) -> list[Look]:
+        """Return what is seen of a link; what cannot be read is listed, and its colliders are seen."""
+        looks = []
+        for part in entry.findall("visual"):
+            try:
+                looks.append(Look(self._shape(part, where), *_origin(part, where), self._color(part, where)))
+            except SceneError as error:
+                self.notes.append(f"{where}: a <visual> is not read ({error.problem})")
+                return []
+        return looks
+
+    def _color(self, part: Any, where: str) -> np.ndarray | None:
+        """Return the colour of a visual element, None where it names none."""
+        given = part.find("material")
+        if given is None:
+            return None
+        color = given.find("color")
+        if color is None:
+            color = self._colors.get(given.get("name"))
+        return None if color is None else np.clip(_numbers(color.get("rgba"), 4, "rgba", where)[:3], 0.0, 1.0)
 
     def _weight(self, entry: Any, where: str) -> Weight | None:
         """Return the mass properties of a link, None where it has no mass."""

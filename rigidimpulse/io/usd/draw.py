@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rigidimpulse.core.quaternion import from_matrix
-from rigidimpulse.io.usd.layer import TYPES, attribute, define, extent, mesh, order, paint, place
+from rigidimpulse.io.usd.layer import TYPES, attribute, define, extent, mesh, order, paint, paint_vertices, place
 from rigidimpulse.io.usd.library import Gf, Layer, PrimSpec, Sdf, SdfPath, Vt
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.shape import Part, Shape
@@ -34,35 +34,36 @@ class Drawing:
     def __init__(self, layer: Layer, half: float, bodies: Iterable[Body]) -> None:
         """half: m, half side of squares. bodies: those that will be drawn."""
         self.layer, self.half = layer, max(half, LEAST_SQUARE)
-        parts = [part.shape.key for body in bodies for part in body.shape.parts_flat() if part.shape.kind == "mesh"]
+        parts = [part.shape.drawn_key for body in bodies for part in body.drawn_shape.parts_flat() if part.shape.kind == "mesh"]
         self._uses = Counter(parts)
-        self._shared: dict[bytes, SdfPath] = {}
+        self._shared: dict[tuple[bytes, bool], SdfPath] = {}
 
     def body(self, path: SdfPath, body: Body, number: int) -> PrimSpec:
         """Return the prim of a body with its shapes, in the colour of the moving body `number`."""
         prim = define(self.layer, path)
         prim.SetInfo("displayName", body.name)
-        paint(prim, surface(number % len(PALETTE), body)["color"])
-        parts = body.shape.parts_flat()
+        paint(prim, surface(number % len(PALETTE), body, None)["color"])
+        parts = body.drawn_shape.parts_flat()
         for k, part in enumerate(parts):
             # Blender makes one object of an Xform and a shape that is alone in it and has no operations, and names it after the shape.
             single = len(parts) == 1 and not self._is_placed(part)
-            self._part(path.AppendChild(path.name if single else f"{path.name}_shape{k}"), part)
+            self._part(path.AppendChild(path.name if single else f"{path.name}_shape{k}"), part, body.shows_own_colors)
         return prim
 
     def _is_placed(self, part: Part) -> bool:
         """Whether the prim of a part has operations, or is an instance."""
         moved = bool(np.any(part.position)) or not np.array_equal(part.rotation, np.eye(3))
-        return moved or part.shape.kind == "box" or self._uses[part.shape.key] > 1
+        return moved or part.shape.kind == "box" or self._uses[part.shape.drawn_key] > 1
 
-    def _part(self, path: SdfPath, part: Part) -> None:
+    def _part(self, path: SdfPath, part: Part, painted: bool) -> None:
+        """Write a part; painted: in the colours that its mesh has."""
         shape = part.shape
-        if shape.kind == "mesh" and self._uses[shape.key] > 1:
+        if shape.kind == "mesh" and self._uses[shape.drawn_key] > 1:
             prim = define(self.layer, path)
-            prim.referenceList.Prepend(Sdf.Reference(primPath=self._class(shape)))
+            prim.referenceList.Prepend(Sdf.Reference(primPath=self._class(shape, painted)))
             prim.instanceable = True
         else:
-            prim = self._geometry(path, shape)
+            prim = self._geometry(path, shape, painted)
         names: list[str] = []
         turn = NO_TURN if np.array_equal(part.rotation, np.eye(3)) else from_matrix(part.rotation)
         if np.any(part.position) or np.any(turn[1:]):
@@ -73,17 +74,18 @@ class Drawing:
         if names:
             order(prim, names)
 
-    def _class(self, shape: Shape) -> SdfPath:
+    def _class(self, shape: Shape, painted: bool) -> SdfPath:
         """Path of the class of a mesh that several bodies have."""
-        if shape.key not in self._shared:
+        key = shape.drawn_key, painted
+        if key not in self._shared:
             path = Sdf.Path(SHAPES).AppendChild(f"mesh{len(self._shared)}")
             define(self.layer, path)
             self.layer.GetPrimAtPath(SHAPES).specifier = Sdf.SpecifierClass
-            self._geometry(path.AppendChild("mesh"), shape)
-            self._shared[shape.key] = path
-        return self._shared[shape.key]
+            self._geometry(path.AppendChild("mesh"), shape, painted)
+            self._shared[key] = path
+        return self._shared[key]
 
-    def _geometry(self, path: SdfPath, shape: Shape) -> PrimSpec:
+    def _geometry(self, path: SdfPath, shape: Shape, painted: bool) -> PrimSpec:
         """Return the prim of a single shape in its own frame."""
         if shape.kind == "half_space":
             return self._square(path, *shape.plane())
@@ -92,6 +94,8 @@ class Drawing:
             assert drawn is not None
             prim = define(self.layer, path, "Mesh")
             mesh(prim, drawn.vertices, drawn.faces, drawn.normals)
+            if painted and drawn.colors is not None:
+                paint_vertices(prim, drawn.colors)
             return prim
         prim = define(self.layer, path, {"box": "Cube"}.get(shape.kind, shape.kind.capitalize()))
         if shape.kind == "box":

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.core.colors import linear_of, seen_of_hex
 from rigidimpulse.io.usd.library import Gf, Layer, PrimSpec, Sdf, SdfPath, Tf, Vt
 
 TYPES = Sdf.ValueTypeNames
@@ -98,7 +99,12 @@ def mesh(prim: PrimSpec, points: np.ndarray, faces: np.ndarray, normals: np.ndar
 
 def paint(prim: PrimSpec, color: str) -> None:
     """Give a prim, and what is below it, a colour "#rrggbb" of the screen."""
-    shade = np.array([int(color[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
-    linear = np.where(shade <= 0.04045, shade / 12.92, ((shade + 0.055) / 1.055) ** 2.4)
+    linear = linear_of(seen_of_hex(color))
     spec = attribute(prim, "primvars:displayColor", TYPES.Color3fArray, Vt.Vec3fArray([Gf.Vec3f(*linear.tolist())]))
     spec.SetInfo("interpolation", "constant")
+
+
+def paint_vertices(prim: PrimSpec, colors: np.ndarray) -> None:
+    """Give each vertex of a mesh its colour (v, 3), uint8 of the screen."""
+    linear = np.ascontiguousarray(linear_of(colors / 255.0), np.float32)
+    attribute(prim, "primvars:displayColor", TYPES.Color3fArray, Vt.Vec3fArray.FromNumpy(linear)).SetInfo("interpolation", "vertex")

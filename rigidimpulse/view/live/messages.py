@@ -2,7 +2,8 @@
 
 All hang on the node /live. Text is JSON, numbers are a Float32Array:
 
-    shape      number, number of vertices, vertices (3 each), their normals (3 each), triangles (3 vertices each)
+    shape      number, number of vertices, whether they have colours, vertices (3 each), their normals (3 each), colours (3 each) if
+               they have some, triangles (3 vertices each)
     begin      manifest of a run: number, frames, bodies, framing, controls; its shapes came before it
     frames     first frame, then for each frame and each body that can move its position (3) and its quaternion x y z w
     impacts    first arrow, then the arrows, see `arrows.impulse_rows`; in the place of a card they have the number of the impact
@@ -21,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.core.colors import linear_of
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import normalized_quaternion
 from rigidimpulse.view.arrows import LEAST_LENGTH, fade_time, impulse_rows, longest_arrow
@@ -130,8 +132,9 @@ def _entry(
 
 def _shape_message(number: int, mesh: DisplayMesh) -> dict[str, Any]:
     """Return the message with the geometry of a shape."""
-    parts = map(np.ravel, (mesh.vertices, mesh.normals, mesh.faces))
-    return number_message("shape", number, np.concatenate([[len(mesh.vertices)], *parts]))
+    colors = [] if mesh.colors is None else [linear_of(mesh.colors / 255.0)]
+    parts = map(np.ravel, (mesh.vertices, mesh.normals, *colors, mesh.faces))
+    return number_message("shape", number, np.concatenate([[len(mesh.vertices), len(colors)], *parts]))
 
 
 def _arrow_sizes(framing: Framing) -> dict[str, float]:

@@ -178,9 +178,11 @@ function paintOctants(shader) {
       diffuseColor.rgb = mix(diffuseColor.rgb, mix(diffuseColor.rgb, vec3(0.9), 0.72), octant);`);
 }
 
-function makeSurface(surface) {
+/* A mesh with colours of its own shows them on a body that is painted. */
+function makeSurface(surface, geometry) {
+  const painted = surface.painted && geometry.getAttribute("color") !== undefined;
   const material = new THREE.MeshPhysicalMaterial({
-    color: linearColour(surface.color), roughness: surface.roughness, metalness: surface.metalness,
+    color: painted ? 0xffffff : linearColour(surface.color), vertexColors: painted, roughness: surface.roughness, metalness: surface.metalness,
     clearcoat: surface.clearcoat, clearcoatRoughness: 0.25});
   material.onBeforeCompile = (shader) => {
     seeRoom(shader, "0.8");

@@ -24,7 +24,7 @@ class Picture {
       node.position.fromArray(body.position);
       node.quaternion.fromArray(body.quaternion);
       if (body.shape >= 0) {
-        const mesh = new THREE.Mesh(geometries[body.shape], sheet.surface(body.surface));
+        const mesh = new THREE.Mesh(geometries[body.shape], sheet.surface(body.surface, geometries[body.shape]));
         mesh.castShadow = mesh.receiveShadow = true;
         node.add(mesh);
       }
@@ -84,9 +84,9 @@ class Sheet {
     this.aim();
   }
 
-  surface(surface) {
+  surface(surface, geometry) {
     const key = JSON.stringify(surface);
-    if (!this.surfaces.has(key)) { this.surfaces.set(key, makeSurface(surface)); }
+    if (!this.surfaces.has(key)) { this.surfaces.set(key, makeSurface(surface, geometry)); }
     return this.surfaces.get(key);
   }
 

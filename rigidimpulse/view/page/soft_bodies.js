@@ -9,7 +9,7 @@ class SoftBody {
     this.geometry = viewer.scene_tree.find([...path, "<object>"]).object.geometry;
     this.frames = frames;
     this.times = times;
-    this.surface = makeSurface(entry.surface);
+    this.surface = makeSurface(entry.surface, this.geometry);
     Object.assign(this.surface, {side: THREE.DoubleSide, polygonOffset: entry.thin, polygonOffsetUnits: -DRAPE});
     const mesh = new THREE.Mesh(this.geometry, this.surface);
     mesh.castShadow = true;

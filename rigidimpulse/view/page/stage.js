@@ -8,6 +8,7 @@ const SKIES = {
   light: {zenith: "#c3d5e8", horizon: "#f5f1ea", nadir: "#d3d7d9"},
   dark: {zenith: "#0f1418", horizon: "#1d2328", nadir: "#0c1013"},
 };
+const DARKER = 0.75; // lines on ground that has a colour of its own, against it
 const GROUNDS = {light: ["#b3b8bd", "#5d6b78"], dark: ["#20272d", "#4d5a65"]}; // face, line
 
 function roundSpacing(length) {
@@ -55,9 +56,12 @@ class Stage {
   paint() {
     const name = theme.dark ? "dark" : "light";
     this.sky.paint(SKIES[name]);
-    for (const ground of this.grounds) { ground.paint(...GROUNDS[name]); }
+    this.grounds.forEach((ground) => this.paintGround(ground));
     this.viewer.set_dirty();
   }
+
+  /* In the theme's colours, or in the one that its body has. */
+  paintGround(ground) { ground.paint(...(ground.chosen ?? GROUNDS[theme.dark ? "dark" : "light"])); }
 
   /* A camera that people have moved stays where they have put it. */
   watchCamera() {
@@ -89,7 +93,7 @@ class Stage {
   }
 
   makeMesh(body, geometry) {
-    const surface = makeSurface(body.surface), mesh = new THREE.Mesh(geometry, surface);
+    const surface = makeSurface(body.surface, geometry), mesh = new THREE.Mesh(geometry, surface);
     this.surfaces.push(surface);
     mesh.castShadow = true;
     mesh.receiveShadow = true;
@@ -102,8 +106,9 @@ class Stage {
     const normal = new THREE.Vector3().fromArray(plane.normal);
     ground.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), normal);
     ground.position.copy(normal).multiplyScalar(plane.offset);
+    if (plane.color) { ground.chosen = [plane.color, `#${new THREE.Color(plane.color).multiplyScalar(DARKER).getHexString()}`]; }
     this.grounds.push(ground);
-    ground.paint(...GROUNDS[theme.dark ? "dark" : "light"]);
+    this.paintGround(ground);
     return ground;
   }
 

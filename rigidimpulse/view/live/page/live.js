@@ -98,10 +98,13 @@ class LivePage {
   }
 
   takeShape(numbers) {
-    const [number, vertices] = numbers, geometry = new THREE.BufferGeometry(), end = 2 + 3 * vertices;
-    geometry.setAttribute("position", new THREE.BufferAttribute(numbers.slice(2, end), 3));
-    geometry.setAttribute("normal", new THREE.BufferAttribute(numbers.slice(end, end + 3 * vertices), 3));
-    geometry.setIndex(new THREE.BufferAttribute(Uint32Array.from(numbers.subarray(end + 3 * vertices)), 1));
+    const [number, vertices, painted] = numbers, geometry = new THREE.BufferGeometry(), size = 3 * vertices;
+    let place = 3;
+    for (const name of painted ? ["position", "normal", "color"] : ["position", "normal"]) {
+      geometry.setAttribute(name, new THREE.BufferAttribute(numbers.slice(place, place + size), 3));
+      place += size;
+    }
+    geometry.setIndex(new THREE.BufferAttribute(Uint32Array.from(numbers.subarray(place)), 1));
     this.nextShapes[number] = geometry;
   }
 
@@ -137,7 +140,7 @@ class LivePage {
 
   /* A flexible body as on the recorded page, with room for the frames that are to come. */
   takeSoftBody({number, faces, vertices, surface, thin}) {
-    const geometry = new THREE.BufferGeometry(), row = 3 * vertices, material = makeSurface(surface);
+    const geometry = new THREE.BufferGeometry(), row = 3 * vertices, material = makeSurface(surface, geometry);
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(row), 3));
     geometry.setIndex(faces);
     Object.assign(material, {side: THREE.DoubleSide, polygonOffset: thin, polygonOffsetUnits: -DRAPE});

@@ -1,0 +1,66 @@
+"""Colours of meshes that trimesh has read: of vertices, faces, materials and textures.
+
+Programs give every mesh some material. One grey all over says nothing, and counts as no colour.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rigidimpulse.core.colors import seen_of
+from rigidimpulse.core.textures import corner_colors, picture_levels
+
+PLAIN = 0.85
+"""Grey of what has no colour in a mesh that has some."""
+
+
+def colors_of_trimesh(mesh: Any) -> np.ndarray | None:
+    """Return the colours (f, 3, 3) in [0, 1] of the corners of the faces, None where the mesh has none of its own."""
+    visual, faces = getattr(mesh, "visual", None), np.asarray(mesh.faces)
+    if visual is None or len(faces) == 0 or not getattr(visual, "defined", False):
+        return None
+    if visual.kind == "texture":
+        corners = _textured(visual, faces)
+    elif visual.kind == "face":
+        corners = np.repeat(np.asarray(visual.face_colors)[:, None, :3], 3, axis=1) / 255.0
+    else:
+        corners = np.asarray(visual.vertex_colors)[faces][..., :3] / 255.0
+    if corners.shape != (len(faces), 3, 3) or np.all(corners == corners[0, 0, 0]):
+        return None
+    return corners
+
+
+def _textured(visual: Any, faces: np.ndarray) -> np.ndarray:
+    """Colours of the corners by the picture of a material, or its one colour."""
+    material, uv = visual.material, visual.uv
+    if "color" in visual.vertex_attributes:
+        # Of a glTF file, where they are linear, and multiply the colour of the material.
+        linear = np.asarray(visual.vertex_attributes["color"], float)[:, :3] * _factor(material)
+        return seen_of(linear)[faces]
+    image = getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
+    if image is None or uv is None or not np.isfinite(uv).all():
+        return np.broadcast_to(_main_color(material), (len(faces), 3, 3))
+    # Rows of a picture run down, v of trimesh runs up.
+    return seen_of(corner_colors(picture_levels(image), np.asarray(uv, float)[faces] * [1.0, -1.0] + [0.0, 1.0]))
+
+
+def _factor(material: Any) -> np.ndarray:
+    """Linear colour (3,) of a material of a glTF file; trimesh has it as bytes."""
+    factor = getattr(material, "baseColorFactor", None)
+    return np.ones(3) if factor is None else np.asarray(factor, float)[:3] / 255.0
+
+
+def _main_color(material: Any) -> np.ndarray:
+    """Colour (3,) of a material: those of glTF files are linear, those of others as on the screen."""
+    if hasattr(material, "baseColorFactor"):
+        return seen_of(_factor(material))
+    return np.asarray(material.main_color, float)[:3] / 255.0
+
+
+def joined_colors(colors: list[np.ndarray | None], counts: list[int]) -> np.ndarray | None:
+    """Return the colours of several meshes with given counts of faces, None if none has any; what has none beside them is light grey."""
+    if all(each is None for each in colors):
+        return None
+    return np.concatenate([np.full((count, 3, 3), PLAIN) if each is None else each for each, count in zip(colors, counts, strict=True)])
