@@ -158,7 +158,8 @@ def motion_entry(recording: Recording, shapes: Shapes, block: Block, frames: int
     for i, body in enumerate(bodies):
         number = shapes.number(body.drawn_shape)
         position, orientation = recording.positions[:, i], recording.orientations[:, i]
-        planes = [[*normal.tolist(), offset] for normal, offset in display_planes(body.drawn_shape)]
+        paint = None if body.visual is None else body.visual.hex_color()
+        planes = [[*normal.tolist(), offset, paint] for normal, offset in display_planes(body.drawn_shape)]
         entries.append({
             "shape": number, "planes": planes, "track": movers.index(i) if i in movers else -1,
             "surface": surface(number_of_movers, body, shapes.meshes[number] if number >= 0 else None), "position": position[0].tolist(),

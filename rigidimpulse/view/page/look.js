@@ -3,6 +3,7 @@
 const SKY = {zenith: "#6397d2", horizon: "#f4efe8", nadir: "#b9bdc1"};
 const KEY_DIRECTION = new THREE.Vector3(-0.55, 1.0, 0.42).normalize(); // from the scene to the key light, Y up
 const SHADOW_MAP_SIZE = 2048;
+const DARKER = 0.75; // lines of ground that has a colour of its own, against it
 
 function linearColour(hex) {
   return new THREE.Color(hex).convertSRGBToLinear();
@@ -163,6 +164,11 @@ function makeGround(spacing, reach, opacity) {
     face.position.set(x, y, 0);
   };
   return ground;
+}
+
+/* The lines of ground that has a colour of its own. */
+function darker(hex) {
+  return `#${new THREE.Color(hex).multiplyScalar(DARKER).getHexString()}`;
 }
 
 /* Round bodies are painted in octants, else one could not see them spin. */

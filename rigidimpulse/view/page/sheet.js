@@ -90,10 +90,11 @@ class Sheet {
     return this.surfaces.get(key);
   }
 
-  ground([x, y, z, offset]) {
+  ground([x, y, z, offset, colour]) {
     const spacing = this.radius / 3, ground = makeGround(spacing, GROUND_REACH * this.radius, 1), normal = new THREE.Vector3(x, y, z);
     ground.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), normal);
     ground.position.copy(normal).multiplyScalar(offset);
+    if (colour) { ground.paint(colour, darker(colour)); }
     return ground;
   }
 

@@ -8,7 +8,6 @@ const SKIES = {
   light: {zenith: "#c3d5e8", horizon: "#f5f1ea", nadir: "#d3d7d9"},
   dark: {zenith: "#0f1418", horizon: "#1d2328", nadir: "#0c1013"},
 };
-const DARKER = 0.75; // lines on ground that has a colour of its own, against it
 const GROUNDS = {light: ["#b3b8bd", "#5d6b78"], dark: ["#20272d", "#4d5a65"]}; // face, line
 
 function roundSpacing(length) {
@@ -106,7 +105,7 @@ class Stage {
     const normal = new THREE.Vector3().fromArray(plane.normal);
     ground.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), normal);
     ground.position.copy(normal).multiplyScalar(plane.offset);
-    if (plane.color) { ground.chosen = [plane.color, `#${new THREE.Color(plane.color).multiplyScalar(DARKER).getHexString()}`]; }
+    if (plane.color) { ground.chosen = [plane.color, darker(plane.color)]; }
     this.grounds.push(ground);
     this.paintGround(ground);
     return ground;
