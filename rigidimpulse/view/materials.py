@@ -6,7 +6,7 @@ import colorsys
 from typing import Any
 
 from rigidimpulse.core.colors import hex_of, seen_of_hex
-from rigidimpulse.view.display import DisplayMesh, has_one_color
+from rigidimpulse.view.display import DisplayMesh
 
 PALETTE = (
     "#2f7fb8",  # blue
@@ -50,8 +50,8 @@ def surface(index: int, body: Any, mesh: DisplayMesh | None) -> dict[str, Any]:
     painted = body.shows_own_colors and colors is not None
     if painted and colors is not None:
         chosen = hex_of(colors.mean(axis=0) / 255.0)
-    # A colour that somebody has chosen is left as it is; a file gives everything some.
-    hides_spin = body.visual is None and (mesh is None or has_one_color(mesh)) and getattr(body.shape, "kind", "") in ROUND_KINDS
+    # A colour that somebody has chosen is left as it is.
+    hides_spin = body.visual is None and not painted and getattr(body.shape, "kind", "") in ROUND_KINDS
     moves = body.motion != "static"
     density = getattr(body.material, "density", None) or 1000.0
     friction = getattr(body.material, "dynamic_friction", None)

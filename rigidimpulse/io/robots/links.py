@@ -18,8 +18,8 @@ import numpy as np
 
 from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.io.inertia import with_possible_inertia
+from rigidimpulse.io.looks import Look, visual_of
 from rigidimpulse.io.pieces import GHOST, Piece, Weight, fill_mass, joined
-from rigidimpulse.io.robots.looks import Look, visual_of
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.collision_filter import CollisionFilter
 from rigidimpulse.scene.joint_six_axis import Drive, Limit, SixAxisJoint

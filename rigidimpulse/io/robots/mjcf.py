@@ -23,10 +23,10 @@ from numpy.typing import ArrayLike
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.io.inertia import nearest_inertia
+from rigidimpulse.io.looks import Look
 from rigidimpulse.io.named_files import named_file
 from rigidimpulse.io.pieces import Piece, Weight, sphere_points
 from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, carried, filters, fixed
-from rigidimpulse.io.robots.looks import Look
 from rigidimpulse.io.robots.xml import read_xml
 from rigidimpulse.scene.joint import BallJoint
 from rigidimpulse.scene.joint_six_axis import AXES, Drive, Limit, SixAxisJoint

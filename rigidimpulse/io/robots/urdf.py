@@ -21,9 +21,9 @@ from rigidimpulse.collision.geometry import compile_shape
 from rigidimpulse.core.conventions import STANDARD_GRAVITY
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import multiply, quaternion_from_rotation_vector, rotate, to_matrix
+from rigidimpulse.io.looks import Look
 from rigidimpulse.io.pieces import Piece, Weight, joined
 from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, carried, filters, fixed
-from rigidimpulse.io.robots.looks import Look
 from rigidimpulse.io.robots.xml import read_xml, robot_file
 from rigidimpulse.scene.joint_six_axis import Limit, SixAxisJoint
 from rigidimpulse.scene.material import Material

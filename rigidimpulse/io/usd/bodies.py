@@ -16,14 +16,16 @@ from typing import Any
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.quaternion import from_matrix, multiply
+from rigidimpulse.core.quaternion import from_matrix
 from rigidimpulse.engine.triggers import Trigger
 from rigidimpulse.io.inertia import with_possible_inertia
+from rigidimpulse.io.looks import visual_of
 from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, fill_mass, joined, weighed
-from rigidimpulse.io.usd.frames import Frames, snapped
+from rigidimpulse.io.usd.frames import Frames
 from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
+from rigidimpulse.io.usd.looks import looks_of
 from rigidimpulse.io.usd.materials import Filters, Units, given_mass, positive, read_material
-from rigidimpulse.io.usd.shapes import Shapes
+from rigidimpulse.io.usd.shapes import Shapes, placed_in
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.keyframes import Keyframes
 from rigidimpulse.scene.material import Material
@@ -48,6 +50,7 @@ class BodyReader:
         self.frames, self.stage, self.notes = frames, frames.stage, []
         self.units = Units(self.stage, frames.meters_per_unit)
         self.shapes = Shapes(frames.start, hulls)
+        self._drawn = Shapes(frames.start, as_drawn=True)
         self.bodies: dict[str, Body] = {}
         self.name_of: dict[SdfPath, str] = {}
         self.triggers: list[Trigger] = []
@@ -127,7 +130,8 @@ class BodyReader:
         material = pieces[0].material
         if values.get("density") is not None:
             material = replace(material, density=values.pop("density"))
-        body = Body(name, joined(pieces), material=material, collision_filter=filter_, **values)
+        visual = visual_of(looks_of(prim, set(self.name_of), self.frames, self._drawn), pieces)
+        body = Body(name, joined(pieces), material=material, collision_filter=filter_, visual=visual, **values)
         return with_possible_inertia(body, self.notes)
 
     def _pieces(self, prim: Prim, owned: list[tuple[SdfPath, Any]]) -> tuple[list[Piece], list[float | None], list[float]]:
@@ -155,12 +159,7 @@ class BodyReader:
         made = self.shapes.of(collider, self.frames.stretch(collider) * self.units.length)
         if made is None:
             return None
-        (x, turn), (origin, frame) = self.frames.rigid(collider), self.frames.rigid(prim)
-        shape, place, own = made
-        relative = snapped(frame.T @ turn)
-        position = frame.T @ (x - origin) + relative @ place
-        orientation = multiply(from_matrix(relative), own) if np.any(relative != np.eye(3)) else own
-        return shape, position, orientation
+        return placed_in(made, self.frames.rigid(collider), self.frames.rigid(prim))
 
     def _material(self, bound: Any) -> tuple[Material, float]:
         """Return the material of a collider, and its density in kg/m^3, 0 if it says none."""

@@ -14,10 +14,14 @@ A negative scale counts as its magnitude, except for meshes. Capsules and cylind
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import from_matrix, multiply
 from rigidimpulse.io.pieces import EQUAL, rim_points, sphere_points
+from rigidimpulse.io.usd.frames import snapped
 from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
 from rigidimpulse.scene.shape import Shape
 
@@ -34,9 +38,12 @@ Placed = tuple[Shape, np.ndarray, np.ndarray]
 class Shapes:
     """Shapes of prims; those that are equal are one. notes: what is not as the file says."""
 
-    def __init__(self, code: float, hulls: frozenset[SdfPath] = frozenset()) -> None:
-        """code: time code of the scene. hulls: paths of meshes that collide as their convex hull, whatever they say."""
-        self._code, self._hulls = code, hulls
+    def __init__(self, code: float, hulls: frozenset[SdfPath] = frozenset(), as_drawn: bool = False) -> None:
+        """code: time code of the scene. hulls: paths of meshes that collide as their convex hull, whatever they say.
+
+        as_drawn: read meshes as they are drawn, not as they collide.
+        """
+        self._code, self._hulls, self._as_drawn = code, hulls, as_drawn
         self.notes: list[str] = []
         self._known: dict[tuple, Placed] = {}
 
@@ -51,6 +58,8 @@ class Shapes:
         approximation = UsdPhysics.MeshCollisionAPI(prim).GetApproximationAttr().Get() if prim.IsA(UsdGeom.Mesh) else None
         if prim.GetPath() in self._hulls:
             approximation = "convexHull"
+        if self._as_drawn:
+            approximation = None
         key = (source.GetPath(), approximation, stretch.tobytes())
         if key not in self._known:
             try:
@@ -121,13 +130,27 @@ def triangles(prim: Prim, code: float) -> tuple[np.ndarray, np.ndarray]:
         raise SceneError("the mesh has no triangles, or its counts do not fit its indices", "export it again")
     if index.min() < 0 or index.max() >= len(points):
         raise SceneError("an index is beyond the points", "export it again")
-    fans = np.repeat(np.arange(len(counts)), counts - 2)
-    start = np.cumsum(counts) - counts
-    step = np.arange(len(fans)) - (np.cumsum(counts - 2) - (counts - 2))[fans]
-    faces = np.column_stack([index[start[fans]], index[start[fans] + step + 1], index[start[fans] + step + 2]])
+    faces = index[corners_of(mesh)[1]]
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         faces = faces[:, ::-1]
     return points, faces
+
+
+def corners_of(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return for each triangle of a UsdGeom.Mesh the polygon (t,) that it is of, and the places (t, 3) of its corners in the indices."""
+    counts = np.array(mesh.GetFaceVertexCountsAttr().Get(), np.int64)
+    fans = np.repeat(np.arange(len(counts)), counts - 2)
+    start = np.cumsum(counts) - counts
+    step = np.arange(len(fans)) - (np.cumsum(counts - 2) - (counts - 2))[fans]
+    return fans, np.column_stack([start[fans], start[fans] + step + 1, start[fans] + step + 2])
+
+
+def placed_in(made: Placed, own: tuple[np.ndarray, np.ndarray], body: tuple[np.ndarray, np.ndarray]) -> Placed:
+    """Return a shape in the rigid frame of a body; own, body: positions (3,) m and rotations (3, 3) of its prim and of the body's."""
+    (shape, place, turn), (x, rotation), (origin, frame) = made, own, body
+    relative = snapped(frame.T @ rotation)
+    orientation = multiply(from_matrix(relative), turn) if np.any(relative != np.eye(3)) else turn
+    return shape, frame.T @ (x - origin) + relative @ place, orientation
 
 
 def _token(prim: Prim, name: str, default: str) -> str:
