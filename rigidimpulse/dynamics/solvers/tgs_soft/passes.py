@@ -194,15 +194,13 @@ def _clamp(simd, x, limit):
 
 
 @inlined
-def _rub(simd, record, o, points, u1, u2, w3):
-    """Friction of a patch with slip (u1, u2) and spin w3 about n: the changes of its impulses along t_1, t_2 and about n."""
+def _rub(simd, record, o, press, lever, u1, u2, w3):
+    """Friction of a patch with slip (u1, u2) and spin w3 about n: the changes of its impulses along t_1, t_2 and about n.
+
+    press, lever: sum of the normal impulses that are expected, and of that times the distances of the points from O.
+    """
     w = width_of(simd)
     zero, one = spread(simd, 0.0), spread(simd, 1.0)
-    press, lever = zero, zero
-    for c in range(points):
-        g = o + (POINT + POINT_SIZE * c) * w
-        p = load(simd, record, g + PRESS * w)
-        press, lever = press + p, fma(p, load(simd, record, g + LEVER * w), lever)
     static, dynamic = load(simd, record, o + MU_STATIC * w), load(simd, record, o + MU_DYNAMIC * w)
     old = load(simd, record, o + TWIST * w)
     # The twist first: it is clamped to mu sum p r.
@@ -228,7 +226,7 @@ def _rub(simd, record, o, points, u1, u2, w3):
 
 @inlined
 def _press(simd, record, g, speed, gap, relaxing, per_h, spring_of):
-    """Normal impulse of the points at g that approach at -speed, in m/s; returns its change. spring_of: STIFF, HARD, SOFT, DEPTH."""
+    """Normal impulses of the points at g that approach at -speed, in m/s: old and new. spring_of: STIFF, HARD, SOFT, DEPTH."""
     stiff, hard, soft, deepest = spring_of
     w = width_of(simd)
     zero = spread(simd, 0.0)
@@ -243,9 +241,7 @@ def _press(simd, record, g, speed, gap, relaxing, per_h, spring_of):
         share = where_greater(gap, zero, spread(simd, 1.0), hard)
         kept = where_greater(gap, zero, zero, soft)
         new = fma(-(mass * share), speed + bias, fma(-kept, old, old))
-    new = where_greater(new, zero, new, zero)
-    store(record, g + PRESS * w, new)
-    return new - old
+    return old, where_greater(new, zero, new, zero)
 
 
 @inlined
@@ -285,12 +281,16 @@ def solve_batches(simd, batches, begin, number, bodies, moved, h, relaxing):
         spin = less(angular(vb), angular(va))
         un, w1, w2 = dot(n, slip), dot(t, spin), dot(u, spin)
         f1, f2, f3 = zero, zero, zero
+        gaps = (at_o, slope_1, slope_2)
         if relaxing:
-            f1, f2, f3 = _rub(simd, record, o, points, dot(t, slip), dot(u, slip), dot(n, spin))
+            # In the sub-step of an impact the springs have taken only what is too fast for the gap. The rest is taken below: friction in
+            # the cone of what the springs took was anything between none and mu p.
+            _, _, _, total, lever = _press_points(simd, record, o, points, (un, w1, w2), gaps, relaxing, per_h, False)
+            f1, f2, f3 = _rub(simd, record, o, total, lever, dot(t, slip), dot(u, slip), dot(n, spin))
             un = _coupled(simd, record, o + TO_NORMAL * w, f1, f2, f3, un)
             w1 = _coupled(simd, record, o + TO_TURN_1 * w, f1, f2, f3, w1)
             w2 = _coupled(simd, record, o + TO_TURN_2 * w, f1, f2, f3, w2)
-        press, turn_1, turn_2 = _press_points(simd, record, o, points, (un, w1, w2), (at_o, slope_1, slope_2), relaxing, per_h)
+        press, turn_1, turn_2, _, _ = _press_points(simd, record, o, points, (un, w1, w2), gaps, relaxing, per_h, True)
         ma, mb = gather(simd, mass, batches.first, k * w), gather(simd, mass, batches.second, k * w)
         f, torque = sum_up(t, u, n, f1, f2, press), sum_up(t, u, n, turn_1, turn_2, f3)
         _push(velocity, batches, k * w, (va, vb), (ma, mb), (arm_a, arm_b), (f, torque))
@@ -303,17 +303,19 @@ def _coupled(simd, record, at, f1, f2, f3, speed):
 
 
 @inlined
-def _press_points(simd, record, o, points, speeds, gaps, relaxing, per_h):
-    """Normal impulses of the points of a patch; returns the sum of their changes along n and its torque about t_1 and t_2.
+def _press_points(simd, record, o, points, speeds, gaps, relaxing, per_h, kept):
+    """Normal impulses of the points of a patch.
 
-    speeds: at O along n, and of the spin about t_1 and t_2; gaps: how the gap has changed at O, and from there along t_1 and t_2.
+    Returns the sum of their changes along n and its torque about t_1 and t_2, then the sum of the impulses, and of those times LEVER.
+    speeds: at O along n, and of the spin about t_1 and t_2; gaps: how the gap has changed at O, and from there along t_1 and t_2; kept:
+    whether they are written down.
     """
     (un, w1, w2), (at_o, slope_1, slope_2) = speeds, gaps
     w = width_of(simd)
     zero = spread(simd, 0.0)
     stiff, hard = load(simd, record, o + STIFF * w), load(simd, record, o + HARD * w)
     soft, deepest = load(simd, record, o + SOFT * w), load(simd, record, o + DEPTH * w)
-    press, turn_1, turn_2 = zero, zero, zero
+    press, turn_1, turn_2, total, lever = zero, zero, zero, zero, zero
     p0, p1, p2 = zero, zero, zero
     for c in range(points):
         g = o + (POINT + POINT_SIZE * c) * w
@@ -330,7 +332,11 @@ def _press_points(simd, record, o, points, speeds, gaps, relaxing, per_h):
             speed = fma(load(simd, record, o + (BETWEEN + 2) * w), p0, speed)
             speed = fma(load(simd, record, o + (BETWEEN + 4) * w), p1, speed)
             speed = fma(load(simd, record, o + (BETWEEN + 5) * w), p2, speed)
-        change = _press(simd, record, g, speed, gap, relaxing, per_h, (stiff, hard, soft, deepest))
+        old, new = _press(simd, record, g, speed, gap, relaxing, per_h, (stiff, hard, soft, deepest))
+        if kept:
+            store(record, g + PRESS * w, new)
+        change = new - old
+        total, lever = total + new, fma(new, load(simd, record, g + LEVER * w), lever)
         if c == 0:
             p0 = change
         elif c == 1:
@@ -338,4 +344,4 @@ def _press_points(simd, record, o, points, speeds, gaps, relaxing, per_h):
         elif c == 2:
             p2 = change
         press, turn_1, turn_2 = press + change, fma(change, y, turn_1), fma(-change, x, turn_2)
-    return press, turn_1, turn_2
+    return press, turn_1, turn_2, total, lever

@@ -14,9 +14,10 @@ over from the sub-step before (a warm start):
     f <- f - u_t / k_t,           |f| > mu_s sum p:    f <- mu_k sum p f / |f|   friction, before the normal rows
     p once more with k = 1, i = 0, c = max(s, 0) / h                            relax: takes out the speed the spring gave
 
-Friction is found in the relaxing pass only, from speeds that the spring has no part in: with it in both passes a stack of three
-boxes rocks for ever at some cm/s. k_t is the largest eigenvalue of the tangents' part of K: with the inverse matrix and a radial clamp a
-block slides where it should hold.
+The p of the cones are those that the relaxing pass would leave without friction: in the sub-step of an impact the springs take only
+what is too fast for the gap, and relaxing the rest. Friction is found in the relaxing pass only, from speeds that the spring has no
+part in: with it in both passes a stack of three boxes rocks for ever at some cm/s. k_t is the largest eigenvalue of the tangents' part
+of K: with the inverse matrix and a radial clamp a block slides where it should hold.
 
 w = 2 pi F / h is the frequency of the spring, z its damping ratio, a_1 = 2 z + h w, a_2 = h w a_1, a_3 = 1 / (1 + a_2); twice
 w against what cannot be moved. Patches are visited colour by colour (Gauss-Seidel), many at once. K is that of the start of the
@@ -76,6 +77,8 @@ DAMPING = 10.0
 """z: damping ratio."""
 KICK, WARM, SOLVE, MOVE, RELAX = range(5)
 """Phases of a sub-step: gravity, warm start, normal rows, motion, relaxing. WARM, SOLVE and RELAX have a round for each colour."""
+REBOUND_ROUNDS = 10
+"""Times round the points of a patch that rebounds: four corners that land at once are within some per cent of e then."""
 BODIES_EACH, BATCHES_EACH = 128, 8
 """Bodies and batches of a piece of a round: a microsecond or two of work."""
 
@@ -262,23 +265,34 @@ def _turn_balls(width, bodies, pairs, patches, chosen, rows, batches):
 def _rebound(width, bodies, patches, chosen, batches, special):
     """Give points that came in fast and are closed their rebound, with friction; adds up the work of supports."""
     record, target, given = batches.record, special.target, special.given
+    gained = np.empty(target.shape[1])
     for m in chosen:
         s = patches.slot[m]
         o = (s // width) * FIELDS * width + s % width
         n = _vector(record, o + NORMAL * width, width)
-        for c in range(patches.size[m]):
+        points = patches.size[m]
+        gained[:points] = 0.0
+        # A box that lands flat turns with each of its corners in turn: once round they leave with half of what they should.
+        for _ in range(REBOUND_ROUNDS if points > 1 else 1):
+            for c in range(points):
+                g = o + (POINT + POINT_SIZE * c) * width
+                # Only points that came in fast and did close.
+                if target[m, c] == 0.0 or record[g + PRESS * width] == 0.0:
+                    continue
+                a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
+                ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
+                p = gained[c] + _field(record, g + MASS * width) * (target[m, c] - (ux * n[0] + uy * n[1] + uz * n[2]))
+                change, gained[c] = max(p, 0.0) - gained[c], max(p, 0.0)
+                # The work of one body's support is done on the other body.
+                given[a] += _push(bodies, b, arm_b, change * n[0], change * n[1], change * n[2])
+                given[b] += _push(bodies, a, arm_a, -change * n[0], -change * n[1], -change * n[2])
+        for c in range(points):
             g = o + (POINT + POINT_SIZE * c) * width
-            # Only points that came in fast and did close.
             if target[m, c] == 0.0 or record[g + PRESS * width] == 0.0:
                 continue
             a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
             ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
-            p = max(_field(record, g + MASS * width) * (target[m, c] - (ux * n[0] + uy * n[1] + uz * n[2])), 0.0)
-            # The work of one body's support is done on the other body.
-            given[a] += _push(bodies, b, arm_b, p * n[0], p * n[1], p * n[2])
-            given[b] += _push(bodies, a, arm_a, -p * n[0], -p * n[1], -p * n[2])
-            ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
-            un, step = ux * n[0] + uy * n[1] + uz * n[2], _field(record, o + STEP_T * width)
+            un, step, p = ux * n[0] + uy * n[1] + uz * n[2], _field(record, o + STEP_T * width), gained[c]
             x, y, z = -step * (ux - un * n[0]), -step * (uy - un * n[1]), -step * (uz - un * n[2])
             size = sqrt(x * x + y * y + z * z)
             # Friction of the rebound, in the cone of its impulse.
