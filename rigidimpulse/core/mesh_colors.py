@@ -1,6 +1,6 @@
 """Colours of meshes that trimesh has read: of vertices, faces, materials and textures.
 
-Programs give every mesh some material. One grey all over says nothing, and counts as no colour.
+Programs give every mesh some material. One middle grey all over a file says nothing, and counts as no colour.
 """
 
 from __future__ import annotations
@@ -14,10 +14,12 @@ from rigidimpulse.core.textures import corner_colors, picture_levels
 
 PLAIN = 0.85
 """Grey of what has no colour in a mesh that has some."""
+GREYS = 0.35, 0.9
+"""Greys between these are what programs write by themselves: trimesh has 0.4, Blender 0.8."""
 
 
 def colors_of_trimesh(mesh: Any) -> np.ndarray | None:
-    """Return the colours (f, 3, 3) in [0, 1] of the corners of the faces, None where the mesh has none of its own."""
+    """Return the colours (f, 3, 3) in [0, 1] of the corners of the faces, None where the mesh has none."""
     visual, faces = getattr(mesh, "visual", None), np.asarray(mesh.faces)
     if visual is None or len(faces) == 0 or not getattr(visual, "defined", False):
         return None
@@ -27,9 +29,7 @@ def colors_of_trimesh(mesh: Any) -> np.ndarray | None:
         corners = np.repeat(np.asarray(visual.face_colors)[:, None, :3], 3, axis=1) / 255.0
     else:
         corners = np.asarray(visual.vertex_colors)[faces][..., :3] / 255.0
-    if corners.shape != (len(faces), 3, 3) or np.all(corners == corners[0, 0, 0]):
-        return None
-    return corners
+    return corners if corners.shape == (len(faces), 3, 3) else None
 
 
 def _textured(visual: Any, faces: np.ndarray) -> np.ndarray:
@@ -60,7 +60,8 @@ def _main_color(material: Any) -> np.ndarray:
 
 
 def joined_colors(colors: list[np.ndarray | None], counts: list[int]) -> np.ndarray | None:
-    """Return the colours of several meshes with given counts of faces, None if none has any; what has none beside them is light grey."""
-    if all(each is None for each in colors):
+    """Return the colours of meshes with given counts of faces, None if they say nothing; what has none beside others is light grey."""
+    known = [each for each in colors if each is not None]
+    if not known or (all(np.all(each == known[0][0, 0, 0]) for each in known) and GREYS[0] < known[0][0, 0, 0] < GREYS[1]):
         return None
     return np.concatenate([np.full((count, 3, 3), PLAIN) if each is None else each for each, count in zip(colors, counts, strict=True)])

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from rigidimpulse.core.colors import bytes_of
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import load_mesh
-from rigidimpulse.core.mesh_colors import colors_of_trimesh
+from rigidimpulse.core.mesh_colors import colors_of_trimesh, joined_colors
 from rigidimpulse.core.portable import dot, length, matmul
 from rigidimpulse.scene.solid import Solid, compute_solid
 from rigidimpulse.scene.surface import Surface, clean_surface
@@ -152,7 +152,7 @@ class Shape:
             mesh = mesh.to_mesh()  # pyright: ignore[reportAttributeAccessIssue]
         if not (hasattr(mesh, "vertices") and hasattr(mesh, "faces")):
             raise SceneError(f"a {type(mesh).__name__} is no trimesh", "give a trimesh.Trimesh", "mesh")
-        return Shape.mesh(mesh.vertices, mesh.faces, colors_of_trimesh(mesh))
+        return Shape.mesh(mesh.vertices, mesh.faces, joined_colors([colors_of_trimesh(mesh)], [len(mesh.faces)]))
 
     @staticmethod
     def convex_hull(points_or_shape: ArrayLike | Shape) -> Shape:

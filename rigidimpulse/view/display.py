@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.core.triangles import unique_edges
 from rigidimpulse.scene.shape import Shape
 
 CREASE = np.radians(35.0)
@@ -32,6 +33,7 @@ class DisplayMesh(NamedTuple):
     faces: np.ndarray  # (f, 3)
     normals: np.ndarray  # (v, 3) unit, outward
     colors: np.ndarray | None = None  # (v, 3) uint8 as people see them, None: of one colour that is chosen elsewhere
+    open: bool = False  # it has edges at which one sees its inside
 
 
 def display_mesh(shape: Shape, segments: int = SEGMENTS) -> DisplayMesh | None:
@@ -60,6 +62,7 @@ def joined_meshes(meshes: list[DisplayMesh]) -> DisplayMesh:
         np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]),
         np.concatenate([mesh.normals for mesh in meshes]),
         np.concatenate([_colors_or_plain(mesh) for mesh in meshes]) if painted else None,
+        any(mesh.open for mesh in meshes),
     )
 
 
@@ -104,7 +107,7 @@ def _single(shape: Shape, segments: int) -> DisplayMesh:
         assert shape.vertices is not None and shape.faces is not None
         return shade_pieces([(shape.vertices, shape.faces, shape.colors)])
     surface = shape.surface()
-    return shade(np.asarray(surface.vertices, dtype=np.float64), np.asarray(surface.faces))
+    return shade(np.asarray(surface.vertices, dtype=np.float64), np.asarray(surface.faces))._replace(open=not surface.closed)
 
 
 def _circle(angle: np.ndarray) -> np.ndarray:
@@ -138,10 +141,10 @@ def shade_pieces(pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray | None]])
     unique, index = np.unique(np.concatenate([vertices for vertices, _, _ in pieces]), axis=0, return_inverse=True)
     faces = index.reshape(-1)[faces]
     proper = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    if all(colors is None for _, _, colors in pieces):
-        return shade(unique, faces[proper])
     painted = [np.full((len(own), 3, 3), PLAIN, np.uint8) if colors is None else colors for _, own, colors in pieces]
-    return shade(unique, faces[proper], np.concatenate(painted)[proper])
+    plain = all(colors is None for _, _, colors in pieces)
+    mesh = shade(unique, faces[proper], None if plain else np.concatenate(painted)[proper])
+    return mesh._replace(open=bool(np.any(unique_edges(faces[proper], len(unique)).count % 2 == 1)))
 
 
 def shade(vertices: np.ndarray, faces: np.ndarray, colors: np.ndarray | None = None) -> DisplayMesh:

@@ -41,8 +41,8 @@ def surface(index: int, body: Any, mesh: DisplayMesh | None) -> dict[str, Any]:
         mesh: what is drawn of it, None: nothing but half spaces.
 
     Returns:
-        color (#rrggbb; the mean one of a body that is painted), painted (the mesh has colours of its own, which are shown), roughness,
-        metalness and clearcoat in [0, 1], octants (round bodies that the library colours are in two tones).
+        color (#rrggbb; the mean one of a body that is painted), painted (the mesh has colours of its own, which are shown), open (one sees
+        its inside), roughness, metalness and clearcoat in [0, 1], octants (round bodies that the library colours are in two tones).
 
     """
     chosen = None if body.visual is None else body.visual.hex_color()
@@ -61,6 +61,7 @@ def surface(index: int, body: Any, mesh: DisplayMesh | None) -> dict[str, Any]:
     return {
         "color": chosen or (color(index) if moves else STATIC_COLOR),
         "painted": painted,
+        "open": mesh is not None and mesh.open,
         "roughness": round(roughness if moves else 0.85, 3),
         "metalness": 0.75 if metal else 0.0,
         "clearcoat": 0.0 if metal or not moves else round(0.5 * (1.0 - min(friction, 1.0)), 3),
@@ -72,7 +73,7 @@ def soft_body_surface(index: int, closed: bool) -> dict[str, Any]:
     """Return how the page paints a flexible body: cloth is dull, what is closed shines like jelly; see `surface`."""
     roughness, clearcoat = (0.3, 0.6) if closed else (0.75, 0.0)
     finish = {"roughness": roughness, "metalness": 0.0, "clearcoat": clearcoat}
-    return {"color": color(index), "painted": False, **finish, "octants": False}
+    return {"color": color(index), "painted": False, "open": not closed, **finish, "octants": False}
 
 
 def color(index: int) -> str:

@@ -88,6 +88,14 @@ class TestColorsOfMeshes:
         (tmp_path / "grey.mtl").write_text("newmtl stuff\nKd 0.8 0.1 0.1\n")
         assert colours_of(ri.Shape.from_file(tmp_path / "grey.obj")) == {(204, 26, 26)}
 
+    def test_black_and_white_parts_are_colours(self, tmp_path: Path) -> None:
+        colors = {"tyre": "0 0 0", "rim": "1 1 1", "cap": "0.5 0.5 0.5"}
+        (tmp_path / "parts.mtl").write_text("".join(f"newmtl {name}\nKd {color}\n" for name, color in colors.items()))
+        faces = [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in CUBE.faces]
+        parts = [line for k, name in enumerate(colors) for line in (f"usemtl {name}", *faces[4 * k : 4 * k + 4])]
+        (tmp_path / "parts.obj").write_text("\n".join(["mtllib parts.mtl", *(f"v {x} {y} {z}" for x, y, z in CUBE.vertices), *parts]))
+        assert colours_of(ri.Shape.from_file(tmp_path / "parts.obj")) == {(0, 0, 0), (255, 255, 255), (128, 128, 128)}
+
 
 class TestVisual:
     @pytest.mark.parametrize("color", ["red", "#12345", "#12345g", (1.0, 0.0), (0.0, 0.0, 2.0), (0.0, 0.0, float("nan")), 7])
@@ -125,6 +133,16 @@ class TestVisual:
         assert entries["other"]["rendered"] == entries["same"]["rendered"] >= 0 and entries["other"]["shape"] >= 0
         assert not entries["over"]["surface"]["painted"] and entries["over"]["surface"]["color"] == "#000000"
         assert entries["table"]["planes"] == [] and entries["table"]["rendered"] >= 0 and entries["table"]["surface"]["color"] == "#00ff00"
+
+    def test_the_inside_of_open_meshes_is_seen(self) -> None:
+        corners, sheet = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)]
+        bodies = [
+            ri.Body("open", ri.Shape.mesh(corners, sheet), motion="static"),
+            ri.Body("painted", ri.Shape.mesh(corners, sheet, [RED, BLUE]), motion="static"),
+            ri.Body("closed", ri.Shape.mesh(CUBE.vertices, CUBE.faces, BY_SIDE), position=(0, 0, 3)),
+        ]
+        entries = {body["name"]: body["surface"]["open"] for body in manifest_of(scene_of(*bodies))["bodies"]}
+        assert entries == {"open": True, "painted": True, "closed": False}
 
     def test_pictures_show_it(self) -> None:
         ball = ri.Body("ball", ri.Shape.sphere(0.5), position=(0, 0, 1), visual=ri.Visual("#00ff00"))
@@ -209,11 +227,17 @@ class TestGltfMaterials:
         surface = self.cube({"pbrMetallicRoughness": {"baseColorTexture": info}}, tmp_path, (tmp_path / "red.png").read_bytes())
         assert surface["painted"] and surface["color"] == "#ff0000"
 
+    @pytest.mark.parametrize("index", [None, 0, 7])
+    def test_a_material_is_white_if_it_says_nothing_or_its_picture_cannot_be_read(self, index: int | None, tmp_path: Path) -> None:
+        material = {} if index is None else {"pbrMetallicRoughness": {"baseColorTexture": {"index": index}}}
+        surface = self.cube(material, tmp_path, b"no picture")
+        assert surface["painted"] and surface["color"] == "#ffffff"
+
     @pytest.mark.parametrize(
         "material",
         [
-            {}, {"pbrMetallicRoughness": {"baseColorFactor": ["red"]}}, {"pbrMetallicRoughness": {"baseColorTexture": {"index": 7}}},
-            {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}, {"pbrMetallicRoughness": 3},
+            {"pbrMetallicRoughness": {"baseColorFactor": ["red"]}}, {"pbrMetallicRoughness": {"baseColorTexture": {"index": -7}}},
+            {"pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2]}}, {"pbrMetallicRoughness": 3},
         ],
     )  # fmt: skip
     def test_broken_ones_are_left_out(self, material: dict, tmp_path: Path) -> None:

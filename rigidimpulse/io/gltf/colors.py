@@ -1,7 +1,7 @@
 """Colours of the primitives of a glTF file: base colour of the material, times its texture, times the colours of the vertices.
 
 Figures of materials and vertices are linear, pictures are as on the screen (glTF 2.0, sections 3.9.2 and 3.7.2.1). What of them cannot be
-read is left out: colours are no reason to refuse a scene. A primitive that none of them colours has none.
+read is left out: colours are no reason to refuse a scene. A primitive without a material and without colours has none.
 """
 
 from __future__ import annotations
@@ -75,19 +75,16 @@ class Colors:
 
     def of(self, primitive: Primitive, faces: np.ndarray) -> np.ndarray | None:
         """Return the colours (f, 3, 3) of the corners of triangles, uint8 as on the screen, None if nothing gives any."""
-        surface = self._surface(primitive)
+        found = self._entry("materials", primitive.material, LookOfMaterial)
+        surface, said = Surface() if found is None else found.surface, found is not None
         factor, info = np.array(surface.base_color_factor[:3]), surface.base_color_texture
-        linear, said = np.broadcast_to(factor, (len(faces), 3, 3)), bool(np.any(factor != 1.0))
+        linear = np.broadcast_to(factor, (len(faces), 3, 3))
         texture = None if info is None else self._textured(primitive, info, faces)
         vertices = self._of_vertices(primitive, "COLOR_0", faces)
         for more in (texture, None if vertices is None else vertices[..., :3]):
             if more is not None:
                 linear, said = linear * more, True
         return seen_bytes(linear) if said else None
-
-    def _surface(self, primitive: Primitive) -> Surface:
-        found = self._entry("materials", primitive.material, LookOfMaterial)
-        return Surface() if found is None else found.surface
 
     def _entry(self, kind: str, index: int, model: Any) -> Any:
         """Return an entry of the file as a model, None if it is none."""

@@ -42,8 +42,10 @@ def write_physics(scene: Scene, target: Path) -> list[str]:
     """
     validate(scene)
     writer = _Writer(scene)
-    for number, body in enumerate(scene.bodies):
+    number = 0
+    for body in scene.bodies:
         writer.add_body(body, number)
+        number += body.motion != "static"
     for effect in scene.effects:
         writer.add_effect(effect)
     writer.finish().write(target)
@@ -88,7 +90,7 @@ class _Writer:
         return self.builder.tree["nodes"][node].setdefault("extensions", {}).setdefault(RIGID_BODIES, {})
 
     def add_body(self, body: Body, number: int) -> None:
-        """Add motion and colliders of a body."""
+        """Add motion and colliders of a body; number: of the bodies that move before it."""
         node = self.node_of[body.name]
         if body.motion != "static":
             self._physics(node)["motion"] = self._motion(body)

@@ -10,6 +10,7 @@ Format: http://wiki.ros.org/urdf/XML.
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -238,7 +239,9 @@ class _Reader:
             shape = Shape.from_file(path)
             assert shape.vertices is not None and shape.faces is not None
             mirrored = np.prod(scale) < 0.0
-            self._meshes[key] = Shape.mesh(shape.vertices * scale, shape.faces[:, ::-1] if mirrored else shape.faces)
+            turned = slice(None, None, -1 if mirrored else 1)
+            scaled = Shape.mesh(shape.vertices * scale, shape.faces[:, turned])
+            self._meshes[key] = scaled if shape.colors is None else replace(scaled, colors=shape.colors[:, turned])
         return self._meshes[key]
 
     def _joint(self, joint: Any, parent: str | None, link: Link) -> list[SixAxisJoint]:

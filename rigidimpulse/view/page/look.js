@@ -189,7 +189,7 @@ function makeSurface(surface, geometry) {
   const painted = surface.painted && geometry.getAttribute("color") !== undefined;
   const material = new THREE.MeshPhysicalMaterial({
     color: painted ? 0xffffff : linearColour(surface.color), vertexColors: painted, roughness: surface.roughness, metalness: surface.metalness,
-    clearcoat: surface.clearcoat, clearcoatRoughness: 0.25});
+    clearcoat: surface.clearcoat, clearcoatRoughness: 0.25, side: surface.open ? THREE.DoubleSide : THREE.FrontSide});
   material.onBeforeCompile = (shader) => {
     seeRoom(shader, "0.8");
     if (surface.octants) { paintOctants(shader); }
