@@ -78,8 +78,8 @@ const ROOM = `
     return light;
   }
   vec3 roomIrradiance(vec3 normal) {
-    vec3 light = mix(vec3(0.9, 0.87, 0.83), vec3(2.0, 2.1, 2.25), 0.5 + 0.5 * normal.y);
-    light += 1.3 * max(dot(normal, vec3(-0.36, 0.93, 0.2)), 0.0);
+    vec3 light = mix(vec3(0.9, 0.87, 0.83), vec3(1.55, 1.65, 1.8), 0.5 + 0.5 * normal.y);
+    light += 0.8 * max(dot(normal, vec3(-0.36, 0.93, 0.2)), 0.0);
     return light + 0.5 * max(dot(normal, vec3(0.5, 0.3, 0.8)), 0.0);
   }`;
 
@@ -90,7 +90,8 @@ function seeRoom(shader, strength) {
     .replace("#include <lights_fragment_maps>", `#include <lights_fragment_maps>
       vec3 mirrored = inverseTransformDirection(reflect(-geometry.viewDir, geometry.normal), viewMatrix);
       iblIrradiance += ${strength} * roomIrradiance(inverseTransformDirection(geometry.normal, viewMatrix));
-      radiance += ${strength} * roomRadiance(mirrored, material.roughness);
+      // Rough surfaces mirror less than the formula has it: the top of a black box was grey.
+      radiance += ${strength} * (1.0 - 0.7 * material.roughness) * roomRadiance(mirrored, material.roughness);
       #ifdef USE_CLEARCOAT
         clearcoatRadiance += ${strength} * roomRadiance(mirrored, material.clearcoatRoughness);
       #endif`);
