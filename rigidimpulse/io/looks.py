@@ -24,6 +24,11 @@ class Look(NamedTuple):
     color: np.ndarray | None
 
 
+def colliders_as_looks(pieces: list[Piece]) -> list[Look]:
+    """Return colliders as what is seen."""
+    return [Look(piece.shape, piece.position, piece.orientation, None) for piece in pieces]
+
+
 def visual_of(looks: list[Look], pieces: list[Piece]) -> Visual | None:
     """Return what is seen of a link whose colliders are given, None where that says no more than they do."""
     if not looks:

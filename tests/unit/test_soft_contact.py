@@ -23,10 +23,11 @@ M, OLD = 2.0, 0.5
 
 @jit
 def press(simd, record, gap, speed):
-    """Change of the impulse of the only contact point in a record; gap [m] and speed [m/s]: (2,)."""
+    """Write the impulse of the only contact point into a record, and its change into gap; gap [m] and speed [m/s]: (2,)."""
     stiff, hard, soft, deepest = spread(simd, STIFF), spread(simd, HARD), spread(simd, SOFT), spread(simd, DEEPEST)
-    change = _press(simd, record, 0, load(simd, speed, 0), load(simd, gap, 0), False, spread(simd, 1.0 / H), (stiff, hard, soft, deepest))
-    store(gap, 0, change)
+    old, new = _press(simd, record, 0, load(simd, speed, 0), load(simd, gap, 0), False, spread(simd, 1.0 / H), (stiff, hard, soft, deepest))
+    store(record, PRESS * WIDTH, new)
+    store(gap, 0, new - old)
 
 
 @pytest.mark.parametrize(("gap", "speed", "expected"), [

@@ -18,7 +18,7 @@ import numpy as np
 
 from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.io.inertia import with_possible_inertia
-from rigidimpulse.io.looks import Look, visual_of
+from rigidimpulse.io.looks import Look, colliders_as_looks, visual_of
 from rigidimpulse.io.pieces import GHOST, Piece, Weight, fill_mass, joined
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.collision_filter import CollisionFilter
@@ -50,6 +50,9 @@ class Link:
 
     def take(self, other: Link) -> None:
         """Make the colliders and the looks of another link parts of this one."""
+        if self.looks or other.looks:
+            # Of one of them that says nothing its colliders are seen.
+            self.looks, other.looks = self.looks or colliders_as_looks(self.pieces), other.looks or colliders_as_looks(other.pieces)
         back = self.orientation * [1.0, -1.0, -1.0, -1.0]
         way, turn = rotate(back, other.position - self.position), multiply(back, other.orientation)
         for mine, its in ((self.pieces, other.pieces), (self.looks, other.looks)):

@@ -285,12 +285,12 @@ def solve_batches(simd, batches, begin, number, bodies, moved, h, relaxing):
         if relaxing:
             # In the sub-step of an impact the springs have taken only what is too fast for the gap. The rest is taken below: friction in
             # the cone of what the springs took was anything between none and mu p.
-            _, _, _, total, lever = _press_points(simd, record, o, points, (un, w1, w2), gaps, relaxing, per_h, False)
+            _, _, _, total, lever = _press_points(simd, record, o, points, (un, w1, w2), gaps, per_h, (relaxing, False))
             f1, f2, f3 = _rub(simd, record, o, total, lever, dot(t, slip), dot(u, slip), dot(n, spin))
             un = _coupled(simd, record, o + TO_NORMAL * w, f1, f2, f3, un)
             w1 = _coupled(simd, record, o + TO_TURN_1 * w, f1, f2, f3, w1)
             w2 = _coupled(simd, record, o + TO_TURN_2 * w, f1, f2, f3, w2)
-        press, turn_1, turn_2, _, _ = _press_points(simd, record, o, points, (un, w1, w2), gaps, relaxing, per_h, True)
+        press, turn_1, turn_2, _, _ = _press_points(simd, record, o, points, (un, w1, w2), gaps, per_h, (relaxing, True))
         ma, mb = gather(simd, mass, batches.first, k * w), gather(simd, mass, batches.second, k * w)
         f, torque = sum_up(t, u, n, f1, f2, press), sum_up(t, u, n, turn_1, turn_2, f3)
         _push(velocity, batches, k * w, (va, vb), (ma, mb), (arm_a, arm_b), (f, torque))
@@ -303,14 +303,14 @@ def _coupled(simd, record, at, f1, f2, f3, speed):
 
 
 @inlined
-def _press_points(simd, record, o, points, speeds, gaps, relaxing, per_h, kept):
+def _press_points(simd, record, o, points, speeds, gaps, per_h, how):
     """Normal impulses of the points of a patch.
 
     Returns the sum of their changes along n and its torque about t_1 and t_2, then the sum of the impulses, and of those times LEVER.
-    speeds: at O along n, and of the spin about t_1 and t_2; gaps: how the gap has changed at O, and from there along t_1 and t_2; kept:
-    whether they are written down.
+    speeds: at O along n, and of the spin about t_1 and t_2; gaps: how the gap has changed at O, and from there along t_1 and t_2; how:
+    whether to relax, and whether they are written down.
     """
-    (un, w1, w2), (at_o, slope_1, slope_2) = speeds, gaps
+    (un, w1, w2), (at_o, slope_1, slope_2), (relaxing, kept) = speeds, gaps, how
     w = width_of(simd)
     zero = spread(simd, 0.0)
     stiff, hard = load(simd, record, o + STIFF * w), load(simd, record, o + HARD * w)
