@@ -40,7 +40,7 @@ def test_from_the_index_to_a_scene_that_plays(browser: Any, tmp_path: Path) -> N
     page.on("request", lambda request: asked.append(request.url))
     page.goto((tmp_path / "index.html").as_uri())
     assert page.inner_text(".card.bad .badge") == "✗ 1 of 2 checks" and page.inner_text(".card.good .badge") == "✓ 1 of 1 check"
-    assert page.evaluate("document.querySelector('.card.bad img').naturalWidth") == 160
+    page.wait_for_function("document.querySelector('.card.bad img').naturalWidth === 160")
     assert page.locator(".card.good .none").count() == 1
     page.click(".card.bad")
     page.wait_for_selector("iframe")
