@@ -23,6 +23,11 @@ def bytes_of(seen: ArrayLike) -> np.ndarray:
     return np.round(255.0 * np.clip(np.asarray(seen, float), 0.0, 1.0)).astype(np.uint8)
 
 
+def seen_bytes(linear: ArrayLike) -> np.ndarray:
+    """Return linear colours as those of the screen, uint8."""
+    return bytes_of(seen_of(linear))
+
+
 def hex_of(seen: ArrayLike) -> str:
     """Return "#rrggbb" of sRGB values (3,) in [0, 1]."""
     return "#" + "".join(f"{part:02x}" for part in bytes_of(seen).tolist())

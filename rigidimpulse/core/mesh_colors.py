@@ -1,6 +1,7 @@
 """Colours of meshes that trimesh has read: of vertices, faces, materials and textures.
 
-Programs give every mesh some material. One middle grey all over a file says nothing, and counts as no colour.
+Programs give every mesh some material. One middle grey all over a file says nothing, and counts as no colour. Colours are no reason to
+refuse a mesh: those that cannot be read are left out.
 """
 
 from __future__ import annotations
@@ -19,17 +20,23 @@ GREYS = 0.35, 0.9
 
 
 def colors_of_trimesh(mesh: Any) -> np.ndarray | None:
-    """Return the colours (f, 3, 3) in [0, 1] of the corners of the faces, None where the mesh has none."""
+    """Return the colours (f, 3, 3) in [0, 1] of the corners of the faces, None where the mesh has none, or none that can be read."""
     visual, faces = getattr(mesh, "visual", None), np.asarray(mesh.faces)
     if visual is None or len(faces) == 0 or not getattr(visual, "defined", False):
         return None
+    try:
+        corners = _of_corners(visual, faces)
+    except Exception:  # pictures and colours of broken files raise anything
+        return None
+    return np.clip(corners, 0.0, 1.0) if corners.shape == (len(faces), 3, 3) and np.isfinite(corners).all() else None
+
+
+def _of_corners(visual: Any, faces: np.ndarray) -> np.ndarray:
     if visual.kind == "texture":
-        corners = _textured(visual, faces)
-    elif visual.kind == "face":
-        corners = np.repeat(np.asarray(visual.face_colors)[:, None, :3], 3, axis=1) / 255.0
-    else:
-        corners = np.asarray(visual.vertex_colors)[faces][..., :3] / 255.0
-    return corners if corners.shape == (len(faces), 3, 3) else None
+        return _textured(visual, faces)
+    if visual.kind == "face":
+        return np.repeat(np.asarray(visual.face_colors)[:, None, :3], 3, axis=1) / 255.0
+    return np.asarray(visual.vertex_colors)[faces][..., :3] / 255.0
 
 
 def _textured(visual: Any, faces: np.ndarray) -> np.ndarray:

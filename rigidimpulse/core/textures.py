@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.core.colors import bytes_of, linear_of, seen_of
+from rigidimpulse.core.colors import linear_of
 
 SIDE = 512
 """Texels along a side of the finest picture that is used."""
@@ -40,8 +40,3 @@ def corner_colors(levels: list[np.ndarray], uv: np.ndarray) -> np.ndarray:
         place = np.floor(inside[some] * size).astype(np.int64) % size
         out[some] = levels[k][place[..., 1], place[..., 0]]
     return out
-
-
-def seen_bytes(linear: np.ndarray) -> np.ndarray:
-    """Return linear colours as those of the screen, uint8."""
-    return bytes_of(seen_of(linear))

@@ -99,7 +99,7 @@ def domino(size: tuple[float, float, float], low: int, high: int) -> Visual:
     painting, (thick, wide, tall) = Painting(), size
     painting.box(size, [INK] * 6)
     for sign in (-1, 1):
-        axes = side_axes(0, sign)  # y, then z up or down
+        axes = side_axes(0, sign)
         out = 0.5 * thick + PIP_HEIGHT * wide
         for number, middle in ((low, -0.25 * tall), (high, 0.25 * tall)):
             for a, b in PIPS[number]:

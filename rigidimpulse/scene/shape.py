@@ -127,7 +127,7 @@ class Shape:
         """Return the mesh in a file of any format that trimesh reads (.obj, .stl, .ply, .glb, ...).
 
         All geometries of the file are taken together, each at its place; seams of texture or normals are joined. Colours of its
-        vertices, faces and materials are drawn, and textures as they are at the vertices; `Body.visual` draws others.
+        vertices, faces and materials are drawn, and textures as coarse as the triangles are; `Body.visual` draws others.
 
         Args:
             path: the file.

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.core.mesh_colors import PLAIN
 from rigidimpulse.core.triangles import unique_edges
 from rigidimpulse.scene.shape import Shape
 
@@ -20,8 +21,7 @@ SEGMENTS = 64
 """Corners of a full turn."""
 LARGEST_FAN = 512
 """Faces around one vertex above which its corners are not smoothed: their comparison grows with the square."""
-PLAIN = 217
-"""Grey, of 255, of what has no colour in a mesh that has some."""
+PLAIN_BYTE = round(255 * PLAIN)
 NORMAL_STEPS = 2.0**12
 """Corners of a vertex share it if their normals agree to one part in this many."""
 
@@ -54,7 +54,7 @@ def display_mesh(shape: Shape, segments: int = SEGMENTS) -> DisplayMesh | None:
 
 
 def joined_meshes(meshes: list[DisplayMesh]) -> DisplayMesh:
-    """Return several meshes, at least one, as one; those without colours are `PLAIN` beside those with some."""
+    """Return several meshes, at least one, as one; those without colours are grey beside those with some."""
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     painted = any(mesh.colors is not None for mesh in meshes)
     return DisplayMesh(
@@ -67,7 +67,7 @@ def joined_meshes(meshes: list[DisplayMesh]) -> DisplayMesh:
 
 
 def _colors_or_plain(mesh: DisplayMesh) -> np.ndarray:
-    return np.full(mesh.vertices.shape, PLAIN, np.uint8) if mesh.colors is None else mesh.colors
+    return np.full(mesh.vertices.shape, PLAIN_BYTE, np.uint8) if mesh.colors is None else mesh.colors
 
 
 def has_one_color(mesh: DisplayMesh) -> bool:
@@ -141,7 +141,7 @@ def shade_pieces(pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray | None]])
     unique, index = np.unique(np.concatenate([vertices for vertices, _, _ in pieces]), axis=0, return_inverse=True)
     faces = index.reshape(-1)[faces]
     proper = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    painted = [np.full((len(own), 3, 3), PLAIN, np.uint8) if colors is None else colors for _, own, colors in pieces]
+    painted = [np.full((len(own), 3, 3), PLAIN_BYTE, np.uint8) if colors is None else colors for _, own, colors in pieces]
     plain = all(colors is None for _, _, colors in pieces)
     mesh = shade(unique, faces[proper], None if plain else np.concatenate(painted)[proper])
     return mesh._replace(open=bool(np.any(unique_edges(faces[proper], len(unique)).count % 2 == 1)))

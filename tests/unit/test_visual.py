@@ -242,3 +242,30 @@ class TestGltfMaterials:
     )  # fmt: skip
     def test_broken_ones_are_left_out(self, material: dict, tmp_path: Path) -> None:
         assert not self.cube(material, tmp_path, b"no picture")["painted"]
+
+
+class Broken:
+    """Colours as a reader of broken files may leave them."""
+
+    def __init__(self, kind: str, colors: object) -> None:
+        self.kind, self.defined, self.colors = kind, True, colors
+
+    def __getattr__(self, name: str) -> object:
+        if name in ("vertex_colors", "face_colors"):
+            return self.colors
+        raise RuntimeError(f"no {name}")
+
+
+@pytest.mark.parametrize(
+    ("kind", "colors"),
+    [
+        ("vertex", np.zeros((3, 4), np.uint8)), ("vertex", np.full((8, 4), np.nan)), ("face", np.zeros((2, 3))), ("texture", None),
+        ("vertex", "red"),
+    ],
+)  # fmt: skip
+def test_colours_that_cannot_be_read_refuse_no_mesh(kind: str, colors: object) -> None:
+    mesh = CUBE.copy()
+    mesh._visual = Broken("vertex", np.zeros((8, 4)))
+    assert ri.Shape.from_trimesh(mesh).colors is not None
+    mesh._visual = Broken(kind, colors)
+    assert ri.Shape.from_trimesh(mesh).colors is None

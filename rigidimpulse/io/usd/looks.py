@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.core.colors import seen_of
+from rigidimpulse.core.colors import seen_bytes, seen_of
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.textures import seen_bytes
 from rigidimpulse.io.looks import Look
 from rigidimpulse.io.usd.frames import Frames
 from rigidimpulse.io.usd.library import Prim, SdfPath, Usd, UsdGeom, UsdShade
