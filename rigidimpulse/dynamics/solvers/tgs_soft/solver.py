@@ -262,47 +262,59 @@ def _turn_balls(width, bodies, pairs, patches, chosen, rows, batches):
 
 
 @jit_making_arrays
+def _push_point(width, bodies, batches, s, c, direction, given):
+    """Push point c of the patch in slot s: impulses on b along a direction (3,), and against it on a; adds up the work of supports."""
+    o = (s // width) * FIELDS * width + s % width
+    a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
+    x, y, z = direction
+    # The work of one body's support is done on the other body.
+    given[a] += _push(bodies, b, arm_b, x, y, z)
+    given[b] += _push(bodies, a, arm_a, -x, -y, -z)
+
+
+@jit_making_arrays
+def _slip_of(width, bodies, batches, s, c):
+    """Velocity of b against a at point c of the patch in slot s, m/s."""
+    a, b, arm_a, arm_b = _arms_to(bodies, batches, s, (s // width) * FIELDS * width + s % width, width, c)
+    return _slip_at(bodies, a, b, arm_a, arm_b)
+
+
+@jit_making_arrays
 def _rebound(width, bodies, patches, chosen, batches, special):
     """Give points that came in fast and are closed their rebound, with friction; adds up the work of supports."""
     record, target, given = batches.record, special.target, special.given
-    gained = np.empty(target.shape[1])
+    gained, closed = np.empty(target.shape[1]), np.empty(target.shape[1], np.bool_)
     for m in chosen:
-        s = patches.slot[m]
+        s, points = patches.slot[m], patches.size[m]
         o = (s // width) * FIELDS * width + s % width
-        n = _vector(record, o + NORMAL * width, width)
-        points = patches.size[m]
+        n, step = _vector(record, o + NORMAL * width, width), _field(record, o + STEP_T * width)
         gained[:points] = 0.0
+        for c in range(points):
+            # Only points that came in fast and did close.
+            closed[c] = target[m, c] != 0.0 and record[o + (POINT + POINT_SIZE * c + PRESS) * width] != 0.0
         # A box that lands flat turns with each of its corners in turn: once round they leave with half of what they should.
         for _ in range(REBOUND_ROUNDS if points > 1 else 1):
             for c in range(points):
-                g = o + (POINT + POINT_SIZE * c) * width
-                # Only points that came in fast and did close.
-                if target[m, c] == 0.0 or record[g + PRESS * width] == 0.0:
-                    continue
-                a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
-                ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
-                p = gained[c] + _field(record, g + MASS * width) * (target[m, c] - (ux * n[0] + uy * n[1] + uz * n[2]))
-                change, gained[c] = max(p, 0.0) - gained[c], max(p, 0.0)
-                # The work of one body's support is done on the other body.
-                given[a] += _push(bodies, b, arm_b, change * n[0], change * n[1], change * n[2])
-                given[b] += _push(bodies, a, arm_a, -change * n[0], -change * n[1], -change * n[2])
+                if closed[c]:
+                    u = _slip_of(width, bodies, batches, s, c)
+                    mass = _field(record, o + (POINT + POINT_SIZE * c + MASS) * width)
+                    p = max(gained[c] + mass * (target[m, c] - (u[0] * n[0] + u[1] * n[1] + u[2] * n[2])), 0.0)
+                    change, gained[c] = p - gained[c], p
+                    _push_point(width, bodies, batches, s, c, (change * n[0], change * n[1], change * n[2]), given)
         for c in range(points):
-            g = o + (POINT + POINT_SIZE * c) * width
-            if target[m, c] == 0.0 or record[g + PRESS * width] == 0.0:
+            if not closed[c]:
                 continue
-            a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
-            ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
-            un, step, p = ux * n[0] + uy * n[1] + uz * n[2], _field(record, o + STEP_T * width), gained[c]
-            x, y, z = -step * (ux - un * n[0]), -step * (uy - un * n[1]), -step * (uz - un * n[2])
+            u = _slip_of(width, bodies, batches, s, c)
+            un = u[0] * n[0] + u[1] * n[1] + u[2] * n[2]
+            x, y, z = -step * (u[0] - un * n[0]), -step * (u[1] - un * n[1]), -step * (u[2] - un * n[2])
             size = sqrt(x * x + y * y + z * z)
             # Friction of the rebound, in the cone of its impulse.
-            if size > _field(record, o + MU_STATIC * width) * p:
-                factor = _field(record, o + MU_DYNAMIC * width) * p / size
+            if size > _field(record, o + MU_STATIC * width) * gained[c]:
+                factor = _field(record, o + MU_DYNAMIC * width) * gained[c] / size
                 x, y, z = factor * x, factor * y, factor * z
-            given[a] += _push(bodies, b, arm_b, x, y, z)
-            given[b] += _push(bodies, a, arm_a, -x, -y, -z)
+            _push_point(width, bodies, batches, s, c, (x, y, z), given)
             # A rebound happens once, and nothing of it is carried over to the next sub-step.
-            target[m, c] = record[g + PRESS * width] = 0.0
+            target[m, c] = record[o + (POINT + POINT_SIZE * c + PRESS) * width] = 0.0
             record[o + PUSH_1 * width] = record[o + PUSH_2 * width] = record[o + TWIST * width] = 0.0
 
 
