@@ -26,7 +26,7 @@ Messages, each with its kind
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -34,6 +34,7 @@ import numpy as np
 
 from rigidimpulse.core.colors import linear_of
 from rigidimpulse.recording.exporters import ExportOptions, ExportTarget
+from rigidimpulse.scene.origin import bodies_as_seen
 from rigidimpulse.scene.shape import rotation_matrix
 from rigidimpulse.view.arrows import arrow_rows, arrow_scale, fade_time, longest_arrow
 from rigidimpulse.view.camera import Framing, Path, frame_action, up_axis
@@ -43,7 +44,6 @@ from rigidimpulse.view.impact_cards import card_entries, card_keys, card_rows, c
 from rigidimpulse.view.joints import fixed_anchors, joint_entries
 from rigidimpulse.view.materials import ROUND_KINDS, soft_body_surface, surface
 from rigidimpulse.view.protocol import RecordingLike, SoftBodyLike
-from rigidimpulse.view.rendered import rendered_meshes
 from rigidimpulse.view.soft_bodies import is_closed, soft_body_messages
 from rigidimpulse.view.spins import angular_momentum, spin_entries, spin_rows, spinning
 from rigidimpulse.view.tracks import animation_message, body_tracks, pack_bytes, pack_float32, quaternion_keys
@@ -67,12 +67,8 @@ SOFT_BODY_MARGIN = 0.03
 """Margin about the vertices of a flexible body in the picture, relative to its extent."""
 
 
-DrawnMeshes = Callable[[Any, dict[str, DisplayMesh], int], dict[str, DisplayMesh]]
-"""Finds what is drawn of the bodies of a scene in the place of their shapes, see `rendered_meshes`."""
-
-
 def page_contents(
-    recording: RecordingLike, other: RecordingLike | None = None, large: bool = False, drawn_of: DrawnMeshes = rendered_meshes
+    recording: RecordingLike, other: RecordingLike | None = None, large: bool = False
 ) -> tuple[dict[str, Any], list[tuple[str, dict[str, Any]]]]:
     """Return the manifest of a recording's page and its messages, each with its kind.
 
@@ -80,7 +76,6 @@ def page_contents(
         recording: the motion.
         other: another motion of the same bodies, which the picture must hold as well.
         large: have the motion as a glTF file.
-        drawn_of: finds what is drawn of bodies in the place of their shapes.
 
     Raises:
         ValueError: the recording has no frames, or a pose is not finite.
@@ -89,10 +84,10 @@ def page_contents(
     times = np.asarray(recording.times, dtype=np.float64)
     if len(times) == 0:
         raise ValueError("the recording has no frames; simulate at least one")
-    bodies = list(recording.scene.bodies)
+    bodies = bodies_as_seen(recording.scene)
     poses = [finite_poses(recording, body.name) for body in bodies]
     numbers, meshes, segments = _shared_meshes(bodies)
-    rendered, meshes = _with_rendered(bodies, numbers, meshes, lambda shown: drawn_of(recording.scene, shown, segments))
+    rendered, meshes = _with_rendered(bodies, meshes, segments)
     up = up_axis(recording.scene.gravity)
     soft_bodies = list(recording.soft_bodies)
     framed = poses if other is None else [_both(pose, finite_poses(other, body.name)) for body, pose in zip(bodies, poses, strict=True)]
@@ -100,7 +95,7 @@ def page_contents(
     soft_body_paths = [_soft_body_path(*tracks) for tracks in zip(*(run.soft_bodies for run in runs), strict=True)]
     framing = frame_action(_paths(bodies, framed, numbers, meshes) + soft_body_paths + _anchor_paths(fixed_anchors(recording)), up)
     framing = replace(framing, movers=[name for name in framing.movers if name not in {track.name for track in soft_bodies}])
-    entries = _entries(recording, poses, (numbers, rendered), meshes)
+    entries = _entries(recording, bodies, poses, (numbers, rendered), meshes)
     num_coloured = sum(body.motion != "static" for body in bodies)
     radius = float(np.linalg.norm(framing.half))
     dynamic = [body.motion == "dynamic" for body in bodies]
@@ -148,12 +143,13 @@ def page_contents(
 
 
 def _entries(
-    recording: RecordingLike, poses: list[tuple[np.ndarray, np.ndarray]], places: tuple[list[int], list[int]], meshes: list[DisplayMesh]
-) -> list[dict[str, Any]]:
-    """Return what the manifest says of the bodies; places: of the mesh that collides and of the one that is drawn, for each body."""
+    recording: RecordingLike, bodies: list[Any], poses: list[tuple[np.ndarray, np.ndarray]], places: tuple[list[int], list[int]],
+    meshes: list[DisplayMesh],
+) -> list[dict[str, Any]]:  # fmt: skip
+    """Return what the manifest says of bodies as they are seen; places: of the meshes that collide and of those that are drawn."""
     up, (numbers, rendered) = up_axis(recording.scene.gravity), places
     entries, num_coloured = [], 0
-    for index, body in enumerate(recording.scene.bodies):
+    for index, body in enumerate(bodies):
         position, orientation = poses[index]
         seen = rendered[index] if rendered[index] >= 0 else numbers[index]
         planes = [] if rendered[index] >= 0 else _plane_entries(body, orientation[0], up)
@@ -228,14 +224,14 @@ def page_scene(
     """
     if len(recording.times) == 0:
         raise ValueError("the recording has no frames; simulate at least one")
-    bodies = list(recording.scene.bodies)
+    bodies = bodies_as_seen(recording.scene)
     poses = [finite_poses(recording, body.name) for body in bodies]
     numbers, meshes, segments = _shared_meshes(bodies)
-    rendered, meshes = _with_rendered(bodies, numbers, meshes, lambda shown: rendered_meshes(recording.scene, shown, segments))
+    rendered, meshes = _with_rendered(bodies, meshes, segments)
     paths = _paths(bodies, poses, numbers, meshes) + [_soft_body_path(track) for track in recording.soft_bodies]
     paths += _anchor_paths(anchors)
     framing, drawn = frame_action(paths, up_axis(recording.scene.gravity)), []
-    for entry, body in zip(_entries(recording, poses, (numbers, rendered), meshes), bodies, strict=True):
+    for entry, body in zip(_entries(recording, bodies, poses, (numbers, rendered), meshes), bodies, strict=True):
         number = entry["rendered"] if entry["rendered"] >= 0 else entry["shape"]
         drawn.append((body, meshes[number] if number >= 0 else None, entry["surface"], entry["planes"]))
     return framing, drawn
@@ -280,16 +276,24 @@ def _shared_meshes(bodies: list[Any]) -> tuple[list[int], list[DisplayMesh], int
     return [number_of[key] for key in keys], meshes, segments
 
 
-def _with_rendered(
-    bodies: list[Any], numbers: list[int], meshes: list[DisplayMesh], drawn_of: Callable[[dict[str, DisplayMesh]], dict[str, DisplayMesh]]
-) -> tuple[list[int], list[DisplayMesh]]:
-    """Return for each body the number of the mesh that is drawn where it is not the one that collides, else -1, and all meshes."""
-    collision = {body.name: meshes[number] for body, number in zip(bodies, numbers, strict=True) if number >= 0}
-    drawn = drawn_of(collision)
-    different = {id(mesh): mesh for mesh in drawn.values()}
-    place = {key: len(meshes) + k for k, key in enumerate(different)}
-    rendered = [place[id(drawn[body.name])] if body.name in drawn else -1 for body in bodies]
-    return rendered, meshes + list(different.values())
+def _with_rendered(bodies: list[Any], meshes: list[DisplayMesh], segments: int) -> tuple[list[int], list[DisplayMesh]]:
+    """Return for each body the number of the mesh that is drawn where it is not the one that collides, else -1, and all meshes.
+
+    Args:
+        bodies: as they are seen. meshes: those that collide. segments: corners of a full turn of round shapes.
+
+    """
+    place: dict[bytes, int] = {}
+    rendered, known = [], list(meshes)
+    for body in bodies:
+        key = None if body.drawn_shape is body.shape else body.drawn_shape.drawn_key
+        if key is not None and key not in place:
+            mesh = display_mesh(body.drawn_shape, segments)
+            assert mesh is not None, "a visual has a surface"
+            place[key] = len(known)
+            known.append(mesh)
+        rendered.append(-1 if key is None else place[key])
+    return rendered, known
 
 
 def _center(position: np.ndarray, orientation: np.ndarray, center: np.ndarray) -> list[float]:

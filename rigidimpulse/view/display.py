@@ -21,6 +21,8 @@ SEGMENTS = 64
 """Corners of a full turn."""
 LARGEST_FAN = 512
 """Faces around one vertex above which its corners are not smoothed: their comparison grows with the square."""
+LEAST_SQUARE = 5.0
+"""m, least half side of the square that stands for a half space."""
 PLAIN_BYTE = round(255 * PLAIN)
 NORMAL_STEPS = 2.0**12
 """Corners of a vertex share it if their normals agree to one part in this many."""
@@ -84,6 +86,15 @@ def display_planes(shape: Shape) -> list[tuple[np.ndarray, float]]:
             turned = part.rotation @ normal
             planes.append((turned, float(offset + turned @ part.position)))
     return planes
+
+
+def display_square(normal: np.ndarray, offset: float, half: float) -> DisplayMesh:
+    """Return a square that stands for a plane; half: m, half its side, unless that is less than `LEAST_SQUARE`."""
+    across = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    across /= np.linalg.norm(across)
+    along, half = np.cross(normal, across), max(half, LEAST_SQUARE)
+    corners = [offset * normal + half * (a * across + b * along) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return DisplayMesh(np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]), np.tile(normal, (4, 1)))
 
 
 def _single(shape: Shape, segments: int) -> DisplayMesh:

@@ -18,9 +18,8 @@ from typing import Any
 
 from rigidimpulse.core.json_text import json_text
 from rigidimpulse.recording.exporters import ExportTarget
-from rigidimpulse.view.contents import MOST_KEYS, DrawnMeshes, check_entries, is_large, page_contents
+from rigidimpulse.view.contents import MOST_KEYS, check_entries, is_large, page_contents
 from rigidimpulse.view.protocol import RecordingLike
-from rigidimpulse.view.rendered import rendered_meshes
 
 SCRIPTS = (
     "elements.js", "numbers.js", "theme.js", "look.js", "room.js", "stage.js", "arrows.js", "contacts.js", "trails.js",
@@ -57,12 +56,11 @@ def export_html(recording: RecordingLike, target: ExportTarget) -> None:
 
 
 def render_page(
-    recording: RecordingLike, title: str = DEFAULT_TITLE, most_keys: int = MOST_KEYS, drawn_of: DrawnMeshes = rendered_meshes,
-    checks: Sequence[Any] = (),
-) -> str:  # fmt: skip
-    """Return the HTML page of a recording, as `write_html` writes it; most_keys, drawn_of: see `contents`."""
+    recording: RecordingLike, title: str = DEFAULT_TITLE, most_keys: int = MOST_KEYS, checks: Sequence[Any] = ()
+) -> str:
+    """Return the HTML page of a recording, as `write_html` writes it; most_keys: from which the page is a large one, see `contents`."""
     large = is_large(recording, most_keys)
-    manifest, messages = page_contents(recording, large=large, drawn_of=drawn_of)
+    manifest, messages = page_contents(recording, large=large)
     manifest["checks"] = check_entries(checks)
     return assemble(manifest, messages, title, LARGE_SCRIPTS if large else SCRIPTS)
 

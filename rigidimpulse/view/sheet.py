@@ -22,6 +22,7 @@ from rigidimpulse.core.colors import linear_of
 from rigidimpulse.core.content_digest import digest_of
 from rigidimpulse.core.json_text import json_text
 from rigidimpulse.recording.recording import Recording
+from rigidimpulse.scene.origin import bodies_as_seen
 from rigidimpulse.scene.shape import rotation_matrix
 from rigidimpulse.view.camera import Path as Way
 from rigidimpulse.view.camera import frame_action, up_axis
@@ -152,7 +153,7 @@ def movers_of(recording: Recording) -> list[int]:
 def motion_entry(recording: Recording, shapes: Shapes, block: Block, frames: int) -> tuple[dict[str, Any], list[Way]]:
     """What the index says of a run, and the ways of its bodies."""
     assert recording.scene is not None
-    bodies, movers = recording.scene.bodies, movers_of(recording)
+    bodies, movers = bodies_as_seen(recording.scene), movers_of(recording)
     chosen = np.unique(np.linspace(0, len(recording.times) - 1, frames).round().astype(int))
     entries, ways, number_of_movers = [], [], 0
     for i, body in enumerate(bodies):

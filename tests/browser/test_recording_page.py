@@ -20,7 +20,6 @@ from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.events import Event
 from rigidimpulse.recording.ledger import Ledger
 from rigidimpulse.recording.status import Status
-from rigidimpulse.view.display import display_mesh
 from rigidimpulse.view.page import render_page
 
 pytestmark = pytest.mark.browser
@@ -50,8 +49,11 @@ def full_run() -> ri.Recording:
 def shared(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Opened:
     """The page of `full_run`, opened once from its file."""
     path = tmp_path_factory.mktemp("page") / "run.html"
-    drawn = display_mesh(ri.Shape.box((0.7, 0.2, 0.1)))
-    path.write_text(render_page(full_run(), drawn_of=lambda scene, collision, segments: {STRANGE_NAME: drawn}), encoding="utf-8")
+    run = full_run()
+    assert run.scene is not None
+    seen = ri.Visual(shape=ri.Shape.box((0.7, 0.2, 0.1)))
+    bodies = [replace(body, visual=seen) if body.name == STRANGE_NAME else body for body in run.scene.bodies]
+    path.write_text(render_page(replace(run, scene=ri.Scene(run.scene.gravity, bodies))), encoding="utf-8")
     page = open_page(browser, path.as_uri(), WIDTH, HEIGHT)
     page.page.keyboard.press("p")  # so low a window has the plots put away
     return page

@@ -8,18 +8,20 @@ import numpy as np
 from gltf_files import BALL, physics, shaped, with_physics
 
 import rigidimpulse as ri
-from rigidimpulse.view.display import display_mesh
-from rigidimpulse.view.rendered import rendered_meshes
+from rigidimpulse.scene.origin import bodies_as_seen
+from rigidimpulse.view.display import DisplayMesh, display_mesh
 
 TURN = (0.0, 0.0, float(np.sqrt(0.5)), float(np.sqrt(0.5)))  # xyzw: a quarter about z
 
 
 def drawn(path: Path) -> dict[str, np.ndarray]:
     """Vertices of the meshes that are drawn in the place of shapes, by body."""
-    scene = ri.load_scene(path)
-    collision = {body.name: display_mesh(body.shape) for body in scene.bodies}
-    found = rendered_meshes(scene, {name: mesh for name, mesh in collision.items() if mesh is not None}, 64)
-    for mesh in found.values():
+    found: dict[str, DisplayMesh] = {}
+    for body in bodies_as_seen(ri.load_scene(path)):
+        mesh = display_mesh(body.drawn_shape)
+        if body.drawn_shape is body.shape or mesh is None:
+            continue
+        found[body.name] = mesh
         corners = mesh.vertices[mesh.faces]
         # Outward faces of a closed mesh have a positive volume, also below a mirror.
         assert np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() > 0.0

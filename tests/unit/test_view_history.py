@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,13 @@ from rigidimpulse.io.scene_file import load_scene
 from rigidimpulse.recording.contacts import CONTACT_DTYPE
 from rigidimpulse.recording.ledger import Ledger
 from rigidimpulse.scene.body import Body
+from rigidimpulse.scene.origin import bodies_as_seen
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 from rigidimpulse.view.display import display_mesh
 from rigidimpulse.view.history import MARK_BINS, contact_rows, energy_span, impact_marks, ledger_curves
+from rigidimpulse.view.materials import PALETTE
 from rigidimpulse.view.page import render_page
-from rigidimpulse.view.rendered import rendered_meshes
 
 
 class TestHistory:
@@ -81,19 +83,18 @@ class TestRenderedMeshes:
 
     @pytest.mark.parametrize("shape", [Shape.sphere(0.5), Shape.box((1, 2, 3)), Shape.cylinder(0.5, 1)], ids=lambda shape: shape.kind)
     def test_a_body_that_looks_as_it_collides_has_no_other_mesh(self, shape: Shape, tmp_path: Path) -> None:
-        scene = self.scene(tmp_path, shape)
-        collision = {body.name: display_mesh(body.shape) for body in scene.bodies}
-        assert all(mesh is not None for mesh in collision.values())
-        for name, mesh in rendered_meshes(scene, collision, 64).items():  # type: ignore[arg-type]
-            # The file gives it a colour, and that is all.
-            assert mesh.colors is not None and len(np.unique(mesh.colors, axis=0)) == 1
-            assert mesh.vertices is collision[name].vertices  # type: ignore[union-attr]
+        (body,) = bodies_as_seen(self.scene(tmp_path, shape))
+        # The file gives it a colour, and that is all.
+        assert body.visual is not None and body.visual.hex_color() == PALETTE[0]
+        assert body.drawn_shape is body.shape
 
     def test_the_mesh_of_the_node_is_drawn_in_the_frame_of_the_body(self, tmp_path: Path) -> None:
         scene = self.scene(tmp_path, Shape.box((1, 2, 3)))
-        ball = display_mesh(Shape.sphere(1.0))
-        assert ball is not None
-        (mesh,) = rendered_meshes(scene, {scene.names[0]: ball}, 64).values()
+        # The shape that collides is another one than that of the node.
+        assert scene.origin is not None
+        (body,) = scene.origin.as_seen([replace(scene.bodies[0], shape=Shape.sphere(1.0))])
+        mesh = display_mesh(body.drawn_shape)
+        assert mesh is not None and body.drawn_shape is not body.shape
         # The corners of the box, although its node lies elsewhere and turned: half the edges away from the body's origin.
         assert np.allclose(np.abs(mesh.vertices), [0.5, 1.0, 1.5], rtol=0, atol=1e-6)
         assert np.einsum("ij,ij->i", mesh.vertices, mesh.normals).min() > 0.0

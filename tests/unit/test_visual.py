@@ -12,7 +12,9 @@ from PIL import Image
 
 import rigidimpulse as ri
 from rigidimpulse.core.colors import linear_of
+from rigidimpulse.scene.origin import bodies_as_seen
 from rigidimpulse.view.contents import page_contents
+from rigidimpulse.view.materials import PALETTE
 from rigidimpulse.view.picture import draw_picture
 
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -181,6 +183,33 @@ class TestFiles:
         assert entries["cube"]["surface"]["painted"] and entries["ball"]["surface"]["painted"]
         assert entries["ball"]["rendered"] >= 0
 
+    def test_scenes_of_glb_files_have_their_looks_in_all_that_is_drawn_of_them(self, tmp_path: Path) -> None:
+        painted = ri.Shape.mesh(CUBE.vertices, CUBE.faces, BY_SIDE)
+        made = scene_of(
+            ri.Body("cube", painted), ri.Body("ball", ri.Shape.sphere(0.5), position=(3, 0, 0), visual=ri.Visual(shape=painted)),
+            ri.Body("red", ri.Shape.box((1, 1, 1)), position=(6, 0, 0), visual=ri.Visual("#ff0000")),
+        )  # fmt: skip
+        scene = ri.load_scene(made.export(tmp_path / "scene.glb"))
+        colours = {body.name: colours_of(body.drawn_shape) for body in bodies_as_seen(scene)[:2]}
+        sides = {tuple(round(255 * x) for x in color) for color in (RED, GREEN, BLUE)}
+        assert colours["cube"] == colours["ball"] == sides
+        again = ri.load_scene(scene.export(tmp_path / "again.glb"))
+        for read in (scene, again):
+            red = bodies_as_seen(read)[2]
+            assert red.visual is not None and red.visual.hex_color() == "#ff0000" and red.drawn_shape is red.shape
+            assert read.bodies[2].visual is None  # it is read when it is drawn
+        pytest.importorskip("pxr")
+        from pxr import Usd, UsdGeom
+
+        stage = Usd.Stage.Open(str(ri.simulate(scene, 0.1).export(tmp_path / "run.usda")))
+        found: dict[str, set] = {}
+        for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
+            shade = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayColor")
+            if prim.IsA(UsdGeom.Gprim):
+                name = next(part for part in str(prim.GetPath()).split("/") if part in ("cube", "ball", "red"))
+                found.setdefault(name, set()).update(tuple(color) for color in shade.Get())
+        assert found == {"cube": {RED, GREEN, BLUE}, "ball": {RED, GREEN, BLUE}, "red": {RED}}
+
     def test_usd_has_colours(self, tmp_path: Path) -> None:
         pytest.importorskip("pxr")
         from pxr import Usd, UsdGeom
@@ -219,19 +248,19 @@ class TestGltfMaterials:
 
     def test_base_colour_is_linear(self, tmp_path: Path) -> None:
         surface = self.cube({"pbrMetallicRoughness": {"baseColorFactor": [*linear_of([0.2, 0.4, 0.6]).tolist(), 1.0]}}, tmp_path)
-        assert surface["painted"] and surface["color"] == "#336699"
+        assert surface["color"] == "#336699"
 
     def test_a_picture(self, tmp_path: Path) -> None:
         Image.new("RGB", (4, 4), (255, 0, 0)).save(tmp_path / "red.png")
         info = {"index": 0, "extensions": {"KHR_texture_transform": {"rotation": 1.0, "scale": [2, 2]}}}
         surface = self.cube({"pbrMetallicRoughness": {"baseColorTexture": info}}, tmp_path, (tmp_path / "red.png").read_bytes())
-        assert surface["painted"] and surface["color"] == "#ff0000"
+        assert surface["color"] == "#ff0000"
 
     @pytest.mark.parametrize("index", [None, 0, 7])
     def test_a_material_is_white_if_it_says_nothing_or_its_picture_cannot_be_read(self, index: int | None, tmp_path: Path) -> None:
         material = {} if index is None else {"pbrMetallicRoughness": {"baseColorTexture": {"index": index}}}
         surface = self.cube(material, tmp_path, b"no picture")
-        assert surface["painted"] and surface["color"] == "#ffffff"
+        assert surface["color"] == "#ffffff"
 
     @pytest.mark.parametrize(
         "material",
@@ -241,7 +270,7 @@ class TestGltfMaterials:
         ],
     )  # fmt: skip
     def test_broken_ones_are_left_out(self, material: dict, tmp_path: Path) -> None:
-        assert not self.cube(material, tmp_path, b"no picture")["painted"]
+        assert self.cube(material, tmp_path, b"no picture")["color"] == PALETTE[0]
 
 
 class Broken:

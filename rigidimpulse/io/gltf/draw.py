@@ -12,14 +12,12 @@ from rigidimpulse.io.gltf.container import Builder
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.shape import Shape
 from rigidimpulse.view.camera import stage_rotation, up_axis
-from rigidimpulse.view.display import DisplayMesh, display_mesh, display_planes, joined_meshes
+from rigidimpulse.view.display import DisplayMesh, display_mesh, display_planes, display_square, joined_meshes
 from rigidimpulse.view.materials import PALETTE, surface
 
 SEGMENTS = 32
 """Corners of a full turn of round shapes."""
 VERTICES, INDICES = 34962, 34963
-LEAST_SQUARE = 5.0
-"""m, least half side of the square that stands for a half space."""
 
 
 def new_file() -> Builder:
@@ -56,7 +54,7 @@ class Drawing:
 
     def __init__(self, builder: Builder, half: float) -> None:
         """half: m, half side of squares for half spaces."""
-        self.builder, self.half = builder, max(half, LEAST_SQUARE)
+        self.builder, self.half = builder, half
         self._geometry: dict[Any, tuple[dict[str, Any], DisplayMesh]] = {}
         self._meshes: dict[Any, int] = {}
         self._paints: dict[str, int] = {}
@@ -79,7 +77,7 @@ class Drawing:
         """Return the triangles of a shape, in the file and as they are."""
         key = shape.drawn_key
         if key not in self._geometry:
-            pieces = [_square(normal, offset, self.half) for normal, offset in display_planes(shape)]
+            pieces = [display_square(normal, offset, self.half) for normal, offset in display_planes(shape)]
             mesh = display_mesh(shape, SEGMENTS)
             drawn = joined_meshes(pieces if mesh is None else [*pieces, mesh])
             normals = drawn.normals.astype(np.float32).astype(float)
@@ -104,12 +102,3 @@ class Drawing:
             finish |= {"metallicFactor": paint["metalness"], "roughnessFactor": paint["roughness"]}
             self._paints[key] = self.builder.add("materials", {"pbrMetallicRoughness": finish, "doubleSided": True})
         return self._paints[key]
-
-
-def _square(normal: np.ndarray, offset: float, half: float) -> DisplayMesh:
-    """A square in a plane."""
-    across = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    across /= np.linalg.norm(across)
-    along = np.cross(normal, across)
-    corners = [offset * normal + half * (a * across + b * along) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    return DisplayMesh(np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]), np.tile(normal, (4, 1)))

@@ -9,6 +9,7 @@ from typing import Any
 
 from rigidimpulse.io.gltf.animation import Animations
 from rigidimpulse.io.gltf.container import Builder
+from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.origin import FileOrigin
 
 
@@ -25,6 +26,12 @@ class Origin(FileOrigin):
     animations: Animations
     node_of: dict[str, int]
     parts: frozenset[str]
+
+    def as_seen(self, bodies: list[Body]) -> list[Body]:
+        """Return bodies with the meshes of their nodes as visuals."""
+        from rigidimpulse.io.gltf.looks import as_in_file
+
+        return as_in_file(bodies, self.node_of, self.animations.hierarchy)
 
     def builder(self) -> Builder:
         """Return a copy of the file to write into: all bytes and images in buffer 0."""

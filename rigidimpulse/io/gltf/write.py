@@ -27,6 +27,7 @@ from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.collision_filter import CollisionFilter
 from rigidimpulse.scene.joint import Joint
 from rigidimpulse.scene.mass import body_mass
+from rigidimpulse.scene.origin import bodies_as_seen
 from rigidimpulse.scene.scene import Scene, validate
 from rigidimpulse.scene.shape import Part, Shape
 
@@ -43,7 +44,7 @@ def write_physics(scene: Scene, target: Path) -> list[str]:
     validate(scene)
     writer = _Writer(scene)
     number = 0
-    for body in scene.bodies:
+    for body in bodies_as_seen(scene):
         writer.add_body(body, number)
         number += body.motion != "static"
     for effect in scene.effects:

@@ -24,6 +24,7 @@ from rigidimpulse.io.usd.draw import Drawing, draw_soft_body
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place, quaternions, sample, valid_name, vectors
 from rigidimpulse.io.usd.library import Gf, Layer, PrimSpec, Sdf, SdfPath, Tf, UsdUtils, Vt, cause_of
 from rigidimpulse.io.usd.origin import UsdOrigin
+from rigidimpulse.scene.origin import bodies_as_seen
 from rigidimpulse.view.camera import stage_rotation, up_axis
 from rigidimpulse.view.materials import color
 
@@ -130,7 +131,7 @@ class _Writer:
     def _bodies(self, root: SdfPath, drawn: Mapping[str, Any], scale: float) -> None:
         """Write bodies that have no prim, below a root in metres."""
         scene, paths = self.motion.scene, self.motion.paths
-        fresh = [body for body in scene.bodies if body.name not in drawn]
+        fresh = [body for body in bodies_as_seen(scene) if body.name not in drawn]
         if not fresh and not self.run.soft_bodies:
             return
         self._root(root, scale, bool(drawn))

@@ -17,13 +17,11 @@ from rigidimpulse.io.usd.layer import TYPES, attribute, define, extent, mesh, or
 from rigidimpulse.io.usd.library import Gf, Layer, PrimSpec, Sdf, SdfPath, Vt
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.shape import Part, Shape
-from rigidimpulse.view.display import display_mesh
+from rigidimpulse.view.display import display_mesh, display_square
 from rigidimpulse.view.materials import PALETTE, surface
 
 SHAPES = "/_Shapes"
 """Class whose children are meshes that bodies share; what is below a class is not drawn."""
-LEAST_SQUARE = 5.0
-"""m, least half side of the square that stands for a half space."""
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])
 CORNERS = np.array([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]])
 
@@ -33,7 +31,7 @@ class Drawing:
 
     def __init__(self, layer: Layer, half: float, bodies: Iterable[Body]) -> None:
         """half: m, half side of squares. bodies: those that will be drawn."""
-        self.layer, self.half = layer, max(half, LEAST_SQUARE)
+        self.layer, self.half = layer, half
         parts = [part.shape.drawn_key for body in bodies for part in body.drawn_shape.parts_flat() if part.shape.kind == "mesh"]
         self._uses = Counter(parts)
         self._shared: dict[tuple[bytes, bool], SdfPath] = {}
@@ -112,12 +110,8 @@ class Drawing:
         return prim
 
     def _square(self, path: SdfPath, normal: np.ndarray, offset: float) -> PrimSpec:
-        prim = define(self.layer, path, "Mesh")
-        across = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-        across /= np.linalg.norm(across)
-        along = np.cross(normal, across)
-        corners = [offset * normal + self.half * (a * across + b * along) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        mesh(prim, np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]))
+        prim, square = define(self.layer, path, "Mesh"), display_square(normal, offset, self.half)
+        mesh(prim, square.vertices, square.faces)
         return prim
 
 
