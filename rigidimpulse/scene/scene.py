@@ -108,6 +108,19 @@ class Scene:
             raise unknown_name("body", name, self._bodies)
         return self._bodies[name]
 
+    def __setitem__(self, name: str, body: Body) -> None:
+        """Put a body in the place of the one of its name, which effects then mean: `scene["door"] = replace(scene["door"], mass=20.0)`.
+
+        Raises:
+            SceneError: the scene has no body of this name, or the new one is called something else, or is none.
+
+        """
+        if not isinstance(body, Body):
+            raise SceneError(f"a {type(body).__name__} is put in its place", "give a Body", f"body {self[name].name!r}")
+        if self[name].name != body.name:
+            raise SceneError(f"a body called {body.name!r} is put in its place", "give one of the same name", f"body {name!r}")
+        self._bodies[name] = body
+
     def __contains__(self, name: object) -> bool:
         """Whether a body has this name."""
         return name in self._bodies

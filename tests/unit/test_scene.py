@@ -1,6 +1,7 @@
 """Scenes and bodies: what is kept, and the words with which bad input is refused."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,6 +46,20 @@ def test_names_are_given_once():
         scene.add(Body("ball", BALL))
     with pytest.raises(SceneError, match="not empty"):
         scene.add(Body("", BALL))
+
+
+def test_a_body_is_put_in_the_place_of_the_one_of_its_name():
+    scene = Scene(bodies=[Body("ball", BALL), Body("other", BALL)])
+    scene["ball"] = heavy = replace(scene["ball"], mass=7.0)
+    assert scene.bodies[0] is heavy and scene.names == ("ball", "other")
+    for name, thing, words in (
+        ("bell", heavy, "did you mean 'ball'"),
+        ("other", heavy, "body 'other': a body called 'ball' is put in its place; give one of the same name"),
+        ("ball", BALL, "body 'ball': a Shape is put in its place; give a Body"),
+    ):
+        with pytest.raises(SceneError, match=words):
+            scene[name] = thing
+    assert scene.bodies[0] is heavy
 
 
 def test_effects_are_kept_apart_from_bodies():
