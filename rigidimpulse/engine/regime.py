@@ -13,7 +13,8 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
     or runaway  in the middle of a step, an island of which a body was solved more than RUNAWAY times in the step, or by as much less
                 often as it has more bodies than LARGE: it costs more than it advances. So do islands in which two bodies come to contact
                 again and again and no impulse keeps them apart. They are handed over at that instant, whatever they are made of.
-                Contacts that rebound by more than REBOUND are no runaways: many impacts are what such scenes are about
+                Contacts that rebound by more than REBOUND, without joints, are given more of them: many impacts are what such scenes
+                are about
 
 and, where an island begins to be sub-stepped (a body that comes near later is taken in):
 
@@ -65,11 +66,12 @@ def why_not_substepped(world: World) -> str:
     if solver == "substepped":
         # Everything that touches would be stepped, and roll for ever.
         return "rolling friction is exact only" if world.rolling is not None else ""
+    if world.joints_of_scene or only_expensive(world):
+        return ""
+    # A crowd is looked at in every step, for nothing if all of it rebounds.
     used, movable = np.unique(world.material_of_body), np.unique(world.material_of_body[world.dynamic])
-    most = ELASTIC if world.joints_of_scene else REBOUND
-    if np.all(world.coefficients[np.ix_(movable, used)][:, :, 0] > most):
-        return f"all bodies rebound by more than {most}"
-    return ""
+    elastic = bool(np.all(world.coefficients[np.ix_(movable, used)][:, :, 0] > REBOUND))
+    return f"all bodies rebound by more than {REBOUND}" if elastic else ""
 
 
 def may_begin(world: World, joined: np.ndarray, solve_count: np.ndarray) -> bool:

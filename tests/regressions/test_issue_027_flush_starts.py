@@ -49,6 +49,21 @@ def test_five_cubes_inside_each_other_do_not_collapse():
         assert 0.0 <= height - (0.5 + level) <= 1e-5
 
 
+@pytest.mark.parametrize("masses", [(0.5, 0.01, 300.0, 500.0, 250.0), (1.0, 0.01, 1.0, 1000.0), (1.0, 0.001, 1e3)])
+def test_light_cubes_below_heavy_ones_are_not_entered(masses):
+    """An open tower has space for all its contact margins. Light cubes were made smaller, as if it had none, by some 1e-6 of their size."""
+    scene = ri.Scene()
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static"))
+    for level, mass in enumerate(masses):
+        scene.add(ri.Body(f"cube {level}", ri.Shape.box(1.0), position=(0, 0, 0.5 + level), mass=mass))
+    run = ri.simulate(scene, 0.2)
+    assert run.status.ok
+    for level in range(len(masses)):
+        heights = run.position(f"cube {level}")[:, 2] - (0.5 + level)
+        # Each of the contacts below it is held at 1e-6 of the size; nothing is less than flush.
+        assert heights.min() >= -1e-12 and heights.max() <= (level + 1.1) * 1e-6
+
+
 def test_cubes_that_fill_a_box_are_held_by_it():
     """They are a little smaller than the box, by some contact margins; when it is turned they do not come out of it, nor jam."""
     scene = ri.Scene()

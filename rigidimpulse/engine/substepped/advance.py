@@ -69,6 +69,8 @@ STRAY = 10.0
 """Skins by which trajectories may stray from the ways of turning bodies, over `Accuracy.substep_motion`: a skin by default."""
 OF_MEAN = 0.125
 """Part of the mean number of solves that each step is, for bodies with joints."""
+MOST_REBOUNDS = 30000.0
+"""Times in a step that bodies which rebound by more than REBOUND may be dealt with beyond RUNAWAY: about a second of the compiled loop."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the island that comes near it."""
 HANDED = "exact contact cost more than it advanced: sub-steps hold these bodies, which may sink in by a skin, 0.8 % of the inner radius"
@@ -121,6 +123,7 @@ class SubsteppedIslands:
         self._jointed = jointed(world)
         self._joint_stepper: JointedStepper | None = None
         self._mean_solves, self._open = np.zeros(world.num_bodies), np.zeros(world.num_bodies, bool)
+        self._bounced = np.zeros(world.num_bodies, bool)
         self.solve_count, self._step_end = self._no_solves(), 0.0
         self._handed: dict[tuple[str, ...], int] = {}
         self._ends: dict[int, float] = {}
@@ -183,6 +186,7 @@ class SubsteppedIslands:
         last = np.maximum(self.solve_count, 0.0)
         if pair_events.end > self._step_end:
             self._mean_solves += OF_MEAN * (np.minimum(last, RUNAWAY) - self._mean_solves)
+            self._bounced[:] = False
             self.solve_count, self._step_end = self._no_solves(), pair_events.end
         # One step with many events is no reason to leave the exact regime with a mechanism: it stays out of it for long.
         solve_count = np.where(self._jointed & self._auto, self._mean_solves, last)
@@ -433,8 +437,12 @@ class SubsteppedIslands:
         """
         members, rebound = island.members, float(island.contacts.restitution.max(initial=0.0))
         stuck, pressed = bool(np.isposinf(self.solve_count[members]).any()), bool(pair_events.pressed()[members].any())
-        bounces = self._cheapest is None and rebound > REBOUND and not stuck
-        if pressed or self._open[members].any() or bounces:
+        # Many impacts are what some scenes are about. Where joints are, each takes a thousand times as long.
+        bounces = self._cheapest is None and rebound > REBOUND and not stuck and not self._jointed[members].any()
+        if bounces and not self._bounced[members].all():
+            self._bounced[members], self.solve_count[members] = True, -MOST_REBOUNDS
+            return
+        if pressed or self._open[members].any():
             # Looked at, and left to the exact regime until the end of the step.
             self.solve_count[members] = NEVER
             if pressed and stuck:
