@@ -47,10 +47,10 @@ class GivenImpulses:
         """Add what the points in play have given."""
         at, table, bodies = _in_play(stepper), stepper.table.points, stepper.bodies
         impulse = table[at.row, GIVEN : GIVEN + 3]
-        some = np.flatnonzero(impulse.any(axis=1))
-        for k in some.tolist():
-            a, b, r = int(at.first[k]), int(at.second[k]), int(at.row[k])
-            size = float(length(impulse[k]))
+        # Squares of impulses below 1e-160 N s are zero, and so is their length.
+        sizes = length(impulse)
+        for k in np.flatnonzero(sizes).tolist():
+            a, b, r, size = int(at.first[k]), int(at.second[k]), int(at.row[k]), float(sizes[k])
             place = bodies.position[b] + dot(bodies.rotation[b], table[r, SKELETON_B : SKELETON_B + 3])
             normal = normal_of(bodies.position, bodies.rotation, table, r, a, b, at.carrier[k])
             self._sums[a, b] = self._sums.get((a, b), 0.0) + np.array([*impulse[k], *(size * place), *(size * np.array(normal)), size])
