@@ -1,10 +1,10 @@
 """Bodies that fill their space exactly: they are made smaller by a few contact margins, so that there is space for these margins.
 
 Lasting contacts are held at a gap d, the contact margin. Cubes that fill a box have no space for it: where four cubes in a row fill it,
-five gaps ask for 5 d. Files rounded to single precision even lack some 1e-7 of the size. Such demands contradict
-each other. Least displacements that meet them as well as can be (`constraints.displacement`, d - g asked for at a gap g, all masses 1) have
-pushes p, and what a contact lacks is s p. Where this is more than a part of d, the smaller movable body of the pair is scaled about its centre of
-mass by 1 - x. Its surface then withdraws by x n.r at the contact, r from the centre; x is such that this is a little more than what is
+five gaps ask for 5 d. Files rounded to single precision even lack some 1e-7 of the size. Such demands contradict each other. Least
+displacements that meet them as well as can be (`constraints.displacement`, d - g asked for at a gap g, all masses 1) have pushes p, and
+what a contact lacks is s p. Where this is more than a part of d, the smaller movable body of the pair is scaled about its centre of mass
+by 1 - x. Its surface then withdraws by x n.r at the contact, r from the centre; x is such that this is a little more than what is
 lacking. Mass and inertia stay.
 """
 
@@ -59,8 +59,8 @@ def make_space(run: Run) -> World:
 
 def lacking(world: World, contacts: Contacts, margin: np.ndarray) -> np.ndarray:
     """What each contact (m,) lacks of its margin (m,) when bodies are displaced as well as can be, m."""
-    # Whether there is space does not depend on masses. With those of the bodies, what pushes 1,000 kg up from 0.01 kg in an open tower would
-    # count as lacking: pushes grow as the ratio of masses.
+    # Whether there is space does not depend on masses. With those of the bodies, what pushes 1,000 kg up from 0.01 kg in an open tower
+    # would count as lacking: pushes grow as the ratio of masses.
     mobility, pair = (world.inv_mass > 0.0).astype(float), (contacts.body_a, contacts.body_b)
     rows = displacement_rows(mobility, pair, contacts.normal, margin - contacts.gap, SOFTNESS)
     solve_newton(rows, world.num_bodies, RESIDUAL * float(margin.min()))

@@ -11,7 +11,7 @@ import pytest
 from box_pit import pit
 
 import rigidimpulse as ri
-from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.core.quaternion import rotate, to_matrix
 from rigidimpulse.core.simd import Simd
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.simulate import complete, frame_times, prepare
@@ -424,3 +424,33 @@ def test_impulses_of_impacts_lie_on_the_cone_where_bodies_slide(name: str, resti
     if spin == (0.0, 0.0, 0.0) and "tilted" not in name:
         # Four corners that land at once rebound together; once round them gave 0.14 of the 0.3.
         assert impulse[2] == pytest.approx(1.0 + restitution, rel=0.01)
+
+
+def on_a_corner(seed: int, size: np.ndarray) -> np.ndarray:
+    """An orientation of a box of which one corner is the lowest by 5 cm."""
+    random, corners = np.random.default_rng(seed), size * (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5)
+    while True:
+        turn = random.normal(size=4)
+        turn /= np.linalg.norm(turn)
+        heights = np.sort(rotate(turn, corners)[:, 2])
+        if heights[1] - heights[0] > 0.05:
+            return turn
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2, 0.5])
+@pytest.mark.parametrize("seed", [0, 1, 3, 4, 7])
+def test_corners_that_land_rebound_as_by_the_impact_of_a_point(friction: float, seed: int) -> None:
+    # Friction couples to the normal velocity of a corner beside the centre. With the rebound and its friction one after the other boxes
+    # lost from 28 % less to 50 % more than in the exact regime. The box flies straight, so that arms are those of the impact, and the next
+    # corner lands in a later step. What is left are arms of float32.
+    material, size = ri.Material(restitution=0.47, static_friction=friction, dynamic_friction=friction), np.array([0.1, 0.15, 0.2])
+    box = ri.Body(
+        "box", ri.Shape.box(size), position=(0, 0, 0.5), orientation=on_a_corner(seed, size), velocity=(0.2, 0.1, -2.8), material=material
+    )
+    scene = ri.Scene((0, 0, 0), [ri.Body("floor", ri.Shape.half_space(), motion="static", material=material), box])
+    exact, soft = (ri.simulate(scene, 0.4, accuracy=ri.Accuracy(contact_solver=solver)) for solver in ("newton", "substepped"))
+    frame = int(np.searchsorted(exact.times, exact.impacts["time"][0])) + 1
+    assert np.count_nonzero(exact.impacts["time"] < exact.times[frame] + 1e-3) == 1
+    assert soft.velocity("box")[frame] == pytest.approx(exact.velocity("box")[frame], abs=1e-6)
+    # The spin has turned for a part of a sub-step more or less; its energy has not changed by that.
+    assert soft.ledger.kinetic[frame] == pytest.approx(exact.ledger.kinetic[frame], rel=1e-6)

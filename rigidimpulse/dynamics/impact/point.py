@@ -35,7 +35,7 @@ def relative_velocity(bodies, contacts, c, u):
 
 
 @jit
-def _add_body(inv_mass, inv_inertia, r, k):
+def add_body(inv_mass, inv_inertia, r, k):
     """k += inv_mass 1 - [r]x inv_inertia [r]x."""
     for i in range(3):
         k[i, i] += inv_mass
@@ -56,8 +56,8 @@ def inverse_effective_mass(bodies, contacts, c, k):
     for i in range(3):
         for j in range(3):
             k[i, j] = 0.0
-    _add_body(bodies.inv_mass[a], bodies.inv_inertia[a], contacts.arm_a[c], k)
-    _add_body(bodies.inv_mass[b], bodies.inv_inertia[b], contacts.arm_b[c], k)
+    add_body(bodies.inv_mass[a], bodies.inv_inertia[a], contacts.arm_a[c], k)
+    add_body(bodies.inv_mass[b], bodies.inv_inertia[b], contacts.arm_b[c], k)
 
 
 @jit

@@ -35,6 +35,7 @@ from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.core.simd import ROW, aligned
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.workers import empty_work_queue
+from rigidimpulse.dynamics.impact.restitution import LAWS
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import SolverBodies, load_bodies
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick, note_pressed
 from rigidimpulse.dynamics.solvers.tgs_soft.depenetration import move_apart
@@ -471,13 +472,16 @@ class ContactStepper:
         connect(self.balance, bodies, table.pairs, self._patches, self._count)
         solve = Solve(bodies, table.pairs, self._patches, self._batches, table.points, self._edges, steady)
         lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
+        law = LAWS[self.world.accuracy.restitution]
         balls = rebounds = supports = 0
         if self._special:
             strength = float(self.world.steady_strength[self.members].max())
             balls, rebounds, supports = special_patches(
                 width, solve, self._steady[0], self._count, self.world.coefficients, strength, lists, target
             )
-        special = SpecialPatches(lists[0, :balls], lists[1, :rebounds], lists[2, :supports], target, self.balance.given)
+        special = SpecialPatches(
+            lists[0, :balls], lists[1, :rebounds], lists[2, :supports], target, self.world.coefficients, law, self.balance.given
+        )
         shares = min(self._shares, self._sharing.solvers) if number * sub_steps > self._sharing.batches else 1
         self._work_queue[:] = empty_work_queue()
         self._sharing.call(advance, [
