@@ -198,7 +198,7 @@ class ContactStepper:
         self.kept = KEPT * self.motion
         # Balls and moving supports: all contacts are found again in the middle of a step.
         self._all_quick = bool(world.moving.any() or world.ball.any())
-        self._special = self._all_quick or bool(world.coefficients[:, :, 0].any())
+        self._special = self._all_quick or bool(world.coefficients[:, :, :2].any())
         self.pressed = np.zeros(n, bool)
         self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
         self.members, self.ahead, self.parts, self.sub_steps, self._pull = np.zeros(0, np.int64), 0.0, 1, 1, 0.0

@@ -25,8 +25,9 @@ step; gaps and arms are those of points fixed in the bodies, updated in every su
 taken along the normal, so that balls roll, and the normal of two balls is updated too. At the end of a sub-step contacts that were seen
 at u_n < -sqrt(2 g skin) / e and are closed by now rebound. Where one point of a patch pushes, the impulses that it has had in the sub-step
 are taken back, and it gets that of the impact of a single point (`impact/friction.py`): friction couples to u_n wherever the point is
-not straight below the centre, and with the two one after the other boxes that landed on a corner lost a fifth more than they should. Points
-of a patch that rebound together leave at -e u_n, with friction after that. The torque-free part of rotation keeps the angular
+not straight below the centre, and with the two one after the other boxes that landed on a corner lost a fifth more than they should. So
+does a point that comes in HARD_IMPACT times as fast and does not rebound. Points of a patch that rebound together leave at -e u_n, with
+friction after that. The torque-free part of rotation keeps the angular
 momentum: w <- I(q')^-1 I(q) w, with q' from the spin at mid-way.
 
 Method: Macklin et al., Small steps in physics simulation, 2019; the relaxing pass and restitution after E. Catto, Solver2D
@@ -83,6 +84,10 @@ DAMPING = 10.0
 """z: damping ratio."""
 KICK, WARM, SOLVE, MOVE, RELAX = range(5)
 """Phases of a sub-step: gravity, warm start, normal rows, motion, relaxing. WARM, SOLVE and RELAX have a round for each colour."""
+HARD_IMPACT = 4.0
+"""Times the speed below which nothing rebounds, from which the friction of a point that only stops is worth its time."""
+STOPS = -1.0
+"""Target of a point that comes in fast and does not rebound."""
 REBOUND_ROUNDS = 10
 """Times round the points of a patch that rebounds: four corners that land at once are within some per cent of e then."""
 BODIES_EACH, BATCHES_EACH = 128, 8
@@ -108,7 +113,7 @@ class SpecialPatches(NamedTuple):
     balls: np.ndarray  # patches of two balls
     rebounds: np.ndarray  # patches with points that rebound
     supports: np.ndarray  # patches on moving supports
-    target: np.ndarray  # (m, 4) m/s, speeds at which points leave after they have closed, 0 for none
+    target: np.ndarray  # (m, 4) m/s, speeds at which points leave after they have closed, STOPS where they only stop, 0 for slow ones
     coefficients: np.ndarray  # (k, k, 4), see material.combine
     law: int  # one of `restitution.LAWS`
     given: np.ndarray  # (n+1,) J, work of moving supports on each body, added up
@@ -148,23 +153,27 @@ def _first_arm(s, width):
     return s // width * ARM_FIELDS * width + s % width
 
 
-@jit_making_arrays
+@jit
+def _arms_along(bodies, batches, s, o, width, place, k):
+    """Component k of the arms to the place (x, y) of a patch; see `_arms_to`."""
+    record, moved, q = batches.record, bodies.moved, _first_arm(s, width)
+    share, d = _field(record, o + SHARE * width), moved[8 * batches.second[s] + k] - moved[8 * batches.first[s] + k]
+    along = place[0] * _field(record, o + (TANGENT_1 + k) * width) + place[1] * _field(record, o + (TANGENT_2 + k) * width)
+    arm = batches.arm
+    return arm[q + (ARM_A + k) * width] + (1.0 - share) * d + along, arm[q + (ARM_B + k) * width] - share * d + along
+
+
+@jit
 def _arms_to(bodies, batches, s, o, width, c):
     """Bodies of slot s, and the arms from them to its point c (to its centre for c < 0) as they are now."""
-    record, arm, moved = batches.record, batches.arm, bodies.moved
-    a, b = batches.first[s], batches.second[s]
-    x, y = 0.0, 0.0
+    place = (0.0, 0.0)
     if c >= 0:
         g = o + (POINT + POINT_SIZE * c) * width
-        x, y = _field(record, g + X * width), _field(record, g + Y * width)
-    share, q = _field(record, o + SHARE * width), _first_arm(s, width)
-    arm_a, arm_b = np.empty(3), np.empty(3)
-    for k in range(3):
-        d = moved[8 * b + k] - moved[8 * a + k]
-        along = x * _field(record, o + (TANGENT_1 + k) * width) + y * _field(record, o + (TANGENT_2 + k) * width)
-        arm_a[k] = arm[q + (ARM_A + k) * width] + (1.0 - share) * d + along
-        arm_b[k] = arm[q + (ARM_B + k) * width] - share * d + along
-    return a, b, arm_a, arm_b
+        place = _field(batches.record, g + X * width), _field(batches.record, g + Y * width)
+    xa, xb = _arms_along(bodies, batches, s, o, width, place, 0)
+    ya, yb = _arms_along(bodies, batches, s, o, width, place, 1)
+    za, zb = _arms_along(bodies, batches, s, o, width, place, 2)
+    return batches.first[s], batches.second[s], (xa, ya, za), (xb, yb, zb)
 
 
 @jit
@@ -199,12 +208,26 @@ def _slip_at(bodies, a, b, arm_a, arm_b):
     return bx - ax, by - ay, bz - az
 
 
+@jit
+def _approach(width, bodies, batches, s, o):
+    """How fast the patch in slot s closes at its centre, m/s, and how much faster at points along t_1 and t_2, 1/s."""
+    record = batches.record
+    a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, -1)
+    u, n = _slip_at(bodies, a, b, arm_a, arm_b), _vector(record, o + NORMAL * width, width)
+    t1, t2 = _vector(record, o + TANGENT_1 * width, width), _vector(record, o + TANGENT_2 * width, width)
+    w1, w2 = 0.0, 0.0
+    for k in range(3):
+        w = bodies.velocity[8 * b + 3 + k] - bodies.velocity[8 * a + 3 + k]
+        w1, w2 = w1 + w * t1[k], w2 + w * t2[k]
+    return -(u[0] * n[0] + u[1] * n[1] + u[2] * n[2]), w2, -w1
+
+
 @jit_making_arrays
 def special_patches(width, solve, begin, count, coefficients, gravity, lists, target):
     """Patches from `begin` to `count` that need more than the passes give: of two balls, of rebounds, of moving supports.
 
-    Writes them to lists (3, m), and returns their numbers. coefficients (k, k, 4) of two materials; gravity: its strength, m/s2. target
-    (m, 4): speeds at which points leave after they have closed, m/s, 0 for none.
+    Writes them to lists (3, m), and returns their numbers. coefficients (k, k, 4) of two materials; gravity: its strength, m/s2; target
+    (m, 4): see `SpecialPatches`.
     """
     bodies, pairs, patches, rows, batches = solve.bodies, solve.pairs, solve.patches, solve.rows, solve.batches
     balls, rebounds, supports = 0, 0, 0
@@ -219,19 +242,18 @@ def special_patches(width, solve, begin, count, coefficients, gravity, lists, ta
             if bodies.mass[8 * i + INVERSE_MASS] == 0.0 and np.any(bodies.velocity[8 * i : 8 * i + 6] != 0.0):
                 lists[2, supports] = m
                 supports += 1
-        restitution = coefficients[bodies.material[a], bodies.material[b], 0]
-        if restitution == 0.0:
-            continue
+        e, mu, _, _ = coefficients[bodies.material[a], bodies.material[b]]
         o = (s // width) * FIELDS * width + s % width
-        nx, ny, nz = _vector(batches.record, o + NORMAL * width, width)
-        some = False
+        if e == 0.0 and mu == 0.0:
+            continue
+        # A speed that would rise less than the skin is none.
+        slow, some = sqrt(2.0 * gravity * rows[patches.row[m, 0], SKIN]), False
+        at_o, along_x, along_y = _approach(width, bodies, batches, s, o)
         for c in range(patches.size[m]):
-            _, _, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, c)
-            ux, uy, uz = _slip_at(bodies, a, b, arm_a, arm_b)
-            speed = -restitution * (ux * nx + uy * ny + uz * nz)
-            # A rebound that would rise less than the skin is none.
-            target[m, c] = speed if speed > sqrt(2.0 * gravity * rows[patches.row[m, 0], SKIN]) else 0.0
-            some = some or target[m, c] > 0.0
+            g = o + (POINT + POINT_SIZE * c) * width
+            approach = at_o + _field(batches.record, g + X * width) * along_x + _field(batches.record, g + Y * width) * along_y
+            target[m, c] = e * approach if e * approach > slow else (STOPS if approach > HARD_IMPACT * slow else 0.0)
+            some = some or target[m, c] != 0.0
         if some:
             lists[1, rebounds] = m
             rebounds += 1
@@ -269,7 +291,7 @@ def _turn_balls(width, bodies, pairs, patches, chosen, rows, batches):
         record[o + (POINT + GAP) * width] = gap
 
 
-@jit_making_arrays
+@jit
 def _push_point(width, bodies, batches, s, c, direction, given):
     """Push point c of the patch in slot s: impulses on b along a direction (3,), and against it on a; adds up the work of supports."""
     o = (s // width) * FIELDS * width + s % width
@@ -280,14 +302,14 @@ def _push_point(width, bodies, batches, s, c, direction, given):
     given[b] += _push(bodies, a, arm_a, -x, -y, -z)
 
 
-@jit_making_arrays
+@jit
 def _slip_of(width, bodies, batches, s, c):
     """Velocity of b against a at point c of the patch in slot s, m/s."""
     a, b, arm_a, arm_b = _arms_to(bodies, batches, s, (s // width) * FIELDS * width + s % width, width, c)
     return _slip_at(bodies, a, b, arm_a, arm_b)
 
 
-@jit_making_arrays
+@jit
 def _take_back(width, bodies, batches, s, points, sign, given):
     """Give the impulses of the patch in slot s once more, times sign: -1 takes them back."""
     record = batches.record
@@ -301,7 +323,7 @@ def _take_back(width, bodies, batches, s, points, sign, given):
     f1, f2 = sign * _field(record, o + PUSH_1 * width), sign * _field(record, o + PUSH_2 * width)
     f3 = sign * _field(record, o + TWIST * width)
     f = (f1 * t[0] + f2 * u[0], f1 * t[1] + f2 * u[1], f1 * t[2] + f2 * u[2])
-    _push_point(width, bodies, batches, s, np.int64(-1), f, given)
+    _push_point(width, bodies, batches, s, -1, f, given)
     for i, turn in ((batches.first[s], -f3), (batches.second[s], f3)):
         v, m, q = bodies.velocity, bodies.mass, 8 * i
         v[q + 3] += turn * (m[q] * n[0] + m[q + 1] * n[1] + m[q + 2] * n[2])
@@ -337,6 +359,8 @@ def _strike(width, bodies, patches, batches, special, m, c):
     _inverse_effective_mass(bodies, a, arm_a, inverse)
     _inverse_effective_mass(bodies, b, arm_b, inverse)
     e, mu_s, mu_k, e_t = special.coefficients[bodies.material[a], bodies.material[b]]
+    if special.target[m, c] == STOPS:
+        e = e_t = 0.0
     contact_impulse(inverse, n, u, PairLaw(special.law, e, e_t, mu_s, mu_k), np.empty(3), np.empty(3), impulse)
     _push_point(width, bodies, batches, s, c, (impulse[0], impulse[1], impulse[2]), special.given)
     return True
@@ -359,6 +383,10 @@ def _rebound(width, bodies, patches, chosen, batches, special):
             pushing, rebounding = pushing + pushes, rebounding + closed[c]
             single = c if closed[c] else single
         alone = pushing == 1 and rebounding == 1 and _strike(width, bodies, patches, batches, special, m, single)
+        for c in range(points):
+            # Points that stop together have done so.
+            if closed[c] and target[m, c] == STOPS and not alone:
+                target[m, c], closed[c] = 0.0, False
         # A box that lands flat turns with each of its corners in turn: once round they leave with half of what they should.
         for _ in range(0 if alone else REBOUND_ROUNDS):
             for c in range(points):
@@ -387,7 +415,7 @@ def _rebound(width, bodies, patches, chosen, batches, special):
             _push_point(width, bodies, batches, s, c, (x, y, z), given)
 
 
-@jit_making_arrays
+@jit
 def _add_work(width, bodies, patches, chosen, batches, given):
     """Add the work that moving supports did by the impulses of a sub-step to what is given (n+1,) J to each body."""
     record = batches.record
@@ -403,7 +431,7 @@ def _add_work(width, bodies, patches, chosen, batches, given):
             p = _field(record, g + PRESS * width)
             press = press + p
             turn_1, turn_2 = turn_1 + p * _field(record, g + Y * width), turn_2 - p * _field(record, g + X * width)
-        a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, np.int64(-1))
+        a, b, arm_a, arm_b = _arms_to(bodies, batches, s, o, width, -1)
         # Impulses act on b and their opposites on a: the support works with the impulse on the other body, at its own speed.
         support, other, sign, arm = (b, a, -1.0, arm_b) if bodies.mass[8 * b + INVERSE_MASS] == 0.0 else (a, b, 1.0, arm_a)
         ux, uy, uz = _velocity_at(bodies, support, arm)
