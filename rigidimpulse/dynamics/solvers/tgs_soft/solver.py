@@ -324,8 +324,10 @@ def _take_back(width, bodies, batches, s, points, sign, given):
     f3 = sign * _field(record, o + TWIST * width)
     f = (f1 * t[0] + f2 * u[0], f1 * t[1] + f2 * u[1], f1 * t[2] + f2 * u[2])
     _push_point(width, bodies, batches, s, -1, f, given)
-    for i, turn in ((batches.first[s], -f3), (batches.second[s], f3)):
+    for i, other, turn in ((batches.first[s], batches.second[s], -f3), (batches.second[s], batches.first[s], f3)):
         v, m, q = bodies.velocity, bodies.mass, 8 * i
+        if m[q + INVERSE_MASS] == 0.0:
+            given[other] -= turn * (n[0] * v[q + 3] + n[1] * v[q + 4] + n[2] * v[q + 5])
         v[q + 3] += turn * (m[q] * n[0] + m[q + 1] * n[1] + m[q + 2] * n[2])
         v[q + 4] += turn * (m[q + 1] * n[0] + m[q + 3] * n[1] + m[q + 4] * n[2])
         v[q + 5] += turn * (m[q + 2] * n[0] + m[q + 4] * n[1] + m[q + 5] * n[2])
