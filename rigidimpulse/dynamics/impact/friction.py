@@ -24,7 +24,7 @@ bilateral,
 e and x reduced together where that would make energy (e <= 1); a contact that does not grip even with x = 0 has the process.
 """
 
-from math import hypot, sqrt
+from math import sqrt
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def _form(x, k, y):
 def _turn_to_slip(u, un, t1, t2):
     """Turn t1, t2 in their plane until t1 points along the tangential part of u; returns its length, 0 if it is round-off of u.n."""
     s1, s2 = dot(u, t1), dot(u, t2)
-    slip = hypot(s1, s2)
+    slip = sqrt(s1 * s1 + s2 * s2)
     if slip <= ROUND_OFF * abs(un):
         slip = 0.0
     else:
@@ -91,7 +91,7 @@ def _slip_direction(k, mu):
         g += square * (sqrt(square) - 1.0) / (d1 * slope1 + d2 * slope2)
         if not g > before:
             break
-    size = hypot(d1, d2)
+    size = sqrt(d1 * d1 + d2 * d2)
     return d1 / size, d2 / size
 
 
@@ -111,7 +111,7 @@ def _process(law, e, mu, mu_s, k, start, q):
         # First the part in which the slip turns (`slip_direction`); it hands back where the slip is straight.
         if mu > 0.0 and turn(law, e, k, start, mu, q):
             return SLIDES
-        slip = hypot(q[S1], q[S2])
+        slip = sqrt(q[S1] * q[S1] + q[S2] * q[S2])
         d1, d2 = q[S1] / slip, q[S2] / slip
         rate = d1 * k.n1 + d2 * k.n2 - mu * (d1 * d1 * k.t11 + 2.0 * d1 * d2 * k.t12 + d2 * d2 * k.t22)
         # The normal impulse after which the slip has stopped.
@@ -163,13 +163,13 @@ def _grip(k, e, e_t, mu_s, start, q):
     q[JN] = (1.0 + kept * e) * an + (1.0 + kept * x) * bn
     q[J1] = (1.0 + kept * e) * a1 + (1.0 + kept * x) * b1
     q[J2] = (1.0 + kept * e) * a2 + (1.0 + kept * x) * b2
-    return q[JN] > 0.0 and (kept == 1.0 or hypot(q[J1], q[J2]) <= mu_s * q[JN])
+    return q[JN] > 0.0 and (kept == 1.0 or sqrt(q[J1] * q[J1] + q[J2] * q[J2]) <= mu_s * q[JN])
 
 
 @jit
 def _makes_energy(k, start, q):
     """Whether the impulse in q makes energy worth the name."""
-    moved = abs(q[JN] * start[0]) + hypot(q[J1], q[J2]) * start[1]
+    moved = abs(q[JN] * start[0]) + sqrt(q[J1] * q[J1] + q[J2] * q[J2]) * start[1]
     return energy_change(k, start, q[JN], q[J1], q[J2]) > ENERGY_ROUND_OFF * moved
 
 

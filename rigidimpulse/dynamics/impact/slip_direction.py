@@ -14,7 +14,7 @@ order ORDER, by the recurrences of products and of |s|^2 = s.s, of such a length
 of them, exponentially in x, so that few steps are needed; none in plane problems.
 """
 
-from math import hypot
+from math import frexp, inf, ldexp, sqrt
 
 import numpy as np
 
@@ -30,6 +30,7 @@ ERROR = TOLERANCES.impact.impulse_error
 LONGEST_STEP = 100.0
 MOST_STEPS = 400
 BISECTIONS = 53
+ROOT_STEPS = 20
 # Rows of the table of coefficients: s, |s|, and the changes of u_n, p, J_t and W since the step began.
 ROW_S1, ROW_S2, ROW_SLIP, ROW_UN, ROW_P, ROW_J1, ROW_J2, ROW_W = range(8)
 
@@ -37,11 +38,11 @@ ROW_S1, ROW_S2, ROW_SLIP, ROW_UN, ROW_P, ROW_J1, ROW_J2, ROW_W = range(8)
 @jit_making_arrays
 def turn(law, e, k, start, mu, q):
     """Go on until the slip is straight or zero (False) or the impact is over (True); arguments as `restitution.go_straight`."""
-    scale = hypot(k.n1, k.n2) + mu * (k.t11 + k.t22)
-    reach = ERROR * max(hypot(q[S1], q[S2]), -scale * start[0] / k.nn)
+    scale = sqrt(k.n1 * k.n1 + k.n2 * k.n2) + mu * (k.t11 + k.t22)
+    reach = ERROR * max(sqrt(q[S1] * q[S1] + q[S2] * q[S2]), -scale * start[0] / k.nn)
     series = np.empty((8, ORDER + 1))
     for _ in range(MOST_STEPS):
-        slip = hypot(q[S1], q[S2])
+        slip = sqrt(q[S1] * q[S1] + q[S2] * q[S2])
         d1, d2 = q[S1] / slip, q[S2] / slip
         g_1 = k.n1 - mu * (k.t11 * d1 + k.t12 * d2)
         g_2 = k.n2 - mu * (k.t12 * d1 + k.t22 * d2)
@@ -53,6 +54,21 @@ def turn(law, e, k, start, mu, q):
         if _take_step(law, e, k, start, step, series, q):
             return True
     return False
+
+
+@jit
+def _root(x, i):
+    """The i-th root of x >= 0, by Newton's method from above: the bits of powers in the C library depend on the processor."""
+    if not 0.0 < x < inf:
+        return x
+    _, exponent = frexp(x)
+    root = ldexp(1.0, -(-exponent // i))
+    for _ in range(ROOT_STEPS):
+        power = 1.0
+        for _ in range(i - 1):
+            power *= root
+        root = ((i - 1) * root + x / power) / i
+    return root
 
 
 @jit
@@ -86,8 +102,8 @@ def _expand(k, mu, scale, slip, q, c):
     # Jorba and Zou: the step at which the last two terms are round-off.
     longest = 1.0 / LONGEST_STEP
     for i in range(ORDER - 1, ORDER + 1):
-        size = max(hypot(c[ROW_S1, i], c[ROW_S2, i]), abs(c[ROW_SLIP, i]))
-        longest = max(longest, (size / (TRUNCATION * slip)) ** (1.0 / i))
+        size = max(sqrt(c[ROW_S1, i] * c[ROW_S1, i] + c[ROW_S2, i] * c[ROW_S2, i]), abs(c[ROW_SLIP, i]))
+        longest = max(longest, _root(size / (TRUNCATION * slip), i))
     return 1.0 / longest
 
 
