@@ -33,7 +33,7 @@ MOMENTUM = 1e-10
 """Of the sum of m |v|: some thousand impulses, each to rounding or to the solver's 1e-12."""
 FLOOR = 1e3
 """Times that, for what the floor gives, which lasting contacts make a sum of many forces."""
-SOFT_CONE = 0.06
+SOFT_CONE = 0.04
 """How near friction of impacts is to its cone in sub-stepped islands, see docs/theory/sub_stepping.md."""
 ANGULAR = 1e-4
 """Of its scale. Forces of lasting contacts are constant over sub-steps in which their arms turn by 0.01 rad: its square."""

@@ -420,7 +420,9 @@ def test_impulses_of_impacts_lie_on_the_cone_where_bodies_slide(name: str, resti
     )  # fmt: skip
     run = ri.simulate(scene, 0.6, accuracy=SUBSTEPPED)
     impulse = run.velocity("body")[-1] - (3.0, 0.0, -1.0)
-    assert np.linalg.norm(impulse[:2]) == pytest.approx(0.25 * impulse[2], rel=0.06)
+    # Four corners that land at once share the friction of their patch. Slip turns a little where the body turns.
+    within = 0.04 if name == "box, flat" else 0.02
+    assert np.linalg.norm(impulse[:2]) == pytest.approx(0.25 * impulse[2], rel=within)
     if spin == (0.0, 0.0, 0.0) and "tilted" not in name:
         # Four corners that land at once rebound together; once round them gave 0.14 of the 0.3.
         assert impulse[2] == pytest.approx(1.0 + restitution, rel=0.01)
