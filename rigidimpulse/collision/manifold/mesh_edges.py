@@ -84,11 +84,11 @@ def _crossing(p, d, q, e, reach):
 
 @inner
 def _crossing_contact(geometry, view, found, count, edges):
-    """Append the contact of two edges if they cross (frame of the first body)."""
+    """Append the contact of two edges if they cross (frame of the first body); returns the new count, and whether they are in reach."""
     p, d, q, e = edges.p, edges.d, edges.q, edges.e
     near, point_a, point_b, c, distance = _crossing(p, d, q, e, view.reach)
     if not near:
-        return count
+        return count, False
     c_length = sqrt(dot(c, c))
     spread = sqrt(dot(d, d) * dot(e, e)) / c_length  # 1 / sine: how much the normal leans where an edge leans
     size = sqrt(min(dot(d, d), dot(e, e)))
@@ -106,9 +106,9 @@ def _crossing_contact(geometry, view, found, count, edges):
             surface_b = along(point_b, -view.radius_v, normal)
             gap = dot(subtract(surface_b, surface_a), normal)
             contact = Contact(surface_a, surface_b, normal, gap, EDGE_EDGE, edges.a, edges.b)
-            return append_contact(found, count, contact, MERGE * size)
+            return append_contact(found, count, contact, MERGE * size), True
         sense = -sense
-    return count
+    return count, True
 
 
 @inner
@@ -125,7 +125,7 @@ def _overlap(p, d, q, e):
 
 @inner
 def _parallel_contacts(geometry, view, found, count, edges):
-    """Append both ends of the overlap of two nearly parallel edges of meshes (frame of the first body)."""
+    """Append both ends of the overlap of two nearly parallel edges of meshes (frame of the first body); returns as `_crossing_contact`."""
     edge, edge_a, edge_b = geometry.edge, edges.a, edges.b
     p, d, q, e = edges.p, edges.d, edges.q, edges.e
     length = sqrt(dot(d, d))
@@ -135,14 +135,14 @@ def _parallel_contacts(geometry, view, found, count, edges):
     between = subtract(along(q, (middle - start) / speed, e), along(p, middle, u))
     distance = sqrt(dot(between, between))
     if high - low <= MERGE * length or distance > view.skeleton or distance <= ROUND_OFF * length:
-        return count
+        return count, False
     normal = (between[0] / distance, between[1] / distance, between[2] / distance)
     error = ROUND_OFF * (length + abs(p[0]) + abs(p[1]) + abs(p[2])) / distance
     if error > TILT and view.leeway == 0.0:
-        return count
+        return count, True
     tolerance = STRICT + view.leeway + error
     if _arcs_miss(geometry, view, edges, normal)[0] > tolerance:
-        return count
+        return count, True
     for end in range(2):
         place = high if end == 1 else low
         point_a = along(p, place, u)
@@ -158,15 +158,18 @@ def _parallel_contacts(geometry, view, found, count, edges):
         feature_b = 2 * edge_b + 1 if of_a else 2 * edge[edge_b, end if speed > 0.0 else 1 - end]
         contact = Contact(point_a, point_b, normal, gap, CORNER, feature_a, feature_b)
         count = append_contact(found, count, contact, MERGE * length)
-    return count
+    return count, True
 
 
 @inner
 def edge_contacts(geometry, view, pairs, end, found, count):
-    """Append the contacts of the edges in both nodes of each pair; `view` is that of the second body's vertices."""
+    """Append the contacts of the edges in both nodes of each pair; `view` is that of the second body's vertices.
+
+    Returns the new count, and whether any two edges are in reach.
+    """
     vertex, edge, kind = geometry.vertex, geometry.edge, geometry.edge_kind
     owns, triangle_edge = geometry.triangle_owns, geometry.triangle_edge
-    meshes = view.radius_v == 0.0 and view.radius_t == 0.0
+    meshes, any_near = view.radius_v == 0.0 and view.radius_t == 0.0, False
     for pair in range(STACK_ROWS, end):
         a, b = pairs[pair, 0], pairs[pair, 1]
         low, high = row(geometry.node_min, a), row(geometry.node_max, a)
@@ -196,8 +199,10 @@ def edge_contacts(geometry, view, pairs, end, found, count):
                 sine_squared = dot(c, c) / (dot(d, d) * dot(e, e))
                 edges = _Edges(edge_a, edge_b, p, d, q, e)
                 if sine_squared > CROSSING * CROSSING:
-                    count = _crossing_contact(geometry, view, found, count, edges)
+                    count, near = _crossing_contact(geometry, view, found, count, edges)
+                    any_near = any_near or near
                 # Nearly parallel edges of meshes have both ends of their overlap.
                 if meshes and sine_squared < NEARLY_PARALLEL * NEARLY_PARALLEL:
-                    count = _parallel_contacts(geometry, view, found, count, edges)
-    return count
+                    count, near = _parallel_contacts(geometry, view, found, count, edges)
+                    any_near = any_near or near
+    return count, any_near

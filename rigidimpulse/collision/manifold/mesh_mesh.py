@@ -188,9 +188,12 @@ def _corner_contact(geometry, view, found, count, corner, p, touched):
 
 @inner
 def _corner_contacts(geometry, view, pairs, end, found, count):
-    """Append the contacts of the corners in one node of each pair with the edges and corners in the other."""
+    """Append the contacts of the corners in one node of each pair with the edges and corners in the other.
+
+    Returns the new count, and whether any two of these are in reach.
+    """
     vertex, triangle, owns, edge = geometry.vertex, geometry.triangle, geometry.triangle_owns, geometry.edge
-    skeleton_squared = view.skeleton * view.skeleton
+    skeleton_squared, any_near = view.skeleton * view.skeleton, False
     for pair in range(STACK_ROWS, end):
         node_v = pairs[pair, 1] if view.flipped else pairs[pair, 0]
         node_t = pairs[pair, 0] if view.flipped else pairs[pair, 1]
@@ -217,7 +220,7 @@ def _corner_contacts(geometry, view, pairs, end, found, count):
                         foot = along(a, s, side)
                         off = subtract(foot, p)
                         if -INSIDE <= s <= 1.0 + INSIDE and dot(off, off) <= skeleton_squared:
-                            size = sqrt(length_squared)
+                            size, any_near = sqrt(length_squared), True
                             count = _corner_contact(geometry, view, found, count, corner, p, (foot, 2 * e + 1, size))
                     v = triangle[face, m]
                     # Two corners are compared once, from the side of the first body.
@@ -225,9 +228,9 @@ def _corner_contacts(geometry, view, pairs, end, found, count):
                         foot = row(vertex, v)
                         off = subtract(foot, p)
                         if dot(off, off) <= skeleton_squared:
-                            size = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(foot[0]) + abs(foot[1]) + abs(foot[2])
+                            size, any_near = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(foot[0]) + abs(foot[1]) + abs(foot[2]), True
                             count = _corner_contact(geometry, view, found, count, corner, p, (foot, 2 * v, size))
-    return count
+    return count, any_near
 
 
 @jit_making_arrays
@@ -275,6 +278,7 @@ def round_round_contacts(geometry, first, second, pose, margin, contacts, count)
     slack = margin if edges_a > 0 and edges_b > 0 and radius_a + radius_b > 0.0 else 0.0
     open_a, open_b = not geometry.closed[first], not geometry.closed[second]
     found = Found(contacts.real, contacts.integer, count)
+    any_near = False
     for leeway in (0.0, ANY):
         of_a = View(False, R_back, t_back, R, t, radius_a, radius_b, margin, depth, skeleton, reach, slack, leeway, open_b)
         of_b = View(True, R, t, R_back, t_back, radius_b, radius_a, margin, depth, skeleton, reach, slack, leeway, open_a)
@@ -285,12 +289,15 @@ def round_round_contacts(geometry, first, second, pose, margin, contacts, count)
             stacked, end = gather_leaf_pairs(
                 geometry.node_min, geometry.node_max, geometry.node_child, R, t, reach, pairs, stacked
             )
-            count = edge_contacts(geometry, of_b, pairs, end, found, count)
+            count, near = edge_contacts(geometry, of_b, pairs, end, found, count)
+            any_near = any_near or near
             for view in (of_a, of_b):
                 count = _face_contacts(geometry, view, pairs, end, found, count)
-                count = _corner_contacts(geometry, view, pairs, end, found, count)
+                count, near = _corner_contacts(geometry, view, pairs, end, found, count)
+                any_near = any_near or near
         if leeway == ANY:
             return _keep_closest(found, count)
-        if count > found.first:
+        # Without any two features in reach there is no contact that round-off could have cost its normal.
+        if count > found.first or not any_near:
             return count
     return count
