@@ -404,7 +404,7 @@ THROWN = {
 """Shapes, orientations and spins."""
 
 
-@pytest.mark.parametrize("height", [0.5, 0.503])
+@pytest.mark.parametrize("height", [0.5, 0.5035])
 @pytest.mark.parametrize("restitution", [0.0, 0.3])
 @pytest.mark.parametrize("name", THROWN)
 def test_impulses_of_impacts_lie_on_the_cone_where_bodies_slide(name: str, restitution: float, height: float) -> None:
@@ -426,6 +426,9 @@ def test_impulses_of_impacts_lie_on_the_cone_where_bodies_slide(name: str, resti
     if spin == (0.0, 0.0, 0.0) and "tilted" not in name:
         # Four corners that land at once rebound together; once round them gave 0.14 of the 0.3.
         assert impulse[2] == pytest.approx(1.0 + restitution, rel=0.01)
+    if name == "box, flat":
+        # The corners in front are pressed by as much more as friction turns the box: with friction after the rebound it tumbled at 2 rad/s.
+        assert np.abs(run.angular_velocity("body")[-1, :2]).max() < 0.05
 
 
 def on_a_corner(seed: int, size: np.ndarray) -> np.ndarray:

@@ -42,6 +42,7 @@ import numpy as np
 from rigidimpulse.collision.contact_records import SKIN, ContactPairs
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.simd import width_of
+from rigidimpulse.core.vector import along, dot, length, row, scaled, subtract
 from rigidimpulse.core.workers import LAST, NONE, PATIENCE, look_at, open_round, pause, report_piece, take_piece, wait_for
 from rigidimpulse.dynamics.impact.friction import contact_impulse
 from rigidimpulse.dynamics.impact.point import add_body
@@ -372,12 +373,12 @@ def _strike(width, bodies, patches, batches, special, m, c):
 def _rebound(width, bodies, patches, chosen, batches, special):
     """Give points that came in fast and are closed their rebound, with friction; adds up the work of supports."""
     record, target, given, single = batches.record, special.target, special.given, np.int64(-1)
-    gained, closed = np.empty(target.shape[1]), np.empty(target.shape[1], np.bool_)
+    gained, closed, rubbed = np.empty(target.shape[1]), np.empty(target.shape[1], np.bool_), np.empty((target.shape[1], 3))
     for m in chosen:
         s, points = patches.slot[m], patches.size[m]
         o = (s // width) * FIELDS * width + s % width
-        n, step = _vector(record, o + NORMAL * width, width), _field(record, o + STEP_T * width)
-        gained[:points], pushing, rebounding = 0.0, 0, 0
+        n = _vector(record, o + NORMAL * width, width)
+        gained[:points], rubbed[:points], pushing, rebounding = 0.0, 0.0, 0, 0
         for c in range(points):
             # Only points that came in fast and did close.
             pushes = record[o + (POINT + POINT_SIZE * c + PRESS) * width] != 0.0
@@ -389,32 +390,37 @@ def _rebound(width, bodies, patches, chosen, batches, special):
             # Points that stop together have done so.
             if closed[c] and target[m, c] == STOPS and not alone:
                 target[m, c], closed[c] = 0.0, False
-        # A box that lands flat turns with each of its corners in turn: once round they leave with half of what they should.
+        # A box that lands flat turns with each of its corners, and with the friction of each, in turn: once round corners leave with half
+        # of what they should, and with friction after all rounds a box that slides tumbles.
         for _ in range(0 if alone else REBOUND_ROUNDS):
             for c in range(points):
                 if closed[c]:
                     u = _slip_of(width, bodies, batches, s, c)
                     mass = _field(record, o + (POINT + POINT_SIZE * c + MASS) * width)
-                    p = max(gained[c] + mass * (target[m, c] - (u[0] * n[0] + u[1] * n[1] + u[2] * n[2])), 0.0)
+                    p = max(gained[c] + mass * (target[m, c] - dot(u, n)), 0.0)
                     change, gained[c] = p - gained[c], p
-                    _push_point(width, bodies, batches, s, c, (change * n[0], change * n[1], change * n[2]), given)
+                    _push_point(width, bodies, batches, s, c, scaled(n, change), given)
+                    _rub(width, bodies, batches, s, c, gained[c], rubbed, given)
         for c in range(points):
-            if not closed[c]:
-                continue
-            # A rebound happens once, and nothing of it is carried over to the next sub-step.
-            target[m, c] = record[o + (POINT + POINT_SIZE * c + PRESS) * width] = 0.0
-            record[o + PUSH_1 * width] = record[o + PUSH_2 * width] = record[o + TWIST * width] = 0.0
-            if alone:
-                continue
-            u = _slip_of(width, bodies, batches, s, c)
-            un = u[0] * n[0] + u[1] * n[1] + u[2] * n[2]
-            x, y, z = -step * (u[0] - un * n[0]), -step * (u[1] - un * n[1]), -step * (u[2] - un * n[2])
-            size = sqrt(x * x + y * y + z * z)
-            # Friction of the rebound, in the cone of its impulse.
-            if size > _field(record, o + MU_STATIC * width) * gained[c]:
-                factor = _field(record, o + MU_DYNAMIC * width) * gained[c] / size
-                x, y, z = factor * x, factor * y, factor * z
-            _push_point(width, bodies, batches, s, c, (x, y, z), given)
+            if closed[c]:
+                # A rebound happens once, and nothing of it is carried over to the next sub-step.
+                target[m, c] = record[o + (POINT + POINT_SIZE * c + PRESS) * width] = 0.0
+                record[o + PUSH_1 * width] = record[o + PUSH_2 * width] = record[o + TWIST * width] = 0.0
+
+
+@jit
+def _rub(width, bodies, batches, s, c, pressed, rubbed, given):
+    """Bring the friction rubbed (p, 3) of point c, N s, to what stops its slip or to the cone of the impulse that has pressed it."""
+    record, o = batches.record, (s // width) * FIELDS * width + s % width
+    n, step = _vector(record, o + NORMAL * width, width), _field(record, o + STEP_T * width)
+    u, before = _slip_of(width, bodies, batches, s, c), row(rubbed, c)
+    f = along(along(before, -step, u), step * dot(u, n), n)
+    size = length(f)
+    if size > _field(record, o + MU_STATIC * width) * pressed:
+        f = scaled(f, _field(record, o + MU_DYNAMIC * width) * pressed / size)
+    for k in range(3):
+        rubbed[c, k] = f[k]
+    _push_point(width, bodies, batches, s, c, subtract(f, before), given)
 
 
 @jit
