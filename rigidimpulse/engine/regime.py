@@ -14,7 +14,7 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
                 often as it has more bodies than LARGE: it costs more than it advances. So do islands in which two bodies come to contact
                 again and again and no impulse keeps them apart. They are handed over at that instant, whatever they are made of.
                 Contacts that rebound by more than REBOUND, without joints, are given more of them: many impacts are what such scenes
-                are about
+                are about. So are neighbours of masses beyond RATIO : 1, which sub-steps may throw apart
 
 and, where an island begins to be sub-stepped (a body that comes near later is taken in):
 
@@ -88,6 +88,11 @@ def may_begin(world: World, joined: np.ndarray, solve_count: np.ndarray) -> bool
 def only_expensive(world: World) -> bool:
     """Whether islands are sub-stepped only where the exact regime has become expensive: the scene has not MANY bodies."""
     return world.accuracy.contact_solver in ("auto", "cheapest") and _number(world) < MANY
+
+
+def is_crowd(world: World) -> bool:
+    """Whether a scene has a CROWD of movable bodies without joints, too many for finer sub-steps than the settings ask for."""
+    return _number(world) >= CROWD
 
 
 def jointed(world: World) -> np.ndarray:
@@ -166,6 +171,12 @@ def lively(now: BodyState, strength: np.ndarray, inner: np.ndarray) -> np.ndarra
     return speed > SLEEP_SPEED * np.sqrt(strength * radius)
 
 
+def unlike(world: World, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Which pairs (k,) bool of bodies a and b (k,) are both dynamic, of masses beyond RATIO : 1."""
+    heavy = np.maximum(world.mass[a], world.mass[b]) > RATIO * np.minimum(world.mass[a], world.mass[b])
+    return world.dynamic[a] & world.dynamic[b] & heavy
+
+
 def refusals(
     world: World, root: np.ndarray, substepped_before: np.ndarray, joined: np.ndarray, moves: np.ndarray, solve_count: np.ndarray,
     pairs: tuple[np.ndarray, np.ndarray], auto: bool,
@@ -210,10 +221,9 @@ def refusals(
     if not begins.any():
         return out
     coefficient = world.coefficients[world.material_of_body[a], world.material_of_body[b], 0]
-    both = world.dynamic[a] & world.dynamic[b]
-    heavy = np.maximum(world.mass[a], world.mass[b]) > RATIO * np.minimum(world.mass[a], world.mass[b])
+    heavy = unlike(world, a, b)
     for r in np.unique(owner[begins & (coefficient > np.where(has_joints[owner], ELASTIC, REBOUND))]).tolist():
         out.setdefault(r, "restitution")
-    for r in np.unique(owner[begins & both & heavy & ~has_joints[owner]]).tolist():
+    for r in np.unique(owner[begins & heavy & ~has_joints[owner]]).tolist():
         out.setdefault(r, "mass ratio")
     return out

@@ -40,7 +40,7 @@ from rigidimpulse.engine.run import Run, start_trajectories
 from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still
 from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.step import step
-from rigidimpulse.engine.substepped.contact_forces import ContactStepper
+from rigidimpulse.engine.substepped.contact_forces import COARSE, ContactStepper
 from rigidimpulse.engine.substepped.jointed import JointedStepper
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.warm_up import (
@@ -171,7 +171,7 @@ def _move(run: Run) -> None:
     pair_events = PairEvents(run, 1.0 / 60.0)
     pair_events.find_pairs()
     pair_events.trajectory_changed(1, 0.0)
-    grown(make_memory(), 1)
+    grown(make_memory(world.num_bodies), 1)
     set_impact_margins(pair_events.table, np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool), 0.0, world.dynamic)
     bisection.sweep(run.detector, state.trajectory, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
 
@@ -180,7 +180,7 @@ def _find_substepped_contacts(run: Run) -> None:
     """Pairs and contacts of sub-stepped islands, before they are solved."""
     world, state, member = run.world, run.state, np.array([False, True])
     state.now.inv_inertia[1] = np.eye(3)
-    stepper = ContactStepper(world, world.dynamic, finer=False)
+    stepper = ContactStepper(world, world.dynamic, COARSE)
     for _ in range(2):  # The second time there is a cover.
         stepper.set_up(run, np.array([1]), np.array([0]), STEP)
     stepper.near(run, member, ~member, STEP)
@@ -193,7 +193,7 @@ def _find_substepped_contacts(run: Run) -> None:
 def _step_substepped(run: Run) -> None:
     """The sub-stepped solver, and the trajectories between its steps."""
     state, now, members = run.state, run.state.now, np.array([1])
-    stepper = ContactStepper(run.world, run.world.dynamic, finer=False)
+    stepper = ContactStepper(run.world, run.world.dynamic, COARSE)
     stepper.members = members
     support_levels(stepper.bodies, stepper.table.pairs, stepper.table.points, TALL)
     mark_quick(stepper.bodies, STEP, 1.0)
@@ -248,7 +248,7 @@ def _fly_on_joints(run: Run) -> None:
 
 def _step_jointed(run: Run) -> None:
     """Joints and contacts of sub-stepped islands, solved together."""
-    stepper = ContactStepper(run.world, run.world.dynamic, finer=False)
+    stepper = ContactStepper(run.world, run.world.dynamic, COARSE)
     joints = JointedStepper(run, stepper)
     run.state.now.inv_inertia[1] = np.eye(3)
     stepper.set_up(run, np.array([1]), np.array([0]), STEP, fineness=joints.fineness(run, np.array([1])))

@@ -23,16 +23,14 @@ from rigidimpulse.core.memory import rows_of
 HELD = np.dtype(
     [
         ("start", np.float64),
-        ("on_a", np.float64, (6,)),
-        ("on_b", np.float64, (6,)),
         ("slips", np.bool_),
         ("first", np.int64),
         ("count", np.int64),
         ("capacity", np.int64),
     ]
 )
-"""A held pair: since when its forces are constant while contacts turn [s], nan where they do not turn; force [N] and torque [N m] on its
-bodies; whether a contact slipped; its stretch of `ContactMemory.force`."""
+"""A held pair: since when its forces are constant while contacts turn [s], nan where they do not turn; whether a contact slipped; its
+stretch of `ContactMemory.force`."""
 FORCE = np.dtype(
     [
         ("kind", np.int64),
@@ -62,14 +60,16 @@ class ContactMemory(NamedTuple):
     held: np.ndarray  # (h,) HELD
     force: np.ndarray  # (f,) FORCE
     used: np.ndarray  # (3,) pairs, rows of held and entries of force in use
+    since: np.ndarray  # (n,) s, since when the wrench of a body's turning contacts is constant, nan where none is
+    wrench: np.ndarray  # (n, 6) N, N m, that wrench
 
 
-def make_memory(pairs: int = FIRST_PAIRS, held: int = FIRST_HELD, forces: int = FIRST_FORCES) -> ContactMemory:
-    """An empty memory with these numbers of places; pairs: a power of two."""
+def make_memory(number: int, pairs: int = FIRST_PAIRS, held: int = FIRST_HELD, forces: int = FIRST_FORCES) -> ContactMemory:
+    """An empty memory of `number` bodies with these numbers of places; pairs: a power of two."""
     integers = np.full((2, pairs), -1, np.int64)
     return ContactMemory(
         integers[0], np.full(pairs, -np.inf), np.zeros(pairs), np.zeros(pairs, np.int64), integers[1], rows_of(held, HELD),
-        rows_of(forces, FORCE), np.zeros(3, np.int64),
+        rows_of(forces, FORCE), np.zeros(3, np.int64), np.full(number, np.nan), np.zeros((number, 6)),
     )  # fmt: skip
 
 
@@ -164,7 +164,9 @@ def read_forces(memory, start, contacts, touching, out):
 def forget_forces(memory, number, contacts):
     """Whatever acted between the bodies of these contacts over a sub-step does not any more; number: of bodies."""
     for c in range(contacts.gap.shape[0]):
-        row = held_row(memory, contacts.body_a[c] * number + contacts.body_b[c])
+        a, b = contacts.body_a[c], contacts.body_b[c]
+        memory.since[a] = memory.since[b] = np.nan
+        row = held_row(memory, a * number + b)
         if row >= 0:
             memory.held[row].start = np.nan
 
@@ -183,8 +185,6 @@ def _empty_stretch(memory, at, size):
         held.first, held.capacity = memory.used[FORCES], max(size, LEAST_STRETCH)
         memory.used[FORCES] += held.capacity
     held.start, held.count, held.slips = np.nan, 0, False
-    for k in range(6):
-        held.on_a[k] = held.on_b[k] = 0.0
     return row
 
 
@@ -215,9 +215,15 @@ def keep_forces(memory, number, time, contacts, touching, force):
 def keep_wrenches(memory, number, time, contacts, world_force, slides):
     """Let the forces kept of these contacts act until they are taken back in part, where contacts turn (velocity projection).
 
-    world_force (m, 3) N on b; slides (m,) bool. Contacts of a pair come one after the other, as `keep_forces` got them.
+    world_force (m, 3) N on b; slides (m,) bool. Contacts of a pair come one after the other, as `keep_forces` got them; all contacts that
+    act on a movable body come at once.
     """
     row, at = np.int64(-1), np.int64(0)
+    for c in range(contacts.gap.shape[0]):
+        for i in (contacts.body_a[c], contacts.body_b[c]):
+            memory.since[i] = time
+            for k in range(6):
+                memory.wrench[i, k] = 0.0
     for c in range(contacts.gap.shape[0]):
         a, b = contacts.body_a[c], contacts.body_b[c]
         if c == 0 or a != contacts.body_a[c - 1] or b != contacts.body_b[c - 1]:
@@ -230,10 +236,10 @@ def keep_wrenches(memory, number, time, contacts, world_force, slides):
         ra, rb, f = contacts.arm_a[c], contacts.arm_b[c], world_force[c]
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
-            held.on_a[k] -= f[k]
-            held.on_b[k] += f[k]
-            held.on_a[3 + k] -= ra[i] * f[j] - ra[j] * f[i]
-            held.on_b[3 + k] += rb[i] * f[j] - rb[j] * f[i]
+            memory.wrench[a, k] -= f[k]
+            memory.wrench[b, k] += f[k]
+            memory.wrench[a, 3 + k] -= ra[i] * f[j] - ra[j] * f[i]
+            memory.wrench[b, 3 + k] += rb[i] * f[j] - rb[j] * f[i]
 
 
 @jit
@@ -277,7 +283,9 @@ def carried_memory(memory: ContactMemory, index: np.ndarray, carried: np.ndarray
 
     index: (n,) of each body there, -1 for those that are not there. carried: (n,) bool, bodies whose contacts still carry their forces.
     """
-    copied = make_memory(len(memory.key), len(memory.held), len(memory.force))
+    copied = make_memory(number, len(memory.key), len(memory.held), len(memory.force))
+    old = np.flatnonzero((index >= 0) & carried)
+    copied.since[index[old]], copied.wrench[index[old]] = memory.since[old], memory.wrench[old]
     for place in np.flatnonzero(memory.key >= 0).tolist():
         pair = np.array(divmod(int(memory.key[place]), len(index)))
         a, b = index[pair].tolist()
@@ -306,7 +314,7 @@ def grown(memory: ContactMemory, contacts: int) -> ContactMemory:
     live = int(rows["capacity"].sum())
     while live + LEAST_STRETCH * contacts > forces // 2:
         forces *= 2
-    larger = make_memory(pairs, held, forces)
+    larger = make_memory(0, pairs, held, forces)._replace(since=memory.since, wrench=memory.wrench)
     _copy_pairs(memory, larger)
     larger.held[: len(rows)] = rows
     place = 0

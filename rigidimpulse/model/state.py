@@ -82,7 +82,7 @@ class State:
             inv_inertia=np.zeros((n, 3, 3)),
         )
         self.rotation = np.zeros((n, 3, 3))
-        self.memory = make_memory()
+        self.memory = make_memory(n)
         self.sub_step = np.full(n, np.inf)
         self.limiter = make_energy_limiter(n)
         self.under_contact, self.sharing, self.correction = self.limiter.under_contact, self.limiter.sharing, self.limiter.correction

@@ -50,7 +50,7 @@ SUBSTEPPED, AFTER, LINEAR = ("contact_solver", "substepped"), ("impact_time", "a
         ("heavy_dropped_1e3", SUBSTEPPED, "heavy one sinks into the light one"),
         ("incline", SUBSTEPPED, "0.1 degrees below: creep along the slope"),
         ("stopping", SUBSTEPPED, "stopping distance"),
-        ("emergency_stop", SUBSTEPPED, "error of the time of the stop"),
+        ("emergency_stop", SUBSTEPPED, "error of the way at any time"),
         ("sliding_to_rolling", SUBSTEPPED, "error of the way"),
         ("ball_off_ball", SUBSTEPPED, "level speed after it leaves"),
         ("rocking_block", SUBSTEPPED, "w+ / w-"),

@@ -52,10 +52,10 @@ def sub_stepped_pile() -> ri.Recording:
 
 
 def boxes_dropped_on_boxes(**accuracy) -> ri.Recording:
-    """Four boxes fall on each other from 5 cm."""
+    """Four boxes fall on each other from 5 cm, at 32 places: scenes of fewer bodies are stepped finely."""
     scene = scene_of(FLOOR)
-    for k in range(4):
-        scene.add(ri.Body(f"box {k}", BOX, position=(0.03 * k, 0.0, 0.11 + 0.25 * k)))
+    for k in range(128):
+        scene.add(ri.Body(f"box {k}", BOX, position=(0.03 * (k % 4), 1.0 * (k // 4), 0.11 + 0.25 * (k % 4))))
     return ri.simulate(scene, 1.0, accuracy=ri.Accuracy(**accuracy))
 
 
@@ -120,7 +120,7 @@ SOUND = (
 def test_what_rises_out_of_deep_overlaps_is_reported_and_the_remedies_help() -> None:
     """In steps of 1/60 s boxes at 2 m/s go 16 mm into each other and rise out of that: 2 % of the energy, which no speed pays."""
     coarse = boxes_dropped_on_boxes(contact_solver="substepped")
-    assert [event.kind for event in coarse.status.problems] == ["energy made"]
+    assert {event.kind for event in coarse.status.problems} == {"energy made"}
     assert boxes_dropped_on_boxes(contact_solver="substepped", step=1.0 / 240.0).status.ok
     assert boxes_dropped_on_boxes(contact_solver="newton").status.ok
 

@@ -38,7 +38,7 @@ def random_contacts(rng: np.random.Generator, pairs: int) -> tuple[Contacts, Tou
 def test_forces_are_those_kept_last():
     """Random solutions, each of which replaces what its pairs carried; the dictionary holds the last one of each pair."""
     rng = np.random.default_rng(0)
-    memory, known = make_memory(16, 4, 8), {}
+    memory, known = make_memory(NUMBER, 16, 4, 8), {}
     start = np.zeros(NUMBER)
     for time in np.arange(1.0, 60.0):
         contacts, touching = random_contacts(rng, 5)
@@ -63,7 +63,7 @@ def test_forces_end_with_a_new_trajectory():
     """A force counts as long as neither body has taken a new trajectory since."""
     rng = np.random.default_rng(1)
     contacts, touching = random_contacts(rng, 1)
-    memory, start, out = make_memory(), np.zeros(NUMBER), np.empty((len(contacts.gap), 3))
+    memory, start, out = make_memory(NUMBER), np.zeros(NUMBER), np.empty((len(contacts.gap), 3))
     force = rng.normal(size=out.shape)
     keep_forces(memory, NUMBER, 1.0, contacts, touching, force)
     start[contacts.body_b[0]] = 1.0
@@ -77,7 +77,7 @@ def test_forces_end_with_a_new_trajectory():
 @pytest.mark.parametrize(("kind", "same"), [(VERTEX_FACE, True), (FACE_VERTEX, False)])
 def test_a_vertex_that_slides_over_faces_stays_the_same_contact(kind: int, same: bool):
     """The face does not count: the feature of b where the vertex belongs to a, that of a where it belongs to b."""
-    memory, out = make_memory(), np.empty((1, 3))
+    memory, out = make_memory(NUMBER), np.empty((1, 3))
     contacts = Contacts(np.array([1]), np.array([2]), *np.zeros((3, 1, 3)), *np.zeros((5, 1)))
     keep_forces(memory, NUMBER, 0.0, contacts, Touching(np.array([kind]), np.array([[5, 7]])), np.ones((1, 3)))
     read_forces(memory, np.zeros(NUMBER), contacts, Touching(np.array([kind]), np.array([[5, 8]])), out)
@@ -89,26 +89,27 @@ def test_wrenches_are_the_sum_of_the_forces():
     rng = np.random.default_rng(2)
     contacts, touching = random_contacts(rng, 4)
     m = len(contacts.gap)
-    memory, force, slides = make_memory(), rng.normal(size=(m, 3)), rng.random(m) < 0.3
+    memory, force, slides = make_memory(NUMBER), rng.normal(size=(m, 3)), rng.random(m) < 0.3
     keep_forces(memory, NUMBER, 1.0, contacts, touching, force)
     keep_wrenches(memory, NUMBER, 1.0, contacts, force, slides)
+    force_on, moment_on = np.zeros((2, NUMBER, 3))
+    for bodies, sign, arm in ((contacts.body_a, -1.0, contacts.arm_a), (contacts.body_b, 1.0, contacts.arm_b)):
+        np.add.at(force_on, bodies, sign * force)
+        np.add.at(moment_on, bodies, sign * np.cross(arm, force))
+    np.testing.assert_allclose(memory.wrench, np.column_stack([force_on, moment_on]), atol=1e-13)
     for a, b in set(zip(contacts.body_a.tolist(), contacts.body_b.tolist(), strict=True)):
         mine = (contacts.body_a == a) & (contacts.body_b == b)
-        held = memory.held[held_row(memory, a * NUMBER + b)]
-        np.testing.assert_allclose(held["on_b"][:3], force[mine].sum(axis=0), atol=1e-14)
-        np.testing.assert_allclose(held["on_b"][3:], np.cross(contacts.arm_b[mine], force[mine]).sum(axis=0), atol=1e-13)
-        np.testing.assert_allclose(held["on_a"][:3], -force[mine].sum(axis=0), atol=1e-14)
-        np.testing.assert_allclose(held["on_a"][3:], -np.cross(contacts.arm_a[mine], force[mine]).sum(axis=0), atol=1e-13)
-        assert held["slips"] == slides[mine].any()
+        assert memory.held[held_row(memory, a * NUMBER + b)]["slips"] == slides[mine].any()
     bodies = np.unique(np.concatenate([contacts.body_a, contacts.body_b]))
     np.testing.assert_array_equal(bodies_in_sub_steps(memory, NUMBER), bodies)
+    np.testing.assert_array_equal(np.flatnonzero(memory.since == 1.0), bodies)
     forget_forces(memory, NUMBER, contacts)
-    assert not len(bodies_in_sub_steps(memory, NUMBER))
+    assert not len(bodies_in_sub_steps(memory, NUMBER)) and np.all(np.isnan(memory.since))
 
 
 def test_rebounds_survive_growth():
     """10,000 pairs in a memory that began with 16 places."""
-    memory = make_memory(16, 4, 8)
+    memory = make_memory(NUMBER, 16, 4, 8)
     keys = np.random.default_rng(3).permutation(10_000)
     for key in keys.tolist():
         if not has_capacity(memory, 1):

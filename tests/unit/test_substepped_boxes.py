@@ -11,7 +11,7 @@ from rigidimpulse.collision.contact_records import CONTACT_MARGIN, SEPARATION, S
 from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.substepped.contact_forces import ContactStepper
+from rigidimpulse.engine.substepped.contact_forces import COARSE, ContactStepper
 from rigidimpulse.model.plan import Plan
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
@@ -43,7 +43,7 @@ def stepper_of(seed: int, wanted: float):
         scene.add(ri.Body(f"{k}", ri.Shape.box(SIDES[k]), position=k * direction / np.linalg.norm(direction) * 3.0, orientation=q[k]))
     world = compile_scene(scene, ri.Accuracy(contact_solver="substepped"))
     run = Run(world, Plan(world, []), Recorder(np.zeros(1), 2), EventLog())
-    stepper, now = ContactStepper(world, world.dynamic, finer=False), run.state.now
+    stepper, now = ContactStepper(world, world.dynamic, COARSE), run.state.now
     order = stepper.order
     stepper.set_up(run, np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
     low, high = 0.0, 3.0

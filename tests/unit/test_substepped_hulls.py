@@ -14,7 +14,7 @@ from rigidimpulse.collision.manifold.polyhedra import EDGE_WINS
 from rigidimpulse.core.quaternion import multiply, rotate, to_matrix
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.substepped.contact_forces import ContactStepper
+from rigidimpulse.engine.substepped.contact_forces import COARSE, ContactStepper
 from rigidimpulse.model.plan import Plan
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
@@ -77,7 +77,7 @@ def moved_together(corners: list[np.ndarray], q: np.ndarray, way: np.ndarray, wa
     for k in range(2):
         scene.add(ri.Body(f"{k}", shapes[k], position=k * high * way, orientation=q[k]))
     world = compile_scene(scene, ri.Accuracy(contact_solver="substepped"))
-    stepper = ContactStepper(world, world.dynamic, finer=False)
+    stepper = ContactStepper(world, world.dynamic, COARSE)
     stepper.set_up(Run(world, Plan(world, []), Recorder(np.zeros(1), 2), EventLog()), np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
     return stepper, world
 
@@ -143,7 +143,7 @@ def test_issue_005_corner_beside_the_face_that_bears_it_has_a_contact():
     for k, place, turn in zip((1, 10), places, turns, strict=True):
         scene.add(ri.Body(f"{k}", hulls[k], position=place, orientation=turn))
     world = compile_scene(scene, ri.Accuracy(contact_solver="substepped"))
-    stepper = ContactStepper(world, world.dynamic, finer=False)
+    stepper = ContactStepper(world, world.dynamic, COARSE)
     stepper.set_up(Run(world, Plan(world, []), Recorder(np.zeros(1), 2), EventLog()), np.arange(2), np.zeros(0, np.int64), 1.0 / 60.0)
     pairs, rows = stepper.table.pairs, stepper.table.points
     start, count = int(pairs.start[0]), int(pairs.count[0])

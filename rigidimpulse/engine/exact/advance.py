@@ -2,7 +2,7 @@
 
 In this order, for all islands at once, since bodies that shared forces may be in several islands by now:
 
-    velocities of contacts are projected (`velocity_projection`), islands one by one
+    velocities of contacts are projected (`velocity_projection`), islands one by one, and then those of bodies that nothing touches any more
     the energy with which bodies arrive is noted, from which the work of the contact forces follows
     joints are closed and stopped (`joints`), islands one by one
     energy that constant forces made is taken off (`energy_limit`)
@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidimpulse.engine.exact.energy_limit import limit_energy, note_end_energy
 from rigidimpulse.engine.exact.trajectories import begin_trajectory
-from rigidimpulse.engine.exact.velocity_projection import project_velocities
+from rigidimpulse.engine.exact.velocity_projection import project_alone, project_velocities
 from rigidimpulse.engine.islands import classify
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
@@ -29,6 +29,7 @@ def arrive(run: Run, islands: list[Island], time: float, bodies: np.ndarray) -> 
         if project_velocities(run, island):
             classify(run, island)
     state, constants = run.state, run.world.constants
+    project_alone(state.memory, run.motion, bodies, time, state.correction)
     pressed = bodies[state.under_contact[bodies]]
     if len(pressed):
         note_end_energy(state.limiter, state.now, constants, pressed)

@@ -41,7 +41,7 @@ from rigidimpulse.engine.exact.impacts import (
 )
 from rigidimpulse.engine.exact.step_size import ErrorEstimate, Forces, StepLimits, Turning, hold_turning, turns
 from rigidimpulse.engine.exact.trajectories import set_impact_margins, take_steady_load
-from rigidimpulse.engine.exact.velocity_projection import ProjectionScratch, project
+from rigidimpulse.engine.exact.velocity_projection import ProjectionScratch, project, project_alone
 from rigidimpulse.engine.pair_table import (
     MARGIN,
     NEVER,
@@ -515,6 +515,7 @@ def _arrive(loop, islands, touch, reached, time):
             bodies[count] = i
             count += 1
     bodies = bodies[:count]
+    project_alone(memory, motion, bodies, time, limiter.correction)
     note_end_energy(limiter, motion.now, constants, bodies)
     slowed, changes = np.zeros(len(reached), np.bool_), np.empty(count)
     done = limit_energy(limiter, motion.now, constants, motion.trajectory, bodies, time, slowed, changes)

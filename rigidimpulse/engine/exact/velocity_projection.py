@@ -6,7 +6,9 @@ them is taken back, and impulses nu along J_1, that of the end, let no contact a
     v_1 = v_0 + h M^-1 F + h/2 M^-1 J_0^T f + M^-1 J_1^T nu,    0 <= nu_n  _|_  J_1n v_1 >= 0,  |nu_t| <= mu nu_n
 
 This is velocity Verlet with constraints (RATTLE: Andersen 1983), of second order where the motion is smooth. Without turning
-J_1 = J_0 and nothing would change: such islands do without.
+J_1 = J_0 and nothing would change: such islands do without. A contact that has opened has nu = 0, and half of its force is taken back like
+that of all others. A light disc that a load and a floor pressed with 7 MN each lost half of one of them only when the other contact had
+opened, and was shot away with the energy of the load.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import row
 from rigidimpulse.dynamics.constraints.contact import SLIP, SOLVE_TOLERANCE
 from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows, row_velocities
 from rigidimpulse.dynamics.constraints.slip import solve_with_slip
@@ -40,22 +43,29 @@ class ProjectionScratch(NamedTuple):
 
 
 @jit
-def _ends(memory, row, start, a, b, time):
-    """Whether the forces of a held pair end at `time`, with neither body on a new trajectory since they began."""
-    if row < 0:
+def _ends(memory, at, start, a, b, time):
+    """Whether the forces of a held pair, in row `at`, end at `time`, with neither body on a new trajectory since they began."""
+    if at < 0:
         return False
-    began = memory.held[row].start
+    began = memory.held[at].start
     return max(start[a], start[b]) <= began and began < time
 
 
 @jit
-def _take_back(bodies, i, half, wrench):
-    """Take half [s] of a wrench (6,) off the velocities of body i."""
-    inv_mass, inv_inertia = bodies.inv_mass[i], bodies.inv_inertia[i]
-    for k in range(3):
-        bodies.velocity[i, k] -= half * inv_mass * wrench[k]
-        turn = inv_inertia[k, 0] * wrench[3] + inv_inertia[k, 1] * wrench[4] + inv_inertia[k, 2] * wrench[5]
-        bodies.angular_velocity[i, k] -= half * turn
+def take_back(memory, motion, bodies, time):
+    """Take half of the forces whose sub-steps end at `time` [s] off the velocities of these bodies (k,); returns whether there were any."""
+    now, any_ended = motion.now, False
+    for i in bodies:
+        since = memory.since[i]
+        if not (motion.trajectory.start[i] <= since and since < time):
+            continue
+        half, wrench, inv_inertia, any_ended = 0.5 * (time - since), memory.wrench[i], now.inv_inertia[i], True
+        for k in range(3):
+            now.velocity[i, k] -= half * now.inv_mass[i] * wrench[k]
+            turn = inv_inertia[k, 0] * wrench[3] + inv_inertia[k, 1] * wrench[4] + inv_inertia[k, 2] * wrench[5]
+            now.angular_velocity[i, k] -= half * turn
+        memory.since[i] = np.nan
+    return any_ended
 
 
 @jit_making_arrays
@@ -72,8 +82,8 @@ def _stop(bodies, contacts, members, number, slides):
 
 
 @jit_making_arrays
-def take_back_and_stop(memory, motion, contacts, touching, held, time, members, number):
-    """End the sub-steps of an island's pairs at `time` [s]; returns whether there were any.
+def _stop_held(memory, motion, contacts, touching, held, time, members, number):
+    """The impulses nu of the contacts of an island whose sub-steps end at `time` [s].
 
     motion: `touching.Motion`; touching: what touches at the contacts; held (m,) bool: those that may have carried forces;
     number (n,): working memory.
@@ -87,15 +97,12 @@ def take_back_and_stop(memory, motion, contacts, touching, held, time, members, 
         while last < m and contacts.body_a[last] == a and contacts.body_b[last] == b:
             any_held = any_held or held[last]
             last += 1
-        row = held_row(memory, a * n + b) if any_held else np.int64(-1)
-        if _ends(memory, row, start, a, b, time):
-            pair = memory.held[row]
-            half = 0.5 * (time - pair.start)
-            _take_back(bodies, a, half, pair.on_a)
-            _take_back(bodies, b, half, pair.on_b)
+        at = held_row(memory, a * n + b) if any_held else np.int64(-1)
+        if _ends(memory, at, start, a, b, time):
+            pair = memory.held[at]
             for c in range(first, last):
                 if held[c]:
-                    entry = find_force(memory, row, touching.kind[c], touching.feature[c, 0], touching.feature[c, 1])
+                    entry = find_force(memory, at, touching.kind[c], touching.feature[c, 0], touching.feature[c, 1])
                     # What has just come to touch slips if its pair does.
                     slides[count] = memory.force[entry].slips if entry >= 0 else pair.slips
                     which[count] = c
@@ -104,15 +111,14 @@ def take_back_and_stop(memory, motion, contacts, touching, held, time, members, 
         first = last
     if count > 0:
         _stop(bodies, select(contacts, which[:count]), members, number, slides[:count])
-    return count > 0
 
 
 @jit_making_arrays
 def project(memory, motion, contacts, touching, held, time, members, scratch):
-    """The same, for an island with bodies that no force pressed in its sub-step; scratch: `ProjectionScratch`.
+    """End the sub-steps of an island at `time` [s], with bodies that no force pressed in it; scratch: `ProjectionScratch`.
 
-    Returns whether sub-steps ended, and the energy [J] that bodies got which flew freely until now: the others have theirs in the work of
-    their contacts, and their frames on the way have their share of the change.
+    Other arguments as for `_stop_held`. Returns whether sub-steps ended, and the energy [J] that bodies got which flew freely until now:
+    the others have theirs in the work of their contacts, and their frames on the way have their share of the change.
     """
     bodies, k = motion.now, members.shape[0]
     before, free, count = np.empty((k, 6)), np.empty(k, np.int64), np.int64(0)
@@ -123,14 +129,27 @@ def project(memory, motion, contacts, touching, held, time, members, scratch):
         for j in range(3):
             before[s, j], before[s, 3 + j] = bodies.velocity[members[s], j], bodies.angular_velocity[members[s], j]
     flying = kinetic_energy(bodies, scratch.constants, free[:count])
-    if not take_back_and_stop(memory, motion, contacts, touching, held, time, members, scratch.number):
+    if not take_back(memory, motion, members, time):
         return False, 0.0
+    _stop_held(memory, motion, contacts, touching, held, time, members, scratch.number)
     for s in range(k):
         if scratch.under_contact[members[s]]:
             for j in range(3):
                 scratch.correction[members[s], j] = bodies.velocity[members[s], j] - before[s, j]
                 scratch.correction[members[s], 3 + j] = bodies.angular_velocity[members[s], j] - before[s, 3 + j]
     return True, kinetic_energy(bodies, scratch.constants, free[:count]) - flying
+
+
+@jit_making_arrays
+def project_alone(memory, motion, bodies, time, correction):
+    """End the sub-steps of those of these bodies (k,) that nothing touches any more; correction (n, 6): as in `ProjectionScratch`."""
+    now = motion.now
+    for s in range(bodies.shape[0]):
+        i = bodies[s]
+        v, w = row(now.velocity, i), row(now.angular_velocity, i)
+        if take_back(memory, motion, bodies[s : s + 1], time):
+            for k in range(3):
+                correction[i, k], correction[i, 3 + k] = now.velocity[i, k] - v[k], now.angular_velocity[i, k] - w[k]
 
 
 def project_velocities(run: Run, island: Island) -> bool:

@@ -27,7 +27,7 @@ from rigidimpulse.engine.exact.advance import NOT_HELD
 from rigidimpulse.engine.exact.energy_limit import note_end_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work, begin_trajectory
 from rigidimpulse.engine.pair_events import PairEvents
-from rigidimpulse.engine.pair_table import NEVER, RUNAWAY, most_solves
+from rigidimpulse.engine.pair_table import NEVER, RUNAWAY, USED, most_solves
 from rigidimpulse.engine.participants import Substepping
 from rigidimpulse.engine.regime import (
     EXPENSIVE_TALL,
@@ -36,6 +36,7 @@ from rigidimpulse.engine.regime import (
     SPIN,
     TALL,
     crowded,
+    is_crowd,
     island_roots,
     jointed,
     lively,
@@ -44,10 +45,11 @@ from rigidimpulse.engine.regime import (
     refusals,
     solves_in_islands,
     support_levels,
+    unlike,
 )
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import advance_sleep_timers, wake_by_contact
-from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Fineness, Outcome, joined_outcomes
+from rigidimpulse.engine.substepped.contact_forces import COARSE, FINE, FINEST, ContactStepper, Fineness, Outcome, joined_outcomes
 from rigidimpulse.engine.substepped.jointed import JointedStepper
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
@@ -65,12 +67,12 @@ LEAVING = 0.1
 """Part of its speed at which a fast body must leave an island that it has hit to be no part of it."""
 MOST_PIECES = 4
 """Parts of what is stepped at once, between which trajectories begin again."""
-STRAY = 10.0
-"""Skins by which trajectories may stray from the ways of turning bodies, over `Accuracy.substep_motion`: a skin by default."""
 OF_MEAN = 0.125
 """Part of the mean number of solves that each step is, for bodies with joints."""
 MOST_REBOUNDS = 30000.0
 """Times in a step that bodies which rebound by more than REBOUND may be dealt with beyond RUNAWAY: about a second of the compiled loop."""
+MOST_UNLIKE = 3000.0
+"""The same for neighbours of unlike masses (`regime.unlike`): a load that presses a light tilted disc flat needs hundreds."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the island that comes near it."""
 HANDED = "exact contact cost more than it advanced: sub-steps hold these bodies, which may sink in by a skin, 0.8 % of the inner radius"
@@ -112,7 +114,8 @@ class SubsteppedIslands:
         self._sharing, self._rest = sharing, rest
         solver = world.accuracy.contact_solver
         self._world, self._movable = world, world.dynamic.copy()
-        self._finer = solver == "auto" and only_expensive(world)
+        self._finer = solver in ("auto", "substepped") and not is_crowd(world)
+        self._parts = COARSE if not self._finer else FINEST if solver == "auto" and only_expensive(world) else FINE
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.sleep_timer = np.zeros(world.num_bodies)
         self.asleep = np.zeros(world.num_bodies, bool)
@@ -123,7 +126,7 @@ class SubsteppedIslands:
         self._jointed = jointed(world)
         self._joint_stepper: JointedStepper | None = None
         self._mean_solves, self._open = np.zeros(world.num_bodies), np.zeros(world.num_bodies, bool)
-        self._bounced = np.zeros(world.num_bodies, bool)
+        self._spared = np.zeros(world.num_bodies, bool)
         self.solve_count, self._step_end = self._no_solves(), 0.0
         self._handed: dict[tuple[str, ...], int] = {}
         self._ends: dict[int, float] = {}
@@ -137,7 +140,7 @@ class SubsteppedIslands:
     def stepper(self) -> ContactStepper:
         """The solver and its contacts; its kernels are compiled here where they were not needed at the start."""
         prepare_kernels(self._world, with_events=False, with_substepped=True)
-        return ContactStepper(self._world, self._movable, self._finer, self._sharing)
+        return ContactStepper(self._world, self._movable, self._parts, self._sharing)
 
     def _no_solves(self) -> np.ndarray:
         """Counts (n,) at the start of a step; nothing is handed over where everything is sub-stepped."""
@@ -186,7 +189,7 @@ class SubsteppedIslands:
         last = np.maximum(self.solve_count, 0.0)
         if pair_events.end > self._step_end:
             self._mean_solves += OF_MEAN * (np.minimum(last, RUNAWAY) - self._mean_solves)
-            self._bounced[:] = False
+            self._spared[:] = False
             self.solve_count, self._step_end = self._no_solves(), pair_events.end
         # One step with many events is no reason to leave the exact regime with a mechanism: it stays out of it for long.
         solve_count = np.where(self._jointed & self._auto, self._mean_solves, last)
@@ -438,9 +441,10 @@ class SubsteppedIslands:
         members, rebound = island.members, float(island.contacts.restitution.max(initial=0.0))
         stuck, pressed = bool(np.isposinf(self.solve_count[members]).any()), bool(pair_events.pressed()[members].any())
         # Many impacts are what some scenes are about. Where joints are, each takes a thousand times as long.
-        bounces = self._cheapest is None and rebound > REBOUND and not stuck and not self._jointed[members].any()
-        if bounces and not self._bounced[members].all():
-            self._bounced[members], self.solve_count[members] = True, -MOST_REBOUNDS
+        spared = self._cheapest is None and not stuck and not self._jointed[members].any() and not self._spared[members].all()
+        more = MOST_REBOUNDS if rebound > REBOUND else MOST_UNLIKE if self._is_unlike(run, pair_events, members) else 0.0
+        if spared and more > 0.0:
+            self._spared[members], self.solve_count[members] = True, -more
             return
         if pressed or self._open[members].any():
             # Looked at, and left to the exact regime until the end of the step.
@@ -456,6 +460,13 @@ class SubsteppedIslands:
         if names not in self._handed:
             run.log.note(island.time, "handed to sub-steps", names, HANDED)
         self._handed[names] = self._handed.get(names, 0) + 1
+
+    def _is_unlike(self, run: Run, pair_events: PairEvents, members: np.ndarray) -> bool:
+        """Whether members met something in this step that is too unlike them in mass for sub-steps."""
+        pairs = pair_events.table.pairs[: pair_events.table.number[USED]]
+        a, b = pairs["a"], pairs["b"]
+        met = (np.isin(a, members) | np.isin(b, members)) & (self.solve_count[a] != 0.0) & (self.solve_count[b] != 0.0)
+        return bool(unlike(run.world, a[met], b[met]).any())
 
     def _lost(self, pair_events: PairEvents, islands: list[Island]) -> np.ndarray:
         """Bodies that no impulse keeps apart and whose contacts the exact regime does not see: one sub-stepped island from here on."""
@@ -603,8 +614,7 @@ class SubsteppedIslands:
     def _end_of_trajectories(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray, step: float) -> float:
         """The same without what joints ask for; step: that is stepped at once at most, s."""
         stepper = self.stepper
-        allowed, pressed = STRAY * stepper.motion, stepper.pressed | self._finer
-        stray = most_stray(run.state.now, members, pressed, stepper.reach, stepper.skin, allowed)
+        stray = most_stray(run.state.now, members, stepper.pressed | self._finer, stepper.reach, stepper.skin, stepper.straight)
         spans = max(math.ceil(step / stepper.span(members, step) - 1e-9), 1)
         pieces = max(min(math.ceil(stray * step), MOST_PIECES * spans), spans)
         left = max(math.ceil((pair_events.end - time) * pieces / step - 1e-6), 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -86,11 +87,27 @@ MOSTLY = 0.3
 """Part of the bodies that are quick beyond which all count as such."""
 _NO_STEADY = 0, np.zeros(1, np.int64)
 """Patches, and edges of the colours of batches, that were made before the last find_contacts."""
-FINER_STEP, FINER_SUB_STEP, FINER_MOTION = 1.0 / 8.0, 1.0 / 32.0, 1.0 / 10.0
-"""Parts of the settings `step` and `substep_motion` that scenes of few bodies are stepped with: they can afford finer ones."""
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
 MOTION_TAKEN_REMEDY = "it was raised to the margin of contacts, and its speed paid for that; contact_solver='newton' needs no such margin"
+
+
+class Parts(NamedTuple):
+    """Parts of the settings `step` and `substep_motion` that bodies without joints are stepped with."""
+
+    step: float  # of `step`, what is stepped at once at most
+    sub_step: float  # of the longest sub-step
+    motion: float  # of `substep_motion`, until touching bodies are looked at again
+    straight: float  # of `substep_motion`, skins by which trajectories may stray from the ways of turning bodies
+
+
+COARSE = Parts(1.0, 1.0, 1.0, 10.0)
+"""For crowds."""
+FINE = Parts(1.0 / 2.0, 1.0 / 8.0, 1.0 / 2.0, 5.0)
+"""For scenes that are no crowd (`regime.CROWD`): no body is deeper in another than the skin in thirty scenes of 12 to 60 bodies, where in
+nine of them one was, up to 13 skins (`tests/bench/both_regimes.py`)."""
+FINEST = Parts(1.0 / 8.0, 1.0 / 32.0, 1.0 / 2.0, 1.0)
+"""For islands of scenes of few bodies that stand in for exact ones: a row of dominoes keeps its energy to 1e-7 of it."""
 
 
 @dataclass
@@ -138,18 +155,19 @@ class ContactStepper:
         inner: (n,) m, distance from the centre of mass to the nearest face; inf for what cannot be moved. skin: (n,) m.
         step_length: s, that is stepped at once at most; motion: inner radii, see `Accuracy.substep_motion`.
         kept: inner radii that a pair may come past each other with the contacts it has, in the middle of a step.
+        straight: skins by which trajectories may stray from the ways of turning bodies.
         bodies: by rank. table: pairs and contact points. balance: of their energy. sub_steps, parts: of the step that is set up; between
             parts contacts are looked for again. pressed: (n,) bool, contacts acted on the body when it was last stepped.
 
     """
 
-    def __init__(self, world: World, movable: np.ndarray, finer: bool, sharing: Sharing | None = None) -> None:
+    def __init__(self, world: World, movable: np.ndarray, parts: Parts, sharing: Sharing | None = None) -> None:
         """Make the arrays of the bodies; shrink the shapes for the contact kernels.
 
         Args:
             world: the compiled scene.
             movable: (n,) bool, bodies that are dynamic, or will be when they are let go.
-            finer: for scenes of few bodies.
+            parts: how finely bodies without joints are stepped.
             sharing: of the work by several cores; None: what suits this machine.
 
         """
@@ -192,9 +210,10 @@ class ContactStepper:
         self._work_queue = empty_work_queue()
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
-        self.step_length = world.accuracy.step * (FINER_STEP if finer else 1.0)
-        self._least_sub_steps = LEAST_SUB_STEPS / (FINER_SUB_STEP if finer else 1.0)
-        self.motion = world.accuracy.substep_motion * (FINER_MOTION if finer else 1.0)
+        self.step_length = world.accuracy.step * parts.step
+        self._least_sub_steps = LEAST_SUB_STEPS / parts.sub_step
+        self.motion = world.accuracy.substep_motion * parts.motion
+        self.straight = world.accuracy.substep_motion * parts.straight
         self.kept = KEPT * self.motion
         # Balls and moving supports: all contacts are found again in the middle of a step.
         self._all_quick = bool(world.moving.any() or world.ball.any())
