@@ -145,8 +145,8 @@ def put_back(smaller, bodies, a, b, real, integer, c):
             rise = _rise(back, feature // 2, n) if feature % 2 == 0 else _rise_of_edge(geometry, back, feature // 2, p, n)
         elif kind == HALF_SPACE_CONTACT:
             rise = _rise(back, feature, n)
-        elif kind == CYLINDER_CONTACT and not _has_cylinder(geometry, bodies.shape[i]):
-            # Features of cylinders have other numbers, and their rise is the depth.
+        elif kind == CYLINDER_CONTACT and feature >= 0:
+            # Features of cylinders are below zero, and their rise is the depth.
             f = feature // 3
             if feature % 3 == 2:
                 rise = _rise_of_face(geometry, back, f, p, n)
@@ -155,15 +155,6 @@ def put_back(smaller, bodies, a, b, real, integer, c):
         for k in range(3):
             real[c, at + k] += sign * rise * real[c, 6 + k]
         real[c, 9] -= rise
-
-
-@jit
-def _has_cylinder(geometry, s):
-    """Whether cylinders are among the primitives of a shape."""
-    for p in range(geometry.shape_first[s], geometry.shape_first[s + 1]):
-        if geometry.kind[p] == CYLINDER:
-            return True
-    return False
 
 
 @jit
