@@ -81,7 +81,7 @@ def test_block_that_starts_closer_than_the_skin_slides_as_far_without_a_hop(step
 
 
 def test_wall_built_without_gaps_stays_where_it_was_built():
-    # Ten courses of bricks, flush: driven out to their skins the top would rise by ten of them (4 mm). Pressed in and led apart they stay
+    # Ten layers of bricks, flush: driven out to their skins the top would rise by ten of them (4 mm). Pressed in and led apart they stay
     # within a skin or two, and all come to rest.
     scene, size = ri.Scene(gravity=(0.0, 0.0, -GRAVITY)), (0.2, 0.1, 0.1)
     scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
