@@ -25,7 +25,9 @@ RIM_POINTS = 8
 """Points, fixed on the cylinder, that stand for a rim that touches all around."""
 SIDE, CAP, RIM, LOWEST, FIXED, NUM_FEATURES = (np.int64(number) for number in (0, 1, 3, 7, 9, 32))
 """Features of a cylinder: side; caps (top, bottom); rims where a curve goes in or out; lowest and fixed points. Those of primitive p begin
-at -32 (p + 1), so that all are below zero, and those of triangles are not."""
+at FIRST_FEATURE + 32 p."""
+FIRST_FEATURE = np.int64(1 << 30)
+"""Features of cylinders begin beyond those of triangles, so that a contact of a body with both tells which it is of."""
 
 WHOLE_PLANE, TRIANGLE = inf, -1.0
 """What bounds a plane, instead of the radius of a disc."""
@@ -64,7 +66,7 @@ def solid_of(frame, radius, cylinder, margin):
     origin, half = row(frame, cylinder), frame[cylinder, 6]
     tilt = STRICT + min(TILT, margin / min(radius[cylinder], half))
     depth = min(DEPTH * margin, MOST_DEPTH * min(radius[cylinder], half))
-    return Solid(origin, u, v, w, radius[cylinder], half, -NUM_FEATURES * (cylinder + 1), False, margin, depth, tilt)
+    return Solid(origin, u, v, w, radius[cylinder], half, FIRST_FEATURE + NUM_FEATURES * cylinder, False, margin, depth, tilt)
 
 
 @inner

@@ -17,7 +17,7 @@ import numpy as np
 from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
 from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Geometry, Primitive, build_geometry
-from rigidimpulse.collision.manifold.cylinder_rims import CYLINDER_CONTACT
+from rigidimpulse.collision.manifold.cylinder_rims import CYLINDER_CONTACT, FIRST_FEATURE
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.vector import turned_back_by
@@ -145,8 +145,8 @@ def put_back(smaller, bodies, a, b, real, integer, c):
             rise = _rise(back, feature // 2, n) if feature % 2 == 0 else _rise_of_edge(geometry, back, feature // 2, p, n)
         elif kind == HALF_SPACE_CONTACT:
             rise = _rise(back, feature, n)
-        elif kind == CYLINDER_CONTACT and feature >= 0:
-            # Features of cylinders are below zero, and their rise is the depth.
+        elif kind == CYLINDER_CONTACT and feature < FIRST_FEATURE:
+            # The rise of a cylinder is the depth.
             f = feature // 3
             if feature % 3 == 2:
                 rise = _rise_of_face(geometry, back, f, p, n)

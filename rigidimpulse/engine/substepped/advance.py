@@ -71,8 +71,9 @@ OF_MEAN = 0.125
 """Part of the mean number of solves that each step is, for bodies with joints."""
 MOST_REBOUNDS = 30000.0
 """Times in a step that bodies which rebound by more than REBOUND may be dealt with beyond RUNAWAY: about a second of the compiled loop."""
-MOST_UNLIKE = 3000.0
-"""The same for neighbours of unlike masses (`regime.unlike`): a load that presses a light tilted disc flat needs hundreds."""
+MOST_UNLIKE = 6000.0
+"""The same for neighbours of unlike masses (`regime.unlike`), over the number of bodies of their island, since each time deals with all of
+them: a load that presses a light tilted disc flat needs hundreds."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the island that comes near it."""
 HANDED = "exact contact cost more than it advanced: sub-steps hold these bodies, which may sink in by a skin, 0.8 % of the inner radius"
@@ -442,7 +443,7 @@ class SubsteppedIslands:
         stuck, pressed = bool(np.isposinf(self.solve_count[members]).any()), bool(pair_events.pressed()[members].any())
         # Many impacts are what some scenes are about. Where joints are, each takes a thousand times as long.
         spared = self._cheapest is None and not stuck and not self._jointed[members].any() and not self._spared[members].all()
-        more = MOST_REBOUNDS if rebound > REBOUND else MOST_UNLIKE if self._is_unlike(run, pair_events, members) else 0.0
+        more = MOST_REBOUNDS if rebound > REBOUND else MOST_UNLIKE / len(members) if self._is_unlike(run, pair_events, members) else 0.0
         if spared and more > 0.0:
             self._spared[members], self.solve_count[members] = True, -more
             return
