@@ -36,7 +36,7 @@ ALLOWED = 0.1
 TURN = 0.01
 """rad, how far arms and normals of contacts may turn in a sub-step."""
 MOST_SUB_STEPS = 256.0
-"""Sub-steps in a step."""
+"""Sub-steps in a step that turning contacts ask for at most; what their error asks for may be shorter."""
 TURN_OF_BODY = 0.1
 """rad, how far bodies may turn in a sub-step where that matters to gaps."""
 GROWTH = 1.5
