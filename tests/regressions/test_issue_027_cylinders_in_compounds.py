@@ -39,3 +39,21 @@ def test_a_cylinder_that_leans_on_a_tooth_does_not_sink_into_it(angle: float) ->
     run = ri.simulate(scene, 0.4, accuracy=ri.Accuracy(contact_solver="substepped"))
     assert run.status.ok, run.status.message
     assert_no_penetration(run, 1e-5 * 0.17)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_rim_of_a_mug_does_not_sink_into_a_floor(seed: int) -> None:
+    """The rim of the smaller cylinder of the search lies deeper than its faces, by d along the axis and by d across it, not by d in all.
+
+    Mugs that land on a rim sank 0.3 mm into the floor, two fifths of d = 0.84 mm, and came out of it when they lay flat.
+    """
+    mug = ri.Shape.compound([
+        (ri.Shape.cylinder(0.04, 0.1), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),
+        (ri.Shape.box((0.02, 0.015, 0.06)), (0.05, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),
+    ])  # fmt: skip
+    scene, turn = ri.Scene(), np.random.default_rng(seed).normal(size=4)
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=MATERIAL))
+    scene.add(ri.Body("mug", mug, position=(0.0, 0.0, 0.3), orientation=turn / np.linalg.norm(turn), material=MATERIAL))
+    run = ri.simulate(scene, 1.5, accuracy=ri.Accuracy(contact_solver="substepped"))
+    assert run.status.ok, run.status.message
+    assert_no_penetration(run, 1e-4)

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import sqrt
 
 import numpy as np
 
 from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
 from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Geometry, Primitive, build_geometry
-from rigidimpulse.collision.manifold.cylinder_rims import CYLINDER_CONTACT, FIRST_FEATURE
+from rigidimpulse.collision.manifold.cylinder_rims import CYLINDER_CONTACT, FIRST_FEATURE, NUM_FEATURES
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.vector import turned_back_by
@@ -145,8 +146,9 @@ def put_back(smaller, bodies, a, b, real, integer, c):
             rise = _rise(back, feature // 2, n) if feature % 2 == 0 else _rise_of_edge(geometry, back, feature // 2, p, n)
         elif kind == HALF_SPACE_CONTACT:
             rise = _rise(back, feature, n)
-        elif kind == CYLINDER_CONTACT and feature < FIRST_FEATURE:
-            # The rise of a cylinder is the depth.
+        elif kind == CYLINDER_CONTACT and feature >= FIRST_FEATURE:
+            rise = _rise_of_cylinder(geometry, depth[i], (feature - FIRST_FEATURE) // NUM_FEATURES, n)
+        elif kind == CYLINDER_CONTACT:
             f = feature // 3
             if feature % 3 == 2:
                 rise = _rise_of_face(geometry, back, f, p, n)
@@ -161,6 +163,14 @@ def put_back(smaller, bodies, a, b, real, integer, c):
 def _rise(back, v, n):
     """How far vertex v is put back along the normal n of its body, m."""
     return back[v, 0] * n[0] + back[v, 1] * n[1] + back[v, 2] * n[2] + back[v, 3]
+
+
+@jit
+def _rise_of_cylinder(geometry, d, p, n):
+    """The same of cylinder p, whose radius and half height are less by d: a rim moves by d out of the axis and by d along it."""
+    frame = geometry.frame
+    along = abs(frame[p, 3] * n[0] + frame[p, 4] * n[1] + frame[p, 5] * n[2])
+    return d * (along + sqrt(max(1.0 - along * along, 0.0)))
 
 
 @jit

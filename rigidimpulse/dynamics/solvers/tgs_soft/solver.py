@@ -27,7 +27,7 @@ at u_n < -sqrt(2 g skin) / e and are closed by now rebound. Where one point of a
 are taken back, and it gets that of the impact of a single point (`impact/friction.py`): friction couples to u_n wherever the point is
 not straight below the centre, and with the two one after the other boxes that landed on a corner lost a fifth more than they should. So
 does a point that comes in HARD_IMPACT times as fast and does not rebound. Points of a patch that rebound together leave at -e u_n, with
-friction after that. The torque-free part of rotation keeps the angular
+the friction of each in the cone of its impulse, point after point and round after round. The torque-free part of rotation keeps the angular
 momentum: w <- I(q')^-1 I(q) w, with q' from the spin at mid-way.
 
 Method: Macklin et al., Small steps in physics simulation, 2019; the relaxing pass and restitution after E. Catto, Solver2D
