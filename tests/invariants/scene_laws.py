@@ -26,7 +26,7 @@ from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.scene.mass import body_mass
 
 DEPTH, SOFT_DEPTH = 1e-6, 1e-2
-"""The second is half of what the status allows such runs (`engine.measure.overlap`); 3.3e-3 is the most that 2,400 random scenes had."""
+"""The second is what the status allows such runs (`engine.measure.overlap`); 3.3e-3 is the most that 2,400 random scenes had."""
 ENERGY, JOINT_ENERGY = 1e-6, 1e-3
 """Of the energy moved. Joints are of second order: some (w h)^2, 1e-3 for a radian in ten steps."""
 MOMENTUM = 1e-10
