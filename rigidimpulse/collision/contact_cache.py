@@ -34,7 +34,8 @@ from rigidimpulse.collision.contact_records import IMPULSE, INVERSE_MASS, OUTSID
 from rigidimpulse.collision.distance.epa import make_polytope
 from rigidimpulse.collision.distance.gjk import closest, make_simplex
 from rigidimpulse.collision.manifold.convex_convex import seen_from
-from rigidimpulse.collision.manifold.dispatch import GENERAL, MOST_HULL_CORNERS, convex_contacts, num_corners, pair_kind
+from rigidimpulse.collision.manifold.convex_parts import FIRST_PLACES, PartScratch, contacts_of_parts, make_part_scratch
+from rigidimpulse.collision.manifold.dispatch import GENERAL, MOST_HULL_CORNERS, SEVERAL, convex_contacts, num_corners, pair_kind
 from rigidimpulse.collision.manifold.polyhedra import POINTS, Pair, Polyhedra, Query, Scratch, make_polygon
 from rigidimpulse.collision.manifold.polyhedra import Points as Found
 from rigidimpulse.core.kernels import inlined, jit
@@ -44,7 +45,9 @@ from rigidimpulse.core.vector import turned_back_by
 AHEAD, AHEAD_GENERAL, FARTHEST = 0.05, 0.12, 2.0
 """Least margin, least margin of general pairs, and greatest margin of the search for contacts, in inner radii."""
 SAME_GENERAL = 0.02
-"""Least relative motion, in inner radii, after which the contacts of a touching general pair are found again."""
+"""Least relative motion, in inner radii, after which the contacts of a touching general pair are found again; also of SEVERAL parts."""
+TOO_FEW_POINTS, TOO_FEW_PLACES = -1, -2
+"""What `find_contacts` ran out of: points of the table, or places of its workspace."""
 FAR = 4.0
 """Distance, in margins, up to which the gap of convex bodies is measured."""
 BLOCK = 64
@@ -88,17 +91,18 @@ class Workspace(NamedTuple):
     old: np.ndarray  # (POINTS, POINT_FIELDS) points that they replace
     old_ids: np.ndarray  # (POINTS, 3)
     scratch: Scratch
+    parts: PartScratch
 
 
-def make_workspace() -> Workspace:
-    """Scratch memory for one share."""
+def make_workspace(places: int = FIRST_PLACES) -> Workspace:
+    """Scratch memory for one share, in which pairs of bodies of several parts have `places` contacts at most."""
     number = POINTS + 1
     scratch = Scratch(
         make_polygon.py_func(), make_simplex.py_func(), make_polytope.py_func(), *np.empty((2, 3, 3)), *np.zeros((2, 3))
     )
     return Workspace(
         Found(np.empty((number, 10)), np.empty((number, 3), np.int64)), np.empty((POINTS, POINT_FIELDS)), np.empty((POINTS, 3), np.int64),
-        scratch,
+        scratch, make_part_scratch(places),
     )  # fmt: skip
 
 
@@ -291,7 +295,7 @@ def review(bodies, pairs, share, limits):
                 # A pair that was s apart is still at least s - m apart.
                 if count[p] == 0 and apart[p] - motion > margin:
                     continue
-                still = max(same, SAME_GENERAL) if general else same
+                still = max(same, SAME_GENERAL) if general or pairs.kind[p] == SEVERAL else same
                 if count[p] > 0 and (motion <= still * size or (kept > 0.0 and motion + speed * ahead <= kept * size)):
                     continue
             places[end], margins[end] = p, margin
@@ -336,13 +340,42 @@ def _take_points(table, p, number):
 
 
 @jit
+def _find_of_parts(convex, bodies, table, p, share, query, coefficients, workspace):
+    """Find the contacts of a pair of kind SEVERAL; returns 0, or what there is too little of."""
+    pairs, points, ids, free = table
+    number, parts = share.number, workspace.parts
+    ends = np.int64(pairs.first[p]), np.int64(pairs.second[p])
+    count, gap = contacts_of_parts(convex.shapes, bodies, ends, query, workspace.scratch, (workspace.found, parts))
+    if count < 0:
+        return TOO_FEW_PLACES
+    new, old = free[number, 0], pairs.start[p]
+    if new + count > free[number, 1]:
+        return TOO_FEW_POINTS
+    if pairs.count[p] == 0:
+        pairs.contact_margin[p] = min(bodies.skin[ends[0]], bodies.skin[ends[1]])
+    for i in range(count):
+        write_point(bodies, pairs, p, Source(parts.real, i, 0.0, 0.0, 1.0, 1.0), coefficients, points, new + i)
+        for j in range(3):
+            ids[new + i, j] = parts.integer[i, 2 + j]
+    if pairs.count[p] == 0:
+        set_contact_margin(pairs.contact_margin, p, points, new, new + count)
+    else:
+        match_contacts(Points(points, ids, old, old + pairs.count[p]), Points(points, ids, new, new + count), NEAR * query.size)
+    pairs.start[p], pairs.count[p], pairs.capacity[p] = new, count, count
+    free[number, 0] = new + count
+    pairs.apart[p] = max(gap, 0.0) if count == 0 else 0.0
+    note_seen(bodies, pairs, p)
+    return 0
+
+
+@jit
 def find_contacts(convex, bodies, table, share, limits, coefficients, workspace):
     """Find the contacts of a share of the pairs where `review` asks for them. General pairs are left at the begin of its places.
 
     convex: `Convex`; table: `contact_table.Table`; coefficients (k, k, 4) of two materials; workspace: of the share. Returns the number of
-    pairs that were searched, and the number of general ones, -1 if there are too few points (grow the table and call again).
+    pairs that were searched, and the number of general ones, or what there is too little of (get more and call again).
     """
-    found, old, old_ids, scratch = workspace
+    found, old, old_ids, scratch, _ = workspace
     pairs, points, ids, _ = table
     position, rotation, velocity, shape, between = bodies.position, bodies.rotation, bodies.velocity, bodies.shape, scratch.between
     waiting = 0
@@ -359,9 +392,14 @@ def find_contacts(convex, bodies, table, share, limits, coefficients, workspace)
             continue
         size = min(bodies.inner[a], bodies.inner[b])
         pair, query = Pair(rotation, velocity, a, b, shape[a], shape[b]), Query(margin, limits.ahead, size)
+        if pairs.kind[p] == SEVERAL:
+            lacks = _find_of_parts(convex, bodies, table, p, share, query, coefficients, workspace)
+            if lacks < 0:
+                return end - begin, lacks
+            continue
         count, gap = convex_contacts(pairs.kind[p], convex.shapes, pair, query, scratch, found)
         if count > pairs.capacity[p] and not _take_points(table, p, share.number):
-            return end - begin, -1
+            return end - begin, TOO_FEW_POINTS
         start, handed = pairs.start[p], 0
         for i in range(start, start + pairs.count[p]):
             # An old contact without impulse gives nothing to a new one.

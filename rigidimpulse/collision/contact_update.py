@@ -19,14 +19,11 @@ from rigidimpulse.collision.manifold.inset_surface import put_back
 from rigidimpulse.collision.manifold.penetrating import gap_along, overlap_contacts, support
 from rigidimpulse.collision.manifold.polyhedra import POINTS, Polyhedra, make_scratch
 from rigidimpulse.collision.manifold.polyhedra import Points as Found
-from rigidimpulse.collision.manifold.reduce import reduce_contacts
+from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT, PER_NORMAL, reduce_contacts
 from rigidimpulse.collision.manifold.rounding import only_primitive, side_radius
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.vector import turned_by
 
-PER_NORMAL, GAP_WEIGHT = np.int64(4), 20.0
-"""Contacts kept of one normal, in addition to the deepest; and, see `reduce`, how far out those with a gap count: bodies tilt by a
-twentieth at most until they are looked at again."""
 FARTHER = 1.5
 """Distance of the search in margins: a pair without contacts is then known to be apart for some time."""
 

@@ -72,8 +72,10 @@ class Body:
 
     @property
     def drawn_shape(self) -> Shape:
-        """The shape that is seen: that of the visual, if it has one, else the body's own."""
-        return self.shape if self.visual is None or self.visual.shape is None else self.visual.shape
+        """The shape that is seen: that of the visual, if it has one, else the body's own, or what its convex parts stand for."""
+        if self.visual is not None and self.visual.shape is not None:
+            return self.visual.shape
+        return self.shape if self.shape.whole is None else self.shape.whole
 
     @property
     def shows_own_colors(self) -> bool:

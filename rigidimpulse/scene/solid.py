@@ -91,7 +91,7 @@ def _mesh(shape: Shape) -> Solid:
 
 
 def _compound(shape: Shape) -> Solid:
-    solids = [(part.shape.solid(), part.position, part.rotation) for part in shape.parts_flat()]
+    solids = [(part.shape.solid(), part.position, part.rotation) for part in shape.solids_flat()]
     volume = math.fsum(solid.volume for solid, _, _ in solids)
     centroids = [position + dot(rotation, solid.centroid) for solid, position, rotation in solids]
     reference = centroids[0]

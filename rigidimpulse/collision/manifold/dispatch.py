@@ -6,7 +6,7 @@ mass) and BOX (a polyhedron along the principal axes). `TABLE` lists for each pa
 its contacts and the one that measures its least gap. Two dispatching kernels ask it:
 
 - `convex_contacts`: pairs of the kinds BOX and POLYHEDRON, and of a POLYHEDRON and a half space, for gaps of EITHER sign. The sub-stepped
-  regime finds the contacts of such pairs with it (`contact_cache`).
+  regime finds the contacts of such pairs with it (`contact_cache`), and those of bodies made of several polyhedra (`convex_parts`).
 - `pair_contacts`, and `pair_gap` for the least gap: any two shapes, primitive by primitive. Bodies are apart, or inside each other by a few
   margins at most; deeper overlap keeps its meaning for half spaces, and for spheres and capsules until an axis is touched. The exact regime
   uses them for all pairs, the sub-stepped regime for the pairs that are left, with smaller shapes (`contact_update`).
@@ -83,8 +83,9 @@ A mesh is ROUND, with radius 0. So a box on a mesh is a pair (ROUND, ROUND), and
 mesh is convex.
 """
 
-BOXES, PLANE, GENERAL, HULLS = 0, 1, 2, 3
-"""Kinds of pairs of bodies: (BOX, BOX), (POLYHEDRON, HALF_SPACE), any other pair, (POLYHEDRON, POLYHEDRON)."""
+BOXES, PLANE, GENERAL, HULLS, SEVERAL = 0, 1, 2, 3, 4
+"""Kinds of pairs of bodies: (BOX, BOX), (POLYHEDRON, HALF_SPACE), any other pair, (POLYHEDRON, POLYHEDRON), and pairs of what is made of
+several polyhedra with such a body, a POLYHEDRON or a HALF_SPACE."""
 MOST_HULL_CORNERS = 256
 """Most corners of a polyhedron among which the farthest one is found by trying all."""
 
@@ -128,6 +129,21 @@ def num_corners(shapes, s):
 
 
 @inlined
+def num_parts(shapes, s):
+    """Of how many polyhedra and half spaces shape s is made; 0 where it is anything else."""
+    return shapes.part_first[s + 1] - shapes.part_first[s]
+
+
+@inlined
+def _few_corners(shapes, s):
+    """Whether no part of shape s has too many corners."""
+    few = True
+    for p in range(shapes.part_first[s], shapes.part_first[s + 1]):
+        few = few and num_corners(shapes, shapes.part[p]) <= MOST_HULL_CORNERS
+    return few
+
+
+@inlined
 def pair_kind(shapes, s, t):
     """Kind of a pair of bodies with the shapes s and t, of `Polyhedra`."""
     solid_s, solid_t = shapes.face_first[s] < shapes.face_first[s + 1], shapes.face_first[t] < shapes.face_first[t + 1]
@@ -138,6 +154,9 @@ def pair_kind(shapes, s, t):
         return PLANE
     if solid_s and solid_t and max(num_corners(shapes, s), num_corners(shapes, t)) <= MOST_HULL_CORNERS:
         return HULLS
+    parts_s, parts_t = num_parts(shapes, s), num_parts(shapes, t)
+    if min(parts_s, parts_t) > 0 and max(parts_s, parts_t) > 1 and _few_corners(shapes, s) and _few_corners(shapes, t):
+        return SEVERAL
     return GENERAL
 
 
@@ -145,7 +164,7 @@ def pair_kind(shapes, s, t):
 def convex_contacts(kind, shapes, pair, query, scratch, points):
     """Contacts of two convex bodies, relative to the first, for a gap of either sign; returns their number and a bound of the gap.
 
-    kind: of the pair, not GENERAL.
+    kind: of the pair, neither GENERAL nor SEVERAL.
     """
     if kind == PLANE:
         count, gap = _polyhedron_half_space(shapes, pair, query, scratch, points)

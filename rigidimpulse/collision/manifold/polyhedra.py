@@ -107,50 +107,108 @@ class Points(NamedTuple):
 
 
 class Polyhedra(NamedTuple):
-    """Faces of the s shapes that are convex polyhedra around their centre of mass, F in all, with L corners."""
+    """Faces of p convex polyhedra, F in all, with L corners: the first s are shapes, around their centre of mass.
 
-    half: np.ndarray  # (s, 3) m, half the sides of boxes along the axes, 0 for others
-    corner_first: np.ndarray  # (s+1,)
+    Then come the parts of shapes that are several polyhedra, each around a centre of its own. Shapes that are neither have no corners.
+    """
+
+    half: np.ndarray  # (p, 3) m, half the sides of boxes along the axes, 0 for others
+    corner_first: np.ndarray  # (p+1,)
     corner: np.ndarray  # (V, 3) m
-    face_first: np.ndarray  # (s+1,)
+    face_first: np.ndarray  # (p+1,)
     plane: np.ndarray  # (F, 4) unit outward normal and offset, m
     loop_first: np.ndarray  # (F+1,)
     loop: np.ndarray  # (L,) corners of each face, counter-clockwise seen from outside
-    half_space: np.ndarray  # (s, 4) unit normal and offset of shapes that are one half space, 0 for others
+    half_space: np.ndarray  # (p, 4) unit normal and offset of shapes that are one half space, 0 for others
+    part_first: np.ndarray  # (s+1,) the first part of each shape; a polyhedron and a half space are their only part
+    part: np.ndarray  # (P,) which polyhedron it is
+    centre: np.ndarray  # (P, 3) m, its centre in the shape
+    bound: np.ndarray  # (P,) m, of a sphere about the centre
 
 
-def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | None = None) -> Polyhedra:
-    """Tables of the shapes that are `convex` (s,) bool; those that are `bare` (s,) bool have corners, but no faces, others neither."""
-    half, half_space = np.zeros((len(convex), 3)), np.zeros((len(convex), 4))
-    planes: list[np.ndarray] = []
-    loops: list[list[int]] = []
-    corners: list[np.ndarray] = []
-    corner_first, face_first = [0], [0]
+class _Tables:
+    """The tables of polyhedra that are added one by one."""
+
+    def __init__(self) -> None:
+        """None is there yet."""
+        self.half: list[np.ndarray] = []
+        self.half_space: list[np.ndarray] = []
+        self.corners: list[np.ndarray] = []
+        self.planes: list[np.ndarray] = []
+        self.loops: list[list[int]] = []
+        self.corner_first, self.face_first = [0], [0]
+
+    def add(self, corners: np.ndarray, half_space: np.ndarray | None = None) -> None:
+        """Add corners (v, 3) that have no faces, or a half space (4,)."""
+        self.half.append(np.zeros(3))
+        self.half_space.append(np.zeros(4) if half_space is None else half_space)
+        self.corners.append(corners)
+        self.corner_first.append(self.corner_first[-1] + len(corners))
+        self.face_first.append(len(self.planes))
+
+    def add_polyhedron(self, corners: np.ndarray, normals: np.ndarray, triangles: np.ndarray, *, is_shape: bool) -> None:
+        """Add a polyhedron with the outward normals (t, 3) of its triangles (t, 3); as a shape it is a BOX where it can be."""
+        self.add(corners)
+        for normal, loop in faces(normals, triangles):
+            self.planes.append(np.append(normal, dot(corners[loop], normal).max()))
+            self.loops.append([self.corner_first[-2] + v for v in loop])
+        self.face_first[-1] = len(self.planes)
+        size = corners.max(0)
+        # Eight corners at +- the same lengths: a box along the principal axes, which has kernels of its own.
+        if is_shape and len(corners) == 8 and np.allclose(np.abs(corners), size, rtol=1e-12, atol=0.0):
+            self.half[-1] = size
+
+
+def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | None = None, several: np.ndarray | None = None) -> Polyhedra:
+    """Tables of shapes (s,).
+
+    Args:
+        geometry: of the shapes.
+        convex: (s,) bool, shapes that are one convex polyhedron. bare: (s,) bool, those that get corners, but no faces. several: (s,) bool,
+            those that are several convex polyhedra, see `shrunk_shapes.several_polyhedra`. All others have nothing.
+
+    """
+    tables, nothing = _Tables(), np.zeros((0, 3))
+    parts: list[list[tuple[int, np.ndarray, float]]] = []
     for s, is_convex in enumerate(convex):
         p = int(geometry.shape_first[s])
-        if geometry.shape_first[s + 1] == p + 1 and geometry.kind[p] == HALF_SPACE:
-            half_space[s] = geometry.frame[p, :4]
-        vertex = geometry.vertex[int(geometry.vertex_first[p]) : int(geometry.vertex_first[p + 1])]
-        if is_convex or (bare is not None and bare[s]):
-            corners.append(vertex)
-            corner_first.append(corner_first[-1] + len(vertex))
+        single = geometry.shape_first[s + 1] == p + 1
+        corners = geometry.vertex[int(geometry.vertex_first[p]) : int(geometry.vertex_first[p + 1])]
+        if single and geometry.kind[p] == HALF_SPACE:
+            tables.add(nothing, geometry.frame[p, :4])
+            parts.append([(s, np.zeros(3), inf)])
+        elif is_convex:
+            tables.add_polyhedron(corners, *_triangles_of(geometry, p), is_shape=True)
+            parts.append([(s, np.zeros(3), _reach(corners))])
         else:
-            corner_first.append(corner_first[-1])
-        if is_convex:
-            before, first, last = corner_first[-2], int(geometry.triangle_first[p]), int(geometry.triangle_first[p + 1])
-            for normal, loop in faces(geometry.triangle_normal[first:last], geometry.triangle[first:last] - int(geometry.vertex_first[p])):
-                planes.append(np.append(normal, dot(vertex[loop], normal).max()))
-                loops.append([before + v for v in loop])
-            size = vertex.max(0)
-            # Eight corners at +- the same lengths: a box along the principal axes, which has kernels of its own.
-            if len(vertex) == 8 and np.allclose(np.abs(vertex), size, rtol=1e-12, atol=0.0):
-                half[s] = size
-        face_first.append(len(planes))
+            tables.add(corners if bare is not None and bare[s] else nothing)
+            parts.append([])
+    for s in np.flatnonzero(several).tolist() if several is not None else []:
+        for p in range(int(geometry.shape_first[s]), int(geometry.shape_first[s + 1])):
+            corners = geometry.vertex[int(geometry.vertex_first[p]) : int(geometry.vertex_first[p + 1])]
+            centre = corners.sum(axis=0) / len(corners)
+            parts[s].append((len(tables.corners), centre, _reach(corners - centre)))
+            tables.add_polyhedron(corners - centre, *_triangles_of(geometry, p), is_shape=False)
+    flat = [part for of_shape in parts for part in of_shape]
     return Polyhedra(
-        half=half, corner_first=np.array(corner_first), corner=np.concatenate([*corners, np.zeros((0, 3))]),
-        face_first=np.array(face_first), plane=np.array(planes).reshape(-1, 4), loop_first=np.cumsum([0, *map(len, loops)]),
-        loop=np.array([v for loop in loops for v in loop], np.int64), half_space=half_space,
+        half=np.array(tables.half).reshape(-1, 3), corner_first=np.array(tables.corner_first),
+        corner=np.concatenate([*tables.corners, nothing]), face_first=np.array(tables.face_first),
+        plane=np.array(tables.planes).reshape(-1, 4), loop_first=np.cumsum([0, *map(len, tables.loops)]),
+        loop=np.array([v for loop in tables.loops for v in loop], np.int64), half_space=np.array(tables.half_space).reshape(-1, 4),
+        part_first=np.cumsum([0, *map(len, parts)]), part=np.array([which for which, _, _ in flat], np.int64),
+        centre=np.array([centre for _, centre, _ in flat]).reshape(-1, 3), bound=np.array([bound for _, _, bound in flat]),
     )  # fmt: skip
+
+
+def _triangles_of(geometry: Geometry, p: int) -> tuple[np.ndarray, np.ndarray]:
+    """Normals (t, 3) of the triangles of primitive p, and its corners (t, 3) by their numbers in it."""
+    first, last = int(geometry.triangle_first[p]), int(geometry.triangle_first[p + 1])
+    return geometry.triangle_normal[first:last], geometry.triangle[first:last] - int(geometry.vertex_first[p])
+
+
+def _reach(corners: np.ndarray) -> float:
+    """Distance of the farthest of corners (v, 3) from their origin, m."""
+    return float(np.sqrt((corners * corners).sum(axis=1).max()))
 
 
 @inlined

@@ -20,6 +20,9 @@ from rigidimpulse.core.vector import along, cross, dot, row
 
 MAX_PER_NORMAL = np.int64(8)
 """Directions in which the extreme contacts of one normal are kept."""
+PER_NORMAL, GAP_WEIGHT = np.int64(4), 20.0
+"""The same of sub-stepped islands, where few contacts are enough; and how far out those with a gap count: bodies tilt by a twentieth at
+most until they are looked at again."""
 SAME_PATCH = 0.999
 """Cosine of the angle between normals above which contacts belong to one patch."""
 TIE = TOLERANCES.manifold.tie

@@ -50,12 +50,19 @@ def _convex_depth(geometry: Geometry, p: int) -> float:
         along = float(centre @ axis)
         return float(min(half - abs(along), geometry.radius[p] - np.linalg.norm(centre - along * axis)))
     vertices = geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]]
-    faces = slice(int(geometry.triangle_first[p]), int(geometry.triangle_first[p + 1]))
-    normals = geometry.triangle_normal[faces]
-    if not np.any(normals):
+    if geometry.triangle_first[p] == geometry.triangle_first[p + 1]:
         # A ball or a capsule.
         return float(geometry.radius[p]) if np.abs(vertices.sum(0)).max() <= 1e-9 * geometry.bound_radius[p] else 0.0
-    depth = np.einsum("ij,ij->i", normals, geometry.vertex[geometry.triangle[faces, 0]])
+    depth = _depth_of_faces(geometry, p, np.zeros(3))
+    return depth + float(geometry.radius[p]) if depth > 0.0 else 0.0
+
+
+def _depth_of_faces(geometry: Geometry, p: int, centre: np.ndarray) -> float:
+    """Distance from a centre (3,) to the nearest face of a triangulated primitive, m; 0 if it is not convex or the centre is outside."""
+    vertices = geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]] - centre
+    triangles = slice(int(geometry.triangle_first[p]), int(geometry.triangle_first[p + 1]))
+    normals = geometry.triangle_normal[triangles]
+    depth = np.einsum("ij,ij->i", normals, geometry.vertex[geometry.triangle[triangles, 0]] - centre)
     if depth.min() <= 0.0:
         return 0.0
     size = float(geometry.bound_radius[p])
@@ -63,7 +70,7 @@ def _convex_depth(geometry: Geometry, p: int) -> float:
         some = slice(first, first + FACES_AT_ONCE)
         if np.any((vertices @ normals[some].T).max(axis=0) > depth[some] + 1e-9 * size):
             return 0.0
-    return float(depth.min() + geometry.radius[p])
+    return float(depth.min())
 
 
 def convex_polyhedra(geometry: Geometry, depths: np.ndarray) -> np.ndarray:
@@ -74,6 +81,23 @@ def convex_polyhedra(geometry: Geometry, depths: np.ndarray) -> np.ndarray:
         single = geometry.shape_first[s + 1] == p + 1 and geometry.kind[p] == ROUND and geometry.radius[p] == 0.0
         out[s] = single and depths[s] > 0.0
     return out
+
+
+def several_polyhedra(geometry: Geometry) -> np.ndarray:
+    """Which shapes (s,) bool are made of several convex polyhedra with sharp edges: compounds of boxes and hulls."""
+    out = np.zeros(len(geometry.shape_first) - 1, bool)
+    for s in range(len(out)):
+        parts = range(int(geometry.shape_first[s]), int(geometry.shape_first[s + 1]))
+        out[s] = len(parts) > 1 and all(_is_polyhedron(geometry, p) for p in parts)
+    return out
+
+
+def _is_polyhedron(geometry: Geometry, p: int) -> bool:
+    """Whether a primitive is a convex polyhedron with sharp edges, wherever it is."""
+    if geometry.kind[p] != ROUND or geometry.radius[p] != 0.0 or geometry.triangle_first[p] == geometry.triangle_first[p + 1]:
+        return False
+    corners = geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]]
+    return _depth_of_faces(geometry, p, corners.sum(axis=0) / len(corners)) > 0.0
 
 
 def shrunk_geometry(geometry: Geometry, depths: np.ndarray, dynamic_shapes: np.ndarray) -> tuple[Geometry, np.ndarray]:

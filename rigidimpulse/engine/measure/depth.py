@@ -153,14 +153,10 @@ def depth_in(solid: Solid, probe: Probe, posed: Posed) -> np.ndarray:
     """Depth (c,) m by which probes at c poses in the frame of a solid are inside it; 0 where nothing is known to be."""
     depth = np.zeros(len(posed.translation))
     centres, edges = posed.points(probe.centres), posed.points(probe.edges)
-    lowest, highest = edges.min(axis=2), edges.max(axis=2)
-    for planes, box in zip(solid.convex, solid.boxes, strict=True):
-        if len(probe.centres):
-            np.maximum(depth, _balls_in_planes(planes, centres, probe.radii), out=depth)
-        # Of bodies of many parts few edges are near one part: all with all took most of the time of a run.
-        pose, edge = np.nonzero(np.all((lowest <= box[1]) & (highest >= box[0]), axis=2))
-        if len(pose):
-            np.maximum.at(depth, pose, _edges_in_planes(planes, edges[pose, edge]))
+    if solid.convex:
+        _enter_convex(solid, probe, centres, edges, depth)
+    if not (solid.rounded or solid.cylinders or solid.inside):
+        return depth
     points = np.concatenate([centres, *(edges[:, :, 0] + s * (edges[:, :, 1] - edges[:, :, 0]) for s in ALONG)], axis=1)
     radii = np.concatenate([probe.radii, np.zeros(points.shape[1] - len(probe.radii))])
     for first, last, radius in solid.rounded:
@@ -173,6 +169,29 @@ def depth_in(solid: Solid, probe: Probe, posed: Posed) -> np.ndarray:
     if solid.inside is not None:
         np.maximum(depth, _depth_in_surface(solid, points, radii), out=depth)
     return depth
+
+
+def _enter_convex(solid: Solid, probe: Probe, centres: np.ndarray, edges: np.ndarray, depth: np.ndarray) -> None:
+    """Raise depths (c,) to those in the convex parts of a solid; centres (c, k, 3) and edges (c, e, 2, 3): of the probe at its poses."""
+    lowest, highest = np.minimum(edges[:, :, 0], edges[:, :, 1]), np.maximum(edges[:, :, 0], edges[:, :, 1])
+    # Of bodies of many parts few edges are near another body, and fewer near one part: all with all took most of the time of a run.
+    whole = np.stack([np.min([box[0] for box in solid.boxes], axis=0), np.max([box[1] for box in solid.boxes], axis=0)])
+    pose, edge = np.nonzero(_meet(lowest, highest, whole))
+    edges, lowest, highest = edges[pose, edge], lowest[pose, edge], highest[pose, edge]
+    for planes, box in zip(solid.convex, solid.boxes, strict=True):
+        if len(probe.centres):
+            np.maximum(depth, _balls_in_planes(planes, centres, probe.radii), out=depth)
+        near = np.flatnonzero(_meet(lowest, highest, box))
+        if len(near):
+            np.maximum.at(depth, pose[near], _edges_in_planes(planes, edges[near]))
+
+
+def _meet(lowest: np.ndarray, highest: np.ndarray, box: np.ndarray) -> np.ndarray:
+    """Which boxes (..., 3) meet a box (2, 3)."""
+    out = (lowest[..., 0] <= box[1, 0]) & (highest[..., 0] >= box[0, 0])
+    for k in (1, 2):
+        out &= (lowest[..., k] <= box[1, k]) & (highest[..., k] >= box[0, k])
+    return out
 
 
 def _balls_in_planes(planes: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:

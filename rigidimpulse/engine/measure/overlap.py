@@ -16,7 +16,7 @@ Pairs that are deeper at the start are not looked at until they are in order for
 starts. Nothing is looked at where bodies are inside each other by the caller's choice: with `response="penalty"`, and with an `impact_time`
 that is late.
 
-The cost follows the numbers of bodies and of frames that are looked at, never the clock: a run gives the same result on every machine.
+The cost follows the numbers of parts of bodies and of frames that are looked at, never the clock: a run gives the same result on every machine.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ CHEAPEST: float = 2e-2
 """The same where sub-steps are as long as the cheapest regime makes them: a disc that is set spinning on a floor tilts by 1.2 % in one."""
 FEWEST_FRAMES: int = 6
 MOST_FRAMES, POSES = 24, 1200
-"""Frames that are looked at: POSES over the number of bodies, within these bounds."""
+"""Frames that are looked at: POSES over the number of all parts of bodies, within these bounds."""
 MOST_SUB_STEPPED_FRAMES, SUB_STEPPED_POSES = 240, 2400
 """The same of runs with sub-stepped islands."""
 LATE = ("linear", "after")
@@ -47,7 +47,9 @@ LATE = ("linear", "after")
 FEW: int = 24
 """Bodies up to which all pairs are compared at once."""
 AT_ONCE: int = 2_000_000
-"""Products of probes and faces that are computed at once."""
+"""Numbers that are computed at once."""
+OF_EDGE: int = 8
+"""Numbers for each end of an edge."""
 REMEDY = "use a smaller step, or contact_solver='newton' where islands are sub-stepped"
 """Tried on letters that fall on a floor and are forced to be sub-stepped (`falling_letters` of the newcomers): 6.6 % inside at a step of
 1/60 s, nothing at 1/240 s nor with "newton"."""
@@ -142,9 +144,10 @@ class _Shapes:
 
 
 def _work(probe: Probe, solid: Solid) -> int:
-    """Products of probes and faces of a candidate."""
-    faces = sum(map(len, solid.convex)) + len(solid.rounded) + len(solid.cylinders) + len(solid.surface)
-    return (len(probe.radii) + 2 * len(probe.edges)) * faces
+    """Numbers that a candidate takes: products of probes and faces of one part; of edges those near it only, so their ends count."""
+    faces = max([1, len(solid.surface), *map(len, solid.convex)])
+    ends = 2 * len(probe.edges)
+    return len(probe.radii) * faces + ends * (faces if len(solid.surface) else OF_EDGE)
 
 
 def _posed(record: RunRecord, frame: np.ndarray, mine: np.ndarray, other: np.ndarray) -> Posed:
@@ -158,8 +161,9 @@ def _posed(record: RunRecord, frame: np.ndarray, mine: np.ndarray, other: np.nda
 def frames_looked_at(record: RunRecord) -> np.ndarray:
     """Which frames are looked at, the first and the last included."""
     poses, most = (SUB_STEPPED_POSES, MOST_SUB_STEPPED_FRAMES) if record.may_be_sub_stepped else (POSES, MOST_FRAMES)
-    number = len(record.frames.times)
-    count = min(max(poses // record.world.num_bodies, FEWEST_FRAMES), most, number)
+    world, number = record.world, len(record.frames.times)
+    parts = int(np.diff(world.geometry.shape_first)[world.shape_of_body].sum())
+    count = min(max(poses // parts, FEWEST_FRAMES), most, number)
     return np.unique(np.linspace(0, number - 1, count).astype(int))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from rigidimpulse.collision.contact_buffer import ContactBuffer, Question, find_together
 from rigidimpulse.collision.contact_cache import (
+    TOO_FEW_PLACES,
     Convex,
     Limits,
     Share,
@@ -26,11 +27,11 @@ from rigidimpulse.collision.contact_table import ContactTable
 from rigidimpulse.collision.contact_update import FARTHER, Searched, SmallerShapes, store_contacts
 from rigidimpulse.collision.fat_boxes import BodyBounds, FatBoxes
 from rigidimpulse.collision.geometry import Shapes
-from rigidimpulse.collision.manifold.dispatch import PairQuery, Posed, pair_gap
+from rigidimpulse.collision.manifold.dispatch import GENERAL, PairQuery, Posed, pair_gap
 from rigidimpulse.collision.manifold.inset_surface import inset_surfaces
 from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
-from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, inner_radii, shrunk_geometry
+from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, inner_radii, several_polyhedra, shrunk_geometry
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.core.simd import ROW, aligned
@@ -184,7 +185,7 @@ class ContactStepper:
         # Soft contacts sink in, and the contact kernels need a gap: smaller shapes for the search.
         inset, depth, self._back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
         self.geometry, factor = shrunk_geometry(inset, world.convex_depths, dynamic_shapes)
-        self.shapes = make_polyhedra(world.geometry, convex)
+        self.shapes = make_polyhedra(world.geometry, convex, several=several_polyhedra(world.geometry))
         self._solids, drum, self._inset = solids(world.shapes, world.geometry, convex, self.shapes)
         convex |= drum
         kinds = world.shape_of_body[self.order]
@@ -317,9 +318,12 @@ class ContactStepper:
                 for share in range(shares)
             ])  # fmt: skip
             # A share whose points were too few says so; all shares are searched again with more.
-            if min(waiting for _, waiting in outcome) >= 0:
+            lacks = min(waiting for _, waiting in outcome)
+            if lacks >= 0:
                 break
-            table.grow(POINTS)
+            if lacks == TOO_FEW_PLACES:
+                self._workspaces = [make_workspace(2 * len(workspace.parts.real)) for workspace in self._workspaces]
+            table.grow(len(self._workspaces[0].parts.real))
         self._looked_at = sum(looked_at for looked_at, _ in outcome)
         begins = [share_of(number, share, shares) for share in range(shares)]
         waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
@@ -384,6 +388,7 @@ class ContactStepper:
         mine = np.zeros(world.num_bodies, bool)
         mine[self.rank[members]] = True
         asked = (mine[pairs.first] | mine[pairs.second]) & (self._depth[pairs.first] + self._depth[pairs.second] > 0.0)
+        asked &= pairs.kind == GENERAL
         for i, j in zip(self.order[pairs.first[asked]].tolist(), self.order[pairs.second[asked]].tolist(), strict=True):
             a, b, limit = int(world.shape_of_body[i]), int(world.shape_of_body[j]), CROSSED * min(self.inner[i], self.inner[j])
             rotation = to_matrix(now.orientation[i]), to_matrix(now.orientation[j])

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.contact_records import CONTACT_MARGIN, ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, in_play
-from rigidimpulse.collision.manifold.dispatch import GENERAL
+from rigidimpulse.collision.manifold.dispatch import GENERAL, SEVERAL
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.simd import ROW, aligned
@@ -110,19 +110,21 @@ def list_patches(bodies, pairs, rows, patches, begin):
     capacity, part, quick = patches.pair.shape[0], bodies.part, bodies.quick
     taken = np.zeros(64, np.bool_)
     for p in range(pairs.first.shape[0]):
-        count = min(pairs.count[p], 64)
+        count = pairs.count[p]
         a, b = pairs.first[p], pairs.second[p]
         if count == 0 or not (quick[a] or quick[b]) or not in_play(part, a, b):
             continue
         start = pairs.start[p]
-        if pairs.kind[p] != GENERAL:
+        if pairs.kind[p] != GENERAL and pairs.kind[p] != SEVERAL:
             if m < capacity:
                 patches.pair[m], patches.size[m] = p, count
                 for c in range(count):
                     patches.row[m, c] = start + c
             m += 1
             continue
-        # Meshes give points with several normals: a patch has one.
+        # Meshes and parts give points with several normals: a patch has one.
+        if count > taken.shape[0]:
+            taken = np.zeros(2 * count, np.bool_)
         taken[:count] = False
         for c in range(count):
             if taken[c]:

@@ -1,0 +1,115 @@
+"""Contacts of bodies that are made of several convex polyhedra: those of all their parts that are near each other.
+
+A part with the centre c of a body is at x + R c, turns like the body, and moves with v + w x R c. So the kernels of convex polyhedra take
+two parts for two bodies, see `polyhedra`. Their points are moved by R_a c_a, so that they are relative to the first body. Of many contacts
+few stay (`reduce`). The gap of the bodies is at least the least of the gaps of their parts, or of spheres around them.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimpulse.collision.manifold.dispatch import HULLS, PLANE, convex_contacts, is_half_space
+from rigidimpulse.collision.manifold.polyhedra import POINTS, Pair
+from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT, PER_NORMAL, reduce_contacts
+from rigidimpulse.core.kernels import inlined, jit
+from rigidimpulse.core.vector import turned_by
+
+FIRST_PLACES = 256
+"""Contacts for which there is memory at first."""
+
+
+class PartScratch(NamedTuple):
+    """Two parts as two bodies, and the contacts of all parts of a pair."""
+
+    rotation: np.ndarray  # (2, 3, 3)
+    velocity: np.ndarray  # (16,) v and w of each
+    real: np.ndarray  # (k, 10) on a, on b, normal, gap; relative to the first body
+    integer: np.ndarray  # (k, 5) 0, 0, kind and features
+
+
+def make_part_scratch(places: int = FIRST_PLACES) -> PartScratch:
+    """Scratch memory for one pair of bodies that has `places` contacts at most."""
+    return PartScratch(np.empty((2, 3, 3)), np.zeros(16), np.empty((places, 10)), np.zeros((places, 5), np.int64))
+
+
+@inlined
+def _set_part(bodies, i, centre, scratch, k):
+    """Let part k of the scratch memory turn with body i and move like its centre (3,), in world axes from that of the body."""
+    rotation, velocity, v = scratch.rotation, scratch.velocity, bodies.velocity
+    x, y, z = centre
+    wx, wy, wz = v[8 * i + 3], v[8 * i + 4], v[8 * i + 5]
+    for m in range(3):
+        for n in range(3):
+            rotation[k, m, n] = bodies.rotation[i, m, n]
+        velocity[8 * k + 3 + m] = v[8 * i + 3 + m]
+    velocity[8 * k] = v[8 * i] + (wy * z - wz * y)
+    velocity[8 * k + 1] = v[8 * i + 1] + (wz * x - wx * z)
+    velocity[8 * k + 2] = v[8 * i + 2] + (wx * y - wy * x)
+
+
+@inlined
+def _place_of(shapes, bodies, p, i):
+    """Where the centre of part p of body i is from that of the body, in world axes."""
+    return turned_by(bodies.rotation, i, shapes.centre[p, 0], shapes.centre[p, 1], shapes.centre[p, 2])
+
+
+@inlined
+def _between_spheres(x, y, reach):
+    """Gap of two spheres about x and y (3,) whose radii have the sum `reach`, m; below 0 where one is a half space."""
+    dx, dy, dz = y[0] - x[0], y[1] - x[1], y[2] - x[2]
+    return sqrt(dx * dx + dy * dy + dz * dz) - reach
+
+
+@jit
+def contacts_of_parts(shapes, bodies, ends, query, scratch, found):
+    """Find the contacts of two bodies, ends = (a, b), relative to the first, in the places of found[1]; both are solid or half spaces.
+
+    shapes: `Polyhedra`; query: `polyhedra.Query`; scratch: `polyhedra.Scratch`, with the way between the bodies; found: `Points` of two
+    parts, and `PartScratch`. Returns their number, -1 if there are too few places, and a lower bound of the gap, m.
+    """
+    (a, b), (points, parts) = ends, found
+    s, t, between = bodies.shape[a], bodies.shape[b], scratch.between
+    away = (between[0], between[1], between[2])
+    count, least, radius = np.int64(0), inf, bodies.radius[b]
+    for p in range(shapes.part_first[s], shapes.part_first[s + 1]):
+        mine = _place_of(shapes, bodies, p, a)
+        # Whole bodies first: most parts are near none of the other.
+        gap = _between_spheres(mine, away, shapes.bound[p] + radius)
+        if gap > query.margin:
+            least = min(least, gap)
+            continue
+        _set_part(bodies, a, mine, parts, 0)
+        for q in range(shapes.part_first[t], shapes.part_first[t + 1]):
+            x, y, z = _place_of(shapes, bodies, q, b)
+            gap = _between_spheres(mine, (away[0] + x, away[1] + y, away[2] + z), shapes.bound[p] + shapes.bound[q])
+            if gap > query.margin:
+                least = min(least, gap)
+                continue
+            if count + POINTS > parts.real.shape[0]:
+                return np.int64(-1), least
+            _set_part(bodies, b, (x, y, z), parts, 1)
+            between[0], between[1], between[2] = away[0] + x - mine[0], away[1] + y - mine[1], away[2] + z - mine[2]
+            i, j = shapes.part[p], shapes.part[q]
+            flat = is_half_space(shapes.half_space, i) or is_half_space(shapes.half_space, j)
+            pair = Pair(parts.rotation, parts.velocity, np.int64(0), np.int64(1), i, j)
+            number, gap = convex_contacts(PLANE if flat else HULLS, shapes, pair, query, scratch, points)
+            least = min(least, gap)
+            _keep(points, number, mine, parts, count)
+            count += number
+    return reduce_contacts(parts.real, parts.integer, np.int64(0), count, PER_NORMAL, GAP_WEIGHT), least
+
+
+@inlined
+def _keep(points, number, mine, parts, count):
+    """Copy the contacts of two parts behind `count` others; mine (3,): where the first part is from its body."""
+    for n in range(number):
+        for k in range(10):
+            parts.real[count + n, k] = points.real[n, k]
+        for k in range(3):
+            parts.real[count + n, k] += mine[k]
+            parts.real[count + n, 3 + k] += mine[k]
+            parts.integer[count + n, 2 + k] = points.ids[n, k]
