@@ -344,7 +344,7 @@ def _find_of_parts(convex, bodies, table, p, share, query, coefficients, workspa
     """Find the contacts of a pair of kind SEVERAL; returns 0, or what there is too little of."""
     pairs, points, ids, free = table
     number, parts = share.number, workspace.parts
-    ends = np.int64(pairs.first[p]), np.int64(pairs.second[p])
+    ends = pairs.first[p], pairs.second[p]
     count, gap = contacts_of_parts(convex.shapes, bodies, ends, query, workspace.scratch, (workspace.found, parts))
     if count < 0:
         return TOO_FEW_PLACES

@@ -12,7 +12,6 @@ from __future__ import annotations
 import os
 import tempfile
 from hashlib import blake2b
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,6 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 
 if TYPE_CHECKING:
-    from rigidimpulse.scene.shape import Shape
     from rigidimpulse.scene.surface import Surface
 
 FOLDER = "rigidimpulse/convex_parts"
@@ -34,29 +32,28 @@ CONVEX: float = 1e-9
 """Part of the size by which corners may stand out in front of the faces of a mesh that is one convex part."""
 
 
-def hulls_of(shape: Shape, concavity: float, most: int | None) -> list[np.ndarray]:
-    """Corners (v, 3) m of the hulls of a mesh, see `Shape.convex_parts`; none where the mesh is convex.
+def hulls_of(surface: Surface, label: str, concavity: float, most: int | None) -> list[np.ndarray]:
+    """Corners (v, 3) m of the hulls of a mesh, see `Shape.convex_parts`; none where the mesh is convex. label: what messages call it.
 
     Raises:
         SceneError: as there.
 
     """
     if not LEAST <= concavity <= MOST:
-        raise SceneError(f"concavity is {concavity}", f"give a part of the size from {LEAST} to {MOST:g}", shape.label)
+        raise SceneError(f"concavity is {concavity}", f"give a part of the size from {LEAST} to {MOST:g}", label)
     if most is not None and most < 1:
-        raise SceneError(f"most is {most}", "give a number of parts, at least 1, or None", shape.label)
-    surface = shape.surface()
+        raise SceneError(f"most is {most}", "give a number of parts, at least 1, or None", label)
     if surface.num_open_edges:
         raise SceneError(
             f"it is open ({surface.num_open_edges} of its edges lack a second face), so it has no inside to be cut into parts",
-            "close it, or use it as it is", shape.label,
+            "close it, or use it as it is", label,
         )  # fmt: skip
     if _is_convex(surface):
         return []
-    library = _library(shape.label)
+    library = _library(label)
     number = -1 if most is None else most
-    settings = f"{concavity!r} {number} {CORNERS} {SEED} {version('coacd')}"
-    digest = blake2b(shape.key + settings.encode(), digest_size=16).hexdigest()
+    settings = f"{concavity!r} {number} {CORNERS} {SEED}"
+    digest = blake2b(settings.encode() + surface.vertices.tobytes() + surface.faces.tobytes(), digest_size=16).hexdigest()
     kept = _folder() / f"{digest}.npz"
     found = _read(kept)
     if found is None:

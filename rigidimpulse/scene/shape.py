@@ -222,7 +222,8 @@ class Shape:
         parts: list[tuple[Shape, np.ndarray, np.ndarray]] = []
         kept = self.parts_flat()
         for part in kept:
-            hulls = hulls_of(part.shape, _number("concavity", concavity), most) if part.shape.kind == "mesh" else []
+            is_mesh = part.shape.kind == "mesh"
+            hulls = hulls_of(part.shape.surface(), part.shape.label, _number("concavity", concavity), most) if is_mesh else []
             parts += [(_hull(part.position + matmul(corners, part.rotation.T)), np.zeros(3), np.eye(4)[0]) for corners in hulls]
             if not hulls:
                 parts.append((part.shape, part.position, from_matrix(part.rotation)))

@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import csv
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from time import process_time
@@ -160,6 +161,32 @@ def rings() -> ri.Scene:
     return scene
 
 
+def _in_parts(scene: ri.Scene, concavity: float) -> ri.Scene:
+    """The scene with meshes cut into convex parts, as a user may do for "preview"."""
+    cut: dict[bytes, ri.Shape] = {}
+    for body in list(scene.bodies):
+        if body.shape.kind == "mesh":
+            if body.shape.key not in cut:
+                cut[body.shape.key] = body.shape.convex_parts(concavity)
+            scene[body.name] = replace(body, shape=cut[body.shape.key])
+    return scene
+
+
+def concave_12_parts() -> ri.Scene:
+    """The twelve rings in convex parts."""
+    return _in_parts(concave_12(), 0.05)
+
+
+def concave_40_parts() -> ri.Scene:
+    """The forty rings in convex parts."""
+    return _in_parts(concave_40(), 0.05)
+
+
+def rings_parts() -> ri.Scene:
+    """The chain of rings in convex parts."""
+    return _in_parts(rings(), 0.02)
+
+
 def _doll(scene: ri.Scene, name: str, at: np.ndarray) -> None:
     """A doll of twelve bodies."""
     parts = {
@@ -244,9 +271,9 @@ def dominoes() -> ri.Scene:
 
 SCENES: dict[str, tuple[Callable[[], ri.Scene], float]] = {
     "die": (die, 1.5), "dice": (dice, 2.0), "wall": (wall, 2.0), "shards": (shards, 2.0), "mixed": (mixed, 2.0),
-    "concave_12": (concave_12, 1.5), "concave_40": (concave_40, 1.5), "rings": (rings, 1.0), "doll": (doll, 2.0),
-    "dolls_10": (dolls_10, 2.0),
-    "gyroscope": (gyroscope, 2.0), "pendulum": (pendulum, 10.0), "chain_100": (chain_100, 2.0), "dominoes": (dominoes, 2.0),
+    "concave_12": (concave_12, 1.5), "concave_40": (concave_40, 1.5), "rings": (rings, 1.0),
+    "concave_12_parts": (concave_12_parts, 1.5), "concave_40_parts": (concave_40_parts, 1.5), "rings_parts": (rings_parts, 1.0),
+    "doll": (doll, 2.0), "dolls_10": (dolls_10, 2.0), "gyroscope": (gyroscope, 2.0), "pendulum": (pendulum, 10.0), "chain_100": (chain_100, 2.0), "dominoes": (dominoes, 2.0),
 }  # fmt: skip
 """Makers and durations, s."""
 

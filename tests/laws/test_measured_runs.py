@@ -202,7 +202,7 @@ def test_a_body_moved_into_another_is_inside_it(make) -> None:
 
 @pytest.mark.parametrize("frame", range(1, 61))
 def test_every_frame_of_few_sub_stepped_bodies_is_looked_at(frame: int) -> None:
-    """A light box that is crushed for one frame: 4 of 10,000 random scenes had that between the frames looked at, and said ok (issue 27)."""
+    """A box that is crushed for one frame: 4 of 10,000 random scenes had that between the frames looked at, and said ok (issue 27)."""
     run = _pile_of_four()
     a, b = run.index("box 0"), run.index("box 1")
     position = run.centers.copy()

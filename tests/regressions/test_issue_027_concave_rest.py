@@ -42,7 +42,7 @@ def test_rings_rest_on_a_floor(shape: str, floor: str) -> None:
     for k in range(3):
         turn, spin = random.normal(size=4), 3.0 * random.normal(size=3)
         scene.add(ri.Body(f"ring {k}", SHAPES[shape], position=(0.5 * k, 0, 0.4), orientation=turn, angular_velocity=spin))
-    run = ri.simulate(scene, 2.2, accuracy="preview")
+    run = ri.simulate(scene, 2.6, accuracy="preview")
     assert run.status.ok
     for k in range(3):
         place, turn = run.position(f"ring {k}")[-20:], run.orientation(f"ring {k}")[-20:]

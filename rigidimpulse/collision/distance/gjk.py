@@ -240,6 +240,7 @@ def closest(shapes, s, t, d, c, small, margin, simplex):
             break
         x, y, z, square = nx, ny, nz, nx * nx + ny * ny + nz * nz
     length = sqrt(x * x + y * y + z * z)
-    if length == 0.0:
+    # The direction of a v that is round-off is none: two cubes, one flush on the other, were 1 m inside each other along it.
+    if length == 0.0 or square <= ROUND * greatest:
         return x, y, z, 0.0, np.int64(5)
     return x / length, y / length, z / length, gap, count

@@ -3,6 +3,10 @@
 A part with the centre c of a body is at x + R c, turns like the body, and moves with v + w x R c. So the kernels of convex polyhedra take
 two parts for two bodies, see `polyhedra`. Their points are moved by R_a c_a, so that they are relative to the first body. Of many contacts
 few stay (`reduce`). The gap of the bodies is at least the least of the gaps of their parts, or of spheres around them.
+
+A part that lies against another part of its body has sides that nothing can touch. A box that slides over the seam of two planks, to which
+the second one is beside it, would be stopped by the side of that one (a ghost collision). So a contact is left out if its point on a body,
+moved out of the surface by OUT, is in another part of the same body. If all are, and bodies are inside each other, the deepest one stays.
 """
 
 from __future__ import annotations
@@ -12,12 +16,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.manifold.dispatch import HULLS, PLANE, convex_contacts, is_half_space
+from rigidimpulse.collision.manifold.dispatch import HULLS, PLANE, convex_contacts, is_half_space, num_parts
 from rigidimpulse.collision.manifold.polyhedra import POINTS, Pair
 from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT, PER_NORMAL, reduce_contacts
 from rigidimpulse.core.kernels import inlined, jit
-from rigidimpulse.core.vector import turned_by
+from rigidimpulse.core.vector import turned_back_by, turned_by
 
+OUT: float = 1e-3
+"""How far a point is moved out, in inner radii, to see whether it is in another part."""
+IN: float = 2e-2
+"""How far in front of the faces of a part, in inner radii, a point counts as in it: what slides towards the side of the next plank is above
+this one by a skin (0.8e-2) at most."""
 FIRST_PLACES = 256
 """Contacts for which there is memory at first."""
 
@@ -25,15 +34,17 @@ FIRST_PLACES = 256
 class PartScratch(NamedTuple):
     """Two parts as two bodies, and the contacts of all parts of a pair."""
 
+    body: np.ndarray  # (2,) 0 and 1, of the type that numbers of bodies have in pairs: kernels are compiled for that one
     rotation: np.ndarray  # (2, 3, 3)
     velocity: np.ndarray  # (16,) v and w of each
     real: np.ndarray  # (k, 10) on a, on b, normal, gap; relative to the first body
-    integer: np.ndarray  # (k, 5) 0, 0, kind and features
+    integer: np.ndarray  # (k, 5) parts of both bodies, kind and features
 
 
 def make_part_scratch(places: int = FIRST_PLACES) -> PartScratch:
     """Scratch memory for one pair of bodies that has `places` contacts at most."""
-    return PartScratch(np.empty((2, 3, 3)), np.zeros(16), np.empty((places, 10)), np.zeros((places, 5), np.int64))
+    body = np.arange(2, dtype=np.int32)
+    return PartScratch(body, np.empty((2, 3, 3)), np.zeros(16), np.empty((places, 10)), np.zeros((places, 5), np.int64))
 
 
 @inlined
@@ -95,18 +106,75 @@ def contacts_of_parts(shapes, bodies, ends, query, scratch, found):
             between[0], between[1], between[2] = away[0] + x - mine[0], away[1] + y - mine[1], away[2] + z - mine[2]
             i, j = shapes.part[p], shapes.part[q]
             flat = is_half_space(shapes.half_space, i) or is_half_space(shapes.half_space, j)
-            pair = Pair(parts.rotation, parts.velocity, np.int64(0), np.int64(1), i, j)
+            pair = Pair(parts.rotation, parts.velocity, parts.body[0], parts.body[1], i, j)
             number, gap = convex_contacts(PLANE if flat else HULLS, shapes, pair, query, scratch, points)
             least = min(least, gap)
-            _keep(points, number, mine, parts, count)
+            _keep(points, number, mine, (p, q), parts, count)
             count += number
+    count = _leave_out_hidden(shapes, bodies, ends, (away, query.size), parts, count)
     return reduce_contacts(parts.real, parts.integer, np.int64(0), count, PER_NORMAL, GAP_WEIGHT), least
 
 
+@jit
+def _leave_out_hidden(shapes, bodies, ends, pair, parts, count):
+    """Leave out contacts at surfaces that other parts of the same body cover; returns how many stay. pair: (way from a to b, size)."""
+    (a, b), (away, size) = ends, pair
+    if count == 0 or max(num_parts(shapes, bodies.shape[a]), num_parts(shapes, bodies.shape[b])) == 1:
+        return count
+    real, kept, deepest = parts.real, np.int64(0), 0
+    for c in range(count):
+        deepest = c if real[c, 9] < real[deepest, 9] else deepest
+    lowest = real[deepest, 9]
+    for c in range(count):
+        n = (real[c, 6], real[c, 7], real[c, 8])
+        on_a = (real[c, 0], real[c, 1], real[c, 2])
+        on_b = (real[c, 3] - away[0], real[c, 4] - away[1], real[c, 5] - away[2])
+        hidden = _is_covered(shapes, bodies, (a, parts.integer[c, 0]), on_a, n, size)
+        hidden = hidden or _is_covered(shapes, bodies, (b, parts.integer[c, 1]), on_b, (-n[0], -n[1], -n[2]), size)
+        if not hidden:
+            _move(parts, c, kept)
+            kept += 1
+    if kept == 0 and lowest <= 0.0:
+        _move(parts, deepest, 0)
+        kept = np.int64(1)
+    return kept
+
+
 @inlined
-def _keep(points, number, mine, parts, count):
-    """Copy the contacts of two parts behind `count` others; mine (3,): where the first part is from its body."""
+def _move(parts, source, target):
+    """Write the contact at `source` over the one at `target`."""
+    for k in range(10):
+        parts.real[target, k] = parts.real[source, k]
+    for k in range(5):
+        parts.integer[target, k] = parts.integer[source, k]
+
+
+@jit
+def _is_covered(shapes, bodies, own, x, n, size):
+    """Whether the place x (3,) on part own[1] of body own[0], moved out by OUT along n (3,), is in another part of the body.
+
+    x, n: in world axes, x from the body's position; size: inner radius, m.
+    """
+    i, s, step = own[0], bodies.shape[own[0]], OUT * size
+    px, py, pz = turned_back_by(bodies.rotation, i, x[0] + step * n[0], x[1] + step * n[1], x[2] + step * n[2])
+    for p in range(shapes.part_first[s], shapes.part_first[s + 1]):
+        dx, dy, dz = px - shapes.centre[p, 0], py - shapes.centre[p, 1], pz - shapes.centre[p, 2]
+        if p == own[1] or dx * dx + dy * dy + dz * dz > (shapes.bound[p] + IN * size) ** 2:
+            continue
+        j, is_inside = shapes.part[p], True
+        for f in range(shapes.face_first[j], shapes.face_first[j + 1]):
+            plane = shapes.plane[f]
+            is_inside = is_inside and plane[0] * dx + plane[1] * dy + plane[2] * dz - plane[3] <= IN * size
+        if is_inside:
+            return True
+    return False
+
+
+@inlined
+def _keep(points, number, mine, between, parts, count):
+    """Copy the contacts of two parts, between = (p, q), behind `count` others; mine (3,): where the first part is from its body."""
     for n in range(number):
+        parts.integer[count + n, 0], parts.integer[count + n, 1] = between
         for k in range(10):
             parts.real[count + n, k] = points.real[n, k]
         for k in range(3):

@@ -50,11 +50,16 @@ def _convex_depth(geometry: Geometry, p: int) -> float:
         along = float(centre @ axis)
         return float(min(half - abs(along), geometry.radius[p] - np.linalg.norm(centre - along * axis)))
     vertices = geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]]
-    if geometry.triangle_first[p] == geometry.triangle_first[p + 1]:
+    if not _has_faces(geometry, p):
         # A ball or a capsule.
         return float(geometry.radius[p]) if np.abs(vertices.sum(0)).max() <= 1e-9 * geometry.bound_radius[p] else 0.0
     depth = _depth_of_faces(geometry, p, np.zeros(3))
     return depth + float(geometry.radius[p]) if depth > 0.0 else 0.0
+
+
+def _has_faces(geometry: Geometry, p: int) -> bool:
+    """Whether a primitive has triangles of some area; a ball and a capsule have one without."""
+    return bool(np.any(geometry.triangle_normal[int(geometry.triangle_first[p]) : int(geometry.triangle_first[p + 1])]))
 
 
 def _depth_of_faces(geometry: Geometry, p: int, centre: np.ndarray) -> float:
@@ -94,7 +99,7 @@ def several_polyhedra(geometry: Geometry) -> np.ndarray:
 
 def _is_polyhedron(geometry: Geometry, p: int) -> bool:
     """Whether a primitive is a convex polyhedron with sharp edges, wherever it is."""
-    if geometry.kind[p] != ROUND or geometry.radius[p] != 0.0 or geometry.triangle_first[p] == geometry.triangle_first[p + 1]:
+    if geometry.kind[p] != ROUND or geometry.radius[p] != 0.0 or not _has_faces(geometry, p):
         return False
     corners = geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]]
     return _depth_of_faces(geometry, p, corners.sum(axis=0) / len(corners)) > 0.0

@@ -9,14 +9,15 @@ was chosen before. The depth of a candidate is a lower bound, see `depth`. A pai
     depth <= CHEAPEST s     the same with contact_solver="cheapest"
     s: size of the smaller body
 
-Contacts of sub-stepped islands are soft: what is pressed hard is too deep for a few frames only. So more frames of such runs are looked at,
-all of them where bodies are few.
+Contacts of sub-stepped islands are soft: what is pressed hard is too deep for a few frames only. So more frames of such runs are looked
+at, all of them where bodies are few.
 
 Pairs that are deeper at the start are not looked at until they are in order for the first time: such an overlap is reported where the run
 starts. Nothing is looked at where bodies are inside each other by the caller's choice: with `response="penalty"`, and with an `impact_time`
 that is late.
 
-The cost follows the numbers of parts of bodies and of frames that are looked at, never the clock: a run gives the same result on every machine.
+The cost follows the numbers of parts of bodies and of frames that are looked at, never the clock: a run gives the same result on every
+machine.
 """
 
 from __future__ import annotations
