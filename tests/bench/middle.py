@@ -273,7 +273,8 @@ SCENES: dict[str, tuple[Callable[[], ri.Scene], float]] = {
     "die": (die, 1.5), "dice": (dice, 2.0), "wall": (wall, 2.0), "shards": (shards, 2.0), "mixed": (mixed, 2.0),
     "concave_12": (concave_12, 1.5), "concave_40": (concave_40, 1.5), "rings": (rings, 1.0),
     "concave_12_parts": (concave_12_parts, 1.5), "concave_40_parts": (concave_40_parts, 1.5), "rings_parts": (rings_parts, 1.0),
-    "doll": (doll, 2.0), "dolls_10": (dolls_10, 2.0), "gyroscope": (gyroscope, 2.0), "pendulum": (pendulum, 10.0), "chain_100": (chain_100, 2.0), "dominoes": (dominoes, 2.0),
+    "doll": (doll, 2.0), "dolls_10": (dolls_10, 2.0), "gyroscope": (gyroscope, 2.0), "pendulum": (pendulum, 10.0),
+    "chain_100": (chain_100, 2.0), "dominoes": (dominoes, 2.0),
 }  # fmt: skip
 """Makers and durations, s."""
 
