@@ -23,7 +23,14 @@ in "sub-stepping". A body of the weight w, at the height h above the lowest, sta
 
     A = sum of w GAP (h / 2 + r)    in runs with sub-stepped islands, else 0
 
-The rise is that of either balance over its least value so far. It is compared with the energy that moves,
+Supports that all have one steady velocity U do no work as seen from them. Where there are no others, and nothing but position corrections
+may give energy, a third balance takes their place: that of the energy seen from the supports,
+
+    E'(t) = K - U.p + m U^2 / 2 + V + (sum of m a).U t    and the causes that move bodies without a force
+
+with p the momentum and m the mass of all, and a the steady accelerations.
+
+The rise is that of any balance over its least value so far. It is compared with the energy that moves,
 
     rise <= RISE S + A,    S = max K + (max V - min V) + sum of (max D_c - min D_c) over the causes that are added + sum of m u^2 / 2
 
@@ -50,14 +57,19 @@ MOST_NAMES: int = 3
 """Bodies that a message names at most."""
 MOST_OF_RISE: float = 0.1
 """Part of what the body gained that gained most, from which another is named beside it."""
+WITHOUT_FORCE = frozenset({"position correction", "overlap", "let go"})
+"""Causes that move bodies without a force: their work is the same from wherever it is seen."""
 REMEDY = "use a smaller step, or contact_solver='newton' where islands are sub-stepped"
 """Tried on a jointed board that falls (`drawbridge` of the newcomers): 1.4e-4 of what moves by default, 1.1e-5 at a step of 1/240 s."""
 
 
 def taking_causes(world: World, may_be_sub_stepped: bool) -> frozenset[str]:
     """Causes that may only take energy in this scene."""
-    if np.any(world.moving):
-        return frozenset()
+    return frozenset() if np.any(world.moving) else _taking_beside_supports(world, may_be_sub_stepped)
+
+
+def _taking_beside_supports(world: World, may_be_sub_stepped: bool) -> frozenset[str]:
+    """The same if supports do no work."""
     takes = {"stick", "sub-stepping"}
     if may_be_sub_stepped:
         takes.add("position correction")
@@ -93,7 +105,29 @@ def energy_rise(record: RunRecord) -> tuple[np.ndarray, float]:
         rise = all_causes - np.minimum.accumulate(all_causes)
     if not record.may_be_sub_stepped or "sub-stepping" in takes:
         rise = np.maximum(rise, given - np.minimum.accumulate(given))
+    seen = _seen_from_supports(record)
+    if seen is not None:
+        rise = np.maximum(rise, seen - np.minimum.accumulate(seen))
     return rise, moved
+
+
+def _seen_from_supports(record: RunRecord) -> np.ndarray | None:
+    """The third balance (f,) J; None where the supports have no velocity in common, or where something else may give energy."""
+    world, frames, ledger = record.world, record.frames, record.ledger
+    others = [cause for cause in ledger.dissipated if cause not in _taking_beside_supports(world, record.may_be_sub_stepped)]
+    if not world.moving.any() or record.release.any() or not set(others) <= WITHOUT_FORCE:
+        return None
+    supports = ~world.dynamic
+    velocity = frames.velocity[0, supports][0]
+    if np.any(frames.velocity[:, supports] != velocity) or frames.angular_velocity[:, supports].any():
+        return None
+    if world.joints_of_scene and np.any(np.minimum(world.joints.body_a, world.joints.body_b) < 0):
+        return None
+    mass = world.mass[world.dynamic]
+    fall = (mass @ world.steady_acceleration[world.dynamic]) @ velocity * frames.times
+    momentum = np.einsum("n,fni->fi", mass, frames.velocity[:, world.dynamic])
+    seen = ledger.total - momentum @ velocity + 0.5 * mass.sum() * (velocity @ velocity) + fall
+    return seen + sum(ledger.dissipated[cause] for cause in others)
 
 
 def allowed_rise(record: RunRecord, moved: float) -> np.ndarray:

@@ -41,7 +41,7 @@ CHEAPEST: float = 2e-2
 FEWEST_FRAMES: int = 6
 MOST_FRAMES, POSES = 24, 1200
 """Frames that are looked at: POSES over the number of all parts of bodies, within these bounds."""
-MOST_SUB_STEPPED_FRAMES, SUB_STEPPED_POSES = 240, 2400
+MOST_SUB_STEPPED_FRAMES, SUB_STEPPED_POSES = 240, 1500
 """The same of runs with sub-stepped islands."""
 LATE = ("linear", "after")
 """Settings of `Accuracy.impact_time` by which impacts are found too late, or missed."""
