@@ -27,6 +27,8 @@ OUT: float = 1e-3
 IN: float = 2e-2
 """How far in front of the faces of a part, in inner radii, a point counts as in it: what slides towards the side of the next plank is above
 this one by a skin (0.8e-2) at most."""
+ALONG = 0.5
+"""Cosine of the angle of a face and a contact's normal from which on the face looks the same way."""
 FIRST_PLACES = 256
 """Contacts for which there is memory at first."""
 
@@ -157,6 +159,7 @@ def _is_covered(shapes, bodies, own, x, n, size):
     """
     i, s, step = own[0], bodies.shape[own[0]], OUT * size
     px, py, pz = turned_back_by(bodies.rotation, i, x[0] + step * n[0], x[1] + step * n[1], x[2] + step * n[2])
+    nx, ny, nz = turned_back_by(bodies.rotation, i, n[0], n[1], n[2])
     for p in range(shapes.part_first[s], shapes.part_first[s + 1]):
         dx, dy, dz = px - shapes.centre[p, 0], py - shapes.centre[p, 1], pz - shapes.centre[p, 2]
         if p == own[1] or dx * dx + dy * dy + dz * dz > (shapes.bound[p] + IN * size) ** 2:
@@ -164,9 +167,17 @@ def _is_covered(shapes, bodies, own, x, n, size):
         j, is_inside = shapes.part[p], True
         for f in range(shapes.face_first[j], shapes.face_first[j + 1]):
             plane = shapes.plane[f]
-            is_inside = is_inside and plane[0] * dx + plane[1] * dy + plane[2] * dz - plane[3] <= IN * size
-        if is_inside:
-            return True
+            # No tolerance at faces that look the same way: parts side by side on a floor all have their contacts with it.
+            faces = plane[0] * nx + plane[1] * ny + plane[2] * nz > ALONG
+            above = plane[0] * dx + plane[1] * dy + plane[2] * dz - plane[3]
+            is_inside = is_inside and above <= (0.0 if faces else IN * size)
+        if not is_inside:
+            continue
+        # Nor is a place hidden that is farther out than all of the part: of a body on a floor the lowest never is.
+        for v in range(shapes.corner_first[j], shapes.corner_first[j + 1]):
+            corner = shapes.corner[v]
+            if (corner[0] - dx) * nx + (corner[1] - dy) * ny + (corner[2] - dz) * nz >= 0.0:
+                return True
     return False
 
 
