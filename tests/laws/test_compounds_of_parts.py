@@ -81,6 +81,22 @@ def test_seams_of_a_floor_stop_nothing() -> None:
     np.testing.assert_allclose(run.positions[-1, cube], (2.0 * paid, 0.0, 0.1), atol=2e-3)
 
 
+def test_an_arm_rests_between_the_centres_of_two_crosses() -> None:
+    """Each corner of the flat where arms lie on each other is in the corner of two parts, of this cross or of the other.
+
+    All four contacts were taken for covered, and the arm sank into the others for good. The gaps at the ends, 0.1 mm, are below IN.
+    """
+    arms = (0.12, 0.03, 0.03), (0.03, 0.12, 0.03), (0.03, 0.03, 0.12)
+    cross = ri.Shape.compound([(ri.Shape.box(arm), (0, 0, 0), UPRIGHT) for arm in arms])
+    scene = ri.Scene()
+    for side in (-1, 1):
+        scene.add(ri.Body(f"support {side}", cross, position=(0.0751 * side, 0, 0), motion="static", material=ROUGH))
+    scene.add(ri.Body("cross", cross, position=(0, 0, 0.03), material=ROUGH))
+    run = ri.simulate(scene, 1.0, accuracy=SUB_STEPPED)
+    assert run.status.ok, run.status.message
+    np.testing.assert_allclose(run.positions[-1, run.index("cross")], (0, 0, 0.03), atol=1.5e-4)
+
+
 @pytest.mark.parametrize("make", [stool, angle, lambda: octants(0.3)], ids=("stool", "angle", "octants"))
 def test_furniture_in_a_pile_comes_to_rest_apart(make) -> None:
     """Ten of one kind fall on each other: none is inside another, energy never grows, and all lie still in the end."""

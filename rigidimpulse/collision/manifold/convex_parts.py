@@ -6,7 +6,15 @@ few stay (`reduce`). The gap of the bodies is at least the least of the gaps of 
 
 A part that lies against another part of its body has sides that nothing can touch. A box that slides over the seam of two planks, to which
 the second one is beside it, would be stopped by the side of that one (a ghost collision). So a contact is left out if its point on a body,
-moved out of the surface by OUT, is in another part of the same body. If all are, and bodies are inside each other, the deepest one stays.
+moved out of the surface by OUT, is covered: it is in another part of the same body, and that part reaches farther out than the point. If
+all are covered, and bodies are inside each other, the deepest one stays.
+
+What "in" means near a face f of the covering part depends on the way n that the surface looks at the point:
+  f looks the same way as n      not beyond f at all: parts side by side on a floor all have their contacts with it
+  f looks against n              at most IN beyond f: the parts meet there, with a gap of round-off
+  f looks aside of n             at most IN beyond f, if the point's own part ends there too: what slides is above a plank by its skin;
+                                 at least IN behind f, if the point's own part goes on beyond f: the surface beside the point is free,
+                                 and a body that lies in the corner of two parts needs both of them.
 """
 
 from __future__ import annotations
@@ -25,10 +33,10 @@ from rigidimpulse.core.vector import turned_back_by, turned_by
 OUT: float = 1e-3
 """How far a point is moved out, in inner radii, to see whether it is in another part."""
 IN: float = 2e-2
-"""How far in front of the faces of a part, in inner radii, a point counts as in it: what slides towards the side of the next plank is above
+"""How near to a face of a covering part, in inner radii, a point is at that face: what slides towards the side of the next plank is above
 this one by a skin (0.8e-2) at most."""
 ALONG = 0.5
-"""Cosine of the angle of a face and a contact's normal from which on the face looks the same way."""
+"""Cosine of the angle of a face and a contact's normal from which on the face looks the same way, or against it if negative."""
 FIRST_PLACES = 256
 """Contacts for which there is memory at first."""
 
@@ -153,32 +161,53 @@ def _move(parts, source, target):
 
 @jit
 def _is_covered(shapes, bodies, own, x, n, size):
-    """Whether the place x (3,) on part own[1] of body own[0], moved out by OUT along n (3,), is in another part of the body.
+    """Whether the place x (3,) on part own[1] of body own[0], moved out by OUT along n (3,), is in another part that reaches farther out.
 
     x, n: in world axes, x from the body's position; size: inner radius, m.
     """
     i, s, step = own[0], bodies.shape[own[0]], OUT * size
     px, py, pz = turned_back_by(bodies.rotation, i, x[0] + step * n[0], x[1] + step * n[1], x[2] + step * n[2])
-    nx, ny, nz = turned_back_by(bodies.rotation, i, n[0], n[1], n[2])
+    way = turned_back_by(bodies.rotation, i, n[0], n[1], n[2])
     for p in range(shapes.part_first[s], shapes.part_first[s + 1]):
         dx, dy, dz = px - shapes.centre[p, 0], py - shapes.centre[p, 1], pz - shapes.centre[p, 2]
         if p == own[1] or dx * dx + dy * dy + dz * dz > (shapes.bound[p] + IN * size) ** 2:
             continue
-        j, is_inside = shapes.part[p], True
-        for f in range(shapes.face_first[j], shapes.face_first[j + 1]):
-            plane = shapes.plane[f]
-            # No tolerance at faces that look the same way: parts side by side on a floor all have their contacts with it.
-            faces = plane[0] * nx + plane[1] * ny + plane[2] * nz > ALONG
-            above = plane[0] * dx + plane[1] * dy + plane[2] * dz - plane[3]
-            is_inside = is_inside and above <= (0.0 if faces else IN * size)
-        if not is_inside:
-            continue
-        # Nor is a place hidden that is farther out than all of the part: of a body on a floor the lowest never is.
-        for v in range(shapes.corner_first[j], shapes.corner_first[j + 1]):
-            corner = shapes.corner[v]
-            if (corner[0] - dx) * nx + (corner[1] - dy) * ny + (corner[2] - dz) * nz >= 0.0:
+        if _is_in_part(shapes, (p, own[1]), (dx, dy, dz), way, IN * size):
+            far = dx * way[0] + dy * way[1] + dz * way[2]
+            if _reach(shapes, shapes.part[p], way) >= far:
                 return True
     return False
+
+
+@inlined
+def _is_in_part(shapes, ends, d, way, near):
+    """Whether d (3,), from the centre of part ends[0], is in it; it is on part ends[1] that looks along `way`; near: IN, m."""
+    p, q = ends
+    j, is_inside = shapes.part[p], True
+    for f in range(shapes.face_first[j], shapes.face_first[j + 1]):
+        plane = shapes.plane[f]
+        above = plane[0] * d[0] + plane[1] * d[1] + plane[2] * d[2] - plane[3]
+        if above > near:
+            return False
+        along = plane[0] * way[0] + plane[1] * way[1] + plane[2] * way[2]
+        if along > ALONG:
+            is_inside = is_inside and above <= 0.0
+        elif along > -ALONG and above > -near:
+            apart = 0.0
+            for k in range(3):
+                apart += plane[k] * (shapes.centre[q, k] - shapes.centre[p, k])
+            is_inside = is_inside and apart + _reach(shapes, shapes.part[q], plane) <= plane[3] + near
+    return is_inside
+
+
+@inlined
+def _reach(shapes, j, way):
+    """How far out solid j reaches along `way` (3,) from its centre, m."""
+    far = -inf
+    for v in range(shapes.corner_first[j], shapes.corner_first[j + 1]):
+        corner = shapes.corner[v]
+        far = max(far, corner[0] * way[0] + corner[1] * way[1] + corner[2] * way[2])
+    return far
 
 
 @inlined
