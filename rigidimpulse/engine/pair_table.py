@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.broad_phase import overlapping_with
+from rigidimpulse.collision.time_of_impact.result import PairsToSweep
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.memory import rows_of
 from rigidimpulse.core.sorted_values import is_among
@@ -36,6 +37,12 @@ RUNAWAY, NEVER = 300.0, -np.inf
 body that is not handed over, however often that is."""
 LARGE = 64
 """Bodies of an island from which that is the case the earlier, the more bodies it has: each event deals with all of them."""
+MANY_SWEEPS = 8
+"""New trajectories of a pair in a step from which it is swept only as far as its trajectories are likely to last."""
+AHEAD = 4.0
+"""How far that is, in lives of its trajectories so far."""
+SHORTEST = 2.0**-12
+"""How far it is at least, in steps."""
 FIRST_ROWS = 64
 USED, SHORT = np.arange(2)
 """Places in `PairTable.number`."""
@@ -51,6 +58,7 @@ PAIR = np.dtype(
         ("contact_margin", np.float64),
         ("tolerance", np.float64),
         ("tries", np.int64),
+        ("sweeps", np.int64),
         ("since", np.float64),
         ("repeats", np.int64),
         ("witness", np.float64, (10,)),
@@ -58,11 +66,12 @@ PAIR = np.dtype(
 )
 """A pair of bodies a < b that may meet in the step:
 
-time: s, when the pair reaches its impact margin; inf if it does not before the end of the step.
-start: s, from when the pair must be swept again; nan if its time stands.
+time: s, when the pair reaches its impact margin; inf if it does not before the end of the step, or not before `start`.
+start: s, from when the pair must be swept on; nan if its time stands.
 impact_margin: m, gap at which contact is declared now. least_impact_margin: m, the same for a pair without a past.
 contact_margin: m, gap at which lasting contacts are held. tolerance: m, gap error of an impact.
 tries: how often the pair came to contact at one instant without an impulse.
+sweeps: how often its bodies took new trajectories in the step, see `pairs_to_sweep`.
 since: s, instant of contact. repeats: how often the pair came to contact at it.
 witness: points on a and b, normal and gap where the pair comes to contact.
 """
@@ -159,7 +168,7 @@ def append_pairs(bodies, margins, table, first, second, start):
         pair.least_impact_margin = margins.impact * size if constants.flat[a] and constants.flat[b] else 0.0
         pair.impact_margin = pair.least_impact_margin
         pair.contact_margin, pair.tolerance = margins.contact * size, margins.tolerance * size
-        pair.tries, pair.since, pair.repeats = 0, -np.inf, 0
+        pair.tries, pair.sweeps, pair.since, pair.repeats = 0, 0, -np.inf, 0
         for i in range(10):
             pair.witness[i] = 0.0
 
@@ -182,6 +191,7 @@ def sweep_pair_again(table, p, time, dynamic):
     """Let pair p be swept from `time` on, unless it is given up or the sub-stepped regime looks after it; dynamic (n,) bool."""
     pair = table.pairs[p]
     pair.time = np.inf
+    pair.sweeps += 1
     again = pair.repeats <= MAX_REPEATS and is_swept(table, dynamic, pair.a, pair.b)
     pair.start = time if again else np.nan
 
@@ -282,6 +292,57 @@ def next_time(table):
     for i in range(table.wake.shape[0]):
         time = min(time, table.wake[i])
     return time
+
+
+@inlined
+def _until(pair, step, end):
+    """Until when a pair that is swept from its start is looked at, s; step: s, that ends at `end`."""
+    if pair.sweeps < MANY_SWEEPS:
+        return end
+    life = (pair.start - (end - step)) / pair.sweeps
+    return min(end, pair.start + max(AHEAD * life, SHORTEST * step))
+
+
+@jit_making_arrays
+def pairs_to_sweep(table, step, end):
+    """The pairs that must be swept before the next event is known; returns their places (k,) and `PairsToSweep`.
+
+    To sweep a pair to the end of the step is wasted where its bodies meet something long before: a light body between two heavy ones does
+    so a thousand times in a step. So a pair that was swept often is looked at only a few lives of its trajectories ahead. If nothing came
+    to pass until then, it is swept on from there, twice as far. Without such pairs all is swept at once.
+    """
+    least, count = np.inf, np.int64(0)
+    for p in range(table.number[USED]):
+        start = table.pairs[p].start
+        if start < least:
+            least = start
+    known = min(next_time(table), end)
+    places = np.empty(table.number[USED], np.int64)
+    for p in range(table.number[USED]):
+        pair = table.pairs[p]
+        if least < known and (pair.start <= least or (pair.sweeps < MANY_SWEEPS and pair.start == pair.start)):
+            places[count] = p
+            count += 1
+    asked = PairsToSweep(
+        np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count), np.empty(count), np.empty(count), np.empty(count)
+    )
+    for k in range(count):
+        pair = table.pairs[places[k]]
+        asked.a[k], asked.b[k], asked.start[k], asked.until[k] = pair.a, pair.b, pair.start, _until(pair, step, end)
+        asked.impact_margin[k], asked.tolerance[k] = pair.impact_margin, pair.tolerance
+    return places[:count], asked
+
+
+@jit
+def note_sweep(table, places, found):
+    """Keep what was found (`ImpactTimes`) of the pairs at these places (k,)."""
+    for k in range(places.shape[0]):
+        pair = table.pairs[places[k]]
+        pair.time, pair.start = found.time[k], found.clear[k]
+        if pair.start == pair.start:
+            pair.sweeps = max(pair.sweeps // 2, MANY_SWEEPS)
+        for j in range(10):
+            pair.witness[j] = found.witness[k, j]
 
 
 @jit
