@@ -71,7 +71,20 @@ class Pair:
         rows = [np.array([float(value)]) for value in (start, impact_margin, tolerance, end)]
         pairs = PairsToSweep(np.array([int(swapped)]), np.array([int(not swapped)]), *rows)
         result = method.sweep(self.detector, self.trajectory, pairs, end)
+        assert np.isnan(result.clear[0])
         return result.time[0], result.status[0], result.queries[0], result.witness[0]
+
+    def sweep_in_pieces(self, method, end, piece):
+        """(time, number of pieces) of the contact, looked for `piece` s at a time."""
+        start, count = 0.0, 0
+        while True:
+            rows = [np.array([value]) for value in (start, 1e-6, 1e-15, min(start + piece, end))]
+            result = method.sweep(self.detector, self.trajectory, PairsToSweep(np.array([0]), np.array([1]), *rows), end)
+            count += 1
+            if result.status[0] != SEPARATE or np.isnan(result.clear[0]):
+                return result.time[0], count
+            assert result.clear[0] == rows[3][0]
+            start = result.clear[0]
 
     def gap(self, t):
         return gap_at(self.detector.geometry, self.trajectory, *self.shapes, t)
