@@ -28,6 +28,8 @@ MOTION = 1.0
 """Parts of `Accuracy.substep_motion` that touching bodies move until their contacts are looked for again."""
 GAINED: float = 1e-4
 """Part of what moves by which the energy of an island may rise in a step: what the method makes, it takes back; a whip makes ever more."""
+TAKEN = 0.1
+"""Part of what moves that the balance of energy may take from an island in a step: more says that the forces were not found."""
 Kept = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 CLOSED, OPEN = TOLERANCES.sub_stepping.joints_closed, TOLERANCES.sub_stepping.joints_open
 
@@ -67,7 +69,8 @@ class JointedStepper:
     def step(self, run: Run, time: float, end: float) -> Outcome | None:
         """Step the island that is set up, whose bodies have joints, from `time` to `end`; None if sub-steps cannot hold it.
 
-        They cannot where joints stay open, or where bodies gain energy that nothing gave: light links between heavy bodies may whip.
+        They cannot where joints stay open, or where bodies gain energy that nothing gave, or had much of it taken back: light links between
+        heavy bodies may whip.
         """
         stepper, which = self._stepper, run.joints.at(self._stepper.members)
         island = self._island(run, which)
@@ -117,7 +120,10 @@ class JointedStepper:
         return worst
 
     def _keeps_energy(self, run: Run, out: Outcome) -> bool:
-        """Whether members have no more energy than before, up to GAINED of what moves and a rise by the margin; no if it is no number."""
+        """Whether members have no more energy than before, up to GAINED of what moves and a rise by the margin; no if it is no number.
+
+        They have not kept it either where the balance had to take more than TAKEN of what moves, and that rise.
+        """
         now, constants, members = run.state.now, self._world.constants, out.members
         after = now._replace(
             position=now.position.copy(), orientation=now.orientation.copy(), velocity=now.velocity.copy(),
@@ -129,7 +135,7 @@ class JointedStepper:
         moves = max(kinetic_energy(now, constants, members), kinetic_energy(after, constants, members))
         rise = float(np.sum(constants.mass[members] * constants.steady_strength[members] * self._stepper.skin[members]))
         # Comparisons with what is no number are false.
-        return gained <= GAINED * moves + rise
+        return gained <= GAINED * moves + rise and float(out.taken.sum()) <= TAKEN * moves + rise
 
     def _hand_over(self, members: np.ndarray) -> None:
         """Give the stepper the velocities of the members."""
