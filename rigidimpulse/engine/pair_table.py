@@ -40,7 +40,7 @@ LARGE = 64
 MANY_SWEEPS = 8
 """New trajectories of a pair in a step from which it is swept only as far as its trajectories are likely to last."""
 AHEAD = 4.0
-"""How far that is, in lives of its trajectories so far."""
+"""How far that is, in lives of its last trajectories."""
 SHORTEST = 2.0**-12
 """How far it is at least, in steps."""
 FIRST_ROWS = 64
@@ -59,6 +59,8 @@ PAIR = np.dtype(
         ("tolerance", np.float64),
         ("tries", np.int64),
         ("sweeps", np.int64),
+        ("began", np.float64),
+        ("life", np.float64),
         ("since", np.float64),
         ("repeats", np.int64),
         ("witness", np.float64, (10,)),
@@ -71,7 +73,8 @@ start: s, from when the pair must be swept on; nan if its time stands.
 impact_margin: m, gap at which contact is declared now. least_impact_margin: m, the same for a pair without a past.
 contact_margin: m, gap at which lasting contacts are held. tolerance: m, gap error of an impact.
 tries: how often the pair came to contact at one instant without an impulse.
-sweeps: how often its bodies took new trajectories in the step, see `pairs_to_sweep`.
+sweeps: how often its bodies took new trajectories in the step. began: s, when they took the present ones.
+life: s, how long these are likely to last, see `pairs_to_sweep`.
 since: s, instant of contact. repeats: how often the pair came to contact at it.
 witness: points on a and b, normal and gap where the pair comes to contact.
 """
@@ -168,7 +171,8 @@ def append_pairs(bodies, margins, table, first, second, start):
         pair.least_impact_margin = margins.impact * size if constants.flat[a] and constants.flat[b] else 0.0
         pair.impact_margin = pair.least_impact_margin
         pair.contact_margin, pair.tolerance = margins.contact * size, margins.tolerance * size
-        pair.tries, pair.sweeps, pair.since, pair.repeats = 0, 0, -np.inf, 0
+        pair.tries, pair.since, pair.repeats = 0, -np.inf, 0
+        pair.sweeps, pair.began, pair.life = 0, start, np.inf
         for i in range(10):
             pair.witness[i] = 0.0
 
@@ -191,7 +195,8 @@ def sweep_pair_again(table, p, time, dynamic):
     """Let pair p be swept from `time` on, unless it is given up or the sub-stepped regime looks after it; dynamic (n,) bool."""
     pair = table.pairs[p]
     pair.time = np.inf
-    pair.sweeps += 1
+    lasted = time - pair.began
+    pair.sweeps, pair.began, pair.life = pair.sweeps + 1, time, lasted if pair.life == np.inf else 0.5 * (pair.life + lasted)
     again = pair.repeats <= MAX_REPEATS and is_swept(table, dynamic, pair.a, pair.b)
     pair.start = time if again else np.nan
 
@@ -299,8 +304,7 @@ def _until(pair, step, end):
     """Until when a pair that is swept from its start is looked at, s; step: s, that ends at `end`."""
     if pair.sweeps < MANY_SWEEPS:
         return end
-    life = (pair.start - (end - step)) / pair.sweeps
-    return min(end, pair.start + max(AHEAD * life, SHORTEST * step))
+    return min(end, pair.start + max(AHEAD * pair.life, SHORTEST * step))
 
 
 @jit_making_arrays
@@ -308,8 +312,9 @@ def pairs_to_sweep(table, step, end):
     """The pairs that must be swept before the next event is known; returns their places (k,) and `PairsToSweep`.
 
     To sweep a pair to the end of the step is wasted where its bodies meet something long before: a light body between two heavy ones does
-    so a thousand times in a step. So a pair that was swept often is looked at only a few lives of its trajectories ahead. If nothing came
-    to pass until then, it is swept on from there, twice as far. Without such pairs all is swept at once.
+    so a thousand times in a step. So a pair that was swept often is looked at only a few lives of its last trajectories ahead (each counts
+    half as much as the next one). If nothing came to pass until then, it is swept on from there, twice as far. Without such pairs
+    all is swept at once.
     """
     least, count = np.inf, np.int64(0)
     for p in range(table.number[USED]):
@@ -340,7 +345,7 @@ def note_sweep(table, places, found):
         pair = table.pairs[places[k]]
         pair.time, pair.start = found.time[k], found.clear[k]
         if pair.start == pair.start:
-            pair.sweeps = max(pair.sweeps // 2, MANY_SWEEPS)
+            pair.life *= 2.0
         for j in range(10):
             pair.witness[j] = found.witness[k, j]
 
