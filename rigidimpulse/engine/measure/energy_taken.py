@@ -1,7 +1,7 @@
 """Energy that a run took back, since sub-steps or contact forces had made it.
 
 Neither regime may make energy. What an island has too much at the end of a sub-step is taken from the motion of its bodies (see
-`tgs_soft.energy_balance` and `exact.energy_limit`), and the ledger books it as "energy correction". It is round-off, or the error of a
+`tgs_soft.energy_balance` and `exact.energy_limit`), and the ledger names it "energy correction". It is round-off, or the error of a
 large step: below 0.07 % of the energy that moves in all 60 scenes of the newcomers, 1.3 % in a chain of forty rings at "preview". More
 says that the solver did not find the forces, and that the motion is not that of the scene:
 
