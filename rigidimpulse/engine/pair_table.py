@@ -41,8 +41,8 @@ MANY_SWEEPS = 8
 """New trajectories of a pair in a step from which it is swept only as far as its trajectories are likely to last."""
 AHEAD = 4.0
 """How far that is, in lives of its last trajectories."""
-SHORTEST = 2.0**-12
-"""How far it is at least, in steps."""
+SHORTEST = 2.0**-14
+"""Shortest life that counts, in steps."""
 FIRST_ROWS = 64
 USED, SHORT = np.arange(2)
 """Places in `PairTable.number`."""
@@ -304,7 +304,9 @@ def _until(pair, step, end):
     """Until when a pair that is swept from its start is looked at, s; step: s, that ends at `end`."""
     if pair.sweeps < MANY_SWEEPS:
         return end
-    return min(end, pair.start + max(AHEAD * pair.life, SHORTEST * step))
+    # Never so short that it takes more than a dozen doublings to the end: at one instant a pair may be swept again and again.
+    pair.life = max(pair.life, SHORTEST * step)
+    return min(end, pair.start + AHEAD * pair.life)
 
 
 @jit_making_arrays
