@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from rigidimpulse.collision.time_of_impact.result import STALLED, PairsToSweep
+from rigidimpulse.collision.time_of_impact.result import STALLED
 from rigidimpulse.engine.pair_events import PairEvents
+from rigidimpulse.engine.pair_table import note_sweep, pairs_to_sweep
 from rigidimpulse.engine.run import Run
 
 REASONS = {
@@ -36,14 +37,12 @@ def sweep_with(method: str) -> Callable[[Run, PairEvents], None]:
 
 
 def sweep_stale_pairs(run: Run, pair_events: PairEvents, method: Callable[..., Any]) -> None:
-    """Sweep the pairs that ask for it, and note when they come to contact."""
-    pairs = pair_events.pairs
-    stale = np.flatnonzero(~np.isnan(pairs["start"]))
-    if not len(stale):
-        return
-    asked = pairs[stale]
-    columns = PairsToSweep(*(np.ascontiguousarray(asked[name]) for name in PairsToSweep._fields))
-    found = run.narrow_phase.sweep(run, method, columns, pair_events.end)
-    pairs["time"][stale], pairs["witness"][stale], pairs["start"][stale] = found.time, found.witness, np.nan
-    for k in np.flatnonzero(found.status == STALLED).tolist():
-        pair_events.report(float(found.time[k]), "sweep stalled", stale[k : k + 1], STALLED_REMEDY)
+    """Sweep the pairs that ask for it, until the next event is known, and note when they come to contact."""
+    table, step, end = pair_events.table, run.world.accuracy.step, pair_events.end
+    places, asked = pairs_to_sweep(table, step, end)
+    while len(places):
+        found = run.narrow_phase.sweep(run, method, asked, end)
+        note_sweep(table, places, found)
+        for k in np.flatnonzero(found.status == STALLED).tolist():
+            pair_events.report(float(found.time[k]), "sweep stalled", places[k : k + 1], STALLED_REMEDY)
+        places, asked = pairs_to_sweep(table, step, end)

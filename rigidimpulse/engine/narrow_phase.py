@@ -37,9 +37,7 @@ class OwnContacts:
 
     def sweep(self, run: Any, method: Callable[..., ImpactTimes], pairs: PairsToSweep, end: float) -> ImpactTimes:
         """First contacts of pairs until `end` [s], by the method of the accuracy."""
-        return method(
-            run.detector, run.state.trajectory, pairs.a, pairs.b, pairs.start, end, pairs.impact_margin, pairs.tolerance
-        )  # fmt: skip
+        return method(run.detector, run.state.trajectory, pairs, end)
 
 
 def mesh_shapes(geometry: Geometry) -> np.ndarray:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.broad_phase import overlapping_with
+from rigidimpulse.collision.time_of_impact.result import PairsToSweep
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.memory import rows_of
 from rigidimpulse.core.sorted_values import is_among
@@ -36,6 +37,12 @@ RUNAWAY, NEVER = 300.0, -np.inf
 body that is not handed over, however often that is."""
 LARGE = 64
 """Bodies of an island from which that is the case the earlier, the more bodies it has: each event deals with all of them."""
+MANY_SWEEPS = 8
+"""New trajectories of a pair in a step from which it is swept only as far as its trajectories are likely to last."""
+AHEAD = 4.0
+"""How far that is, in lives of its last trajectories."""
+SHORTEST = 2.0**-14
+"""Shortest life that counts, in steps."""
 FIRST_ROWS = 64
 USED, SHORT = np.arange(2)
 """Places in `PairTable.number`."""
@@ -51,6 +58,9 @@ PAIR = np.dtype(
         ("contact_margin", np.float64),
         ("tolerance", np.float64),
         ("tries", np.int64),
+        ("sweeps", np.int64),
+        ("began", np.float64),
+        ("life", np.float64),
         ("since", np.float64),
         ("repeats", np.int64),
         ("witness", np.float64, (10,)),
@@ -58,11 +68,13 @@ PAIR = np.dtype(
 )
 """A pair of bodies a < b that may meet in the step:
 
-time: s, when the pair reaches its impact margin; inf if it does not before the end of the step.
-start: s, from when the pair must be swept again; nan if its time stands.
+time: s, when the pair reaches its impact margin; inf if it does not before the end of the step, or not before `start`.
+start: s, from when the pair must be swept on; nan if its time stands.
 impact_margin: m, gap at which contact is declared now. least_impact_margin: m, the same for a pair without a past.
 contact_margin: m, gap at which lasting contacts are held. tolerance: m, gap error of an impact.
 tries: how often the pair came to contact at one instant without an impulse.
+sweeps: how often its bodies took new trajectories in the step. began: s, when they took the present ones.
+life: s, how long these are likely to last, see `pairs_to_sweep`.
 since: s, instant of contact. repeats: how often the pair came to contact at it.
 witness: points on a and b, normal and gap where the pair comes to contact.
 """
@@ -160,6 +172,7 @@ def append_pairs(bodies, margins, table, first, second, start):
         pair.impact_margin = pair.least_impact_margin
         pair.contact_margin, pair.tolerance = margins.contact * size, margins.tolerance * size
         pair.tries, pair.since, pair.repeats = 0, -np.inf, 0
+        pair.sweeps, pair.began, pair.life = 0, start, np.inf
         for i in range(10):
             pair.witness[i] = 0.0
 
@@ -182,6 +195,8 @@ def sweep_pair_again(table, p, time, dynamic):
     """Let pair p be swept from `time` on, unless it is given up or the sub-stepped regime looks after it; dynamic (n,) bool."""
     pair = table.pairs[p]
     pair.time = np.inf
+    lasted = time - pair.began
+    pair.sweeps, pair.began, pair.life = pair.sweeps + 1, time, lasted if pair.life == np.inf else 0.5 * (pair.life + lasted)
     again = pair.repeats <= MAX_REPEATS and is_swept(table, dynamic, pair.a, pair.b)
     pair.start = time if again else np.nan
 
@@ -282,6 +297,59 @@ def next_time(table):
     for i in range(table.wake.shape[0]):
         time = min(time, table.wake[i])
     return time
+
+
+@inlined
+def _until(pair, step, end):
+    """Until when a pair that is swept from its start is looked at, s; step: s, that ends at `end`."""
+    if pair.sweeps < MANY_SWEEPS:
+        return end
+    # Never so short that it takes more than a dozen doublings to the end: at one instant a pair may be swept again and again.
+    pair.life = max(pair.life, SHORTEST * step)
+    return min(end, pair.start + AHEAD * pair.life)
+
+
+@jit_making_arrays
+def pairs_to_sweep(table, step, end):
+    """The pairs that must be swept before the next event is known; returns their places (k,) and `PairsToSweep`.
+
+    To sweep a pair to the end of the step is wasted where its bodies meet something long before: a light body between two heavy ones does
+    so a thousand times in a step. So a pair that was swept often is looked at only a few lives of its last trajectories ahead (each counts
+    half as much as the next one). If nothing came to pass until then, it is swept on from there, twice as far. Without such pairs
+    all is swept at once.
+    """
+    least, count = np.inf, np.int64(0)
+    for p in range(table.number[USED]):
+        start = table.pairs[p].start
+        if start < least:
+            least = start
+    known = min(next_time(table), end)
+    places = np.empty(table.number[USED], np.int64)
+    for p in range(table.number[USED]):
+        pair = table.pairs[p]
+        if least < known and (pair.start <= least or (pair.sweeps < MANY_SWEEPS and pair.start == pair.start)):
+            places[count] = p
+            count += 1
+    asked = PairsToSweep(
+        np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count), np.empty(count), np.empty(count), np.empty(count)
+    )
+    for k in range(count):
+        pair = table.pairs[places[k]]
+        asked.a[k], asked.b[k], asked.start[k], asked.until[k] = pair.a, pair.b, pair.start, _until(pair, step, end)
+        asked.impact_margin[k], asked.tolerance[k] = pair.impact_margin, pair.tolerance
+    return places[:count], asked
+
+
+@jit
+def note_sweep(table, places, found):
+    """Keep what was found (`ImpactTimes`) of the pairs at these places (k,)."""
+    for k in range(places.shape[0]):
+        pair = table.pairs[places[k]]
+        pair.time, pair.start = found.time[k], found.clear[k]
+        if pair.start == pair.start:
+            pair.life *= 2.0
+        for j in range(10):
+            pair.witness[j] = found.witness[k, j]
 
 
 @jit

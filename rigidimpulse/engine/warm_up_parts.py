@@ -13,6 +13,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from rigidimpulse.collision.time_of_impact import bisection
+from rigidimpulse.collision.time_of_impact.result import PairsToSweep
 from rigidimpulse.core.union_find import roots
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
@@ -173,7 +174,8 @@ def _move(run: Run) -> None:
     pair_events.trajectory_changed(1, 0.0)
     grown(make_memory(world.num_bodies), 1)
     set_impact_margins(pair_events.table, np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool), 0.0, world.dynamic)
-    bisection.sweep(run.detector, state.trajectory, np.array([0]), np.array([1]), zero, 1.0 / 60.0, zero, zero)
+    pair = PairsToSweep(np.array([0]), np.array([1]), zero, zero, zero, zero + 1.0 / 60.0)
+    bisection.sweep(run.detector, state.trajectory, pair, 1.0 / 60.0)
 
 
 def _find_substepped_contacts(run: Run) -> None:

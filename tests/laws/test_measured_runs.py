@@ -17,13 +17,14 @@ from rigidimpulse.collision.distance.fcl import Narrowphase
 from rigidimpulse.collision.geometry import CompiledShape, compile_shape
 from rigidimpulse.core.quaternion import rotate, to_matrix
 from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, depth_in, planes_of, probe_of, solid_of, surely_apart
+from rigidimpulse.engine.measure.energy import energy_rise
 from rigidimpulse.engine.measure.measure import measured_faults, record_of_recording
 from rigidimpulse.engine.measure.overlap import box_pairs
 from rigidimpulse.engine.measure.record import RunRecord
 from rigidimpulse.recording.ledger import Masses, mechanics
 from rigidimpulse.recording.recorder import Frames
 
-MEASURED = {"energy made", "momentum not kept", "bodies inside each other"}
+MEASURED = {"energy made", "energy taken", "momentum not kept", "bodies inside each other"}
 BOX = ri.Shape.box((0.2, 0.2, 0.2))
 FLOOR = ri.Body("floor", ri.Shape.half_space(), motion="static")
 
@@ -191,6 +192,24 @@ def test_energy_of_nothing_names_the_body_that_got_it() -> None:
     velocity[20:, run.index("box 1"), 0] += 1.0
     fault = next(fault for fault in measured_faults(recorded(run, velocity=velocity)) if fault.kind == "energy made")
     assert fault.time == run.times[20] and fault.bodies[0] == "box 1"
+
+
+@pytest.mark.parametrize(("part", "is_said"), [(0.04, False), (0.06, True)])
+def test_energy_that_a_run_took_back_is_said(part: float, is_said: bool) -> None:
+    """A twentieth of the energy that moves is the bound; it was taken in one frame, and box 2 loses most there."""
+    run = falling_boxes()
+    record = record_of_recording(run)
+    _, moved = energy_rise(record)
+    taken = np.where(np.arange(len(run.times)) >= 20, part * moved, 0.0)
+    velocity = run.velocities.copy()
+    velocity[20:, run.index("box 2")] *= 0.5
+    record = recorded(run, velocity=velocity)
+    record = replace(record, ledger=replace(record.ledger, dissipated=record.ledger.dissipated | {"energy correction": taken}))
+    faults = [fault for fault in measured_faults(record) if fault.kind == "energy taken"]
+    assert len(faults) == is_said
+    if is_said:
+        assert faults[0].time == run.times[20] and faults[0].bodies[0] == "box 2"
+        assert faults[0].amount == pytest.approx(part * moved)
 
 
 @pytest.mark.parametrize(("what", "kick"), [("velocity", (1e-4, 0.0, 0.0)), ("angular_velocity", (0.0, 0.0, 1e-2))])

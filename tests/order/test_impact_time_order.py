@@ -16,6 +16,7 @@ import trimesh
 
 from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, CompiledShape, Primitive, build_geometry
 from rigidimpulse.collision.time_of_impact import bisection, conservative, linear
+from rigidimpulse.collision.time_of_impact.result import PairsToSweep
 from rigidimpulse.collision.time_of_impact.safe_step import make_scratch
 from rigidimpulse.motion.trajectory import FREE, begin, make_trajectories, state_at
 
@@ -46,8 +47,8 @@ def trajectory(height=2.0, velocity=(1.0, 0.5, -3.0)):
 def impact(method, path, start=0.0, end=1.0, tolerance=1e-15):
     """(time, queries, closing speed) of the impact."""
     one = np.ones(1)
-    pairs = np.array([0]), np.array([1])
-    found = method.sweep(DETECTOR, path, *pairs, start * one, end, 1e-9 * one, tolerance * one)
+    pairs = PairsToSweep(np.array([0]), np.array([1]), start * one, 1e-9 * one, tolerance * one, end * one)
+    found = method.sweep(DETECTOR, path, pairs, end)
     x, q, v, w = np.empty(3), np.empty(4), np.empty(3), np.empty(3)
     state_at(path, 1, found.time[0], x, q, v, w)
     speed = v + np.cross(w, found.witness[0, 3:6] - x)

@@ -10,7 +10,7 @@ from contact_scenes import box, capsule, half_space, mesh, prism, sphere
 from rigidimpulse.collision.geometry import CYLINDER, CompiledShape, Primitive, build_geometry
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.collision.time_of_impact import bisection, conservative
-from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE
+from rigidimpulse.collision.time_of_impact.result import IMPACT, SEPARATE, PairsToSweep
 from rigidimpulse.collision.time_of_impact.safe_step import make_scratch
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
@@ -68,10 +68,23 @@ class Pair:
 
     def sweep(self, method=bisection, end=STEP, impact_margin=1e-6, tolerance=1e-15, start=0.0, swapped=False):
         """(time, status, queries, witness) of the pair."""
-        a, b = np.array([int(swapped)]), np.array([int(not swapped)])
-        rows = [np.array([float(value)]) for value in (start, impact_margin, tolerance)]
-        result = method.sweep(self.detector, self.trajectory, a, b, rows[0], end, rows[1], rows[2])
+        rows = [np.array([float(value)]) for value in (start, impact_margin, tolerance, end)]
+        pairs = PairsToSweep(np.array([int(swapped)]), np.array([int(not swapped)]), *rows)
+        result = method.sweep(self.detector, self.trajectory, pairs, end)
+        assert np.isnan(result.clear[0])
         return result.time[0], result.status[0], result.queries[0], result.witness[0]
+
+    def sweep_in_pieces(self, method, end, piece):
+        """(time, number of pieces) of the contact, looked for `piece` s at a time."""
+        start, count = 0.0, 0
+        while True:
+            rows = [np.array([value]) for value in (start, 1e-6, 1e-15, min(start + piece, end))]
+            result = method.sweep(self.detector, self.trajectory, PairsToSweep(np.array([0]), np.array([1]), *rows), end)
+            count += 1
+            if result.status[0] != SEPARATE or np.isnan(result.clear[0]):
+                return result.time[0], count
+            assert result.clear[0] == rows[3][0]
+            start = result.clear[0]
 
     def gap(self, t):
         return gap_at(self.detector.geometry, self.trajectory, *self.shapes, t)

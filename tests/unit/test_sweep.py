@@ -38,6 +38,20 @@ def test_swapped_bodies_meet_at_the_same_time():
 
 
 @pytest.mark.parametrize("method", GUARDED)
+def test_a_sweep_in_pieces_finds_the_same_contact(method):
+    """Also where it begins at a gap that is barely above the margin. A closed form answers at once to the end."""
+    rng, most = np.random.default_rng(7), 0
+    for pair in filter(None, (random_pair(rng) for _ in range(60))):
+        time, status, _, _ = pair.sweep(method, end=0.1)
+        other, pieces = pair.sweep_in_pieces(method, 0.1, 0.013)
+        most = max(most, pieces)
+        assert (other == np.inf) == (status == SEPARATE)
+        if status == IMPACT:
+            assert abs(pair.gap(time) - pair.gap(other)) < ROUND_OFF
+    assert most == 8
+
+
+@pytest.mark.parametrize("method", GUARDED)
 def test_ball_falls_on_a_plane(method):
     """1/2 g t^2 = z - r - impact_margin."""
     pair = Pair("half space", "sphere").set(1, FREE, (0, 0, 2), acceleration=(0, 0, -9.81), spin=(3, 2, 1))

@@ -6,31 +6,20 @@ remainder of the time to contact, so few are needed; where bodies graze, each ha
 
 from __future__ import annotations
 
-import numpy as np
-
 from rigidimpulse.collision.time_of_impact.result import ImpactTimes, PairsToSweep, SearchEffort, SweepDetector, no_impacts
 from rigidimpulse.collision.time_of_impact.search import first_contacts
 from rigidimpulse.motion.trajectory import Trajectories
 
 
-def sweep(
-    detector: SweepDetector,
-    trajectory: Trajectories,
-    pairs_a: np.ndarray,
-    pairs_b: np.ndarray,
-    start: np.ndarray,
-    end: float,
-    impact_margin: np.ndarray,
-    tolerance: np.ndarray,
-) -> ImpactTimes:
+def sweep(detector: SweepDetector, trajectory: Trajectories, pairs: PairsToSweep, end: float) -> ImpactTimes:
     """Find the first contact of each pair of bodies; arguments and result as for `bisection.sweep`."""
-    result = no_impacts(len(pairs_a))
+    result = no_impacts(len(pairs.a))
     first_contacts(
         detector.geometry,
         trajectory,
         detector.sweep_scratch,
         detector.shape_of_body,
-        PairsToSweep(pairs_a, pairs_b, start, impact_margin, tolerance),
+        pairs,
         float(end),
         SearchEffort(0.0, detector.max_queries),
         result,

@@ -64,23 +64,13 @@ def _sweep(geometry, trajectory, shape_of_body, pairs, end, result):
             result.queries[k] = 3
 
 
-def sweep(
-    detector: SweepDetector,
-    trajectory: Trajectories,
-    pairs_a: np.ndarray,
-    pairs_b: np.ndarray,
-    start: np.ndarray,
-    end: float,
-    impact_margin: np.ndarray,
-    tolerance: np.ndarray,
-) -> ImpactTimes:
-    """Report the pairs that are in contact at `end`; arguments as for `bisection.sweep`, `tolerance` is not read.
+def sweep(detector: SweepDetector, trajectory: Trajectories, pairs: PairsToSweep, end: float) -> ImpactTimes:
+    """Report the pairs that are in contact at `end`; arguments as for `bisection.sweep`; `tolerance` and `until` are not read.
 
     Returns:
         `end` for pairs that overlap there or are closer than `impact_margin`.
 
     """
-    result = no_impacts(len(pairs_a))
-    pairs = PairsToSweep(pairs_a, pairs_b, start, impact_margin, tolerance)
+    result = no_impacts(len(pairs.a))
     _sweep(detector.geometry, trajectory, detector.shape_of_body, pairs, float(end), result)
     return result

@@ -73,23 +73,13 @@ def _sweep(geometry, trajectory, shape_of_body, pairs, end, result):
             result.queries[k] = 2
 
 
-def sweep(
-    detector: SweepDetector,
-    trajectory: Trajectories,
-    pairs_a: np.ndarray,
-    pairs_b: np.ndarray,
-    start: np.ndarray,
-    end: float,
-    impact_margin: np.ndarray,
-    tolerance: np.ndarray,
-) -> ImpactTimes:
-    """Estimate the first contact of each pair of bodies; arguments as for `bisection.sweep`, `tolerance` is not read.
+def sweep(detector: SweepDetector, trajectory: Trajectories, pairs: PairsToSweep, end: float) -> ImpactTimes:
+    """Estimate the first contact of each pair of bodies; arguments as for `bisection.sweep`; `tolerance` and `until` are not read.
 
     Returns:
         Times with an error of second order in the step; the gap measured there is in the witness.
 
     """
-    result = no_impacts(len(pairs_a))
-    pairs = PairsToSweep(pairs_a, pairs_b, start, impact_margin, tolerance)
+    result = no_impacts(len(pairs.a))
     _sweep(detector.geometry, trajectory, detector.shape_of_body, pairs, float(end), result)
     return result

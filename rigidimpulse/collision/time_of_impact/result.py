@@ -34,6 +34,7 @@ class ImpactTimes(NamedTuple):
     witness: (
         np.ndarray
     )  # (k, 10) m, points on a and b, normal from a to b (zeros if unknown) and gap where contact is made
+    clear: np.ndarray  # (k,) s, until when a pair that is SEPARATE was looked at, if that is not `end`; else nan
 
 
 class PairsToSweep(NamedTuple):
@@ -44,6 +45,7 @@ class PairsToSweep(NamedTuple):
     start: np.ndarray  # (k,) s, from when on
     impact_margin: np.ndarray  # (k,) m, gap at which contact is declared
     tolerance: np.ndarray  # (k,) m, how far above it the gap may be
+    until: np.ndarray  # (k,) s, until when the answer is wanted, at most `end`; methods may go on to the end
 
 
 class SearchEffort(NamedTuple):
@@ -84,4 +86,5 @@ def no_impacts(num_pairs: int) -> ImpactTimes:
         status=np.full(num_pairs, SEPARATE, np.int64),
         queries=np.zeros(num_pairs, np.int64),
         witness=np.zeros((num_pairs, 10)),
+        clear=np.full(num_pairs, np.nan),
     )

@@ -10,11 +10,13 @@ Balls, and balls and planes that stand, have their time in closed form (`ball_ti
 With `ahead`, the time at which the limiting features come down to `impact_margin` is found by bisection
 (`witness`); the steps then only have to confirm that nothing is earlier. Without it, they are repeated until
 they are there (conservative advancement).
+
+A pair is looked at no farther than to its `until`. It is told until when it is clear if that is before the end of the step.
 """
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 
 from rigidimpulse.collision.time_of_impact.free_flight import plane_safe_until, relative_flight, rounding_slack, spheres_safe_until
 from rigidimpulse.collision.time_of_impact.motion_bound import MOTION_SIZE, motion_bound, stop_turning
@@ -104,7 +106,7 @@ def _record_ball(frame, trajectory, scratch, pair, t, interval, result, k):
 
 @jit
 def first_contacts(geometry, trajectory, scratch, shape_of_body, pairs, end, effort, result):
-    """Fill in `result` (`ImpactTimes`) until `end` [s]; scratch: `SweepScratch`, pairs: `PairsToSweep`, effort: `SearchEffort`."""
+    """Fill in `result` (`ImpactTimes`); end: of the step, s, scratch: `SweepScratch`, pairs: `PairsToSweep`, effort: `SearchEffort`."""
     start, impact_margin, tolerance = pairs.start, pairs.impact_margin, pairs.tolerance
     ahead, max_queries = effort
     work, pair_scratch = scratch.work, PairScratch(scratch.work, scratch.index, scratch.cylinders)
@@ -119,7 +121,8 @@ def first_contacts(geometry, trajectory, scratch, shape_of_body, pairs, end, eff
                 continue
         slack = rounding_slack(trajectory, scratch.reach, a, b, shape_a, shape_b, end)
         above = max(tolerance[k], slack)
-        t, target, trial, floor = start[k], end, end - start[k], impact_margin[k]
+        last = pairs.until[k]
+        t, target, trial, floor = start[k], last, last - start[k], impact_margin[k]
         status, queries, is_let_go = STALLED, 0, False
         while queries < max_queries:
             rest = target - t
@@ -134,10 +137,11 @@ def first_contacts(geometry, trajectory, scratch, shape_of_body, pairs, end, eff
                 is_free = safe >= span
                 s = s if exact and not is_free else safe
             if is_free:
-                if s >= rest and target == end:
+                if s >= rest and target == last:
                     t, status = inf, SEPARATE
+                    result.clear[k] = last if last < end else nan
                     break
-                t, target = target if s >= rest else _later(t, s), end if s >= rest else target
+                t, target = target if s >= rest else _later(t, s), last if s >= rest else target
                 trial, floor, is_let_go = max(_GROWTH * s, trial), impact_margin[k], False
                 continue
             gap, closing = work[WITNESS + GAP], closing_speed(work)
@@ -148,7 +152,7 @@ def first_contacts(geometry, trajectory, scratch, shape_of_body, pairs, end, eff
                 break
             if near and not is_let_go:
                 # They hover, slide or leave: they may come closer by the slack for rounding.
-                floor, is_let_go, target = min(gap, impact_margin[k]) - slack, True, end
+                floor, is_let_go, target = min(gap, impact_margin[k]) - slack, True, last
                 continue
             if near and closing < 0.0:
                 s *= 0.5  # it leaves: look again half way to its return

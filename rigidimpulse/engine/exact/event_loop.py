@@ -17,7 +17,7 @@ import numpy as np
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.contact_points import Contacts as ContactBuffers
 from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS
-from rigidimpulse.collision.time_of_impact.result import STALLED, ImpactTimes, PairsToSweep, SearchEffort
+from rigidimpulse.collision.time_of_impact.result import STALLED, ImpactTimes, SearchEffort
 from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch
 from rigidimpulse.collision.time_of_impact.search import first_contacts
 from rigidimpulse.core.cycles import cycles
@@ -55,6 +55,8 @@ from rigidimpulse.engine.pair_table import (
     mark_met,
     most_solves,
     next_time,
+    note_sweep,
+    pairs_to_sweep,
     renew_pairs,
     settle_pairs,
 )
@@ -225,31 +227,21 @@ def _report_pairs(reports, kind, time, table, places):
 
 @jit_making_arrays
 def _sweep_stale(loop, end):
-    """Sweep the pairs that ask for it until `end` [s], and note when they come to contact."""
-    table, shapes, settings, count = loop.table, loop.shapes, loop.settings, np.int64(0)
-    for p in range(table.number[USED]):
-        start = table.pairs[p].start
-        count += start == start
-    if count == 0:
-        return
-    places, k = np.empty(count, np.int64), np.int64(0)
-    asked = PairsToSweep(np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count), np.empty(count), np.empty(count))
-    found = ImpactTimes(np.full(count, np.inf), np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros((count, 10)))
-    for p in range(table.number[USED]):
-        pair = table.pairs[p]
-        if pair.start == pair.start:
-            places[k], asked.a[k], asked.b[k], asked.start[k] = p, pair.a, pair.b, pair.start
-            asked.impact_margin[k], asked.tolerance[k] = pair.impact_margin, pair.tolerance
-            k += 1
+    """Sweep the pairs that ask for it, until the next event before `end` [s] is known; see `impact_time.sweep_stale_pairs`."""
+    table, shapes, settings = loop.table, loop.shapes, loop.settings
     effort = SearchEffort(settings.ahead, settings.queries)
-    first_contacts(shapes.geometry, loop.motion.trajectory, loop.sweep, shapes.of_body, asked, end, effort, found)
-    for k in range(count):
-        pair = table.pairs[places[k]]
-        pair.time, pair.start = found.time[k], np.nan
-        for j in range(10):
-            pair.witness[j] = found.witness[k, j]
-        if found.status[k] == STALLED:
-            _report_pairs(loop.reports, SWEEP_STALLED, found.time[k], table, places[k : k + 1])
+    places, asked = pairs_to_sweep(table, settings.step, end)
+    while places.shape[0]:
+        count = places.shape[0]
+        found = ImpactTimes(
+            np.full(count, np.inf), np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros((count, 10)), np.full(count, np.nan)
+        )
+        first_contacts(shapes.geometry, loop.motion.trajectory, loop.sweep, shapes.of_body, asked, end, effort, found)
+        note_sweep(table, places, found)
+        for k in range(count):
+            if found.status[k] == STALLED:
+                _report_pairs(loop.reports, SWEEP_STALLED, found.time[k], table, places[k : k + 1])
+        places, asked = pairs_to_sweep(table, settings.step, end)
 
 
 @jit_making_arrays

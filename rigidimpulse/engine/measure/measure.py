@@ -8,6 +8,7 @@ from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import multiply
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.measure.energy import energy_faults
+from rigidimpulse.engine.measure.energy_taken import energy_taken_faults
 from rigidimpulse.engine.measure.momentum import momentum_faults
 from rigidimpulse.engine.measure.overlap import overlap_faults
 from rigidimpulse.engine.measure.record import Fault, RunRecord
@@ -53,7 +54,7 @@ def measured_faults(record: RunRecord) -> list[Fault]:
     frames = record.frames
     if len(frames.times) < 2 or not all(np.isfinite(part).all() for part in frames):
         return []
-    faults = energy_faults(record) + momentum_faults(record) + overlap_faults(record)
+    faults = energy_faults(record) + energy_taken_faults(record) + momentum_faults(record) + overlap_faults(record)
     return sorted(faults, key=lambda fault: fault.time)
 
 
