@@ -33,9 +33,12 @@ def run_to_end(run: Run, duration: float, progress: Callable[[float], None] | No
 
 
 def run_steps(run: Run, end: float, progress: Callable[[float], None] | None) -> None:
-    """Step to the end [s]; progress: called with the time of the run after each step, or after WATCHED at most."""
+    """Step to the end [s]; progress: called with the time of the run after each step, or after WATCHED at most.
+
+    There is no step of the length of a rounding error: in one of 4e-16 s springs pushed dominoes at 2e9 m/s.
+    """
     size, state = run.world.accuracy.step, run.state
-    while state.time < end:
+    while end - state.time > GRID * size:
         begin = state.time
         run.keyframes.start_segments(run, begin)
         stop = min(run.keyframes.next_key(begin), end)
@@ -46,8 +49,8 @@ def run_steps(run: Run, end: float, progress: Callable[[float], None] | None) ->
             stop = min(stop, (math.floor(begin / size + GRID) + WATCHED) * size)
         how = fly(run, stop) if run.flight.may_fly() else STEP
         if how == STEP:
-            index = math.floor(state.time / size + GRID) + 1
-            step(run, run.soft_bodies.advance(run, min(index * size, stop)))
+            boundary = (math.floor(state.time / size + GRID) + 1) * size
+            step(run, run.soft_bodies.advance(run, stop if stop < boundary + GRID * size else boundary))
         if progress is not None:
             progress(state.time)
 

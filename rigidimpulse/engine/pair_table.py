@@ -327,7 +327,7 @@ def pairs_to_sweep(table, step, end):
     places = np.empty(table.number[USED], np.int64)
     for p in range(table.number[USED]):
         pair = table.pairs[p]
-        if least < known and (pair.start <= least or (pair.sweeps < MANY_SWEEPS and pair.start == pair.start)):
+        if least <= known and (pair.start <= least or (pair.sweeps < MANY_SWEEPS and pair.start == pair.start)):
             places[count] = p
             count += 1
     asked = PairsToSweep(

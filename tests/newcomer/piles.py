@@ -50,13 +50,16 @@ def domino_row():
 
 @newcomer(1.5)
 def domino_ball():
-    """A ball is thrown at the first of some dominoes; all fall."""
+    """A ball is thrown at the first of some dominoes; all fall, or lean on those that have.
+
+    A domino tips over beyond 9.5 degrees. How they jam is chance: a ball from 1e-9 m further on leaves the first at 39 to 53 degrees.
+    """
     stage = Stage()
     stage.floor(material=WOOD)
     stage.ball("ball", 0.015, (-0.06, 0.0, 0.045), velocity=(1.2, 0.0, 0.0), material=STEEL)
     for k in range(8):
         stage.box(f"domino {k}", (0.01, 0.03, 0.06), (0.035 * k, 0.0, 0.03), material=WOOD)
-    return stage, lambda run: must(*((tilt(run, f"domino {k}") > 0.8, f"domino {k} stands") for k in range(8)))
+    return stage, lambda run: must(*((tilt(run, f"domino {k}") > 0.5, f"domino {k} stands") for k in range(8)))
 
 
 @newcomer(1.5)

@@ -160,12 +160,12 @@ def energy_faults(record: RunRecord) -> list[Fault]:
 
 
 def bodies_that_gained(record: RunRecord, frame: int, sign: float = 1.0) -> tuple[str, ...]:
-    """Names of the bodies whose energy rose most from the frame before to this one, or fell most with a sign of -1."""
+    """Names of the dynamic bodies whose energy rose most from the frame before to this one, or fell most with a sign of -1."""
     frames, world = record.frames, record.world
     here = slice(frame - 1, frame + 1)
     mass = np.where(world.dynamic & (frames.times[here, None] >= record.release), world.mass, 0.0)
     parts = type(frames)(*(part[here] for part in frames))
     kinetic, potential, _, _ = mechanics(parts, Masses(mass, world.inertia, world.steady_acceleration), np.ones((1, 1)))
-    gain = sign * np.diff(kinetic + potential, axis=0)[0]
+    gain = np.where(world.dynamic, sign * np.diff(kinetic + potential, axis=0)[0], -np.inf)
     order = np.argsort(-gain, kind="stable")[:MOST_NAMES]
     return tuple(world.names[i] for i in order if gain[i] >= MOST_OF_RISE * abs(gain[order[0]]) or i == order[0])

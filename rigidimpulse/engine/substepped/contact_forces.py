@@ -227,6 +227,7 @@ class ContactStepper:
         self.pressed = np.zeros(n, bool)
         self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
         self.members, self.ahead, self.parts, self.sub_steps, self._pull = np.zeros(0, np.int64), 0.0, 1, 1, 0.0
+        self._usual = self.step_length
 
     def _make_bodies(self) -> SolverBodies:
         """Rows of all bodies by rank, and one of none."""
@@ -297,7 +298,7 @@ class ContactStepper:
         self.sub_steps = max(math.ceil(ahead / fineness.sub_step - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
         most = max(self.sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
         self.parts = min(max(math.ceil(motion / fineness.motion), needed, 1), most)
-        self.ahead = ahead / self.parts
+        self.ahead, self._usual = ahead / self.parts, fineness.sub_step
         self._look(run, kept)
 
     def _report_fastest(self, run: Run, members: np.ndarray, looks: int, ahead: float) -> None:
@@ -447,7 +448,7 @@ class ContactStepper:
         self._edges = np.concatenate([edges[:-1], self._begins[: colours + 1]])
         place_patches(width, bodies, table.pairs, self._patches, (begin, count), self._batches, (first, number))
         place_bodies(bodies, self._places_of_bodies)
-        fill(self.simd, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h))
+        fill(self.simd, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h, self._usual))
         return number
 
     def move_apart(self, run: Run, fresh: np.ndarray, time: float) -> None:

@@ -19,8 +19,9 @@ what is too fast for the gap, and relaxing the rest. Friction is found in the re
 part in: with it in both passes a stack of three boxes rocks for ever at some cm/s. k_t is the largest eigenvalue of the tangents' part
 of K: with the inverse matrix and a radial clamp a block slides where it should hold.
 
-w = 2 pi F / h is the frequency of the spring, z its damping ratio, a_1 = 2 z + h w, a_2 = h w a_1, a_3 = 1 / (1 + a_2); twice
-w against what cannot be moved. Patches are visited colour by colour (Gauss-Seidel), many at once. K is that of the start of the
+w = 2 pi F / max(h, SHORTEST h_0) is the frequency of the spring for sub-steps of up to h_0, z its damping ratio, a_1 = 2 z + h w,
+a_2 = h w a_1, a_3 = 1 / (1 + a_2); twice w against what cannot be moved. Where an impact left 1e-8 s of a step, springs that grew
+stiffer without bound gave resting boxes 50 J. Patches are visited colour by colour (Gauss-Seidel), many at once. K is that of the start of the
 step; gaps and arms are those of points fixed in the bodies, updated in every sub-step (gaps to second order in the turn); radii are
 taken along the normal, so that balls roll, and the normal of two balls is updated too. At the end of a sub-step contacts that were seen
 at u_n < -sqrt(2 g skin) / e and are closed by now rebound. Where one point of a patch pushes, the impulses that it has had in the sub-step
@@ -83,6 +84,8 @@ FREQUENCY = 0.25
 """F: frequency of the spring in sub-steps."""
 DAMPING = 10.0
 """z: damping ratio."""
+SHORTEST = 1.0 / 16.0
+"""Length of a sub-step, of the usual one, below which springs get no stiffer."""
 KICK, WARM, SOLVE, MOVE, RELAX = range(5)
 """Phases of a sub-step: gravity, warm start, normal rows, motion, relaxing. WARM, SOLVE and RELAX have a round for each colour."""
 HARD_IMPACT = 4.0
@@ -120,11 +123,11 @@ class SpecialPatches(NamedTuple):
     given: np.ndarray  # (n+1,) J, work of moving supports on each body, added up
 
 
-def softness(h: float) -> np.ndarray:
-    """Rows (w / a_1 [1/s], a_2 a_3, a_3): between movable bodies, against immovable ones, (2, 3)."""
+def softness(h: float, usual: float) -> np.ndarray:
+    """Rows (w / a_1 [1/s], a_2 a_3, a_3): between movable bodies, against immovable ones, (2, 3); usual: h_0, s."""
     out = np.zeros((2, 3))
     for k, factor in enumerate((1.0, 2.0)):
-        w = factor * 2.0 * pi * FREQUENCY / h
+        w = factor * 2.0 * pi * FREQUENCY / max(h, SHORTEST * usual)
         a_1 = 2.0 * DAMPING + h * w
         a_2 = h * w * a_1
         a_3 = 1.0 / (1.0 + a_2)
