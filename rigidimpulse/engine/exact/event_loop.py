@@ -3,7 +3,7 @@
 From event to event it calls the kernels that the loop in Python calls, in the same order, so the results are the same bits. It returns to
 Python at the end of the step, and before an event
 
-    that reaches a body which the loop in Python must look after (`Fixed.elsewhere`),
+    that reaches a body which the loop in Python must look after (`Fixed.elsewhere`), or with a body that runs away,
     for which there is no space in the memory of contacts or in what is recorded.
 
 `compiled_loop` calls it.
@@ -287,11 +287,12 @@ def run_events(loop, bodies, is_given, time, end, scratch):
             return NO_CAPACITY, time, is_given
         if not is_given:
             _count_contacts(loop, time)
-        is_given = False
         for i in range(number):
             if bodies[i]:
                 table.wake[i] = np.inf
-        _react(loop, found, count, time, end)
+        if not _react(loop, found, count, time, end):
+            return AT_EVENT, time, True
+        is_given = False
         if table.number[SHORT]:
             return SHORT_OF_PAIRS, time, is_given
 
@@ -344,27 +345,34 @@ def _give_up(loop, kind, time, places):
 
 
 @jit
-def _hand_over(loop, islands, time):
-    """Leave members that run away to the loop in Python, at once."""
+def _runs_away(solve_count, islands):
+    """Whether a body was dealt with so often, this event counted, that it or its island is handed over (see `SubsteppedIslands.join`)."""
+    for i in range(len(solve_count)):
+        if solve_count[i] == np.inf:
+            return True
     for k in range(len(islands.record)):
         first, last = islands.member_first[k], islands.member_first[k + 1]
         often = most_solves(last - first)
         for i in islands.member[first:last]:
-            if loop.solve_count[i] > often:
-                loop.elsewhere[i] = True
-                loop.table.wake[i] = min(loop.table.wake[i], time)
+            if solve_count[i] + 1.0 > often:
+                return True
+    return False
 
 
 @jit_making_arrays
 def _react(loop, found, count, time, end):
-    """Everything that happens at `time` to the islands of the contacts found, and to the bodies reached."""
+    """Everything that happens at `time` to the islands of the contacts found, and to the bodies reached.
+
+    Nothing does, and it returns False, where a body runs away: the loop in Python deals with that event.
+    """
     motion, table, dynamic, number = loop.motion, loop.table, loop.bodies.constants.dynamic, len(found.reached)
     root, order = np.empty(number, np.int64), np.empty(count, np.int64)
     split_islands(dynamic, np.empty((0, 2), np.int64), found, count, root, order)
     touch = _touch(loop, found, order, time)
-    islands = _islands(motion.now, root, touch.contacts, dynamic, time, end)
+    islands, solve_count = _islands(motion.now, root, touch.contacts, dynamic, time, end), loop.solve_count
+    if _runs_away(solve_count, islands):
+        return False
     _arrive(loop, islands, touch, found.reached, time)
-    solve_count = loop.solve_count
     for i in islands.member:
         solve_count[i] += 1.0
     _let_go(loop, islands.member, found.reached, time, end)
@@ -377,7 +385,7 @@ def _react(loop, found, count, time, end):
     given_up = np.empty(table.number[USED], np.int64)
     stuck = settle_pairs(table, time, dynamic, given_up)
     _give_up(loop, NOT_RESOLVED, time, given_up[:stuck])
-    _hand_over(loop, islands, time)
+    return True
 
 
 @jit_making_arrays
