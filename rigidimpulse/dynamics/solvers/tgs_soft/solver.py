@@ -19,17 +19,17 @@ what is too fast for the gap, and relaxing the rest. Friction is found in the re
 part in: with it in both passes a stack of three boxes rocks for ever at some cm/s. k_t is the largest eigenvalue of the tangents' part
 of K: with the inverse matrix and a radial clamp a block slides where it should hold.
 
-w = 2 pi F / max(h, SHORTEST h_0) is the frequency of the spring for sub-steps of up to h_0, z its damping ratio, a_1 = 2 z + h w,
-a_2 = h w a_1, a_3 = 1 / (1 + a_2); twice w against what cannot be moved. Where an impact left 1e-8 s of a step, springs that grew
-stiffer without bound gave resting boxes 50 J. Patches are visited colour by colour (Gauss-Seidel), many at once. K is that of the start of the
-step; gaps and arms are those of points fixed in the bodies, updated in every sub-step (gaps to second order in the turn); radii are
-taken along the normal, so that balls roll, and the normal of two balls is updated too. At the end of a sub-step contacts that were seen
-at u_n < -sqrt(2 g skin) / e and are closed by now rebound. Where one point of a patch pushes, the impulses that it has had in the sub-step
-are taken back, and it gets that of the impact of a single point (`impact/friction.py`): friction couples to u_n wherever the point is
-not straight below the centre, and with the two one after the other boxes that landed on a corner lost a fifth more than they should. So
-does a point that comes in HARD_IMPACT times as fast and does not rebound. Points of a patch that rebound together leave at -e u_n, with
-the friction of each in the cone of its impulse, point after point and round after round. The torque-free part of rotation keeps the angular
-momentum: w <- I(q')^-1 I(q) w, with q' from the spin at mid-way.
+w = 2 pi F / max(h, SHORTEST h_0) is the frequency of the spring for sub-steps of up to h_0, z its damping ratio, a_1 = 2 z + h w, a_2 = h w
+a_1, a_3 = 1 / (1 + a_2); twice w against what cannot be moved. Where an impact left 1e-8 s of a step, springs that grew stiffer without
+bound gave resting boxes 50 J. Patches are visited colour by colour (Gauss-Seidel), many at once. K is that of the start of the step; gaps
+and arms are those of points fixed in the bodies, updated in every sub-step (gaps to second order in the turn); radii are taken along the
+normal, so that balls roll, and the normal of two balls is updated too. At the end of a sub-step contacts that were seen at u_n < -sqrt(2 g
+skin) / e and are closed by now rebound. Where one point of a patch pushes, the impulses that it has had in the sub-step are taken back, and
+it gets that of the impact of a single point (`impact/friction.py`): friction couples to u_n wherever the point is not straight below the
+centre, and with the two one after the other boxes that landed on a corner lost a fifth more than they should. So does a point that comes in
+HARD_IMPACT times as fast and does not rebound. Points of a patch that rebound together leave at -e u_n, with the friction of each in the
+cone of its impulse, point after point and round after round. The torque-free part of rotation keeps the angular momentum: w <- I(q')^-1
+I(q) w, with q' from the spin at mid-way.
 
 Method: Macklin et al., Small steps in physics simulation, 2019; the relaxing pass and restitution after E. Catto, Solver2D
 (2024). The load of a column of k bodies presses the skin in by k g / w^2; the error is of first order in h.
